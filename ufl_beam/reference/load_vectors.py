@@ -153,7 +153,7 @@ class FrameForce(LoadForce):
         self._pull = csr_array(mass.matrix.multiply(self._Ω**2 * self._translational[:, None]))
         nodes = np.concatenate([numbering.dofs_of_bodies, numbering.dofs])
         self._pairs = np.unique(nodes[:, :2], axis=0)  # degrees of freedom u, v of the nodes
-        # G: mass times a rotation by 90°; minus the Coriolis forces are 2 Ω G times the velocities.
+        # G: mass times a rotation by 90°.  The Coriolis forces are -2 Ω G v.
         (u, _), (w_u, _) = split(ufl.TrialFunction(element.space)), split(element.w)
         density = element.inertia[0] * ufl.dot(perpendicular(u), w_u)
         G = mass.cells.form(density * element.dx_of_mass()).assembled()
@@ -177,7 +177,7 @@ class FrameForce(LoadForce):
         return np.asarray(r + coriolis), csr_array(K + self._gyro / step.dt)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter the work, and store mass times the accelerations by the frame in the beams."""
+        """Enter the work, and store the forces of beams by the accelerations of the frame."""
         super().accept(step, q1, s)
         v = (q1 - step.q0) / step.dt
         a = -self.factor * self._Ω**2 * self._translational * (self._places + self.place(step, q1))
@@ -242,7 +242,7 @@ class WorkForce(CellForce):
         stored, t = self.stored.get(name, 0.0), float(acting(self._scheme, np.array(self._t), at))
         self._before, (self._t, self._grown) = self.force, self._end
         super().accept(step, q1, s)
-        if self._varies:  # supply by time: the change of energy without its part by the motion
+        if self._varies:  # supplied in time: the energy change without its part by the motion
             self._put(t)
             moved = self.energy(q1) - self.energy(step.q0)
             supplied[self._work.in_time] += self.stored[name] - stored - moved

@@ -248,7 +248,8 @@ class MaterialPoints:
         roots, last = np.full_like(stress, np.nan), np.full_like(stress, np.inf)
         low, high = np.zeros_like(stress), np.full_like(stress, np.inf)
         over, slope = excess(low)
-        none = np.logical_not(np.logical_and(opens, over > 0))  # or above by round-off
+        # No growth of points that are closed, or above the limit only by round-off
+        none = np.logical_not(np.logical_and(opens, over > 0))
         a = np.where(slope < 0, np.fmin(bound, -over / slope), bound)
         for _ in range(2 * CORRECTIONS):
             before, (over, slope) = over, excess(a)

@@ -58,7 +58,7 @@ TRIAL_STEP = 1 / 16
 """Length of the trial step for initial accelerations, as a fraction of the first step."""
 
 APPLYING = 1 / 8
-"""First fraction of the first step, in which loads that act from the start are applied."""
+"""Fraction of the first step, at its beginning, in which initially acting loads are applied."""
 
 APPLYING_ROTATION = 0.02
 """Largest rotation of a node in a substep while these loads are applied; rad."""
@@ -67,7 +67,7 @@ SHORT_SUBSTEP = 512
 """Ratio of the time in which these loads are applied to the longest substep without this limit."""
 
 EXCESS_DECAY = 0.7
-"""Factor of the largest excess above which points open; its power grows with each repetition."""
+"""Factor of the largest excess above which points open; its exponent is the repetition."""
 
 EXCESS_TOLERANCE = 1e-9
 """Largest difference of excesses that count as equal."""
