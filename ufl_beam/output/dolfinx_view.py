@@ -150,7 +150,7 @@ class DolfinxView:
                 with the degree that UFL estimates.
 
         Raises:
-            ArgumentError: ``integral`` is neither, is on another mesh, or is over facets.
+            ArgumentError: ``integral`` is of another type, on another mesh, or over facets.
 
         Example:
             >>> length = view.total(1.0 * view.dx)

@@ -34,7 +34,7 @@ EXTENT = ("low", "high", "time_low", "time_high")
 class AlongCells(NamedTuple):
     """Form of the section forces at points of cells, and its coefficients.
 
-    A form for the ends of cells only depends neither on displacements nor on forces between them.
+    If all points are ends of cells, displacements and forces between the ends do not matter.
 
     Attributes:
         motions: Degrees of freedom of a cell: all, or for ends only the last, the rotations.

@@ -328,8 +328,8 @@ class Fatigue(Restartable):
     Args:
         spots: Places and their stresses.
         curve: S-N curve of all spots.
-        resolution: Stresses are rounded to multiples of it; Pa.  By default a hundredth of the
-            ``range`` of the curve.
+        resolution: Unit to whose multiples stresses are rounded; Pa.  By default a hundredth of
+            the ``range`` of the curve.
 
     Raises:
         ArgumentError: A spot or the curve has another type, or the resolution is negative.

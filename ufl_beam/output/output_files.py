@@ -2,7 +2,7 @@
 """Output files: checks of their paths, errors that name them, and the container of saved data.
 
 The container of solutions, studies and checkpoints has named arrays and JSON, with a checksum.
-It is a zip archive as ``numpy.savez`` writes it, which ``numpy.load`` reads.  Its member
+It is a zip archive in the format of ``numpy.savez``, so ``numpy.load`` reads it.  Its member
 ``text.json`` has all content except arrays.  The comment at the end of the archive has the name of
 the content, the number of the format, the version of ufl_beam, and the SHA-256 of all bytes before
 this checksum.

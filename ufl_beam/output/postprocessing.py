@@ -252,8 +252,8 @@ class ForcesAlongCells:
 def _axis_angles(numbering: Any, angles: Array) -> Array:
     """Return angles from chords of cells to the smooth axis at both ends; (num_cells, 2); rad.
 
-    The axis halves the angle between two cells at a vertex, except at corners of the beam.  In a
-    cell with one smooth neighbour it is circular, in a cell without any straight.
+    The axis halves the angle between two cells at a vertex, except at corners of the beam.  A cell
+    with one smooth neighbour has a circular axis, a cell without one a straight axis.
     """
     half = np.angle(np.exp(1j * np.diff(angles))) / 2
     half[np.diff(numbering.beam_of_cell) != 0] = np.nan

@@ -264,7 +264,7 @@ class Cells:
 
 
 def end_forces(numbering: DofNumbering, kind: str, cells: Index, forces: Array) -> Array:
-    """Return forces of the nodes on all cells, and resultants of loads on them; (9, num_cells).
+    """Return forces of the nodes on all cells, and moments of loads on the cells; (9, num_cells).
 
     The rows are (X, Y, M) at the start and at the end of a cell; the couple of a load along the
     cell, zero for "stress"; and the first moments of X and Y about the middle of the cell, divided

@@ -44,8 +44,8 @@ from ufl_beam.reference.return_map import MaterialPoints, derivative
 CREEP = 1e-12
 """Creep in a step of a sticking connector at its limit; divided by the size of the scene, or rad.
 
-It is used only if several sticking connectors constrain the same motion; it determines their shares
-of the force.
+It is used only if several sticking connectors constrain the same motion; then it determines the
+share of the force that each connector bears.
 """
 
 REFERENCE_MOTION = 0.01
