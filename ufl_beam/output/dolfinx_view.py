@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""State of a simulation as functions and forms of DOLFINx, for user forms and files."""
+"""State of a simulation as functions and forms of DOLFINx, for forms of users and for files."""
 
 from __future__ import annotations
 
@@ -26,9 +26,7 @@ from ufl_beam.terms.beam_forces import elastic_forms, inelastic_forms
 
 
 class BeamForms(NamedTuple):
-    """Forms of the resultants and the inertia of the beams.
-
-    They do not contain joints, loads and supports.
+    """Forms of the resultants and the inertia of the beams, without joints, loads and supports.
 
     Attributes:
         q0, q1: Configurations at the beginning and at the end of a step.
@@ -54,14 +52,14 @@ def put_in_cells(function: fem.Function, values: Array) -> fem.Function:
 class DolfinxView:
     """Mesh, functions and forms of a simulation, in the types of DOLFINx; ``simulation.dolfinx``.
 
-    A function is made at its first access.  Each access returns the same object, updated to the
-    accepted state.  Functions are copies: changes of them do not affect the run.  If several
-    processes share a scene, each has a mesh of its own cells, and all access properties together.
-    The communicator of the mesh has one process, so sums over ``view.mesh.comm`` are incomplete:
-    :meth:`total` integrates over the whole scene.
+    A function is created at its first access.  Each access returns the same object, updated to the
+    accepted state.  Functions are copies, so a change of their values does not affect the run.  If
+    several processes share a scene, each process has a mesh of its own cells, and all processes
+    must access a property together.  The communicator of the mesh has one process, so sums over
+    ``view.mesh.comm`` are incomplete; :meth:`total` integrates over the whole scene.
 
-    Each beam has its own vertices, also at joints.  So a function of the mesh may jump there, and
-    :attr:`dofs` maps it to the unknowns of the scene, which joints share.
+    Each beam has its own vertices, also at joints.  So a function on the mesh may jump at a joint.
+    :attr:`dofs` has the degree of freedom of the scene for each degree of freedom of the mesh.
 
     Example:
         >>> from dolfinx import fem
@@ -92,7 +90,7 @@ class DolfinxView:
 
     @cached_property
     def cells(self) -> Index:
-        """Number in the scene of each cell of the mesh: index of rows such as section forces.
+        """Number in the scene of each cell of the mesh, as an index of rows of section forces.
 
         Example:
             >>> simulation.section_forces()[view.cells].shape
@@ -141,18 +139,18 @@ class DolfinxView:
 
     @property
     def dx(self) -> ufl.Measure:
-        """Measure of the cells with the quadrature points of the resultants, 1 for degree 1."""
+        """Measure of the cells at the quadrature points of the resultants, one at degree 1."""
         return self._fields.element.dx(1)
 
     def total(self, integral: ufl.Form | Expr) -> float:
-        """Integrate over the beams of the scene on all processes; all call it together.
+        """Integrate over the beams of the scene on all processes, which call it together.
 
         Args:
             integral: Form over cells without arguments, or a scalar expression, which is integrated
                 with the degree that UFL estimates.
 
         Raises:
-            ArgumentError: ``integral`` is neither, or is of another mesh.
+            ArgumentError: ``integral`` is of another type, on another mesh, or over facets.
 
         Example:
             >>> length = view.total(1.0 * view.dx)
@@ -202,7 +200,7 @@ class DolfinxView:
     def strains(self) -> fem.Function:
         """Strains (Σ, Γ, K) of the configuration, means of the cells; 1, 1, 1/m.
 
-        Strains of the bulk do not include jumps, see ``mechanics/functional.py``.
+        They include jumps; strains of the bulk do not, see ``mechanics/functional.py``.
         """
         return self._function("strains", self._view.now.mean_strains(0)[self.cells])
 
@@ -242,7 +240,7 @@ class DolfinxView:
         return self._function("jump", self._view.damage()[0][self.cells])
 
     def _function(self, name: str, values: Array) -> fem.Function:
-        """Return the function of a quantity, with values at the degrees of freedom of cells."""
+        """Return the function of a quantity after setting its values, cell by cell."""
         if name not in self._functions:
             element = self._fields.element
             space = element.stiffness.function_space
@@ -257,7 +255,7 @@ class DolfinxView:
 
     @property
     def forms(self) -> BeamForms:
-        """Forms of the beams in the time scheme, at the beginning of a step: q0 is q1.
+        """Forms of the beams in the time scheme at the accepted state, which is both q0 and q1.
 
         Cells that may yield or break have the resultants of the state, and the consistent tangent
         of a step like the last step.
@@ -278,15 +276,15 @@ class DolfinxView:
         for cells, *values in (beams.about_state() for beams in self._view.inelastic):
             for table, rows in zip(tables, values, strict=True):
                 table[cells] = rows
-        for function, table in zip(self._around, tables, strict=False):  # none if all is elastic
+        for function, table in zip(self._around, tables, strict=False):  # none in elastic scenes
             put_in_cells(function, table[self.cells])
         return forms
 
     @cached_property
     def _forms(self) -> BeamForms:
-        """Forms, which are made once.
+        """Forms, which are stated once.
 
-        Cells with material points have no elastic stiffness; elastic cells have no b and D.
+        The elastic stiffness is zero in cells with material points; b and D are zero in others.
         """
         element, scheme = self._fields.element, self._view.scheme
         self._around: tuple[fem.Function, ...] = ()

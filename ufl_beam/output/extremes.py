@@ -32,15 +32,15 @@ EXTENT = ("low", "high", "time_low", "time_high")
 
 
 class AlongCells(NamedTuple):
-    """Form of the section forces in points of cells, and its coefficients.
+    """Form of the section forces at points of cells, and its coefficients.
 
-    At the ends of cells the form does not depend on displacements and on forces between the ends.
+    If all points are ends of cells, displacements and forces between the ends do not matter.
 
     Attributes:
-        motions: The last degrees of freedom of a cell: all, or rotations.
-        resultants: Forces of the cells, the first components of ``cell_number`` of loops.h.
+        motions: Degrees of freedom of a cell: all, or for ends only the last, the rotations.
+        resultants: The first numbers ``cell_number`` of loops.h of the cells.
         angles: :attr:`ForcesAlongCells.angles`.
-        first: Number of components of ``numbers``.
+        first: Number of components of ``resultants``.
         moves: Number of degrees of freedom in ``motions``.
     """
 
@@ -58,11 +58,11 @@ def along_cells(element: Element, fractions: tuple[float, ...], works: bool) -> 
     mesh, h, between = Mesh(degree=element.degree), element.axis.h, set(fractions) > {0.0, 1.0}
     n = len(mesh.nodes)
     first, moves = (lib.CELL_NUMBERS, 3 * n) if between else (lib.COUPLE, n)
-    # All are constant in cells: interpolation in a cell would take longer than the evaluation.
+    # Coefficients are constant in cells: interpolation would take longer than the rest of the form.
     motions, resultants, angles, values = map(
         element.in_cells, (moves, first, 2, 3 * len(fractions))
     )
-    order = [0, *range(2, n), 1]  # of the nodes along a cell
+    order = [0, *range(2, n), 1]  # order of nodes along a cell
     *displacements, rotations = ([motions[k + i] for i in order] for k in range(0, moves, n))
 
     def weighted(weights: Array, values: list[Expr]) -> Expr:
@@ -89,11 +89,11 @@ def along_cells(element: Element, fractions: tuple[float, ...], works: bool) -> 
 
 
 class ExtremesInC:
-    """Extremes of section forces in points of cells and of motions, for a scene on one process.
+    """Extremes of section forces at points of cells, and of motions, for a scene on one process.
 
     Attributes:
         c: ``watch`` of loops.h.
-        seen: Number of steps up to the last state that is included.
+        seen: Number of steps up to the last included state.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class ExtremesInC:
                 setattr(c, name, doubles(values))
 
     def add(self, steps: int, t: float, q: Array, before: Array) -> None:
-        """Include the state after ``steps`` steps, if C has not."""
+        """Include the state after ``steps`` steps, unless C has already included it."""
         if steps == self.seen:
             return
         resultants = self._forces(q, before)
@@ -179,7 +179,7 @@ class Extent(NamedTuple):
     time_high: Array
 
     def of(self, rows: Index) -> Extent:
-        """Return the range of some of the values."""
+        """Return the extremes of some of the rows."""
         return Extent(*(values[rows] for values in self))
 
 
@@ -187,7 +187,8 @@ class Extremes(Restartable):
     """Recorder of the extremes of section forces along all cells and of motions of all nodes.
 
     All steps are included, even if the solution does not keep them; memory does not grow.  Section
-    forces agree with diagrams in equally spaced points of each cell, both ends included.
+    forces are taken at equally spaced points of each cell, both ends included; they agree with
+    :meth:`Solution.diagram`.
 
     Args:
         points: Number of points of a cell, at least 2.
@@ -283,7 +284,7 @@ class Extremes(Restartable):
         return self._solution
 
     def section_forces(self, beam: Member) -> Extent:
-        """Return extremes of (N, V, M) in points of the cells of a beam, N, N, N m.
+        """Return extremes of (N, V, M) at points of the cells of a beam; N, N, N m.
 
         Rows have the order of a :class:`Diagram` with the same points; (num_cells points, 3).
 

@@ -28,17 +28,17 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.model.records import Instance, Positive, Record
 from ufl_beam.output.recorder import Restartable, StateView
 
-BLOCK = 1000  # steps that are collected before cycles are counted
+BLOCK = 1000  # number of steps that are collected before cycles are counted
 
 # -- mean stresses and S-N curves -----------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Goodman(Record):
-    """Goodman's line: equivalent range S / (1 − mean / ultimate) about a tensile mean stress.
+    """Goodman's line: equivalent range S / (1 − mean / ultimate) of a range S about a tensile mean.
 
     It is the straight line of the Haigh diagram, and Soderberg's line with the yield stress as
-    ``ultimate``.  Compression has no effect.  At a mean stress of ``ultimate`` the life is zero.
+    ``ultimate``.  A compressive mean has no effect.  At the mean ``ultimate`` the life is zero.
 
     Args:
         ultimate: Ultimate stress; Pa.
@@ -63,7 +63,7 @@ class Goodman(Record):
 
 @dataclass(frozen=True)
 class Gerber(Goodman):
-    """Gerber's parabola: equivalent range S / (1 − (mean / ultimate)²) about a mean stress.
+    """Gerber's parabola: equivalent range S / (1 − (mean / ultimate)²), as :class:`Goodman`.
 
     Args:
         ultimate: Ultimate stress; Pa.
@@ -78,7 +78,7 @@ class Gerber(Goodman):
 
 
 def any_mean(range: Array, mean: Array) -> Array:
-    """Return the ranges as they are: the mean stress does not affect welded details."""
+    """Return the ranges unchanged, because the mean stress does not affect welded details."""
     return range
 
 
@@ -90,7 +90,7 @@ MeanStress = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class SNCurve(Record):
-    """S-N curve: cycles to failure over the stress range, by Basquin's law.
+    """S-N curve: number of cycles to failure as a function of stress range, by Basquin's law.
 
     Args:
         range: Stress range that leads to failure after ``cycles``; Pa.
@@ -102,7 +102,8 @@ class SNCurve(Record):
         mean: Function of ranges and mean stresses for equivalent ranges, such as :class:`Goodman`.
 
     Raises:
-        ArgumentError: A number is not positive, or ``limit`` is less than ``knee``.
+        ArgumentError: A number is not positive, ``limit`` is less than ``knee``, or ``mean`` is no
+            function.
 
     Example:
         >>> curve = ub.SNCurve.eurocode(71e6)
@@ -147,7 +148,7 @@ class SNCurve(Record):
         if math.isfinite(self.knee):
             second = self.knee * (first / self.knee) ** (self.slope_beyond / self.slope)
             first = np.where(first > self.knee, second, first)
-        # A category is a rounded number: its limit holds to round-off.
+        # A range whose endurance is the limit may exceed the limit by round-off.
         return np.where(first > self.limit * (1 + 1e-12), np.inf, first)
 
 
@@ -161,7 +162,7 @@ class Cycles:
     Attributes:
         range: Stress ranges; (n,); Pa.
         mean: Mean stresses; (n,); Pa.
-        count: Numbers of cycles, half cycles included; (n,).
+        count: Numbers of cycles; a half cycle counts as 0.5; (n,).
 
     Example:
         >>> cycles = ub.rainflow([0, 100e6, -50e6, 80e6, 0])  # Pa
@@ -185,7 +186,7 @@ class Cycles:
     def equivalent(self, curve: SNCurve) -> float:
         """Compute the constant range that does the same damage in the same number of cycles; Pa.
 
-        It uses the first slope alone, as usual for damage equivalent ranges.
+        The first slope alone is used, as is usual for damage equivalent ranges.
         """
         m, ranges = curve.slope, curve.mean(self.range, self.mean)
         total = self.count.sum()
@@ -212,11 +213,11 @@ def rainflow(series: npt.ArrayLike) -> Cycles:
 
 
 class RainflowCounter:
-    """Rainflow counter of a series that comes in pieces, in constant memory.
+    """Rainflow counter of a series that comes in pieces.
 
-    Values are rounded to multiples of ``resolution`` (Pa).  So cycles fall into classes, whose
-    number limits the number of waiting turning points.  Without a resolution values are not
-    rounded.  ``counted`` and ``waiting`` are the results of :meth:`state` for a restart.
+    With a ``resolution`` (Pa), values are rounded to its multiples.  So cycles fall into classes,
+    whose number limits the memory.  Turning points wait until their cycle is complete.  ``counted``
+    and ``waiting`` are the results of :meth:`state` for a restart.
     """
 
     def __init__(
@@ -226,14 +227,14 @@ class RainflowCounter:
         self._rounds, self._unit = resolution is not None, 1.0
         if resolution is not None:
             self._unit = require_number(resolution, "RainflowCounter: resolution", positive=True)
-        self._counts: defaultdict[tuple[float, float], float] = defaultdict(float)  # by both ends
+        self._counts: defaultdict[tuple[float, float], float] = defaultdict(float)  # by ends
         for low, high, count in () if counted is None else counted:
             self._counts[float(low), float(high)] = float(count)
-        # Turning points with decreasing ranges between them
+        # Turning points of incomplete cycles, with decreasing ranges between them
         self._waiting: list[float] = [*map(float, waiting)]
 
     def add(self, series: Array) -> None:
-        """Count the next piece by the method of ASTM E1049; (n,)."""
+        """Count the next piece of the series, (n,), by the method of ASTM E1049."""
         points = self._waiting
         for value in map(float, np.rint(series / self._unit) if self._rounds else series):
             if points and value == points[-1]:
@@ -242,13 +243,13 @@ class RainflowCounter:
                 points.pop()  # no turning point: the series goes on beyond it
             points.append(value)
             while len(points) > 2 and abs(value - points[-2]) >= abs(points[-2] - points[-3]):
-                half = len(points) == 3  # from the beginning of the series
+                half = len(points) == 3  # the range includes the first point
                 low, high = sorted(points[-3:-1])
                 self._counts[low, high] += 0.5 if half else 1.0
                 del points[-3 : -2 if half else -1]
 
     def cycles(self) -> Cycles:
-        """Return all cycles so far; ranges between waiting points count as half cycles."""
+        """Return all cycles so far; ranges between waiting turning points count as half cycles."""
         counts = self._counts.copy()
         for ends in pairwise(self._waiting):
             counts[min(ends), max(ends)] += 0.5
@@ -258,7 +259,7 @@ class RainflowCounter:
         return Cycles(unit * (high - low)[order], unit / 2 * (low + high)[order], count[order])
 
     def state(self) -> tuple[Array, Array]:
-        """Return ends and numbers of cycles, (n, 3), and waiting turning points, in classes."""
+        """Return (low, high, number) of cycles, (n, 3), and waiting points; stress / resolution."""
         counted = [(*ends, count) for ends, count in self._counts.items()]
         return np.array(counted, dtype=float).reshape(-1, 3), np.array(self._waiting, dtype=float)
 
@@ -271,8 +272,8 @@ class HotSpot(Record):
     """Place of a beam whose stress cycles :class:`Fatigue` counts.
 
     Args:
-        place: Where on a beam.
-        stress: Stress from N, V (N) and M (N m) at many times; (n,) each; Pa.
+        place: Place on a beam.
+        stress: Function of N, V (N) and M (N m) that returns the stress; (n,) each; Pa.
 
     Raises:
         ArgumentError: ``place`` is no place, or ``stress`` is no function.
@@ -301,10 +302,10 @@ class HotSpot(Record):
         """Make a spot with the elastic stress E (N/EA − y M/EI) of a fibre.
 
         Args:
-            place: Where on a beam.
+            place: Place on a beam.
             y: Distance from the axis, positive to the left of the direction from start to end; m.
             E: Young's modulus; Pa.
-            factor: Stress concentration factor: hot-spot stress over nominal stress.
+            factor: Stress concentration factor: hot-spot stress divided by nominal stress.
         """
         require_kind(place, Place, "HotSpot: place")
         require_number(y, f"HotSpot {place}: y")
@@ -321,14 +322,14 @@ class HotSpot(Record):
 class Fatigue(Restartable):
     """Recorder of the rainflow cycles of the stress at named places.
 
-    Its memory does not grow with the number of steps.  Section forces follow from the equation of
-    each step at the place, see :meth:`Solution.diagram`.
+    The memory does not grow with the number of steps.  Section forces at the places follow from the
+    equation of each step, see :meth:`Solution.diagram`.
 
     Args:
         spots: Places and their stresses.
         curve: S-N curve of all spots.
-        resolution: Stresses are rounded to multiples of it; Pa.  By default a hundredth of the
-            ``range`` of the curve.
+        resolution: Unit to whose multiples stresses are rounded; Pa.  By default a hundredth of
+            the ``range`` of the curve.
 
     Raises:
         ArgumentError: A spot or the curve has another type, or the resolution is negative.
@@ -387,7 +388,9 @@ class Fatigue(Restartable):
             N, V, M = (forces[k, i] for i in range(3))
             stress = np.asarray(spot.stress(N, V, M), dtype=np.float64)
             if stress.shape != N.shape or not np.isfinite(stress).all():
-                raise ArgumentError(f"HotSpot {spot}: stress(N, V, M) must be a finite number each")
+                raise ArgumentError(
+                    f"HotSpot {spot}: stress(N, V, M) must return a finite number for each N, V, M"
+                )
             self._counters[spot].add(stress)
 
     def close(self) -> None:
@@ -405,7 +408,7 @@ class Fatigue(Restartable):
 
     @property
     def duration(self) -> float:
-        """Time that was counted; s."""
+        """Time in which cycles were counted; s."""
         return self._end - self._begin
 
     def cycles(self, spot: HotSpot) -> Cycles:
@@ -415,7 +418,7 @@ class Fatigue(Restartable):
             ArgumentError: The spot is not among ``spots``, or nothing was run.
         """
         if spot not in self._counters:
-            raise ArgumentError(f"Fatigue: nothing was counted at {spot}; name it, and run")
+            raise ArgumentError(f"Fatigue: nothing was counted at {spot}; add it to spots, and run")
         return self._counters[spot].cycles()
 
     def damage(self, spot: HotSpot) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""History of a run: motions, connectors and the energy ledger as a CSV file; its events."""
+"""History of a run: a CSV file of motions, connectors and the energy ledger; and events."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ from ufl_beam.parallel import on_first
 # -- table -----------------------------------------------------------------------------------------
 
 MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))  # columns of a place, and their units
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # beginnings of formulas in spreadsheets
-COMPONENTS = ("along", "across", "turn")  # of a bushing
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of formulas in spreadsheets
+COMPONENTS = ("along", "across", "turn")  # motions of a bushing
 CONNECTOR = ("motion", "force", "work")  # columns of a connector
 
 
 class History(Restartable):
-    """Table (CSV) of the motion of places and of the energy ledger, complete after a crash.
+    """Recorder of a table (CSV) of motions and the energy ledger, complete after a crash.
 
     The columns are t, or the load factor of a path; u, v, psi of each place; motion, force, work
     of each connector; and the entries of the ledger.  The names of the columns end in their units.
@@ -53,8 +53,8 @@ class History(Restartable):
         connectors: Connectors to follow, see
             :class:`~ufl_beam.output.state_rows.Connection`; for a joint, all its connectors.
         every: Number of steps between rows.
-        max_rows: Largest number of rows, besides the initial row.  When it is exceeded, every
-            other row is deleted, and the interval of rows is doubled.
+        max_rows: Largest number of rows, besides the initial row.  A row beyond it deletes every
+            other row and doubles ``every``.
 
     Raises:
         ArgumentError: ``every`` or ``max_rows`` is not a whole number of at least 1.
@@ -79,7 +79,7 @@ class History(Restartable):
         require_count(max_rows, f"History {path}: max_rows")
         self._first_every, self._max_rows = every, max_rows
         self._path = require_path(path, "History")
-        self._temporary = beside(self._path)  # replaces it when rows are deleted
+        self._temporary = beside(self._path)  # replaces the file when rows are deleted
         self.files = (self._path,) if max_rows == sys.maxsize else (self._path, self._temporary)
         self._places = require_sequence(places, f"History {path}: places")
         self._connectors = require_sequence(connectors, f"History {path}: connectors")
@@ -109,7 +109,7 @@ class History(Restartable):
                 "energy ledger; give the work another name"
             )
         columns = [simulation.parameter.column, *names, *energies]
-        # Spreadsheets read such beginnings as formulas, which may run programs
+        # Spreadsheets read names that begin so as formulas, which may run programs
         self._header = _line([f"'{c}" if c.startswith(FORMULA) else c for c in columns])
         if state is None:
             row = self._row(simulation)
@@ -155,7 +155,7 @@ class History(Restartable):
         return _line([repr(float(x)) for x in line])
 
     def state(self) -> State:
-        """Return the length of the file and its checksum, or its content if rows may be deleted."""
+        """Return counts and checksum of the file, or its content if rows may be deleted later."""
         rows = self._steps // self._every
         counts = np.array([self._every, self._steps, rows, 0], dtype=float)
         content = digest = b""
@@ -206,7 +206,7 @@ def _line(cells: Sequence[str]) -> bytes:
 
 
 def _named_components(scene: Scene, followed: Connector | Joint) -> list[tuple[int, str]]:
-    """Return indices and names of connectors; equal places have different names."""
+    """Return the index and the name of each component; several have different names."""
     connectors = connector_indices(scene, followed)
     if isinstance(followed, Connector):
         names = COMPONENTS if followed.components else (type(followed.law).__name__,)
@@ -226,11 +226,11 @@ def _named_components(scene: Scene, followed: Connector | Joint) -> list[tuple[i
 
 Flags = npt.NDArray[np.bool_]
 
-IN_CELLS = ("yields", "opens", "is free")  # once in a cell; hinges and cracks open and end
-CONNECTOR_EVENTS = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}  # with their ends
+IN_CELLS = ("yields", "opens", "is free")  # in a cell or hinge, each once
+CONNECTOR_EVENTS = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}  # begin, end
 KINDS = (*IN_CELLS, *(kind for pair in CONNECTOR_EVENTS.values() for kind in pair))  # all events
 Row = tuple[float, int, str]  # time, number of the cell or connector, kind of event
-BROKEN_FRACTION = 0.999  # fraction of the energy of a hinge after which it is called a joint
+BROKEN_FRACTION = 0.999  # of the fracture energy of a hinge, after which it "is free"
 
 
 class Event(NamedTuple):
@@ -238,7 +238,7 @@ class Event(NamedTuple):
 
     Attributes:
         time: End of the step; s; on a path its load factor.
-        where: Place in the middle of a cell, place of a plastic hinge, or connector.
+        where: Middle of a cell, place of a plastic hinge, or connector.
         what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
         parameter: Name and formats of ``time``.
 
@@ -265,7 +265,8 @@ class Event(NamedTuple):
 class Events(Restartable):
     """Recorder of events, for scenes with hinges, inelastic material, stops or friction.
 
-    A hinge "is free" when it has dissipated 99.9 % of its energy; a hinge that hardens "yields".
+    A hinge "is free" when it has dissipated 99.9 % of its fracture energy; a hinge that hardens
+    "yields".
     Contact and sliding may begin and end repeatedly; all other events occur once in a cell or
     hinge.
 
@@ -297,7 +298,7 @@ class Events(Restartable):
         if state is not None:
             rows = [(float(t), int(n), KINDS[int(kind)]) for t, n, kind in state["events"]]
             self._add(simulation, rows)
-        # Events that the scene may have, and events before the run
+        # Energies at which hinges are free, followed connectors, and events before the run
         numbering = simulation.numbering
         in_cells = [law for beam in simulation.scene.beams for law in numbering.hinges(beam)]
         laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
@@ -312,7 +313,7 @@ class Events(Restartable):
         self._in_cells, self._on = self._look(simulation)
 
     def _look(self, simulation: StateView) -> tuple[Flags, Flags]:
-        """Return the events of each cell and hinge, (n, 3), and which connectors touch or slide."""
+        """Return events in cells and hinges, (n, 3), and which connectors touch or slide."""
         in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
         num_cells, hinges = len(simulation.numbering.cells), simulation.scene.hinges
         plastic, broken = simulation.now.cells_of(0)[:, [PLASTIC, HINGE]].T
@@ -326,7 +327,7 @@ class Events(Restartable):
         if not self._followed:
             return in_cells, np.zeros(0, dtype=bool)
         forces = np.abs(simulation.connections()[self._followed, FORCE])
-        # Forces above which they touch or slide; the limit of friction holds to some digits
+        # Forces above which they touch or slide; sliding forces have round-off
         connectors = (simulation.scene.all_connectors[connector] for connector in self._followed)
         limits = [
             (1 - 1e-9) * simulation.requested_forces.get(connector, 0.0) for connector in connectors

@@ -2,9 +2,10 @@
 """Output files: checks of their paths, errors that name them, and the container of saved data.
 
 The container of solutions, studies and checkpoints has named arrays and JSON, with a checksum.
-It is a zip archive as ``numpy.savez`` writes it, which ``numpy.load`` reads.  Its member
-``text.json`` has all content except arrays.  The comment at its end names the content, the number
-of the format, the version of ufl_beam, and the SHA-256 of all bytes before the checksum.
+It is a zip archive in the format of ``numpy.savez``, so ``numpy.load`` reads it.  Its member
+``text.json`` has all content except arrays.  The comment at the end of the archive has the name of
+the content, the number of the format, the version of ufl_beam, and the SHA-256 of all bytes before
+this checksum.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from ufl_beam.file_system import is_at, sync
 Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
 _in_use: list[Output] = []  # outputs of present runs in this process, outer runs first
 
-BLOCK = 1 << 20  # bytes that are read at once for a checksum
+BLOCK = 1 << 20  # number of bytes that are read at once for a checksum
 
 
 def require_path(path: str | Path, what: str) -> Path:
@@ -93,7 +94,7 @@ def require_apart(outputs: Sequence[Output], call: str) -> None:
 
 @contextmanager
 def reserved(outputs: Iterable[Output]) -> Iterator[None]:
-    """Reserve the files of a run against runs within it."""
+    """Reserve the files of a run, so that runs within this run cannot write them."""
     taken = list(outputs)
     _in_use.extend(taken)
     try:
@@ -110,7 +111,7 @@ def beside(path: Path, ending: str = ".part") -> Path:
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Let errors of writing name the file, the reason, the free space and the kept content."""
+    """Let errors of writing name the file and the reason, and the free space on a full disk."""
     try:
         yield
     except OSError as error:
@@ -125,7 +126,7 @@ def naming(path: Path) -> Iterator[None]:
 
 
 class OutputFile:
-    """File that is written at given positions, emptied or made if new; errors name it."""
+    """File that is written at given positions; ``new`` creates or empties it; errors name it."""
 
     def __init__(self, path: Path, *, new: bool = True) -> None:
         self.path = path
@@ -150,14 +151,14 @@ class OutputFile:
                 rest, at = rest[done:], at + done
 
     def read(self, at: int, count: int) -> bytes:
-        """Read some bytes, fewer at the end of the file."""
+        """Read ``count`` bytes from a position, or fewer at the end of the file."""
         return os.pread(self._file, count, at)
 
     def digest(self, length: int) -> bytes:
-        """Return the SHA-256 of the first bytes, which do not change any more; each is read once.
+        """Return the SHA-256 of the first ``length`` bytes, which must not change any more.
 
-        ``length`` must not decrease from call to call.  A file that is too short has another
-        digest.
+        Each byte is read once, so ``length`` must not decrease from call to call.  A file that is
+        too short has another digest.
         """
         while self._regular and self._hashed < length:
             block = self.read(self._hashed, min(length - self._hashed, BLOCK))
@@ -173,14 +174,14 @@ class OutputFile:
             os.ftruncate(self._file, length)
 
     def allocate(self, length: int) -> None:
-        """Allocate disk space, so that a full disk raises now rather than in a library."""
+        """Allocate disk space, so that an error of a full disk is raised here, not in a library."""
         missing = length - self.size
         if missing > 0 and hasattr(os, "posix_fallocate"):
             with naming(self.path):
                 try:
                     os.posix_fallocate(self._file, self.size, missing)
                 except OSError as error:
-                    if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):  # not supported there
+                    if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):  # not supported
                         raise
 
     def rename(self, path: Path) -> None:
@@ -201,7 +202,7 @@ class OutputFile:
             try:
                 os.fsync(self._file)
             except OSError as error:
-                if error.errno not in (errno.EINVAL, errno.EROFS):  # not of a file
+                if error.errno not in (errno.EINVAL, errno.EROFS):  # pipe or terminal
                     raise
 
     def close(self) -> None:
@@ -261,10 +262,10 @@ NPY: Any = np.lib.format
 """NumPy's reader and writer of arrays, which has no type annotations."""
 
 DIGEST = 64
-"""Bytes of the checksum at the end of a file."""
+"""Number of bytes of the checksum at the end of a file."""
 
 END = re.compile(rb"(?s).*?(\w+ of ufl_beam, \d+); written by ufl_beam ([!-~]+); sha256 \w{64}")
-"""The end of a file: format, and version of the package."""
+"""Pattern of the end of a file, with the format and the version of the package."""
 
 
 @cache
@@ -285,7 +286,7 @@ def above(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def below(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content whose names begin with a prefix, without it."""
+    """Return the content whose names begin with a prefix, under names without the prefix."""
     inside = ((n, v) for n, v in content.items() if n.startswith(prefix))
     return {name.removeprefix(prefix): value for name, value in inside}
 
@@ -293,13 +294,13 @@ def below(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
 def write(path: Path, format: str, content: Content, at: str = "") -> None:
     """Write a file; a whole file exists at any time, either the new or the previous file.
 
-    The ``format`` names the content and its number, "solution of ufl_beam, 2"; the number grows
-    whenever the meaning of files changes.  ``at`` is a part of messages, such as the time.
+    The ``format`` names the content and a number, such as "solution of ufl_beam, 2"; the number
+    grows whenever the meaning of files changes.  ``at`` is a part of messages, such as the time.
 
     Raises:
         ArgumentError: The file cannot be written, or the content has other types than numbers,
             texts, lists and dicts.
-        OSError: The disk is full.
+        OSError: The disk is full, or has another error.
     """
     require_writable(path)
     what, file = format.partition(" ")[0], io.BytesIO()
@@ -357,7 +358,7 @@ def decoding(path: Path, format: str) -> Iterator[None]:
 
 
 def read(path: Path, format: str) -> Content:
-    """Read a file of :func:`write`, within :func:`decoding`."""
+    """Read a file of :func:`write`; call it within :func:`decoding`, which names the file."""
     try:
         data = path.read_bytes()
     except FileNotFoundError:

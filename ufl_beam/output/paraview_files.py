@@ -37,20 +37,20 @@ class Lines(NamedTuple):
 
     points: Array  # (n, 3); m
     cells: Index  # points at both ends of each line; (m, 2)
-    kinds: Array  # kind of each line: 0 for beams, BODY or LINK; (m,)
+    kinds: Array  # kind of each line: 0 for beams, or BODY, or LINK; (m,)
 
 
-BODY, RIGID_LINE = 1, 2
-"""Numbers of lines of bodies and of links; lines of beams are 0."""
+BODY, LINK = 1, 2
+"""Kinds of lines: of bodies; of links and connectors.  Lines of beams have the kind 0."""
 
 
 class Rod(NamedTuple):
-    """Straight line between two anchors, of a body or a connector."""
+    """Straight line of a body or a connector, between two places."""
 
     a: AttachmentPoint
     b: AttachmentPoint
     group: int  # BODY or LINK
-    along: Connector | None = None  # connector whose force acts along it
+    along: Connector | None = None  # connector whose force acts along the line
 
 
 def scene_rods(scene: Scene) -> list[Rod]:
@@ -59,16 +59,16 @@ def scene_rods(scene: Scene) -> list[Rod]:
     for body in scene.bodies:
         x, y = body.center
         # A body with attachments at its centre alone also gets a line, which shows its rotation.
-        beside = body.at(x + 0.02 * scene.size, y)
-        others = [s for s in spots[body] if s.point != body.center] or [beside]
+        near = body.at(x + 0.02 * scene.size, y)
+        others = [s for s in spots[body] if s.point != body.center] or [near]
         rods += [Rod(body.middle, place, BODY) for place in others]
     for joint in scene.joints:
         if isinstance(joint, RigidLink | Link):
             a, b = joint.places
             pulls = next((c for c in joint.holders if c.stretches), None)
-            rods.append(Rod(a, b, RIGID_LINE, pulls))
+            rods.append(Rod(a, b, LINK, pulls))
     rods += [
-        Rod(c.a, c.b, RIGID_LINE, c if c.stretches else None)
+        Rod(c.a, c.b, LINK, c if c.stretches else None)
         for c in scene.connectors
         if not c.is_rotation and c.apart != (0.0, 0.0)
     ]
@@ -76,10 +76,10 @@ def scene_rods(scene: Scene) -> list[Rod]:
 
 
 class LineData:
-    """Geometry of beams, bodies and connectors as lines, and the fields of a state on it.
+    """Geometry of beams, bodies and connectors as lines, and the fields of a state on these lines.
 
-    Beams come first, node after node.  Each line of a body or connector follows with two separate
-    points.  N is the force of a connector that acts along its line; V and M are zero there.
+    Beams come first, node after node; then each line of a body or connector, with two points of its
+    own.  N is the force of a connector that acts along its line; V and M are zero there.
     """
 
     def __init__(self, simulation: StateView) -> None:
@@ -96,7 +96,7 @@ class LineData:
         self._ends = slice(len(numbering.points), None)
         self._arms = np.reshape([arm(end) for end in ends], (-1, 2))
         connectors = simulation.scene.all_connectors
-        # Lines, and links whose forces act along them
+        # Connectors whose forces act along lines, by the index of the line in ``rods``
         self._pulls = {k: connectors.index(rod.along) for k, rod in enumerate(rods) if rod.along}
         self._pieces_per_cell, self._num_rods = numbering.mesh.degree, len(rods)
 
@@ -132,8 +132,8 @@ HEAD = (
     b'<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>'
     b'<Grid Name="scene" GridType="Collection" CollectionType="Temporal">\n'
 )
-TAIL = b"</Grid></Domain></Xdmf>\n<?spare "  # steps to come are written into the instruction
-CLOSING = b"<?e?>"  # its end; a separate instruction once the previous one has lost its end
+TAIL = b"</Grid></Domain></Xdmf>\n<?spare "  # later steps are written into this instruction
+CLOSING = b"<?e?>"  # end of that instruction; after an earlier end, an instruction of its own
 PAGE, CAPACITY = mmap.PAGESIZE, 1 << 16
 
 
@@ -143,17 +143,17 @@ class Complete(NamedTuple):
     steps: int  # number of steps
     tail: int  # position of TAIL, the end of the document
     capacity: int  # position of CLOSING, the end of the spare instruction
-    data: int  # length of the numbers
+    data: int  # length of the numbers; bytes
 
 
 class XdmfWriter:
     """Writer of a time series as XDMF: text with a grid for each step, numbers in a binary file.
 
     A processing instruction of spaces, ``<?spare ... ?>``, follows the text.  A step is written
-    into it with new closing tags.  Then the old closing tags, within one page of memory, are
-    overwritten with spaces, so that the step belongs to the document.  Thus an interrupted write
-    leaves valid XML, and the cost of a step does not grow.  Numbers are written before the text
-    that refers to them.
+    into the instruction, with new closing tags.  Then the old closing tags, within one page of
+    memory, are overwritten with spaces, so that the step belongs to the document.  Thus an
+    interrupted write leaves valid XML, and the cost of a step does not grow.  Numbers are written
+    before the text that refers to them.
 
     For a restart ``complete`` are the sizes after the last complete step, and ``digest`` is the
     result of :meth:`sync`.  If the files differ, :class:`ValueError` is raised.
@@ -189,7 +189,7 @@ class XdmfWriter:
             self._cut()
 
     def _item(self, values: Array | Index, at: int) -> str:
-        """Return the element with the position of numbers in the binary file."""
+        """Return the XML element for numbers at a position of the binary file."""
         kind = "Int" if values.dtype.kind == "i" else "Float"
         shape = " ".join(map(str, values.shape))
         return (
@@ -213,8 +213,8 @@ class XdmfWriter:
                 data += values.tobytes()
         self._data.put(length, data)
         # The text goes into the instruction, with a new tail that lies within one page.
-        numbering, start = (text + "</Grid>\n").encode(), tail + len(TAIL)
-        new_tail = start + len(numbering)
+        grid, start = (text + "</Grid>\n").encode(), tail + len(TAIL)
+        new_tail = start + len(grid)
         if new_tail % PAGE + len(TAIL) > PAGE:
             new_tail += -new_tail % PAGE
         if (least := new_tail + len(TAIL)) > capacity:
@@ -225,14 +225,14 @@ class XdmfWriter:
             self._xml.put(new_capacity, CLOSING)
             self._xml.put(capacity, b" " * len(CLOSING))
             capacity = new_capacity
-        self._xml.put(start, numbering.ljust(new_tail - start) + TAIL)  # still in the instruction
+        self._xml.put(start, grid.ljust(new_tail - start) + TAIL)  # still in the instruction
         self._xml.put(tail, b" " * len(TAIL))  # now in the document
         self.complete = Complete(steps + 1, new_tail, capacity, length + len(data))
 
     def _cut(self) -> None:
         """Cut off data after the last complete step; the document is valid at any time.
 
-        Numbers of a step are written before its text, and cut off after it.
+        Numbers of a step are written before its text, and cut off after the text.
         """
         _, tail, capacity, length = self.complete
         self._xml.put(tail, TAIL)
@@ -266,15 +266,15 @@ class XdmfWriter:
 # -- VTKHDF ---------------------------------------------------------------------------------------
 
 FORMAT_VERSION = (2, 0)  # version of the format; VTK 9.3 warns of later versions
-LINE = 3  # VTK's number of the type of a cell
+LINE = 3  # VTK's type of cells that are lines
 KINDS = ("PointData", "CellData")  # groups of fields
-ZERO_OFFSETS = {  # rows of each step, since all have one mesh
+ZERO_OFFSETS = {  # rows that each step adds; all steps have one mesh
     "Steps/PartOffsets": np.array([0]),
     "Steps/CellOffsets": np.array([[0]]),
     "Steps/NumberOfParts": np.array([1]),
 }
-ROWS = 1024  # steps in a chunk of a data set with one number for each step
-BLOCK = 4096  # rows in a chunk of a field, at least the rows of one step
+ROWS = 1024  # number of steps in a chunk of a data set with one number for each step
+BLOCK = 4096  # number of rows in a chunk of a field, unless one step has more
 INDEX = 1 << 20  # upper bound of the growth of the indices of all data sets in a step; bytes
 
 
@@ -282,7 +282,7 @@ class VtkhdfWriter:
     """Writer of a time series as VTKHDF: mesh written once, fields appended step by step.
 
     The layout is "UnstructuredGrid" of version 2.0 with "Steps", see the documentation of VTK's
-    file formats; VTK 9.3, PyVista and ParaView 5.13 read it.  All data sets are made at the
+    file formats; VTK 9.3, PyVista and ParaView 5.13 read it.  All data sets are created at the
     beginning: a kill during the creation of a data set damages the file more easily than a kill
     during its growth.  HDF5 crashes when a disk is full, so the space for a step is allocated
     first.
@@ -316,7 +316,7 @@ class VtkhdfWriter:
     def _resume(self, path: Path, digest: bytes) -> None:
         """Copy the complete steps of a file, and replace it by the copy if the digest agrees.
 
-        So the run does not append to a damaged file, in which HDF5 may crash.
+        So the run does not append to a damaged file, where HDF5 may crash.
         """
         import h5py
 
@@ -348,7 +348,7 @@ class VtkhdfWriter:
         for name, values in others:
             self._put(name, values)
         self._file.flush()
-        # The data of the step are in the file.  Last, its time and the number of steps follow.
+        # The data of the step are in the file.  Its time and the number of steps follow last.
         self._put(times, time)
         self._root["Steps"].attrs.modify("NSteps", np.int64(steps + 1))
         self._file.flush()
@@ -403,7 +403,7 @@ class VtkhdfWriter:
 
 
 def _rows(t: float, n: int, fields: LineFields) -> dict[str, Array]:
-    """Return the rows that the n-th step adds to each growing data set; its time comes first."""
+    """Return the rows that the n-th step adds to each growing data set; the time comes first."""
     rows = {"Steps/Values": np.array([t])}
     offsets = {}
     for kind, by_name in zip(KINDS, fields, strict=True):
@@ -420,7 +420,7 @@ def _empty_file(lines: Lines, rows: dict[str, Array], fields: LineFields) -> byt
     with h5py.File("vtkhdf", "w", driver="core", backing_store=False) as file:
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array(FORMAT_VERSION)
-        root.attrs["Type"] = np.bytes_("UnstructuredGrid")  # of fixed length; a str is refused
+        root.attrs["Type"] = np.bytes_("UnstructuredGrid")  # VTK refuses a str
         root["NumberOfPoints"] = np.array([len(lines.points)])
         root["NumberOfCells"] = np.array([len(lines.cells)])
         root["NumberOfConnectivityIds"] = np.array([lines.cells.size])
@@ -455,8 +455,8 @@ class TimeSeries(Restartable):
     """Base of recorders of a scene as one data set of lines, see :class:`XDMF` and :class:`VTKHDF`.
 
     Attributes:
-        ending: End of the name of the file.
-        second: Ending that is added for the name of the second file.
+        ending: Suffix of the file.
+        second: Suffix that is added to the name of the file for a second file.
         writer: Class of the writer.  Its arguments are path, lines and fields of the first state;
             for a restart also ``complete`` and the result of ``sync()`` of the earlier writer.
     """
@@ -526,12 +526,12 @@ class XDMF(TimeSeries):
 
     Points have ``displacement`` (3 components; m) and ``rotation`` (rad), in dynamics also
     ``velocity`` (m/s) and ``angular velocity`` (rad/s).  Cells have ``N``, ``V`` (N), ``M`` (N m)
-    in their middle; if something yields or breaks, also the ``jump`` of the hinge (rad) and the
+    in their middle; if something may yield or break, also the ``jump`` of the hinge (rad) and the
     ``dissipated energy`` (J).  ``part`` is 0 in beams; 1 in lines from the centre of each body to
     its points; 2 along links and springs, where N is the force along the line.
 
     The file is valid and has all complete steps at any moment, also after a kill.  The cost of a
-    step does not grow with their number.  On a path the time is the load factor.
+    step does not grow with the number of steps.  On a path the time is the load factor.
 
     Args:
         path: File, ending in ``.xdmf``; its numbers are in a second file, with ``.bin`` added to
@@ -566,7 +566,7 @@ class VTKHDF(TimeSeries):
     """Time series for ParaView, VTK and PyVista in one HDF5 file, with the fields of :class:`XDMF`.
 
     Each step is flushed, so the file can be read during the run.  After a kill it has all complete
-    steps, unless HDF5 was just rearranging its index, for some microseconds.  A restarted run
+    steps, except in the microseconds in which HDF5 rearranges its index.  A restarted run
     compares the numbers and continues in a copy, as HDF5 may crash in a damaged file.
 
     Args:

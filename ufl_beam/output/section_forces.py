@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Results from states: motions of places, forces of joints, section forces along cells.
 
-At both ends of a cell the section forces are the forces of the cell on the nodes, by stresses,
-inertia, damping, loads and works, see :mod:`ufl_beam.terms.cell_forces`.  So they are in
-equilibrium with supports, joints and other nodal forces, up to the residual of the step.  Between
-the ends they change by the forces along the cell: their resultant, their couple, and their
-distribution as far as it is known.
+At both ends of a cell the section forces are the forces between the cell and its nodes, by
+stresses, inertia, damping, loads and works (virtual works and potentials of users), see
+:mod:`ufl_beam.terms.cell_forces`.  So they are in equilibrium with supports, joints and other nodal
+forces, up to the residual of the step.  Between the ends they change by the forces along the cell,
+of which the resultant, the couple and, without works, the first moments are known.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ Vectors: TypeAlias = Any
 
 @in_one_line
 class JointHistory(NamedTuple):
-    """History of a joint with the first place a and the second place b.
+    """History of a joint, whose first place is a and whose second place is b.
 
     Attributes:
         motion: Displacement of b relative to a, in axes that turn with a, and rotation of b
             relative to a; zero in the undeformed scene; (n+1, 3); m, m, rad.
         force: Force of the joint on b, in the plane; (n+1, 2); N.
         in_a, in_b: The same force in axes that turn with a and with b; (n+1, 2); N.
-        moment: Moment of the joint on b, about the place b; (n+1,); N m.  It is NaN, for unknown,
-            if the places share their rotation.
+        moment: Moment of the joint on b, about the place b; (n+1,); N m.  It is unknown, NaN, if
+            the places share their rotation.
     """
 
     motion: Array
@@ -76,7 +76,7 @@ def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
 
 
 def values_at(numbering: DofNumbering, place: AttachmentPoint, states: Vectors) -> Array:
-    """Return values at the node that moves a place, or interpolated in its cell; (n, 3)."""
+    """Return values of the node of a body, or interpolated at a place of a beam; (n, 3)."""
     if isinstance(place, Spot):
         if node(place) is GROUND:
             return np.zeros((len(states), 3))
@@ -148,20 +148,20 @@ GAUSS = [(float(1 + x) / 2, float(w) / 2) for x, w in zip(POINTS, WEIGHTS, stric
 """Points and weights of the Gauss rule on a cell, which is exact for all integrals here."""
 
 Tangent = Callable[[Any], tuple[Any, Any]]
-"""Derivative of the position by the fraction of the cell, at a fraction."""
+"""Function that returns the derivative of the position by the fraction s of a cell, at s."""
 
 
 def section_force(
     resultants: Any, tangent: Tangent, *, works: bool
 ) -> Callable[[Any], tuple[Any, Any, Any]]:
-    """Return the force in the plane and the moment as a function of the fraction of a cell.
+    """Return a function that gives the force in the plane and the moment at a fraction of a cell.
 
     The fraction is 0 at the start of the cell and 1 at its end.
 
     Args:
-        resultants: Forces of the cell, ``cell_number`` of loops.h: arrays, or expressions of UFL.
-        tangent: Derivative of the position in the configuration of equilibrium.
-        works: Whether forces across the cell may have any distribution, due to works of a user.
+        resultants: Numbers ``cell_number`` of loops.h of the cell: arrays, or expressions of UFL.
+        tangent: Tangent of the cell in the configuration in which the forces are in equilibrium.
+        works: True if forces across the cell may have any distribution, as the scene has works.
     """
     start, end, skew = (
         (resultants[k], resultants[k + 1]) for k in (lib.START_X, lib.END_X, lib.SKEW_X)
@@ -173,36 +173,36 @@ def section_force(
         return [s * (a + b) - a + bend * c for a, b, c in zip(start, end, skew, strict=True)]
 
     def lever(s: Any) -> Any:
-        """Return the moment of the forces up to ``s`` about the point at ``s``, over ``s``."""
+        """Return the mean from 0 to ``s`` of the cross product of tangent and force."""
         pairs = ((weight, tangent(at * s), force(at * s)) for at, weight in GAUSS)
         return sum(weight * (x[0] * f[1] - x[1] * f[0]) for weight, x, f in pairs)
 
-    # The moments at both ends also determine couples, or the distribution of works across.
+    # The moments at both ends determine a further couple, or with works the forces across.
     imbalance = at_start + at_end - couple + lever(1.0)
     if works:
         arms = [[6 * w * at * (1 - at) * x for x in tangent(at)] for at, w in GAUSS]
         x, y = (sum(column) for column in zip(*arms, strict=True))
-        turned = imbalance / (x * x + y * y)
-        skew = skew[0] - turned * y, skew[1] + turned * x
+        factor = imbalance / (x * x + y * y)
+        skew = skew[0] - factor * y, skew[1] + factor * x
     else:
         couple = couple + imbalance
     return lambda s: (*force(s), s * (couple - lever(s)) - at_start)
 
 
 def in_section(plane: tuple[Any, Any, Any], c: Any, s: Any) -> tuple[Any, Any, Any]:
-    """Return (N, V, M) from force and moment in the plane; (c, s) is the axis of the section."""
+    """Return (N, V, M) from force and moment in the plane; (c, s) is the direction of the axis."""
     x, y, M = plane
     return c * x + s * y, c * y - s * x, M
 
 
 class ForcesAlongCells:
-    """(N, V, M) in points of the cells of a scene.
+    """Section forces (N, V, M) at points of the cells of a scene.
 
     Args:
-        numbering: Cells and numbering.
+        numbering: Numbering of the scene.
 
     Attributes:
-        angles: Angles of the undeformed axis at both ends of the cells; (num_cells, 2); rad.
+        angles: Angles of the smooth undeformed axis at both ends of cells; (num_cells, 2); rad.
         dofs: Degrees of freedom (u, v, ψ) of the nodes of cells; (num_cells, 3, degree + 1).
     """
 
@@ -225,9 +225,9 @@ class ForcesAlongCells:
         Args:
             cells: Numbers of the cells, or of one cell at many times.
             fractions: Fractions from 0 at the start to 1 at the end; (points,).
-            resultants: Forces of the cells, ``cell_number`` of loops.h; (9, num_cells).
-            q: Configurations (u, v, ψ) of the nodes at the time within the step at which its
-                forces are in equilibrium; (num_cells, 3, degree + 1).
+            resultants: Numbers ``cell_number`` of loops.h of the cells; (9, num_cells).
+            q: Configurations (u, v, ψ) of the nodes at the time in the step at which the forces
+                are in equilibrium; (num_cells, 3, degree + 1).
 
         Returns:
             (N, V, M); (num_cells, points, 3).
@@ -250,10 +250,10 @@ class ForcesAlongCells:
 
 
 def _axis_angles(numbering: Any, angles: Array) -> Array:
-    """Return angles from both ends of cells to the smooth axis of beams; (num_cells, 2); rad.
+    """Return angles from chords of cells to the smooth axis at both ends; (num_cells, 2); rad.
 
-    The axis halves the angle between two cells at a vertex, except at corners of the beam.  Its
-    angle is linear in a cell.
+    The axis halves the angle between two cells at a vertex, except at corners of the beam.  A cell
+    with one smooth neighbour has a circular axis, a cell without one a straight axis.
     """
     half = np.angle(np.exp(1j * np.diff(angles))) / 2
     half[np.diff(numbering.beam_of_cell) != 0] = np.nan
@@ -262,6 +262,6 @@ def _axis_angles(numbering: Any, angles: Array) -> Array:
             at_corners = np.isin(numbering.parameters(beam)[1:-1], beam.corners)
             half[numbering.cells_of(beam)[:-1][at_corners]] = np.nan
     start, end = np.append(np.nan, -half), np.append(half, np.nan)
-    # The axis is a circle in cells without a neighbour
+    # NaN: no smooth neighbour there
     both = np.where(np.isnan(start), -end, start), np.where(np.isnan(end), -start, end)
     return np.nan_to_num(np.column_stack(both))

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Scenes as JSON data: each record with its exact arguments.
 
-Functions of a user are no data.  Functions of time are saved by their values at the times of a
-solution, curves by many points, other functions by their names.  Laws and other records of a user
-are saved by their numbers and the name of the class, to compare them with a scene of the user.
+Functions of a user are code, which is not saved.  Functions of time are saved by their values at
+the times of a solution, curves by many points, other functions by their names.  Laws and other
+records of a user are saved by their numbers and the name of the class, so that they can be compared
+with a scene of the user.
 """
 
 from __future__ import annotations
@@ -33,14 +34,14 @@ from ufl_beam.output.output_files import WrongReader
 T = TypeVar("T")
 Data = Any  # data of JSON
 Sampling = Callable[[Any, str, Any], Any]
-"""Function of record, field and function that returns a substitute; None if there is none."""
+"""Function (record, field, function of a user) that returns a substitute, or None."""
 
-SAMPLES = 1000  # intervals in which a curve is sampled
+SAMPLES = 1000  # number of intervals in which a curve is sampled
 
 
 @dataclasses.dataclass(frozen=True)
 class SavedFunction:
-    """Function of time that is known at some times."""
+    """Function of time that is known at saved times only."""
 
     name: str  # name of the function
     times: tuple[float, ...]  # ascending; s
@@ -113,7 +114,7 @@ class LostFunction:
 
 
 def _sampled(function: Callable[[float], T], at: Iterable[float]) -> dict[float, T]:
-    """Return values of a function by ascending argument, except where it fails."""
+    """Return the values of a function by argument, in ascending order, except where it fails."""
     known = {}
     for x in sorted(at):
         try:
@@ -147,7 +148,7 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
     Functions of a user are replaced by results of ``sampling``, or by their names.
     """
     records: list[Data] = []
-    # By identity; references to the objects prevent that an identity is used again.
+    # By id; a reference to each object prevents that Python uses the id for another object.
     indices: dict[int, tuple[int, Any]] = {}
 
     def describe(value: Any, owner: Any, field: str) -> Data:
@@ -252,9 +253,9 @@ CODE = "code"
 class Description:
     """All numbers and names that can be reached from some values, by unique names.
 
-    Functions are compared by their code, defaults and enclosing variables, and by the numbers and
-    functions of their module that they use.  Objects with ``state()`` and ``restore(state)``, and
-    random generators of NumPy, are not compared but collected.
+    Functions are compared by their code, defaults and enclosing variables, and by the data and the
+    functions of their own module that they use.  Objects with ``state()`` and ``restore(state)``,
+    and random generators of NumPy, are not compared but collected.
 
     Attributes:
         texts: Text by name, such as ``{"scene.beams[0] 'left'.section.EI": "2000.0"}``.
@@ -264,7 +265,7 @@ class Description:
     def __init__(self, values: Mapping[str, Any]) -> None:
         self.texts: dict[str, str] = {}
         self.stateful: dict[str, Any] = {}
-        # By identity; references to the objects prevent that an identity is used again.
+        # By id; a reference to each object prevents that Python uses the id for another object.
         self._seen: dict[int, tuple[str, Any]] = {}
         for name, value in values.items():
             self._put(name, value)

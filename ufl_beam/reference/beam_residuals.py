@@ -41,7 +41,7 @@ from ufl_beam.reference.return_map import MaterialPoints
 
 
 class ElasticBeams(CellForce):
-    """Elastic cells: the resultants of a time scheme work on its virtual strains."""
+    """Elastic cells; the time scheme states the resultants and the virtual strains."""
 
     inner = True
 
@@ -60,7 +60,8 @@ class ElasticBeams(CellForce):
             bool(scheme.lost_fraction),
             element.at_points(3),
         )
-        if scheme.lost_fraction:  # c C (Δe - r Δe'), Δe' of the step before
+        if scheme.lost_fraction:
+            # c C (Δe - r Δe'), with Δe' of the step before and the ratio r of the step lengths
             damped = element.constant(scheme.lost_fraction) * resultants(
                 e1 - e0 - self._change_before, C
             )
@@ -77,7 +78,7 @@ class ElasticBeams(CellForce):
         self._last_dt = math.inf
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return the work of the resultants, which may depend on the last change of strains."""
+        """Return the virtual work, and its derivative; both may depend on the step before."""
         put(self._change_before, min(1.0, step.dt / self._last_dt) * self._last_change)
         return super().response(step, q1)
 
@@ -86,14 +87,14 @@ class ElasticBeams(CellForce):
         return self.energy(q1) - self.stored["stored"]
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Accept the end of the step, and keep its changes of the strains."""
+        """Accept the end of the step; store the changes of the strains if the scheme uses them."""
         super().accept(step, q1, s)
         if self._decays:
             self._last_change = self.cells.strains(q1) - self.cells.strains(step.q0)
             self._last_dt = step.dt
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore the changes of the strains in the last step, and its length."""
+        """Save or restore the length of the last step, and the changes of the strains in it."""
         if self._decays:
             n = len(self._last_change)
             rows = self._last_change.reshape(n, -1), np.full(n, self._last_dt)
@@ -105,10 +106,11 @@ class ElasticBeams(CellForce):
 
 
 class YieldingBeams(CellForce):
-    """Cells with material points; quadrature functions hold the resultants r of their return map.
+    """Cells with material points, whose return map computes the resultants r.
 
-    Around an iterate the resultants b + D e are linear in the strains e; UFL derives the material
-    and geometric tangent from them.
+    The virtual work has r as a quadrature function.  The tangent is derived by UFL from a form with
+    b + D e, the resultants linearised around an iterate, in the strains e.  So it has a material
+    and a geometric part.
     """
 
     inner = True
@@ -131,7 +133,7 @@ class YieldingBeams(CellForce):
         )
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return the work of the resultants of the return map, with its consistent tangent."""
+        """Return the virtual work after a return map, and its consistent tangent."""
         points = self.points
         points.return_map(self.cells.strains(q1)[:, 0], step.dt)
         put(self._r, points.r)
@@ -154,7 +156,7 @@ class YieldingBeams(CellForce):
 
     @property
     def stored(self) -> Mapping[str, float]:  # type: ignore[override]
-        """Stored energies of the points."""
+        """Stored energies of the points, by entry of the ledger; J."""
         return self.points.stored
 
     def save_or_restore(self, archive: Archive) -> None:
@@ -162,14 +164,14 @@ class YieldingBeams(CellForce):
         self.points.state(archive.rows("cells", self.cells.cell_indices, self.points.state()))
 
     def material(self) -> Array:
-        """Return the numbers of the cells, and their data for solutions; (num_cells, 7)."""
+        """Return the number and the column "material" of each cell; (num_cells, 1 + 6)."""
         data = self.points.recorded.copy()
-        data[:, 3] *= self._hinges  # a crack of one fibre is no rotation
+        data[:, 3] *= self._hinges  # the jump of a cracked fibre is no rotation
         return np.column_stack([self.cells.cell_indices, data])
 
 
 def inelastic_cells(numbering: DofNumbering) -> dict[SectionPoints, Index]:
-    """Return layouts of material points that can yield or break, and their cells."""
+    """Return layouts of material points that can yield or break, and the cells with them."""
     sections, section_indices = numbering.sections
     groups: dict[SectionPoints, list[int]] = {}
     for number, section in enumerate(sections):
@@ -209,17 +211,17 @@ class Mass:
         self._beam_form = cells.form(ufl.action(form, cells.element.q1))
 
     def on_nodes(self, v: Array) -> Array:
-        """Return the mass matrix of the beams times a vector, on the nodes of cells."""
+        """Return :func:`end_forces` of the mass matrix of the beams times ``v``."""
         self.cells.set(self.cells.element.q1, v)
         return self.cells.on_nodes("density", self._beam_form.assembled())
 
 
 class MatrixForce(Force):
-    """Constant matrix times a rate by a row of :class:`Coefficients`.
+    """Force that is a constant matrix times a rate, which :class:`Coefficients` define.
 
     Attributes:
         rate: Rate in the latest response; (size,).
-        coefficients: Numbers of the scheme in the latest response.
+        coefficients: Coefficients of the scheme in the latest response.
     """
 
     row: str
@@ -230,7 +232,7 @@ class MatrixForce(Force):
         self.ledger, self._rotations = setting.ledger, setting.numbering.rotations.astype(np.int32)
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return forces; the scheme decides whether the step of a rotation is 2 tan(Δψ/2) or Δψ."""
+        """Return forces and derivative; the scheme steps rotations by 2 tan(Δψ/2), or by Δψ."""
         scheme, before, rotations = self.scheme, self.inertia, self._rotations
         self.coefficients = scheme.coefficients(step.dt, before.last_dt, len(before.more))
         row = getattr(self.coefficients, self.row)
@@ -264,7 +266,7 @@ class Inertia(MatrixForce):
             setting.loses("numerical")
 
     def after(self, s: Array) -> tuple[Array, ...]:
-        """Return velocities and further rates of the scheme after the step ``s``."""
+        """Return velocities and further rates of the scheme after the nodal step ``s``."""
         return tuple(combined(row, s, self) for row in self.coefficients.rates)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
@@ -283,7 +285,7 @@ class Inertia(MatrixForce):
         self.stored = {"kinetic": float(self.v @ (self.matrix @ self.v)) / 2}
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore the further rates of the scheme."""
+        """Save or restore further rates of the scheme, and data of the last step that it uses."""
         pairs = zip_longest(self.scheme.kept, self.more)
         more = [archive.vector(name, known) for name, known in pairs]
         self.more = tuple(known for known in more if known is not None)
@@ -294,7 +296,7 @@ class Inertia(MatrixForce):
 
 
 class RayleighForce(MatrixForce):
-    """Rayleigh damping: (a0 M + a1 K) v, with the stiffness K of the undeformed scene, P(92)."""
+    """Rayleigh damping: (a0 M + a1 K) v, with the stiffness K of the undeformed beams, P(92)."""
 
     row = "velocity"
 
@@ -313,12 +315,13 @@ class RayleighForce(MatrixForce):
         self.ledger.lost["damping"] += float(s @ (self.matrix @ s)) / step.dt
         mass, damping = self.inertia.mass, self._damping
         by_mass = mass.on_nodes(self.rate)
-        by_stiffness = mass.cells.on_nodes("stress", self._stiffness.assembled())  # at the same q1
+        # q1 of this form is the rate, which mass.on_nodes has set.
+        by_stiffness = mass.cells.on_nodes("stress", self._stiffness.assembled())
         self.on_nodes = damping.mass * by_mass + damping.stiffness * by_stiffness
 
 
 class KelvinVoigtForce(CellForce):
-    """Kelvin-Voigt damping: resultants C Δe times the retardation time over the step length."""
+    """Kelvin-Voigt damping: resultants C Δe/Δt, multiplied by the retardation time."""
 
     def __init__(self, damping: KelvinVoigt, indices: Index, setting: Setting) -> None:
         cells = Cells(setting.numbering, indices)
@@ -334,7 +337,7 @@ class KelvinVoigtForce(CellForce):
         super().__init__(cells, virtual_work(r, w_e) * element.dx(1), setting, lost=lost)
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return the work of the resultants at the rates of the step."""
+        """Return the virtual work at the strain rates of the step, and its derivative."""
         self._rate.value = self._time / step.dt
         return super().response(step, q1)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Forms on cells, assembled by DOLFINx, and the base of all forces in the equation of a step.
 
-Each cell has its own nodes: q = C q_scene, with the Boolean matrix C of the numbers that joints and
-neighbours share.  Residuals of the scene are Cᵀ r, tangents Cᵀ K C.
+Each cell has nodes of its own.  Connected cells share degrees of freedom of the scene:
+q = C q_scene with a Boolean matrix C.  Residuals of the scene are Cᵀ r, tangents Cᵀ K C.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ufl_beam.model.connectors import Connector
 T = TypeVar("T", bound=Array | None)
 
 Response = tuple[Array, csr_array]
-"""Forces, and their derivative by the configuration."""
+"""Forces, and their derivatives with respect to the configuration."""
 
 Entry = tuple[ufl.Form, str]
 """Form of an energy, and its entry in the ledger."""
@@ -51,8 +51,9 @@ class Search:
     """Search for the equilibrium of a step without unnecessary openings.
 
     Attributes:
-        hold: True if points and connectors that did not flow in the last step stay closed.
-        over: True if a held point or connector has exceeded its limit.
+        hold: True if points and connectors that did not flow in the last step stay closed, and
+            friction by laws of users sticks or slides as in that step.
+        over: True if ``hold`` has kept a point or connector from opening or slipping.
     """
 
     hold: bool = False
@@ -61,18 +62,18 @@ class Search:
 
 @dataclass
 class Setting:
-    """Arguments of all forces and laws of a scene."""
+    """Objects that all forces and laws of a scene share."""
 
     numbering: DofNumbering
     scheme: Scheme
-    requested_forces: Mapping[Connector, float]  # forces of controllers, limits of friction
-    rates: Mapping[Connector, float]  # of motions with friction at the beginning of a step
-    friction_repeats: bool  # True if sticking may repeat a constraint
+    requested_forces: Mapping[Connector, float]  # of controllers; limits of friction
+    rates: Mapping[Connector, float]  # of motions with friction, at the beginning of a step
+    friction_repeats: bool  # True if sticking may be a redundant constraint
     ledger: Ledger = field(default_factory=Ledger)
     search: Search = field(default_factory=Search)
 
     def loses(self, *names: str) -> None:
-        """Make entries for losses."""
+        """Create entries of the ledger for losses."""
         for name in names:
             self.ledger.lost[name] += 0.0
 
@@ -92,13 +93,13 @@ class Archive:
     saved: dict[str, list[Array]] = field(default_factory=lambda: defaultdict(list))
 
     def vector(self, name: str, values: T) -> Array | T:
-        """Save values at the degrees of freedom if known; return the restored values, if any."""
+        """Save ``values`` unless they are None; return the restored values, or else ``values``."""
         if values is not None:
             self.saved[name].append(values)
         return self.restored.get(name, values)
 
     def rows(self, name: str, indices: Index, rows: Array) -> Array:
-        """Save rows with numbers of cells or connectors; return them, replaced by restored rows."""
+        """Save rows with the numbers of their cells or connectors; return the restored rows."""
         name, result = f"{name}, {rows.shape[1]}", rows.copy()
         self.saved[name].append(np.column_stack([indices, rows]))
         if name in self.restored:
@@ -109,13 +110,13 @@ class Archive:
 
 
 class Force:
-    """Virtual work in the equation of a step; methods that a force does not define do nothing.
+    """Base of forces in the equation of a step; by default methods do nothing or return zero.
 
     Attributes:
         inner: True for forces between parts of the scene: cells and connectors.
         size: Number of degrees of freedom of the scene.
         stored: Energies stored in the accepted state, by entry of the ledger; J.
-        on_nodes: Forces on the cells in the accepted step, see :func:`end_forces`.
+        on_nodes: Forces of the nodes on the cells in the accepted step, see :func:`end_forces`.
     """
 
     inner = False
@@ -124,7 +125,7 @@ class Force:
     on_nodes: Array | float = 0.0
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return virtual work and derivative if the step ends at ``q1``; (size,), (size, size)."""
+        """Return virtual work in a step to ``q1``, and the derivative; (size,), (size, size)."""
         return np.zeros(self.size), csr_array((self.size, self.size))
 
     def change(self, step: Step, q1: Array) -> float:
@@ -138,8 +139,8 @@ class Force:
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Accept the end of the step, and enter works and losses in the ledger.
 
-        ``q1`` is the configuration of the latest response, and ``s`` the nodal step that forces
-        work on.
+        ``q1`` is the configuration of the latest response, and ``s`` the nodal step on which the
+        forces do work.
         """
 
     def start(self, q: Array) -> None:
@@ -156,9 +157,10 @@ class Form:
     """Form on the cells of a mesh, assembled by DOLFINx for the degrees of freedom of a scene.
 
     Args:
-        form: Form with one quadrature rule; FFCx 0.9 to 0.11 is silently wrong otherwise.
-        at: Number in the scene of each degree of freedom of the mesh.  size: Number of degrees of
-            freedom of the scene.
+        form: Form with one quadrature rule; FFCx 0.9 to 0.11 compiles forms with several rules
+            wrongly, without an error.
+        at: Number in the scene of each degree of freedom of the mesh.
+        size: Number of degrees of freedom of the scene.
     """
 
     def __init__(self, form: ufl.Form, at: Index, size: int) -> None:
@@ -167,9 +169,10 @@ class Form:
         self._matrix: Any = None if self._form.rank < 2 else fem.create_matrix(self._form)
 
     def assembled(self) -> Any:
-        """Return a value, a vector on the form's own space, or a matrix of the scene.
+        """Return the value of a form without arguments, or the assembled form.
 
-        The form has no, one, or two arguments, respectively.
+        A form with one argument gives a vector on the space of the argument, a form with two
+        arguments a matrix of the scene.
         """
         if self._form.rank == 0:
             return float(fem.assemble_scalar(self._form))
@@ -180,7 +183,7 @@ class Form:
         return csr_array(self._joins.T @ K @ self._joins)
 
     def joined(self, values: Array) -> Array:
-        """Return the vector of the scene from entries of a linear form; shared nodes add up."""
+        """Return the vector of the scene from :meth:`assembled`; shared entries are added."""
         return np.asarray(self._joins.T @ values)
 
 
@@ -198,17 +201,17 @@ def put(function: fem.Function, values: Array) -> None:
 
 
 def separate_cells(points: Array) -> tuple[meshes.Mesh, Index]:
-    """Return a mesh of unconnected cells, (num_cells, 2, 2) in m, and their original numbers."""
+    """Return a mesh of unconnected cells, and their rows in ``points``, (num_cells, 2, 2); m."""
     n = len(points)
     mesh = line_mesh(points.reshape(-1, 2), np.arange(2 * n).reshape(n, 2))
     return mesh, np.asarray(mesh.topology.original_cell_index)
 
 
 class Cells:
-    """Cells of beams, each with its own nodes; joints and neighbours share numbers of the scene.
+    """Cells of beams, each with its own nodes.
 
     Attributes:
-        numbers: Numbers of the cells in the scene, in the order of the mesh.
+        cell_indices: Numbers of the cells in the scene, in the order of the mesh.
         lengths: Lengths of the cells; m.
         element: Functions in the forms.
         at: Number in the scene of each degree of freedom of the mesh.
@@ -255,20 +258,22 @@ class Cells:
         return np.asarray(strains)
 
     def on_nodes(self, kind: str, values: Array) -> Array:
-        """Return a vector on the nodes of the cells, see :func:`end_forces`."""
+        """Return :func:`end_forces` of a vector on the space of the element."""
         forces = values[self._dofs].reshape(len(self.cell_indices), 3, self._dofs.shape[1] // 3)
         return end_forces(self._numbering, kind, self.cell_indices, forces)
 
 
 def end_forces(numbering: DofNumbering, kind: str, cells: Index, forces: Array) -> Array:
-    """Return forces at both ends of all cells, and moments of their distribution; (9, num_cells).
+    """Return forces of the nodes on all cells, and moments of loads on the cells; (9, num_cells).
 
-    The rows are (X, Y, M) at the start and at the end, the couple of the load along a cell, and
-    first moments of its forces about the middle, over the length.
+    The rows are (X, Y, M) at the start and at the end of a cell; the couple of a load along the
+    cell, zero for "stress"; and the first moments of X and Y about the middle of the cell, divided
+    by its length, for "density" only.
 
     Args:
         numbering: Numbering of the scene.
-        kind: "stress"; "work" of a user; "density" along the whole cell.
+        kind: "stress" for resultants, "work" for works of a user, "density" for loads and inertia
+            along the whole cell.
         cells: Numbers of cells.
         forces: Forces on the nodes; (len(cells), 3, nodes of a cell); N, N, N m.
     """
@@ -286,10 +291,10 @@ class CellForce(Force):
     """Virtual work on cells: a form that is linear in ``element.w``, and its derivative by UFL.
 
     Args:
-        cells: Cells on which it acts.
-        work: The form.
+        cells: Cells on which the work is done.
+        work: Form of the virtual work.
         setting: Setting; its ledger has the entries of energies.
-        around: Form with the same derivative, if UFL cannot derive ``work``.
+        around: Form with the same derivative, if UFL cannot differentiate ``work``.
         stored: Form of the energy stored at the end of the step, and its entry.
         lost: Form of the energy lost in the step, and its entry.
         kind: See :func:`end_forces`.
@@ -344,7 +349,7 @@ class CellForce(Force):
 
 
 def lumps(numbering: DofNumbering) -> list[tuple[Index, float, float]]:
-    """Return dofs, mass and inertia of point masses and rigid bodies; (3,), kg, kg m²."""
+    """Return (degrees of freedom, mass, inertia) of point masses and bodies; (3,), kg, kg m²."""
     masses = [
         (numbering.node(mass.place), mass.mass, mass.inertia) for mass in numbering.scene.masses
     ]
@@ -355,6 +360,6 @@ def lumps(numbering: DofNumbering) -> list[tuple[Index, float, float]]:
 
 
 def coupled(size: int, rows: Index, columns: Index, values: Array) -> csr_array:
-    """Return the matrix of the scene from entries; duplicates add up."""
+    """Return the matrix of the scene from entries; duplicates are added."""
     triplets = np.ravel(values), (np.ravel(rows), np.ravel(columns))
     return csr_array(scipy.sparse.coo_array(triplets, (size, size)))

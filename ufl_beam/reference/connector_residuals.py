@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Connectors: the force of a law on the variation of a relative motion, and guide curves."""
+"""Connectors, whose forces do work on variations of relative motions, and guide curves."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from ufl_beam.reference.cell_forms import (
 from ufl_beam.reference.connector_updates import law_in_step
 
 GUIDE_INCREMENT = 1e-5
-"""Increment of differences of the forces of guides, over the size of the scene.
+"""Increment of central differences of the forces of guides, divided by the size of the scene.
 
-The differences are of second order; the round-off of the curve spoils less than 1e-10.
+The error of the differences is of second order; round-off of the curve adds less than 1e-10.
 """
 
 
@@ -45,7 +45,7 @@ class Linked(Force):
         indices: Indices of the connectors in :attr:`Scene.all_connectors`.
         forces_at: Degrees of freedom of their forces.
         before: Forces at the end of the last step.
-        at_rest: Forces of the laws in the undeformed scene.
+        at_rest: Forces of the laws at the initial configuration.
     """
 
     inner = True
@@ -60,9 +60,10 @@ class Linked(Force):
 
 
 class Connectors(Linked):
-    """Connectors of one relative motion, or of the k motions of a bushing.
+    """Connectors with the same kind of relative motion, or bushings with k motions each.
 
-    Each is a cell of unit length between both nodes, with its forces as further unknowns.
+    Each connector or bushing is a cell of unit length between its nodes, with its forces as further
+    unknowns.
     """
 
     def __init__(self, motions: Sequence[str], indices: Index, setting: Setting) -> None:
@@ -111,7 +112,7 @@ class Connectors(Linked):
             law.begin(e0, step)
 
     def _by_connector(self, values: Array) -> list[Any]:
-        """Return values by connector: a number, or an array of numbers of its components."""
+        """Return the values of each connector: a number, or the array of its k components."""
         return [*map(float, values)] if self._k == 1 else [*values.reshape(-1, self._k)]
 
     def response(self, step: Step, q1: Array) -> Response:
@@ -124,9 +125,10 @@ class Connectors(Linked):
         return self._work.joined(self._work.assembled()), self._tangent.assembled()
 
     def relative_residual(self, q: Array, r: Array, scale: float, moved: float) -> float:
-        """Return the largest residual of a row, relative to 1 % of ``moved`` or to ``scale``.
+        """Return the largest relative residual of a law, without round-off of motions.
 
-        The round-off of a row by motions does not count.
+        A residual in motion is relative to 1 % of ``moved`` (m), a residual in force to ``scale``
+        (N).  Rotations and moments are compared by the size of the scene as length.
         """
         size = self.setting.numbering.scene.size
         k, length = self._k, self._length.reshape(-1, self._k)
@@ -197,11 +199,12 @@ class Connectors(Linked):
 
 
 class GuideForce(Linked):
-    """Point on a curve of the plane: constrained across it, free along it.
+    """Guide: a point is constrained to a curve of the plane, and free along the curve.
 
-    The force over a step is normal to the chord of the curve, so that it does no work.  Round-off
-    of the curve spoils the direction of a short chord; there the direction of the curve in the
-    middle is used.  The motion is the distance from the curve, zero when a step is accepted.
+    In schemes whose forces act over the step, the force is normal to the chord of the step, so that
+    it does no work; in other schemes it is normal to the curve.  Round-off of the curve spoils the
+    direction of a short chord, so the tangent in the middle replaces it.  The motion is the
+    distance from the curve; at the end of a step it is zero.
     """
 
     def __init__(self, number: int, setting: Setting) -> None:
@@ -218,11 +221,11 @@ class GuideForce(Linked):
         self._over_step = setting.scheme.average(0.0, 1.0) != 1.0
         last_digit = np.spacing(self._size + np.abs(self._point).max())
         self._shortest = self._size * (24 * last_digit / self._size) ** (1 / 3)
-        self._s = self._s0 = self._distance = 0.0  # parameters now, and at the beginning
+        self._s = self._s0 = self._distance = 0.0  # parameters: of the iterate, accepted
         self._step = parameter_step(self._curve, 0.0, self._size)
 
     def begin(self, step: Step) -> None:
-        """Begin at the point of the last step."""
+        """Begin the search for the nearest point at the end of the last step."""
         self._s = self._s0
 
     def _nearest(self, x: Array) -> float:
@@ -233,7 +236,7 @@ class GuideForce(Linked):
         return s
 
     def _equation(self, x: Array) -> Array:
-        """Return the distance from the curve, and the force direction over the step; (3,)."""
+        """Return the distance from the curve, and the direction of the force in the step; (3,)."""
         s = self._nearest(x)
         on, slope = np.array(self._curve(s), np.float64), tangent(self._curve, s, self._step)
         t = along = slope / math.hypot(*slope)
@@ -246,12 +249,12 @@ class GuideForce(Linked):
         return np.array([t[0] * (x - on)[1] - t[1] * (x - on)[0], -y_m, x_m])
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return force across the curve, distance, and derivatives by central differences."""
+        """Return the force and the distance; their derivatives are central differences."""
         x, λ, r = self._point + q1[self._x], q1[self._λ], np.zeros(self.size)
         self._s = self._nearest(x)
         r[self._λ], *direction = self._equation(x)
         r[self._x] = λ * np.array(direction)
-        increments, K = GUIDE_INCREMENT * self._size * np.eye(2), np.zeros((3, 3))  # of x, y, λ
+        increments, K = GUIDE_INCREMENT * self._size * np.eye(2), np.zeros((3, 3))  # x, y, λ
         slopes = [self._equation(x + δ) - self._equation(x - δ) for δ in increments]
         K[2, :2], *K[:2, :2] = np.transpose(slopes) / (2 * GUIDE_INCREMENT * self._size)
         K[:2, :2] *= λ
@@ -260,7 +263,7 @@ class GuideForce(Linked):
         return r, coupled(self.size, np.repeat(dofs, 3), np.tile(dofs, 3), K)
 
     def relative_residual(self, q: Array, r: Array, scale: float, moved: float) -> float:
-        """Return the distance, relative to 1 % of the scene."""
+        """Return the distance beyond round-off, divided by 1 % of the size of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._point + self._on0).max())
         return float(max(abs(r[self._λ]) - round_off, 0.0) / (0.01 * self._size))
 
@@ -271,7 +274,7 @@ class GuideForce(Linked):
         self._step, self._s0 = REACH * self._size / math.hypot(*t), self._s
 
     def columns(self, q: Array) -> Array:
-        """Return the columns of ``Connection``; the distance is NaN at the end of a curve."""
+        """Return the columns of ``Connection``; the distance is NaN without a nearest point."""
         self._s = self._s0
         try:
             self._distance = self._equation(self._point + q[self._x])[0]
@@ -280,7 +283,7 @@ class GuideForce(Linked):
         return np.array([[self._distance, q[self._λ], 0.0, 0.0, 0.0]])
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore the point on the curve, its parameter, and its step for tangents."""
+        """Save or restore the distance, the parameters, the step for tangents, and the point."""
         row = np.array([[self._distance, self._s, self._s0, self._step, *self._on0]])
         (row,) = archive.rows("guides", self.indices, row)
         self._distance, self._s, self._s0, self._step = map(float, row[:4])
@@ -288,7 +291,7 @@ class GuideForce(Linked):
 
 
 def all_connectors(setting: Setting) -> list[Connectors | GuideForce]:
-    """Return all connectors of a scene, grouped by motion, and each guide."""
+    """Return all connectors of a scene: a group for each kind of motion, and each guide."""
     connectors: list[Connectors | GuideForce] = []
     kinds: dict[tuple[str, ...], list[int]] = {(motion,): [] for motion in MOTIONS}
     kinds |= {("sliding", "sliding", "turning")[:k]: [] for k in (2, 3)}

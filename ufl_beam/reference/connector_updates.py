@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors over a step: a row ``α e + β λ = γ`` each, linear around an iterate.
+"""Laws of connectors over a step; each is a row ``α e + β λ = γ``, linearised at an iterate.
 
 e is the relative motion at the end of the step and λ the force that resists its growth.  A law is a
 class: ``row`` returns the equation, ``z`` has the internal variables, ``stored`` the energies.
@@ -42,39 +42,39 @@ from ufl_beam.reference.cell_forms import Setting
 from ufl_beam.reference.return_map import MaterialPoints, derivative
 
 CREEP = 1e-12
-"""Creep in a step of a sticking connector under its limit; over the size of the scene, or rad.
+"""Creep in a step of a sticking connector at its limit; divided by the size of the scene, or rad.
 
-It occurs only if several sticking connectors constrain the same motion, so that they share the
-force.
+It is used only if several sticking connectors constrain the same motion; then it determines the
+share of the force that each connector bears.
 """
 
 REFERENCE_MOTION = 0.01
-"""Motion, in rad or over the size of the scene, that weighs as much as the limit of the force.
+"""Motion, in rad or divided by the size of the scene, that weighs as much as the limit of a force.
 
-It decides whether a rigid-plastic connector slips in an iterate.
+Force and motion together decide whether a rigid-plastic connector slips in an iterate.
 """
 
 LEAST_SLOPE = 1e-9
-"""Least factor of motions, over EI of the member divided by the size of the scene."""
+"""Least factor r of :class:`_Slipping`, as a multiple of EI of the beam / size of the scene."""
 
 Row = tuple[float, float, float] | Array
-"""α, β, γ; (k, k + 2) of the k components of a bushing."""
+"""α, β, γ; an array (k, k + 2) for the k components of a bushing."""
 
 Motions = Any
 """A relative motion, or an array of the components of a bushing; m or rad."""
 
 
 class LawInStep:
-    """Law of a connector in a step; its work is in ``entry`` of the ledger, if it has an entry.
+    """Law of a connector in a step; its work is in ``entry`` of the ledger, unless that is empty.
 
     Attributes:
-        saved_as: Name of the internal variables, as in the package's class.
+        saved_as: Name of the internal variables in saved states, as in ``ufl_beam.terms``.
         z: Internal variables of the accepted state; "dissipated" is the energy lost since the
-            beginning by yielding, slip and laws of users, J; "start" is the motion without
-            round-off.
+            beginning by yielding, slip and laws of users, J; "start" is the motion of a
+            rigid-plastic connector, without round-off.
         stored: Energies in the accepted state, by entry of the ledger; J.
         opens: Object that opens beyond a limit, or None; see ``Solver._equilibrium``.
-        slope: Divisor of rows about the force.
+        slope: Number by which rows that state the force are divided.
     """
 
     account, entry, sign, saved_as = "lost", "", 1.0, ""
@@ -126,13 +126,13 @@ class LawInStep:
         return 0.0
 
     def state(self, values: Array | None = None) -> Array:
-        """Return the internal variables as a row, after ``values`` has replaced them."""
+        """Return the internal variables as a row; ``values`` replace them first, if given."""
         if values is not None:
             self.z = dict(zip(self.z, map(float, values), strict=True))
         return np.array([*self.z.values()])
 
     def after(self, e1: Motions, fraction: float) -> tuple[Any, Any, State]:
-        """Return motions and rates at the time of a user's law, and variables after a substep.
+        """Return motions and rates at t_n+θ, and variables after a fraction of the step.
 
         All have the form of arguments of the law; variables grow in proportion to ``fraction``.
         """
@@ -147,7 +147,7 @@ class LawInStep:
 
 
 def around(forces: Callable[[Array], Any], e: Motions, increments: Motions) -> Array:
-    """Return rows of a law with ``forces`` as functions of motions, by central differences."""
+    """Return rows of a law whose forces are functions of motions, by central differences."""
     e, increments = np.atleast_1d(e), np.diag(np.atleast_1d(increments))
     with np.errstate(all="ignore"):
         slopes = [(forces(e + δ) - forces(e - δ)) / (2 * δ.sum()) for δ in increments]
@@ -156,7 +156,11 @@ def around(forces: Callable[[Array], Any], e: Motions, increments: Motions) -> A
 
 
 def small_increment(e0: Motions, e1: Motions, length: Motions) -> Any:
-    """Return an increment for central differences: third root of round-off times the step."""
+    """Return steps of central differences: the increments of motions times 6e-6.
+
+    This is the third root of round-off.  An increment counts as at least 1e-3 of the motion, or
+    1e-6 of ``length``.
+    """
     least = 1e-3 * np.maximum(np.abs(e1), 1e-3 * length)
     return 6e-6 * np.maximum(np.abs(e1 - e0), least)
 
@@ -165,7 +169,7 @@ def small_increment(e0: Motions, e1: Motions, length: Motions) -> Any:
 
 
 class _Known(LawInStep):
-    """Law with a row known at the beginning of a step: joint, motor, prescribed force, damper."""
+    """Law with a row known at the beginning of a step, such as a joint, motor or damper."""
 
     KINDS = {  # noqa: RUF012
         PrescribedMotion: ("supplied", "motors", -1.0, "_Driven"),
@@ -223,16 +227,16 @@ class _EnergyLaw(LawInStep):
         return np.sum(self.law.energy(self.law.as_argument([*np.atleast_1d(e)[:, None]]), z))
 
     def _elastic(self, e: Array, z: State) -> Array:
-        """Return derivatives of the energy by the motions; (k,)."""
+        """Return derivatives of the energy with respect to the motions; (k,)."""
         return np.array([float(np.sum(f)) for f in self.law.elastic_forces([*e[:, None]], z)])
 
     def _forces(self, e1: Array) -> Array:
-        """Return forces of a step to ``e1``: elastic at the time of loads, and resistance; (k,)."""
+        """Return elastic forces at the time of loads plus resistance, in a step to ``e1``; (k,)."""
         e0, (*_, z) = np.atleast_1d(self.e0), self.after(e1, self._load_weight)
         resistance = self.law.each(self.law.resistance(*self.after(e1, self._θ), self.dt))
         elastic = end = self._elastic(e1, z)
         if self._load_weight != 1.0:
-            # By Gauss's rule, or from the change of the energy if the forces are not smooth
+            # By Gauss's rule; if forces are not smooth, the work is corrected to the energy change
             Δe, mean = e1 - e0, self.setting.scheme.mean(lambda e: self._elastic(e, z), e0, e1)
             first, middle = (self._elastic(e, z) for e in (e0, (e0 + e1) / 2))
             errors = (mean - (first + 4 * middle + end) / 6) * Δe
@@ -259,7 +263,7 @@ class _EnergyLaw(LawInStep):
         """Accept the variables; work that is neither stored nor numerical loss is dissipated."""
         (*_, old), (*_, new) = (self.after(e1, fraction) for fraction in (0.0, 1.0))
         stored, numerical = float(self._energy(e1, new)), 0.0
-        if self._delayed:  # growth: derivative along the step, by a complex step
+        if self._delayed:  # growth: derivative of the energy along the step, by a complex step
             z = {n: x + 1e-30j * (x - getattr(old, n)) for n, x in vars(new).items()}
             along = self._energy(e1 + 1e-30j * (e1 - self.e0), State(z))
             growth = float(np.imag(along)) / 1e-30
@@ -329,13 +333,14 @@ class _Friction(LawInStep):
     """Dry friction, also by laws of users: it sticks, or slips in the direction -1 or 1.
 
     The sliding force of a user's law may be below its limit, so that sticking and sliding can both
-    be solutions.  The connector sticks or slides as in the last step, unless no equilibrium admits
-    it.
+    be solutions.  The connector sticks or slides as in the last step, unless there is no such
+    equilibrium.
 
     Attributes:
-        excess: For a law of a user: infinite if it slides back or its stop generates energy;
-            ``|force| / limit - 1`` if it is held and exceeds the limit; else 0.
-        released: True if it may change in the iterates from now on.
+        excess: For a law of a user that is held: infinite if the connector slides back, comes to
+            rest with a gain of energy, or has the limit zero; ``|force| / limit - 1`` if the force
+            exceeds the limit; else 0.
+        released: True if the connector may begin to stick or slide in iterates from now on.
     """
 
     entry, saved_as = "friction", "_Rubbing"
@@ -355,21 +360,21 @@ class _Friction(LawInStep):
             self._limit = self.setting.requested_forces[self.connector]
         softness = CREEP * self.length * self.setting.friction_repeats
         self._creep = softness / self._limit if self._limit > 0 else 0.0
-        # With this motion the velocity at the end is zero; without motion it would return reversed.
+        # This motion ends at rest; with no motion the velocity at the end would be reversed.
         self._rest_motion = (
             increment_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.connector]
         )
-        self._direction, self._against, self._guessed = self.z["slip"], False, True
+        self._direction, self._motionless, self._guessed = self.z["slip"], False, True
 
     def row(self, e1: float, λ: float) -> Row:
         """Stick while the force is below the limit; slip until the sliding velocity reverses."""
         moved, stuck, search = e1 - self.e0, self._direction == 0, self.setting.search
-        if not self._against and self._direction * self._rest_motion > 0:
+        if not self._motionless and self._direction * self._rest_motion > 0:
             moved -= self._rest_motion  # rest at the end instead of a reversed velocity
         reverses = not stuck and self._direction * moved < -1e-14 * self.length
-        # A stop must not generate energy; if it did, the motion is held at once in this step. The
+        # Coming to rest must not generate energy; otherwise the step has no motion at all.  The
         # force of the guess does not decide this, since it belongs to another motion.
-        gives = not self._guessed and not self._against and stuck and λ * self._rest_motion < 0
+        gives = not self._guessed and not self._motionless and stuck and λ * self._rest_motion < 0
         over = stuck and abs(λ) > self._limit * (1 + 1e-12)
         self._guessed, self.excess = False, 0.0
         if self.opens and search.hold and not self.released:
@@ -377,13 +382,13 @@ class _Friction(LawInStep):
                 changes = reverses or gives or not self._limit
                 self.excess, search.over = math.inf if changes else abs(λ) / self._limit - 1, True
         else:
-            self._against |= gives
+            self._motionless |= gives
             if reverses:
                 self._direction = 0.0
             elif over:
                 self._direction = math.copysign(1.0, λ)
         if self._direction == 0 and self._limit > 0:
-            return 1.0, -self._creep, self.e0 + (0.0 if self._against else self._rest_motion)
+            return 1.0, -self._creep, self.e0 + (0.0 if self._motionless else self._rest_motion)
         if not self.opens:
             return 0.0, 1.0, self._direction * self._limit
 
@@ -406,15 +411,17 @@ class _Friction(LawInStep):
 class _Slipping(LawInStep):
     """Rigid-plastic connector, such as a plastic hinge: constrained up to a limit, then a slip law.
 
-    With R the resistance after the motion m, and any r > 0, the equation for the force λ is
+    With R the resistance after the motion m, any r > 0, and without a back force, the equation for
+    the force λ is
 
         r m = 0 where |λ + r m| <= R, else λ = R or -R:
 
     its residual is continuous in λ and m, as Newton's method requires.
 
     Attributes:
-        excess: ``|force| / limit - 1`` if it is kept closed and exceeds the limit, else 0.
-        released: True if it may open from now on.
+        excess: ``|λ + r m| / limit - 1`` if the connector is kept closed and exceeds the limit,
+            else 0.
+        released: True if the connector may open from now on.
     """
 
     saved_as = "CompiledSlips"
@@ -437,9 +444,7 @@ class _Slipping(LawInStep):
 
     def begin(self, e0: float, step: Step) -> None:
         super().begin(e0, step)
-        self._direction = int(
-            self.z["way"]
-        )  # slip direction of the iterate; at first of the last step
+        self._direction = int(self.z["way"])  # of slip in the iterate; now as in the last step
 
     def _law_step(self, grown: Any, direction: int) -> RigidPlasticStep:
         at = {**self._parameters, **self.z, "θ": self.setting.scheme.theta, "dt": self.dt}
@@ -449,7 +454,7 @@ class _Slipping(LawInStep):
 
     @np.errstate(all="ignore")
     def row(self, e1: float, λ: float) -> Row:
-        """Return α, β, γ around an iterate, after finding its direction of slip."""
+        """Return α, β, γ around an iterate, after finding the direction of slip."""
         z, r, search, self.excess = self.z, self.slope, self.setting.search, 0.0
         motion, limit = e1 - z["start"], z["limit"]
         tested = λ - z["back force"] + r * motion
@@ -517,7 +522,7 @@ def _slope(connector: Connector, size: float) -> float:
 
 
 class _UserLaw(LawInStep):
-    """Force law of a user: a function of motion and rate, of time and its own history."""
+    """Force law of a user: a function of motion, rate, time and its own state."""
 
     entry, saved_as = "functions", "AskedLaws"
 
@@ -533,7 +538,7 @@ class _UserLaw(LawInStep):
         state = self.state()
         state.flags.writeable = False  # all iterates begin with the same state
         self._known = {"t": t, "dt": step.dt, "state": state}
-        self._last: tuple[float, float, float, float] | None = None  # e, λ, residual, motion of law
+        self._last: tuple[float, float, float, float] | None = None  # e, λ, residual, linearised at
 
     def _evaluate(self, e1: float) -> tuple[float, Array]:
         """Return force and internal variables after a step to the motion ``e1``."""
@@ -561,8 +566,9 @@ class _UserLaw(LawInStep):
         """Return the law around an iterate.
 
         At an infinite slope, Newton's method oscillates for ever.  The secant through the two
-        latest iterates approximates the rest of the scene.  The law is linearised at its
-        intersection with this line, if that is between ``e1`` and the previous motion.
+        latest iterates approximates the rest of the scene.  If the residual does not halve, the law
+        is linearised at its intersection with this line, if that is between ``e1`` and the motion
+        of the previous linearisation.
         """
         last, at, residual = self._last, e1, self._evaluate(e1)[0] - λ
         if last is not None and abs(residual) > abs(last[2]) / 2 and e1 != last[0]:
@@ -601,7 +607,7 @@ LAWS: dict[type, type[LawInStep]] = {
     **dict.fromkeys(_Known.KINDS, _Known), ConnectorLaw: _EnergyLaw, Spring: _SpringLaw,
     Coulomb: _Friction, RigidPlastic: _Slipping, ForceLaw: _UserLaw,
 }  # fmt: skip
-"""Classes of laws in a step, by the class of a record or its base."""
+"""Classes of laws in a step, by the class of the law in the scene or a base of it."""
 
 
 def law_in_step(connector: Connector, setting: Setting) -> LawInStep:

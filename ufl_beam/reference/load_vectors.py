@@ -37,11 +37,11 @@ AT_REST = 1e300
 
 
 class LoadForce(Force, ABC):
-    """Base of loads: a factor in time, times forces at the configuration at which loads act.
+    """Base of loads: a function of time, times forces at the configuration where the load acts.
 
     Attributes:
         force: Force in the latest response; (size,).
-        along: :attr:`on_nodes` of loads along beams, at a factor of one.
+        along: :attr:`on_nodes` of loads along beams, for a factor of one.
     """
 
     along: Array | float = 0.0
@@ -56,14 +56,14 @@ class LoadForce(Force, ABC):
 
     @abstractmethod
     def forces(self, q: Array) -> Response:
-        """Return forces at the configuration ``q`` and a factor of one, and their derivative."""
+        """Return forces at the configuration ``q`` for a factor of one, and their derivative."""
 
     def place(self, step: Step, q1: Array) -> Array:
         """Return the configuration at which the load acts if the step ends at ``q1``."""
         return np.asarray(step.q0 + self.scheme.load_weight * (q1 - step.q0))
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return minus the load of the step, in proportion to the substep."""
+        """Return minus the load and its derivative; a substep takes its part of the increment."""
         wanted = value_at(self.time, step.load_time, self.load)
         growth = step.fraction * (wanted - self._reached)
         self.factor, self._end = self._reached + step.at * growth, self._reached + growth
@@ -77,7 +77,7 @@ class LoadForce(Force, ABC):
         self._before, self._reached = self.force, self._end
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
-        """Return the load at time ``t``; the state is assumed in equilibrium with it."""
+        """Return the load at time ``t``, with which the initial state is assumed in equilibrium."""
         self._reached = value_at(self.time, t, self.load)
         self.force = self._before = self._reached * self.forces(q)[0]
         return self.force
@@ -91,9 +91,8 @@ class DeadLoad(LoadForce):
         numbering = setting.numbering
         scene, self._vector = numbering.scene, np.zeros(numbering.size)
         per_beam = np.zeros((len(scene.beams), 3))
-        if isinstance(load, PointLoad) and carries(
-            load.place
-        ):  # else Scene.all_connectors has connectors
+        # Point loads beside the node of a body are connectors in Scene.all_connectors.
+        if isinstance(load, PointLoad) and carries(load.place):
             np.add.at(self._vector, numbering.node(load.place), [*load.force, load.moment])
         elif isinstance(load, LineLoad):
             per_beam[scene.beams.index(load.beam)] = *load.force, load.moment
@@ -110,7 +109,7 @@ class DeadLoad(LoadForce):
         self.along = end_forces(numbering, "density", cells, -along)
 
     def forces(self, q: Array) -> Response:
-        """Return the consistent nodal forces."""
+        """Return the consistent nodal forces, and a derivative of zero."""
         return self._vector, csr_array((self.size, self.size))
 
 
@@ -125,7 +124,7 @@ class Follower(LoadForce):
         )
 
     def forces(self, q: Array) -> Response:
-        """Return (F_x, F_y, M) turned by the rotation."""
+        """Return (F_x, F_y, M) turned with the node, and the derivative."""
         (x, y, M), ψ, force = self._unit_force, q[self._dofs[2]], np.zeros(self.size)
         c, s = math.cos(ψ), math.sin(ψ)
         x, y = c * x - s * y, s * x + c * y
@@ -137,7 +136,7 @@ class Follower(LoadForce):
 class FrameForce(LoadForce):
     """Centrifugal forces, which have a potential, and Coriolis forces, which do no work.
 
-    Rotary inertia keeps its spin in steady rotation, so it causes no moments.
+    The spin of rotary inertia is constant in steady rotation, so there are no moments.
     """
 
     def __init__(self, frame: RotatingFrame, setting: Setting, mass: Mass) -> None:
@@ -154,7 +153,7 @@ class FrameForce(LoadForce):
         self._pull = csr_array(mass.matrix.multiply(self._Ω**2 * self._translational[:, None]))
         nodes = np.concatenate([numbering.dofs_of_bodies, numbering.dofs])
         self._pairs = np.unique(nodes[:, :2], axis=0)  # degrees of freedom u, v of the nodes
-        # Mass times a quarter turn; Coriolis' force is 2 Ω times it times the velocities.
+        # G: mass times a rotation by 90°.  The Coriolis forces are -2 Ω G v.
         (u, _), (w_u, _) = split(ufl.TrialFunction(element.space)), split(element.w)
         density = element.inertia[0] * ufl.dot(perpendicular(u), w_u)
         G = mass.cells.form(density * element.dx_of_mass()).assembled()
@@ -164,21 +163,21 @@ class FrameForce(LoadForce):
             )
         self._gyro = csr_array(self._double * G)
         centers = np.array([body.center for body in numbering.scene.rigid_bodies]).reshape(-1, 2)
-        self._places: Array = np.zeros(numbering.size)  # from the centre of rotation
+        self._places: Array = np.zeros(numbering.size)  # positions from the centre of rotation
         self._places[nodes[:, :2]] = np.concatenate([centers, numbering.points]) - frame.about
 
     def forces(self, q: Array) -> Response:
-        """Return the centrifugal forces at the positions of the nodes."""
+        """Return the centrifugal forces at the positions of the nodes, and their derivative."""
         return np.asarray(self._pull @ (self._places + q)), self._pull
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return minus the centrifugal forces and the Coriolis forces at the mean rate."""
+        """Return minus the forces, and the derivative; Coriolis forces are at mean velocities."""
         r, K = super().response(step, q1)
         coriolis = self._gyro @ (q1 - step.q0) / step.dt
         return np.asarray(r + coriolis), csr_array(K + self._gyro / step.dt)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter the work, and keep mass times the accelerations of the frame in the beams."""
+        """Enter the work, and store the forces of beams by the accelerations of the frame."""
         super().accept(step, q1, s)
         v = (q1 - step.q0) / step.dt
         a = -self.factor * self._Ω**2 * self._translational * (self._places + self.place(step, q1))
@@ -190,7 +189,7 @@ class FrameForce(LoadForce):
 class WorkForce(CellForce):
     """Virtual work or potential of a user on the cells on which it acts.
 
-    Forces of a potential always act fully; virtual works grow over substeps of the first step, as
+    Forces of a potential always act fully; virtual works grow in substeps of the first step, as
     loads do.
     """
 
@@ -223,9 +222,9 @@ class WorkForce(CellForce):
         self._at = t
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return minus the virtual work, or the derivative of the potential, and its derivative.
+        """Return minus the virtual work, or the gradient of the potential, and the derivative.
 
-        Substeps take the same fraction as for loads.
+        A substep takes the same part of the increment as for loads.
         """
         fraction, growth = step.fraction, step.fraction * (1.0 - self._grown)
         self._end = self._t + fraction * (step.motion_time - self._t), self._grown + growth
@@ -243,7 +242,7 @@ class WorkForce(CellForce):
         stored, t = self.stored.get(name, 0.0), float(acting(self._scheme, np.array(self._t), at))
         self._before, (self._t, self._grown) = self.force, self._end
         super().accept(step, q1, s)
-        if self._varies:  # supply by time: the change except its part by the motion
+        if self._varies:  # supplied in time: the energy change without its part by the motion
             self._put(t)
             moved = self.energy(q1) - self.energy(step.q0)
             supplied[self._work.in_time] += self.stored[name] - stored - moved
@@ -255,7 +254,7 @@ class WorkForce(CellForce):
             super().start(q)
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
-        """Return the forces at ``q``, as at the end of a second with constant velocities."""
+        """Return the forces at ``q``, the end of a step of 1 s with constant velocities ``v``."""
         self._t, self._grown = t, 1.0
         self.cells.set(self.element.q0, q if v is None else q - v)
         self.cells.set(self.element.q1, q)
@@ -264,7 +263,7 @@ class WorkForce(CellForce):
         return self.force
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore the forces of the last step if they depend on its motion."""
+        """Save or restore the forces in the last step if they depend on velocities."""
         if self._work.takes_rates and self._scheme.weight_of_before and not self._is_potential:
             self._before = archive.vector(f"work of {self._work.name}", self._before)
 
@@ -289,7 +288,7 @@ class Supports:
     """Supports of a scene, which may be at an angle to the axes of the plane.
 
     Attributes:
-        axes: Orthogonal matrix from the axes of the plane to those of the supports.
+        axes: Orthogonal matrix from the axes of the plane to the axes of the supports.
         constrained: Constrained or prescribed degrees of freedom, in the axes of the supports.
         free: All other degrees of freedom: the unknowns of a step.
         reactions: Forces of the supports in the latest residual, in their axes; (size,).
@@ -328,14 +327,14 @@ class Supports:
             x[dof] = x0[dof] + step.fraction * (wanted - x0[dof])
 
     def stop(self, v: Array) -> Array:
-        """Return velocities with zeros at fixed supports; else they would oscillate."""
+        """Return velocities with zeros at fixed supports, where others would oscillate."""
         x = self.axes @ v
         moving = [dof for dof, *_ in self._motions]
         x[np.setdiff1d(self.constrained, moving)] = 0.0
         return np.asarray(self.axes.T @ x)
 
     def store_reactions(self, r: Array) -> None:
-        """Store the reactions of a residual in the axes of the supports."""
+        """Store the reactions in a residual ``r``, which is in the axes of the supports."""
         self.reactions: Array = np.zeros(len(r))
         self.reactions[self.constrained] = r[self.constrained]
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Return map of material points in NumPy, all points of a kind at once.
+"""Return map of material points in NumPy, for all points of a kind at once.
 
-A point responds to the strain at the end of a step.  Its law is called on arrays; derivatives are
+A point responds to the strain at the end of a step.  Laws are called on arrays; derivatives are by
 complex steps.  If the stress exceeds the resistance of the discontinuity, the jump grows until both
 are equal, and the tangent is condensed.
 """
@@ -22,7 +22,7 @@ from ufl_beam.model.law_functions import Values
 from ufl_beam.reference.cell_forms import Setting
 
 CLOSED, FLOWING = 0.0, 1.0
-"""Flags of a discontinuity that did not grow, or grew, in the last step."""
+"""Flags of a discontinuity that has not grown in the last step, and of one that has."""
 
 IMAGINARY = 1e-200
 """Imaginary step; its square does not change the value."""
@@ -30,10 +30,10 @@ IMAGINARY = 1e-200
 EPS = float(np.finfo(float).eps)
 
 NO_ENERGY = 1e-9
-"""Dissipation, over the size of its terms, that counts as zero."""
+"""Largest energy gain that counts as zero, divided by the size of the terms of dissipation."""
 
 CORRECTIONS, HALVINGS = 100, 10
-"""Maximum number of corrections of the variables of a law, and of halvings of a correction."""
+"""Maximum number of Newton corrections of variables, and of halvings of a correction."""
 
 
 # -- derivatives ---------------------------------------------------------------------------------
@@ -48,7 +48,7 @@ def derivative(f: Callable[[Values], Values], x: Array) -> tuple[Array, Array]:
 def jacobian(
     f: Callable[[At], Array], at: Mapping[str, Values], by: Sequence[str]
 ) -> tuple[Array, Array]:
-    """Return values of functions and derivatives by numbers ``by``; (n, ...), (n, k, ...)."""
+    """Return values of functions, and derivatives by the k inputs ``by``; (n, ...), (n, k, ...)."""
 
     def column(name: str) -> tuple[Array, Array]:
         return derivative(lambda x: f({**at, name: x}), at[name])
@@ -80,8 +80,8 @@ class MaterialPoints:
         at: Numbers of the points by name, including internal variables; (cells, n) each.
         r: (N, V, M) of the latest response; (cells, 3).
         D: Derivatives of ``r`` by the strains; (cells, 3, 3).
-        kept: By cell: (N, V, M) of the accepted state, the jump of the last point, the energies
-            dissipated by plastic strains and by discontinuities; (cells, 6).
+        recorded: For each cell: (N, V, M) of the accepted state, the jump of the last point, the
+            energies dissipated by plastic strains and by discontinuities; (cells, 6).
         stored: Energies in the accepted state, by entry of the ledger; J.
         softens: True if points may open.
         excess: ``|stress| / limit - 1`` of the points that are kept closed, else 0; (cells, n).
@@ -129,8 +129,8 @@ class MaterialPoints:
         self.excess: Array = np.zeros((cells, n))
         self.released: Any = False
         self.softens = section_points.softening is not None
-        # Broken points have no stress where the law holds, but may have a stress at the ends of a
-        # step.
+        # Broken points have no stress where the law holds, but may have a stress at the end of a
+        # step, which is released as a numerical loss.
         over_step = scheme.average(0.0, 1.0) != 1.0
         releases = over_step and (self.softens or curved(section_points.kind))
         losses = {"plastic": section_points.yields, "hinges": self.softens}
@@ -161,7 +161,7 @@ class MaterialPoints:
             at[name][:] = values
         at["growth"][:] = at["direction"][:] = 0.0
         stress, slope = self._bulk(at)
-        first = stress[0]  # the only component of points that can open
+        first = stress[0]  # points that can open have only this component
         over = np.abs(first) > at["traction"]  # P(51)
         closed = over & (at["flows"] == CLOSED) & (at["traction"] > 0) & self._search.hold
         closed &= np.logical_not(self.released)
@@ -175,13 +175,13 @@ class MaterialPoints:
             stress_open, D = self._bulk(at)
             condensed = D * softens / (D / at["length"] + softens)  # P(76)
             stress, slope = np.where(opens, stress_open, stress), np.where(opens, condensed, slope)
-        rest = self._section_points.rest  # stiffness without points
+        rest = self._section_points.rest  # stiffness of resultants without points
         self.r = rest * ((1 - θ) * self.strains0 + θ * strains)
         self.r = self.r + np.einsum("n,acn,nak->ck", w, stress, self._B)
         self.D = np.einsum("n,abcn,nak,nbl->ckl", w, slope, self._B, self._B) + θ * np.diag(rest)
 
     def _bulk(self, at: At) -> tuple[Array, Array]:
-        """Return bulk stresses at t_n+θ, and derivatives; (d, cells, n), (d, d, cells, n)."""
+        """Return bulk stresses at t_n+θ, and slopes by strain; (d, cells, n), (d, d, cells, n)."""
 
         def stress(at: At) -> Array:
             return self._array(self._equations.stress(at))
@@ -230,7 +230,7 @@ class MaterialPoints:
     # -- discontinuities -------------------------------------------------------------------------
 
     def _growth(self, stress: Array, opens: Array) -> Array:
-        """Return the growth for equilibrium of bulk and discontinuity, by Newton in bounds."""
+        """Return the growth for equilibrium of bulk and discontinuity, by Newton within bounds."""
         at, length = self.at, self.at["length"]
 
         def excess(a: Array) -> tuple[Array, Array]:
@@ -240,7 +240,7 @@ class MaterialPoints:
             over = at["direction"] * borne[0] - resists  # P(32)
             return over, -tangent[0, 0] / length - softens
 
-        # An elastic bulk loses all its stress over this growth.
+        # An elastic bulk has lost all its stress after this growth.
         bound = np.abs(stress) / at["stiffness"] * length / self._scheme.theta
         bound += np.finfo(float).tiny
         digits = np.maximum(np.abs(at["before"]), np.abs(at["strain"])) * length
@@ -248,14 +248,15 @@ class MaterialPoints:
         roots, last = np.full_like(stress, np.nan), np.full_like(stress, np.inf)
         low, high = np.zeros_like(stress), np.full_like(stress, np.inf)
         over, slope = excess(low)
-        none = np.logical_not(np.logical_and(opens, over > 0))  # or over the limit by round-off
+        # No growth of points that are closed, or above the limit only by round-off
+        none = np.logical_not(np.logical_and(opens, over > 0))
         a = np.where(slope < 0, np.fmin(bound, -over / slope), bound)
         for _ in range(2 * CORRECTIONS):
             before, (over, slope) = over, excess(a)
             low, high = np.where(over > 0, a, low), np.where(over > 0, high, a)
             better = a - over / slope
             step = np.abs(better - a)
-            # The step after this relative step would be its square, below round-off.
+            # After a relative step of 1e-9 the next would be its square, below round-off.
             ends = np.isnan(roots) & ((step <= 1e-9 * a) | (step <= digits))
             roots = np.where(ends, np.where(better > 0, better, a), roots)
             if (none | ~np.isnan(roots)).all():
@@ -330,17 +331,17 @@ class MaterialPoints:
         lost = {"plastic": plastic.sum(), "hinges": broken.sum(), "numerical": numerical}
         for entry in self._lost:
             self._ledger.lost[entry] += float(lost[entry])
-        self._hold(self.strains)
+        self._update_accepted(self.strains)
 
     def start(self, strains: Array) -> None:
         """Begin at these strains of the cells, without a step; (cells, 3)."""
         softening, breaking = self._section_points.softening, self._section_points.breaking
         if softening is not None:
             self.at["traction"][:, breaking] = softening.traction(self.at["opening"][:, breaking])
-        self._hold(strains.copy())
+        self._update_accepted(strains.copy())
 
-    def _hold(self, strains: Array) -> None:
-        """Compute forces and stored energies from the variables at these strains."""
+    def _update_accepted(self, strains: Array) -> None:
+        """Compute forces and stored energies of the accepted state from variables and strains."""
         at, w = self.at, self._section_points.weights
         self.strains0, point_strains = strains, self._at_points(strains)
         for name, values in zip(self._e0, point_strains, strict=True):
@@ -357,9 +358,9 @@ class MaterialPoints:
         self.stored = {entry: by_entry[entry] for entry in self.stored}
 
     def state(self, values: Array | None = None) -> Array:
-        """Return the accepted internal variables, (cells, k), after ``values`` has replaced them.
+        """Return the accepted internal variables, (cells, k); ``values`` replace them if given.
 
-        Forces and stored energies follow from :meth:`start`.
+        :meth:`start` then computes forces and stored energies.
         """
         if values is not None:
             n = self.at["length"].shape[1]
@@ -367,13 +368,13 @@ class MaterialPoints:
                 self.at[name][:] = values[:, i * n : (i + 1) * n]
             self.recorded = values[:, -11:-5].copy()
         stored = np.zeros((len(self.recorded), 2))
-        # The energy of all cells together; the owner does not matter.
+        # The first row has the energies of all cells, as only the sum over the rows is used.
         stored[:1] = self.stored["stored"], self.stored.get("hardening", 0.0)
         variables = [self.at[name] for name in self._variables]
         return np.asarray(np.hstack([*variables, self.recorded, self.strains0, stored]))
 
 
 def _largest_ratio(residuals: Array, sizes: Array) -> Array:
-    """Return the largest ratio of residuals of a law to their sizes; infinite instead of NaN."""
+    """Return the largest ratio of a residual of a law to its size; infinite instead of NaN."""
     ratio = np.where(residuals == 0, 0.0, np.abs(residuals) / sizes)
     return np.asarray(np.nan_to_num(ratio, nan=np.inf, posinf=np.inf).max(axis=0))

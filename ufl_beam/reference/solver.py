@@ -43,7 +43,7 @@ from ufl_beam.reference.connector_residuals import Connectors, all_connectors
 from ufl_beam.reference.load_vectors import Supports, all_loads
 
 LARGEST_ROTATION = 0.75 * math.pi
-"""Largest rotation of a node in a step before it is cut; the algorithmic strains end at π."""
+"""Rotation of a node above which a step is cut, as 2 tan(Δψ/2) is infinite at π; rad."""
 
 MOST_SUBSTEPS = 2**12
 """Largest number of substeps of a step."""
@@ -52,31 +52,31 @@ FIRST_TOLERANCE = 1e-4
 """Fraction of the tolerance that first iterates have to meet."""
 
 STALL_LIMIT = 8
-"""Iterations without halving the least residual after which Newton's method stops."""
+"""Number of iterations without halving the least residual after which Newton's method stops."""
 
-FIRST = 1 / 16
-"""Fraction of the first step whose end accelerations serve as initial accelerations."""
+TRIAL_STEP = 1 / 16
+"""Length of the trial step for initial accelerations, as a fraction of the first step."""
 
 APPLYING = 1 / 8
-"""Fraction of the first step in which loads that act from the start are applied."""
+"""Fraction of the first step, at its beginning, in which initially acting loads are applied."""
 
 APPLYING_ROTATION = 0.02
 """Largest rotation of a node in a substep while these loads are applied; rad."""
 
 SHORT_SUBSTEP = 512
-"""Ratio of that fraction of the step to a substep from which on the rotation has no limit."""
+"""Ratio of the time in which these loads are applied to the longest substep without this limit."""
 
 EXCESS_DECAY = 0.7
-"""Factor, for each repetition, of the largest excess over a limit from which on points open."""
+"""Factor of the largest excess above which points open; its exponent is the repetition."""
 
 EXCESS_TOLERANCE = 1e-9
-"""Difference of excesses that does not matter."""
+"""Largest difference of excesses that count as equal."""
 
 LARGEST_MOTION = 1e3
-"""Largest motion in a static step that is no mechanism, over the size of the scene, or rad."""
+"""Largest motion in a static step that is no mechanism; rad, or divided by the scene's size."""
 
 KINK_WORK = 1e-6
-"""Work that a kink of a law may leave unexplained, over the energy that went through."""
+"""Largest difference of work and energy by kinks of laws, relative to the sum of the ledger."""
 
 SAMPLE_TOLERANCE = 1e-9
 """Fraction of a sample time by which the end of a step may miss it."""
@@ -150,9 +150,9 @@ class Solver(PresentState):
         damping = damping_forces(setting, self.inertia)
         self.forces: list[Force] = [*self.inner, *self.loads, *inertia, *damping]
         self._groups = [group for group in self.connectors if isinstance(group, Connectors)]
-        candidates = (law.opens for group in self._groups for law in group.laws)
-        self._open: list[Any] = [candidate for candidate in candidates if candidate is not None]
-        self._open += [beams.points for beams in self.yielding if beams.points.softens]
+        opening = (law.opens for group in self._groups for law in group.laws)
+        self._candidates: list[Any] = [candidate for candidate in opening if candidate is not None]
+        self._candidates += [beams.points for beams in self.yielding if beams.points.softens]
 
         self._weights: Array = np.ones(numbering.size)  # make forces and moments comparable
         self._weights[numbering.rotations] = 1 / self.scene.size
@@ -167,7 +167,8 @@ class Solver(PresentState):
     def start(self, internal: dict[str, Array] | None, *, same: bool) -> None:
         """Begin with the internal variables of another run, if there are any.
 
-        ``same`` means that the scene and the time are as at its end, so that no force has jumped.
+        ``same`` means that scene and time are as at the end of that run, so that no force has
+        jumped.
         """
         scheme, variables = self.scheme, dict(internal or {})
         self._continues = internal is not None
@@ -203,7 +204,7 @@ class Solver(PresentState):
         self._sum_energies()
 
     def internal(self, variables: Mapping[str, Array] | None = None) -> dict[str, Array]:
-        """Return data for later steps, by name, after ``variables`` has replaced its entries."""
+        """Return the data that later steps need, by name; entries of ``variables`` replace them."""
         archive, supports = Archive(variables or {}), self.supports
         supports.before = supports.reactions = archive.vector("reactions", supports.before)
         for force in self.forces:
@@ -232,7 +233,7 @@ class Solver(PresentState):
         if self.parts == 0 and not self._continues and not at_end:
             frames = any(isinstance(load, RotatingFrame) for load in scene.loads)
             if frames or scene.works or any(f(self.t) != 0 for _, f in scene.time_functions()):
-                # Loads that act at the beginning are applied before the first step.
+                # Loads that act at the beginning are applied first, in a part of the step.
                 begin, end = self.t, self.t + APPLYING * (t1 - self.t)
                 self._in_substeps(end, partial(self._attempt, end=end, at_rest=begin))
                 self.last_dt = math.inf  # the next guess does not extrapolate these substeps
@@ -257,15 +258,14 @@ class Solver(PresentState):
                 substep *= 2  # a larger substep can begin here
 
     def _attempt(self, t1: float, end: float, at_rest: float | None = None) -> None:
-        """Take the step to ``t1``, in a whole step to ``end``, if there is an equilibrium.
+        """Take the substep to ``t1`` of a whole step to ``end``.
 
-        With ``at_rest`` the loads of that time are applied, in substeps with small rotations of
-        nodes.
+        If ``at_rest`` is given, the loads of that time are applied, and nodes must not turn far.
         """
         inertia = self.inertia
         if inertia is not None and inertia.scheme.kept and not inertia.more:
             # A short trial step gives the initial accelerations.
-            t = self.t + FIRST * (t1 - self.t)
+            t = self.t + TRIAL_STEP * (t1 - self.t)
             q1, s = self._solve(Step.of(self.scheme, self.t, t, t1, self.q))
             inertia.more = inertia.after(s)[1:]
             self.supports.before = self.supports.reactions
@@ -281,7 +281,7 @@ class Solver(PresentState):
         self._accept(step, q1, s)
 
     def _solve(self, step: Step) -> tuple[Array, Array]:
-        """Return the configuration at the end of a step, and the nodal step that forces work on."""
+        """Return the end configuration of a step, and the nodal step on which forces do work."""
         q0, axes = self.q, self.supports.axes
         self.evaluate()
         self.begin(step)
@@ -309,10 +309,10 @@ class Solver(PresentState):
         return float(np.abs(q1 - self.q)[self.numbering.rotations].max(initial=0.0))
 
     def _require_path(self, q1: Array, s: Array, in_beams: float, in_connectors: float) -> None:
-        """Raise :class:`StepFailed` if a static step has jumped to another branch of equilibria.
+        """Raise :class:`StepFailed` if a static step has moved far or jumped to another branch.
 
-        Along the path the work of internal forces equals the stored and dissipated energy of the
-        step.
+        Along a path of equilibria the work of the internal forces equals the energy that the step
+        stores and dissipates.
         """
         moves = np.abs(s) / self.scene.size
         moves[self.numbering.rotations] *= self.scene.size
@@ -357,17 +357,17 @@ class Solver(PresentState):
         """Find the equilibrium of a step without unnecessary openings.
 
         A point or connector that does not flow at the beginning stays closed if an equilibrium
-        exists in which it bears at most its limit.  Of several above their limits, the one with the
-        largest excess opens first.
+        exists in which it bears at most its limit.  Of several above their limits, those with the
+        largest excess open first.
         """
-        if not self._open:
+        if not self._candidates:
             return self._newton(guess)
         self.search.hold, self.search.over = True, False
         try:
             x, times = self._newton(guess), 0
-            while excess := max(float(np.max(candidate.excess)) for candidate in self._open):
+            while excess := max(float(np.max(candidate.excess)) for candidate in self._candidates):
                 least = EXCESS_DECAY**times * excess - EXCESS_TOLERANCE
-                for candidate in self._open:
+                for candidate in self._candidates:
                     candidate.released |= (candidate.excess > 0) & (candidate.excess >= least)
                 x, times = self._newton(x), times + 1
             return x
@@ -376,7 +376,7 @@ class Solver(PresentState):
                 raise  # nothing would open
         finally:
             self.search.hold = False
-            for candidate in self._open:
+            for candidate in self._candidates:
                 candidate.released = False
         self.begin(step)
         return self._newton(guess)
@@ -457,7 +457,7 @@ class Solver(PresentState):
                 cause = cause.__cause__
             if not isinstance(cause, PETSc.Error):
                 raise cause from None
-            self._make_snes()  # MUMPS has stopped it without a pivot
+            self._make_snes()  # as MUMPS has found no pivot
             return int(REASONS.DIVERGED_LINEAR_SOLVE)
         self.iterations += self.snes.getIterationNumber()
         return int(self.snes.getConvergedReason())
@@ -472,14 +472,14 @@ class Solver(PresentState):
         """Compute the residual of the free degrees of freedom; NaN after an error stops SNES."""
         try:
             self._r, self._K = self.response(self._all(vector))
-        except Exception as error:  # of a function of the user
+        except Exception as error:  # of a user's function
             self._error = error
         if self._error is not None:
             self._r = np.full(self.numbering.size, np.nan)
         f.array_w[:] = self._r[self.supports.free]
 
     def _jacobian(self, snes: PETSc.SNES, vector: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
-        """Set the derivative of the residual by the free degrees of freedom."""
+        """Set the derivative with respect to the free degrees of freedom."""
         K = csr_array(self._K[self.supports.free][:, self.supports.free])
         if not np.isfinite(K.data).all():
             self._error = self._error or StepFailed("the tangent has entries that are no numbers")
@@ -517,11 +517,11 @@ class Solver(PresentState):
         return REASONS.DIVERGED_DTOL if self._slow > STALL_LIMIT else REASONS.CONVERGED_ITERATING
 
     def _norm(self, forces: Array) -> float:
-        """Return the norm of forces, and of moments over the size of the scene; N."""
+        """Return the norm of forces, and of moments divided by the size of the scene; N."""
         return float(np.linalg.norm(self._weights * forces))
 
     def _round_off(self, x: Array) -> Array:
-        """Return the residual by round-off of motions; N, N m."""
+        """Return the residuals that round-off of the motions causes; N, N m."""
         motions = np.abs(x) * (self._weights > 0)
         return np.asarray(np.abs(self._K) @ np.spacing(motions))
 
@@ -540,7 +540,7 @@ class Solver(PresentState):
     # -- controllers and friction ----------------------------------------------------------------
 
     def evaluate(self) -> None:
-        """Evaluate controllers and limits of friction; store the rates of friction."""
+        """Evaluate controllers and limits of friction; store the rates of motions with friction."""
         for connector in self.requested_forces:
             due = self._due(connector) if connector in self._sampled else None
             if due is None or due != self.samples.get(connector):
@@ -584,9 +584,9 @@ class Solver(PresentState):
 
     @property
     def now(self) -> States:
-        """Present state as a solution; initial reactions are reactions of the scene at rest."""
+        """Present state as a solution; initial static reactions belong to the initial forces."""
         reactions = np.array(self.supports.forces())
-        for k, support in enumerate(self.scene.supports):  # in its axes
+        for k, support in enumerate(self.scene.supports):  # in the axes of the support
             reactions[k, :2] = turned(reactions[k, :2], np.full(1, -support.angle))[0]
         rows = np.concatenate([np.zeros((0, 7)), *(beams.material() for beams in self.yielding)])
         state = {"t": np.array(self.t), "q": self.q, "reactions": reactions}
