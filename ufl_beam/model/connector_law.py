@@ -100,7 +100,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
             motion: Motion at the time of the step at which the law holds; m or rad.
             rate: Mean rate of the step; m/s or rad/s.
             state: Internal variables at the time of the motion.
-            dt: Length of the step; s.
+            dt: Length of the step, infinite on a path; s.
         """
         return 0.0 if self.components == 1 else self.components * (0.0,)
 
@@ -252,7 +252,7 @@ CALLED = ("energy", "limit", "resistance", "sliding", "increments")
 
 
 def require_limit(law: ConnectorLaw, what: str) -> None:
-    """Raise :class:`ModelError` unless the increments of a law have a limit for long steps."""
+    """Raise :class:`ModelError` unless the increments of a law are finite for an infinite step."""
     motion, rest = (law.as_argument([np.full(1, x)] * law.components) for x in (0.5, 0.0))
     with np.errstate(all="ignore"):
         changes = law.increments(motion, rest, initial_state(law), np.inf) if law.variables else {}
