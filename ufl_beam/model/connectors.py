@@ -271,7 +271,7 @@ class Component(Connector):
         return self.owner
 
 
-UNIT = 4 * sys.float_info.epsilon
+UNIT_TOLERANCE = 4 * sys.float_info.epsilon
 """Largest difference of the length of a unit vector from 1 by round-off."""
 
 
@@ -286,7 +286,7 @@ def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: 
             f"{kind}({a}, {b}): the axis has zero length; give axis = (x, y), a direction in the "
             "undeformed scene"
         )
-    if abs(length - 1.0) <= UNIT:  # axes that are read from files must not change
+    if abs(length - 1.0) <= UNIT_TOLERANCE:  # axes that are read from files must not change
         return x, y
     return x / length, y / length
 

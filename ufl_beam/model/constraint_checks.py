@@ -72,7 +72,7 @@ def require_inertia(scene: Scene) -> None:
     """
     inertias = [(s.rhoA, s.rhoA, s.rhoA or s.rhoI) for s in (beam.section for beam in scene.beams)]
     inertias += [(body.mass, body.mass, body.inertia) for body in scene.bodies]
-    loose = np.flatnonzero(np.array(inertias) == 0.0)  # columns of :func:`_constraints`
+    loose = np.flatnonzero(np.array(inertias) == 0.0)  # columns of the matrix of _constraints
     if not loose.size:
         return
     masses = [
@@ -102,7 +102,7 @@ def require_inertia(scene: Scene) -> None:
 
 
 def _fixed(scene: Scene) -> set[NodeDof]:
-    """Return the degrees of freedom of the ground, and those held by supports in x and y."""
+    """Return the degrees of freedom of the ground, and those held by supports in unrotated axes."""
     same = scene.representatives
     by_supports = {same[node(s.place), c] for s in scene.supports if not s.angle for c in s.held}
     return {same[GROUND, component] for component in range(3)} | by_supports
@@ -305,7 +305,7 @@ def _sparse(terms: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> 
 
 
 def _null_space(constraints: csr_array) -> Array:
-    """Return an orthonormal basis of the null space in columns; at most six if it is sparse."""
+    """Return an orthonormal basis of the null space, in columns; at most 6 beyond :data:`DENSE`."""
     unknowns = constraints.shape[1]
     if unknowns <= DENSE:
         _, sizes, rows = np.linalg.svd(constraints.toarray(), full_matrices=True)
