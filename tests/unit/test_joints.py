@@ -62,7 +62,7 @@ BAD = {
     "guide": (
         lambda: ub.Scene([PLACE.beam], joints=[ub.Guided(PLACE, lambda s: (s, 1.0))]),
         "must be at the place"),
-    "guide at rest": (lambda: ub.Guided(PLACE, lambda s: (1.0, 0.0)), "the curve stands still"),
+    "guide at rest": (lambda: ub.Guided(PLACE, lambda s: (1.0, 0.0)), "the curve has no direction"),
     "guide of a rim": (lambda: ub.Guided(body().at(1, 0), lambda s: (1, s)), "the centre of the"),
     "clamp of a rim": (lambda: ub.Clamped(body().at(1, 0)), "is not the centre of the body"),
     "clamp of the ground": (lambda: ub.Clamped(ub.ground(1, 0)), "does not move"),
