@@ -31,7 +31,7 @@ REACH = 1e-3
 """Step of finite differences for tangents, as a fraction of a length.  A tangent has an error of
 some 1e-12 if this length is the radius of the curve; round-off costs three digits."""
 
-PROJECTIONS = 50
+MOST_ITERATIONS = 50
 """Largest number of iterations in the search for the point of a curve nearest to another."""
 
 WEIGHTS = np.array(
@@ -159,7 +159,7 @@ def nearest(curve: Curve, point: Array, s: float, step: float, length: float) ->
     scene; m.
     """
     last_digits = 4 * np.spacing(length + math.hypot(*point))
-    for _ in range(PROJECTIONS):
+    for _ in range(MOST_ITERATIONS):
         t = tangent(curve, s, step)
         change = float((point - curve(s)) @ t / (t @ t))
         s += change
