@@ -210,7 +210,7 @@ class Rayleigh(Record):
 @closed("state other damping as a VirtualWork of v")
 @dataclass(frozen=True, eq=False)
 class KelvinVoigt(Record):
-    """Kelvin-Voigt damping: viscous resultants, C times the strain rates; objective.
+    """Kelvin-Voigt damping: viscous resultants, retardation_time C times strain rates; objective.
 
     Rigid motion is not damped.  The damping ratio of a mode of circular frequency ω in small
     vibration is retardation_time ω/2, as with ``Rayleigh(stiffness=retardation_time)``.  Cells of a
