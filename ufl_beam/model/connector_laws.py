@@ -311,7 +311,7 @@ class Clearance(Record, ConnectorLaw):
         return self.damping == 0.0 and not self.rubs
 
     def _contact(self, motion: Any, rate: Any = (0.0, 0.0)) -> tuple[Values, ...]:
-        """Return elastic and damping force, N, and the direction from the hole's centre to the pin's."""
+        """Return elastic and damping force, N, and the direction from hole centre to pin centre."""
         x, y = motion[:2]
         r = sqrt(larger(x**2 + y**2, (self.gap / 2) ** 2))  # at zero there is no direction
         x, y, elastic = x / r, y / r, self.stiffness * positive(r - self.gap)
