@@ -51,12 +51,12 @@ def require_masses(scene: Scene) -> None:
     """
     if not scene.bodies:
         return
-    same, moved = scene.representatives, _fixed(scene)
+    same, determined = scene.representatives, _fixed(scene)
     for alike in scene.shared_by_joints:
-        moved |= {same[dof] for dof in alike if not isinstance(dof[0], Body)}
+        determined |= {same[dof] for dof in alike if not isinstance(dof[0], Body)}
     for body in scene.bodies:
         for name, components in (("mass", (0, 1)), ("inertia", (2,))):
-            free = any(same[body, component] not in moved for component in components)
+            free = any(same[body, component] not in determined for component in components)
             if free and getattr(body, name) == 0.0:
                 raise ModelError(
                     f"{body.name}: {name} = 0, but dynamics needs it to be positive; use RigidLink "
@@ -118,21 +118,22 @@ def require_independent(scene: Scene) -> None:
     They do if their gradients with respect to the free degrees of freedom are linearly dependent in
     the undeformed scene.  A rigid-plastic connector is a constraint below its limit.
     """
-    rows, within = _dependences(scene)
-    if within.shape[1] == 0:
+    rows, combinations = _dependences(scene)
+    if combinations.shape[1] == 0:
         return
-    dependent = [rows[i] for i in np.flatnonzero(np.abs(within).max(axis=1) > 1e-6)]
+    dependent = [rows[i] for i in np.flatnonzero(np.abs(combinations).max(axis=1) > 1e-6)]
     joints = {holder: joint for joint in scene.joints for holder in joint.holders}
     owners: list[object] = [joints.get(owner, owner) for owner, _ in dependent]
-    owners += _already(scene, [row for _, row in dependent])
+    owners += _supports_and_joints_at(scene, [row for _, row in dependent])
     names = [
         f"{owner} with {type(owner.law).__name__}" if isinstance(owner, Connector) else str(owner)
         for owner in {id(owner): owner for owner in owners}.values()
     ]
     rigid = any(isinstance(getattr(owner, "law", None), RigidPlastic) for owner in owners)
     raise ModelError(
-        f"constraints repeat or contradict each other: {within.shape[1]} of the constraints of "
-        f"{'; '.join(names)} can be left out. Remove one, or make it elastic: "
+        "constraints repeat or contradict each other: "
+        f"{combinations.shape[1]} of the constraints of {'; '.join(names)} can be left out. "
+        "Remove one, or make it elastic: "
         + (
             "a RigidPlastic connector holds its motion until it yields, and a "
             "Spring(stiffness, law=...) yields, too; replace two in parallel by one with the "
@@ -143,7 +144,7 @@ def require_independent(scene: Scene) -> None:
     )
 
 
-def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
+def _supports_and_joints_at(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
     """Iterate over supports that hold, and joints that equate, degrees of freedom of ``rows``."""
     same = scene.representatives
     supports = {same[node(s.place), c]: s for s in scene.supports for c in s.held if not s.angle}
@@ -181,25 +182,25 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
     same, fixed = scene.representatives, _fixed(scene)
     turned = (support for support in scene.supports if support.angle)
     rows = [*_rows(scene, holds, turned)]
-    moved: list[dict[NodeDof, float]] = []
-    users: dict[NodeDof, set[int]] = defaultdict(set)
+    entries: list[dict[NodeDof, float]] = []
+    rows_at: dict[NodeDof, set[int]] = defaultdict(set)
     for number, (_, row) in enumerate(rows):
         sums: dict[NodeDof, float] = defaultdict(float)
         for carrier, factors in row:
             for component, factor in enumerate(factors):
                 sums[same[carrier, component]] += factor
         # Factors of one degree of freedom at both ends cancel, which leaves round-off.
-        moved.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
-        for dof in moved[-1]:
-            users[dof].add(number)
+        entries.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
+        for dof in entries[-1]:
+            rows_at[dof].add(number)
     left = set(range(len(rows)))
-    alone = [dof for dof, indices in users.items() if len(indices) == 1]
+    alone = [dof for dof, indices in rows_at.items() if len(indices) == 1]
     while alone:
-        for number in users[alone.pop()] & left:
+        for number in rows_at[alone.pop()] & left:
             left.discard(number)
-            for dof in moved[number]:
-                users[dof].discard(number)
-                if len(users[dof]) == 1:
+            for dof in entries[number]:
+                rows_at[dof].discard(number)
+                if len(rows_at[dof]) == 1:
                     alone.append(dof)
     if not left:
         return [], np.zeros((0, 0))
@@ -208,7 +209,7 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
     terms = [
         (columns.setdefault(dof, len(columns)), column, factor)
         for column, number in enumerate(indices)
-        for dof, factor in moved[number].items()
+        for dof, factor in entries[number].items()
     ]
     gradients = _sparse(terms, (max(len(columns), 1), len(indices)))
     return [rows[number] for number in indices], _null_space(gradients)
@@ -229,13 +230,13 @@ def require_no_mechanism(scene: Scene) -> str:
     moving = _moving(scene, free[:, 0])
     more = f"; and {len(moving) - 4} more" if len(moving) > 4 else ""
     ways = "way" if free.shape[1] == 1 else "independent ways"
-    said = (
+    description = (
         f"the scene is free to move in {free.shape[1]} {ways}, so statics has no unique answer: "
         f"{'; '.join(moving[:4])}{more}. "
     )
     if not scene.loads:
-        raise ModelError(said + INSTEAD)
-    return said
+        raise ModelError(description + INSTEAD)
+    return description
 
 
 def _center(member: Member | Body) -> Point:
