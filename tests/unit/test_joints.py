@@ -37,7 +37,7 @@ BAD = {
     ),
     "axis of one point": (lambda: ub.Prismatic(ub.ground(1, 0), PLACE), "the axis has zero length"),
     "link": (lambda: ub.Link(ub.ground(1, 0), PLACE), "Link(ground (1, 0), beam.end (1, 0)): zero"),
-    "rigid link": (lambda: ub.RigidLink(PLACE, body(1.0).middle), "zero length; join the places with"),
+    "rigid link": (lambda: ub.RigidLink(PLACE, body(1.0).middle), "zero length; join the places"),
     "stretch": (lambda: ub.Stretch(PLACE, body(1.0).middle, ub.Spring(1.0)), "zero length"),
     "law": (lambda: ub.Turn(PLACE, body().middle, 3.0), "law = 3.0 is not a"),
     "stiffness": (lambda: ub.Spring(-1.0), "Spring: stiffness = -1 must be positive"),
