@@ -124,7 +124,7 @@ PARTS = [
     (lambda: beam(hinges={0.5: BREAKS, 0.5 + 1e-13: BREAKS}), "two hinges at s = 0.5...give one"),
     (
         lambda: ub.Beam((0, 0), (1, 0), in_fibres(), hinges={0.5: BREAKS}),
-        "beam: hinges are for resultants; here the fibres of the section soften",
+        "beam: hinges are for resultants; fibres break by Fibres(softening=)",
     ),
     # functions of time
     (lambda: ub.Table([0, 2, 1], [0, 0, 0]), "Table: times must increase...times[1] = 2...by 1"),

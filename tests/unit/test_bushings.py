@@ -406,8 +406,8 @@ def test_wrong_bushings_are_refused(make, message):
     [
         ({"stiffness": 0.0, "gap": 1e-3}, "stiffness"),
         ({"stiffness": 1e6, "gap": 0.0}, "gap"),
-        ({"stiffness": 1e6, "gap": 1e-3, "friction": 0.1}, "give friction and radius together"),
-        ({"stiffness": 1e6, "gap": 1e-3, "radius": 0.1}, "give friction and radius together"),
+        ({"stiffness": 1e6, "gap": 1e-3, "friction": 0.1}, "give friction and the radius"),
+        ({"stiffness": 1e6, "gap": 1e-3, "radius": 0.1}, "give friction and the radius"),
         ({"stiffness": 1e6, "gap": 1e-3, "damping": -1.0}, "damping"),
     ],
 )

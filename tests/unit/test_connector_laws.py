@@ -498,7 +498,7 @@ ONE = {"variables": {"z": 0.0}, "energy": quadratic}
         (lambda: law_of(energy=quadratic, fields={"k": math.nan}), "Mine: k = nan is not finite"),
         (lambda: law_of(energy=quadratic, fields={"k": "x"}), "Mine: k = 'x' is not a number"),
         (lambda: law_of(energy=quadratic, fields={"parameters": 1.0}), "have the name parameters"),
-        (lambda: law_of(energy=quadratic, entry="kinetic"), "is no name of a loss; there"),
+        (lambda: law_of(energy=quadratic, entry="kinetic"), "is no entry for a loss; use"),
         (lambda: law_of(energy=quadratic, entry=3), "Mine.entry = 3 must be text"),
         (lambda: law_of(**ONE), "has variables and no increments"),
         (lambda: law_of(**ONE, increments=lambda s, e, r, z, dt: {}), "lacks z"),

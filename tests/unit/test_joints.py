@@ -37,7 +37,7 @@ BAD = {
     ),
     "axis of one point": (lambda: ub.Prismatic(ub.ground(1, 0), PLACE), "the axis has zero length"),
     "link": (lambda: ub.Link(ub.ground(1, 0), PLACE), "Link(ground (1, 0), beam.end (1, 0)): zero"),
-    "rigid link": (lambda: ub.RigidLink(PLACE, body(1.0).middle), "zero length; join them with"),
+    "rigid link": (lambda: ub.RigidLink(PLACE, body(1.0).middle), "zero length; join the places"),
     "stretch": (lambda: ub.Stretch(PLACE, body(1.0).middle, ub.Spring(1.0)), "zero length"),
     "law": (lambda: ub.Turn(PLACE, body().middle, 3.0), "law = 3.0 is not a"),
     "stiffness": (lambda: ub.Spring(-1.0), "Spring: stiffness = -1 must be positive"),
@@ -62,7 +62,7 @@ BAD = {
     "guide": (
         lambda: ub.Scene([PLACE.beam], joints=[ub.Guided(PLACE, lambda s: (s, 1.0))]),
         "must be at the place"),
-    "guide at rest": (lambda: ub.Guided(PLACE, lambda s: (1.0, 0.0)), "the curve stands still"),
+    "guide at rest": (lambda: ub.Guided(PLACE, lambda s: (1.0, 0.0)), "the curve has no direction"),
     "guide of a rim": (lambda: ub.Guided(body().at(1, 0), lambda s: (1, s)), "the centre of the"),
     "clamp of a rim": (lambda: ub.Clamped(body().at(1, 0)), "is not the centre of the body"),
     "clamp of the ground": (lambda: ub.Clamped(ub.ground(1, 0)), "does not move"),

@@ -55,7 +55,7 @@ def test_a_massless_beam_that_nothing_holds(rotary):
     """Its motion is not determined; EnergyMomentum made it go to and fro."""
     loose = beam((2, 0), (3, 1), ub.Section(**LIGHT, rhoA=0.0, rhoI=rotary), name="loose")
     held = beam()
-    with raises("dynamics needs mass or something that holds: loose (beam 1) can shift along"):
+    with raises("dynamics needs mass or resistance for every motion: loose (beam 1) can shift"):
         begin(held, loose, supports=[ub.Clamped(held.start)])
 
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """C library of the package: loops over cells and rows, material points, Newton's method.
 
-It is compiled once for the machine.  The loops over cells assemble as DOLFINx does (a test compares
-both); they also update the unknowns of a cell, and store the matrix indices of its entries.
+It is compiled once for the machine.  The loops over cells assemble the same vectors and matrices as
+DOLFINx (a test compares both).  In addition they copy the unknowns into the coefficients of a cell,
+and add its entries at stored indices of the matrix.
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ SOURCES = (
     "connectors", "guide_curves", "beam_elimination", "fronts", "newton", "cell_forces",
     "term_phases", "energy_ledger", "time_loop",
 )  # fmt: skip
-"""C files beside this one; they form one translation unit."""
+"""C files in the folder c; they form one translation unit."""
 
 FLAGS = ["-O3", NATIVE, "-fopenmp-simd", "-ffp-contract=off"]
-"""Compiler flags; sums may be reordered for vectors, but each product is rounded, as in NumPy."""
+"""Compiler flags; the order of sums may change for vectors, but each product is rounded first."""
 
 _CALLBACKS = """
 extern "Python" void curve_in_python(void *handle, double s, double step, double *out);
@@ -63,7 +64,7 @@ module = compiled(
 ffi: Any = module.ffi
 lib: Any = module.lib
 
-_PETSC = ctypes.CDLL(PETSc.__file__)  # petsc4py, which has loaded PETSc
+_PETSC = ctypes.CDLL(PETSc.__file__)  # petsc4py has loaded PETSc
 for _name, _field in ffi.typeof("petsc_functions").fields:
     _address = ctypes.cast(getattr(_PETSC, _name), ctypes.c_void_p).value
     setattr(lib.petsc, _name, ffi.cast(_field.type, _address))
@@ -93,11 +94,11 @@ def loop(name: str, data: Any) -> Loop:
 
 
 doubles = partial(ffi.from_buffer, ffi.typeof("double[]"))
-"""Pointer to a contiguous array of float64; it keeps the array alive."""
+"""Return a pointer to a contiguous array of float64; the pointer keeps it alive."""
 
 
 def view_pointer(array: Array) -> Any:
-    """Return a pointer to the first number of a view of float64; it keeps the array alive."""
+    """Return a pointer to the first number of a view of float64; the pointer keeps it alive."""
     return ffi.gc(ffi.cast("double *", array.ctypes.data), lambda _, alive=array: None)
 
 
@@ -105,7 +106,7 @@ _INT32, _INT32_ARRAY = np.dtype(np.int32), ffi.typeof("int32_t[]")
 
 
 def integers(array: Index) -> Any:
-    """Return a pointer to a contiguous array of int32; it keeps the array alive."""
+    """Return a pointer to a contiguous array of int32; the pointer keeps it alive."""
     if array.dtype != _INT32:
         raise TypeError(f"C takes integers of 32 bits, not {array.dtype}")
     return ffi.from_buffer(_INT32_ARRAY, array)
@@ -115,9 +116,9 @@ _alive: WeakKeyDictionary[Any, dict[str, Any]] = WeakKeyDictionary()
 
 
 def fill(struct: Any, **fields: Any) -> Any:
-    """Set fields of a struct of loops.h and return it; it keeps the values alive.
+    """Set fields of a struct of loops.h and return the struct, which keeps the values alive.
 
-    Arrays become pointers to their float64 or int32.
+    Arrays of float64 or int32 become pointers.
     """
     alive = _alive.setdefault(struct, {})
     for name, value in fields.items():
@@ -134,7 +135,7 @@ def struct(kind: str, **fields: Any) -> Any:
 
 
 def names(enum: str, prefix: str = "") -> tuple[str, ...]:
-    """Return the names in an enum of loops.h, in order, without the last, which is their number."""
+    """Return the names of an enum of loops.h in order, without the last one, which counts them."""
     elements = ffi.typeof(f"enum {enum}").elements
     return tuple(elements[i].lower().removeprefix(prefix) for i in range(len(elements) - 1))
 
@@ -148,7 +149,7 @@ def in_order(enum: str, values: Mapping[str, T], prefix: str = "") -> list[T]:
 
 
 LARGE_SCENE = 2**16
-"""Number of unknowns from which on memory is released to the system; that takes 0.03 ms or more."""
+"""Number of unknowns above which memory is returned to the system, in 0.03 ms or more."""
 
 
 def give_back_memory(unknowns: int) -> None:
@@ -158,11 +159,11 @@ def give_back_memory(unknowns: int) -> None:
 
 
 def kernel(pointer: Any, instance: Any) -> Any:
-    """Cast an FFCx kernel, a function pointer of the cffi ``instance``, for loops.h."""
+    """Return the FFCx kernel ``pointer``, which belongs to a cffi ``instance``, for loops.h."""
     expected, actual = ffi.typeof("kernel *").cname, instance.typeof(pointer).cname
     if actual != expected:
         raise RuntimeError(
-            f"{VERSIONS} make kernels of the C type {actual}; ufl_beam calls {expected}. It is "
-            "tested with DOLFINx 0.9 to 0.11"
+            f"{VERSIONS} make kernels of the C type {actual}; ufl_beam calls {expected}, and "
+            "is tested with DOLFINx 0.9 to 0.11"
         )
     return ffi.cast("kernel *", int(instance.cast("intptr_t", pointer)))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Directory of compiled code: private to its user, checked before use, complete after a kill.
 
-An entry is a directory with the files of one build and a list of their checksums.  It is built
-elsewhere, written to the disk and renamed, so that a killed process leaves no incomplete entry.
-The lock of an entry belongs to the operating system, which frees it when the process ends.  A
-sweep, at most once a day, removes entries that were not used for a month.
+An entry is a directory with the files of one build and a list of their checksums.  An entry is
+built in a scratch directory, written to the disk and renamed, so that a killed process leaves no
+incomplete entry.  The lock of an entry belongs to the operating system, which frees it when the
+process ends.  A sweep, at most once a day, removes entries that were not used for a month.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ufl_beam.file_system import locked, sync
 T = TypeVar("T")
 
 CHECKSUMS = "checksums"
-"""File of an entry with its name and the checksums of its other files."""
+"""File with the name of its entry and the checksums of the other files of the entry."""
 
 SWEPT = "swept"
 """File whose modification time is the time of the last sweep."""
@@ -43,31 +43,32 @@ UNUSED = 30 * DAY
 """Time after which an unused entry is removed; s."""
 
 TRUSTED = os.geteuid(), 0
-"""Users whose files are loaded: this one and the administrator."""
+"""Users whose files are loaded: the user of this process and the administrator."""
 
 
 def cached(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tuple[T, Path]:
-    """Load an entry of the cache, which is built if it is missing or damaged; return its directory.
+    """Return a loaded entry of the cache and its directory; build a missing or damaged entry first.
 
     If several processes need the same entry, one builds it and the others wait.  ``build`` writes
-    its files into an empty directory and loads them.  ``name`` must change with the sources.
+    the files of the entry into an empty directory and loads them.  ``name`` must change with the
+    sources.  An entry that cannot be imported is built again.
     """
     place, foreign = _place(), False
     if intact(place / name):
         try:
-            if _age(place / name / CHECKSUMS) > DAY:  # record the use
-                with suppress(PermissionError):  # an entry of the administrator
+            if _age(place / name / CHECKSUMS) > DAY:  # record that the entry is used
+                with suppress(PermissionError):  # the entry belongs to the administrator
                     os.utime(place / name / CHECKSUMS)
             return load(place / name), place / name
         except FileNotFoundError:
             pass  # a sweep has just removed the entry
         except ImportError:
-            foreign = True  # built for another system
+            foreign = True  # it was built for another system
     if not os.access(place, os.W_OK | os.X_OK):
         place, foreign = _temporary(f"the cache {place} cannot be written to"), False
     entry = place / name
     with locked(place / f"{name}.lock"):
-        if not foreign and intact(entry):  # another process was faster
+        if not foreign and intact(entry):  # another process has built it meanwhile
             return load(entry), entry
         _remove_incomplete(entry)
         scratch = Path(tempfile.mkdtemp(prefix=f"{name}.", suffix=".part", dir=place))
@@ -96,7 +97,7 @@ def _remove_incomplete(entry: Path) -> None:
 
 
 def intact(entry: Path) -> bool:
-    """Return whether an entry is complete, unchanged since its build, and of a trusted owner."""
+    """Return whether an entry is complete, unchanged since its build, and of trusted users."""
     try:
         return (entry / CHECKSUMS).read_text() == _checksums(entry, entry.name)
     except (OSError, ValueError):
@@ -104,12 +105,12 @@ def intact(entry: Path) -> bool:
 
 
 def _checksums(entry: Path, name: str) -> str:
-    """Return the name of an entry and the SHA-256 of its files; ValueError for foreign files."""
+    """Return the text of :data:`CHECKSUMS`; ValueError unless trusted users own all files."""
     lines = [name]
     for path in sorted(entry.iterdir()):
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode) or status.st_uid not in TRUSTED:
-            raise ValueError(f"{path} is not a file of this user")
+            raise ValueError(f"{path} is not a file of a trusted user")
         if path.name != CHECKSUMS:
             lines.append(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}")
     return "\n".join(lines) + "\n"
@@ -119,12 +120,12 @@ def _checksums(entry: Path, name: str) -> str:
 
 
 def _age(path: Path) -> float:
-    """Return the time since a file was written or its use was recorded, once a day; s."""
+    """Return the time since a file was written, or since its use was last recorded; s."""
     return time.time() - path.stat().st_mtime
 
 
 def sweep(place: Path) -> None:
-    """Remove entries that were not used for long, and their locks; at most once a day.
+    """Remove entries that were not used for :data:`UNUSED`, and their locks; at most once a day.
 
     An entry is renamed before it is removed, so that no process finds an incomplete entry.
     """
@@ -150,8 +151,8 @@ def sweep(place: Path) -> None:
 # -- directories ---------------------------------------------------------------------------------
 
 
-def _made(directory: Path) -> str:
-    """Create a private directory if it is missing; return why it cannot be used, else ""."""
+def _make_private(directory: Path) -> str:
+    """Create a private directory if it is missing; return why it cannot be used, or ""."""
     try:
         directory.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = directory.lstat()
@@ -174,7 +175,7 @@ def _made(directory: Path) -> str:
 def _place() -> Path:
     """Return the directory of the entries."""
     chosen = jit_directory() / "ufl_beam"
-    if why := _made(chosen):
+    if why := _make_private(chosen):
         return _temporary(f"the cache {chosen} cannot be used: {why}")
     if MPI.COMM_WORLD.rank == 0:
         sweep(chosen)
@@ -183,16 +184,16 @@ def _place() -> Path:
 
 @cache
 def _temporary(why: str) -> Path:
-    """Return a private temporary directory; the first process warns once why it is used."""
+    """Return a private temporary directory; rank 0 warns, once for each reason ``why``."""
     base = Path(tempfile.gettempdir())
     directory = base / f"ufl_beam-{os.geteuid()}"
-    if _made(directory):
+    if _make_private(directory):
         directory = Path(tempfile.mkdtemp(prefix="ufl_beam-"))
         atexit.register(shutil.rmtree, directory, ignore_errors=True)
     if MPI.COMM_WORLD.rank == 0:
         warnings.warn(
             f"{why}. Compiled code is kept in {directory} instead; "
-            "for another cache set XDG_CACHE_HOME",
+            "for a cache in another directory set XDG_CACHE_HOME",
             RuntimeWarning,
             stacklevel=2,
         )

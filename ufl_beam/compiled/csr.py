@@ -17,9 +17,9 @@ from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, loop, struc
 
 
 class Csr:
-    """Compressed sparse rows with the 32-bit indices that C needs; SciPy may choose others.
+    """Compressed sparse rows with 32-bit indices, which C needs; those of SciPy may have 64 bits.
 
-    ``again`` recomputes the indices after :meth:`release` has freed them.
+    ``again`` recomputes the column indices after :meth:`free` has freed them.
     """
 
     def __init__(
@@ -37,14 +37,14 @@ class Csr:
         return self._again()
 
     def free(self) -> None:
-        """Free the memory of :attr:`indices` until they are needed again."""
+        """Free the memory of :attr:`indices` until they are needed, unless PETSc shares them."""
         if self._again is not None:
             vars(self).pop("indices", None)
 
     def zeros_like(self) -> Csr:
         """Return a matrix that shares the sparsity pattern."""
         matrix = copy(self)
-        matrix.data = np.zeros(len(self.data))  # zeros_like would touch the memory
+        matrix.data = np.zeros(len(self.data))  # np.zeros_like would write to the memory at once
         return matrix
 
     @property
@@ -53,7 +53,7 @@ class Csr:
         return len(self.indptr) - 1
 
     def narrow(self) -> bool:
-        """Return whether a byte can number the entries of each row."""
+        """Return whether each row has at most 256 entries, which a byte can number."""
         return bool(np.diff(self.indptr).max(initial=0) <= 256)
 
     def rows(self) -> Index:
@@ -61,13 +61,13 @@ class Csr:
         return np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.indptr))
 
     def entries_of(self, rows: Index) -> Index:
-        """Return the entries of some rows, one row after the other."""
+        """Return the indices in :attr:`data` of the entries of ``rows``, row by row."""
         first, number = self.indptr[rows].astype(np.int64), np.diff(self.indptr)[rows]
         before = np.cumsum(number) - number
         return np.asarray(np.repeat(first - before, number) + np.arange(number.sum()))
 
     def positions(self, rows: Index, columns: Index) -> Index:
-        """Find the entries (rows[k], columns[k]) in :attr:`data`; they must exist."""
+        """Return the indices in :attr:`data` of entries (rows[k], columns[k]), which must exist."""
         positions = np.empty(len(rows), dtype=np.int32)
         structure = (self.size, integers(self.indptr), integers(self.indices))
         pairs = [np.ascontiguousarray(x, dtype=np.int32) for x in (rows, columns)]
@@ -76,11 +76,11 @@ class Csr:
         return positions
 
     def blocks(self, dofs: Index, lanes: int) -> Index:
-        """Find the entries of all pairs of ``dofs``, int32, of each cell, in batches of cells.
+        """Find the entries of all pairs of ``dofs`` (int32) of each cell; the entries must exist.
 
-        They must exist.  The result has the shape (num_batches, pairs, lanes), see
-        :func:`in_batches`.  It has positions in the row (uint8) if rows have at most 256 entries,
-        else positions in :attr:`data` (int32).
+        The result has the shape (num_batches, pairs, lanes), see :func:`in_batches`.  If rows have
+        at most 256 entries, the results are positions in the row (uint8), else positions in
+        :attr:`data` (int32).
         """
         cells, cell_size = dofs.shape
         narrow = self.narrow()
@@ -95,7 +95,7 @@ class Csr:
         return positions
 
     def petsc(self) -> PETSc.Mat:
-        """Return a PETSc matrix on this process that shares the arrays and keeps them alive."""
+        """Return a PETSc matrix on this process, which shares the arrays and keeps them alive."""
         indptr, indices = (x.astype(PETSc.IntType, copy=False) for x in (self.indptr, self.indices))
         self._again = None
         arrays = (indptr, indices, self.data)
@@ -105,7 +105,7 @@ class Csr:
 
 
 def zero_matrix(size: int, *coupled: Index) -> Csr:
-    """Return a zero matrix whose pattern has the diagonal and all pairs of coupled dofs."""
+    """Return a zero matrix whose pattern has the diagonal and all pairs in rows of ``coupled``."""
     indices, indptr = _pattern(size, *coupled)
     return Csr(np.zeros(len(indices)), indices, indptr, lambda: _pattern(size, *coupled)[0])
 
@@ -131,8 +131,8 @@ def _pattern(size: int, *coupled: Index) -> tuple[Index, Index]:
 class Product:
     """Operator ``x -> A x`` on this process, without the zeros that ``A`` stores.
 
-    Successive rows whose entries have the same distances from the diagonal are a run, as most rows
-    along beams are.
+    Successive rows whose entries have the same distances from the diagonal form a run, which stores
+    the distances once.  Most rows along beams are in such runs.
     """
 
     def __init__(self, A: Csr) -> None:
@@ -159,7 +159,7 @@ class Product:
         )  # fmt: skip
 
     def pairs(self) -> tuple[Index, Index]:
-        """Return row and column of each entry, in the order of :attr:`data`."""
+        """Return the rows and the columns of all entries, in the order of :attr:`data`."""
         rows = np.repeat(self._rows, self._widths)
         first = np.repeat(self._first[:-1], self._widths)
         before = np.cumsum(rows) - rows
@@ -182,12 +182,13 @@ class StepProduct:
     """Forces ``A (factor s - back v)`` with s = (Δu, 2 tan(Δψ/2)), and their derivative.
 
     ``A`` is constant and has the sparsity pattern of ``tangent``, to which the derivative is added.
-    ``scratch`` is space for a number in each row; others may use it too.
+    ``scratch`` is space for a number of each row; it may be used elsewhere between evaluations.
 
     Attributes:
-        c: ``step_product`` of loops.h; phases of a step set factors, velocities and q0.
+        A: The matrix as :class:`Product`.
+        c: ``step_product`` of loops.h; phases of a step set ``factor``, ``back``, ``v`` and ``q0``.
         loops: C functions that add the forces and their derivative.
-        rate: Pointer to the address of ``factor s - back v`` in the latest forces.
+        rate: Address of the pointer to ``factor s - back v`` of the latest forces.
     """
 
     def __init__(self, A: Csr, rotations: Index, tangent: Csr, scratch: Array) -> None:
@@ -206,7 +207,7 @@ class StepProduct:
         self.rate = ffi.addressof(self.c, "rate")
 
     def matrix(self) -> Csr:
-        """Return the matrix ``A`` as a new matrix."""
+        """Return the matrix ``A`` in the pattern of the tangent."""
         A = self._tangent.zeros_like()
         A.data[A.positions(*self.A.pairs())] = self.A.data
         return A

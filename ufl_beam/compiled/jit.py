@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Compilation of C modules and UFL forms, once for the machine.
 
-FFCx needs a C compiler at run time anyway.
+It adds no requirement, because FFCx needs a C compiler at run time, too.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ HEADERS = f"""\
 #include <malloc.h>
 #endif
 #define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})"""
-"""Head of all C files; CALL calls a kernel of FFCx."""
+"""Beginning of every translation unit; CALL calls a kernel of FFCx."""
 
 
 def text(name: str) -> str:
@@ -49,7 +49,7 @@ DECLARATIONS = f"""\
 typedef void (kernel)({TABULATE[0]});
 typedef int{8 * np.dtype(PETSc.IntType).itemsize}_t petsc_int;
 {text("loops.h")}"""
-"""Declarations that all C files share."""
+"""Declarations that follow HEADERS in every translation unit."""
 
 SANITIZERS = [
     *("-O1", "-g1", "-fno-omit-frame-pointer", "-fno-wrapv"),
@@ -78,7 +78,7 @@ class CompilerError(RuntimeError):
 
 
 class Refused(Exception):
-    """Code that must not be used, with the reason; the cache remembers it."""
+    """Code must not be used; the message is the reason, which the cache stores."""
 
 
 def compiled(
@@ -90,18 +90,18 @@ def compiled(
     flags: Sequence[str],
     check: Callable[[ModuleType], None] = lambda _: None,
 ) -> ModuleType:
-    """Load a C module, which is compiled if it is not in the cache.
+    """Return a C module, which is compiled if it is not in the cache.
 
     Args:
-        stem: Beginning of its name.
-        declarations: C declarations of its functions and types for Python.
-        source: Function that returns its C code, called if the module is not in the cache; it may
+        stem: Beginning of the name of the module.
+        declarations: C declarations of functions and types for Python.
+        source: Function that returns the C code, called if the module is not in the cache; it may
             raise :class:`Refused`.
-        depends_on: Texts on which the C code and the effect of the flags depend.
+        depends_on: Texts that determine the C code; if one changes, the module is compiled again.
         flags: Compiler flags.
         check: Function called with the newly compiled module; it may raise :class:`Refused`.
     """
-    # Python's own flags have -g; debug symbols take a fifth of the time and half of the file.
+    # Python's own flags have -g, and debug symbols take a fifth of the time and half of the file.
     flags = [*flags, "-g0", "-fvisibility=hidden", *EXTRA]
     name = f"{stem}_{_digest(declarations, *depends_on, *flags, sys.version, repr(PROCESSOR))}"
 
@@ -126,12 +126,12 @@ def compiled(
     module, directory = cached(name, build, load)
     if isinstance(module, Refused):
         raise module
-    module.__file__ = str(directory / Path(str(module.__file__)).name)  # built in another directory
+    module.__file__ = str(directory / Path(str(module.__file__)).name)  # renamed since its import
     return module
 
 
 REFUSAL = "refused"
-"""File of a cache entry with the reason why its code must not be used."""
+"""File of a cache entry whose code must not be used; it contains the reason."""
 
 
 def _imported(name: str, directory: Path) -> ModuleType:
@@ -146,7 +146,7 @@ def _imported(name: str, directory: Path) -> ModuleType:
 
 
 def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:
-    """Load a form, compiled if it is not in the cache, and return the path of its C code."""
+    """Return a form, which is compiled if it is not in the cache, and the path of its C code."""
 
     def build(directory: Path) -> fem.Form:
         with _explained("a form"):
@@ -164,7 +164,7 @@ def _digest(*texts: str) -> str:
 
 @contextmanager
 def _explained(code: str) -> Iterator[None]:
-    """Explain what to do if the compiler fails."""
+    """Raise :class:`CompilerError` with the remedy if ``code`` cannot be compiled."""
     try:
         yield
     except cffi.VerificationError as error:

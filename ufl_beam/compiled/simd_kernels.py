@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """SIMD versions of FFCx's kernels: several cells at once, one in each lane of a vector.
 
-Kernels are straight-line arithmetic on the numbers of one cell.  Their text is compiled again with
-vector types of GCC and Clang instead of numbers; the results are compared with FFCx's kernel.
+A kernel computes with the numbers of one cell, without branches.  Its text is compiled again with
+vector types of GCC and Clang instead of numbers.  The results are compared with FFCx's kernel.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ LOGGER = logging.getLogger("ufl_beam")
 _WIDE = {"AVX512F", "X86_V4"} & {*PROCESSOR.get("baseline", ()), *PROCESSOR.get("found", ())}
 
 LANES = 8 if _WIDE else 4
-"""Number of cells that are computed at once: a vector of AVX-512 or AVX; compilers split vectors on
-other processors."""
+"""Number of cells that are computed at once: numbers in a vector of AVX-512 or AVX.  On processors
+without these, compilers split the vectors."""
 
 FLAGS = ["-O2", NATIVE, "-fno-math-errno", *(["-mprefer-vector-width=512"] if _WIDE else [])]
-"""Compiler flags; without the last one, square roots are computed in halves of a vector."""
+"""Compiler flags; without the last one, compilers halve vectors of 512 bits for square roots."""
 
 FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "pow"}
 """Functions that assembly_simd.h provides for vectors; pow with integer exponents only."""
@@ -58,8 +58,9 @@ _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 def in_vectors(kernel: str) -> str:
     """Rewrite the C code of an FFCx kernel with vectors instead of numbers.
 
-    Divisions by constants, and by variables that divide more than once, become multiplications.
-    Conditions become masks with all bits of a lane zero or one, logical operators bitwise ones.
+    Divisions by constants become multiplications; divisions by variables that divide more than once
+    become calls of ``quotient`` in lanes.h.  Conditions become masks, whose bits in a lane are all
+    zero or all one, and logical operators become bitwise operators.
 
     Raises:
         Refused: The kernel needs a function or a condition that assembly_simd.h does not provide.
@@ -98,7 +99,7 @@ def in_vectors(kernel: str) -> str:
 
 
 def written(source: Path) -> str:
-    """Return the kernel that FFCx wrote into the file ``source`` for a cell form."""
+    """Return the text of the kernel that FFCx wrote into the file ``source`` for a form."""
     pattern = r"^void tabulate_tensor_.*?^}(?=\s*^(?:bool|ufcx_integral) )"
     if source.exists() and (match := re.search(pattern, source.read_text(), re.M | re.S)):
         return match[0]
@@ -106,7 +107,7 @@ def written(source: Path) -> str:
 
 
 def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
-    """Arrange rows of cells in batches (num_batches, numbers, lanes), see loops.h."""
+    """Arrange one row for each cell in batches (num_batches, numbers, lanes), see loops.h."""
     rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
     if missing := -len(rows) % lanes:
         rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
@@ -117,14 +118,15 @@ def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
 AGREEMENT = 1e-10
 """Tolerance on the difference from FFCx's kernel, relative to the largest entry of a cell.
 
-The round-off in the tangent of a cell of degree 3 is 1e-12 of it; wrong kernels have larger errors.
+The round-off in the tangent of a cell of degree 3 is 1e-12 of this entry; a wrong kernel has larger
+errors than the tolerance.
 """
 
 
 def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, int]) -> None:
     """Refuse a vector kernel that differs from FFCx's kernel on random cells.
 
-    ``sizes`` are the numbers of its entries, coefficient values and constants.
+    ``sizes`` are the numbers of entries, of coefficient values and of constants of the kernel.
     """
     random, (entries, width, constants) = np.random.default_rng(0), sizes
     at, wrong = partial(module.ffi.from_buffer, "double[]"), 0
@@ -139,8 +141,8 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
             good = (np.abs(several - single) <= AGREEMENT * scale) | (several == single)
         wrong += np.sum(~good & ~(np.isnan(single) & np.isnan(several)))
     if wrong:
-        why = f"{wrong} of {16 * entries} entries differ from FFCx's kernel"
-        LOGGER.warning("a kernel in vectors, compiled by %s, is wrong: %s", VERSIONS, why)
+        why = f"{wrong} of {4 * LANES * entries} entries differ from FFCx's kernel"
+        LOGGER.warning("a vector kernel, from code of %s, is wrong: %s", VERSIONS, why)
         raise Refused(why)
 
 
@@ -150,8 +152,8 @@ def interleaved(
 ) -> int | None:
     """Return the address of the SIMD loop of a compiled form, or None if there is none.
 
-    ``sizes`` as in :func:`require_agreement`; ``unknowns`` are the position of the first unknown
-    among the coefficients, and the number of unknowns.
+    ``sizes`` are as in :func:`require_agreement`.  ``unknowns`` are the position of the first
+    unknown among the coefficients, and the number of unknowns.
     """
     names = ("LANES", "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "AT", "UNKNOWNS")
     values = LANES, math.isqrt(sizes[0]), *sizes, *unknowns
@@ -165,7 +167,7 @@ def interleaved(
             "ufl_beam_lanes",
             INTERFACE,
             lambda: "\n".join([head, in_vectors(written(source)), loop]),
-            # FFCx names its files by a hash of their content.
+            # The name of the file is a hash of the form, options and versions of FFCx.
             depends_on=[source.name, head, loop, Path(__file__).read_text()],
             flags=FLAGS,
             check=lambda module: require_agreement(module, kernel, sizes),

@@ -40,21 +40,21 @@ class Beam(Record, Member):
     Args:
         start: First end; m.
         end: Last end; m.
-        section: Its cross-section.
-        cells: Number of cells, of equal length in the parameter of the curve.  Attachment points
-            and corners become vertices too.
+        section: Cross-section of the beam.
+        cells: Number of cells, equal intervals of the parameter ``s``.  Attachment points, corners
+            and hinges become vertices too, and divide the cells in which they lie.
         name: Name in messages and pictures.
-        curve: Axis from ``s = 0`` at the start to ``s = 1`` at the end.
-        corners: Parameters ``s`` that must be vertices.
+        curve: Axis ``s -> (x, y)`` from ``s = 0`` at the start to ``s = 1`` at the end; m.
+        corners: Parameters ``s`` of the corners of the curve.
         hinges: Plastic hinges of zero length, by their parameter ``s``, which becomes a vertex:
-            ``{0.0: Softening(limit, fracture_energy)}``.  A hinge is rigid until the moment at
-            ``s`` reaches its limit; then it follows its law, :class:`Softening` or
-            :class:`ElastoPlastic` (limit in N m, moduli in N m/rad, ``eta`` in N m s).  At an end
-            it replaces the hinge of the section; ``None`` there removes that hinge.
+            ``{0.0: Softening(limit, fracture_energy)}``.  The law is a :class:`SofteningLaw` or
+            :class:`ElastoPlastic` (limit in N m, moduli in N m/rad, ``eta`` in N m s).  A hinge is
+            rigid until the moment at ``s`` reaches its limit.  A hinge at an end replaces the hinge
+            of the section there; ``None`` instead of a law removes the hinge of the section.
 
     Raises:
-        ModelError: Zero length, ``cells < 1``, coordinates that are not finite, or hinges in a
-            section of fibres.
+        ModelError: Zero length, ``cells < 1``, coordinates that are not finite, corners or hinges
+            outside the beam, hinges in a section of fibres, or a curve that misses an end.
 
     Example:
         >>> column = ub.Beam((0, 0), (0, 3), section, cells=6, name="column")
@@ -104,15 +104,16 @@ class Beam(Record, Member):
                     raise ModelError(f"{self.name}: curve({s}) = {point} is not the end {end}")
             length = sum(math.dist(p, q) for p, q in pairwise(points))
         depth = self.section.depth
-        if depth > math.sqrt(12) * length > 0.0:  # the radius of gyration is larger
+        if depth > math.sqrt(12) * length > 0.0:  # the radius of gyration is depth / sqrt(12)
             warn(
                 f"{self.name}: its section is {depth:.3g} m deep (sqrt(12 EI/EA) where no depth is "
-                f"given), but it is only {length:.3g} m long. Are sizes of the section in mm? "
-                "Units are SI: m, N, N m². If EI is large on purpose, give the section its depth"
+                f"given), but the beam is only {length:.3g} m long. Are sizes of the section in "
+                "mm? Units are SI: m, N, N m². If EI is large on purpose, give the section its "
+                "depth"
             )
 
     def _require_hinges(self) -> None:
-        """Raise :class:`ModelError` unless all plastic hinges have a law and are apart."""
+        """Raise :class:`ModelError` if hinges lack a law, coincide, or lie in a beam of fibres."""
         for s, law in self.hinges.items():
             require_number(s, f"{self.name}: hinge at")
             if not 0.0 <= s <= 1.0:
@@ -122,11 +123,11 @@ class Beam(Record, Member):
         for first, second in pairwise(sorted(self.hinges)):
             if (second - first) * self.cells <= TOGETHER:
                 raise ModelError(
-                    f"{self.name}: two hinges at s = {first:g}; give one, with the law of both"
+                    f"{self.name}: two hinges at s = {first:g}; give one, with a law for both"
                 )
         if self.hinges and self.section.fibres is not None:
             raise ModelError(
-                f"{self.name}: hinges are for resultants; here the fibres of the section soften"
+                f"{self.name}: hinges are for resultants; fibres break by Fibres(softening=)"
             )
 
     def _label(self) -> str:
@@ -163,7 +164,7 @@ class Beam(Record, Member):
         cls, points: Sequence[Point], section: Section, *,
         cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
     ) -> Beam:  # fmt: skip
-        """Create straight pieces through ``points``, rigidly joined; ``s`` is length over total."""
+        """Create a beam of straight pieces; ``s`` is the fraction of the length from the start."""
         points = require_sequence(points, f"{name}: points")
         xy = [require_vector(p, f"{name}: point {i}") for i, p in enumerate(points)]
         if len(xy) < 2:
@@ -184,7 +185,7 @@ class Beam(Record, Member):
         cls, curve: Curve, section: Section, *,
         cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
     ) -> Beam:  # fmt: skip
-        """Create a beam along any curve ``s -> (x, y)``, ``s`` from 0 to 1; m."""
+        """Create a beam along any curve ``s -> (x, y)``, with ``s`` from 0 to 1; m."""
         a, b = (curve_point(curve, s, f"{name}: curve") for s in (0.0, 1.0))
         return cls(a, b, section, cells=cells, name=name, curve=curve, hinges=hinges)
 
@@ -197,8 +198,8 @@ class Mesh:
     """Discretization of a scene: number of cells, polynomial degree, lumped mass.
 
     Args:
-        refine: Factor on the number of cells between any two places of a beam; a whole number
-            divides each cell, ``Fraction(1, 2)`` merges cells in pairs.
+        refine: Factor on the number of cells between any two places of a beam: 3 divides each cell
+            into three, ``Fraction(1, 2)`` merges two cells into one.
         degree: Polynomial degree p of displacements and rotations in a cell: 1, 2 or 3.  A cell
             has p integration points.  Degrees 2 and 3 are for elastic beams only.
         lumped: Use a lumped mass matrix of the beams: diagonal, with the row sums of the
@@ -252,12 +253,12 @@ class Mesh:
         return np.asarray(1 / (p * (p + 1) * at**2))
 
     def weights(self, s: npt.ArrayLike) -> Array:
-        """Evaluate the Lagrange polynomials at ``s`` of a cell, from 0 to 1; (..., nodes)."""
+        """Evaluate the Lagrange polynomials of a cell at ``s``, from 0 to 1; (..., nodes)."""
         powers = np.power.outer(s, np.arange(self.degree + 1))
         return np.asarray(powers @ self._polynomials)
 
     def slopes(self, s: npt.ArrayLike) -> Array:
-        """Evaluate the derivatives of :meth:`weights` by ``s``; (..., nodes)."""
+        """Evaluate the derivatives of :meth:`weights` with respect to ``s``; (..., nodes)."""
         powers = np.arange(1, self.degree + 1) * np.power.outer(s, np.arange(self.degree))
         return np.asarray(powers @ self._polynomials[1:])
 
@@ -267,7 +268,7 @@ class Mesh:
         return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)))
 
     def vertices(self, beam: Member, attached: Sequence[float]) -> list[float]:
-        """Return the vertices of a beam, with its ends, corners and ``attached`` places.
+        """Return the parameters of the vertices of a beam, also of corners and ``attached`` places.
 
         Raises:
             ModelError: ``refine`` gives no whole number of cells between two of these places.

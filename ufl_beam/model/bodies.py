@@ -26,13 +26,13 @@ from ufl_beam.model.functions import Curve, Point, tangent_within
 from ufl_beam.model.records import NotNegative, Number, Record, Text, Vector
 
 TOGETHER = 1e-9
-"""Distance below which two places of a beam coincide, as a fraction of a cell."""
+"""Largest distance of two places of a beam that coincide, as a fraction of a cell."""
 
 
 class Member(ABC):
     """Base of :class:`Beam`: an axis with places on it, and the attributes of a beam."""
 
-    called: ClassVar[str] = "Beam"  # in messages
+    called: ClassVar[str] = "Beam"  # name of the class in messages
     a: Point
     b: Point
     name: str
@@ -45,7 +45,7 @@ class Member(ABC):
     def at(self, s: float) -> Place:
         """Return the place at the parameter ``s`` of the axis, 0 at the start and 1 at the end.
 
-        On straight beams, arcs and polylines ``s`` is the length from the start over the total.
+        On straight beams, arcs and polylines ``s`` is the fraction of the length from the start.
         """
         return Place(self, s)
 
@@ -60,7 +60,7 @@ class Member(ABC):
         return Place(self, 1.0)
 
     def vertices(self, attached: Sequence[float]) -> list[float]:
-        """Return the parameters of the vertices: equal cells, corners and ``attached`` places.
+        """Return the parameters of all vertices: of equal cells, corners and ``attached`` places.
 
         A place within :data:`TOGETHER` of another vertex adds no vertex.
         """
@@ -84,8 +84,8 @@ class Place:
     """A point of a beam; made by ``beam.start``, ``beam.end`` and ``beam.at(s)``.
 
     Attributes:
-        beam: The beam, by identity.
-        s: Parameter of its axis, from 0 to 1.
+        beam: The beam, compared by identity.
+        s: Parameter of the axis, from 0 to 1.
         beyond: True for the cross-section beyond the plastic hinge at ``s``, to which no joint,
             support or load is attached.
 
@@ -139,12 +139,12 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Body(Record):
-    """Rigid body; joints, connectors and loads may act at any of its points.
+    """Rigid body; joints, connectors and point loads may act at any of its points.
 
     Args:
         center: Centre of mass in the undeformed scene; m.
-        mass: kg.
-        inertia: About the centre of mass; kg m².
+        mass: Mass; kg.
+        inertia: Moment of inertia about the centre of mass; kg m².
         name: Name in messages and pictures.
 
     Raises:
@@ -181,7 +181,7 @@ class Spot:
     """A point of a rigid body; made by ``body.at(x, y)``, ``body.middle`` and :func:`ground`.
 
     Attributes:
-        body: The body, by identity.
+        body: The body, compared by identity.
         point: Coordinates in the undeformed scene; m.
 
     Example:
@@ -231,15 +231,15 @@ NodeDof = tuple[Node, int]
 
 
 class Representatives(dict[NodeDof, NodeDof]):
-    """Representatives of equal degrees of freedom; any other represents itself."""
+    """Representative of each degree of freedom that equals another; others represent themselves."""
 
     def __missing__(self, dof: NodeDof) -> NodeDof:
         return dof
 
 
 def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
-    """Find the representatives of degrees of freedom from groups of equal ones."""
-    # Numbers instead of nodes: to hash nodes would take longer than all the rest.
+    """Return the representatives of degrees of freedom, given groups of equal ones."""
+    # Nodes are numbered, because to hash them again would take longer than all the rest.
     number: dict[Node, int] = {}
     dofs: dict[int, NodeDof] = {}
     parent: dict[int, int] = {}
@@ -267,7 +267,7 @@ def node(place: AttachmentPoint) -> Node:
 
 
 def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
-    """Return the vector from the node of a place to a point, by default the place; m.
+    """Return the vector from the node of a place to a point, by default the place itself; m.
 
     It is zero for points of the ground, which do not move.
     """
@@ -294,7 +294,7 @@ def require_anchors(owner: str, *anchors: object) -> None:
 
 
 def require_node(place: object, owner: str) -> None:
-    """Raise :class:`ModelError` naming ``owner`` unless a place moves like a node."""
+    """Raise :class:`ModelError` unless a place is on a beam or the centre of a moving body."""
     require_anchors(owner, place)
     if isinstance(place, Spot) and place.body is GROUND:
         raise ModelError(f"{owner}: {place} does not move")
@@ -313,9 +313,9 @@ class PointMass(Record):
     """Point mass, with rotary inertia, fixed to a place.
 
     Args:
-        place: Place to which it is fixed.
-        mass: kg.
-        inertia: About the place; kg m².
+        place: Place to which the mass is fixed.
+        mass: Mass; kg.
+        inertia: Rotary inertia about the place; kg m².
 
     Example:
         >>> heavy = ub.Scene(

@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 def raising_model_errors(check: Callable[P, T]) -> Callable[P, T]:
-    """Make a check raise :class:`ModelError`."""
+    """Return a check that raises :class:`ModelError` instead of :class:`ArgumentError`."""
 
     @wraps(check)
     def checked(*arguments: P.args, **named: P.kwargs) -> T:

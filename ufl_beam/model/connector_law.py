@@ -27,7 +27,7 @@ from ufl_beam.model.material_law import (
 from ufl_beam.model.records import Record, parameters_by_name
 
 LOSSES = ("damping", "friction", "functions", "connectors", "contact")
-"""Entries of the energy ledger for losses in connectors and dampers."""
+"""Entries of the energy ledger to which a connector law may add its losses."""
 
 CONTRIBUTIONS = (
     *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
@@ -36,26 +36,26 @@ CONTRIBUTIONS = (
 """Names of all entries of the energy ledger that the package uses."""
 
 IMAGINARY = 1e-30
-"""Size of a complex step; a derivative by it has no cancellation."""
+"""Size of a complex step; the derivative that it gives has no cancellation."""
 
 
-class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but one of two
+class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be defined
     """Base of connector laws; a user's law is a frozen dataclass derived from it.
 
     The fields of the dataclass are the parameters of the law.  Its methods use the functions of
     ``ub.law_functions``.  A law states an energy, a resistance, or both: the force that resists
-    the growth of the motion is the derivative of the energy by the motion, plus the resistance.
-    Work that is not stored is lost.  A friction law states a limit instead, and perhaps a sliding
-    force: a constraint holds the motion until its force exceeds the limit, and again when the
-    motion comes to rest.  See docs/extending_laws.md.
+    growth of the motion is the derivative of the energy with respect to the motion, plus the
+    resistance.  Work that is not stored is lost.  A friction law states a limit instead, and
+    perhaps a sliding force: a constraint holds the motion until the constraint force exceeds the
+    limit, and again when the motion comes to rest.  See docs/extending_laws.md.
 
     Attributes:
         variables: Internal variables, and their initial values.
         components: Number of motions on which the law acts.  A law for :class:`Bushing` has 2 or 3;
             its methods get tuples of motions and rates, and its resistance is a tuple.
         entry: Entry of the ledger, in ``lost``, for work that is not stored.
-        active: True if the law may supply energy, such as a drive.  Otherwise runs warn if the
-            energy that it has lost falls.
+        active: True if the law may supply energy, as a drive does.  Otherwise runs warn if the
+            lost energy decreases.
 
     Example:
         >>> from dataclasses import dataclass
@@ -86,7 +86,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         """Return the recoverable energy, zero by default; J.
 
         Args:
-            motion: m or rad; a tuple for several components.
+            motion: Motion; a tuple for several components; m or rad.
             state: Internal variables, as attributes.
         """
         return 0.0
@@ -100,7 +100,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
             motion: Motion at the time of the step at which the law holds; m or rad.
             rate: Mean rate of the step; m/s or rad/s.
             state: Internal variables at the time of the motion.
-            dt: Length of the step; s.
+            dt: Length of the step, infinite on a path; s.
         """
         return 0.0 if self.components == 1 else self.components * (0.0,)
 
@@ -120,13 +120,13 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         return self.limit(state)
 
     def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
-        """Return increments of the variables over a backward-Euler step dt, in closed form.
+        """Return increments of the variables over a backward-Euler step, in closed form.
 
         Args:
             motion: Motion at the end of the step; m or rad.
-            rate: Mean rate; m/s or rad/s.
+            rate: Mean rate of the step; m/s or rad/s.
             state: Variables at the beginning of the step.
-            dt: s; infinite on a path.
+            dt: Length of the step, infinite on a path; s.
         """
         return {}
 
@@ -147,7 +147,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         return type(self).energy is not ConnectorLaw.energy
 
     def parameters(self) -> dict[str, Any]:
-        """Return the parameters of the law by name, its fields."""
+        """Return the parameters of the law, which are its fields, by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
     def with_parameters(self, parameters: Mapping[str, Values]) -> ConnectorLaw:
@@ -157,7 +157,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         return law
 
     def as_argument(self, motions: Sequence[Values]) -> Any:
-        """Return motions as arguments of the methods: a number, or a tuple of several."""
+        """Return motions as the methods expect them: one motion, or a tuple of several."""
         return motions[0] if self.components == 1 else tuple(motions)
 
     def each(self, forces: Any) -> tuple[Values, ...]:
@@ -165,7 +165,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         return (forces,) if self.components == 1 else tuple(forces)
 
     def elastic_forces(self, motions: Sequence[Values], state: State) -> list[Values]:
-        """Return the derivatives of the energy by the motions, real arrays; N or N m."""
+        """Return the derivatives of the energy with respect to real motions; N or N m."""
         forces = []
         for i, motion in enumerate(motions):
             moved = [*motions[:i], motion + IMAGINARY * 1j, *motions[i + 1 :]]
@@ -179,9 +179,9 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
 
 
 def require_connector_law(law: ConnectorLaw, what: str) -> None:
-    """Raise :class:`ModelError` unless a connector law is complete; it is called at zero motion.
+    """Raise :class:`ModelError` unless a connector law is complete.
 
-    Its methods are compiled when a run begins.
+    Its methods are called at zero motion here, and compiled when a run begins.
     """
     what = f"{what}: {type(law).__name__}"
     require_fields(law, ConnectorLaw, what)
@@ -195,17 +195,17 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
     if law.holds and (defined & {"energy", "resistance"} or law.components > 1):
         raise ModelError(
             f"{what} has a limit, which is for laws of one component without energy and "
-            "resistance; let another connector beside it have these"
+            "resistance; give these to a second connector between the same places"
         )
     if "sliding" in defined and not law.holds:
-        raise ModelError(f"{what} has a sliding force and no limit; define this method")
+        raise ModelError(f"{what} has a sliding force and no limit; define the method limit")
     if law.variables and "increments" not in defined:
         raise ModelError(f"{what} has variables and no increments; define this method")
     require_text(law.entry, f"{what}.entry")
     if not law.entry or (law.entry in CONTRIBUTIONS and law.entry not in LOSSES):
         raise ModelError(
-            f"{what}.entry = {law.entry!r} is no name of a loss; there are "
-            f"{', '.join(LOSSES)}, or use a name of your own"
+            f"{what}.entry = {law.entry!r} is no entry for a loss; use one of "
+            f"{', '.join(LOSSES)}, or a name of your own"
         )
     for name, value in law.variables.items():
         require_number(value, f"{what}.variables[{name!r}]")
@@ -248,11 +248,11 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
 
 
 CALLED = ("energy", "limit", "resistance", "sliding", "increments")
-"""Methods that a law of a connector may define."""
+"""Methods that a user's connector law may define."""
 
 
 def require_limit(law: ConnectorLaw, what: str) -> None:
-    """Raise :class:`ModelError` unless increments of a law are finite for an infinite step."""
+    """Raise :class:`ModelError` unless the increments of a law are finite for an infinite step."""
     motion, rest = (law.as_argument([np.full(1, x)] * law.components) for x in (0.5, 0.0))
     with np.errstate(all="ignore"):
         changes = law.increments(motion, rest, initial_state(law), np.inf) if law.variables else {}
@@ -260,14 +260,14 @@ def require_limit(law: ConnectorLaw, what: str) -> None:
         if not np.all(np.isfinite(change)):
             raise ModelError(
                 f"{what}: {type(law).__name__}.increments returns {name} = {shorten(change)} for "
-                "dt = inf, and steps of a path are infinitely slow; state it so that it has a "
-                "limit, as a / (b / dt + c), or use simulate(scene, Static(), ...)"
+                "dt = inf, and steps of a path are infinitely slow; state the increment so that "
+                "it has a limit, as a / (b / dt + c), or use simulate(scene, Static(), ...)"
                 f"{source_location(law)}"
             )
 
 
 def source_location(law: object) -> str:
-    """Return file and line of the class of a law in brackets, if they are known."""
+    """Return " (file, line n)" of the class of a law; empty if they are unknown."""
     try:
         file, (_, line) = inspect.getsourcefile(type(law)), inspect.getsourcelines(type(law))
     except (OSError, TypeError):
@@ -276,9 +276,10 @@ def source_location(law: object) -> str:
 
 
 def judges_loss(law: ConnectorLaw) -> bool:
-    """Return whether the loss of a connector law is its own dissipation, for steps of any length.
+    """Return whether a loss that decreases is a fault of the law, for steps of any length.
 
-    A law with variables has an error of the step in its loss, unless its energy is quadratic.
+    The loss of a law with variables has an integration error, unless its energy is quadratic.  An
+    active law may supply energy.
     """
 
     def energy(factor: float) -> list[float]:
@@ -291,7 +292,7 @@ def judges_loss(law: ConnectorLaw) -> bool:
     return not law.active and (not law.variables or quadratic(energy))
 
 
-# -- functions of a user ------------------------------------------------------------------------
+# -- functions of users ------------------------------------------------------------------------
 
 
 def _require_state(value: Any, what: str) -> tuple[float, ...]:
@@ -301,17 +302,19 @@ def _require_state(value: Any, what: str) -> tuple[float, ...]:
 @closed("give it a function of your own")
 @dataclass(frozen=True, repr=False)
 class ForceLaw(Record):
-    """Force of a connector as a function of its motion and rate, of time and its own history.
+    """Force of a connector as a function of motion, rate, time and internal variables.
 
     Args:
-        force: ``force(motion, rate)``; N or N m; a positive force resists growth.  It is evaluated
-            at the time of loads, in dynamics in the middle of the step.  It may have the parameters
-            ``t``, this time (s), ``dt``, the length of the step (s), and ``state``, the internal
-            variables before the step.  With ``state`` it returns the force and the new variables.
+        force: ``force(motion, rate)``; N or N m; a positive force resists growth of the motion.  It
+            is evaluated when loads act: in dynamics with energy-momentum schemes in the middle of a
+            step, with :class:`EnergyMomentumStatic` at its fraction ``theta``, otherwise at its
+            end.  It may have the parameters ``t``, this time (s), ``dt``, the length of the step
+            (s), and ``state``, the internal variables before the step.  With ``state`` it returns
+            the force and the new variables.
         state: Internal variables before the run.
-        stored: ``stored(motion)``, or ``stored(motion, state)``, the recoverable energy; J.  The
-            ledger has it in the entry "stored", and the rest of the work on the law in the entry
-            "functions".  By default all work is in "functions".
+        stored: ``stored(motion)``, or ``stored(motion, state)``, the recoverable energy; J.  This
+            energy is in the entry "stored" of the ledger, and the rest of the work on the law in
+            the entry "functions".  By default all work is in "functions".
 
     Raises:
         ModelError: A function has an unknown parameter, or only one of ``state`` and the parameter
@@ -356,12 +359,12 @@ class ForceLaw(Record):
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Names of the parameters of the function after motion and rate."""
+        """Names of the parameters of ``force`` after motion and rate."""
         return self._names(self.force, "force", "t", "dt", after=2)
 
     @property
     def stored_arguments(self) -> tuple[str, ...]:
-        """Names of the parameters of the energy after the motion."""
+        """Names of the parameters of ``stored`` after the motion."""
         return self._names(self.stored, "stored", after=1) if self.stored else ()
 
     def _names(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors: the force of a relative motion, or a prescribed motion."""
+"""Laws of connectors: force as a function of a relative motion, prescribed motions or forces."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from ufl_beam.model.softening_laws import (
 )
 
 OWN_LAW = "state a ConnectorLaw of your own"
-"""Message of classes without subclasses."""
+"""Advice in the error that refuses a subclass of a law."""
 
 
 @closed(OWN_LAW)
@@ -36,7 +36,7 @@ class PrescribedMotion(Record):
     """Prescribed relative motion of a connector; its force is unknown.
 
     Args:
-        motion: Motion over time; m or rad.  Joints use zero, which holds it.
+        motion: Motion as a function of time; m or rad.  Joints prescribe zero.
 
     Example:
         >>> motor = ub.Turn(
@@ -57,7 +57,7 @@ class PrescribedForce(Record):
     """Prescribed force or moment of a connector; a positive force makes the motion grow.
 
     Args:
-        force: Force over time; N or N m.
+        force: Force as a function of time; N or N m.
 
     Example:
         >>> jack = ub.Slide(
@@ -65,7 +65,7 @@ class PrescribedForce(Record):
         ... )
         >>> lifted = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[jack])
         >>> run = ub.simulate(lifted, ub.Static(), t=(0, 1), dt=0.5)
-        >>> print(run.connector(jack).force.round())  # of its resistance; N
+        >>> print(run.connector(jack).force.round())  # force that resists growth of the motion; N
         [    0.  -500. -1000.]
     """
 
@@ -73,7 +73,7 @@ class PrescribedForce(Record):
 
 
 class Bearing:
-    """Base of joints and supports: their force may be the normal force of friction."""
+    """Base of joints and supports, whose force may be the normal force of friction."""
 
 
 class Running(Protocol):
@@ -89,18 +89,18 @@ class Running(Protocol):
 @closed(OWN_LAW)
 @dataclass(frozen=True, repr=False)
 class Controller(Record):
-    """Force by a function of the running simulation, constant until the next evaluation.
+    """Force computed from the state of a run, constant until the next evaluation.
 
-    The force acts a step, or a sample time, after the state from which it is computed.  A force of
-    ``kd`` times a rate grows without bound, or changes its sign each time, unless
-    ``kd sample < 2 J``; J is the inertia that the force accelerates within that time.  At the end
-    of a beam without a body J is nearly zero.  :class:`ForceLaw` has no such delay.
+    The force acts during the step, or the sample time, after the state from which it is computed.
+    A force of ``-kd`` times a rate changes its sign at each evaluation and grows, unless
+    ``kd sample < 2 J``; J is the inertia that the force accelerates within a sample time.  At the
+    end of a beam without a body J is nearly zero.  :class:`ForceLaw` has no such delay.
 
     Args:
-        force: ``force(simulation)``; N or N m; a positive force makes the motion grow.  It may read
-            the time, motions, velocities and forces of joints of the simulation.
-        sample: Sample time, from the beginning of the run; s.  Steps end at samples.  By default
-            the force is computed at every step.
+        force: ``force(simulation)``; N or N m; a positive force makes the motion grow.  The
+            function may read the time, motions, velocities and forces of joints of the simulation.
+        sample: Time between evaluations, from the beginning of the run on; s.  Steps end at these
+            times.  By default the force is computed for every step.
 
     Example:
         >>> brake = ub.Controller(lambda now: -1e4 * now.velocity(beam.end)[1])
@@ -117,7 +117,7 @@ class Controller(Record):
     sample: Annotated[float | None, partial(require_number, positive=True)] = None
 
     def evaluate(self, simulation: Running, connector: object) -> float:
-        """Evaluate the force of a connector for the next steps; all processes call it together."""
+        """Return the force of a connector in the next steps; all processes call this together."""
         at = f"t = {simulation.t:.9g} s"
         return require_returned(
             self.force(simulation), f"{connector}: the controller", at, finite=True
@@ -130,7 +130,7 @@ class Spring(Record):
     """Elastic spring of a connector, which may yield and break.
 
     Args:
-        stiffness: N/m or N m/rad.
+        stiffness: Elastic stiffness; N/m or N m/rad.
         law: Law of yielding; limit in N or N m, moduli in the unit of the stiffness.
         softening: Law of fracture; energy in J.
 
@@ -153,10 +153,10 @@ class Spring(Record):
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Damper(Record):
-    """Viscous damper: a force in proportion to the rate of the motion.
+    """Viscous damper: a force proportional to the rate of the motion.
 
     Args:
-        viscosity: N s/m or N m s/rad.
+        viscosity: Force divided by rate; N s/m or N m s/rad.
 
     Example:
         >>> damper = ub.Stretch(ub.ground(2, -1), beam.end, ub.Damper(2e3))  # N s/m
@@ -174,20 +174,21 @@ class Damper(Record):
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Stop(Record, ConnectorLaw):
-    """Stop: a contact force if the motion leaves an interval, elastic or damped.
+    """Stop: an elastic or damped contact force while the motion is outside an interval.
 
-    At a depth δ the force is stiffness δ (1 + damping dδ/dt), and never pulls (Hunt and Crossley
-    1975).  It begins and ends at zero.  The lost energy is the entry "contact" of the ledger.
+    At a depth δ the force is stiffness δ (1 + damping dδ/dt), but never pulls (Hunt and Crossley
+    1975).  A contact begins and ends with zero force.  The lost energy is the entry "contact" of
+    the ledger.
 
     Args:
         low, high: Ends of the interval; m or rad.
         stiffness: Contact stiffness; N/m or N m/rad.
-        damping: s/m or s/rad.  A mass that arrives with a small velocity v leaves with the
-            velocity (1 - 2/3 damping v) v.
+        damping: Contact damping; s/m or s/rad.  A mass that arrives with a small velocity v leaves
+            with the velocity (1 - 2/3 damping v) v.
 
     Raises:
-        ModelError: The interval does not contain 0, the stiffness is not positive, or the damping
-            is negative.
+        ModelError: The interval does not contain 0 or has no end, the stiffness is not positive, or
+            the damping is negative.
 
     Example:
         >>> buffer = ub.Slide(ub.ground(2, 0), beam.end, ub.Stop(1e9, low=-0.01), axis=(0, 1))
@@ -214,7 +215,7 @@ class Stop(Record, ConnectorLaw):
         return self.stiffness * (below**2 + above**2) / 2
 
     def resistance(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
-        """Return the damping force, at most as large as the elastic force if it pulls."""
+        """Return the damping force; if it pulls, it is at most as large as the elastic force."""
         below, above = positive(self.low - motion), positive(motion - self.high)
         above = above * larger(self.damping * rate, -1.0)
         below = below * larger(-self.damping * rate, -1.0)
@@ -240,12 +241,13 @@ class Stop(Record, ConnectorLaw):
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Clearance(Record, ConnectorLaw):
-    """Pin in a larger round hole, of a Bushing: free within a gap, contact at its edge.
+    """Law of a :class:`Bushing` for a pin in a larger round hole, free up to contact at the edge.
 
     At a depth δ beyond the gap the hole presses on the pin with stiffness δ (1 + damping dδ/dt), as
     a :class:`Stop`.  Friction acts along the edge, against the motion of the surface of the pin,
-    and turns the pin.  A sticking contact deflects elastically, with the contact stiffness, up to
-    ``friction`` times the normal force.  The lost energy is the entry "contact" of the ledger.
+    and turns the pin.  A sticking contact deflects elastically, with the contact stiffness, until
+    the friction force is ``friction`` times the normal force.  The lost energy is the entry
+    "contact" of the ledger.
 
     Args:
         stiffness: Contact stiffness; N/m.
@@ -281,7 +283,7 @@ class Clearance(Record, ConnectorLaw):
     def __post_init__(self) -> None:
         super().__post_init__()
         if (self.friction > 0.0) != (self.radius > 0.0):
-            raise ModelError("Clearance: give friction and radius together, the latter of the pin")
+            raise ModelError("Clearance: give friction and the radius of the pin together")
 
     @property
     def rubs(self) -> bool:
@@ -290,7 +292,7 @@ class Clearance(Record, ConnectorLaw):
 
     @property
     def components(self) -> int:  # type: ignore[override]
-        """Number of components: displacements along and across the axis, rotation with friction."""
+        """Number of components: displacements along and across the axis, rotation if ``rubs``."""
         return 3 if self.rubs else 2
 
     @property
@@ -309,9 +311,9 @@ class Clearance(Record, ConnectorLaw):
         return self.damping == 0.0 and not self.rubs
 
     def _contact(self, motion: Any, rate: Any = (0.0, 0.0)) -> tuple[Values, ...]:
-        """Return elastic and damping force, N, and their direction, from hole to pin centre."""
+        """Return elastic and damping force, N, and the direction from hole centre to pin centre."""
         x, y = motion[:2]
-        r = sqrt(larger(x**2 + y**2, (self.gap / 2) ** 2))  # a zero radius has no direction
+        r = sqrt(larger(x**2 + y**2, (self.gap / 2) ** 2))  # at zero there is no direction
         x, y, elastic = x / r, y / r, self.stiffness * positive(r - self.gap)
         return elastic, elastic * larger(self.damping * (x * rate[0] + y * rate[1]), -1.0), x, y
 
@@ -330,7 +332,7 @@ class Clearance(Record, ConnectorLaw):
         return damped * x - friction * y, damped * y + friction * x, friction * self.radius
 
     def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
-        """Move the deflection with the surface of the pin, up to the limit of friction."""
+        """Return the growth of the deflection with the surface of the pin, up to sliding."""
         if not self.rubs:
             return {}
         elastic, damped, x, y = self._contact(motion, rate)
@@ -343,15 +345,16 @@ class Clearance(Record, ConnectorLaw):
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Coulomb(Record):
-    """Coulomb friction: sticks below a limit of the force, slides at the limit.
+    """Coulomb friction: a connector sticks below a limit of its force, and slides at the limit.
 
-    The limit is ``force``, plus ``coefficient`` times the force of a joint at the end of the
-    previous step.  Sticking has no stiffness: a constraint holds the motion.
+    The limit is ``force``, plus ``coefficient`` times the force of a joint or support at the end of
+    the previous step.  A sticking connector has no elasticity: a constraint holds the motion.
 
     Args:
         force: Constant term of the limit; N or N m.
-        coefficient: Coefficient of friction; for rotations times the radius of the pin; 1 or m.
-        joint: Joint or support that provides the normal force.  A joint needs ``multipliers``,
+        coefficient: Coefficient of friction; 1.  For rotations it is multiplied by the radius of
+            the pin; m.
+        joint: Joint or support whose force is the normal force.  A joint needs ``multipliers``,
             unless it always has constraint forces, as :class:`Prismatic` and :class:`Link` do.
 
     Raises:
@@ -381,7 +384,7 @@ class Coulomb(Record):
             raise ModelError("Coulomb: give coefficient and joint together")
 
     def evaluate(self, simulation: Running, connector: object) -> float:
-        """Return the limit of the next step; all processes call it together."""
+        """Return the limit of the force in the next step; all processes call this together."""
         if self.joint is None:
             return self.force
         return self.force + self.coefficient * simulation.press(self.joint)
@@ -392,11 +395,11 @@ OWN_HINGE = (
 )
 
 HingeLaw = SofteningLaw | ElastoPlastic
-"""Laws of a plastic hinge of zero length, which is not elastic itself."""
+"""Laws of plastic hinges of zero length; such a hinge is rigid before it yields."""
 
 
 def require_hinge_law(law: object, what: str) -> None:
-    """Raise :class:`ModelError` naming ``what`` unless a rigid-plastic hinge can follow a law."""
+    """Raise :class:`ModelError` naming ``what`` unless ``law`` can be the law of a rigid hinge."""
     if isinstance(law, MaterialLaw) and not isinstance(law, ElastoPlastic):
         raise ModelError(
             f"{what}: {type(law).__name__} is the law of an elastic stiffness, and a hinge of zero "
@@ -424,10 +427,10 @@ def require_hinge_law(law: object, what: str) -> None:
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class RigidPlastic(Record):
-    """Rigid-plastic law: no motion below a limit of the force, flow or softening at it.
+    """Rigid-plastic law: no motion below a limit of the force, flow or softening at the limit.
 
     There is no elastic stiffness: below the limit a constraint holds the motion.  No other
-    constraint may hold it, see docs/warnings.md.  Plastic hinges of beams,
+    constraint may hold the same motion, see docs/warnings.md.  Plastic hinges of beams,
     ``Beam(hinges={s: law})``, are rotations with this law.
 
     Args:
@@ -449,7 +452,7 @@ class RigidPlastic(Record):
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Guide(Record):
-    """Constraint of a point to a curve of the plane, free along it; see :class:`Guided`."""
+    """Law that keeps a point on a curve of the plane, free to move along; see :class:`Guided`."""
 
     # ``s -> (x, y)``, smooth, for all s that the motion may reach; m
     curve: Annotated[Curve, partial(require_function, arguments="s that returns (x, y)")]
@@ -461,21 +464,21 @@ Law = (
 )  # fmt: skip
 
 HOLDING = (PrescribedMotion, Guide)
-"""Laws that prescribe the motion."""
+"""Laws that are constraints on the motion."""
 
 RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
 """Laws that resist every motion; see :func:`resists`."""
 
 
 def resists(law: Law) -> bool:
-    """Return whether a law resists every motion; other laws may bear no force, or a given one."""
+    """Return whether every motion changes the force of a law, or a constraint holds the motion."""
     return law.resists if isinstance(law, ConnectorLaw) else isinstance(law, RESISTING)
 
 
 def rubs(law: object) -> bool:
-    """Return whether a law holds its motion below a limit of the force, and slides beyond it."""
+    """Return whether a law of friction holds the motion below a limit, and slides at the limit."""
     return isinstance(law, Coulomb) or (isinstance(law, ConnectorLaw) and law.holds)
 
 
 RIGID = PrescribedMotion(Constant(0.0))
-"""Law of the connectors of a joint."""
+"""Law of the connectors that represent a joint."""

@@ -29,21 +29,21 @@ from ufl_beam.model.functions import Point
 from ufl_beam.model.records import Record
 
 Factors = tuple[float, float, float]
-"""Derivatives of a relative motion by (u, v, ψ) of a node."""
+"""Derivatives of a relative motion with respect to (u, v, ψ) of a node."""
 
 
 class Connector(ABC):
-    """Relative motion of two anchors with a force law; base of :class:`Turn` and others.
+    """Relative motion of two places with a force law; base of :class:`Turn` and others.
 
-    The motion is zero in the undeformed scene.  The force of a connector resists its growth: it is
-    positive in a spring that is stretched, and negative in a motor that drives.
+    The motion is zero in the undeformed scene.  The force of a connector resists growth of the
+    motion: it is positive in a spring that is stretched, and negative in a motor that drives.
 
     Attributes:
-        motion: Name of the relative motion in ``relative_motions.MOTIONS``.
-        a, b: The anchors.
-        law: Law of its force.
+        motion: Name of the relative motion in ``relative_motions.MOTIONS``, or "guided".
+        a, b: The places.
+        law: Law of the force.
         axis: Unit vector, for motions along an axis.
-        corner: Point of frame a, if it is not the point of the anchor.
+        corner: Point that is fixed to the node of ``a`` and compared with ``b``; None: place ``a``.
         component: Index of the motion in the law of a :class:`Bushing`.
         components: Connectors of the components of a :class:`Bushing`.
 
@@ -86,7 +86,7 @@ class Connector(ABC):
 
     @property
     def kind(self) -> str:
-        """Name of its class, for messages."""
+        """Name of the class in messages."""
         return type(self).__name__
 
     @property
@@ -102,7 +102,7 @@ class Connector(ABC):
 
     @property
     def is_rotation(self) -> bool:
-        """True if the motion is a rotation: rad and N m instead of m and N."""
+        """True if the motion is a rotation, in rad and N m instead of m and N."""
         return self.motion == "turning"
 
     @property
@@ -116,7 +116,7 @@ class Connector(ABC):
         return self.motion == "sliding"
 
     def rigidly(self) -> tuple[Factors, Factors]:
-        """Return the derivatives of the motion by (u, v, ψ) of nodes a and b, undeformed."""
+        """Return the derivatives of the motion for nodes a and b, in the undeformed scene."""
         if self.is_rotation:
             return (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)
         (dx, dy), length = self.apart, math.hypot(*self.apart)
@@ -149,7 +149,7 @@ class Stretch(Connector):
     """Connector of the distance between ``a`` and ``b``: springs, dampers, actuators; m, N.
 
     Raises:
-        ModelError: Both are at the same point, so that no direction exists.
+        ModelError: Both places are at the same point, so that the distance has no direction.
 
     Example:
         >>> rod = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e6))
@@ -188,7 +188,7 @@ class Slide(Connector):
     b: AttachmentPoint
     law: Law
     _: KW_ONLY
-    axis: Point = None  # type: ignore[assignment]  # a unit vector follows
+    axis: Point = None  # type: ignore[assignment]  # replaced by a unit vector
     motion = "sliding"
 
     def __post_init__(self) -> None:
@@ -200,13 +200,14 @@ class Slide(Connector):
 class Bushing(Connector):
     """Connector of two or three components of the motion of ``b`` relative to ``a``; N, N m.
 
-    The first is the displacement along an axis that turns with ``a``, the second the displacement
-    along the normal, 90 degrees counter-clockwise.  The third, if the law has it, is the rotation.
-    All are zero in the undeformed scene.  Solutions have their histories in this order.
+    The first component is the displacement along an axis that turns with ``a``, the second the
+    displacement along the normal, 90 degrees counter-clockwise from the axis, and the third, if the
+    law has it, the rotation.  All are zero in the undeformed scene.  The histories of a solution
+    are in this order.
 
     Args:
         a: Place with which the axis turns; it may be on the ground.
-        b: Place that moves; it may be at the same point.
+        b: Place that moves; it may be at the point of ``a``.
         law: A :class:`ConnectorLaw` with two or three components, such as :class:`Clearance`.
         axis: Direction of the first component in the undeformed scene.
 
@@ -242,7 +243,7 @@ class Bushing(Connector):
 
     @cached_property
     def components(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """Connectors of its components."""
+        """Connectors of the two or three components."""
         x, y = self.axis
         motions = (("sliding", (x, y)), ("sliding", (-y, x)), ("turning", (x, y)))
         return tuple(
@@ -253,7 +254,7 @@ class Bushing(Connector):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Component(Connector):
-    """One relative motion of a joint, a plastic hinge or a bushing."""
+    """One relative motion of a joint, a plastic hinge, a bushing or an off-centre point load."""
 
     owner: str
     motion: str
@@ -266,16 +267,16 @@ class Component(Connector):
 
     @property
     def kind(self) -> str:
-        """Name of its owner, for messages."""
+        """Name of the owner in messages, such as "Revolute"."""
         return self.owner
 
 
-UNIT = 4 * sys.float_info.epsilon
-"""Round-off of the length of a unit vector."""
+UNIT_TOLERANCE = 4 * sys.float_info.epsilon
+"""Largest difference of the length of a unit vector from 1 by round-off."""
 
 
 def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: str) -> Point:
-    """Return the unit vector along an axis, by default from ``a`` to ``b``."""
+    """Return the unit vector along ``axis``, by default along the line from ``a`` to ``b``."""
     require_anchors(kind, a, b)
     (ax, ay), (bx, by) = a.point, b.point
     x, y = (bx - ax, by - ay) if axis is None else require_vector(axis, f"{kind}: axis")
@@ -285,7 +286,7 @@ def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: 
             f"{kind}({a}, {b}): the axis has zero length; give axis = (x, y), a direction in the "
             "undeformed scene"
         )
-    if abs(length - 1.0) <= UNIT:  # read from a file: it must not change
+    if abs(length - 1.0) <= UNIT_TOLERANCE:  # axes that are read from files must not change
         return x, y
     return x / length, y / length
 
@@ -311,10 +312,10 @@ def plastic_hinges(
     """Return plastic hinges of zero length as connectors; their motions are jumps of rotation.
 
     A beam has its ``hinges``, and a hinge at each end if its section has one.  An end has no hinge
-    if it bears no moment, or if only a load acts there: the load acts on the member, because
-    nothing beyond the hinge could bear it.  Where two members meet and nothing else bears a
-    moment, both have the same moment.  Then only the weaker member has a hinge, because the hinge
-    of the stronger would never open.
+    if it bears no moment, or if its only moment is a load: the load acts on the member, because
+    nothing beyond the hinge could bear it.  Where two members meet and nothing else bears or loads
+    the joint by a moment, both have the same moment.  Then only the weaker member has a hinge,
+    because the hinge of the stronger member would never open.
     """
     laws = {place: law for place, law in may_have.items() if law.opens}
     if not laws:
@@ -331,7 +332,7 @@ def plastic_hinges(
             return True
         dof = same[place, 2]
         others = [x for x in members.get(dof, ()) if x != place]
-        between = len(others) > 0 and (dof in acted or not _outlasts(place, others, laws))
+        between = len(others) > 0 and (dof in acted or not _never_opens(place, others, laws))
         return dof in borne or between
 
     hinges = []
@@ -344,7 +345,7 @@ def plastic_hinges(
 
 
 def law_of(connector: Connector) -> HingeLaw:
-    """Return the law of a plastic hinge, or of another rigid-plastic connector."""
+    """Return the law of a plastic hinge or of another rigid-plastic connector."""
     if not isinstance(connector.law, RigidPlastic):
         raise ModelError(f"{connector}: its law is not rigid-plastic")
     return connector.law.law
@@ -357,8 +358,11 @@ def place_of(hinge: Connector) -> Place:
     return hinge.a.beam.at(hinge.a.s)
 
 
-def _outlasts(place: Place, others: Sequence[Node], laws: Mapping[Place, HingeLaw]) -> bool:
-    """Return whether the only other member at a joint yields first, or is listed first."""
+def _never_opens(place: Place, others: Sequence[Node], laws: Mapping[Place, HingeLaw]) -> bool:
+    """Return whether a hinge never opens, because the only other member at the joint yields first.
+
+    If both members have the same limit, the first one in ``laws`` yields.
+    """
     if len(others) > 1 or not isinstance(others[0], Place) or others[0] not in laws:
         return False
     own, next_law, order = laws[place], laws[others[0]], list(laws)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rank analysis: motions without strain, and redundant constraints."""
+"""Checks of constraints and masses by rank analysis; checks of prestress and time schemes."""
 
 from __future__ import annotations
 
@@ -38,22 +38,25 @@ INSTEAD = "Add supports or joints, or run dynamics (EnergyMomentum)"
 """Advice if statics has no unique answer."""
 
 LAST_DIGITS = 1e-12
-"""Strain, or motion over the size of the scene, that causes a stress of round-off."""
+"""Strain, or motion divided by the size of the scene, whose stress counts as round-off."""
 
 DENSE = 90
-"""Largest number of unknowns for a null space by a dense decomposition."""
+"""Largest number of unknowns whose null space is found by a dense decomposition."""
 
 
 def require_masses(scene: Scene) -> None:
-    """Raise :class:`ModelError` if a free body has no mass, unless it is joined to a beam."""
+    """Raise :class:`ModelError` if a body moves freely without mass, or turns without inertia.
+
+    A displacement or rotation that a body shares with a beam needs no mass of the body.
+    """
     if not scene.bodies:
         return
-    same, moved = scene.representatives, _fixed(scene)
+    same, determined = scene.representatives, _fixed(scene)
     for alike in scene.shared_by_joints:
-        moved |= {same[dof] for dof in alike if not isinstance(dof[0], Body)}
+        determined |= {same[dof] for dof in alike if not isinstance(dof[0], Body)}
     for body in scene.bodies:
         for name, components in (("mass", (0, 1)), ("inertia", (2,))):
-            free = any(same[body, component] not in moved for component in components)
+            free = any(same[body, component] not in determined for component in components)
             if free and getattr(body, name) == 0.0:
                 raise ModelError(
                     f"{body.name}: {name} = 0, but dynamics needs it to be positive; use RigidLink "
@@ -62,14 +65,14 @@ def require_masses(scene: Scene) -> None:
 
 
 def require_inertia(scene: Scene) -> None:
-    """Raise :class:`ModelError` if a beam or body can move without inertia and resistance.
+    """Raise :class:`ModelError` if a beam or body can move with neither inertia nor resistance.
 
     Rigid motions without inertia need stiffness, damping or constraints.  Otherwise the equations
     of motion are singular.
     """
     inertias = [(s.rhoA, s.rhoA, s.rhoA or s.rhoI) for s in (beam.section for beam in scene.beams)]
     inertias += [(body.mass, body.mass, body.inertia) for body in scene.bodies]
-    loose = np.flatnonzero(np.array(inertias) == 0.0)  # in the order of (u, v, size ψ) of all parts
+    loose = np.flatnonzero(np.array(inertias) == 0.0)  # columns of the matrix of _constraints
     if not loose.size:
         return
     masses = [
@@ -92,14 +95,14 @@ def require_inertia(scene: Scene) -> None:
     mode[loose] = free[:, 0]
     moving = "; ".join(_moving(scene, mode)[:4])
     raise ModelError(
-        f"dynamics needs mass or something that holds: {moving}, without mass (rhoA or mass = "
-        "0), and nothing determines this motion. Give it mass (a section rho or rhoA), or hold or "
-        "join it"
+        f"dynamics needs mass or resistance for every motion: {moving}, without mass (rhoA or "
+        "mass = 0), and nothing determines this motion. Give the part mass (a section rho or "
+        "rhoA), hold it by a support, or join it"
     )
 
 
 def _fixed(scene: Scene) -> set[NodeDof]:
-    """Return the degrees of freedom that the ground and supports prescribe."""
+    """Return the degrees of freedom of the ground, and those held by supports in unrotated axes."""
     same = scene.representatives
     by_supports = {same[node(s.place), c] for s in scene.supports if not s.angle for c in s.held}
     return {same[GROUND, component] for component in range(3)} | by_supports
@@ -112,35 +115,37 @@ Row = list[tuple[Node, Array]]
 def require_independent(scene: Scene) -> None:
     """Raise :class:`ModelError` if constraints repeat or contradict each other.
 
-    They do if their gradients by the free degrees of freedom are linearly dependent in the
-    undeformed scene.  A rigid-plastic connector is a constraint below its limit.
+    They do if their gradients with respect to the free degrees of freedom are linearly dependent in
+    the undeformed scene.  A rigid-plastic connector is a constraint below its limit.
     """
-    rows, within = _dependences(scene)
-    if within.shape[1] == 0:
+    rows, combinations = _dependences(scene)
+    if combinations.shape[1] == 0:
         return
-    dependent = [rows[i] for i in np.flatnonzero(np.abs(within).max(axis=1) > 1e-6)]
+    dependent = [rows[i] for i in np.flatnonzero(np.abs(combinations).max(axis=1) > 1e-6)]
     joints = {holder: joint for joint in scene.joints for holder in joint.holders}
     owners: list[object] = [joints.get(owner, owner) for owner, _ in dependent]
-    owners += _already(scene, [row for _, row in dependent])
+    owners += _supports_and_joints_at(scene, [row for _, row in dependent])
     names = [
         f"{owner} with {type(owner.law).__name__}" if isinstance(owner, Connector) else str(owner)
         for owner in {id(owner): owner for owner in owners}.values()
     ]
     rigid = any(isinstance(getattr(owner, "law", None), RigidPlastic) for owner in owners)
     raise ModelError(
-        f"constraints repeat or contradict each other: {within.shape[1]} of the constraints of "
-        f"{'; '.join(names)} can be left out. Remove one, or make it elastic: "
+        "constraints repeat or contradict each other: "
+        f"{combinations.shape[1]} of the constraints of {'; '.join(names)} can be left out. "
+        "Remove one, or make it elastic: "
         + (
             "a RigidPlastic connector holds its motion until it yields, and a "
-            "Spring(stiffness, law=...) yields, too; of two in parallel make one of both limits"
+            "Spring(stiffness, law=...) yields, too; replace two in parallel by one with the "
+            "sum of the limits"
             if rigid
             else "a Spring, or a Beam instead of a rigid part"
         )
     )
 
 
-def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
-    """Iterate over supports that hold ends of constraints, and joints that make ends equal."""
+def _supports_and_joints_at(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
+    """Iterate over supports that hold, and joints that equate, degrees of freedom of ``rows``."""
     same = scene.representatives
     supports = {same[node(s.place), c]: s for s in scene.supports for c in s.held if not s.angle}
     for row in rows:
@@ -153,17 +158,18 @@ def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
 
 
 def friction_repeats(scene: Scene) -> bool:
-    """Return whether constraints of sticking friction are redundant."""
+    """Return whether constraints of sticking friction repeat each other or other constraints."""
     friction = any(rubs(connector.law) for connector in scene.all_connectors)
     return friction and _dependences(scene, friction=True)[1].shape[1] > 0
 
 
 def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[object, Row]], Array]:
-    """Find dependent constraints of laws, of supports in rotated axes and of sticking friction.
+    """Find linearly dependent constraints of connectors and of supports in rotated axes.
 
-    Returns candidate constraints with their owners, and in columns the combinations of them that
-    vanish for all free degrees of freedom.  A constraint that alone acts on a degree of freedom is
-    independent; such constraints are removed from the candidates, one after the other.
+    With ``friction``, sticking friction is a constraint, too.  Returns candidate constraints with
+    their owners, and a matrix: each column has the factors of a combination of candidates that
+    vanishes for all free degrees of freedom.  A constraint that alone acts on a degree of freedom
+    is independent; such constraints are removed from the candidates, one after the other.
     """
 
     def holds(connector: Connector) -> bool:
@@ -176,25 +182,25 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
     same, fixed = scene.representatives, _fixed(scene)
     turned = (support for support in scene.supports if support.angle)
     rows = [*_rows(scene, holds, turned)]
-    moved: list[dict[NodeDof, float]] = []
-    users: dict[NodeDof, set[int]] = defaultdict(set)
+    entries: list[dict[NodeDof, float]] = []
+    rows_at: dict[NodeDof, set[int]] = defaultdict(set)
     for number, (_, row) in enumerate(rows):
         sums: dict[NodeDof, float] = defaultdict(float)
         for carrier, factors in row:
             for component, factor in enumerate(factors):
                 sums[same[carrier, component]] += factor
-        # If both ends are one node, only round-off is left.
-        moved.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
-        for dof in moved[-1]:
-            users[dof].add(number)
+        # Factors of one degree of freedom at both ends cancel, which leaves round-off.
+        entries.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
+        for dof in entries[-1]:
+            rows_at[dof].add(number)
     left = set(range(len(rows)))
-    alone = [dof for dof, indices in users.items() if len(indices) == 1]
+    alone = [dof for dof, indices in rows_at.items() if len(indices) == 1]
     while alone:
-        for number in users[alone.pop()] & left:
+        for number in rows_at[alone.pop()] & left:
             left.discard(number)
-            for dof in moved[number]:
-                users[dof].discard(number)
-                if len(users[dof]) == 1:
+            for dof in entries[number]:
+                rows_at[dof].discard(number)
+                if len(rows_at[dof]) == 1:
                     alone.append(dof)
     if not left:
         return [], np.zeros((0, 0))
@@ -203,20 +209,20 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
     terms = [
         (columns.setdefault(dof, len(columns)), column, factor)
         for column, number in enumerate(indices)
-        for dof, factor in moved[number].items()
+        for dof, factor in entries[number].items()
     ]
     gradients = _sparse(terms, (max(len(columns), 1), len(indices)))
     return [rows[number] for number in indices], _null_space(gradients)
 
 
 def require_no_mechanism(scene: Scene) -> str:
-    """Raise :class:`ModelError` if the scene is a mechanism in statics.
+    """Raise :class:`ModelError` if the scene is a mechanism without loads.
 
-    An elastic beam resists every motion except the three rigid ones, so a motion without strain
-    moves each beam as a rigid body.  It exists if the constraints on these motions have a null
-    space.  Loads may stabilize a mechanism, as weight stabilizes a pendulum.  So for a scene with
-    loads the result describes the motion, until the tangent in equilibrium is known.  The result is
-    empty if the scene is no mechanism.
+    Loads may stabilize a mechanism, as weight stabilizes a pendulum, which only the tangent in
+    equilibrium shows.  So for a mechanism with loads this function returns a description of its
+    motions, otherwise an empty text.  An elastic beam resists every motion except the three rigid
+    ones, so a motion without strain moves each beam as a rigid body.  Such a motion exists if the
+    constraints on rigid motions have a null space.
     """
     free = _null_space(_constraints(scene))
     if free.shape[1] == 0:
@@ -224,17 +230,17 @@ def require_no_mechanism(scene: Scene) -> str:
     moving = _moving(scene, free[:, 0])
     more = f"; and {len(moving) - 4} more" if len(moving) > 4 else ""
     ways = "way" if free.shape[1] == 1 else "independent ways"
-    said = (
+    description = (
         f"the scene is free to move in {free.shape[1]} {ways}, so statics has no unique answer: "
         f"{'; '.join(moving[:4])}{more}. "
     )
     if not scene.loads:
-        raise ModelError(said + INSTEAD)
-    return said
+        raise ModelError(description + INSTEAD)
+    return description
 
 
 def _center(member: Member | Body) -> Point:
-    """Return the reference point for the rigid motion of a beam or body."""
+    """Return the reference point of a rigid motion: a body's centre, or the middle of both ends."""
     if isinstance(member, Body):
         return member.center
     (xa, ya), (xb, yb) = member.start.point, member.end.point
@@ -244,7 +250,7 @@ def _center(member: Member | Body) -> Point:
 def _rows(
     scene: Scene, acts: Callable[[Connector], bool], supports: Iterable[Support]
 ) -> Iterator[tuple[object, Row]]:
-    """Iterate over the constraints of supports and of connectors that ``acts`` selects."""
+    """Iterate over constraints and their owners: connectors that ``acts`` selects, and supports."""
     for connector in filter(acts, scene.all_connectors):
         unit = np.array([1.0, 1.0, 1.0 if connector.is_rotation else 1 / scene.size])
         ends = zip((connector.a, connector.b), connector.rigidly(), strict=True)
@@ -262,9 +268,9 @@ def _constraints(
 ) -> csr_array:
     """Assemble constraints on the rigid motions (u, v, size ψ) of all parts; (n, 3 parts).
 
-    Parts are beams and bodies.  Rows are of joints, of supports, of connectors that ``acts``
-    selects and of degrees of freedom in ``also``.  Beams with works of the user have rows too,
-    because a work may hold them.
+    Parts are beams and bodies.  Joints, supports, connectors that ``acts`` selects and degrees of
+    freedom in ``also`` have rows.  Beams with works of the user have rows too, because a work may
+    hold a beam.
     """
     unit = np.eye(3)
     rows: list[Row] = [
@@ -300,7 +306,7 @@ def _sparse(terms: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> 
 
 
 def _null_space(constraints: csr_array) -> Array:
-    """Return an orthonormal basis of the null space of ``constraints``, in columns."""
+    """Return an orthonormal basis of the null space, in columns; at most 6 beyond :data:`DENSE`."""
     unknowns = constraints.shape[1]
     if unknowns <= DENSE:
         _, sizes, rows = np.linalg.svd(constraints.toarray(), full_matrices=True)
@@ -331,7 +337,7 @@ def _moving(scene: Scene, mode: Array) -> list[str]:
 def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
     """Raise :class:`ModelError` if a law has a stress at zero strain, as with an eigenstrain.
 
-    Then the undeformed scene, from which ``what`` starts, is not in equilibrium.
+    Then the undeformed scene, from which the analysis ``what`` starts, is not in equilibrium.
     """
     size = scene.size
     laws: list[tuple[object, MaterialLaw, Array, Array]] = [
@@ -379,14 +385,14 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
 
 
 class Rated(Protocol):
-    """Properties of a time scheme that a scene may need."""
+    """Properties of a time scheme that not all scenes admit."""
 
     has_mean_velocity: bool
     rings: bool
 
 
 def require_rates(scene: Scene, scheme: Rated) -> None:
-    """Raise :class:`ModelError` if a time scheme lacks the rates that a scene needs."""
+    """Raise :class:`ModelError` if a scheme lacks a mean velocity or damping that a scene needs."""
     name = type(scheme).__name__
     for owner, what in [
         *((c, c.law) for c in scene.all_connectors),
@@ -394,8 +400,8 @@ def require_rates(scene: Scene, scheme: Rated) -> None:
     ]:
         if (isinstance(what, RotatingFrame) or rubs(what)) and not scheme.has_mean_velocity:
             raise ModelError(
-                f"{name}: {owner} needs the mean velocity of a step, and forces act at its end "
-                "here; use EnergyMomentum() or EnergyMomentumDecaying()"
+                f"{name}: {owner} needs the mean velocity of a step, and this scheme takes all "
+                "forces at the end of the step; use EnergyMomentum() or EnergyMomentumDecaying()"
             )
     prescribed = [str(c) for c in scene.all_connectors if isinstance(c.law, HOLDING)]
     prescribed += [f"the support of {s.place}" for s in scene.supports if s.moving]

@@ -24,7 +24,7 @@ from ufl_beam.model.records import Positive, Record
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
 Below = Callable[[Array], Array]
-"""Function of y: area of a shape up to y, less a constant, and its first moment; (2, n); m², m³."""
+"""Function of y: area up to y and its first moment, each less a constant; (2, n); m², m³."""
 
 
 class Kind(NamedTuple):
@@ -38,20 +38,21 @@ class Kind(NamedTuple):
 class SectionPoints:
     """Material points of a cross-section, with their strains, weights and laws.
 
-    The resultants of the section are the sums of weight times stress times ``strains``.
+    The resultants of the section are the sums of weight times stress times ``strains`` over all
+    points, and ``rest`` times the strains of the section.
     """
 
-    strains: Values  # derivatives of the strain of each point by (Σ, Γ, K) of the section; (n, 3)
-    weights: Values  # area of fibres, 1 for resultants; (n,)
-    stiffness: Values  # elastic; (n,); interacting resultants have a row each, but one weight
-    laws: tuple[tuple[MaterialLaw, int], ...]  # each with its number of consecutive points
+    strains: Values  # derivatives of strains of points with respect to (Σ, Γ, K); (n, 3)
+    weights: Values  # areas of fibres, 1 for resultants; (n,), (1,) for interacting resultants
+    stiffness: Values  # elastic stiffness, also of each interacting resultant; (n,)
+    laws: tuple[tuple[MaterialLaw, int], ...]  # each law with its number of successive points
     rest: Values  # stiffness (axial, shear, bending) of resultants without points; (3,)
     softening: SofteningLaw | None  # law of the discontinuities, if points can break
     breaking: slice  # points that can break
-    hinges: bool = False  # True if the discontinuity is one hinge, a jump of rotation
+    hinges: bool = False  # True if the points that break are one hinge, a jump of rotation
 
     def __post_init__(self) -> None:
-        _ = self.kind  # refuses laws of several kinds
+        _ = self.kind  # raises if the laws are of several classes
 
     @property
     def elastic(self) -> bool:
@@ -60,12 +61,12 @@ class SectionPoints:
 
     @property
     def yields(self) -> bool:
-        """True if the bulk can yield."""
+        """True if the law of any point can yield."""
         return any(not law.elastic for law, _ in self.laws)
 
     @cached_property
     def kind(self) -> Kind:
-        """The kind of law that all points of the bulk follow, each with its own parameters."""
+        """The kind of law that all points follow, each with its own parameters."""
         laws = [law for law, _ in self.laws if not law.elastic] or [self.laws[0][0]]
         kinds: dict[Kind, MaterialLaw] = {}
         for law in laws:
@@ -79,15 +80,15 @@ class SectionPoints:
         for law, _ in self.laws:
             if type(law) is not type(kind.law):
                 raise ModelError(
-                    f"Section: beside {type(kind.law).__name__}, a resultant that yields or hinges "
-                    "needs a law of the same kind, with numbers at which it stays elastic"
+                    f"Section: beside {type(kind.law).__name__}, a resultant with a law or a hinge "
+                    "needs a law of the same class, with parameters at which it stays elastic"
                 )
         return kind
 
     def parameters(self, keys: list[tuple[int, int]]) -> dict[str, Values]:
         """Return the parameters of the laws at the points of many cells, each (cells, n).
 
-        Random values depend on the keys of the cells and a seed.
+        Random values depend on the keys of the cells and the seed of a distribution.
         """
         shape, first = (len(keys), len(self.weights)), 0
         columns = {name: np.zeros(shape) for name in self.kind.parameters}
@@ -110,8 +111,8 @@ class Fibres(Record):
         law: Law of each fibre; stresses in Pa.  A random limit is drawn for each fibre of each
             cell.
         number: Number of layers of equal thickness, if the shape of the section gives their areas.
-        softening: Law of the crack that opens in a fibre if the stress reaches its limit; Pa,
-            J/m².
+        softening: Law of the crack that opens in a fibre if the stress reaches the limit of this
+            law; Pa, J/m².
 
     Raises:
         ModelError: A law has the wrong type, or ``number`` is not a whole number from 1.
@@ -144,7 +145,7 @@ class PlacedFibres:
     def layers(
         cls, fibres: Fibres | None, E: float, h: float, below: Below, edges: Sequence[float] = ()
     ) -> PlacedFibres | None:
-        """Create layers of equal thickness over the depth ``h``, also cut at ``edges``; m."""
+        """Create layers of equal thickness over the depth ``h`` (m), also cut at ``edges`` (m)."""
         if fibres is None:
             return None
         require_kind(fibres, Fibres, "Section: fibres")
@@ -166,7 +167,7 @@ class PlacedFibres:
         return float(self.E * self.A @ self.y**2)
 
     def section_points(self, GA: float) -> SectionPoints:
-        """Return the layout with one material point for each fibre; shear stays elastic."""
+        """Return one material point for each fibre, with the elastic shear stiffness ``GA`` (N)."""
         n, softening = len(self.y), self.fibres.softening
         return SectionPoints(
             strains=np.column_stack([np.ones(n), np.zeros(n), -self.y]),
@@ -191,8 +192,9 @@ def _require_seed(value: Any, what: str) -> None:
 class Distribution(Record, ABC):
     """Base of the distributions: a random positive quantity, the same on every process.
 
-    Each cell of each beam draws from its own random stream, whose key follows from the ends of the
-    beam.  So values depend on neither the order of beams nor the number of processes.
+    Each cell of each beam draws from its own random stream.  Its key is a checksum of the ends of
+    the beam and the number of the cell in the beam.  So values depend on neither the order of beams
+    nor the number of processes.
     """
 
     _: KW_ONLY
@@ -200,10 +202,10 @@ class Distribution(Record, ABC):
 
     @abstractmethod
     def _law(self) -> Any:
-        """Return the distribution of SciPy."""
+        """Return this distribution as an object of SciPy."""
 
     def draw(self, n: int, key: tuple[int, int]) -> npt.NDArray[np.float64]:
-        """Draw ``n`` independent values of the stream ``key``, at least zero; shape (n,)."""
+        """Draw ``n`` independent values from the stream ``key``, at least zero; shape (n,)."""
         stream = np.random.default_rng(np.random.SeedSequence(int(self.seed), spawn_key=key))
         return np.asarray(np.maximum(self._law().rvs(n, random_state=stream), 0.0))
 
@@ -217,7 +219,7 @@ class _ByMoments(Distribution):
 
 
 class Normal(_ByMoments):
-    """Normal distribution; negative values become zero, and such fibres yield at once.
+    """Normal distribution; negative values become zero: such points yield at once.
 
     Args:
         mean: Mean; Pa for fibres, N or N m for resultants.
@@ -237,7 +239,9 @@ class Normal(_ByMoments):
 
 
 class TruncatedNormal(_ByMoments):
-    """Normal distribution with these parameters, truncated to positive values.
+    """Normal distribution with the arguments of :class:`Normal`, truncated to positive values.
+
+    So its mean is larger than ``mean``, and its deviation smaller than ``deviation``.
 
     Example:
         >>> limit = ub.TruncatedNormal(mean=30e6, deviation=20e6, seed=1)
@@ -250,7 +254,7 @@ class TruncatedNormal(_ByMoments):
 
 
 class Lognormal(_ByMoments):
-    """Lognormal distribution of given mean and standard deviation.
+    """Lognormal distribution of given mean and standard deviation, see :class:`Normal`.
 
     Example:
         >>> limit = ub.Lognormal(mean=355e6, deviation=25e6, seed=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Users' functions: curves of the plane, and functions of time."""
+"""Curves of the plane, among them axes of beams, and functions of time."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ Point = tuple[float, float]
 Curve = Callable[[float], Sequence[float]]
 
 REACH = 1e-3
-"""Step of finite differences for tangents, as a fraction of a length.  Their error is some 1e-12
-for a curve with a radius of this length; round-off costs three digits of the coordinates."""
+"""Step of finite differences for tangents, as a fraction of a length.  A tangent has an error of
+some 1e-12 if this length is the radius of the curve; round-off costs three digits."""
 
-PROJECTIONS = 50
-"""Largest number of iterations in the search for the nearest point of a curve."""
+MOST_ITERATIONS = 50
+"""Largest number of iterations in the search for the point of a curve nearest to another."""
 
 WEIGHTS = np.array(
     [[-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1],
      [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25]]
 ) / 12  # fmt: skip
-"""Weights of five equidistant values in the derivative at each of these points."""
+"""Row k: weights of five equidistant values in the derivative at the k-th of their points."""
 
 
 # -- beam axes: records, so that scenes are compared and saved by their numbers ------------------
@@ -59,7 +59,7 @@ class Straight:
 
 @dataclass(frozen=True)
 class Arc:
-    """Circular arc, m, between two angles counter-clockwise from x; rad."""
+    """Circular arc (m) between two angles (rad), counter-clockwise from the x axis."""
 
     center: Point
     radius: float
@@ -103,7 +103,7 @@ def curve_point(curve: Curve, s: float, what: str) -> Point:
 
 
 def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] | Array]) -> Array:
-    """Return points of several curves at the parameters of each, curve by curve; (n, 2); m."""
+    """Return points of curves, each at its own parameters, curve by curve; (n, 2); m."""
     ends = [(*c.a, *c.b) if isinstance(c, Straight) else (0.0,) * 4 for c in curves]
     counts = [len(s) for s in parameters]
     s = np.concatenate([np.empty(0), *parameters])
@@ -120,14 +120,14 @@ def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] |
 
 
 def tangent(curve: Curve, s: float, step: float) -> Array:
-    """Return the derivative of a curve, from points at most two steps away; (2,); m."""
+    """Return the derivative of a curve at ``s``, from points at most two steps away; (2,); m."""
     inner = np.subtract(curve(s + step), curve(s - step))
     outer = np.subtract(curve(s + 2 * step), curve(s - 2 * step))
     return np.asarray((8 * inner - outer) / (12 * step))
 
 
 def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
-    """Return the tangent of a curve from points between ``low`` and ``high`` only; (2,); m."""
+    """Return the derivative at ``s`` from points between ``low`` and ``high`` only; (2,); m."""
     step = min(REACH, (high - low) / 8)
     left, right = int((s - low) / step), int((high - s) / step)
     before = left if left < 2 else max(2, 4 - right)
@@ -136,7 +136,7 @@ def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
 
 
 def parameter_step(curve: Curve, s: float, length: float) -> float:
-    """Find the parameter step that moves a point along a curve by :data:`REACH` of a length.
+    """Find the parameter step from ``s`` that moves a point by about ``REACH * length``.
 
     The parameter may have any unit, so the search begins at an arbitrary step.
     """
@@ -153,13 +153,13 @@ def parameter_step(curve: Curve, s: float, length: float) -> float:
 
 
 def nearest(curve: Curve, point: Array, s: float, step: float, length: float) -> float:
-    """Find the parameter of the point of a curve nearest to ``point``; NaN without convergence.
+    """Find the parameter at which a curve is nearest to ``point``; NaN without convergence.
 
     The search begins at ``s``.  ``step`` is the step of :func:`tangent`, ``length`` the size of the
-    guided object; m.
+    scene; m.
     """
     last_digits = 4 * np.spacing(length + math.hypot(*point))
-    for _ in range(PROJECTIONS):
+    for _ in range(MOST_ITERATIONS):
         t = tangent(curve, s, step)
         change = float((point - curve(s)) @ t / (t @ t))
         s += change
@@ -171,8 +171,8 @@ def nearest(curve: Curve, point: Array, s: float, step: float, length: float) ->
 def enclosing_diameter(points: Array) -> float:
     """Return the diameter of the smallest circle around points, (n, 2); m.
 
-    It does not depend on the axes.  The circle goes through two or three points; the point farthest
-    outside is included, until none is outside.
+    It does not depend on the coordinate axes.  The circle goes through two or three points; the
+    point that is farthest outside is included, until no point is outside.
     """
     points = points - points.mean(axis=0)
     distances = np.hypot(*points.T)
@@ -184,18 +184,18 @@ def enclosing_diameter(points: Array) -> float:
         if distances[outside] <= radius + slack:
             return 2 * radius
         chosen, center, larger = _circle_around(points, [*chosen, outside])
-        if larger <= radius:  # by round-off
+        if larger <= radius:  # only round-off is left
             return 2 * radius
         radius = larger
 
 
 def _circle_around(points: Array, few: list[int]) -> tuple[list[int], Array, float]:
-    """Find the smallest circle around at most four points: points on it, centre, radius."""
+    """Return indices on the smallest circle around the points ``few``, its centre and radius."""
     circles = []
     for chosen in (*combinations(few, 2), *combinations(few, 3)):
         first, *others = points[list(chosen)]
         ways = np.array(others) - first
-        # at equal distance from all; if they are collinear, a least-squares centre
+        # The centre is equidistant from all points, in least squares if they are collinear.
         center = first + np.linalg.lstsq(2 * ways, (ways**2).sum(axis=1), rcond=None)[0]
         circles.append((float(np.hypot(*(points[few] - center).T).max()), list(chosen), center))
     radius, through, center = min(circles, key=lambda circle: circle[0])
@@ -239,14 +239,14 @@ def ramp(duration: float) -> TimeFunction:
 @closed("any function of t will do")
 @dataclass(frozen=True)
 class Table:
-    """Time function through points, linear between them and constant outside.
+    """Time function with given values, linear between their times and constant outside.
 
     Args:
         times: Increasing times; s.
-        values: Value at each time.
+        values: Value at each of the times.
 
     Raises:
-        ModelError: The lengths differ, or times do not increase.
+        ModelError: The lengths differ or are zero, or times do not increase.
 
     Example:
         >>> pulse = ub.Table([0, 0.1, 0.2], [0, 5, 0])
@@ -279,7 +279,7 @@ class Table:
 
     @property
     def kinks(self) -> Sequence[float]:
-        """Times at which adaptive steps end: the function is smooth only between them; s."""
+        """Times at which adaptive steps end, as the function is smooth only between them; s."""
         return self.times
 
     def __call__(self, t: float) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joints: places share degrees of freedom, or connectors hold their relative motion."""
+"""Joints: places share degrees of freedom, or connectors hold relative motions of places."""
 
 from __future__ import annotations
 
@@ -30,12 +30,13 @@ class Joint(Bearing, ABC):
     """Joint by shared unknowns or constraint forces; base of :class:`Rigid` and other joints.
 
     Attributes:
-        places: The anchors.
-        shared: Components that are equal: 0, 1 displacement, 2 rotation.  They are one unknown;
-            for displacements this holds for anchors that move like their nodes.
-        holders: Connectors that hold the other components.
-        meets: Whether the anchors must coincide in the undeformed scene.
-        advice: Text appended to the error if they do not coincide.
+        places: The joined places.
+        shared: Components that are equal at all places: 0, 1 displacement, 2 rotation.  Equal
+            rotations are one unknown.  So are equal displacements, except at points of a body
+            other than its centre, where the node has another displacement.
+        holders: Connectors that hold the other motions that the joint prevents.
+        meets: Whether the places must coincide in the undeformed scene.
+        advice: Text appended to the error if the places do not coincide.
 
     Example:
         >>> mast = ub.Beam((2, 0), (2, 3), section, name="mast")
@@ -60,9 +61,9 @@ class Joint(Bearing, ABC):
         return f"{type(self).__name__}({', '.join(map(str, self.places))})"
 
     def equal(self, component: int) -> list[NodeDof]:
-        """Return equal degrees of freedom; displacements only of anchors that move like nodes."""
-        alike = [place for place in self.places if component == 2 or carries(place)]
-        return [(node(place), component) for place in alike]
+        """Return equal degrees of freedom of nodes; displacements only of places at their nodes."""
+        places = [place for place in self.places if component == 2 or carries(place)]
+        return [(node(place), component) for place in places]
 
     def _hold(self, motion: str, axis: Point, corner: Point | None = None) -> Connector:
         """Return a connector that holds a relative motion of the first two places."""
@@ -71,14 +72,14 @@ class Joint(Bearing, ABC):
 
 
 class _AtPoint(Joint):
-    """Joint at one point by shared unknowns or, with multipliers, by connectors.
+    """Joint at one point by shared unknowns or, with ``multipliers``, by connectors.
 
-    Connectors also hold anchors that do not move like their nodes.
+    Connectors also hold displacements at points of bodies other than the centre.
     """
 
     meets = True
     joined: tuple[int, ...] = (0, 1)
-    """Components that are equal."""
+    """Components that are equal at all places."""
 
     multipliers: bool
 
@@ -103,7 +104,7 @@ class _AtPoint(Joint):
 def _constraints_at_point(
     joint: Joint, multipliers: bool, joined: tuple[int, ...]
 ) -> tuple[Connector, ...]:
-    """Return connectors for anchors that do not move like nodes, or for all with multipliers."""
+    """Return connectors for places away from their nodes; with ``multipliers`` for all places."""
     carriers = [place for place in joint.places if carries(place) and not multipliers]
     base = (carriers or joint.places)[0]
     others = [place for place in joint.places if place not in (*carriers, base)]
@@ -123,9 +124,9 @@ class Rigid(_AtPoint):
     """Rigid joint at one point: all ``places`` share displacement and rotation.
 
     Args:
-        places: Places to be joined, at one point.
-        multipliers: Keep separate unknowns, and hold them by constraint forces that solutions and
-            controllers can read.  By default the places share unknowns, at no cost.
+        places: Two or more places at one point.
+        multipliers: Keep separate unknowns, and make them equal by constraint forces, which
+            solutions and controllers can read.  By default the places share unknowns.
 
     Example:
         >>> column = ub.Beam((2, 0), (2, -3), section, name="column")
@@ -141,9 +142,10 @@ class Rigid(_AtPoint):
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class Revolute(_AtPoint):
-    """Revolute joint: all ``places`` share the displacement, each turns freely.
+    """Revolute joint: all ``places`` share the displacement, and each turns freely.
 
-    It has the arguments of :class:`Rigid`; friction needs ``multipliers``.
+    It has the arguments of :class:`Rigid`.  Friction by the force of the joint needs
+    ``multipliers``, see :class:`Coulomb`.
 
     Example:
         >>> rod = ub.Beam((2, 0), (4, 0), section, name="rod")
@@ -161,7 +163,7 @@ class Prismatic(Joint):
     """Prismatic joint: ``slider`` moves along an axis that turns with ``rail``.
 
     Args:
-        rail: Place with the axis; it may be on the ground.
+        rail: Place with which the axis turns; it may be on the ground.
         slider: Place that slides.
         axis: Direction in the undeformed scene; from rail to slider by default.
         turning: Whether the slider may turn on the rail, like a pin in a slot.
@@ -199,7 +201,7 @@ class Prismatic(Joint):
 
     @cached_property
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """Connector that holds the motion across the axis."""
+        """Connector that prevents motion across the axis."""
         assert self.axis is not None
         x, y = self.axis
         return (self._hold("sliding", (-y, x)),)
@@ -207,10 +209,10 @@ class Prismatic(Joint):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigidLink(Joint):
-    """Massless rigid link: ``b`` moves as if it were a point of the cross-section or body of ``a``.
+    """Massless rigid link: ``b`` moves as a point of the cross-section or body of ``a`` would.
 
     Raises:
-        ModelError: Both are at the same point.
+        ModelError: Both places are at the same point.
 
     Example:
         >>> flange = ub.Beam((0, 0.5), (2, 0.5), section, name="flange")
@@ -226,11 +228,11 @@ class RigidLink(Joint):
     def __post_init__(self) -> None:
         require_anchors("RigidLink", self.a, self.b)
         if self.a.point == self.b.point:
-            raise ModelError(f"{self}: zero length; join them with Rigid")
+            raise ModelError(f"{self}: zero length; join the places with Rigid")
 
     @property
     def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
-        """Both ends of it."""
+        """Both ends of the link."""
         return self.a, self.b
 
     @cached_property
@@ -244,7 +246,7 @@ class RigidLink(Joint):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Link(Joint):
-    """Massless rigid rod with a revolute joint at both ends: keeps the distance.
+    """Massless rigid rod with a revolute joint at both ends, which keep their distance.
 
     Raises:
         ModelError: Zero length.
@@ -268,12 +270,12 @@ class Link(Joint):
 
     @property
     def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
-        """Both ends of it."""
+        """Both ends of the link."""
         return self.a, self.b
 
     @cached_property
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """Connector that holds the distance."""
+        """Connector that keeps the distance of the ends."""
         return (self._hold("stretching", (1.0, 0.0)),)
 
 
@@ -282,13 +284,13 @@ class Guided(Joint):
     """Joint that keeps a point on a guide curve of the ground, free along it and free to turn.
 
     Args:
-        place: Guided place.  On a body it is the centre; join another point to a guided beam by a
-            :class:`Revolute`.
+        place: Guided place: on a beam, or the centre of a body.  Another point of a body can be
+            joined to a guided beam by a :class:`Revolute`.
         curve: ``s -> (x, y)`` for all s that the motion may reach; ``curve(0)`` is at the place; m.
 
     Raises:
-        ModelError: The curve has no direction at s = 0.  A scene raises it if ``curve(0)`` is not
-            at the place.
+        ModelError: The curve has no direction at s = 0, or the place is another point of a body.
+            A scene raises this error if ``curve(0)`` is not at the place.
 
     Example:
         >>> rail = ub.Guided(beam.end, lambda s: (2 + s, 0.5 * s**2))
@@ -305,12 +307,12 @@ class Guided(Joint):
     def __post_init__(self) -> None:
         require_anchors("Guided", self.place)
         if not carries(self.place):
-            raise ModelError(f"Guided({self.place}): it must be the centre of the body")
+            raise ModelError(f"Guided({self.place}): the place must be the centre of the body")
         _ = self.holders  # checks the curve
 
     @cached_property
     def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
-        """The start of the curve, and the place."""
+        """The point of the curve at s = 0, and the guided place."""
         return self._start, self.place
 
     @cached_property
@@ -319,13 +321,13 @@ class Guided(Joint):
 
     @cached_property
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """Connector that holds the distance from the curve."""
+        """Connector that keeps the distance from the curve zero."""
         law, name = Guide(self.curve), f"Guided({self.place}): curve"
         start = self._start
         (x0, y0), (x1, y1) = (curve_point(self.curve, s, name) for s in START_INTERVAL)
         length = math.hypot(x1 - x0, y1 - y0)
         if length == 0.0:
-            raise ModelError(f"Guided({self.place}): the curve stands still at s = 0")
+            raise ModelError(f"Guided({self.place}): the curve has no direction at s = 0")
         across = (y0 - y1) / length, (x1 - x0) / length
         return (Component("Guided", "guided", start, self.place, law, across),)
 
@@ -340,8 +342,8 @@ class Release(Joint):
 
     Args:
         a: Place on a beam, whose axis defines the axial direction.
-        b: Place to which it is joined.
-        free: Resultants that are not transmitted: letters of "NVM".
+        b: Place to which ``a`` is joined.
+        free: Resultants that are not transmitted: one to three letters of "NVM".
         multipliers: As in :class:`Rigid`.
 
     Raises:
@@ -381,12 +383,12 @@ class Release(Joint):
 
     @property
     def shared(self) -> tuple[int, ...]:  # type: ignore[override]
-        """Components that no resultant releases."""
+        """Components that share an unknown; none with ``multipliers``."""
         return () if self.multipliers else self._joined
 
     @cached_property
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """Connectors that hold the components that are not released, along the axes of the beam."""
+        """Connectors that hold the components that are neither released nor shared."""
         if 0 in self._joined:
             return _constraints_at_point(self, self.multipliers, self._joined)
         x, y = self.a.direction

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Functions for material laws, of arrays and of UFL expressions.
+"""Functions for laws of materials, softening and connectors; of arrays and UFL expressions.
 
 Arrays may be complex, because the reference solver differentiates by complex steps: use
 :func:`absolute` instead of ``abs``.  The operators + - * / and ** are the Python operators.
@@ -23,7 +23,7 @@ Values = Any
 
 @singledispatch
 def where(condition: Values, yes: Values, no: Values) -> Values:
-    """Return ``yes`` where the condition holds, else ``no``; both are evaluated everywhere."""
+    """Return ``yes`` where the condition is true, else ``no``; both are evaluated everywhere."""
     return np.where(condition, yes, no)
 
 
@@ -35,12 +35,12 @@ def below(x: Values, limit: float) -> Values:
 
 @singledispatch
 def exp(x: Values) -> Values:
-    """Return the exponential of numbers or arrays."""
+    """Return the exponential of x."""
     return np.exp(x)
 
 
 def sign(x: Values) -> Values:
-    """Return the sign, 1 or -1; it is 1 at zero."""
+    """Return the sign of x, 1 or -1; at zero 1."""
     return where(below(x, 0.0), -1.0, 1.0)
 
 
@@ -78,5 +78,5 @@ def log(x: Values) -> Values:
 
 @singledispatch
 def tanh(x: Values) -> Values:
-    """Return the hyperbolic tangent of numbers or arrays."""
+    """Return the hyperbolic tangent of x."""
     return np.tanh(x)

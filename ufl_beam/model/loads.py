@@ -42,7 +42,7 @@ class LoadAtPlace(Load):
 
 
 OWN_LOAD = "state other loads as a VirtualWork, a Potential or a connector with a ForceLaw"
-"""Message of classes without subclasses."""
+"""Advice in the error that refuses a subclass of a load."""
 
 
 @closed(OWN_LOAD)
@@ -53,8 +53,8 @@ class PointLoad(LoadAtPlace):
     Args:
         place: Loaded place.
         force: (F_x, F_y); N.
-        moment: Counter-clockwise; N m.
-        amplitude: Factor at time t.
+        moment: Moment, positive counter-clockwise; N m.
+        amplitude: Factor on force and moment, a function of time t (s).
 
     Example:
         >>> load = ub.PointLoad(
@@ -70,9 +70,9 @@ class PointLoad(LoadAtPlace):
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
 class FollowerLoad(LoadAtPlace):
-    """Follower force at a place: it turns with the cross-section and is not conservative.
+    """Follower force: it turns with the cross-section or body, and is not conservative.
 
-    It has the arguments of :class:`PointLoad`; ``force`` is the force before any rotation.
+    It has the arguments of :class:`PointLoad`; ``force`` is the force in the undeformed scene.
 
     Example:
         >>> thrust = ub.FollowerLoad(beam.end, force=(0, -1e5), amplitude=lambda t: t)
@@ -86,8 +86,8 @@ class FollowerLoad(LoadAtPlace):
         super().__post_init__()
         if not carries(self.place):
             raise ModelError(
-                f"{self}: not the centre of the body; act on the centre, "
-                "with the moment that this makes"
+                f"{self}: not the centre of the body; apply the force at the centre, with its "
+                "moment about the centre"
             )
 
 
@@ -99,8 +99,8 @@ class LineLoad(Load):
     Args:
         beam: Loaded beam.
         force: (f_x, f_y); N/m.
-        moment: Counter-clockwise; N m/m.
-        amplitude: Factor at time t.
+        moment: Moment, positive counter-clockwise; N m/m.
+        amplitude: Factor on force and moment, a function of time t (s).
 
     Example:
         >>> snow = ub.LineLoad(beam, force=(0, -1e3))
@@ -132,7 +132,7 @@ class Gravity(Load):
 
     Args:
         acceleration: (g_x, g_y); m/s².
-        amplitude: Factor at time t.
+        amplitude: Factor on the acceleration, a function of time t (s).
 
     Example:
         >>> hanging = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
@@ -151,7 +151,7 @@ class Gravity(Load):
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False)
 class RotatingFrame(Load):
-    """Centrifugal and Coriolis forces on all masses, in a frame that turns steadily.
+    """Centrifugal and Coriolis forces on all masses, in a frame that turns at a constant rate.
 
     Motions, velocities and all other loads refer to the rotating frame.  A static run gives the
     state of steady rotation, with its deformation.
@@ -172,7 +172,7 @@ class RotatingFrame(Load):
 
     @property
     def amplitude(self) -> TimeFunction:
-        """Constant 1: a rate that changes would cause other forces."""
+        """Constant 1, because a rate that changes would cause a further force, the Euler force."""
         return steady
 
 
@@ -184,13 +184,13 @@ class RotatingFrame(Load):
 class Rayleigh(Record):
     """Rayleigh damping (a0 M + a1 K) v with the stiffness K of the undeformed scene, P(92).
 
-    The damping ratio of a mode of circular frequency ω is a0/(2ω) + a1 ω/2.  It is a property of
-    the structure, not of the material, and it is not objective: it damps rigid rotation too, and
-    resists a hinge that has opened.  For large motion see :class:`KelvinVoigt`.
+    The damping ratio of a mode of circular frequency ω is a0/(2ω) + a1 ω/2.  This damping is a
+    property of the structure, not of the material, and is not objective: it damps rigid rotation,
+    too, and resists a hinge that has opened.  For large motion see :class:`KelvinVoigt`.
 
     Args:
-        mass: a0; 1/s.
-        stiffness: a1; s.
+        mass: Factor a0 on the mass matrix; 1/s.
+        stiffness: Factor a1 on the stiffness matrix; s.
 
     Raises:
         ModelError: A negative number, or both zero.
@@ -216,14 +216,14 @@ class Rayleigh(Record):
 @closed("state other damping as a VirtualWork of v")
 @dataclass(frozen=True, eq=False)
 class KelvinVoigt(Record):
-    """Kelvin-Voigt damping: viscous resultants, C times the strain rates; objective.
+    """Kelvin-Voigt damping: viscous resultants, retardation_time C times strain rates; objective.
 
     Rigid motion is not damped.  The damping ratio of a mode of circular frequency ω in small
-    vibration is retardation_time ω/2, as with ``Rayleigh(stiffness=retardation_time)``.  Cells with
-    a hinge are not damped, so that an open hinge turns freely.
+    vibration is retardation_time ω/2, as with ``Rayleigh(stiffness=retardation_time)``.  Cells of a
+    section with a ``hinge`` are not damped, so that an open hinge turns freely.
 
     Args:
-        retardation_time: Viscosity over stiffness; s.
+        retardation_time: Viscosity divided by stiffness; s.
         beams: The damped beams; all by default.
 
     Raises:
