@@ -100,7 +100,7 @@ PARTS = [
     (lambda: ub.ElastoPlastic(1.0, isotropic=-2.0), "isotropic = -2 must not...use Softening("),
     (lambda: ub.ElastoPlastic(1.0, kinematic=-2.0), "kinematic = -2 must not...use Softening("),
     (lambda: ub.ElastoPlastic(1.0, viscosity=5.0), "viscosity = 5.0 is not a Perzyna or DuvautL"),
-    (lambda: ub.Section(1, 1, 1, bending=BREAKS), "Section: bending...is not a ElastoPlastic"),
+    (lambda: ub.Section(1, 1, 1, bending=BREAKS), "Section: bending...is not an ElastoPlastic"),
     (lambda: in_fibres(bending=STEEL_LAW), "Section: a law bending beside fibres"),
     (lambda: in_fibres(axial=STEEL_LAW), "Section: a law axial beside fibres"),
     (lambda: in_fibres(shear=STEEL_LAW), "Section: a law shear beside fibres...elastic"),
