@@ -108,8 +108,8 @@ PARTS = [
     # one layer, whose middle is the axis
     (lambda: in_fibres(ub.Fibres(STEEL_LAW, number=1)), "number = 1 has no bending stiffness; use"),
     (lambda: of_fibres([0.1, 0.1], [1, 1]), "of_fibres: all fibres at one y...spread them"),
-    (lambda: of_fibres([0, 1], [1, 1, 1]), "y and A must be lists of one length...(2,)"),
-    (lambda: of_fibres([0, 1], [1, -1]), "y must be finite, and all A positive"),
+    (lambda: of_fibres([0, 1], [1, 1, 1]), "y and A must be lists of equal length...(2,)"),
+    (lambda: of_fibres([0, 1], [1, -1]), "all areas A must be positive"),
     # beams
     (lambda: beam((1, 2), (1, 2)), "girder: zero length, both ends are at (1.0, 2.0)"),
     (lambda: ub.Beam.arc((0, 0), 1.0, (2, 2), SECTION), "beam: zero length, both angles...are 2"),
