@@ -35,8 +35,8 @@ def hu_washizu(W: Energy, q: Expr, D: Expr, r: Expr, axis: Axis) -> Expr:
 def incompatible(α: Expr, axis: Axis) -> Expr:
     """Return the strain that a jump α of the rotation causes in the bulk; it unloads the cell.
 
-    The rotation by the jump is α times the difference of Heaviside's function and a linear one,
-    P(69).  The derivative of the linear function is this strain; the Dirac delta is the hinge.
+    The jump adds to the rotation α times the difference of Heaviside's function and a linear
+    function, P(69).  The slope of the linear function is this strain; the Dirac delta is the hinge.
     """
     return ufl.as_vector([0, 0, -α / axis.h])  # P(71)!
 
