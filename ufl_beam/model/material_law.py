@@ -72,7 +72,7 @@ class MaterialLaw(ABC):
 
     @abstractmethod
     def stress(self, strain: Values, state: State) -> Values:
-        """Return the stress; its slope at fixed variables is ``C``, unless it is nonlinear."""
+        """Return the stress; its slope at fixed variables is ``C`` unless the law is nonlinear."""
 
     @abstractmethod
     def elastic_energy(self, strain: Values, state: State) -> Values:
@@ -124,7 +124,7 @@ class MaterialLaw(ABC):
         return False
 
     def parameters(self, C: Values) -> dict[str, Any]:
-        """Return the parameters by name, at points of stiffness ``C``: by default, the fields."""
+        """Return the parameters at points of stiffness ``C`` by name; by default the fields."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
     def with_parameters(self, C: Values, parameters: Mapping[str, Values]) -> MaterialLaw:

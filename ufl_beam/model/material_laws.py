@@ -118,8 +118,8 @@ class ElastoPlastic(_Plastic):
     """Elasto-(visco)plastic law with linear isotropic and kinematic hardening, P(35)-P(48).
 
     Args:
-        yield_limit: Yield stress, or yield force or moment of a resultant; Pa, N or N m.  For
-            fibres also a distribution such as :class:`Normal`.
+        yield_limit: Yield stress, or yield force or moment of a resultant, or a distribution such
+            as :class:`Normal`; Pa, N or N m.
         isotropic: Isotropic hardening; stress per plastic strain.
         kinematic: Kinematic hardening (Prager); stress per plastic strain.
         viscosity: :class:`Perzyna` or :class:`DuvautLions`; rate-independent by default.
@@ -138,7 +138,7 @@ class ElastoPlastic(_Plastic):
     viscosity: Annotated[Any, partial(require_kind, kind=(Perzyna, DuvautLions))] = Perzyna(0.0)
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "accumulated": 0.0}
     fracture_energy: ClassVar[float] = math.inf  # it never breaks
-    steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # as of a SofteningLaw: no fall
+    steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # of a SofteningLaw; here nothing falls
 
     def parameters(self, C: Values) -> dict[str, Any]:
         """Return limit and moduli, and the viscosity as overstress per plastic strain rate."""
@@ -223,7 +223,7 @@ class RambergOsgood(_Plastic):
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "largest": 0.0}
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Return residuals of the largest plastic strain by the power law, and of the present."""
+        """Return the residuals of the largest and of the present plastic strain."""
         stress = self.stress(strain, new)
         largest = larger(
             old.largest, self.offset * (absolute(stress) / self.yield_limit) ** self.exponent
@@ -358,7 +358,7 @@ class AxialBending(Record, MaterialLaw):
     Args:
         axial: Np, the yield force; N.
         bending: Mp, the plastic moment; N m.
-        rounding: Width w of the rounding.
+        rounding: Width w of the rounded corners, in terms of m.
 
     Raises:
         ModelError: A number is not positive.
