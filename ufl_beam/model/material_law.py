@@ -220,7 +220,7 @@ def require_law(law: object, what: str) -> None:
         raise ModelError(f"{what} = {shorten(law)} is not an ElastoPlastic or another MaterialLaw")
     kind = f"{what}: {type(law).__name__}"
     require_fields(law, MaterialLaw, kind)
-    ways = [w for w in WAYS if getattr(type(law), w) is not getattr(MaterialLaw, w)]
+    ways = [w for w in EVOLUTION_METHODS if getattr(type(law), w) is not getattr(MaterialLaw, w)]
     if len(ways) != (1 if law.variables else len(ways)):
         has = "both increments and residuals" if ways else "neither increments nor residuals"
         raise ModelError(f"{kind} has {has}; define one of the two methods")
@@ -284,7 +284,7 @@ def require_field(value: object, what: str, kinds: Any = Real) -> None:
         )
 
 
-WAYS = ("increments", "residuals")
+EVOLUTION_METHODS = ("increments", "residuals")
 """Methods for the evolution of variables; a law with variables defines one of the two."""
 
 

@@ -125,7 +125,7 @@ class Scene(Record, Rich):
             if node(connector.a) == node(connector.b):
                 raise ModelError(f"{connector}: both ends are at the same body or cross-section")
             if isinstance(connector.law, Coulomb) and connector.law.joint is not None:
-                self._require_pressing(connector, connector.law.joint)
+                self._require_normal_force(connector, connector.law.joint)
         self._require_single_supports()
 
     def __getitem__(self, name: str) -> Beam | Body:
@@ -296,17 +296,17 @@ class Scene(Record, Rich):
                 "quadratic in the rate; give one RotatingFrame with the total rate"
             )
 
-    def _require_pressing(self, connector: Connector, pressing: Bearing) -> None:
+    def _require_normal_force(self, connector: Connector, bearing: Bearing) -> None:
         """Raise unless the normal force of friction is a known force of a support or joint."""
-        if pressing not in (*self.joints, *self.supports):
+        if bearing not in (*self.joints, *self.supports):
             why = "is not in the scene; add it to joints or supports"
-        elif isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
+        elif isinstance(bearing, Support) and not bearing.held.keys() & {0, 1}:
             why = "holds no displacement and bears no force; name another support or joint"
-        elif isinstance(pressing, Joint) and all(holder.is_rotation for holder in pressing.holders):
+        elif isinstance(bearing, Joint) and all(holder.is_rotation for holder in bearing.holders):
             why = "shares unknowns, so that its force is not known; make it with multipliers=True"
         else:
             return
-        raise ModelError(f"{connector}: {pressing}, whose force is to cause its friction, {why}")
+        raise ModelError(f"{connector}: {bearing}, whose force is to cause its friction, {why}")
 
     @property
     def shared_by_joints(self) -> list[list[NodeDof]]:
