@@ -264,7 +264,7 @@ def test_beams_and_bodies_by_name():
     scene = machine()
     assert scene["left"] is scene.beams[1]
     assert scene["b"] is scene.bodies[1]
-    with pytest.raises(ub.ArgumentError, match="no beams and bodies are called 'roof'; there is"):
+    with pytest.raises(ub.ArgumentError, match="bodies are called 'roof'; the names are"):
         scene["roof"]
     two = [ub.Beam((0, k), (1, k), ub.Section(**STEEL)) for k in (0, 1)]
     with pytest.raises(ub.ArgumentError, match="2 beams and bodies are called 'beam'"):

@@ -100,7 +100,7 @@ PARTS = [
     (lambda: ub.ElastoPlastic(1.0, isotropic=-2.0), "isotropic = -2 must not...use Softening("),
     (lambda: ub.ElastoPlastic(1.0, kinematic=-2.0), "kinematic = -2 must not...use Softening("),
     (lambda: ub.ElastoPlastic(1.0, viscosity=5.0), "viscosity = 5.0 is not a Perzyna or DuvautL"),
-    (lambda: ub.Section(1, 1, 1, bending=BREAKS), "Section: bending...is not a ElastoPlastic"),
+    (lambda: ub.Section(1, 1, 1, bending=BREAKS), "Section: bending...is not an ElastoPlastic"),
     (lambda: in_fibres(bending=STEEL_LAW), "Section: a law bending beside fibres"),
     (lambda: in_fibres(axial=STEEL_LAW), "Section: a law axial beside fibres"),
     (lambda: in_fibres(shear=STEEL_LAW), "Section: a law shear beside fibres...elastic"),
@@ -108,8 +108,8 @@ PARTS = [
     # one layer, whose middle is the axis
     (lambda: in_fibres(ub.Fibres(STEEL_LAW, number=1)), "number = 1 has no bending stiffness; use"),
     (lambda: of_fibres([0.1, 0.1], [1, 1]), "of_fibres: all fibres at one y...spread them"),
-    (lambda: of_fibres([0, 1], [1, 1, 1]), "y and A must be lists of one length...(2,)"),
-    (lambda: of_fibres([0, 1], [1, -1]), "y must be finite, and all A positive"),
+    (lambda: of_fibres([0, 1], [1, 1, 1]), "y and A must be lists of equal length...(2,)"),
+    (lambda: of_fibres([0, 1], [1, -1]), "all areas A must be positive"),
     # beams
     (lambda: beam((1, 2), (1, 2)), "girder: zero length, both ends are at (1.0, 2.0)"),
     (lambda: ub.Beam.arc((0, 0), 1.0, (2, 2), SECTION), "beam: zero length, both angles...are 2"),

@@ -118,15 +118,15 @@ def test_the_ledger_closes():
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: section(bending=LAW), r"is a law of NM together; use it as Section\(interaction"),
+        (lambda: section(bending=LAW), r"couples the resultants NM; use it as Section\("),
         (lambda: section(interaction=ub.ElastoPlastic(1.0)), "is no law of N and M together"),
         (
             lambda: section(interaction=LAW, bending=ub.ElastoPlastic(1.0)),
             "bending beside interaction",
         ),
         (lambda: section(interaction=LAW, hinge=ub.Softening(1.0, 1.0)), "hinge beside interact"),
-        (lambda: ub.Spring(1.0, law=LAW), "Spring: law = .* is a law of NM together"),
-        (lambda: ub.Fibres(LAW), "Fibres: law = .* is a law of NM together"),
+        (lambda: ub.Spring(1.0, law=LAW), "Spring: law = .* couples the resultants NM"),
+        (lambda: ub.Fibres(LAW), "Fibres: law = .* couples the resultants NM"),
         (lambda: ub.AxialBending(0.0, 1.0), "AxialBending: axial"),
     ],
 )

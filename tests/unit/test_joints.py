@@ -41,7 +41,7 @@ BAD = {
     "stretch": (lambda: ub.Stretch(PLACE, body(1.0).middle, ub.Spring(1.0)), "zero length"),
     "law": (lambda: ub.Turn(PLACE, body().middle, 3.0), "law = 3.0 is not a"),
     "stiffness": (lambda: ub.Spring(-1.0), "Spring: stiffness = -1 must be positive"),
-    "hardening": (lambda: ub.Spring(1.0, law=2.0), "Spring: law = 2.0 is not a ElastoPlastic"),
+    "hardening": (lambda: ub.Spring(1.0, law=2.0), "Spring: law = 2.0 is not an ElastoPlastic"),
     "softening": (lambda: ub.Spring(1.0, softening=2.0), "Spring: softening = 2.0"),
     "viscosity": (lambda: ub.Damper(0.0), "Damper: viscosity = 0 must be positive"),
     "stop": (lambda: ub.Stop(1.0, low=0.1, high=0.2), "Stop: the interval from low = 0.1"),

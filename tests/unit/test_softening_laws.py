@@ -457,7 +457,7 @@ class OfNumPy(Mine):
 
 REFUSED = [
     (FromNothing(), "traction is 0 at zero opening; it must be positive"),
-    (BelowZero(), r"traction is -\S+ at the opening \S+, and a hinge would drive"),
+    (BelowZero(), r"traction is -\S+ at the opening \S+, where it would drive"),
     (Lasting(), "energy is not finite; let it fall to zero, or faster than 1/opening"),
     (Jumping(), r"traction jumps from 1 to 0 at the opening 1"),
     (Vertical(), "infinite slope at zero opening"),
@@ -466,7 +466,7 @@ REFUSED = [
     (OneNumber(), "one number for each|broadcast"),
     (WrongEnergy(), "energy_to is 1 at the opening 0, but the integral of the traction is 0"),
     (WrongLimit(), "limit = 2, but the traction at zero opening is 1"),
-    (WrongTotal(), "fracture_energy = 2, but its integral is 1"),
+    (WrongTotal(), "fracture_energy = 2, but the integral of the traction is 1"),
     (Taken(), "field cannot have the name bounded"),
     (Thawed(), "must be a dataclass: @dataclass"),
     (Mine(ub.Normal(1.0, 0.1, seed=1)), r"t = Normal\(.*\) is a distribution"),

@@ -266,8 +266,8 @@ class Renamed(Dashpot):
         (Both(), "Both has both increments and residuals"),
         (Infinite(), "Infinite.stress is .* must be a number"),
         (PowerLaw("strong", 1.0, 2.0), "PowerLaw: M0 = 'strong' is no number"),
-        (PowerLaw, "is not a ElastoPlastic or another MaterialLaw"),
-        (3.0, "3.0 is not a ElastoPlastic or another MaterialLaw"),
+        (PowerLaw, "is not an ElastoPlastic or another MaterialLaw"),
+        (3.0, "3.0 is not an ElastoPlastic or another MaterialLaw"),
     ],
     ids=str,
 )

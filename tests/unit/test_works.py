@@ -367,7 +367,10 @@ STRAY = ub.Beam((0, 1), (1, 1), SECTION, cells=2, name="stray")
     [
         (lambda: ub.VirtualWork(3, air), ("VirtualWork: name = 3 must be text",)),
         (lambda: ub.VirtualWork("", air), ("VirtualWork: name = ''",)),
-        (lambda: ub.Potential("kinetic", soil), ("'kinetic' is an entry of the energy ledger",)),
+        (
+            lambda: ub.Potential("kinetic", soil),
+            ("'kinetic' is empty or a reserved entry",),
+        ),
         (lambda: ub.Potential("a", 3), ("Potential 'a': density = 3 must be a function of q",)),
         (lambda: ub.Potential("a", min), ("Potential 'a'", "have no names")),
         (lambda: ub.Potential("a", lambda q, k: q[0]), ("a parameter 'k', which is unknown",)),
@@ -403,7 +406,10 @@ STRAY = ub.Beam((0, 1), (1, 1), SECTION, cells=2, name="stray")
         ),
         (
             lambda: ub.Scene([BEAM], works=[ub.Potential("a", lambda q: q[0]) for _ in "ab"]),
-            ("a work is called 'a' twice, as works[0] and works[1]",),
+            (
+                "'a', the name of a work",
+                "occurs twice, as works[0] and works[1]; rename one",
+            ),
         ),
         (lambda: ub.Scene([BEAM], works=[soil]), ("works[0]", "is not a VirtualWork or Potential")),
         (lambda: ub.Scene([BEAM], works=3), ("works = 3 must be a list",)),

@@ -31,11 +31,11 @@ class PlainStep:
 
 
 STATIC_ADVICE = (
-    "Try a smaller dt; beyond a limit load, and where softening snaps back (limit**2/energy of "
-    "a hinge, half of it if softening is linear, above the stiffness that drives it), there is "
-    "no equilibrium nearby: follow the path with ub.follow(scene, ub.ArcLength(...)) or "
-    "ub.DissipationControl(...), prescribe a displacement instead of the load, or run "
-    "dynamics"
+    "Try a smaller dt. There is no equilibrium nearby beyond a limit load, or where softening "
+    "snaps back: limit**2/energy of a hinge, half of this if softening is linear, exceeds the "
+    "stiffness that drives the hinge. Then follow the path with ub.follow(scene, "
+    "ub.ArcLength(...)) or ub.DissipationControl(...), prescribe a displacement instead of the "
+    "load, or run dynamics"
 )
 """Advice if a static step, in which time is the load factor, finds no equilibrium."""
 
@@ -43,11 +43,11 @@ STATIC_ADVICE = (
 class _AtEnd(PlainStep):
     """Base of schemes whose forces, strains and variations are taken at the end of the step.
 
-    The trapezoidal rule counts their works.
+    The ledger computes works by the trapezoidal rule.
     """
 
     load_weight = 1.0
-    weight_of_before = 0.5  # the trapezoidal rule, exact where forces grow in proportion
+    weight_of_before = 0.5  # trapezoidal rule, exact for forces that are linear in the motion
     limits_rotation = False  # rotations of nodes in a step have no limit
     theta = 1.0
     alpha = lost_fraction = 0.0
@@ -73,13 +73,13 @@ class _AtEnd(PlainStep):
 class Static(_AtEnd):
     """Static equilibrium at the end of each step; time is the load parameter.
 
-    Viscous forces act at the mean rates of the step, in real time: dampers, :class:`KelvinVoigt`,
-    viscosity of materials, works with ``v``.  There is no inertia.
+    Dampers, :class:`KelvinVoigt`, viscosity of materials, and works with ``v`` take the mean rates
+    of the step, in real time.  There is no inertia.
 
-    The ledger counts works by the trapezoidal rule.  Its imbalance is of second order in the step
-    and measures the error.  A step is cut if the work of its forces misses the stored and
-    dissipated energy by more than a twentieth, since it may have jumped to another branch of
-    equilibria.
+    The ledger computes works by the trapezoidal rule.  Its imbalance is of second order in the step
+    and measures the error.  A step is cut if the work of the forces differs from the stored and
+    dissipated energy by more than 5 % of both together, because the step may have jumped to another
+    branch of equilibria.
 
     Example:
         >>> run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
@@ -95,7 +95,7 @@ class Static(_AtEnd):
 class Weights(NamedTuple):
     """Weights of Newmark's formulas and of the mean accelerations of generalised-α.
 
-    With the acceleration a that u and v follow from, and the acceleration ü by the forces,
+    With the acceleration a, from which u and v follow, and the acceleration ü by the forces,
 
         u1 = u0 + dt v0 + dt² ((1/2 - β) a0 + β a1),     v1 = v0 + dt ((1 - γ) a0 + γ a1),
         (1 - α_m) a1 + α_m a0 = (1 - α_f) ü1 + α_f ü0.
@@ -108,14 +108,14 @@ class Weights(NamedTuple):
 
 
 CONSTANT = Weights(0.0, 0.0, 1.0, 1 / 2)
-"""Weights with the acceleration at the end of the step; they need none at its beginning."""
+"""Weights with the acceleration at the end of the step alone: none is known at its beginning."""
 
 AVERAGE = Weights(0.0, 0.0, 1 / 2, 1 / 4)
 """Weights with the mean of the accelerations at both ends of the step."""
 
 
 class _Accelerated(_AtEnd):
-    """Base of Newmark's scheme and its relatives."""
+    """Base of :class:`Newmark` and :class:`GeneralizedAlpha`."""
 
     dynamic = True
     slack = math.inf
@@ -128,7 +128,7 @@ class _Accelerated(_AtEnd):
     def rings(self) -> bool:
         """True if the accelerations of a prescribed motion oscillate for ever.
 
-        They follow from Newmark's formulas alone, which damp errors only if γ > 1/2.
+        They follow from Newmark's formulas alone, which damp errors only if 2 β > γ > 1/2.
         """
         _, _, γ, β = self.weights
         return not 2 * β > γ > 0.5
@@ -136,8 +136,8 @@ class _Accelerated(_AtEnd):
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
         """Return the numbers of Newmark's formulas, and of the accelerations ü by the forces.
 
-        The acceleration a leads ü by (α_m - α_f) dt.  A step uses the acceleration
-        and the lead only if they are known.
+        The acceleration a is ü at a time that is later by (α_m - α_f) dt; the lead is (a - ü)/dt.
+        A step uses ü and the lead at its beginning only if they are known.
         """
         s, v, _, *more = np.eye(3 + known)
         forced = a0 = more[0] if known else 0 * s
@@ -157,7 +157,7 @@ class _Accelerated(_AtEnd):
         return Coefficients(inertia=forced1, velocity=v1, rates=(v1, *further))
 
     def error_weights(self) -> tuple[float, float]:
-        """Return the error of Taylor's series; a leads the forces by α_m - α_f steps."""
+        """Return the errors against Taylor's series; a leads the forces by α_m - α_f steps."""
         α_m, α_f, γ, β = self.weights
         ahead = α_m - α_f
         return 0.0, abs(β + ahead / 2 - 1 / 6) + abs(γ + ahead - 1 / 2)
@@ -168,22 +168,22 @@ class Newmark(_Accelerated):
     """Newmark's scheme, by default with average acceleration; for comparison with other programs.
 
     ``gamma = 1/2`` is of second order and damps nothing.  In large motion its energy is not
-    bounded, and it may diverge where :class:`EnergyMomentum` does not.  ``gamma > 1/2`` damps at
-    first order; :class:`GeneralizedAlpha` does so at second order.
+    bounded, and it may diverge where :class:`EnergyMomentum` does not.  ``gamma > 1/2`` damps, but
+    is of first order; :class:`GeneralizedAlpha` damps and is of second order.
 
-    The ledger counts works by the trapezoidal rule.  It does not close; its imbalance is of second
-    order in the step and measures the error.  Initial accelerations come from a trial step of a
-    sixteenth of the first step.  Laws that depend on rates, except :class:`Rayleigh`, take the mean
-    rate of the step, and yielding is stated at its end.  Both are of first order.
+    The ledger computes works by the trapezoidal rule.  It does not close; its imbalance is of
+    second order in the step and measures the error.  Initial accelerations come from a trial step
+    of a sixteenth of the first step.  Laws that depend on rates, except :class:`Rayleigh`, take the
+    mean rate of the step, and yielding is stated at its end.  Both are of first order.
 
     Args:
         gamma: γ; from 1/2.
         beta: β; from γ/2, below which the scheme is unstable at large steps.
 
     Raises:
-        ArgumentError: A number is out of range.  A run raises it if the scene has joints held by
-            multipliers, motors or moving supports while nothing is damped; dry friction, or a
-            rotating frame.
+        ArgumentError: A number is out of range.  A run raises it if the scene has dry friction or a
+            rotating frame; unless 2 beta > gamma > 1/2, also if the scene has joints held by
+            multipliers, guides, motors or moving supports.
 
     Example:
         >>> run = ub.simulate(scene, ub.Newmark(), t=(0, 1), dt=0.05)
@@ -210,7 +210,7 @@ class Newmark(_Accelerated):
 
     @property
     def weights(self) -> Weights:  # type: ignore[override]
-        """Weights of γ and β alone, without a relation between accelerations."""
+        """Weights of Newmark's formulas, where a is ü."""
         return Weights(0.0, 0.0, self.gamma, self.beta)
 
 
@@ -233,7 +233,7 @@ class GeneralizedAlpha(_Accelerated):
 
     Raises:
         ArgumentError: A number outside [0, 1].  A run raises it for the scenes that
-            :class:`Newmark` lists.
+            :class:`Newmark` lists, for the joints and motions only if ``rho_inf=1``.
 
     Example:
         >>> run = ub.simulate(scene, ub.GeneralizedAlpha(rho_inf=0.8), t=(0, 1), dt=0.05)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Equations of connector laws over a step: energy and resistance, and rigid-plastic slip.
+"""Equations of connector laws over a step: laws of energy and resistance, and rigid-plastic laws.
 
-A law of energy and resistance holds at t_n+θ.  A backward-Euler step of length θ dt gives its
-variables there; from there they grow in proportion to the end of the step.  Its elastic force acts
-at the time of the loads.  A rigid-plastic law is a function of the slip that grows in the step; it
-is stated once for UFL and for numbers.
+A law of energy and resistance holds at t_n+θ.  A backward-Euler step of length θ dt gives the
+changes of its variables up to t_n+θ; divided by θ, they are the changes in the whole step.  The
+elastic force acts at the time of the loads.  The force of a rigid-plastic law is a function of the
+slip in the step; it is stated once for UFL and for numbers.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from ufl_beam.model.softening_laws import SofteningLaw
 # -- energy and resistance -------------------------------------------------------------------------
 
 SMOOTH = 1e-7
-"""Relative difference of forces by Gauss's and Simpson's rule up to which Gauss's has all digits.
+"""Relative difference of works by Gauss's and Simpson's rules up to which Gauss's rule is exact.
 
-Gauss's rule has four points.  The errors are of the eighth and the fourth order in the step h, with
+Gauss's rule has four points.  The errors are of the eighth and the fourth order in the step, with
 the factors 1 / 1778112000 and 1 / 2880.  If Simpson's error is 1e-7, Gauss's is (3e-4)² / 2e9,
 below round-off.
 """
@@ -38,7 +38,7 @@ below round-off.
 class LawStep(NamedTuple):
     """Equations of a law over a step; J, forces in N or N m."""
 
-    forces: tuple[Expr, ...]  # of each component in the step; size of a sliding force
+    forces: tuple[Expr, ...]  # one for each component; or sliding force of a law with a limit
     stored: Expr  # at the end
     numerical: Expr  # lost by the scheme in the step
     variables: tuple[Expr, ...]  # at the end
@@ -47,11 +47,11 @@ class LawStep(NamedTuple):
 def law_step(
     law: ConnectorLaw, at: Mapping[str, Expr], scheme: Scheme, *, frozen: bool = False
 ) -> LawStep:
-    """State the equations of a step; ``frozen`` variables stay constant.
+    """State the equations of a step; if ``frozen``, the variables stay constant.
 
     The names in ``at`` are "motion 0" and so on for the motions at the end of the step, "before 0"
     for the motions before it, "dt" and "theta", "state ..." for the variables before the step, and
-    "number ..." for the numbers of the law.
+    "number ..." for the parameters of the law.
     """
     law = law.with_parameters({name: at[f"number {name}"] for name in law.parameters()})
     dt, θ, load_weight = at["dt"], at["theta"], scheme.load_weight
@@ -69,7 +69,7 @@ def law_step(
 
     end = {n: ufl.variable(ufl.as_ufl(z)) for n, z in vars(after(1.0)).items()}
     zero = ufl.as_ufl(0.0)
-    if law.holds:  # the force against the motion
+    if law.holds:  # a law with a limit has only a sliding force, whose size is returned
         sliding = ufl.as_ufl(law.sliding(e, rate, after(θ), dt))
         return LawStep((sliding,), zero, zero, tuple(end.values()))
     resistances = law.each(law.resistance(e, rate, after(θ), dt))
@@ -79,8 +79,8 @@ def law_step(
     stored = ufl.as_ufl(law.energy(law.as_argument(moved), State(end)))
     numerical = zero
     if load_weight > 0.5 and scheme.average(0.0, 1.0) != 1.0:
-        # Works are exact increments of energy.
-        # Loss of backward Euler: of second order, and positive for convex energies.
+        # The scheme counts works exactly.  Forces that act after the middle of the step lose energy
+        # as in backward Euler: of second order, and positive for convex energies.
         each = zip(moved, pairs, strict=True)
         growth = sum(ufl.diff(stored, m) * (x1 - x0) for m, (x0, x1) in each)
         growth += sum(ufl.diff(stored, z) * (z - getattr(old, n)) for n, z in end.items())
@@ -91,13 +91,13 @@ def law_step(
 def _elastic_forces(
     law: ConnectorLaw, e0: Sequence[Expr], e1: Sequence[Expr], state: State, scheme: Scheme
 ) -> list[Expr]:
-    """Return the elastic forces at the time of the loads: over the step, at its end, or a mean.
+    """Return the elastic forces at the time of the loads: over the step, at its end, or between.
 
-    Over the step the work of the forces equals the change of the energy.  For forces that are
-    smooth over the step, means by Gauss's rule satisfy this to all digits.  At kinks and in large
-    steps a force along the increment does the missing work.  Forces and moment share that work in
+    The work of forces over the step equals the change of the energy.  For forces that are smooth
+    over the step, means by Gauss's rule satisfy this to round-off.  At kinks and in large steps a
+    force along the increment does the missing work.  Forces and moment share this work in
     proportion to the squares of the errors of their works.  A single force is then the growth of
-    the energy over the increment of the motion, which has few digits in small steps.
+    the energy divided by the increment of the motion, which has few digits in small steps.
     """
 
     def energy(e: Sequence[Expr]) -> Expr:
@@ -142,18 +142,18 @@ def _elastic_forces(
 
 
 class RigidPlasticStep(NamedTuple):
-    """Response of a law of slip over a step; J, forces in N or N m."""
+    """Response of a rigid-plastic law over a step; J, forces in N or N m."""
 
     force: Values  # in the step, in the direction of the motion
     dissipated: Values  # in the step
-    lost: Values  # numerically by backward Euler, over ``2 alpha`` of the scheme
+    lost: Values  # numerically by backward Euler, divided by ``2 alpha`` of the scheme
     stored: Values  # at the end
-    limit: Values  # beyond the back force, up to which the motion is held after the step
+    limit: Values  # largest abs(force - back_force) that holds the motion after the step
     back_force: Values  # centre of the limits after the step
 
 
 def parameters(law: SofteningLaw | ElastoPlastic) -> dict[str, Any]:
-    """Return the numbers of a law of slip by the names that :func:`slip` takes."""
+    """Return the parameters of a law by the names that :func:`rigid_plastic_step` takes."""
     values = law.parameters() if isinstance(law, SofteningLaw) else law.parameters(np.ones(()))
     return {f"number {name}": value for name, value in values.items()}
 
@@ -161,11 +161,11 @@ def parameters(law: SofteningLaw | ElastoPlastic) -> dict[str, Any]:
 def rigid_plastic_step(
     law: SofteningLaw | ElastoPlastic, at: Mapping[str, Values], scheme: Scheme
 ) -> RigidPlasticStep:
-    """Return the response of a law; its numbers come from ``at``, not from ``law``.
+    """Return the response of a law, whose parameters come from ``at``, not from ``law``.
 
-    ``at`` maps names to numbers: the slip of the step and its direction (1 or -1); accumulated slip
-    (slipped) and motion (start) at its beginning; θ and dt; numbers of the law, see
-    :func:`numbers`.
+    ``at`` maps names to numbers: "slip" in the step and its "direction" (1 or -1); at the beginning
+    of the step, accumulated slip "slipped" and motion "start"; "θ" and "dt"; parameters of the law,
+    see :func:`parameters`.
     """
     a, ξ, s, none = at["slip"], at["slipped"], at["direction"], 0 * at["slip"]
     values = {n.removeprefix("number "): x for n, x in at.items() if n.startswith("number ")}

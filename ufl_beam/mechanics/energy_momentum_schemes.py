@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Schemes whose forces act over the step, so that their works are increments of energy."""
+"""Schemes whose forces act over the step: energy-momentum schemes, and the paper's printed form."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
 
 GAUSS_POINTS = 4
-"""Points of Gauss's rule over the increment of a step.
+"""Number of points of Gauss's rule on the line from the beginning to the end of a step.
 
-The rule is exact up to degree 7, and four forces cost hardly more than a strain.
+The rule is exact up to degree 7, and four forces cost hardly more than one strain.
 """
 
 
 class _OverStep:
     """Base of schemes whose forces act over the step."""
 
-    weight_of_before = 0.0  # the forces in the equation of the step do its work
+    weight_of_before = 0.0  # the forces in the equation of the step do the work of the step
     limits_rotation = True
     alpha: float
     lost_fraction = 0.0
@@ -45,14 +45,14 @@ class _OverStep:
         return softening.mean_traction(opening, growth)
 
     def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
-        """Return the mean of both ends, shifted to the end in proportion to ``alpha``."""
+        """Return the mean of the resultants at both ends, plus ``alpha`` times their change."""
         mean = functional.resultants((e0 + e1) / 2, C)  # P(83)
         if self.alpha == 0:
             return mean
         return mean + constant(self.alpha) * functional.resultants(e1 - e0, C)  # P(89)
 
     def average(self, before: Expr, now: Expr) -> Expr:
-        """Return the mean of both ends; products with it are exact increments."""
+        """Return the mean of both ends; with means, the product rule holds for increments."""
         return (before + now) / 2
 
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
@@ -81,7 +81,7 @@ class EnergyMomentumBase(_OverStep):
         return kinematics.virtual_strain_over_step(q0, q1, w, axis)
 
     def virtual_rotation(self, rotation_a: Expr, rotation_b: Expr, w: Expr) -> Expr:
-        """Return the increment of the rotation, if ``w`` is 2 tan(turn_b/2) - 2 tan(turn_a/2)."""
+        """Return ``rotation_b - rotation_a`` if w is 2 tan(rotation_b/2) - 2 tan(rotation_a/2)."""
         tan_a, tan_b = (ufl.sin(x / 2) / ufl.cos(x / 2) for x in (rotation_a, rotation_b))
         return kinematics.over_tan((rotation_b - rotation_a) / 2) / (1 + tan_a * tan_b) * w
 
@@ -102,8 +102,8 @@ class EnergyMomentumStatic(EnergyMomentumBase):
     Args:
         theta: Fraction of the step at which resultants and loads are in equilibrium.  With 1/2 no
             energy is lost, but the states at the ends may oscillate about equilibrium.  With 1 they
-            tend to equilibrium, and the loss is the entry "numerical" of the ledger.  Uniform
-            moments vary along a beam by (Δψ/2)² in a step.
+            tend to equilibrium, and the loss is the entry "numerical" of the ledger.  Moments that
+            are uniform in equilibrium vary along a beam by the fraction (Δψ/2)² in a step.
 
     Raises:
         ArgumentError: A number outside [1/2, 1].
@@ -153,26 +153,26 @@ class MidpointLoads:
     rings = False
     kept: tuple[str, ...] = ()
     advice = (
-        "Try a smaller dt, loads and motions without jumps, or more energy taken out of high "
+        "Try a smaller dt, loads and motions without jumps, or more dissipation at high "
         "frequencies, such as EnergyMomentum(alpha=0.05, beta=0.05) or EnergyMomentumDecaying()"
     )
 
 
 class _Velocities(MidpointLoads):
-    """Velocities with dissipation ``beta``."""
+    """Base of schemes with the velocities of P(87) and their dissipation ``beta``."""
 
     alpha: float
     beta: float
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
-        """Return the numbers of v1 = a s - b v0 for the nodal step s, and of its change over dt."""
+        """Return the numbers of v1 = a s - b v0 for the nodal step s, and of (v1 - v0)/dt."""
         keep = 0.5 + self.beta
         a, b = 1 / (dt * keep), (0.5 - self.beta) / keep  # P(87)
         return Coefficients(
             inertia=(a / dt, -(1 + b) / dt, 0.0),  # P(78)
             velocity=(1 / dt, 0.0, 0.0),
             rates=((a, -b, 0.0),),
-            slip=(self.beta, 0.0, 0.0) if self.beta else None,  # P(88), its loss is D_K
+            slip=(self.beta, 0.0, 0.0) if self.beta else None,  # P(88), with the loss D_K
         )
 
     def error_weights(self) -> tuple[float, float]:
@@ -191,9 +191,10 @@ class EnergyMomentum(EnergyMomentumBase, _Velocities):
 
     Laws of inelastic material hold in the middle of the step, which is of second order.  With
     ``alpha = 1/2`` they hold at its end, which is backward Euler, of first order.  In the middle of
-    the step stresses lie on the yield surface, and an open hinge bears no moment.  At the ends they
-    alternate about these values by the order of a step; a small ``alpha`` damps this.  The elastic
-    energy of material that breaks completely is lost at once, as "numerical".
+    the step stresses lie on the yield surface, and a fully open hinge bears no moment.  At the ends
+    stress and moment alternate about these values, with deviations of the order of a step; a small
+    ``alpha`` damps this.  The elastic energy of material that breaks completely is lost at once, as
+    "numerical".
 
     Args:
         alpha: Dissipation by the resultants, from 0 to 1/2.
@@ -234,12 +235,12 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
 
         resultants  C ((e0 + e1)/2 + c (Δe - r Δe')),     Δu/dt = (v0 + v1)/2 + c (Δv - r Δv'),
 
-    Δe' and Δv' being the changes in the step before, and r the ratio of both steps, 1 at most.
+    where Δe' and Δv' are the changes in the previous step of length dt', and r = dt/dt', at most 1.
 
-    The sum of the energy and of c/2 times the energy of Δe and Δv never grows by the scheme, for
-    any steps, because Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2.  The total loss is the
-    entry "numerical" of the ledger and never negative; a single step may give back a part of the
-    loss of previous steps.  Linear momentum is conserved exactly, angular momentum to second order.
+    The sum of the energy and of c times the energy of Δe and Δv never grows by the scheme, for any
+    steps, because Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2.  The total loss is the entry
+    "numerical" of the ledger and never negative; a single step may give back a part of the loss of
+    previous steps.  Linear momentum is conserved exactly, angular momentum to second order.
     Connectors and the resultants of cells that may yield or break are not damped, so that open
     hinges turn freely.
 
@@ -266,18 +267,19 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
     @property
     def lost_fraction(self) -> float:  # type: ignore[override]
         """Fraction c of the energy of second differences of strains and velocities that is lost."""
-        # At infinity (λ + 1)/2 + c (λ - 1)²/λ = 0; λ = -rho_inf is the larger root.
+        # In a step a mode of infinite frequency is multiplied by the larger root λ = -rho_inf of
+        # (λ + 1)/2 + c (λ - 1)²/λ = 0.
         return self.rho_inf * (1 - self.rho_inf) / (2 * (1 + self.rho_inf) ** 2)
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
         """Return the numbers of the step, with c times second differences of velocities."""
         c, keep = self.lost_fraction, 0.5 + self.lost_fraction
-        r = c * min(1.0, dt / last_dt)
+        cr = c * min(1.0, dt / last_dt)
         return Coefficients(
-            inertia=(1 / (dt**2 * keep), (r - 1) / (dt * keep), -r / (dt * keep)),
+            inertia=(1 / (dt**2 * keep), (cr - 1) / (dt * keep), -cr / (dt * keep)),
             velocity=(1 / dt, 0.0, 0.0),
-            rates=((1 / (dt * keep), (c + r - 0.5) / keep, -r / keep),),
-            slip=(c, -r, r),
+            rates=((1 / (dt * keep), (c + cr - 0.5) / keep, -cr / keep),),
+            slip=(c, -cr, cr),
         )
 
     def error_weights(self) -> tuple[float, float]:
@@ -291,11 +293,11 @@ class EnergyMomentumPrinted(_OverStep, _Velocities, PlainStep):
 
     The variation of the strains is taken in the middle of the step and differs from their
     increment, so energy drifts by the square of the rotation of a step.  Linear and angular
-    momentum are conserved.  The ledger counts the works of the step, and its imbalance is this
-    drift.  Joints with multipliers do work of the same size.
+    momentum are conserved.  The ledger contains the works of the step, and its imbalance is this
+    drift.  Joints with multipliers do work of the size of the drift.
 
     Equations:
-        P(77)-P(84), with the sign of P(79) mended; see docs/errata.md.
+        P(77)-P(84), with the sign of P(79) corrected; see docs/errata.md.
 
     Example:
         >>> free = ub.Scene([beam], initial=[ub.Velocity((beam,), angular=10.0)])

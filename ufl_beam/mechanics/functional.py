@@ -33,10 +33,10 @@ def hu_washizu(W: Energy, q: Expr, D: Expr, r: Expr, axis: Axis) -> Expr:
 
 
 def incompatible(α: Expr, axis: Axis) -> Expr:
-    """Return the strain of the bulk by a jump α of the rotation; it unloads the cell.
+    """Return the strain that a jump α of the rotation causes in the bulk; it unloads the cell.
 
-    It is the derivative of Heaviside's function less a linear function, P(69); the Dirac delta is
-    the hinge.
+    The jump adds to the rotation α times the difference of Heaviside's function and a linear
+    function, P(69).  The slope of the linear function is this strain; the Dirac delta is the hinge.
     """
     return ufl.as_vector([0, 0, -α / axis.h])  # P(71)!
 
@@ -47,7 +47,7 @@ def enhanced_strain(q: Expr, α: Expr, axis: Axis) -> Expr:
 
 
 def modified_functional(W: Energy, q: Expr, D: Expr, r: Expr, axis: Axis) -> Expr:
-    """Return the functional in which D are only the strains beyond those by the configuration."""
+    """Return the functional with D as the strains in addition to those of the configuration."""
     return W(strain(q, axis) + D) - ufl.dot(r, D)  # P(31)
 
 
@@ -78,6 +78,6 @@ def virtual_work(r: Expr, w_e: Expr) -> Expr:
 
 
 def kinetic_energy(v: Expr, ρ: Expr) -> Expr:
-    """Return the kinetic energy of v = (u', ψ'), with ρ = (A_ρ, J_ρ); kg/m, kg m."""
+    """Return the kinetic energy of v = (du/dt, dψ/dt), with ρ = (A_ρ, J_ρ); kg/m, kg m."""
     v_u, ω = split(v)
     return (ρ[0] * ufl.dot(v_u, v_u) + ρ[1] * ω**2) / 2  # P(18)

@@ -18,11 +18,11 @@ class Axis:
 
     Attributes:
         nodes: Positions of the nodes of configurations in a cell, from 0 to 1; ascending.
-        X: Position of the point along each cell, from 0 to 1; by default in the middle.
+        X: Position along each cell of the point of evaluation, from 0 to 1; by default the middle.
         t0: Unit tangent of the cell, from its first to its last vertex; shape (2,).
         n0: Unit normal, ``t0`` turned by +90°; shape (2,).
         h: Length of the cell; m.
-        x: The point, in the plane; m.
+        x: Position of the point of evaluation in the plane; m.
     """
 
     def __init__(self, mesh: ufl.Mesh, nodes: Iterable[float] = (0.0, 1.0), X: Expr = 0.5) -> None:
@@ -37,7 +37,7 @@ class Axis:
         return ufl.dot(ufl.grad(f), self.t0)
 
     def at_nodes(self, f: Expr) -> list[Expr]:
-        """Return nodal values of a scalar function by Taylor's series from the point."""
+        """Return nodal values of a scalar polynomial by Taylor's series from the point."""
         terms = [f]
         for _ in self.nodes[1:]:
             terms.append(self.h * self.d(terms[-1]))
@@ -118,9 +118,9 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
     """Return the algorithmic variation of the strain over a step, exact for energy and momentum.
 
     With ``w = (Δu, 2 tan(Δψ/2))`` at the nodes it is ``strain(q1) - strain(q0)`` to round-off, so
-    the work of the algorithmic resultants is the increment of stored energy.  It vanishes for rigid
-    rotations about any point, so angular momentum is exact.  P(82) as printed has neither property
-    beyond O(Δψ²); docs/errata.md derives this form.
+    the work of the algorithmic resultants is the increment of stored energy.  It vanishes if ``w``
+    is a rigid rotation about any point, so angular momentum is exact.  P(82) as printed has only
+    the second property, and misses the increment by O(Δψ²); docs/errata.md derives this form.
 
     Valid for ``|Δψ| < π``, on two-node cells with a one-point rule, on other cells with any rule.
     """
@@ -138,8 +138,8 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
 
 
 def _two_node_rotation(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
-    """Return :func:`_nodal_rotation` in the middle of a cell with two nodes, a shorter formula."""
-    # Half the increments of rotation at both nodes of the cell are δ - e and δ + e.
+    """Return :func:`_nodal_rotation` in the middle of a cell with two nodes: a shorter formula."""
+    # The halves of the increments of rotation at the two nodes are δ - e and δ + e.
     e = axis.h / 4 * axis.d(ψ1 - ψ0)
     sinc_e, cos_e = _sinc(e), ufl.cos(e)
     tan_e = e * sinc_e / cos_e
@@ -155,7 +155,7 @@ def _two_node_rotation(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr,
 def _nodal_rotation(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
     """Return virtual rotation and curvature at a point: 2 tan δ, 2 δ' if w is 2 tan δ at nodes.
 
-    Both are linear in w; a uniform w gives the rotation w and no curvature, see docs/errata.md.
+    Both results are linear in w; for a uniform w they are w and zero, see docs/errata.md.
     """
     δ = (ψ1 - ψ0) / 2  # half of the increment of rotation
     nodes, virtual = axis.at_nodes(δ), axis.at_nodes(w)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Equations of a material point over a step, stated once for UFL and for arrays.
 
-The law holds at t_n+θ.  A backward-Euler step of length θ dt gives its variables there; from there
-they grow in proportion to the end of the step.
+The law holds at t_n+θ.  A backward-Euler step of length θ dt gives the changes of its variables up
+to t_n+θ; divided by θ, they are the changes in the whole step.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.softening_laws import SofteningLaw
 
 At = Mapping[str, Values]
-"""Numbers of points by name, see :func:`inputs`."""
+"""Inputs of points by name, see :func:`inputs`."""
 
 
 def rows(law: MaterialLaw, name: str) -> tuple[str, ...]:
@@ -33,12 +33,12 @@ def rows(law: MaterialLaw, name: str) -> tuple[str, ...]:
 
 
 def prefixed(prefix: str, names: Mapping[str, object] | tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of inputs that a user has named."""
+    """Return names with a prefix: ``state plastic`` for the variable ``plastic`` of a law."""
     return tuple(f"{prefix} {name}" for name in names)
 
 
 def inputs(section_points: SectionPoints) -> tuple[str, ...]:
-    """Return the input names of the law of a point as stored; loops.h explains their order."""
+    """Return the names of the inputs of a point in their order in memory, see loops.h."""
     law, parameters = section_points.kind
     softening = (
         section_points.softening.parameters() if section_points.softening is not None else {}
@@ -57,10 +57,10 @@ class End(NamedTuple):
 
     worked: Values  # dissipated by the bulk
     broken: Values  # dissipated by the discontinuity, per area
-    lost: Values  # numerical loss of backward Euler, over ``2 alpha`` of the scheme
+    lost: Values  # numerical loss of backward Euler, divided by ``2 alpha`` of the scheme
     elastic: Values  # stored elastically
     hardening: Values  # stored by hardening
-    relaxed: Values  # work on plastic strain of the mean of both stresses, less of the end stress
+    relaxed: Values  # work on plastic strain by the mean stress, minus work by the end stress
     resistance: Values  # of the discontinuity
     left: Values  # stored elastically after the point has dropped its stress
     missed: Values  # numerical loss of schemes over the step in nonlinear elasticity
@@ -98,7 +98,7 @@ class PointEquations:
         self._over_step = scheme.average(0.0, 1.0) != 1.0
 
     def law(self, at: At) -> MaterialLaw:
-        """Return the law with the numbers of points."""
+        """Return the law with the parameters of the points."""
         law, parameters = self._kind
         C = tuple(at[name] for name in rows(law, "stiffness"))
         return law.with_parameters(
@@ -106,14 +106,14 @@ class PointEquations:
         )
 
     def softening(self, at: At) -> SofteningLaw | None:
-        """Return the law of the discontinuity with the numbers of points."""
+        """Return the law of the discontinuity with the parameters of the points."""
         law = self._softening
         return law and law.with_parameters(
             {name: at[f"softening {name}"] for name in law.parameters()}
         )
 
     def resistance(self, at: At, growth: Values) -> Values:
-        """Return the resistance of a discontinuity that grows in the step."""
+        """Return the resistance of a discontinuity whose opening grows by ``growth``."""
         law = self.softening(at)
         return 0 * growth if law is None else self._scheme.resistance(law, at["opening"], growth)
 
@@ -122,7 +122,7 @@ class PointEquations:
         return State({name: at[f"{prefix} {name}"] for name in self._names})
 
     def strain(self, at: At) -> Values:
-        """Return the strain of the bulk at t_n+θ; a jump reduces it by jump over length."""
+        """Return the strain of the bulk at t_n+θ: the strain of the cell minus jump/length."""
         law, θ = self._kind.law, at["theta"]
         jump = at["jump"] + θ * at["direction"] * at["growth"]
         ends = zip(rows(law, "before"), rows(law, "strain"), strict=True)
@@ -150,10 +150,10 @@ class PointEquations:
         return law.elastic_energy(self.strain(at), new) + law.hardening_energy(new)
 
     def own_dissipation(self, at: At, slopes: tuple[Values, ...]) -> tuple[Values, Values]:
-        """Return dissipation at t_n+θ of a law that solves for its variables; size of its terms.
+        """Return (dissipation, size of its terms) of a law that solves for its variables.
 
-        It is the dissipation that the law states, or -∂ψ/∂z Δz, free of errors of the time scheme.
-        ``slopes`` are the derivatives ∂ψ/∂z of :meth:`stored`.
+        The dissipation is as the law states it, or -∂ψ/∂z Δz, without errors of the time scheme.
+        ``slopes`` are the derivatives ∂ψ/∂z of :meth:`stored` by the variables z.
         """
         law, old, new = self.law(at), self.state(at), self.state(at, "new")
         changes = State({n: (getattr(new, n) - getattr(old, n)) / at["theta"] for n in self._names})
@@ -179,7 +179,7 @@ class PointEquations:
         return law.as_tuple(law.stress(self.strain(at), self.state(at)))
 
     def _elastic_growth(self, law: MaterialLaw, de: tuple[Values, ...], dz: State) -> Values:
-        """Return the second-order part of the growth of the elastic energy in the step."""
+        """Return the growth of the elastic energy without the part that is linear in the step."""
         growth = law.elastic_energy(law.as_argument(de), dz)
         if not law.prestressed:
             return growth
@@ -192,7 +192,7 @@ class PointEquations:
     def end(self, at: At) -> End:
         """Return changes and energies at the end of the step."""
         law, softening, θ, a = self.law(at), self.softening(at), at["theta"], at["growth"]
-        some, zero = law.as_argument, 0 * a
+        argument, zero = law.as_argument, 0 * a
         relieved, length = at["jump"], at["length"]
         e0 = tuple(at[n] - relieved / length for n in rows(law, "before"))
         relieved = relieved + at["direction"] * a
@@ -202,25 +202,25 @@ class PointEquations:
         at_θ, old = self.changes(at), self.state(at)
         changes = State({name: getattr(at_θ, name) * (1 / θ) for name in self._names})
         new = _plus(old, changes)
-        before, now = (law.as_tuple(law.stress(some(e), z)) for e, z in ((e0, old), (e1, new)))
-        elastic, hardening = law.elastic_energy(some(e1), new), law.hardening_energy(new)
-        # Energies are quadratic, except for laws without a stated dissipation: see their
-        # ``worked``.
+        before, now = (law.as_tuple(law.stress(argument(e), z)) for e, z in ((e0, old), (e1, new)))
+        elastic, hardening = law.elastic_energy(argument(e1), new), law.hardening_energy(new)
+        # ``lost`` is exact if energies are quadratic.  Laws that are not quadratic and state no
+        # dissipation have its error in ``worked``.
         hardened = law.hardening_energy(changes)
         lost = self._elastic_growth(law, de, changes) + hardened
         elastically, missed, C = de, zero, tuple(at[n] for n in rows(law, "stiffness"))
         if self._curved:
-            # The value of the formula below at constant variables is not dissipation.
-            ends = tuple(law.as_tuple(law.stress(some(e1), old)))
+            # The value of ``worked`` below at constant variables is not dissipation.
+            ends = tuple(law.as_tuple(law.stress(argument(e1), old)))
             elastically = tuple((y - x) / c for x, y, c in zip(before, ends, C, strict=True))
             work = sum(σ * e for σ, e in zip(self.elastic_stress(at), de, strict=True))
-            stored = law.elastic_energy(some(e1), old) - law.elastic_energy(some(e0), old)
+            stored = law.elastic_energy(argument(e1), old) - law.elastic_energy(argument(e0), old)
             none = State(dict.fromkeys(self._names, zero))
             missed = work - stored - (2 * θ - 1) * self._elastic_growth(law, de, none)
         worked = law.dissipation(self.strain(at), _plus(old, at_θ), changes, at["dt"])
         if worked is None:
             work = sum(σ * e for σ, e in zip(self.stress(at), de, strict=True))
-            stored = elastic - law.elastic_energy(some(e0), old)
+            stored = elastic - law.elastic_energy(argument(e0), old)
             stored = stored + hardening - law.hardening_energy(old)
             worked = work - stored - (2 * θ - 1) * lost - missed
         relaxed = hardened

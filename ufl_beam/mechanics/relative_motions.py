@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Relative motions of two frames, their variation over a step, and forms of connectors, in UFL.
 
-A frame is a configuration (u_x, u_y, ψ).  Each motion is a function of the frames at both ends of a
-step, and of virtual motions of them.  It returns the motion at the end, which is zero in the
-undeformed scene, and its variation.  With the nodal step (Δu, 2 tan(Δψ/2)) as virtual motions, the
-variation is the increment of the motion.  So constraint forces do no work, and springs store the
-work that is done on them.  All variations vanish for rigid motions of both frames.
+A frame is a configuration (u_x, u_y, ψ).  Each motion is stated by a function of the frames at both
+ends of a step and of virtual motions of the frames.  The function returns the motion at the end,
+which is zero in the undeformed scene, and the variation of the motion.  In schemes of
+:class:`EnergyMomentumBase` the variation for the nodal step (Δu, 2 tan(Δψ/2)) is the increment of
+the motion: constraint forces do no work, and springs store the work that is done on them.
+Variations vanish for rigid virtual motions of both frames; that of :func:`parting` vanishes only if
+the points coincide.
 """
 
 from __future__ import annotations
@@ -78,13 +80,13 @@ def _length(d: Expr) -> Expr:
 
 
 def turning(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[Expr, Expr]:
-    """Return the rotation of b relative to a; rad."""
+    """Return the rotation of b relative to a, and its variation; rad."""
     rotation_a, rotation_b = (now[2] - before[2] for before, now in zip(q0, q1, strict=True))
     return q1.b[2] - q1.a[2], scheme.virtual_rotation(rotation_a, rotation_b, w.b[2] - w.a[2])
 
 
 def stretching(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[Expr, Expr]:
-    """Return the growth of the distance of the points; m."""
+    """Return the growth of the distance between the points, and its variation; m."""
     # (d·d - d0·d0) / (|d| + |d0|) with d = d0 + moved; a difference of lengths would lose digits.
     moved, before, now = _moved(q1, n), _between(q0, n), _between(q1, n)
     value = ufl.dot(n.apart + n.apart + moved, moved) / (_length(now) + _length(n.apart))
@@ -93,13 +95,13 @@ def stretching(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tupl
 
 
 def parting(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[Expr, Expr]:
-    """Return the displacement of point b relative to a along an axis of the plane; m."""
+    """Return the displacement of b relative to a along a fixed axis, and its variation; m."""
     virtual = _virtually_between(q0, q1, w, n, scheme)
     return ufl.dot(n.axis, _moved(q1, n)), ufl.dot(n.axis, virtual)
 
 
 def sliding(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[Expr, Expr]:
-    """Return the displacement of point b relative to a along an axis that turns with a; m."""
+    """Return the displacement of b from a along an axis that turns with a, and its variation; m."""
     by_turning = _by_turning(n.axis, q1.a[2])
     value = ufl.dot(by_turning, _between(q1, n)) + ufl.dot(n.axis, _moved(q1, n))
     axis = scheme.average(_turned(n.axis, q0.a[2]), _turned(n.axis, q1.a[2]))
@@ -119,14 +121,14 @@ class ConnectorForms(NamedTuple):
     """Forms of connectors, and their coefficients."""
 
     work: ufl.Form  # virtual work, and a row ``row[:n]·e + row[n] λ - row[n + 1]`` of each motion
-    tangent: ufl.Form  # derivative of ``work`` by the configuration
-    motion: ufl.Form  # the n relative motions e by cell
+    tangent: ufl.Form  # derivative of ``work`` by ``q1``
+    motion: ufl.Form  # the n relative motions e of each cell
     rate: ufl.Form  # derivatives of the motions along ``u``
     change: ufl.Form  # derivative of the tangent along ``u``, with ``bend`` = d row[:n] / de
     geometry: fem.Function  # :class:`Geometry` of each motion
     row: fem.Function
-    q0: fem.Function
-    q1: fem.Function
+    q0: fem.Function  # configurations and forces λ at the beginning of the step
+    q1: fem.Function  # configurations and forces λ at its end
     bend: fem.Function
     u: fem.Function
 
@@ -170,7 +172,7 @@ def connector_forms(motions: Sequence[str], scheme: Scheme, cell: meshes.Mesh) -
 
 
 def _split(q: Expr) -> tuple[Pair, Sequence[Expr]]:
-    """Split coefficients into the configurations at both ends of a cell, and the forces."""
+    """Split a function into the configurations at both ends of a cell, and the forces."""
     fields = ufl.split(q)
 
     def at(end: float) -> Expr:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Time schemes: the equation of a step between two states of the scene.
 
-A scheme says, in UFL, which strains vary and which resultants act during a step, how velocities
-follow from displacements, and at which time loads act.  Neither material laws nor the solver know
+A scheme states, in UFL, how strains vary and which resultants act in a step, how velocities follow
+from displacements, and at which time loads act.  Neither material laws nor the solver know
 which scheme runs.  This module has the protocols.  Schemes whose forces act over the step are in
 energy_momentum_schemes.py, schemes whose forces act at its end in classical_schemes.py.
 """
@@ -23,7 +23,7 @@ from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
 
 Constant = Callable[[float], Expr]
-"""Makes a number of the scheme a constant of the form, so that a new value compiles nothing."""
+"""Function that makes a number a constant of the form, so that a new value needs no compilation."""
 
 
 @in_one_line
@@ -39,19 +39,19 @@ class Step(NamedTuple):
     t0: float  # beginning; s
     t1: float  # end; s
     q0: Array  # configuration at the beginning, local degrees of freedom
-    load_time: float  # at which loads are taken; s
-    motion_time: float  # at which prescribed motions are taken; s
-    fraction: float  # of the remaining increment of loads and motions in the step; 1: all of it
+    load_time: float  # time at which loads are taken; s
+    motion_time: float  # time at which prescribed motions are taken; s
+    fraction: float  # of the remaining increment of loads and motions that is applied; 1: all
     at: float = 1.0  # fraction of the increment of loads in the step equation; 1: at the end
     q_before: Array | None = None  # configuration at the beginning of the last step, if ratio > 0
-    ratio: float = 0.0  # of the length to the last step's; 0 if no step led to the beginning
+    ratio: float = 0.0  # length divided by that of the last step; 0 if there is no last step
 
     @classmethod
     def of(cls, scheme: Scheme, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Return the step of a scheme from ``t0`` to ``t1``, in a whole step that ends at ``end``.
+        """Return the step of a scheme from ``t0`` to ``t1``, a part of a step that ends at ``end``.
 
-        In statics a substep takes its fraction of the increment of loads and motions to the end of
-        the whole step.  So sudden loads, too, can be applied in substeps.
+        In statics a part of a step applies its fraction of the increment of loads and motions up to
+        ``end``.  So sudden loads, too, can be applied in parts.
         """
         w = scheme.load_weight
         if scheme.dynamic:
@@ -65,7 +65,7 @@ class Step(NamedTuple):
 
 
 class Scheme(Protocol):
-    """Protocol of time schemes, static ones and those with inertia.
+    """Protocol of time schemes, with or without inertia.
 
     Any hashable object with these attributes and methods is a scheme; the error of a run lists
     missing names.  A base class to begin with is :class:`EnergyMomentumBase`; docs/extending.md has
@@ -79,16 +79,16 @@ class Scheme(Protocol):
         ufl_beam.errors.ArgumentError: scheme: Mine is not a time scheme: it lacks advice, ...
     """
 
-    dynamic: bool  # True if the scene has inertia
+    dynamic: bool  # True if the scheme has inertia
     advice: str  # for the error if a step finds no equilibrium
-    load_weight: float  # fraction of the step at which loads act; in statics of their increment
-    weight_of_before: float  # of the forces before a step in the mean that does its work
+    load_weight: float  # fraction of the step at which loads act; in statics, of their increment
+    weight_of_before: float  # weight of the last step's forces in the mean that does the work
     half_tangents: bool  # True if forces work on 2 tan(Δψ/2) of a rotation, else on Δψ
     limits_rotation: bool  # True if a step that turns a node by more than 0.75 π is cut
     theta: float  # fraction of the step at which laws of inelastic material hold
-    slack: float  # fraction of stored and dissipated energy that the forces may miss; else a cut
-    alpha: float  # numerical loss over twice the energy of a change of strain
-    lost_fraction: float  # numerical loss over the energy of a second difference of strain
+    slack: float  # relative error of the work of the forces above which a static step is cut
+    alpha: float  # numerical loss divided by twice the energy of the change of strain
+    lost_fraction: float  # numerical loss divided by the energy of a second difference of strain
 
     def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
         """Return the traction of a discontinuity whose opening grows in the step."""
@@ -100,32 +100,33 @@ class Scheme(Protocol):
         """Return (N, V, M) during the step, from stiffness and strains at both ends."""
 
     def average(self, before: Expr, now: Expr) -> Expr:
-        """Return the average of a vector or distance between frames, for variations."""
+        """Return the average of a vector or length at both ends of the step, for variations."""
 
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
-        """Return the value in the step of a function of the configuration."""
+        """Return the value that a function of the configuration has in the step."""
 
     def virtual_rotation(self, rotation_a: Expr, rotation_b: Expr, w: Expr) -> Expr:
         """Return the variation of a relative rotation whose virtual motion is ``w``."""
 
 
 CHANGE, V, V_BEFORE, FURTHER = range(4)
-"""Positions of the rates in C: the step or a change of velocities, velocities, ..."""
+"""Positions of the rates in C, in the order of a row of :class:`Coefficients`."""
 
 
 class Coefficients(NamedTuple):
     """Numbers of a step of a scheme with inertia.
 
-    In a row the first number multiplies the nodal step (Δu, 2 tan(Δψ/2)).  The next numbers
-    multiply the velocities at its beginning, the velocities before the last step, and the other
-    rates of :attr:`DynamicScheme.kept`.
+    In a row the first number multiplies the step of the nodes, see :func:`nodal_step`.  The next
+    numbers multiply the velocities at the beginning of the step, the velocities before the last
+    step, and the rates of :attr:`DynamicScheme.kept`.
 
     Attributes:
         inertia: Row of the acceleration in the equation of the step.
         velocity: Row of the velocity in the equation of the step.
         rates: Row of the velocities after the step, and a row of each other rate that is kept.
-        slip: Row of Δu/Δt less the mean of both end velocities, P(88), whose work on the change of
-            momentum is lost; its first number multiplies the change of velocities.  None: no loss.
+        slip: Row of Δu/Δt minus the mean of the velocities at both ends, P(88), whose work on the
+            change of momentum is lost.  Its first number multiplies the change of velocities.  None
+            means no loss.
 
     Example:
         >>> print(ub.EnergyMomentum().coefficients(dt=0.1, last_dt=0.1, known=0).rates)
@@ -154,7 +155,7 @@ class DynamicScheme(Scheme, Protocol):
     """
 
     kept: tuple[str, ...]  # names of rates besides velocities, such as accelerations
-    has_mean_velocity: bool  # in the equation of a step; friction and rotating frames need it
+    has_mean_velocity: bool  # True if steps have a mean velocity, for friction and RotatingFrame
     uses_last_step: bool  # True if a step depends on length and velocities of the last step
     rings: bool  # True if accelerations of prescribed motions oscillate for ever
 
@@ -165,7 +166,7 @@ class DynamicScheme(Scheme, Protocol):
             dt: Length of the step; s.
             last_dt: Length of the step before; infinite if there was none; s.
             known: Number of rates of :attr:`kept` that are known at the beginning.  After the step,
-                each row of rates after the first makes a rate known.
+                each row of ``rates`` after the first makes one of them known.
         """
 
     def error_weights(self) -> tuple[float, float]:
@@ -173,12 +174,12 @@ class DynamicScheme(Scheme, Protocol):
 
 
 def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
-    """Return whether the scheme is a dynamic one."""
+    """Return whether a scheme has inertia."""
     return scheme.dynamic
 
 
 def acting(scheme: Scheme, before: Array, now: Array) -> Array:
-    """Return the forces that do the work of a step, from its equation and the last one."""
+    """Return the forces that do the work of a step: a mean of forces ``before`` and ``now``."""
     w = scheme.weight_of_before
     return w * before + (1 - w) * now if w else now
 
@@ -196,10 +197,10 @@ def nodal_step(scheme: Scheme, q0: Array, q1: Array, rotations: Index) -> Array:
 
 
 def increment_to_rest(scheme: Scheme, dt: float) -> float:
-    """Return the increment of a step that ends at rest, over its initial velocity; s.
+    """Return the increment of a step that ends at rest, divided by its initial velocity; s.
 
-    It holds for a step without a previous one.  It is zero in statics and for schemes without a
-    mean velocity.
+    The result holds for a step without a previous one.  It is zero in statics and for schemes
+    without a mean velocity.
     """
     if not has_inertia(scheme) or not scheme.has_mean_velocity:
         return 0.0
@@ -210,8 +211,8 @@ def increment_to_rest(scheme: Scheme, dt: float) -> float:
 def combined(row: Sequence[float], s: Array, rates: Any) -> Array:
     """Return the sum of a row of :class:`Coefficients` for the nodal step ``s``.
 
-    ``rates`` at the beginning of the step are ``v``, ``v_before`` and ``more``, the known rates of
-    :attr:`DynamicScheme.kept`.
+    ``rates`` has the rates at the beginning of the step: ``v``, ``v_before``, and as ``more`` the
+    known rates of :attr:`DynamicScheme.kept`.
     """
     known: tuple[Array, ...] = (s, rates.v, rates.v_before, *rates.more)
     return sum(c * x for c, x in zip(row, known, strict=True) if c) + np.zeros(len(s))

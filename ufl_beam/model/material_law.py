@@ -21,7 +21,7 @@ Values = Any
 
 
 class State:
-    """Internal variables of a material point, as attributes."""
+    """Internal variables of a law, as attributes."""
 
     def __init__(self, variables: Mapping[str, Values]) -> None:
         vars(self).update(variables)
@@ -35,20 +35,20 @@ class State:
 class MaterialLaw(ABC):
     """Base of the laws of material points; a user's law is a frozen dataclass derived from it.
 
-    The fields of the dataclass are the parameters of the law.  Its methods use the functions of
-    ``ub.law_functions``, because they are called with arrays and with UFL expressions.  In them
-    ``self.C`` is the elastic stiffness at the point: EA, GA or EI of a resultant in a
-    :class:`Section`, Young's modulus of a fibre, or the stiffness of a :class:`Spring`.  Internal
-    variables evolve by either :meth:`increments` or :meth:`residuals`.
-    See docs/extending_laws.md.
+    The fields of the dataclass are the parameters of the law.  Its methods are called with arrays
+    and with UFL expressions; therefore they use the functions of ``ub.law_functions``.  Methods
+    read the elastic stiffness at the point from ``self.C``: EA, GA or EI of a resultant in a
+    :class:`Section`, Young's modulus of a fibre, or the stiffness of a :class:`Spring`.  A law with
+    internal variables defines either :meth:`increments` or :meth:`residuals`.  Energies are per
+    volume of a fibre, or per length for resultants.  See docs/extending_laws.md.
 
     Attributes:
         variables: Internal variables, and their initial values.
-        resultants: ``"NM"`` or ``"NVM"`` if these interact; strain, stress and ``C`` are tuples
-            then.  By default a law has one strain and one stress.
+        resultants: ``"NM"`` or ``"NVM"`` if the law couples these resultants; strain, stress and
+            ``C`` are then tuples.  By default a law has one strain and one stress.
         C: Elastic stiffness.
         active: True if the law may supply energy, for example by swelling.  Otherwise a step is
-            refused if :meth:`residuals` have a solution with negative dissipation.
+            refused if the solution of :meth:`residuals` has a negative dissipation.
 
     Example:
         >>> from dataclasses import dataclass
@@ -72,23 +72,23 @@ class MaterialLaw(ABC):
 
     @abstractmethod
     def stress(self, strain: Values, state: State) -> Values:
-        """Return the stress; its derivative by the strain at fixed variables is ``C``."""
+        """Return the stress; its slope at fixed variables is ``C`` unless the law is nonlinear."""
 
     @abstractmethod
     def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Return the stored energy per volume, without the energy of hardening."""
+        """Return the density of stored energy, without the energy of hardening."""
 
     def hardening_energy(self, state: State) -> Values:
-        """Return the energy per volume that hardening stores in the variables, zero by default."""
+        """Return the density of the energy that hardening stores; zero by default."""
         return 0.0
 
     def increments(self, strain: Values, state: State, dt: Values) -> Mapping[str, Values]:
-        """Return increments of the variables over a backward-Euler step dt, in closed form.
+        """Return increments of the variables in a backward-Euler step, in closed form.
 
         Args:
             strain: Strain at the end of the step.
             state: Variables at the beginning of the step.
-            dt: s.
+            dt: Length of the step; s.
         """
         return {}
 
@@ -99,20 +99,22 @@ class MaterialLaw(ABC):
             strain: Strain at the end of the step.
             old: Variables at the beginning of the step.
             new: Variables at the end of the step.
-            dt: s.
+            dt: Length of the step; s.
         """
         return {}
 
     def dissipation(
         self, strain: Values, state: State, changes: State, dt: Values
     ) -> Values | None:
-        """Return the energy per volume dissipated over a step; None means all work not stored.
+        """Return the density of the energy that a step dissipates.
+
+        None, the default, means the work that is neither stored nor lost by the time scheme.
 
         Args:
-            strain: Strain at the time of the step at which the law holds.
-            state: Variables at this time.
-            changes: Increments of the variables over the step.
-            dt: s.
+            strain: Strain at the instant of the step at which the law holds.
+            state: Variables at this instant.
+            changes: Increments of the variables in the step.
+            dt: Length of the step; s.
         """
         return None
 
@@ -122,11 +124,11 @@ class MaterialLaw(ABC):
         return False
 
     def parameters(self, C: Values) -> dict[str, Any]:
-        """Return the parameters by name at points of stiffness ``C``, by default the fields."""
+        """Return the parameters at points of stiffness ``C`` by name; by default the fields."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
     def with_parameters(self, C: Values, parameters: Mapping[str, Values]) -> MaterialLaw:
-        """Return the law with a stiffness, and with arrays or symbols as parameters."""
+        """Return the law with stiffness ``C`` and other parameters: numbers, arrays or symbols."""
         law = copy.copy(self)
         vars(law).update(parameters, C=C)
         return law
@@ -139,13 +141,13 @@ class MaterialLaw(ABC):
     @property
     def prestressed(self) -> bool:
         """True if laws of this class may bear stress at zero strain, for some parameters."""
-        law = copy.copy(self)  # with irrational parameters, whose terms do not cancel
+        law = copy.copy(self)  # gets irrational parameters, whose terms do not cancel
         vars(law).update({name: math.sqrt(k + 2) for k, name in enumerate(vars(self))})
         unit = uniform(self, 1.0)
         return any(np.any(σ != 0) for σ in _at_no_strain(law.with_parameters(unit, {})))
 
     def stressed(self, C: tuple[Values, ...], least: tuple[Values, ...]) -> bool:
-        """Return whether the stress at zero strain exceeds ``C`` times ``least``."""
+        """Return whether a stress at zero strain exceeds ``C`` times the strain ``least``."""
         stresses = _at_no_strain(_sample(self, C))
         return any(np.any(abs(σ) > c * e) for σ, c, e in zip(stresses, C, least, strict=True))
 
@@ -159,7 +161,7 @@ class MaterialLaw(ABC):
         return tuple(values) if self.resultants else (values,)
 
     def as_argument(self, values: tuple[Values, ...]) -> Values:
-        """Return strains or stiffnesses of a point as arguments of the methods."""
+        """Return strains or stiffnesses as the methods take them: a tuple, or a single value."""
         return values if self.resultants else values[0]
 
 
@@ -169,7 +171,7 @@ def uniform(law: MaterialLaw, value: Values) -> Values:
 
 
 def _sample(law: MaterialLaw, C: tuple[Values, ...] = ()) -> MaterialLaw:
-    """Return a law at points of stiffness ``C``, 1 by default, with 1 instead of random values."""
+    """Return a law with stiffness ``C``, 1 by default, and with 1 for each random parameter."""
     at = law.as_argument(C) if C else uniform(law, np.ones(1))
     parameters = law.parameters(at).items()
     return law.with_parameters(
@@ -178,7 +180,7 @@ def _sample(law: MaterialLaw, C: tuple[Values, ...] = ()) -> MaterialLaw:
 
 
 def _at_no_strain(law: MaterialLaw) -> tuple[Values, ...]:
-    """Return the stresses at zero strain."""
+    """Return the stresses at zero strain, with the initial variables."""
     none = uniform(law, np.zeros(1))
     with np.errstate(all="ignore"):
         return law.as_tuple(law.stress(none, initial_state(law)))
@@ -197,7 +199,7 @@ def require_bulk_law(law: object, what: str) -> None:
     require_law(law, what)
     if resultants := law.resultants:  # type: ignore[attr-defined]
         raise ModelError(
-            f"{what} = {shorten(law)} is a law of {resultants} together; use it as "
+            f"{what} = {shorten(law)} couples the resultants {resultants}; use it as "
             "Section(interaction=)"
         )
 
@@ -207,21 +209,21 @@ def require_interaction(law: object, what: str) -> None:
     require_law(law, what)
     if law.resultants not in ("NM", "NVM"):  # type: ignore[attr-defined]
         raise ModelError(
-            f"{what} = {shorten(law)} is no law of N and M together, with resultants = 'NM' or "
-            "'NVM'; use it as axial, shear or bending"
+            f"{what} = {shorten(law)} is no law of N and M together, which has resultants = 'NM' "
+            "or 'NVM'; use it as axial, shear or bending"
         )
 
 
 def require_law(law: object, what: str) -> None:
-    """Raise :class:`ModelError` unless a law is complete; its methods are called at zero strain."""
+    """Raise :class:`ModelError` unless a law is complete; it is called at zero strain."""
     if not isinstance(law, MaterialLaw):
-        raise ModelError(f"{what} = {shorten(law)} is not a ElastoPlastic or another MaterialLaw")
+        raise ModelError(f"{what} = {shorten(law)} is not an ElastoPlastic or another MaterialLaw")
     kind = f"{what}: {type(law).__name__}"
     require_fields(law, MaterialLaw, kind)
-    ways = [w for w in WAYS if getattr(type(law), w) is not getattr(MaterialLaw, w)]
+    ways = [w for w in EVOLUTION_METHODS if getattr(type(law), w) is not getattr(MaterialLaw, w)]
     if len(ways) != (1 if law.variables else len(ways)):
         has = "both increments and residuals" if ways else "neither increments nor residuals"
-        raise ModelError(f"{kind} has {has}; define one of both methods")
+        raise ModelError(f"{kind} has {has}; define one of the two methods")
     parameters = law.parameters(uniform(law, np.ones(1)))
     if "C" in parameters:
         raise ModelError(f"{kind}.parameters has the name C, the name of the elastic stiffness")
@@ -244,13 +246,13 @@ def require_law(law: object, what: str) -> None:
                 result = getattr(tried, name)(*arguments)
         except Exception as error:
             raise ModelError(
-                f"{kind}.{name} fails at no strain: {error}{raised_at(error)}"
+                f"{kind}.{name} fails at zero strain: {error}{raised_at(error)}"
             ) from error
         if name == method:
             require_names(result, law, f"{kind}.{name}")
         elif name == "stress" and not np.all(np.isfinite(law.as_tuple(result))):
             raise ModelError(
-                f"{kind}.stress is {shorten(result)} at no strain; it must be a number"
+                f"{kind}.stress is {shorten(result)} at zero strain; it must be a number"
             )
         elif name == "stress" and len(law.as_tuple(result)) != len(law.resultants or "x"):
             raise ModelError(f"{kind}.stress must return one stress for each of {law.resultants}")
@@ -259,7 +261,7 @@ def require_law(law: object, what: str) -> None:
 def require_fields(law: Any, base: type, what: str, but: Collection[str] = ()) -> None:
     """Raise :class:`ModelError` unless a law is a frozen dataclass whose fields have free names.
 
-    A field cannot have the name of a member of the base, unless ``but`` has the name.
+    A field cannot have the name of a member of ``base``, except for the names in ``but``.
     """
     parameters = getattr(type(law), "__dataclass_params__", None)
     if parameters is None or not parameters.frozen or not parameters.eq:
@@ -274,16 +276,16 @@ def require_fields(law: Any, base: type, what: str, but: Collection[str] = ()) -
 
 
 def require_field(value: object, what: str, kinds: Any = Real) -> None:
-    """Raise :class:`ModelError` unless a field of a law is a number."""
+    """Raise :class:`ModelError` unless the value of a field of a law is of one of ``kinds``."""
     if not isinstance(value, kinds) or isinstance(value, bool):
         raise ModelError(
-            f"{what} = {shorten(value)} is no number; fields of a law are its numbers, what else "
-            "it knows can be a class variable"
+            f"{what} = {shorten(value)} is no number; fields of a law are numbers, its other "
+            "attributes can be class variables"
         )
 
 
-WAYS = ("increments", "residuals")
-"""Methods of a law by which its variables evolve."""
+EVOLUTION_METHODS = ("increments", "residuals")
+"""Methods for the evolution of variables; a law with variables defines one of the two."""
 
 
 @contextmanager
@@ -300,7 +302,7 @@ def traced(law: object) -> Iterator[None]:
 
 
 def require_names(result: object, law: Any, what: str) -> None:
-    """Raise :class:`ModelError` unless a method returned the variables of a law by name."""
+    """Raise :class:`ModelError` unless a method returned a dict with each variable of a law."""
     if not isinstance(result, Mapping):
         raise ModelError(
             f"{what} returns {shorten(result)}; it must return a dict with the names "
@@ -317,10 +319,11 @@ def require_names(result: object, law: Any, what: str) -> None:
 
 
 def judges_dissipation(law: MaterialLaw) -> bool:
-    """Return whether the entry "plastic" of a law is its own dissipation, for steps of any length.
+    """Return whether the dissipation of a law cannot fall in a run, for steps of any length.
 
-    It is if the law states its dissipation, or if energies are quadratic.  Otherwise the entry has
-    an integration error, of either sign.  An active law may supply energy.
+    The entry "plastic" of the ledger is exact if the law states its dissipation, or if its energies
+    are quadratic.  Otherwise the entry has an integration error of either sign.  An active law may
+    supply energy.
     """
     defined = type(law).dissipation is not MaterialLaw.dissipation
     return not law.active and (defined or has_quadratic_energies(law))
@@ -343,5 +346,5 @@ def has_quadratic_energies(law: MaterialLaw) -> bool:
 
 def quadratic(energies: Callable[[float], list[float]]) -> bool:
     """Return whether energies grow with the square of a factor on their arguments."""
-    # Factors of two keep all digits.
+    # A factor of two keeps all digits of the arguments.
     return bool(np.allclose(energies(2.0), 4.0 * np.array(energies(1.0)), rtol=1e-12, atol=0.0))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Laws of a material point in one dimension: yielding, hardening, viscous flow.
+"""Laws of material points: yielding, hardening, viscous flow, hysteresis, interaction of N and M.
 
-A point is a resultant of a cross-section (strain 1 or curvature 1/m against N or N m) or a fibre
-(strain against Pa).  The laws are functions of arrays, and of UFL expressions too: UFL derives
-their tangents and FFCx compiles them for the time loop, see
-:mod:`ufl_beam.terms.material_points`.
+A point is a resultant of a cross-section (N of a strain, N m of a curvature in 1/m), N and M
+together, a fibre (Pa of a strain) or a spring (N of m, N m of rad).  The laws are functions of
+arrays and of UFL expressions: UFL derives the tangents, and FFCx compiles the laws for the time
+loop, see :mod:`ufl_beam.terms.material_points`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.records import FromZero, NotNegative, Positive, Record
 
 OWN_LAW = "state a MaterialLaw of your own"
-"""Message of classes without subclasses."""
+"""Remedy in the error if a user derives a subclass from a closed class."""
 
 
 @closed(OWN_LAW)
@@ -44,7 +44,7 @@ class Perzyna(Record):
 
     Args:
         eta: Overstress per plastic strain rate; Pa s for fibres, N s and N m² s for resultants.
-            Zero is rate-independent, infinity elastic.
+            With zero the law is rate-independent, with infinity it is elastic.
 
     Example:
         >>> law = ub.ElastoPlastic(250e6, isotropic=2e9, viscosity=ub.Perzyna(eta=1e6))  # Pa, Pa s
@@ -63,10 +63,10 @@ class Perzyna(Record):
 class DuvautLions(Record):
     """Duvaut-Lions viscoplasticity: relaxation towards the rate-independent stress, P(45).
 
-    It is the law of :class:`Perzyna` with ``eta = tau (C + H)``, given by its relaxation time.
+    It is the law of :class:`Perzyna` with ``eta = tau (C + isotropic + kinematic)``.
 
     Args:
-        tau: Relaxation time; s.  Zero is rate-independent, infinity elastic.
+        tau: Relaxation time; s.  With zero the law is rate-independent, with infinity elastic.
 
     Example:
         >>> law = ub.ElastoPlastic(  # Pa, s
@@ -78,7 +78,7 @@ class DuvautLions(Record):
     tau: FromZero
 
     def coefficient(self, stiffness: Values) -> Values:
-        """Return the overstress per rate of plastic strain: tau times the stiffness C + H."""
+        """Return the overstress per rate of plastic strain; hardening adds to ``stiffness``."""
         return np.asarray(self.tau * stiffness)  # P(46)
 
 
@@ -91,8 +91,8 @@ def _require_limit(value: Any, what: str, **limits: Any) -> None:
 def _require_modulus(value: Any, what: str) -> None:
     if require_number(value, what) < 0.0:
         raise ModelError(
-            f"{what} = {value:g} must not be negative: a softening bulk has no size, and results "
-            "would depend on the mesh; use Softening(limit, fracture_energy)"
+            f"{what} = {value:g} must not be negative: softening of the bulk has no length scale, "
+            "and results would depend on the mesh; use Softening(limit, fracture_energy)"
         )
 
 
@@ -102,14 +102,14 @@ Exponent = Annotated[float, partial(require_number, at_least=1.0)]
 
 
 class _Plastic(Record, MaterialLaw):
-    """Base of laws whose stress is C times (strain less plastic strain)."""
+    """Base of laws with the stress C (strain - plastic strain)."""
 
     def stress(self, strain: Values, state: State) -> Values:
         """Return the stress of the elastic strain."""
         return self.C * (strain - state.plastic)
 
     def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Return the energy per volume of the elastic strain."""
+        """Return the energy density of the elastic strain."""
         return self.C * (strain - state.plastic) ** 2 / 2
 
 
@@ -118,8 +118,8 @@ class ElastoPlastic(_Plastic):
     """Elasto-(visco)plastic law with linear isotropic and kinematic hardening, P(35)-P(48).
 
     Args:
-        yield_limit: Yield stress, or yield force or moment of a resultant; Pa, N or N m.  For
-            fibres also a distribution such as :class:`Normal`.
+        yield_limit: Yield stress, or yield force or moment of a resultant, or a distribution such
+            as :class:`Normal`; Pa, N or N m.
         isotropic: Isotropic hardening; stress per plastic strain.
         kinematic: Kinematic hardening (Prager); stress per plastic strain.
         viscosity: :class:`Perzyna` or :class:`DuvautLions`; rate-independent by default.
@@ -138,15 +138,15 @@ class ElastoPlastic(_Plastic):
     viscosity: Annotated[Any, partial(require_kind, kind=(Perzyna, DuvautLions))] = Perzyna(0.0)
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "accumulated": 0.0}
     fracture_energy: ClassVar[float] = math.inf  # it never breaks
-    steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # fall per opening, and its opening
+    steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # of a SofteningLaw; here nothing falls
 
     def parameters(self, C: Values) -> dict[str, Any]:
-        """Return limit, moduli and viscosity, as overstress per plastic strain rate."""
+        """Return limit and moduli, and the viscosity as overstress per plastic strain rate."""
         eta = self.viscosity.coefficient(C + self.isotropic + self.kinematic)
         return super().parameters(C) | {"viscosity": eta}
 
     def increments(self, strain: Values, state: State, dt: Values) -> dict[str, Values]:
-        """Return the plastic strain increment and its size, in closed form, P(38)-P(44)."""
+        """Return the increment of plastic strain and its size, in closed form, P(38)-P(44)."""
         trial = self.stress(strain, state) - self.kinematic * state.plastic
         direction = sign(trial)
         overstress = direction * trial - (
@@ -157,15 +157,15 @@ class ElastoPlastic(_Plastic):
         return {"plastic": direction * γ, "accumulated": γ}
 
     def hardening_energy(self, state: State) -> Values:
-        """Return the energy per volume that hardening stores."""
+        """Return the density of the energy that hardening stores."""
         return (
             self.kinematic * state.plastic**2 + self.isotropic * state.accumulated**2
         ) / 2  # P(35)
 
     def dissipation(self, strain: Values, state: State, changes: State, dt: Values) -> Values:
-        """Return the energy per volume that yield stress and viscosity dissipate in a step."""
+        """Return the density of the energy that yield stress and viscosity dissipate in a step."""
         γ = changes.accumulated
-        flows = below(-γ, 0.0)  # avoids infinity times zero
+        flows = below(-γ, 0.0)  # without flow, infinite numbers times zero would be NaN
         return (
             where(flows, self.yield_limit, 0.0) + where(flows, self.viscosity, 0.0) * γ / dt
         ) * γ  # P(37)
@@ -199,14 +199,14 @@ class ElastoPlastic(_Plastic):
 class RambergOsgood(_Plastic):
     """Power law of Ramberg and Osgood: strain = stress/C + offset (stress/yield_limit)^exponent.
 
-    The power law holds while the stress exceeds all previous stresses; below them the point is
-    elastic, in both directions (isotropic hardening).  There is no yield limit.  After Ramberg and
-    Osgood, NACA TN 902 (1943).
+    The power law holds while the size of the stress exceeds all its previous values; below them
+    the point is elastic, in both directions (isotropic hardening).  There is no elastic range at
+    first.  After Ramberg and Osgood, NACA TN 902 (1943).
 
     Args:
         yield_limit: Stress at which the plastic strain is ``offset``, or a distribution such as
             :class:`Normal`; Pa, N or N m.
-        offset: Plastic strain or curvature at that stress, such as 0.002; 1 or 1/m.
+        offset: Plastic strain or curvature at the stress ``yield_limit``, such as 0.002; 1 or 1/m.
         exponent: At least 1.
 
     Raises:
@@ -223,7 +223,7 @@ class RambergOsgood(_Plastic):
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "largest": 0.0}
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Return residuals of accumulated strain at the largest stress, and of plastic strain."""
+        """Return the residuals of the largest and of the present plastic strain."""
         stress = self.stress(strain, new)
         largest = larger(
             old.largest, self.offset * (absolute(stress) / self.yield_limit) ** self.exponent
@@ -236,9 +236,9 @@ class RambergOsgood(_Plastic):
 class ArmstrongFrederick(_Plastic):
     """Plasticity with nonlinear kinematic hardening: loops that close, ratchet and saturate.
 
-    The stress lies within ``yield_limit`` of a back stress X with dX = kinematic dp - recovery X
-    abs(dp), which saturates at kinematic/recovery.  After Armstrong and Frederick, CEGB report
-    RD/B/N731 (1966).
+    The stress lies within ``yield_limit`` of a back stress X.  With the plastic strain p,
+    dX = kinematic dp - recovery X abs(dp), so that X saturates at kinematic/recovery.  After
+    Armstrong and Frederick, CEGB report RD/B/N731 (1966).
 
     Args:
         yield_limit: Yield stress, or a distribution such as :class:`Normal`; Pa, N or N m.
@@ -266,17 +266,17 @@ class ArmstrongFrederick(_Plastic):
         C, B, r = self.C, self.kinematic, self.recovery
         trial = self.stress(strain, state)
         direction = sign(trial - state.back)
-        over = positive(direction * (trial - state.back) - self.yield_limit)
-        b = C + B - r * (direction * trial - self.yield_limit)  # C r γ² + b γ = over
-        root = sqrt(b**2 + 4 * C * r * over)
-        above = where(below(b, 0.0), 1.0, b + root)  # avoids cancellation
-        γ = where(below(b, 0.0), (root - b) / (2 * C * r), 2 * over / above)
-        γ = where(below(-over, 0.0), γ, 0.0)
+        overstress = positive(direction * (trial - state.back) - self.yield_limit)
+        b = C + B - r * (direction * trial - self.yield_limit)  # C r γ² + b γ = overstress
+        root = sqrt(b**2 + 4 * C * r * overstress)
+        divisor = where(below(b, 0.0), 1.0, b + root)  # root - b would cancel digits if b > 0
+        γ = where(below(b, 0.0), (root - b) / (2 * C * r), 2 * overstress / divisor)
+        γ = where(below(-overstress, 0.0), γ, 0.0)
         change = (direction * B - r * state.back) * γ / (1 + r * γ)
         return {"plastic": direction * γ, "back": change}
 
     def hardening_energy(self, state: State) -> Values:
-        """Return the energy per volume that the back stress stores."""
+        """Return the density of the energy that the back stress stores."""
         return state.back**2 / (2 * self.kinematic)
 
 
@@ -284,19 +284,20 @@ class ArmstrongFrederick(_Plastic):
 class BoucWen(Record, MaterialLaw):
     """Smooth hysteresis of Bouc and Wen, with the degradation of Baber and Wen.
 
-    The stress is C (hardening strain + (1 - hardening) z), where the hysteretic strain z follows
-    dz = dx (1 - ν abs(z/z0)^n (1 - β + β sign(z dx))) with z0 = yield_limit/C.  Strength degrades
-    by ν = 1 + strength e with the dissipated energy e over yield_limit²/C.  After Wen, J. Eng.
-    Mech. Div. ASCE 102 (1976), and Baber and Wen, ibid. 107 (1981).  Their degradation of
-    stiffness is left out: in unloading it would return dissipated energy.
+    The stress at the strain x is C (a x + (1 - a) z) with a = ``hardening``.  The hysteretic strain
+    z follows dz = dx (1 - ν abs(z/z0)^n (1 - β + β sign(z dx))) with z0 = yield_limit/C.  Strength
+    degrades by ν = 1 + strength e, where e is the dissipated energy in units of
+    (1 - a) yield_limit²/C.  After Wen, J. Eng. Mech. Div. ASCE 102 (1976), and Baber and Wen, ibid.
+    107 (1981).  Their degradation of stiffness is left out: in unloading it would return dissipated
+    energy.
 
     Args:
-        yield_limit: Stress at which the tangents of both branches meet without hardening, or a
-            distribution such as :class:`Normal`; Pa, N, N m.
-        hardening: Slope of the plastic branch over C, below 1.
+        yield_limit: Stress at which the elastic tangent meets the plastic branch, or a distribution
+            such as :class:`Normal`; Pa, N or N m.
+        hardening: Ratio of the slope of the plastic branch to C, from 0 to 0.999.
         exponent: Sharpness n of the transition, at least 1.
         shape: β from 1/2 (unloading along C) to 1.
-        strength: Degradation per dissipated energy; zero by default.
+        strength: Growth of ν per dissipated energy e; zero by default.
 
     Raises:
         ModelError: A parameter is out of range.
@@ -314,21 +315,22 @@ class BoucWen(Record, MaterialLaw):
     variables: ClassVar[Mapping[str, float]] = {"slip": 0.0, "strain": 0.0, "energy": 0.0}
 
     def stress(self, strain: Values, state: State) -> Values:
-        """Return the stress of both springs in parallel; the slip is the strain less z."""
+        """Return the stress; the variable ``slip`` is the strain minus z."""
         return self.C * (strain - (1 - self.hardening) * state.slip)
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
         """Return the residuals of the slip, the stored strain and the dissipated energy.
 
-        Far beyond all solutions the flow no longer grows with z, so that no second root exists.
+        For abs(z) far beyond the solution the flow does not grow with z, so that there is no second
+        solution.
         """
         z, z0, dx = strain - new.slip, self.yield_limit / self.C, strain - old.strain
         before = old.strain - old.slip
         size = smaller(absolute(z), 2 * larger(z0, absolute(before)))
         sliding = dx + before - sign(z) * size
-        weaker = 1 + self.strength * (old.energy + positive(sign(z) * size * sliding) / z0**2)
-        bends = 1 - self.shape + self.shape * sign(z * dx)
-        flow = dx * weaker * (size / z0) ** self.exponent * bends
+        ν = 1 + self.strength * (old.energy + positive(sign(z) * size * sliding) / z0**2)
+        factor = 1 - self.shape + self.shape * sign(z * dx)
+        flow = dx * ν * (size / z0) ** self.exponent * factor
         increment = new.slip - old.slip
         return {
             "slip": increment - flow,
@@ -337,7 +339,7 @@ class BoucWen(Record, MaterialLaw):
         }
 
     def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Return the energy per volume of both springs."""
+        """Return the energy density of the strain and of z, two springs in parallel."""
         a = self.hardening
         return self.C * (a * strain**2 + (1 - a) * (strain - state.slip) ** 2) / 2
 
@@ -349,14 +351,14 @@ class BoucWen(Record, MaterialLaw):
 class AxialBending(Record, MaterialLaw):
     """Yield surface of axial force and moment, (N/Np)² + abs(M)/Mp = 1, with associated flow.
 
-    The surface is exact for a rectangle of ideally plastic material.  Its ridge at M = 0 is
+    The surface is exact for a rectangle of ideally plastic material.  Its corners at M = 0 are
     rounded: with m = M/Mp and w = ``rounding``, (sqrt(m² + w²) - w)/(sqrt(1 + w²) - w) replaces
     abs(m).
 
     Args:
         axial: Np, the yield force; N.
         bending: Mp, the plastic moment; N m.
-        rounding: Width w of the ridge.
+        rounding: Width w of the rounded corners, in terms of m.
 
     Raises:
         ModelError: A number is not positive.
@@ -388,10 +390,10 @@ class AxialBending(Record, MaterialLaw):
         return (N / self.axial) ** 2 + (sqrt(m**2 + w**2) - w) / (sqrt(1 + w**2) - w) - 1
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Return the residuals of flow along the normal of the surface, with return to the surface.
+        """Return the residuals of both plastic strains, and of the return to the yield surface.
 
-        Flow against the normal would lead to the far side of the surface.  So a negative flow
-        changes no strain, but increases the residual: the equations have one solution.
+        A flow against the normal could return to the far side of the surface.  Therefore a negative
+        flow changes no strain but increases the residual: the equations have one solution.
         """
         (N, M), (EA, EI) = self.stress(strain, new), self.C
         w, m, flow = self.rounding, M / self.bending, new.flow - old.flow

@@ -42,19 +42,19 @@ FromZero = Annotated[float, partial(require_number, at_least=0.0, infinite=True)
 Vector = Annotated[tuple[float, float], require_vector]
 Text = Annotated[str, require_text]
 Instance = Annotated[T, require_kind]
-"""An object of a class, or of one of several."""
+"""An object of the annotated class, or of one of several classes."""
 
 
 class Record:
     """Base of frozen dataclasses that check their fields by annotations ``Annotated[T, check]``.
 
-    A value other than the default is checked by ``check(value, what=name)``.  The result replaces
-    the value, unless it is None.  ``name`` is the name of the field, or the text that follows the
-    check in the annotation.
+    A value other than the default is checked by ``check(value, what="Record: name")``, where
+    ``name`` is the name of the field, or the text that follows the check in the annotation.  The
+    value that the check returns replaces the field, unless it is None.
     """
 
     _refused: ClassVar[type[ArgumentError]] = ModelError
-    """Error of wrong fields; it is ArgumentError for records that do not belong to a model."""
+    """Error that a wrong field raises; ArgumentError in records that are not part of a model."""
 
     def __repr__(self) -> str:
         return compact_repr(self)  # for dataclasses with ``repr=False``
@@ -79,7 +79,7 @@ class Record:
 
 @cache
 def _checks(record: type[Any]) -> list[tuple[str, str, object, Callable[..., object]]]:
-    """Return name, name in messages, default and check of each field with a check."""
+    """Return (name, name in messages, default, check) of each field that has a check."""
     checks = []
     hints = get_type_hints(record, include_extras=True)
     for field in fields(record):
@@ -97,17 +97,17 @@ def _checks(record: type[Any]) -> list[tuple[str, str, object, Callable[..., obj
 
 NO_MEMBERS = {object, ABC, Protocol, Generic}
 
-_alike: WeakKeyDictionary[type, set[type]] = WeakKeyDictionary()
-"""Protocols that a class satisfies; a check of signatures takes a millisecond."""
+_satisfied: WeakKeyDictionary[type, set[type]] = WeakKeyDictionary()
+"""Protocols that each class satisfies, kept because a check of signatures takes a millisecond."""
 
 
 def parameters_by_name(
     function: Callable[..., Any], known: Sequence[str], what: str, after: int = 0, more: str = ""
 ) -> tuple[str, ...] | None:
-    """Return the ``known`` names among the parameters of a function, without the first ``after``.
+    """Return the ``known`` names among the parameters that follow the first ``after`` ones.
 
-    A function with ``**more`` takes all known names.  The result is None if a function has no
-    signature.
+    A function with parameters ``**kwargs`` takes all known names.  The result is None if a function
+    has no signature.  ``more`` is appended to the message.
 
     Raises:
         ModelError: ``what`` has an unknown parameter without a default.
@@ -122,7 +122,7 @@ def parameters_by_name(
     for p in named:
         if p.name not in known and p.default is p.empty:
             raise ModelError(
-                f"{what} has a parameter {p.name!r}, which is unknown; there are "
+                f"{what} has a parameter {p.name!r}, which is unknown; the known ones are "
                 f"{', '.join(known)}{more}"
             )
     return tuple(p.name for p in named if p.name in known)
@@ -130,7 +130,7 @@ def parameters_by_name(
 
 @lru_cache(maxsize=32)
 def members(protocol: type) -> dict[str, Callable[..., Any] | None]:
-    """Return public methods by name of a protocol or an abstract class; attributes are None."""
+    """Return methods by name of a protocol or abstract class, and None for each attribute."""
     methods: dict[str, Callable[..., Any] | None] = {}
     for base in reversed([base for base in protocol.__mro__ if base not in NO_MEMBERS]):
         for name, thing in (dict.fromkeys(inspect.get_annotations(base)) | vars(base)).items():
@@ -140,13 +140,13 @@ def members(protocol: type) -> dict[str, Callable[..., Any] | None]:
 
 
 def unlike(value: object, protocol: type) -> str:
-    """Return why an object does not satisfy a protocol; empty if it does.
+    """Return why an object does not satisfy a protocol, or an empty text if it does.
 
-    Methods must accept the arguments of the methods of the protocol.
+    Methods of the object must accept the arguments of the methods of the protocol.
     """
     if missing := [name for name in members(protocol) if not hasattr(value, name)]:
         return f"it lacks {', '.join(missing)}"
-    known = _alike.setdefault(type(value), set())
+    known = _satisfied.setdefault(type(value), set())
     for name, expected in members(protocol).items():
         if expected is None or protocol in known:
             continue

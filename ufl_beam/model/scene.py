@@ -50,7 +50,7 @@ from ufl_beam.model.works import Potential, VirtualWork, Work
 
 
 def _all(*kinds: type) -> Callable[..., tuple[Any, ...]]:
-    """Check of a list of records."""
+    """Return a check that a field is a list of records of these kinds."""
     return partial(require_all, kind=kinds)
 
 
@@ -61,7 +61,7 @@ class Scene(Record, Rich):
     Args:
         beams: The beams.
         joints: :class:`Rigid`, :class:`Revolute`, :class:`Prismatic`, :class:`RigidLink`,
-            :class:`Link` and :class:`Release`.
+            :class:`Link`, :class:`Guided`, :class:`Release`.
         supports: :class:`Clamped`, :class:`Pinned`, :class:`Roller`,
             :class:`PrescribedDisplacement`.
         loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`,
@@ -70,8 +70,8 @@ class Scene(Record, Rich):
         initial: :class:`Velocity`; all is at rest by default.
         damping: :class:`Rayleigh`, :class:`KelvinVoigt`, in addition to dissipation of materials.
         bodies: :class:`Body`.
-        connectors: :class:`Turn`, :class:`Stretch`, :class:`Slide`: springs, dampers, stops,
-            friction, motors.
+        connectors: :class:`Turn`, :class:`Stretch`, :class:`Slide`, :class:`Bushing`: springs,
+            dampers, stops, friction, motors.
         works: :class:`VirtualWork`, :class:`Potential`: effects along beams that you state in UFL.
 
     Raises:
@@ -124,7 +124,7 @@ class Scene(Record, Rich):
             if node(connector.a) == node(connector.b):
                 raise ModelError(f"{connector}: both ends are at the same body or cross-section")
             if isinstance(connector.law, Coulomb) and connector.law.joint is not None:
-                self._require_pressing(connector, connector.law.joint)
+                self._require_normal_force(connector, connector.law.joint)
         self._require_single_supports()
 
     def __getitem__(self, name: str) -> Beam | Body:
@@ -139,7 +139,7 @@ class Scene(Record, Rich):
             names = ", ".join(dict.fromkeys(str(x.name) for x in everything))
             raise ModelError(
                 f"Scene: {len(matches) or 'no'} beams and bodies are called {name!r}; "
-                f"there is {names}; scene.beams[i] and scene.bodies[i] are found by index"
+                f"the names are {names}; scene.beams[i] and scene.bodies[i] are found by index"
             )
         return matches[0]
 
@@ -159,8 +159,8 @@ class Scene(Record, Rich):
     def size(self) -> float:
         """Diameter of the smallest circle around the undeformed scene; m.
 
-        It does not depend on the axes.  If all points coincide, it is the largest radius of
-        gyration, or 1.
+        It does not depend on the directions of x and y.  If all points coincide, it is the largest
+        radius of gyration of a body, or 1.
         """
         beams = {(b.cells, b.corners): b for b in self.beams}  # equal beams share an array
         vertices = {kind: np.array(b.vertices(())) for kind, b in beams.items()}
@@ -187,7 +187,7 @@ class Scene(Record, Rich):
 
     @cached_property
     def hinges(self) -> tuple[Connector, ...]:
-        """Plastic hinges of zero length: ``hinges`` of beams, and hinges of sections at ends."""
+        """Plastic hinges of zero length: ``hinges`` of beams, and of sections at ends of beams."""
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
         bearing = [support.place for support in self.supports if 2 in support.held]
         bearing += [mass.place for mass in self.masses if mass.inertia]
@@ -213,7 +213,7 @@ class Scene(Record, Rich):
         return (*self.bodies, *((GROUND,) if any(node(p) is GROUND for p in attached) else ()))
 
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
-        """Iterate over functions of time of loads, motions and drives, and their owners."""
+        """Iterate over (owner, function of time): loads, supports, connectors, and works."""
         yield from ((x, x.amplitude) for x in self.loads if not isinstance(x, RotatingFrame))
         yield from ((x, motion) for x in self.supports for motion in x.held.values())
         for connector in self.all_connectors:
@@ -225,7 +225,7 @@ class Scene(Record, Rich):
             yield from ((work, number) for number in work.numbers.values() if callable(number))
 
     def attachments(self) -> Iterator[tuple[object, AttachmentPoint]]:
-        """Iterate over pairs of a record (or a word for it) and a place that it refers to."""
+        """Iterate over (record or its class name, place): each place that a record refers to."""
         yield from ((joint, place) for joint in self.joints for place in joint.places)
         yield from (
             (connector, place)
@@ -251,7 +251,7 @@ class Scene(Record, Rich):
 
     @cached_property
     def attached(self) -> dict[Member, list[float]]:
-        """Parameters of the places on each beam that must be vertices."""
+        """For each beam, the parameters s of the places that must be vertices."""
         places: dict[Member, list[float]] = {beam: list(beam.hinges) for beam in self.beams}
         for _, place in self.attachments():
             if isinstance(place, Place):
@@ -259,13 +259,13 @@ class Scene(Record, Rich):
         return places
 
     def _require_once(self) -> None:
-        """Raise if a record repeats another, works share a name, or two frames rotate."""
+        """Raise if a record is repeated, works share a name, or there are two rotating frames."""
         for member, twice in (*_again("beams", self.beams), *_again("bodies", self.bodies)):
             raise ModelError(f"Scene: {member.name} is in the scene {twice}")
         for field in ("joints", "connectors", "loads", "masses", "initial", "damping", "works"):
             for record, twice in _again(field, getattr(self, field)):
                 raise ModelError(
-                    f"Scene: {clip(str(record))} occurs {twice}; remove one, or make two of them"
+                    f"Scene: {clip(str(record))} occurs {twice}; remove one, or create two records"
                 )
         for joint, twice in _again(
             "joints", self.joints,
@@ -277,35 +277,35 @@ class Scene(Record, Rich):
             raise ModelError(f"Scene: {joint} occurs {twice}; remove one")
         for work, twice in _again("works", self.works, key=lambda work: work.name):
             raise ModelError(
-                f"Scene: a work is called {work.name!r} {twice}, the name of its entry in the "
-                "energy ledger; give one of them another name"
+                f"Scene: {work.name!r}, the name of a work and of its entry in the energy ledger, "
+                f"occurs {twice}; rename one work"
             )
         in_time = {work.in_time: work for work in self.works if isinstance(work, Potential)}
         for work in self.works:
             if work.name in in_time:
                 raise ModelError(
-                    f"Scene: {work} has the name of another entry of the energy ledger, the energy "
-                    f"that {in_time[work.name]} gains in time; give one of them another name"
+                    f"Scene: {work} has the name of another entry of the energy ledger, for energy "
+                    f"that {in_time[work.name]} gains by changes in time; rename one work"
                 )
         frames = [load for load in self.loads if isinstance(load, RotatingFrame)]
         if len(frames) > 1:
             raise ModelError(
                 f"Scene: {len(frames)} rotating frames, {frames[0]} and {frames[1]}: a scene is in "
-                "one frame, whose forces go with the square of its rate; give one, of the whole "
-                "rate"
+                "one frame, and the forces of two cannot be added, because centrifugal forces are "
+                "quadratic in the rate; give one RotatingFrame with the total rate"
             )
 
-    def _require_pressing(self, connector: Connector, pressing: Bearing) -> None:
-        """Raise unless the normal force on friction is known, from a support or joint."""
-        if pressing not in (*self.joints, *self.supports):
+    def _require_normal_force(self, connector: Connector, bearing: Bearing) -> None:
+        """Raise unless the normal force of friction is a known force of a support or joint."""
+        if bearing not in (*self.joints, *self.supports):
             why = "is not in the scene; add it to joints or supports"
-        elif isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
+        elif isinstance(bearing, Support) and not bearing.held.keys() & {0, 1}:
             why = "holds no displacement and bears no force; name another support or joint"
-        elif isinstance(pressing, Joint) and all(holder.is_rotation for holder in pressing.holders):
+        elif isinstance(bearing, Joint) and all(holder.is_rotation for holder in bearing.holders):
             why = "shares unknowns, so that its force is not known; make it with multipliers=True"
         else:
             return
-        raise ModelError(f"{connector}: {pressing}, which presses on its friction, {why}")
+        raise ModelError(f"{connector}: {bearing}, whose force is to cause its friction, {why}")
 
     @property
     def shared_by_joints(self) -> list[list[NodeDof]]:
@@ -313,7 +313,7 @@ class Scene(Record, Rich):
         return [joint.equal(component) for joint in self.joints for component in joint.shared]
 
     def free_caches(self) -> None:
-        """Free the memory of properties that only numbering uses; they are computed again."""
+        """Free the memory of properties that only numbering uses; further uses compute them."""
         for name in ("attached", "representatives"):
             vars(self).pop(name, None)
 
@@ -344,7 +344,7 @@ class Scene(Record, Rich):
 
 
 def attachment_points(scene: Scene) -> dict[Body, list[Spot]]:
-    """Find the attachment points of bodies and of the ground, each once."""
+    """Find the attachment points of each body and of the ground, without repetition."""
     anchors = [place for joint in scene.joints for place in joint.places]
     anchors += [place for connector in scene.connectors for place in (connector.a, connector.b)]
     anchors += [x.place for x in scene.loads if isinstance(x, LoadAtPlace)]
@@ -356,7 +356,7 @@ def attachment_points(scene: Scene) -> dict[Body, list[Spot]]:
 
 
 def _off_center(load: PointLoad) -> tuple[Connector, ...]:
-    """Return connectors with the force of a load at a point of a body that is not its centre."""
+    """Return connectors that apply a load at a point off the centre of a body; else nothing."""
     if carries(load.place):
         return ()
 
@@ -375,7 +375,7 @@ def _off_center(load: PointLoad) -> tuple[Connector, ...]:
 def _again(
     field: str, records: Sequence[Any], key: Callable[[Any], object] = id
 ) -> Iterator[tuple[Any, str]]:
-    """Iterate over records that a list repeats, with words for a message."""
+    """Iterate over (repeated record of a list, text for a message)."""
     first: dict[object, int] = {}
     for i, record in enumerate(records):
         if (j := first.setdefault(key(record), i)) != i:

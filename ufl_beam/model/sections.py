@@ -33,24 +33,24 @@ class Section(Record):
         EA: Axial stiffness; N.
         GA: Shear stiffness, shear factor included; N.
         EI: Bending stiffness; N m².
-        rhoA: Mass per length; kg/m.  Zero, the default, is a beam without mass; give zero
-            explicitly if other beams of a scene in motion have mass.
+        rhoA: Mass per length; kg/m.  Zero, the default, is a beam without mass.  Give zero
+            explicitly to avoid the warning if other beams of a dynamic scene have mass.
         rhoI: Rotary inertia per length; kg m.  Zero leaves rotary inertia out.
         depth: Depth in the plane of motion, for pictures; m.  The default is the depth of the
-            rectangle with the same EI/EA.  A much shorter beam causes a warning.
+            rectangle with the same EI/EA.  A beam shorter than depth/√12 causes a warning.
         axial: Law of the axial force N, if it can yield; N.
         shear: Law of the shear force V, if it can yield; N.
         bending: Law of the bending moment M, if it can yield; N m.
-        hinge: Law of the hinge that opens in each cell where the moment reaches its limit; N m, J.
-            For hinges in chosen cells see :class:`Beam`.
-        fibres: Fibres instead of the laws of N, M and the hinge; the shapes below and
-            :meth:`of_fibres` place them.
+        hinge: Law of the hinge that opens in each cell where the moment reaches the limit of the
+            law; N m, J.  For hinges at chosen places see :class:`Beam`.
+        fibres: Fibres, instead of all laws of resultants and of the hinge; shapes such as
+            :meth:`rectangle`, and :meth:`of_fibres`, place them.
         interaction: Law of N and M together, such as :class:`AxialBending`, instead of laws of
-            single resultants and the hinge.
+            single resultants, the hinge and fibres.
 
     Raises:
         ModelError: A stiffness is not positive, a number is not finite, a law has the wrong type,
-            or a section has both fibres and laws of resultants.
+            or laws, fibres and ``interaction`` exclude each other.
 
     Example:
         >>> plate = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
@@ -85,24 +85,25 @@ class Section(Record):
         laws = [n for n in ("axial", "shear", "bending", "hinge") if getattr(self, n) is not None]
         if laws and self.fibres is not None:
             raise ModelError(
-                f"Section: a law {laws[0]} beside fibres; the fibres bear N and M, shear is elastic"
+                f"Section: a law {laws[0]} beside fibres, which bear N and M, while shear is "
+                "elastic; leave one out"
             )
         if self.interaction is not None and (laws or self.fibres is not None):
             law = laws[0] if laws else "fibres"
             raise ModelError(
-                f"Section: {law} beside interaction, the law of N and M; give one of both"
+                f"Section: {law} beside interaction, the law of N and M; leave one out"
             )
-        self.section_points(self.hinge)  # refuses laws that do not go together
+        self.section_points(self.hinge)  # raises an error if the laws cannot be combined
 
     def section_points(self, hinge: SofteningLaw | None) -> SectionPoints | None:
-        """Return the material points of a cell with this hinge law; None if it is elastic."""
+        """Return the material points of a cell with this hinge law; None if the cell is elastic."""
         if self.fibres is not None:
             return self.fibres.section_points(self.GA)
         stiffness = np.array([self.EA, self.GA, self.EI])
         if self.interaction is not None:
             together = np.array([name in self.interaction.resultants for name in "NVM"])
             if hinge is not None and hinge.opens:
-                raise ModelError("Section: a hinge in a cell whose N and M interact; leave one out")
+                raise ModelError("Section: a hinge beside interaction of N and M; leave one out")
             return SectionPoints(
                 strains=np.eye(3)[together],
                 weights=np.ones(1),
@@ -144,10 +145,10 @@ class Section(Record):
             E: Young's modulus; Pa.
             nu: Poisson's ratio.
             rho: Density; kg/m³.
-            shear_factor: Shear area over A.
+            shear_factor: Shear area divided by A.
             depth: Depth in the plane of motion; m.
-            fibres: Fibres; EA and EI are then sums over them.
-            laws: ``axial``, ``shear``, ``bending`` and ``hinge`` of :class:`Section`.
+            fibres: Fibres; EA and EI are then sums over the fibres.
+            laws: ``axial``, ``shear``, ``bending``, ``hinge``, ``interaction`` of :class:`Section`.
         """
         _require_positive("Section", A=A, I=I, E=E, shear_factor=shear_factor)
         require_number(depth, "Section: depth", at_least=0.0)
@@ -168,12 +169,14 @@ class Section(Record):
         cls, y: Sequence[float], A: Sequence[float], *, E: float, nu: float, fibres: Fibres,
         rho: float | None = None, shear_factor: float = 5 / 6,
     ) -> Section:  # fmt: skip
-        """Create a section of fibres with areas ``A`` (m²) at ``y`` (m) from any parallel line.
+        """Create a section of fibres with areas ``A`` (m²) at coordinates ``y`` (m).
 
-        The axis of the beam runs through their centroid.
+        The direction of y is to the left of the beam, its origin is arbitrary.  The axis of the
+        beam runs through the centroid of the fibres.
 
         Raises:
-            ModelError: The lengths of the lists differ, or all fibres lie at one y.
+            ModelError: The lengths of the lists differ, an area is not positive, or all fibres lie
+                at one y.
         """
         require_kind(fibres, Fibres, "Section.of_fibres: fibres")
         require_number(E, "Section: E", positive=True)
@@ -182,11 +185,11 @@ class Section(Record):
         )
         if at.ndim != 1 or at.shape != areas.shape or not len(at):
             raise ModelError(
-                f"Section.of_fibres: y and A must be lists of one length, not {at.shape} and "
+                f"Section.of_fibres: y and A must be lists of equal length, not {at.shape} and "
                 f"{areas.shape}"
             )
         if not (areas > 0).all():
-            raise ModelError("Section.of_fibres: y must be finite, and all A positive")
+            raise ModelError("Section.of_fibres: all areas A must be positive")
         total, depth = float(areas.sum()), float(np.ptp(at))
         if depth == 0.0:
             raise ModelError(
@@ -250,7 +253,7 @@ class Section(Record):
         cls, h: float, b: float, tw: float, tf: float, *, E: float, nu: float,
         rho: float | None = None, fibres: Fibres | None = None, **laws: Any,
     ) -> Section:  # fmt: skip
-        """Create a symmetric I of depth ``h``, width ``b``, web ``tw`` and flanges ``tf``; m.
+        """Create a symmetric I, ``h`` deep and ``b`` wide, web ``tw`` and flanges ``tf`` thick; m.
 
         It bends about its strong axis; the web between the mid-planes of the flanges carries shear.
         """
@@ -283,7 +286,7 @@ def _below_in_circle(y: Array, d: float) -> Array:
     """Return the area up to y, less a constant, and its first moment; (2, n)."""
     r = d / 2
     y = np.clip(y, -r, r)
-    half_chord = np.sqrt((r - y) * (r + y))  # round-off makes no negative radicand
+    half_chord = np.sqrt((r - y) * (r + y))  # as a product, it is never negative by round-off
     area = y * half_chord + (r**2 * np.arcsin(y / r) if r else 0.0)
     return np.array([area, -2 / 3 * half_chord**3])
 

@@ -20,34 +20,34 @@ from ufl_beam.model.material_law import require_field, require_fields
 from ufl_beam.model.records import FromZero, Positive, Record
 
 OWN_LAW = "state a SofteningLaw of your own"
-"""Message of classes without subclasses."""
+"""Remedy in the error if a user derives a subclass from a closed class."""
 
-GAUSS = 6
-"""Points of Gauss-Legendre quadrature of a traction over a step.
+QUADRATURE_POINTS = 6
+"""Number of points of Gauss-Legendre quadrature of a traction over a step.
 
-The error of an exponential traction is 1e-12 of its mean in a step that opens by twice
-energy/limit, after which 86 % of the energy is dissipated, and 5e-20 in one that opens by half.
+For an exponential traction the error is 1e-12 of the mean in a step that opens by 2 energy/limit
+and dissipates 86 % of the energy, and 5e-20 in a step that opens by 0.5 energy/limit.
 """
 
-SMALL = 1e-4
-"""Growth over energy/limit above which the mean traction is a difference of energies.
+SMALL_GROWTH = 1e-4
+"""Growth, as a multiple of energy/limit, above which mean tractions are differences of energies.
 
-At this growth the difference loses four digits.  Quadrature over a smaller step is exact to
+At this growth the difference loses four digits.  For a smaller growth quadrature is exact to
 round-off, or to 1e-10 of the energy if the step contains a kink.
 """
 
-MOST = 10_000
-"""Number of intervals above which adaptive quadrature stops: a noisy law never converges."""
+MOST_INTERVALS = 10_000
+"""Number of intervals above which adaptive quadrature stops; for a noisy law it never converges."""
 
 DECADES = 20
-"""A law is sampled at openings from ten to minus this power to ten to this power; m or rad."""
+"""A law is sampled at openings from 10**-DECADES to 10**DECADES; m or rad."""
 
 
 class SofteningLaw(ABC):
     """Base of the laws of hinges and cracks that lose their resistance.
 
-    A user's law is a frozen dataclass, whose fields are its parameters.  Its methods use the
-    functions of ``ub.law_functions``, because they are called with arrays and with UFL expressions.
+    A user's law is a frozen dataclass, whose fields are its parameters.  Its methods are called
+    with arrays and with UFL expressions; therefore they use the functions of ``ub.law_functions``.
     The traction must be positive at zero opening and vanish at large openings; it may rise before
     it falls.  See docs/extending_laws.md.
 
@@ -76,30 +76,30 @@ class SofteningLaw(ABC):
 
     @abstractmethod
     def traction(self, opening: Values) -> Values:
-        """Return the resistance after an accumulated opening; N m, N or Pa."""
+        """Return the traction at an accumulated opening; N m, N or Pa."""
 
     def energy_to(self, opening: Values) -> Values | None:
         """Return the integral of the traction up to an opening; None leaves it to quadrature."""
         return None
 
     def mean_traction(self, opening: Values, growth: Values) -> Values:
-        """Return the mean resistance over a growth; dissipation is its product with the growth.
+        """Return the mean traction over a growth of the opening; dissipation is their product.
 
-        It is the difference of :meth:`energy_to` over the growth.  Gauss-Legendre quadrature
-        replaces it if a law has no ``energy_to``, or if a small step would lose digits.
+        It is the difference of :meth:`energy_to` divided by the growth.  Gauss-Legendre quadrature
+        replaces this if a law has no ``energy_to``, or if the growth is too small for a difference.
         """
-        points, weights = np.polynomial.legendre.leggauss(GAUSS)
+        points, weights = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
         terms = zip(points.tolist(), weights.tolist(), strict=True)
         mean = sum(w / 2 * self.traction(opening + (1 + x) / 2 * growth) for x, w in terms)
         before, after = self.energy_to(opening), self.energy_to(opening + growth)
         if before is None or after is None:
             return mean
-        large = below(SMALL * self.fracture_energy, growth * self.limit)
+        large = below(SMALL_GROWTH * self.fracture_energy, growth * self.limit)
         return where(large, (after - before) / where(large, growth, 1.0), mean)
 
     def __getattr__(self, name: str) -> Any:
         if name in ("limit", "fracture_energy"):
-            return getattr(course(self), name)
+            return getattr(traction_properties(self), name)
         raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
 
     @property
@@ -110,12 +110,12 @@ class SofteningLaw(ABC):
     @property
     def bounded(self) -> bool:
         """True if the traction never exceeds the limit."""
-        return bool(course(self).largest <= self.limit)
+        return bool(traction_properties(self).largest <= self.limit)
 
     @property
     def steepest(self) -> tuple[float, float]:
         """Largest fall of the traction per opening, and an opening with this fall."""
-        return course(self).steepest
+        return traction_properties(self).steepest
 
     def parameters(self) -> dict[str, Any]:
         """Return the parameters of the law by name: its fields, limit and energy."""
@@ -135,18 +135,19 @@ class SofteningLaw(ABC):
 
 # -- laws of the package -------------------------------------------------------------------------
 
-BROKEN = 70.0
-"""Exponent of the decay from which on a traction, some 1e-30 of the limit, is set to zero.
+LARGEST_DECAY = 70.0
+"""Exponent of the decay above which a traction is set to zero; it is then below 1e-30 of the limit.
 
-This is far below round-off.  Numbers that underflow would make forces and stiffnesses of noise.
+Such tractions are far below round-off, and smaller ones would underflow to noise in forces and
+stiffnesses.
 """
 
 
 @dataclass(frozen=True)
 class _LimitAndEnergy(Record, SofteningLaw):
-    """Base of laws with a limit and an energy; their tractions never exceed the limit.
+    """Base of laws with a limit and an energy, whose tractions never exceed the limit.
 
-    They fall by at most limit²/energy per opening; a steeper law must define ``steepest``.
+    The tractions fall by at most limit²/energy per opening; a steeper law must define ``steepest``.
     """
 
     limit: FromZero
@@ -155,7 +156,7 @@ class _LimitAndEnergy(Record, SofteningLaw):
 
     @property
     def steepest(self) -> tuple[float, float]:
-        """Bound on the fall per opening, at zero opening; linear softening falls by half of it."""
+        """Bound on the fall per opening, at zero opening; linear softening has half this fall."""
         return self.limit * (self.limit / self.fracture_energy), 0.0
 
 
@@ -164,9 +165,9 @@ class Softening(_LimitAndEnergy):
     """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
 
     Args:
-        limit: Traction at which opening begins: moment of a hinge, N m; stress of a fibre, Pa.
-            Zero is a perfect joint; with infinity it never opens.
-        fracture_energy: Energy dissipated by a complete opening: J; for fibres J/m².
+        limit: Traction at which opening begins: moment of a hinge, N m; stress of a fibre, Pa;
+            force or moment of a spring.  Zero is a perfect joint; with infinity nothing opens.
+        fracture_energy: Energy that a complete opening dissipates: J; for fibres J/m².
 
     Raises:
         ModelError: The limit is negative, or the energy is not positive.
@@ -180,7 +181,7 @@ class Softening(_LimitAndEnergy):
     def traction(self, ξ: Values) -> Values:
         """Return the resistance after the accumulated opening ξ."""
         decay = self.limit / self.fracture_energy * ξ
-        return where(below(decay, BROKEN), self.limit * exp(-decay), 0.0)  # P(52)!
+        return where(below(decay, LARGEST_DECAY), self.limit * exp(-decay), 0.0)  # P(52)!
 
     def mean_traction(self, ξ: Values, a: Values) -> Values:
         """Return the mean resistance from ξ to ξ + a; its product with a is dissipated."""
@@ -212,7 +213,7 @@ class LinearSoftening(_LimitAndEnergy):
 
 
 def _decay_mean(x: Values) -> Values:
-    """Return the mean of exp(-x) from 0 to x, (1 - exp(-x))/x; below 0.1 by its series."""
+    """Return the mean of exp(-t) for t from 0 to x, (1 - exp(-x))/x; its series if x < 0.1."""
     small = below(x, 0.1)
     series = 1.0
     for k in range(12, 1, -1):
@@ -222,7 +223,7 @@ def _decay_mean(x: Values) -> Values:
 
 
 def require_softening(law: object, what: str) -> None:
-    """Raise :class:`ModelError` naming ``what`` unless a discontinuity can follow a law."""
+    """Raise :class:`ModelError` naming ``what`` unless a law is a valid softening law."""
     require_kind(law, (Softening, LinearSoftening, SofteningLaw), what)
     if isinstance(law, _LimitAndEnergy):
         return
@@ -232,12 +233,12 @@ def require_softening(law: object, what: str) -> None:
         value = getattr(law, field.name)
         if hasattr(value, "draw"):
             raise ModelError(
-                f"{kind}: {field.name} = {shorten(value)} is a distribution; numbers of softening "
-                "are the same in all cells; draw the numbers of the bulk, ElastoPlastic(limit)"
+                f"{kind}: {field.name} = {shorten(value)} is a distribution, but the parameters of "
+                "softening are the same in all cells; give the distribution to ElastoPlastic(limit)"
             )
         require_field(value, f"{kind}: {field.name}")
     try:
-        course(law)
+        traction_properties(law)
     except ModelError as error:
         raise ModelError(f"{what}: {error}") from error.__cause__
 
@@ -245,7 +246,7 @@ def require_softening(law: object, what: str) -> None:
 # -- parameters that follow from the traction ----------------------------------------------------
 
 
-class Course(NamedTuple):
+class TractionProperties(NamedTuple):
     """Properties of a traction over all openings."""
 
     limit: float
@@ -255,20 +256,20 @@ class Course(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def course(law: SofteningLaw) -> Course:
-    """Sample a law from zero to full opening; raise :class:`ModelError` if it is invalid."""
+def traction_properties(law: SofteningLaw) -> TractionProperties:
+    """Sample the traction of a law at all openings; raise :class:`ModelError` if it is invalid."""
     kind = type(law).__name__
     edges = np.append(0.0, np.logspace(-DECADES, DECADES, 16 * DECADES + 1))
     t = _called(law, "traction", edges)
     limit = float(t[0])
     if limit <= 0:
         raise ModelError(
-            f"{kind}: its traction is {limit:g} at zero opening; it must be positive, as nothing "
-            "opens below it. For a hinge that never resists give Softening(0.0, 1.0)"
+            f"{kind}: its traction is {limit:g} at zero opening; it must be positive: this is "
+            "the limit. For a hinge that never resists give Softening(0.0, 1.0)"
         )
-    _require_no_drive(kind, edges, t)
+    _require_not_negative(kind, edges, t)
     energy = _integral(law, edges)
-    if t[-1] > 0:  # extrapolated by the power law of its fall
+    if t[-1] > 0:  # add the energy of larger openings, by the power law of the last decade
         power = np.log(t[-17] / t[-1]) / np.log(edges[-1] / edges[-17])
         if power <= 1.01:
             raise ModelError(
@@ -280,7 +281,7 @@ def course(law: SofteningLaw) -> Course:
     unit = energy / limit
     some = np.append(0.0, unit * np.logspace(-6, 6, 4001))
     tractions = _called(law, "traction", some)
-    _require_no_drive(kind, some, tractions)
+    _require_not_negative(kind, some, tractions)
     tiny = 1e-200
     with np.errstate(all="ignore"):
         slope = _called(law, "traction", np.array([1j * tiny])).imag[0] / tiny
@@ -293,16 +294,16 @@ def course(law: SofteningLaw) -> Course:
     falls = -np.diff(tractions) / np.diff(some)
     worst = {int(np.argmax(falls)), int(np.argmax(np.abs(np.diff(tractions))))}
     steepest = max(_slope(law, some[i], some[i + 1], limit, unit) for i in worst)
-    return Course(limit, energy, float(tractions.max()), steepest)
+    return TractionProperties(limit, energy, float(tractions.max()), steepest)
 
 
-def _require_no_drive(kind: str, jumps: Array, t: Array) -> None:
-    """Raise :class:`ModelError` where a traction is negative."""
+def _require_not_negative(kind: str, jumps: Array, t: Array) -> None:
+    """Raise :class:`ModelError` if a traction is negative."""
     if (negative := t < 0).any():
         raise ModelError(
             f"{kind}: its traction is {t[negative][0]:.6g} at the opening "
-            f"{jumps[negative][0]:.6g}, and a hinge would drive its opening; let it end at "
-            "zero, such as by ub.law_functions.positive"
+            f"{jumps[negative][0]:.6g}, where it would drive the opening; let the traction end "
+            "at zero, for example by ub.law_functions.positive"
         )
 
 
@@ -319,13 +320,13 @@ def _called(law: SofteningLaw, method: str, jumps: Array) -> Array:
         ) from error
     if np.shape(values) != jumps.shape:
         raise ModelError(
-            f"{what} returns for {len(jumps)} openings an array of shape {np.shape(values)}; it "
-            "must return one number for each"
+            f"{what} returns an array of shape {np.shape(values)} for {len(jumps)} openings; it "
+            "must return one number for each opening"
         )
     if (bad := ~np.isfinite(values)).any():
         raise ModelError(
             f"{what} is {values[bad][0]} at the opening {jumps[bad][0]:.6g}; it must be a "
-            "number at all openings from zero on"
+            "finite number at all openings"
         )
     return np.asarray(values)
 
@@ -333,11 +334,11 @@ def _called(law: SofteningLaw, method: str, jumps: Array) -> Array:
 def _integral(law: SofteningLaw, edges: Array) -> float:
     """Integrate a traction; intervals are halved until quadrature is exact to round-off.
 
-    Lobatto's rule has points at both ends, so that it detects a kink near them.
+    Lobatto's rule has points at both ends of an interval, so that it detects kinks near the ends.
     """
-    polynomial = np.polynomial.Legendre.basis(GAUSS)
+    polynomial = np.polynomial.Legendre.basis(QUADRATURE_POINTS)
     x = np.array([-1.0, *polynomial.deriv().roots(), 1.0])
-    w = 2 / (GAUSS * (GAUSS + 1) * polynomial(x) ** 2)
+    w = 2 / (QUADRATURE_POINTS * (QUADRATURE_POINTS + 1) * polynomial(x) ** 2)
 
     def lobatto(a: Array, b: Array) -> Array:
         at = a[:, None] + (b - a)[:, None] * (1 + x) / 2
@@ -350,7 +351,7 @@ def _integral(law: SofteningLaw, edges: Array) -> float:
         exact = np.abs(whole - halves) <= 1e-15 * (total + np.abs(halves).sum())
         total += float(halves[exact].sum())
         a, b, middle = a[~exact], b[~exact], middle[~exact]
-        if not len(a) or len(a) > MOST:
+        if not len(a) or len(a) > MOST_INTERVALS:
             break
         a, b = np.append(a, middle), np.append(middle, b)
     return total + float(lobatto(a, b).sum())
@@ -366,16 +367,16 @@ def _require_integral(law: SofteningLaw, unit: float, energy: float) -> None:
             if abs(defined - computed) > 1e-6 * energy:
                 raise ModelError(
                     f"{kind}: energy_to is {defined:.6g} at the opening {opening:.6g}, but the "
-                    f"integral of the traction is {computed:.6g}; make both agree, or leave it out"
+                    f"integral of the traction is {computed:.6g}; correct or omit it"
                 )
     (first,) = _called(law, "traction", np.zeros(1))
     for name, computed in (("limit", first), ("fracture_energy", energy)):
         if name in vars(law) or hasattr(type(law), name):
             defined = getattr(law, name)
             if not abs(defined - computed) <= 1e-6 * computed:
-                means = "the traction at zero opening" if name == "limit" else "its integral"
+                what = "traction at zero opening" if name == "limit" else "integral of the traction"
                 raise ModelError(
-                    f"{kind}: {name} = {defined:.6g}, but {means} is {computed:.6g}; make both "
+                    f"{kind}: {name} = {defined:.6g}, but the {what} is {computed:.6g}; make both "
                     "agree, or give the number another name"
                 )
 
@@ -392,7 +393,7 @@ def _slope(law: SofteningLaw, a: float, b: float, limit: float, unit: float) -> 
         if not a < middle < b:
             raise ModelError(
                 f"{type(law).__name__}: its traction jumps from {at_a:.6g} to {at_b:.6g} at the "
-                f"opening {a:.6g}, for which there is no tangent; let it change over an opening"
+                f"opening {a:.6g}, for which there is no tangent; make it continuous"
             )
         at_middle = traction(middle)
         if abs(at_middle - at_a) >= abs(at_b - at_middle):

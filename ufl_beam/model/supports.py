@@ -31,7 +31,8 @@ class Support(Bearing, ABC):
 
     Attributes:
         place: Supported place.
-        held: Component -> its value in time (m, m, rad), in axes turned by ``angle``.
+        held: Function of time of each held component: 0 and 1, displacements in axes turned by
+            ``angle``, m; 2, rotation, rad.
         angle: Direction of the first axis; rad.
 
     Example:
@@ -50,7 +51,7 @@ class Support(Bearing, ABC):
     @property
     @abstractmethod
     def held(self) -> dict[int, TimeFunction]:
-        """Component -> its value in time."""
+        """Function of time of each held component."""
 
     def __post_init__(self) -> None:
         require_node(self.place, type(self).__name__)
@@ -61,7 +62,7 @@ class Support(Bearing, ABC):
 
     @property
     def moving(self) -> dict[int, TimeFunction]:
-        """The held components that may move."""
+        """The held components without those that are fixed at zero."""
         return {c: f for c, f in self.held.items() if f is not still}
 
     def __str__(self) -> str:
@@ -129,7 +130,7 @@ class Roller(Support):
 
     @property
     def angle(self) -> float:  # type: ignore[override]
-        """Direction in which it rolls, or 0 if that is along an axis; rad."""
+        """Direction in which the place rolls, or 0 if it rolls along x or y; rad."""
         return math.atan2(self.along[1], self.along[0]) if all(self.along) else 0.0
 
 
@@ -157,7 +158,7 @@ class PrescribedDisplacement(Support):
 
     @cached_property
     def held(self) -> dict[int, TimeFunction]:
-        """Component -> its value in time."""
+        """Function of time of each held component."""
         components: dict[int, TimeFunction] = {}
         for component, value in enumerate((self.u, self.v, self.psi)):
             if callable(value):

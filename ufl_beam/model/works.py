@@ -20,14 +20,14 @@ def _require_name(name: Any, what: str) -> None:
     require_text(name, what)
     if not name or name in CONTRIBUTIONS:
         raise ModelError(
-            f"{what} = {name!r} is an entry of the energy ledger already; give the work a name of "
-            "its own"
+            f"{what} = {name!r} is empty or a reserved entry of the energy ledger; give the work "
+            "another name"
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Work(Record):
-    """Base of effects along beams that a user states as a function, a density of energy.
+    """Base of effects along beams, stated by a function that returns a density of work or energy.
 
     Attributes:
         arguments: Names that the parameters of the function may have, besides ``numbers``.
@@ -72,7 +72,7 @@ class Work(Record):
 
     @property
     def used_arguments(self) -> tuple[str, ...]:
-        """Names of the parameters of the function, all of them known."""
+        """Names of the parameters of the function, each known; others raise an error."""
         known = (*self.arguments, *self.numbers)
         asked = parameters_by_name(
             self.density, known, f"{self}: the function", more=", and the names in `numbers`"
@@ -95,7 +95,7 @@ class Work(Record):
         return f"{self.name} in time"
 
     def on(self, beams: Sequence[Member]) -> Sequence[Member]:
-        """Return the beams of a scene on which it acts."""
+        """Return the beams on which the work acts; ``beams`` are all beams of the scene."""
         return beams if self.beams is None else self.beams
 
 
@@ -105,29 +105,29 @@ class VirtualWork(Work):
     """Virtual work of a distributed effect, which a user states in UFL.
 
     The function returns the work of the effect on a virtual motion, per undeformed length and with
-    the sign of loads: a force f along y is ``f * w[1]``.  UFL derives its tangent.  Parameters of
-    the function may be, by name:
+    the sign of loads: a force f along y is ``f * w[1]``.  UFL derives the tangent.  The function
+    may have parameters of these names:
 
     * ``q0``, ``q1``: configurations (u_x, u_y, ψ) at both ends of the step; m, m, rad,
-    * ``q``: configuration at which the time scheme evaluates forces, in :class:`EnergyMomentum` the
-      mean of ``q0`` and ``q1``,
+    * ``q``: configuration at the instant of the step at which loads act, in
+      :class:`EnergyMomentum` the mean of ``q0`` and ``q1``,
     * ``v``: mean velocity of the step, (q1 - q0)/dt, also in static runs; m/s, m/s, rad/s,
     * ``w``: virtual motion (w_x, w_y, w_ψ), in which the work is linear; m, m, rad,
-    * ``axis``: undeformed axis, with ``axis.x``, its point (2,), tangent ``axis.t0`` and normal
-      ``axis.n0``, derivative along it ``axis.d(f)``, length of the cell ``axis.h``,
-    * ``t``, ``dt``: time at which it acts, and length of the step; s,
+    * ``axis``: undeformed axis: point ``axis.x`` (2,), tangent ``axis.t0``, normal ``axis.n0``,
+      derivative along the axis ``axis.d(f)``, length of the cell ``axis.h``,
+    * ``t``, ``dt``: time at which the effect acts, and length of the step; s,
     * the names in ``numbers``.
 
-    Its work since the beginning is an entry ``name`` of the supplied energy in the ledger.  State
-    effects that store energy as a :class:`Potential`.  A static run has real time: there works with
-    ``v`` act like dampers, with a warning.
+    The work of the effect since the beginning of a run is the entry ``name`` of the supplied energy
+    in the ledger.  State effects that store energy as a :class:`Potential`.  A static run has real
+    time: there works with ``v`` act like dampers, with a warning.
 
     Args:
         name: Entry in the ledger.
         density: The function; J/m.
         beams: Beams on which it acts; all by default.
-        numbers: Parameters of the function: numbers or functions of time.  Other values need no
-            new compilation.
+        numbers: Parameters of the function: numbers or functions of time.  New values need no
+            compilation.
         degree: Degree of polynomials that are integrated exactly in cells of degree 1.  Each
             further degree of the cells adds two.
 
@@ -157,10 +157,10 @@ class Potential(Work):
 
     The function returns the energy per undeformed length.  Its parameters may be ``q``, ``axis``,
     ``t`` and the names in ``numbers``, see :class:`VirtualWork`.  UFL derives the forces.
-    :class:`EnergyMomentum` and related schemes use the mean of this derivative over the step.  Then
-    the work of the forces is the increment of the energy: to round-off for polynomials of degree 8,
+    :class:`EnergyMomentum` and related schemes use the mean of the forces over the step.  Then the
+    work of the forces is the increment of the energy: to round-off for polynomials up to degree 8,
     otherwise with an error of the ninth power of a step.  The energy is the entry ``name`` of the
-    state of the ledger; energy gained by a change in time is the supplied entry "name in time".
+    state in the ledger; energy gained by changes in time is the supplied entry "name in time".
 
     It has the arguments of :class:`VirtualWork`.
 
