@@ -20,7 +20,7 @@ of the scene, of rotations in rad, of velocities as a fraction of the largest on
 which counts as at least 1 m."""
 
 CELL_TABLES = ("cells", "changes of strains")
-"""Tables of internal variables with a row for each cell; others have a row for each connector."""
+"""Tables of internal variables whose rows begin with the number of a cell, not of a connector."""
 
 
 class Transfer:
