@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Caches of forms and of results that depend only on structure; no garbage collection.
+"""Caches of forms and of results that depend only on structure, and garbage collection.
 
 Sparsity patterns, chains and groups of nodes depend only on the structure of a scene.  Scenes that
-differ in numbers only, such as the members of a study, have the same structure.  Such results are
-computed for the first of these scenes.  All other results are computed for each scene, so that the
-cache does not change a single bit of a simulation.
+differ in numbers only, such as the members of a study, have the same structure.  Results that
+depend only on it are computed for the first of these scenes.  All other results are computed for
+each scene, so that the cache does not change a single bit of a simulation.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MOST_CACHED = 64
 LARGEST = 2**16
 """Largest size of the arguments of results that are kept: bytes of arrays plus whole numbers.
 
-Some 500 cells exceed it; a hundred steps of these take longer than the building of the scene.
+Some 500 cells exceed it; a hundred steps of so many cells take longer than building their scene.
 """
 
 
@@ -39,7 +39,7 @@ def cached_forms(function: Callable[P, Cached]) -> Callable[P, Cached]:
 def cached_by_structure(function: Callable[..., T]) -> Callable[..., T]:
     """Let a function of index arrays and whole numbers run once for the same arguments.
 
-    It must depend on its arguments only, and return a tuple of arrays.  The arrays become
+    The function must depend only on its arguments and return a tuple of arrays.  The arrays become
     read-only, because several callers share them.
     """
 

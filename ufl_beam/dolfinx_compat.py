@@ -68,7 +68,7 @@ TABULATE = (
     "const uint8_t *permutation" + ("" if VERSION < (0, 10) else ", void *data"),
     "" if VERSION < (0, 10) else ", 0",
 )
-"""Parameters of an FFCx kernel, and its arguments after the sixth."""
+"""Parameters of an FFCx kernel in C, and the arguments of a call after the sixth."""
 
 
 def jit_directory() -> Path:

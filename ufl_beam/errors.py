@@ -90,7 +90,7 @@ class StepFailed(Exception):
 
 
 class NoNumber(StepFailed, ModelError):
-    """A user's function returned no finite number; a shorter step may avoid such arguments."""
+    """A user's function returned no finite number; a shorter step may avoid this."""
 
 
 class ConvergenceError(RuntimeError):
@@ -336,7 +336,7 @@ def require_function(value: Any, what: str, arguments: str) -> None:
 
 
 def require_capacity(cells: int, what: str) -> None:
-    """Raise :class:`ArgumentError` naming ``what`` if there are too many cells for this machine.
+    """Raise :class:`ArgumentError` naming ``what`` if there are too many cells for memory or indices.
 
     Each process stores the numbering of the whole scene.
     """

@@ -271,7 +271,7 @@ def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
 # -- redundant computation of a small scene --------------------------------------------------------
 
 TOLERANCE = 1e-8
-"""Largest relative difference of equal motions; it is far above round-off."""
+"""Largest relative difference of motions that count as equal; it is far above round-off."""
 
 SMALLEST_SUBDOMAIN = 6_000
 """Processes share a scene with at least this number of cells per process; else each computes it.

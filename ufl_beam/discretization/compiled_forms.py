@@ -146,7 +146,7 @@ class Kernel:
             )
         self._matrix: Csr | None = None
         self._at, self._unknowns = 0, 0
-        self._values, self._columns = ready.packed, ready.columns  # below less the unknown
+        self._values, self._columns = ready.packed, ready.columns  # the unknown is removed below
         if self.uses(unknown):
             columns, self._unknowns = dict(ready.columns), self._dofs.shape[1]
             unknown_columns = columns.pop(id(unknown))

@@ -276,7 +276,7 @@ class DofNumbering:
         return int(self._first_cells[i]) + left, float(fraction)
 
     def cell(self, place: Place) -> int:
-        """Return the cell at a place: the cell before a vertex; the first cell at the start."""
+        """Return the cell at a place; at a vertex, the cell before it; at the start, the first."""
         return self.cell_and_fraction(place)[0]
 
     def vertex(self, place: Place) -> int:
@@ -326,7 +326,7 @@ class DofNumbering:
     # -- degrees of freedom ----------------------------------------------------------------------
 
     def nodes_of(self, member: Member | Body) -> tuple[Array, Index]:
-        """Return points (m) and degrees of freedom of all nodes of a member; (n, 2), (n, 3)."""
+        """Return points (m) and degrees of freedom of nodes of a beam or body; (n, 2), (n, 3)."""
         if isinstance(member, Body):
             return np.array([member.center]), self.node(member.middle).reshape(1, 3)
         nodes = self._beam_nodes(member)

@@ -169,7 +169,7 @@ class Fields:
         return kernel
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
-        """Compile a virtual work and its derivative, which is added to ``A``; they share values."""
+        """Compile a virtual work and its derivative, which adds to ``A``, with shared values."""
         form, lanes = derivative(work, q1), self._coordinates_in_lanes
         force = self.kernel(work, q1)
         tangent = Kernel(form, q1, self.cell_dofs, self._coordinates(), lanes)

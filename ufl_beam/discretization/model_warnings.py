@@ -157,9 +157,10 @@ def warn_of_far_points(scene: Scene) -> None:
     """Warn of points of bodies that are far from the centre of their body and from other parts.
 
     No other part has a point there, and the distance from the centre is more than :data:`FAR_OUT`
-    radii of gyration.  Without mass or inertia, the distance from the box around the other parts
-    and the centre is larger than its diagonal.  ``body.at(x, y)`` takes coordinates of the
-    undeformed scene; coordinates relative to the centre, given by mistake, may be far away.
+    radii of gyration.  For a body without mass or inertia, the distance from the box around the
+    other parts and the centre is more than the diagonal of this box.  ``body.at(x, y)`` takes
+    coordinates of the undeformed scene; coordinates relative to the centre, given by mistake, may
+    be far away.
     """
     attached = (place for _, place in scene.attachments() if isinstance(place, Spot))
     spots = dict.fromkeys(s for s in attached if s.body is not GROUND and not carries(s))

@@ -57,7 +57,7 @@ class Subdomain:
             ψ; shape (len(cells), 3 (degree + 1)).
         connectors: Numbers of the connectors of this process.
         body_dofs: Local degrees of freedom of the bodies on this process; shape (num, 3).
-        connector_dofs: Local degrees of freedom of these connectors: of both nodes as in a cell,
+        connector_dofs: Local degrees of freedom of ``connectors``: u of both nodes, then v, then ψ,
             then the force; shape (len(connectors), 7).
         rotations, multipliers: Local numbers of all rotations, and of the forces of connectors, on
             this process; int32.

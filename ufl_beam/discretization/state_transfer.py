@@ -65,13 +65,13 @@ class Transfer:
             beam = next(b for b, before, now in nodes if not np.array_equal(before, now))
             raise ModelError(
                 f"start: {beam.name} has other vertices than in the solution, because objects "
-                "are attached at other places; let corners=(s, ...) of the beam have these places"
+                "are attached at other places; add these places to corners=(s, ...) of the beam"
             )
         for body in new.scene.bodies:
             if body not in old.scene.bodies:
                 raise ModelError(
                     f"start: {body.name} is not in the scene of the solution, so its position is "
-                    "unknown; add it to both scenes, held by supports in the first"
+                    "unknown; add it to the first scene, too, held by supports there"
                 )
 
     def state(self, q: Array) -> Array:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Eigenvalues nearest to a shift, of sparse pencils by SLEPc, and of small ones by LAPACK."""
+"""Eigenvalues of pencils: those nearest to a shift by SLEPc; all of a small one by LAPACK."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TOLERANCE = 1e-12
 """Tolerance of the residual of an eigenpair, relative to its eigenvalue."""
 
 SHIFT = 1e-13
-"""Shift relative to the squared frequencies of single nodes; round-off hides smaller ones."""
+"""Shift relative to the least squared frequency of a dof alone; round-off hides smaller shifts."""
 
 EXTRA = 8
 """Number of additional eigenvalues, so that none of several close eigenvalues is missed."""

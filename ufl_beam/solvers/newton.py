@@ -71,7 +71,7 @@ class Solver:
 
     Args:
         equation: The :class:`StepEquation` of the steps.
-        least: Number of iterations below which a residual must be far below the tolerance.
+        least: Number of iterations; before it, a residual must be far below the tolerance.
 
     Attributes:
         c: ``equation`` of loops.h.
@@ -282,7 +282,7 @@ class Solver:
         return float(self.c.loads + lib.over_processes(self.c, lib.HYPOT, self.c.inner_size))
 
     def random_work(self, x: Array, s: Array) -> float:
-        """Return the work of round-off forces at ``x``, if independent, in a step ``s``; J."""
+        """Return the work of independent round-off forces at ``x`` in a step ``s``; J."""
         forces = np.empty(self._subdomain.size)
         lib.find_motion(self.c, doubles(x))
         lib.find_round_off(self.c, doubles(x), doubles(forces))
