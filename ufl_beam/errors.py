@@ -336,7 +336,7 @@ def require_function(value: Any, what: str, arguments: str) -> None:
 
 
 def require_capacity(cells: int, what: str) -> None:
-    """Raise :class:`ArgumentError` naming ``what`` if there are too many cells for memory or indices.
+    """Raise :class:`ArgumentError` naming ``what`` if cells are too many for memory or indices.
 
     Each process stores the numbering of the whole scene.
     """
