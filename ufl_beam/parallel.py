@@ -277,7 +277,7 @@ SMALLEST_SUBDOMAIN = 6_000
 """Processes share a scene with at least this number of cells per process; else each computes it.
 
 Measured with lattices on two cores: two processes break even at some 3 000 cells each, and are 1.2
-times as fast at 6 000; see benchmarks/README.md.
+times as fast at 6 000; see docs/ranks.md.
 """
 
 INTERVAL = 256
