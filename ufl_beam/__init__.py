@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Planar flexible multibody dynamics with geometrically exact beams.  Units are SI.
 
-The examples in docstrings, which are run as tests, use the names of this one: a cantilever, and
-one with a plastic hinge at its clamped end that has opened.
+The examples in docstrings, which are run as tests, use the names of the example below: a
+cantilever, and a second one with a plastic hinge, at its clamped end, that has opened.
 
 Example:
     >>> import numpy as np
@@ -21,7 +21,7 @@ Example:
 
 from typing import NoReturn
 
-from ufl_beam import dolfinx_compat  # noqa: F401 - first: it explains what is missing
+from ufl_beam import dolfinx_compat  # noqa: F401 - first, to explain missing packages
 
 # isort: split
 
@@ -321,10 +321,10 @@ OLD_NAMES = {
     "plot_tradeoff": "plot(tradeoff)",
     "say": "print_once",
 }
-"""Public names before 0.1.0, and those in their place."""
+"""Public names before version 0.1.0, and the names that replace them."""
 
 
 def __getattr__(name: str) -> NoReturn:
-    """Raise :class:`AttributeError`; for an old name with the new one."""
+    """Raise :class:`AttributeError`; for an old name, its message has the new name."""
     new = f"; it is ufl_beam.{OLD_NAMES[name]} now" if name in OLD_NAMES else ""
     raise AttributeError(f"module 'ufl_beam' has no attribute {name!r}{new}")

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Memory: the cache of what scenes of one structure share, and garbage collection.
+"""Caches of forms and of results that depend only on structure, and garbage collection.
 
-Sparsity patterns, chains and groups of nodes follow from the structure of a scene.  Scenes that
-differ in numbers only, such as the members of a study, have the same structure.  What follows from
-it is computed for the first of them; what follows from numbers is computed for each, so that a
-simulation is to the last bit what it would be alone.
+Sparsity patterns, chains and groups of nodes depend only on the structure of a scene.  Scenes that
+differ in numbers only, such as the members of a study, have the same structure.  Results that
+depend only on it are computed for the first of these scenes.  All other results are computed for
+each scene, so that the cache does not change a single bit of a simulation.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ P = ParamSpec("P")
 Cached = TypeVar("Cached")
 
 MOST_CACHED = 64
-"""Results that are kept of each function."""
+"""Largest number of results of each function that are kept."""
 
 LARGEST = 2**16
-"""Bytes of arguments, or size that they state, beyond which results are not kept.
+"""Largest size of the arguments of results that are kept: bytes of arrays plus whole numbers.
 
-That are some 500 cells, of which a hundred steps take longer than all of the building.
+Some 500 cells exceed it; a hundred steps of so many cells take longer than building their scene.
 """
 
 
 def cached_forms(function: Callable[P, Cached]) -> Callable[P, Cached]:
-    """Call a function that states forms once in a process with the same arguments."""
+    """Let a function that states forms run once in a process for the same arguments."""
     return cast("Callable[P, Cached]", lru_cache(maxsize=128)(function))
 
 
 def cached_by_structure(function: Callable[..., T]) -> Callable[..., T]:
-    """Call a function of index arrays and whole numbers once with the same arguments.
+    """Let a function of index arrays and whole numbers run once for the same arguments.
 
-    It sees nothing but the numbers in its arguments, and returns a tuple; nobody can write to the
-    arrays in it, as others have them too.
+    The function must depend only on its arguments and return a tuple of arrays.  The arrays become
+    read-only, because several callers share them.
     """
 
     def locked(result: T) -> T:
@@ -50,7 +50,7 @@ def cached_by_structure(function: Callable[..., T]) -> Callable[..., T]:
 
     @lru_cache(maxsize=MOST_CACHED)
     def cached(*keys: Any) -> T:
-        # Of an array the type, the shape and the bytes, which have a hash
+        # The key of an array is its type, shape and bytes, because arrays have no hash.
         arguments = (
             np.frombuffer(key[2], key[0]).reshape(key[1]) if isinstance(key, tuple) else key
             for key in keys
@@ -73,10 +73,10 @@ def cached_by_structure(function: Callable[..., T]) -> Callable[..., T]:
 
 @contextmanager
 def no_garbage_collection() -> Iterator[None]:
-    """Suspend automatic garbage collection; also a decorator.
+    """Suspend automatic garbage collection, as a context or a decorator.
 
-    It looks at all objects again and again while their number grows: a tenth of the time in which a
-    scene of 100 000 beams is built.
+    The collector looks at all objects again and again while their number grows.  This would take a
+    tenth of the time in which a scene of 100 000 beams is built.
     """
     was_enabled = gc.isenabled()
     gc.disable()

@@ -16,11 +16,11 @@ from typing import Any, NamedTuple, TypeVar
 
 T = TypeVar("T")
 
-FEW = 4  # size of the largest array that is written in full
+FEW = 4  # size of the largest array whose numbers are written
 
 
 class _Short(reprlib.Repr):
-    """Short texts: six digits, names of functions, shapes of arrays, long lists cut."""
+    """Short texts: numbers of six digits, names of functions, shapes of arrays, parts of lists."""
 
     def repr1(self, x: Any, level: int) -> str:
         if isinstance(x, float):
@@ -40,7 +40,7 @@ _SHORT.maxother = _SHORT.maxstring = 120
 
 
 def compact_repr(record: Any) -> str:
-    """Write a record, ``Mesh(refine=2)``, without fields that have their default or are empty."""
+    """Write a record as ``Mesh(refine=2)``, without fields that are empty or have their default."""
     fields = []
     for name, parameter in signature(type(record)).parameters.items():
         value = _SHORT.repr(getattr(record, name))
@@ -61,7 +61,7 @@ def bracketed(named: Any) -> str:
 
 
 def counted(*things: tuple[int, str, str]) -> str:
-    """Write numbers of things, without zeros: ``1 beam, 8 cells``."""
+    """Write the numbers of things, as in ``1 beam, 8 cells``; leave out zeros."""
     return ", ".join(f"{n} {singular if n == 1 else plural}" for n, singular, plural in things if n)
 
 
@@ -91,7 +91,7 @@ class Parameter(NamedTuple):
     value: str  # format of a value in a sentence
     step: str  # format of a step in a sentence
     column: str  # title of a column
-    progress: str  # title of an axis along which a solution only advances
+    progress: str  # title of an axis for a quantity that never decreases along the solution
 
     def at(self, value: float, digits: str = ".4g") -> str:
         """Write a value with its name or unit."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""DOLFINx 0.9 to 0.11: all code that depends on the version, and no other code."""
+"""DOLFINx 0.9 to 0.11: all code that depends on its version, and checks of the installation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 
 SOURCES = Path(__file__).resolve().parents[1]
 WAYS = (
-    'It comes by conda install -c conda-forge fenics-dolfinx "petsc=*=real*" slepc4py c-compiler, '
+    'Get it by conda install -c conda-forge fenics-dolfinx "petsc=*=real*" slepc4py c-compiler, '
     "by apt-get install python3-dolfinx-real (Debian 13), or in the Docker image dolfinx/dolfinx"
 ) + (f"; or run through {SOURCES}/env, see docs/installation.md" * (SOURCES / "env").is_file())
 """How to install DOLFINx, for an installed package and for a source tree."""
@@ -53,7 +53,7 @@ if all(
     for handler in logging.getLogger(name).handlers
 ):
     # FFCx 0.9 redirects all Python warnings to the log, where they are lost without a handler.
-    # A warning before this line, as with -W always, adds a handler to the log that shows nothing.
+    # An earlier warning, as with -W always, has added a handler that shows nothing.
     logging.captureWarnings(False)
 
 if VERSION > (0, 11) and MPI.COMM_WORLD.rank == 0:
@@ -68,7 +68,7 @@ TABULATE = (
     "const uint8_t *permutation" + ("" if VERSION < (0, 10) else ", void *data"),
     "" if VERSION < (0, 10) else ", 0",
 )
-"""Parameters of FFCx kernels, and the arguments of a call after the first six."""
+"""Parameters of an FFCx kernel in C, and the arguments of a call after the sixth."""
 
 
 def jit_directory() -> Path:

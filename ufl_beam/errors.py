@@ -22,7 +22,7 @@ LONGEST = 80
 """Largest number of characters of a value in a message."""
 
 BYTES_PER_CELL = 400
-"""Least memory of a cell on each process, for its vertices and the numbering of its unknowns."""
+"""Least memory of a cell on each process, for its vertices and the numbers of its unknowns; B."""
 
 RAM = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 """Memory of this machine; B."""
@@ -81,7 +81,7 @@ class ModelWarning(UserWarning):
 
 
 class StepFailed(Exception):
-    """A step found no equilibrium; attributes are as in :class:`ConvergenceError`."""
+    """A step failed; ``residuals`` and ``reason`` are as in :class:`ConvergenceError`."""
 
     def __init__(self, message: str, residuals: dict[str, float] | None = None) -> None:
         super().__init__(message)
@@ -90,19 +90,19 @@ class StepFailed(Exception):
 
 
 class NoNumber(StepFailed, ModelError):
-    """A user's function returned no finite number; a shorter step may avoid the argument."""
+    """A user's function returned no finite number; a shorter step may avoid this."""
 
 
 class ConvergenceError(RuntimeError):
-    """A step found no equilibrium, even after it was cut; ``solution`` has the results so far.
+    """A step found no equilibrium, even after it was divided; ``solution`` has the results so far.
 
     Attributes:
         time: Time of the last accepted state, on a path its load factor; s.
         dt: The smallest step that was tried, on a path the change of the load factor; s.
         solution: The :class:`~ufl_beam.simulation.solution.Solution` up to ``time``;
             ``start=solution`` continues from there with another step or scheme.
-        residuals: Largest residual in each beam, body and connector, in descending order; N,
-            moments over the size of the scene.  Empty if equilibria were found but refused.
+        residuals: Largest residual in each beam, body and connector, in descending order; N, with
+            moments divided by the size of the scene.  Empty if equilibria were found but refused.
         forces: Magnitudes of the forces by kind: "beams", "connectors", "loads", "inertia",
             "damping"; N.
         reason: PETSc's name of the reason, such as "DIVERGED_MAX_IT"; empty if equilibria were
@@ -139,7 +139,7 @@ class ConvergenceError(RuntimeError):
 
 
 class CopiesDiffer(RuntimeError):
-    """Processes that each compute the same small scene found different motions.
+    """Processes that each compute the same small scene found different motions, or one failed.
 
     Example:
         >>> try:
@@ -173,7 +173,7 @@ class TradeoffError(RuntimeError):
 def warn(message: str) -> None:
     """Issue a :class:`ModelWarning` that points to the line of the user's script."""
     level, frame = 1, sys._getframe()
-    # <string> has the methods that ``dataclass`` generates, contextlib its decorators.
+    # Methods that ``dataclass`` generates are in <string>, wrappers of decorators in contextlib.
     library = (PACKAGE, "<string>", contextlib.__file__)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(library):
         level, frame = level + 1, frame.f_back
@@ -193,7 +193,7 @@ def shorten(value: object) -> str:
     """Format a value for a message: its ``repr`` in one line, of readable length."""
     try:
         text = " ".join(repr(value).split())
-    except Exception:  # by a user's class, or an integer with too many digits
+    except Exception:  # of a user's class, or for an integer with too many digits
         text = f"<{type(value).__name__}>"
     return clip(text)
 
@@ -246,7 +246,7 @@ def require_number(
 
 
 def require_returned(value: object, function: str, at: str, *, finite: bool = False) -> float:
-    """Return the value of a user's function as a float; NaN passes unless ``finite``."""
+    """Return the value of a user's function as a float; NaN and infinity pass unless ``finite``."""
     try:
         number = as_float(value)
     except (TypeError, ValueError, OverflowError):
@@ -336,7 +336,7 @@ def require_function(value: Any, what: str, arguments: str) -> None:
 
 
 def require_capacity(cells: int, what: str) -> None:
-    """Raise :class:`ArgumentError` naming ``what`` if memory or indices are too small for cells.
+    """Raise :class:`ArgumentError` naming ``what`` if cells are too many for memory or indices.
 
     Each process stores the numbering of the whole scene.
     """

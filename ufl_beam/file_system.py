@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""File system: what is brought to the disk, and locks between processes.
+"""File system: data brought to the disk, and locks between processes.
 
-The operating system frees a lock when its process ends.  A file system that knows no locks locks
-nothing.
+The operating system frees a lock when its process ends.  On a file system without locks, all
+processes get a lock at once.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import IO
 
 
 def is_at(file: int, path: Path) -> bool:
-    """Return whether a path leads to an open file."""
+    """Return whether ``path`` still leads to the open file ``file``."""
     try:
         return os.path.samestat(os.fstat(file), os.stat(path))
     except OSError:
@@ -34,7 +34,10 @@ def sync(path: Path) -> None:
 
 
 def _open_and_lock(path: Path, more: int = 0) -> IO[str]:
-    """Open a file with an exclusive lock; a new one if another process has just removed it."""
+    """Open a file with an exclusive lock; open a new one if another process has just removed it.
+
+    ``more`` are flags of ``flock``.
+    """
     while True:
         file = path.open("a+", encoding="utf-8", errors="replace")
         try:
@@ -52,26 +55,26 @@ def _open_and_lock(path: Path, more: int = 0) -> IO[str]:
 
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Wait until no other process is in a context with this path; the file stays.
+    """Wait until no other process is in such a context with the same path; the file stays.
 
-    It may be removed within the context: those who wait for it take a new one.
+    The file may be removed within the context: processes that wait for it then create a new one.
     """
     with _open_and_lock(path):
         yield
 
 
 class Lock:
-    """An exclusive lock beside a file, in a file with ``.lock`` after its name."""
+    """Exclusive lock of a file, by a second file with ``.lock`` after the name of the first."""
 
     def __init__(self, path: Path) -> None:
         self.path = path.with_name(path.name + ".lock")
         self._file: IO[str] | None = None
 
     def acquire(self) -> str:
-        """Take the lock, or return who has it; an empty text if it was free.
+        """Take the lock and return an empty text, or return which process has it.
 
         Raises:
-            OSError: The file cannot be written.
+            OSError: The file of the lock cannot be written.
         """
         try:
             self._file = _open_and_lock(self.path, fcntl.LOCK_NB)

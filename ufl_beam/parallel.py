@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""MPI processes: computation of a scene together, exceptions on all processes, output.
+"""MPI processes: computation of a scene by one or all, exceptions on all processes, output.
 
-Without agreement a process that fails alone leaves the other processes waiting forever in a
+Without agreement, a process that fails alone would leave the other processes waiting forever in a
 collective call.
 """
 
@@ -52,7 +52,7 @@ _ACTIVE: ContextVar[MPI.Intracomm] = ContextVar("processes of a scene", default=
 
 
 def active_comm() -> MPI.Intracomm:
-    """Return the processes that compute a scene, unless a call has the argument ``comm``."""
+    """Return the processes that compute a scene if a call has no argument ``comm``."""
     return _ACTIVE.get()
 
 
@@ -96,9 +96,9 @@ def duplicate(comm: MPI.Intracomm) -> MPI.Intracomm:
 class Agreement:
     """Calls that raise on all processes if they raise on one.
 
-    On one process they are plain calls.  On several they cost one reduction of an integer.  A
-    failed process prints its exception and aborts all processes if the others do not join the
-    reduction within :data:`GRACE`, because they wait for it elsewhere.
+    On one process they are plain calls.  On several they cost one reduction of an integer.  If the
+    others do not join the reduction of a failed process within :data:`GRACE`, because they may wait
+    for it elsewhere, the failed process prints its exception and aborts all processes.
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
@@ -106,7 +106,7 @@ class Agreement:
         self.raised: BaseException | None = None  # latest exception that all processes raised
 
     def __call__(self, function: Callable[..., T], *arguments: Any) -> T:
-        """Call a function on all processes."""
+        """Call a function on all processes together."""
         if self._comm is None:
             return function(*arguments)
         error: BaseException | None = None
@@ -228,9 +228,9 @@ def _write_to_nowhere() -> bool:
 _print_exception = sys.excepthook
 sys.excepthook = _end
 atexit.register(_write_to_nowhere)
-with suppress(ValueError):  # in a thread
-    # `dolfinx_compat` has imported PETSc, whose signal handler ends with a page of text.  Restore
-    # Python's exception.
+with suppress(ValueError):  # not in the main thread
+    # `dolfinx_compat` has imported PETSc, whose signal handler prints a page of text.  Restore the
+    # exception of Python.
     signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
 
 
@@ -252,7 +252,7 @@ def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
     """Create a tqdm bar, which the first process shows in a terminal or notebook.
 
     Members of a study show no bar, and work of less than half a second shows none.  A notebook
-    shows none if its kernel has TQDM_DISABLE=1 in its environment, for documentation.
+    shows none if its kernel has TQDM_DISABLE=1 in its environment, as for documentation.
 
     Args:
         shown: Whether the user wants a bar.
@@ -271,13 +271,13 @@ def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
 # -- redundant computation of a small scene --------------------------------------------------------
 
 TOLERANCE = 1e-8
-"""Relative difference of motions above which they differ: far above round-off."""
+"""Largest relative difference of motions that count as equal; it is far above round-off."""
 
 SMALLEST_SUBDOMAIN = 6_000
-"""Scenes with fewer cells per process are computed by each process.
+"""Processes share a scene with at least this number of cells per process; else each computes it.
 
 Measured with lattices on two cores: two processes break even at some 3 000 cells each, and are 1.2
-times as fast at 6 000; see benchmarks/README.md.
+times as fast at 6 000; see docs/ranks.md.
 """
 
 INTERVAL = 256
@@ -287,7 +287,7 @@ LONGEST_WAIT = 20.0
 """Time for which a process waits for the other processes before it warns; s."""
 
 _left: list[tuple[MPI.Request, Array]] = []
-"""Abandoned comparisons; MPI needs their buffers until they are complete."""
+"""Abandoned comparisons, whose buffers MPI needs until they are complete."""
 
 
 def sharing(comm: MPI.Intracomm, cells: int) -> MPI.Intracomm:
@@ -298,18 +298,18 @@ def sharing(comm: MPI.Intracomm, cells: int) -> MPI.Intracomm:
 class Copies:
     """Redundant computation of a small scene, once on each process.
 
-    If a user's function draws random numbers or reads a clock, each process has another scene and
-    another solution.  So all processes compare a weighted sum of all states so far: in the
+    If a user's function draws random numbers or reads a clock, the scene and its solution differ
+    between processes.  So all processes compare a weighted sum of all states so far: in the
     background after 1, 2, 4, ... and then every :data:`INTERVAL` steps, and before results are
     written or returned.
 
     Attributes:
-        several: False if the scene is computed once, with nothing to compare.
+        several: Whether several processes each compute the scene; else there is no comparison.
     """
 
     def __init__(
         self, comm: MPI.Intracomm, subdomain: Any
-    ) -> None:  # a `Subdomain`, above this module
+    ) -> None:  # a `Subdomain`, which this module must not import
         self.several = self._open = comm.size > subdomain.comm.size
         self._pending: tuple[MPI.Request, Array] | None = None
         if not self.several:
@@ -348,7 +348,7 @@ class Copies:
             self._pending = None
 
     def _post(self, failed: float = 0.0) -> None:
-        """Begin a comparison: reduce the largest and smallest sums of all processes."""
+        """Begin a comparison: find the largest and the smallest sum among all processes."""
         mine = np.array([self._sum, self._times, float(self._steps)])
         ends = np.concatenate([mine, -mine, [self._size, failed]])
         self._pending = self._comm.Iallreduce(MPI.IN_PLACE, ends, op=MPI.MAX), ends

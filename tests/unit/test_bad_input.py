@@ -420,7 +420,7 @@ MASS = ub.PointMass(GIRDER.at(0.3), 1.0)  # makes a vertex there
 CLAMPED = scene(supports=[ub.Clamped(GIRDER.start)])
 YIELDING = ub.Beam((0, 0), (1, 0), ub.Section(1e4, 1e4, 100.0, bending=ub.ElastoPlastic(1.0)))
 YIELDS = ub.Scene([YIELDING], supports=[ub.Clamped(YIELDING.start)])
-OF_OTHERS = "start: the solution is of other beams, joints or cells"
+OF_OTHERS = "start: the solution has other beams or another mesh"
 RUNS = [
     (lambda: run(t=(1.0, 1.0)), "the end t[1] = 1 must come after the beginning 1"),
     (lambda: run(t=1.0), "simulate: t = 1.0 must be a pair (beginning, end)"),

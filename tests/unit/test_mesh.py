@@ -163,7 +163,7 @@ def test_runs_go_on_with_their_mesh():
     again = bend(scene, start=first)
     assert again.numbering.mesh == ub.Mesh(2)
     assert again.displacement(tip)[-1] == pytest.approx(first.displacement(tip)[-1])
-    with pytest.raises(ub.ArgumentError, match="other beams, joints or cells"):
+    with pytest.raises(ub.ArgumentError, match="other beams or another mesh"):
         bend(scene, start=first, mesh=ub.Mesh())
 
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""UFL forms and functions of points, compiled for the hot loop.
+"""UFL forms, and functions of values at a point, compiled to C.
 
 Coefficients of forms are packed once; later only changed values are packed again.
 
-A form is compiled with one quadrature rule: forms that mix a one-point rule with another rule are
-silently wrong in FFCx 0.9 to 0.11.
+A form is compiled with one quadrature rule only, because FFCx 0.9 to 0.11 gives wrong results for
+forms that mix a one-point rule with another rule.
 """
 
 from __future__ import annotations
@@ -41,10 +41,13 @@ class Prepared(NamedTuple):
     """Form compiled for all scenes.
 
     Attributes:
-        source: C file that FFCx wrote for it.
-        columns: Columns of each coefficient, by identity, in the packed values of a cell.
-        packed: Values of the coefficients in the cells of the form's own mesh.
-        entries: Number of entries of the vector or matrix of a cell.
+        source: C file that FFCx wrote for the form.
+        tabulate: C function of the form.
+        coefficients: Coefficients that the C function uses.
+        columns: Columns of each coefficient in ``packed``, by the identity of the coefficient.
+        constants, packed: Values of the constants, and of the coefficients in each cell of the mesh
+            of the form.
+        entries: Number of entries of the vector or matrix of a cell; 1 for a functional.
     """
 
     form: fem.Form
@@ -67,7 +70,7 @@ def prepared(form: ufl.Form) -> Prepared:
     ends = [0, *accumulate(f.function_space.element.space_dimension for f in used)]
     if packed.shape[1] != ends[-1]:
         raise ValueError(f"{VERSIONS} pack {packed.shape[1]} values of a cell, not {ends[-1]}")
-    # By identity, as functions of UFL compute their hashes.
+    # Keys are identities, because hashes of UFL functions are computed in Python, which is slow.
     columns = {id(f): slice(*ends[i : i + 2]) for i, f in enumerate(used)}
     sizes = [x.ufl_function_space().element.space_dimension for x in form.arguments()]
     entries = math.prod(sizes)
@@ -81,9 +84,10 @@ def prepared(form: ufl.Form) -> Prepared:
 
 
 def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
-    """Make fields of ``cells`` of loops.h for :meth:`Csr.blocks`; equal batches share a pattern.
+    """Return fields of ``cells`` of loops.h with the positions ``places`` of :meth:`Csr.blocks`.
 
-    The first patterns belong to cells of degree 1 with contiguous entries in each row.
+    Batches of cells with equal positions share a pattern.  Patterns of cells of degree 1 whose
+    entries are adjacent in each row come first.
     """
     batches, entries, lanes = places.shape
     rows = places.reshape(batches, entries * lanes).view(f"V{entries * lanes}")[:, 0]
@@ -104,16 +108,18 @@ class Kernel:
     """Compiled cell form with the packed values of its coefficients.
 
     A form stated on one cell is evaluated on all cells.  Its coefficients keep their values on that
-    cell until :meth:`put` or :meth:`set` changes them.  If its test functions are in the unknown's
-    space, cells add to their degrees of freedom; else each cell has its own entries.
+    cell until :meth:`put` or :meth:`set` changes them.  Entries of a linear form whose test
+    function is in the space of the unknown are added at the degrees of freedom of the cells;
+    entries of a bilinear form are added to a matrix after :meth:`place`.  Otherwise, each cell has
+    its own entries.
 
     Args:
         form: Cell integrals with one quadrature rule.
         unknown: The configuration that most calls change; it need not appear in the form.
-        cell_dofs: Its degrees of freedom; shape (num_cells, 6).
+        cell_dofs: Degrees of freedom of the unknown; shape (num_cells, dofs per cell).
         coordinates: Vertices of the cells; shape (num_cells, 2, 2); m.
-        several: The coordinates in batches of :data:`LANES`, see :func:`in_batches`, to compute
-            several cells at once if the form allows it.
+        several: ``coordinates`` in batches of :data:`LANES`, see :func:`in_batches`, to compute
+            several cells at once if the form has a SIMD version.
 
     Attributes:
         lanes: Number of cells that are computed at once.
@@ -135,12 +141,12 @@ class Kernel:
         if expected != (num_cells % len(ready.packed), self._entries, coordinates.shape):
             raise ValueError(
                 f"a form with {self._entries} entries of a cell, stated on {len(ready.packed)} "
-                f"cells, got rows of {(num_cells, per_cell)} and coordinates of "
+                f"cells, got rows of shape {(num_cells, per_cell)} and coordinates of shape "
                 f"{coordinates.shape}"
             )
         self._matrix: Csr | None = None
         self._at, self._unknowns = 0, 0
-        self._values, self._columns = ready.packed, ready.columns  # without the unknown
+        self._values, self._columns = ready.packed, ready.columns  # the unknown is removed below
         if self.uses(unknown):
             columns, self._unknowns = dict(ready.columns), self._dofs.shape[1]
             unknown_columns = columns.pop(id(unknown))
@@ -164,13 +170,13 @@ class Kernel:
 
     @cached_property
     def _packed(self) -> Array:
-        """Values of the coefficients in the cells except the unknown, in batches."""
+        """Values of all coefficients but the unknown in the cells, in batches."""
         values = self._values
         return in_batches(np.tile(values, (len(self._dofs) // len(values), 1)), self.lanes)
 
     @cached_property
     def _places(self) -> dict[str, Any]:
-        """Fields of ``cells`` of loops.h with the target positions of the cells' entries."""
+        """Fields of ``cells`` of loops.h with the positions to which entries are added."""
         shape = len(self._dofs), self._entries
         if self._to_dofs or self._is_functional:
             return {}
@@ -186,7 +192,7 @@ class Kernel:
 
     @cached_property
     def cells(self) -> Any:
-        """Argument of ``add_cells`` of loops.h; made when all of its arrays are known."""
+        """Argument of ``add_cells`` of loops.h, created when all of its arrays are known."""
         number, cell_size = self._dofs.shape
         packed, coefficients = self._packed, self._form.packed.shape[1]
         return fill(
@@ -200,11 +206,11 @@ class Kernel:
         )  # fmt: skip
 
     def uses(self, function: fem.Function) -> bool:
-        """Return whether a function appears in the form."""
+        """Return whether ``function`` is a coefficient of the form."""
         return id(function) in self._form.columns
 
     def position(self, function: fem.Function) -> int:
-        """Return the first column of ``function``, which is not the unknown, in a cell."""
+        """Return the first column of ``function``, not the unknown, in the packed values."""
         return int(self._columns[id(function)].start)
 
     def set(self, function: fem.Function, q: Array) -> None:
@@ -219,7 +225,11 @@ class Kernel:
         self._packed[:, columns] = in_batches(rows, self.lanes)
 
     def subdomain(self, source: Kernel) -> bool:
-        """Use the packed values of ``source``, if it has this form's values contiguously."""
+        """Share the packed values of ``source`` if they have this form's values in one block.
+
+        Returns:
+            Whether both forms share their values now.
+        """
         mine, others = self._columns, source._columns
         shifts = {others[f].start - mine[f].start for f in mine.keys() & others.keys()}
         if not mine.keys() <= others.keys() or len(shifts) != 1 or self.lanes != source.lanes:
@@ -229,18 +239,20 @@ class Kernel:
         return True
 
     def place(self, A: Csr) -> None:
-        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
+        """Let :meth:`add` of a bilinear form add to ``A`` at the degrees of freedom of cells."""
         per_cell = self._dofs.shape[1]
         if self._entries != per_cell**2:
-            raise ValueError(f"a form of {self._entries} entries on {per_cell} degrees of freedom")
+            raise ValueError(f"{self._entries} entries of a cell are no matrix of {per_cell} rows")
         self._matrix = A
 
     def keep_entries(self) -> tuple[Any, int, Array]:
-        """Store the entries of all cells in each evaluation from now on; nothing else may change.
+        """Store the entries of all cells in each evaluation from now on.
+
+        Call it after :meth:`place` and :meth:`subdomain`, because later changes have no effect.
 
         Returns:
-            A pointer to the address of their array, which C may change; the number of cells in a
-            batch, see :func:`in_batches`; and a second array of the same shape.
+            A pointer to the address of the array of entries, which C may exchange for another
+            array; the number of cells in a batch, see :func:`in_batches`; and such an array.
         """
         batches = -(-len(self._dofs) // self.lanes)
         each, second = np.zeros((2, batches, self._entries, self.lanes))
@@ -248,7 +260,7 @@ class Kernel:
         return ffi.addressof(self.cells, "each"), self.lanes, second
 
     def add(self, q: Array, b: Array) -> None:
-        """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
+        """Add the form at the unknown ``q`` to ``b``, a vector or the entries of a matrix."""
         lib.add_cells(self.cells, doubles(q), doubles(b))
 
     def value(self, q: Array) -> float:
@@ -258,9 +270,12 @@ class Kernel:
 
 
 class Pointwise:
-    """Compiler of functions of values at a point, named ``inputs``.
+    """Compiler of functions of values at a point; ``inputs`` are the names of these values.
 
     Such a function is compiled as a form on a cell of unit length with one quadrature point.
+
+    Attributes:
+        at: The values in UFL, by name.
     """
 
     def __init__(self, inputs: Sequence[str]) -> None:
@@ -270,7 +285,7 @@ class Pointwise:
         self.at: dict[str, Expr] = {name: x[i] for i, name in enumerate(inputs)}
 
     def compile(self, *outputs: Expr) -> Any:
-        """Compile a function to C; it is valid as long as this object exists."""
+        """Compile a function with these ``outputs``; it is valid as long as this object exists."""
         z = ufl.TestFunction(self._values(len(outputs)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
         form, _ = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)

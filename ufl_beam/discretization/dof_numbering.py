@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Vertices, cells and the numbering of degrees of freedom of a scene.
 
-Every process holds the numbering of the whole scene, a few integers per cell, and meshes only its
-own cells.  So joints and supports need no communication, and files do not depend on the number of
-processes.
+Every process stores the numbering of the whole scene, a few numbers per cell, but evaluates forms
+on its own cells only.  So joints and supports need no communication, and files do not depend on the
+number of processes.
 """
 
 from __future__ import annotations
@@ -35,21 +35,24 @@ class DofNumbering:
     """Vertices, cells and degrees of freedom of a scene.
 
     Cells of a higher degree also have nodes between their vertices.  A node has three degrees of
-    freedom (u, v, ψ); nodes of a joint share degrees of freedom.  They are numbered along the
-    beams, shared ones last: elimination in this order causes fill-in only by the coupling of
-    joints.
+    freedom (u, v, ψ); nodes of a joint share degrees of freedom.  Degrees of freedom are numbered
+    along the beams; after them come those of bodies and joints, and last the forces of connectors.
+    Elimination in this order causes fill-in only where joints and connectors couple beams.
 
     Attributes:
-        points: Nodes of all beams: vertices, beam after beam, then nodes inside of cells, then the
+        points: Nodes of all beams: vertices, beam after beam, then nodes inside cells, then the
             second vertex of each plastic hinge; shape (num_nodes, 2); m.
         cells: Vertices of the cells; shape (num_cells, 2).
-        nodes_of_cells: Both vertices of the cells and the nodes between; (num_cells, degree + 1).
+        nodes_of_cells: Both vertices of each cell, then the nodes between them; shape
+            (num_cells, degree + 1).
         beam_of_cell: Number of the beam of each cell; shape (num_cells,).
         first_vertices: First vertex of each beam, then the number of vertices; (num_beams + 1,).
         dofs: Degrees of freedom of each node; shape (num_nodes, 3).
-        dofs_of_bodies: Degrees of freedom of the rigid bodies; shape (num_bodies, 3).
-        multipliers: Lagrange multipliers, the forces of connectors; shape (num_links,).
-        size: Number of degrees of freedom.
+        dofs_of_bodies: Degrees of freedom of ``scene.rigid_bodies``; shape (num_bodies, 3).
+        multipliers: Lagrange multipliers, the forces of connectors; shape (num_connectors,).
+        size: Number of degrees of freedom, including the forces of connectors.
+        cells_at_hinges, vertices_at_hinges: Cell, and first vertex, at each plastic hinge of zero
+            length; shape (num_hinges,).
     """
 
     def __init__(self, scene: Scene, mesh: Mesh | None = None) -> None:
@@ -101,7 +104,7 @@ class DofNumbering:
         return f"<DofNumbering: {self}>"
 
     def _add_hinges(self, places: Sequence[Place]) -> None:
-        """Give each plastic hinge a second vertex, an end of the cell beyond it."""
+        """Give each plastic hinge a second vertex, which is an end of the cell beyond the hinge."""
         at = np.array([self.vertex(place) for place in places], dtype=np.int64)
         vertices = range(len(self.points), len(self.points) + len(at))
         beyond = [Place(place.beam, place.s, beyond=True) for place in places]
@@ -141,12 +144,13 @@ class DofNumbering:
         number[order] = np.arange(len(order))
         dofs = number[slots].reshape(-1, 3)
         self.dofs, self.dofs_of_bodies = dofs[:nodes], dofs[nodes:]
-        # Forces come last: eliminating their motions first leaves no zero on the diagonal.
+        # Forces of connectors come last, because their diagonal may be zero until the motions that
+        # they act on are eliminated.
         self.multipliers: Index = len(order) + np.arange(len(self.scene.all_connectors))
         self.size = len(order) + len(self.multipliers)
 
     def agrees(self, numbering: DofNumbering) -> bool:
-        """Return whether another numbering has the same degrees of freedom."""
+        """Return whether ``numbering`` has the same beams, points and degrees of freedom."""
         return (
             self.scene.beams == numbering.scene.beams
             and np.array_equal(self.points, numbering.points)
@@ -154,7 +158,7 @@ class DofNumbering:
         )
 
     def checksum(self) -> int:
-        """Compute a checksum of points and numbering."""
+        """Compute a checksum of the points and the degrees of freedom."""
         integers = np.concatenate(
             [self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers]
         )
@@ -172,7 +176,7 @@ class DofNumbering:
         raise ModelError(f"{beam.name} is not in the scene")
 
     def parameters(self, beam: Member) -> Array:
-        """Return the parameters of the vertices of a beam."""
+        """Return the parameters s of the vertices of a beam, from start to end."""
         return self._parameters[self._index(beam)]
 
     def vertices_of(self, beam: Member) -> Index:
@@ -186,20 +190,20 @@ class DofNumbering:
         return np.arange(self._first_cells[i], self._first_cells[i + 1])
 
     def nodes_along(self, beam: Member) -> Index:
-        """Return the vertices of a beam and nodes between them, from start to end."""
+        """Return the vertices of a beam and the nodes between them, from start to end."""
         vertices, inner = self.vertices_of(beam), self.nodes_of_cells[self.cells_of(beam), 2:]
         return np.append(np.column_stack([vertices[:-1], inner]), vertices[-1])
 
     @property
     def pieces(self) -> Index:
-        """Pairs of neighbouring nodes along each cell; (degree num_cells, 2)."""
+        """Pairs of neighbouring nodes along each cell; (num_cells degree, 2)."""
         start, end, *between = self.nodes_of_cells.T
         along = np.column_stack([start, *between, end])
         return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2)
 
     @cached_property
     def sections(self) -> tuple[list[Any], Index]:
-        """Sections of the beams, each object once, and the number of each beam's section."""
+        """Different sections of the beams, and the index of the section of each beam."""
         indices: dict[int, int] = {}
         section_indices = [
             indices.setdefault(id(b.section), len(indices)) for b in self.scene.beams
@@ -210,10 +214,10 @@ class DofNumbering:
 
     @cached_property
     def inelastic(self) -> list[tuple[SectionPoints, Index]]:
-        """Layouts of material points, and the cells that have them.
+        """Layouts of material points that can yield or break, each with the cells that have it.
 
         Raises:
-            ModelError: Such cells have a degree above one.
+            ModelError: There are such cells, and the degree of the mesh is above one.
         """
         groups = dict[SectionPoints, list[int]]()
         sections, beam_sections = self.sections
@@ -250,7 +254,7 @@ class DofNumbering:
         return [beam.section.hinge] * len(self.cells_of(beam))
 
     def keys(self, cells: Index) -> list[tuple[int, int]]:
-        """Return for each cell a checksum of its beam's ends, and its number in the beam."""
+        """Return for each cell a checksum of the ends of its beam, and its number in the beam."""
         beams = self.beam_of_cell[cells]
         checksums = [
             crc32(struct.pack("4d", *beam.ends[0], *beam.ends[1])) for beam in self.scene.beams
@@ -261,7 +265,7 @@ class DofNumbering:
     # -- places ----------------------------------------------------------------------------------
 
     def cell_and_fraction(self, place: Place) -> tuple[int, float]:
-        """Return the cell at a place, and the fraction of it that lies before the place."""
+        """Return the cell at a place, and the fraction of the cell before the place."""
         require_kind(place, Place, "place")
         if place.beam not in self._beam_indices:
             raise ModelError(f"{place}: {place.beam.name} is not in the scene")
@@ -272,11 +276,11 @@ class DofNumbering:
         return int(self._first_cells[i]) + left, float(fraction)
 
     def cell(self, place: Place) -> int:
-        """Return the cell at a place; at a vertex the cell before it, at the start the first."""
+        """Return the cell at a place; at a vertex, the cell before it; at the start, the first."""
         return self.cell_and_fraction(place)[0]
 
     def vertex(self, place: Place) -> int:
-        """Return the vertex of an attachment place."""
+        """Return the vertex at a place; beyond a plastic hinge, its second vertex."""
         if place.beyond:
             return self._beyond[place]
         i = self._index(place.beam)
@@ -288,11 +292,11 @@ class DofNumbering:
         return cell + i + round(fraction)
 
     def weights(self, place: Place) -> tuple[Index, Array]:
-        """Return nodes of the cell at a place, vertices first, and their weights; (degree + 1,)."""
+        """Return the nodes of the cell at a place and their shape functions; (degree + 1,)."""
         cell, fraction = self.cell_and_fraction(place)
         first, *between, last = self.mesh.weights(fraction)
         nodes = self.nodes_of_cells[cell].copy()
-        if fraction in (0.0, 1.0):  # the attached side of a hinge, not the cell's
+        if fraction in (0.0, 1.0):  # at a hinge, the cell may have the other vertex
             nodes[int(fraction)] = self.vertex(place)
         return nodes, np.array([first, last, *between])
 
@@ -310,7 +314,7 @@ class DofNumbering:
         return beam.at((s[i] + s[i + 1]) / 2)
 
     def place_of(self, number: int) -> Place:
-        """Return the middle of a cell, or the place of a hinge, numbered after the cells."""
+        """Return the middle of a cell, or the place of a hinge; hinges follow after the cells."""
         if number < len(self.cells):
             return self.middle(number)
         return place_of(self.scene.hinges[number - len(self.cells)])
@@ -322,7 +326,7 @@ class DofNumbering:
     # -- degrees of freedom ----------------------------------------------------------------------
 
     def nodes_of(self, member: Member | Body) -> tuple[Array, Index]:
-        """Return points and degrees of freedom of nodes of a beam or body; (n, 2), (n, 3); m."""
+        """Return points (m) and degrees of freedom of nodes of a beam or body; (n, 2), (n, 3)."""
         if isinstance(member, Body):
             return np.array([member.center]), self.node(member.middle).reshape(1, 3)
         nodes = self._beam_nodes(member)
@@ -333,7 +337,7 @@ class DofNumbering:
         return np.union1d(self.nodes_of_cells[self.cells_of(beam)], self.vertices_of(beam))
 
     def node(self, point: AttachmentPoint) -> Index:
-        """Return degrees of freedom of the vertex or body that an anchor belongs to; (3,)."""
+        """Return the degrees of freedom of the vertex or body to which a place belongs; (3,)."""
         carrier = node(point)
         if not isinstance(carrier, Body):
             return np.asarray(self.dofs[self.vertex(carrier)])
@@ -343,14 +347,14 @@ class DofNumbering:
 
     @cached_property
     def rotations(self) -> Index:
-        """Rotational degrees of freedom, each shared one once."""
+        """Rotational degrees of freedom; a shared one occurs once."""
         return np.unique(np.r_[self.dofs[:, 2], self.dofs_of_bodies[:, 2]])
 
     @property
     def scales(self) -> Array:
-        """Scale factors of motions: 1 over the size of the scene, 1 for rotations; (size,).
+        """Factors that make motions dimensionless; (size,).
 
-        Forces of connectors have the factor 0.
+        1/size of the scene for displacements, 1 for rotations, 0 for forces of connectors.
         """
         scales = np.full(self.size, 1 / self.scene.size)
         scales[self.rotations] = 1.0
@@ -359,14 +363,17 @@ class DofNumbering:
 
     @cached_property
     def dofs_of_connectors(self) -> Index:
-        """Degrees of freedom of each connector: u, v, ψ of both nodes, force; (num_links, 7)."""
+        """Degrees of freedom of each connector; (num_connectors, 7).
+
+        First u of both nodes, then v of both, then ψ of both, and last the force.
+        """
         connectors = self.scene.all_connectors
         nodes = np.array([(self.node(c.a), self.node(c.b)) for c in connectors]).reshape(-1, 2, 3)
         both = nodes.transpose(0, 2, 1).reshape(-1, 6)
         return np.column_stack([both, self.multipliers]).astype(np.int64)
 
     def describe(self, dof: int) -> str:
-        """Describe a degree of freedom by its component, beam and point."""
+        """Describe a degree of freedom by its component and beam or body, or by its connector."""
         if dof in self.multipliers:
             return f"force of {self.scene.all_connectors[dof - self.multipliers[0]]}"
         if dof not in self.dofs:
@@ -383,7 +390,10 @@ class DofNumbering:
         return f"{self.scene.beams[self.beam_of_cell[number]].name} at ({x:g}, {y:g})"
 
     def worst(self, sizes: Array) -> dict[str, float]:
-        """Describe the largest degree of freedom of each beam, body and connector, if not zero."""
+        """Return the largest of ``sizes`` in each beam, body and connector, in descending order.
+
+        The keys describe the degrees of freedom; zeros are left out.
+        """
         beam_dofs = [self.nodes_of(beam)[1] for beam in self.scene.beams]
         groups = [*beam_dofs, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
         worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Finite element of the beams, on which forms are stated, and the cells of a subdomain.
 
-Forms do not depend on a scene: they are stated on one cell and compiled once per process.  The
-user's own integrals are on the cells of a scene as a mesh of DOLFINx.
+Forms do not depend on a scene: they are stated on one cell and compiled once per process.  Only
+integrals of a user are stated on the cells of a scene, as a mesh of DOLFINx.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from ufl_beam.model.scene import Scene
 class Element:
     """Finite element of the beams, and the functions in which forms are written.
 
-    Forms that are compiled once for all scenes are stated on one cell; DOLFINx assembles forms that
-    are stated on the cells of a scene.
+    By default, forms are stated on one cell and compiled once for all scenes.  With ``cells``, the
+    mesh of a scene, DOLFINx can assemble them.
 
     Attributes:
         degree: Polynomial degree of configurations.
         axis: Undeformed axis at the points of ``dx(1)``, in UFL.
-        anywhere: Undeformed axis at the points of any rule.
+        anywhere: Undeformed axis at the points of any quadrature rule.
         space: Configurations (u_x, u_y, ψ).
         q0, q1: Configurations at the beginning and at the end of a step.
         w: Virtual motions.
@@ -68,34 +68,34 @@ class Element:
         return fem.Function(self.space)
 
     def in_cells(self, *shape: int) -> fem.Function:
-        """Create a function with a value, or values of a shape, in each cell."""
+        """Create a function that is constant in each cell, with values of ``shape``."""
         return fem.Function(fem.functionspace(self._cell, ("DG", 0, shape)))
 
     def at_points(self, *shape: int) -> fem.Function:
-        """Create a function with values of a shape at the points of ``dx(1)``."""
+        """Create a function with values of ``shape`` at the points of ``dx(1)``."""
         rule = self._rule(1)
         element = basix.ufl.quadrature_element("interval", value_shape=shape, degree=rule)
         return fem.Function(fem.functionspace(self._cell, element))
 
     def sampled(self, values: Expr) -> ufl.Form:
-        """Return values of shape (3,) at the points of ``dx(1)``, multiplied by their weights."""
+        """Return ``values``, of shape (3,), at the points of ``dx(1)``, times weights of sum 1."""
         z = ufl.TestFunction(self.at_points(3).function_space)
         return ufl.dot(values, z) / self.axis.h * self.dx(1)
 
     def constant(self, value: float) -> fem.Constant:
-        """Create a number whose changes need no new compilation of forms."""
+        """Create a number that can change without new compilation of forms."""
         return fem.Constant(self._cell, value)
 
     def dx(self, degree: int) -> ufl.Measure:
-        """Return the measure of the cells; one degree per form, see compiled_forms.py.
+        """Return the measure of the cells; a form has only one, see compiled_forms.py.
 
-        ``degree`` is for cells of degree 1; each further degree of the cells adds two.
+        ``degree`` of quadrature is for cells of degree 1; each further degree of the cells adds 2.
         """
         rule = {"quadrature_degree": self._rule(degree)}
         return ufl.Measure("dx", domain=self._cell, metadata=rule)
 
     def dx_of_mass(self) -> ufl.Measure:
-        """Return the measure of inertia: exact, or lumped, with the nodes as points."""
+        """Return the measure of inertia: exact, or with the nodes as points for lumped mass."""
         if not self._lumped:
             return self.dx(2)
         rule = {"quadrature_rule": "GLL", "quadrature_degree": self._rule(1)}
@@ -106,7 +106,7 @@ class Element:
 
 
 def element_of(mesh: Mesh) -> Element:
-    """Return the element of a mesh on one cell; meshes that differ only in cells share it."""
+    """Return the element of a mesh, stated on one cell; it does not depend on ``refine``."""
     return _element(mesh.degree, mesh.lumped)
 
 
@@ -117,26 +117,26 @@ def _element(degree: int, lumped: bool) -> Element:
 
 @cached_forms
 def derivative(work: ufl.Form, q1: fem.Function) -> ufl.Form:
-    """Return the derivative of a virtual work."""
+    """Return the derivative of a virtual work with respect to ``q1``."""
     return ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
 
 
 @cached_forms
 def applied(form: ufl.Form, q1: fem.Function) -> ufl.Form:
-    """Return a bilinear form times a vector, the unknown q1."""
+    """Return the product of a bilinear form and a vector, the unknown ``q1``."""
     return ufl.action(form, q1)
 
 
 class Fields:
     """Cells of one process, or some of them, on which forms of the element are evaluated.
 
-    Loops in C evaluate the forms, which are compiled once for all scenes.  ``positions`` in
-    ``subdomain.cells`` select the cells.
+    Loops in C evaluate the forms, which are compiled once for all scenes.  ``positions`` are those
+    of the cells in ``subdomain.cells``; by default, all cells are selected.
 
     Attributes:
         cell_dofs: Local degrees of freedom of the cells; (num_cells, 3 (degree + 1)).
         order: Position in ``subdomain.cells`` of each cell.
-        element: The element that forms are stated on.
+        element: Element on which the forms are stated.
     """
 
     def __init__(self, subdomain: Subdomain, positions: Index | None = None) -> None:
@@ -157,7 +157,7 @@ class Fields:
         Args:
             form: Cell integrals with one quadrature rule.
             unknown: The configuration that changes.
-            cell_dofs: Its degrees of freedom, by default all of the cells.
+            cell_dofs: Degrees of freedom of the unknown, by default :attr:`cell_dofs`.
             several: Whether to compute several cells at once, if possible.
         """
         dofs = self.cell_dofs if cell_dofs is None else cell_dofs
@@ -169,11 +169,11 @@ class Fields:
         return kernel
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
-        """Compile a virtual work and its derivative, for ``A``, with shared coefficients."""
+        """Compile a virtual work and its derivative, which adds to ``A``, with shared values."""
         form, lanes = derivative(work, q1), self._coordinates_in_lanes
         force = self.kernel(work, q1)
         tangent = Kernel(form, q1, self.cell_dofs, self._coordinates(), lanes)
-        if force.lanes != tangent.lanes:  # they could not share coefficients
+        if force.lanes != tangent.lanes:  # they could not share packed coefficients
             force = self.kernel(work, q1, several=False)
             tangent = Kernel(form, q1, self.cell_dofs, self._coordinates())
         if not tangent.subdomain(force):
@@ -192,7 +192,7 @@ class Fields:
         return in_batches(self._coordinates(), LANES)
 
     def matrix(self) -> Csr:
-        """Create a matrix on the degrees of freedom of this process."""
+        """Create a zero matrix on the degrees of freedom of this process."""
         if self._matrix is None:
             subdomain = self.subdomain
             connectors = subdomain.numbering.scene.all_connectors
@@ -200,7 +200,7 @@ class Fields:
             component = np.array(
                 [connectors[i].component for i in subdomain.connectors], dtype=np.int32
             )
-            for offset in range(1, component.max(initial=0) + 1):  # forces of one bushing
+            for offset in range(1, component.max(initial=0) + 1):  # forces of a bushing are coupled
                 later, force = np.flatnonzero(component >= offset), subdomain.connector_dofs[:, 6]
                 couples.append(np.column_stack([force[later], force[later - offset]]))
             self._matrix = zero_matrix(subdomain.size, *couples)
@@ -208,7 +208,7 @@ class Fields:
         return self._matrix.zeros_like()
 
     def assembled(self, form: ufl.Form) -> Csr:
-        """Assemble a bilinear form of the undeformed scene in a new matrix."""
+        """Assemble a bilinear form at the undeformed configuration in a new matrix."""
         matrix = self.matrix()
         kernel = self.kernel(form, self.element.q1, several=False)
         kernel.place(matrix)
@@ -216,7 +216,7 @@ class Fields:
         return matrix
 
     def section_values(self, function: fem.Function) -> Array:
-        """Return properties of the cells' sections, for a coefficient of the element."""
+        """Return the values of ``element.stiffness`` or ``element.inertia`` in the cells."""
         numbering = self.subdomain.numbering
         names = ("rhoA", "rhoI") if function is self.element.inertia else ("EA", "GA", "EI")
         sections, beam_sections = numbering.sections
@@ -236,7 +236,7 @@ def mass_form(element: Element) -> ufl.Form:
 
 
 def mass_kernel(fields: Fields) -> Kernel:
-    """Compile the mass of the beams times a vector, the unknown q1."""
+    """Compile the product of the mass matrix of the beams and a vector, the unknown ``q1``."""
     q1 = fields.element.q1
     return fields.kernel(applied(mass_form(fields.element), q1), q1)
 
@@ -264,10 +264,10 @@ def _weighted_strains(element: Element) -> ufl.Form:
 
 
 class Strains:
-    """Strains (Σ, Γ, K) at the points of the cells; the kernel multiplies them by weights.
+    """Strains (Σ, Γ, K) at the quadrature points of the cells.
 
     Attributes:
-        weights: Weights of the strains of a cell.
+        weights: Weights of the points; the kernel multiplies the strains of a cell by them.
     """
 
     def __init__(self, fields: Fields) -> None:
@@ -276,11 +276,11 @@ class Strains:
         self.shape = (len(fields.order), len(self.weights))
 
     def __call__(self, q: Array) -> Array:
-        """Compute strains at ``q``, in the order of the mesh, point after point; 1, 1, 1/m."""
+        """Compute strains at ``q``, point after point; (num_cells, 3 degree); 1, 1, 1/m."""
         return np.asarray(self._weighted(q) / self.weights)
 
     def mean(self, q: Array) -> Array:
-        """Compute cell means at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
+        """Compute the mean strains of the cells at ``q``; (num_cells, 3); 1, 1, 1/m."""
         in_points = self._weighted(q).reshape(self.shape[0], self.shape[1] // 3, 3)
         return np.asarray(in_points.sum(axis=1))
 
@@ -309,7 +309,7 @@ def section_forces(fields: Fields) -> Kernel:
 
 
 def dofs_of_cells(space: fem.FunctionSpace) -> Index:
-    """Return degrees of freedom of the cells of a space; (num_cells, dofs of a cell)."""
+    """Return the degrees of freedom of a space in each cell; (num_cells, dofs per cell)."""
     blocks, size = space.dofmap.list, space.dofmap.bs
     return np.asarray(blocks[:, :, None] * size + np.arange(size)).reshape(len(blocks), -1)
 
@@ -318,7 +318,7 @@ def integrated(integral: ufl.Form | Expr, mesh: meshes.Mesh) -> float:
     """Integrate a form without arguments, or a scalar expression, over the cells of a mesh.
 
     Raises:
-        ModelError: ``integral`` is neither, or is on another mesh.
+        ModelError: ``integral`` is neither, is over facets, or is on another mesh.
     """
     if isinstance(integral, Expr) and not integral.ufl_shape:
         integral = integral * ufl.dx(domain=mesh)
@@ -329,21 +329,21 @@ def integrated(integral: ufl.Form | Expr, mesh: meshes.Mesh) -> float:
         )
     if any(term.integral_type() != "cell" for term in integral.integrals()):
         raise ModelError(
-            "dolfinx.total: the form has integrals over facets, and the mesh of each process has "
-            "facets of its own where it ends; integrate over cells, with dx"
+            "dolfinx.total: the form has integrals over facets, which would depend on the number "
+            "of processes, because each has its own mesh; integrate over cells, with dx"
         )
     if any(domain != mesh.ufl_domain() for domain in integral.ufl_domains()):
-        raise ModelError("dolfinx.total: the form is of another mesh; state it on view.mesh")
-    # Separately, as each compiled form has one quadrature rule.
+        raise ModelError("dolfinx.total: the form is on another mesh; state it on view.mesh")
+    # Integrals are compiled separately, because each compiled form has one quadrature rule.
     forms = (compiled_form(ufl.Form([term]))[0] for term in integral.integrals())
     return float(sum(fem.assemble_scalar(form) for form in forms))
 
 
 class DolfinxFields(Fields):
-    """Cells whose element is stated on their own mesh, for DOLFINx to assemble.
+    """Cells as a mesh of DOLFINx; their element is stated on it, so that DOLFINx can assemble.
 
     Attributes:
-        mesh: Mesh of the cells, which DOLFINx reorders.
+        mesh: Mesh of the cells; DOLFINx chooses their order.
     """
 
     def __init__(self, subdomain: Subdomain, positions: Index | None = None) -> None:

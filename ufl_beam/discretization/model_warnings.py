@@ -24,17 +24,17 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 
 TOUCHING = 1e-3
-"""Largest distance of touching places, as a fraction of the length of the shorter beam."""
+"""Largest distance of vertices that touch, as a fraction of the length of the shorter beam."""
 
 JUMP = 1e-6
-"""Least jump of a prescribed motion, as a fraction of the size of the scene, or in rad."""
+"""Largest jump of a prescribed motion without a warning: fraction of the scene's size, or rad."""
 
 FAR_OUT = 10.0
-"""Unlikely distance of a point from its body's centre, in radii of gyration."""
+"""Largest likely distance of a point from the centre of its body, in radii of gyration."""
 
 
 def warn_of_masses(scene: Scene) -> None:
-    """Warn of massless beams in a scene with other mass, and of scenes without mass."""
+    """Warn of sections without rho and rhoA if other beams have mass, or if nothing has mass."""
     light = [beam.name for beam in scene.beams if beam.section.massless_by_default]
     if not light:
         return
@@ -53,18 +53,18 @@ def warn_of_masses(scene: Scene) -> None:
 
 
 def warn_of_rates(scene: Scene) -> None:
-    """Warn of works with velocities in a static run, such as drag left in a preload."""
+    """Warn of a user's virtual works that depend on velocities, such as drag, in a static run."""
     for work in scene.works:
         if "v" in work.used_arguments:
             warn(
-                f"{work} takes v, which is (q1 - q0)/dt in a static run, too: it carries a part of "
-                "the loads, as a damper does. Leave it out of the scene of a preload; if slow "
-                "motion in time is meant, filter this warning"
+                f"{work} takes v, which is (q1 - q0)/dt also in a static run: this work carries "
+                "part of the loads, as a damper does. Leave it out of the scene of a preload; if "
+                "slow motion in time is meant, filter this warning"
             )
 
 
 def warn_of_free_hinges(scene: Scene) -> None:
-    """Warn of hinges at free ends that are omitted because only a moment load is beyond them."""
+    """Warn of a beam's hinges that are left out because only a moment load is beyond them."""
     hinge_places = {place_of(hinge) for hinge in scene.hinges}
     for load in scene.moments:
         place = load.place
@@ -79,7 +79,7 @@ def warn_of_free_hinges(scene: Scene) -> None:
 
 
 def warn_of_touching(numbering: DofNumbering) -> None:
-    """Warn of ends of beams that touch another beam without a joint or connector between them."""
+    """Warn of ends of beams that touch another beam and are not connected with it."""
     if not numbering.scene.beams or not len(pairs := _touching(numbering)):
         return
     end, touched = (numbering.place(int(vertex)) for vertex in pairs[0])
@@ -93,7 +93,10 @@ def warn_of_touching(numbering: DofNumbering) -> None:
 
 
 def _touching(numbering: DofNumbering) -> Index:
-    """Return vertices of ends, and vertices that they touch without a joint; (num_pairs, 2)."""
+    """Return pairs of an end and the nearest vertex of a beam that it touches; (num_pairs, 2).
+
+    Ends that are connected with a vertex of the beam that they touch are left out.
+    """
     first = numbering.first_vertices
     beams = np.repeat(np.arange(len(first) - 1), np.diff(first))
     points = numbering.points[: first[-1]]
@@ -127,7 +130,11 @@ def _touching(numbering: DofNumbering) -> Index:
 
 
 def _groups(numbering: DofNumbering) -> Index:
-    """Number groups of nodes connected by joints, connectors and supports; return each node's."""
+    """Return the group number of each node of the beams; connected nodes are in one group.
+
+    Joints that share u and connectors connect nodes.  Supports that hold u and v connect nodes to
+    the ground.
+    """
     connectors = numbering.dofs_of_connectors[:, :2]
     fixed = [s.place for s in numbering.scene.supports if {0, 1} <= s.held.keys()]
     has_ground = GROUND in numbering.scene.rigid_bodies
@@ -147,10 +154,13 @@ def _connected(size: int, pairs: Index) -> tuple[Index]:
 
 
 def warn_of_far_points(scene: Scene) -> None:
-    """Warn of points of bodies that are far from their body and from everything else.
+    """Warn of points of bodies that are far from the centre of their body and from other parts.
 
-    ``body.at(x, y)`` takes coordinates of the undeformed scene; a point relative to the centre,
-    given by mistake, may be far away.
+    No other part has a point there, and the distance from the centre is more than :data:`FAR_OUT`
+    radii of gyration.  For a body without mass or inertia, the distance from the box around the
+    other parts and the centre is more than the diagonal of this box.  ``body.at(x, y)`` takes
+    coordinates of the undeformed scene; coordinates relative to the centre, given by mistake, may
+    be far away.
     """
     attached = (place for _, place in scene.attachments() if isinstance(place, Spot))
     spots = dict.fromkeys(s for s in attached if s.body is not GROUND and not carries(s))
@@ -178,7 +188,7 @@ def warn_of_far_points(scene: Scene) -> None:
 
 
 def _points(scene: Scene) -> Iterator[tuple[tuple[float, float], object]]:
-    """Yield points of a scene, and the beam or body of each."""
+    """Yield points of a scene, and the beam or body to which each belongs."""
     for beam in scene.beams:
         for s in (0.0, *beam.corners, *(i / beam.cells for i in range(1, beam.cells + 1))):
             yield beam.at(s).point, beam
@@ -189,7 +199,11 @@ def _points(scene: Scene) -> Iterator[tuple[tuple[float, float], object]]:
 
 
 def warn_of_origin(scene: Scene) -> None:
-    """Warn of angular velocities about the default origin if the scene is far from it."""
+    """Warn of angular velocities about the origin if ``about`` is not given and the scene is far.
+
+    The distance of the origin from the box around the scene is then larger than the diagonal of the
+    box around the parts that turn.
+    """
     points = np.array([point for point, _ in _points(scene)])
     away = _outside(np.zeros(2), points)
     for velocity in scene.initial:
@@ -207,16 +221,16 @@ def warn_of_origin(scene: Scene) -> None:
 
 
 def _outside(point: Array, points: Array) -> float:
-    """Compute the distance of a point from the box around others; m."""
+    """Compute the distance of a point from the box around ``points``; m."""
     low, high = points.min(axis=0), points.max(axis=0)
     beyond = np.maximum(low - point, 0.0) + np.maximum(point - high, 0.0)
     return float(np.linalg.norm(beyond))
 
 
 def warn_of_jumps(numbering: DofNumbering, t: float, q: Array, motions: Array) -> None:
-    """Warn of prescribed motions in dynamics that jump from the state ``q`` at the time ``t``.
+    """Warn of prescribed motions in dynamics that differ from the state ``q`` at the time ``t``.
 
-    ``motions`` are the relative motions of the connectors in this state; (num_links,).
+    ``motions`` are the relative motions of the connectors in this state; (num_connectors,).
     """
     starts = [
         (
@@ -242,6 +256,6 @@ def warn_of_jumps(numbering: DofNumbering, t: float, q: Array, motions: Array) -
             unit = "rad" if is_rotation else "m"
             warn(
                 f"{name} jumps from {value:.6g} to {target:.6g} {unit} at the start, "
-                f"t = {t:g} s, which in dynamics is an impact. Let it grow in time, as "
-                "ub.Table and lambda t: ... can, or begin with start= from a static run"
+                f"t = {t:g} s, which in dynamics is an impact. Let it grow in time, by ub.Table or "
+                "lambda t: ..., or begin with start= from a static run"
             )

@@ -17,9 +17,10 @@ from ufl_beam.model.bodies import AttachmentPoint, Spot
 
 
 def bisected(points: Array, number: int) -> Index:
-    """Divide points into subdomains of equal size with few neighbours; return each point's number.
+    """Divide points into ``number`` equal subdomains; return the number of each point's subdomain.
 
-    Recursive coordinate bisection divides along the longer side of the bounding box.
+    Recursive coordinate bisection cuts the longer side of the bounding box, which keeps the number
+    of neighbours small.
     """
     subdomains = np.zeros(len(points), dtype=np.int32)
     to_divide = [(np.arange(len(points)), 0, number)]
@@ -40,26 +41,26 @@ def bisected(points: Array, number: int) -> Index:
 class Subdomain:
     """Subdomain of a scene that one process computes: its cells, and their degrees of freedom.
 
-    Local numbers begin with the degrees of freedom that this process owns, followed by the ghosts,
-    each in the order of the numbering.  Global numbers, used by PETSc, are contiguous on each
-    process.
+    Local numbers begin with the degrees of freedom that this process owns.  The ghosts, which other
+    processes own, follow; both are in the order of the numbering.  Global numbers, used by PETSc,
+    are contiguous on each process.
 
     Attributes:
         numbering: The :class:`DofNumbering`.
-        alone: True if there is only one process; MPI calls take longer.
+        alone: True if there is only one process, which needs no MPI calls.
         cells: Numbers of the cells of this process, ascending.
-        dofs: Degrees of freedom, in numbers of the scene, by local number.
+        dofs: Number in the scene of each local degree of freedom.
         size: Number of local degrees of freedom, including ghosts.
         num_owned: Number of degrees of freedom that this process owns.
         ghosts: Global numbers of the ghosts.
-        cell_dofs: Local degrees of freedom of the cells: all u, all v, all ψ of their nodes;
-            shape (len(cells), 3 (degree + 1)).
+        cell_dofs: Local degrees of freedom of each cell: u of all its nodes, then all v, then all
+            ψ; shape (len(cells), 3 (degree + 1)).
         connectors: Numbers of the connectors of this process.
-        body_dofs: Local degrees of freedom of the bodies on this process; (num, 3).
-        connector_dofs: Local degrees of freedom of the connectors: u, v, ψ of both nodes, as in a
-            cell, and the force; shape (num, 7).
-        rotations, multipliers: Local numbers of all rotations, and of the forces of connectors;
-            int32.
+        body_dofs: Local degrees of freedom of the bodies on this process; shape (num, 3).
+        connector_dofs: Local degrees of freedom of ``connectors``: u of both nodes, then v, then ψ,
+            then the force; shape (len(connectors), 7).
+        rotations, multipliers: Local numbers of all rotations, and of the forces of connectors, on
+            this process; int32.
     """
 
     def __init__(self, numbering: Any, comm: MPI.Intracomm) -> None:
@@ -67,7 +68,7 @@ class Subdomain:
         self.comm, self.alone = comm, comm.size == 1
         cell_ranks = bisected(numbering.points[numbering.cells].mean(axis=1), comm.size)
         owner = np.full(numbering.size, comm.size, dtype=np.int32)
-        for rank in reversed(range(comm.size)):  # the first process that has it
+        for rank in reversed(range(comm.size)):  # the first process that has a dof owns it
             owner[numbering.dofs[numbering.nodes_of_cells[cell_ranks == rank]]] = rank
         self.cells = np.flatnonzero(cell_ranks == comm.rank).astype(np.int32)
         cell_dofs = numbering.dofs[numbering.nodes_of_cells[self.cells]].transpose(0, 2, 1)
@@ -80,10 +81,10 @@ class Subdomain:
         connector_dofs = numbering.dofs_of_connectors
         connector_ranks = owner[connector_dofs].min(axis=1, initial=comm.size) % comm.size
         np.minimum.at(owner, connector_dofs, connector_ranks[:, None])
-        owner[owner == comm.size] = 0  # bodies without attachments
+        owner[owner == comm.size] = 0  # bodies to which nothing is attached
         self.connectors = np.flatnonzero(connector_ranks == comm.rank)
         order = np.argsort(owner, kind="stable")
-        number = np.empty(numbering.size, dtype=np.int32)  # of PETSc
+        number = np.empty(numbering.size, dtype=np.int32)  # global numbers
         number[order] = np.arange(numbering.size, dtype=np.int32)
 
         own = owner == comm.rank
@@ -102,7 +103,7 @@ class Subdomain:
         body_dofs = self._local[numbering.dofs_of_bodies]
         self.body_dofs = body_dofs[(body_dofs >= 0).all(axis=1)]
         self._all_owned: Index = order
-        if self.alone:  # all numbers are the same
+        if self.alone:  # local numbers are those of the scene
             self._local = self._all_owned = self.dofs
         self.rotations = np.sort(self.local(numbering.rotations)).astype(np.int32)
         self.multipliers = self.local(numbering.multipliers).astype(np.int32)
@@ -115,7 +116,7 @@ class Subdomain:
         return np.empty(self.size)
 
     def computes(self, point: AttachmentPoint) -> bool:
-        """Return whether this process has the (first) cell at a place, or owns a body.
+        """Return whether this process has the cell at a place, or owns the body of a point.
 
         It then has all degrees of freedom of the place, even if other processes own some of them.
         """
@@ -125,7 +126,7 @@ class Subdomain:
         return bool(np.any(self.cells[place : place + 1] == cell))
 
     def translations(self) -> tuple[Index, Index]:
-        """Return local numbers of both components of all displacements."""
+        """Return the local numbers of u, and of v, of all nodes and bodies on this process."""
         numbering = self.numbering
         pairs = np.unique(np.r_[numbering.dofs[:, :2], numbering.dofs_of_bodies[:, :2]], axis=0)
         indices = self._local[pairs]
@@ -133,9 +134,9 @@ class Subdomain:
         return x, y
 
     def lengths(self) -> Array:
-        """Return the change of each local dof by a unit strain: a cell's length, or a radian.
+        """Return the change of each local dof by a strain of 1: the length of a cell, or 1 rad.
 
-        Bodies have the size of the scene, forces of connectors 0.
+        It is the size of the scene for displacements of bodies, and 0 for forces of connectors.
         """
         lengths = np.full(self.size, self.numbering.scene.size)
         displacements = self.cell_dofs[:, : 2 * (self.numbering.mesh.degree + 1)]
@@ -165,7 +166,8 @@ class Subdomain:
     def gather(self, values: Array, out: Array | None = None) -> Array:
         """Gather values of all degrees of freedom, in the order of the numbering, on every process.
 
-        A single process returns ``values`` itself: states are new arrays in each step.
+        A single process returns ``values`` themselves, not a copy, because states are new arrays in
+        each step.
         """
         if self.alone:
             return values
@@ -177,7 +179,7 @@ class Subdomain:
         return result
 
     def added(self, values: Array) -> Array:
-        """Sum values at the local degrees of freedom over the processes."""
+        """Return the sums over the processes of values at the local degrees of freedom."""
         if self.alone:
             return values
         sums = np.zeros(self.numbering.size)

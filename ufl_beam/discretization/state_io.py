@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """State of a simulation in numbers of the scene, the same on any number of processes.
 
-Each object with state between steps lists it in one method, ``save_or_restore``.  The same calls
-save and restore it.
+An object that keeps data between steps lists these in one method, ``save_or_restore``, whose calls
+of an :class:`Archive` both save and restore.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ModelError
 
 NOWHERE: Array = np.empty(0)
-"""Argument of ``save_or_restore`` instead of a configuration while a state is restored: saved
-strains and stored energies do not belong to the configuration of the scene."""
+"""Argument of ``save_or_restore`` instead of a configuration while a state is restored, because
+restored strains and stored energies do not belong to the configuration of the scene."""
 
 
 class Archive:
     """Storage of the state of a process, for restart and ``start=``.
 
-    Without a ``state``, methods save their values and return them.  With a ``state``, they return
-    the saved values instead.
+    Without a ``state``, methods save their values and return them.  With a ``state``, methods
+    return the saved values instead.
     """
 
     def __init__(self, subdomain: Subdomain, state: State | None = None) -> None:
@@ -40,7 +40,7 @@ class Archive:
         return float(self._values(name, np.array([value]), *self._scalar)[0])
 
     def total(self, name: str, value: float) -> float:
-        """Save or restore a number of which only the sum over the processes is defined."""
+        """Save or restore a number as its sum over the processes."""
         return float(self._values(name, np.array([value]), *self._scalar, summed=True)[0])
 
     def at_dofs(self, name: str, values: Array) -> Array:
@@ -48,15 +48,15 @@ class Archive:
         return self._values(name, values, *self._dofs)
 
     def added(self, name: str, values: Array) -> Array:
-        """Save or restore values at local degrees of freedom that are sums over the processes."""
+        """Save or restore values at the local degrees of freedom as sums over the processes."""
         return self._values(name, values, *self._dofs, summed=True)
 
     def _values(
         self, name: str, values: Array, size: int, where: Index, owned: int, *, summed: bool = False
     ) -> Array:
-        """Save or restore values at positions ``where`` of an array; this process owns the first.
+        """Save or restore values at ``where`` in an array; the first ``owned`` are this process's.
 
-        They are equal on all processes that have a position, or addends if they are ``summed``.
+        Processes that have the same position have equal values, or addends if ``summed``.
         """
         if self._restored is None:
             mine = len(values) if summed else owned
@@ -68,10 +68,10 @@ class Archive:
         return np.asarray(result)
 
     def rows(self, name: str, indices: Index, rows: Array, *, known: bool = False) -> Array:
-        """Save or restore rows by number, each on one process, or all ``known`` to all processes.
+        """Save or restore numbered rows; each is on one process, or all on all if ``known``.
 
-        Rows of one name may have different lengths.  A number that is not in the state keeps its
-        present row.
+        Calls with one name may have rows of different lengths.  If the state has no row of a
+        number, the present row stays.
         """
         columns = rows.shape[1]
         key = f"{name}, {columns}"
@@ -91,7 +91,7 @@ class Archive:
         return self._restored is not None and name in self._restored
 
     def _array(self, name: str, shape: tuple[int, ...]) -> Array:
-        """Return an array of the state; :class:`ModelError` if its shape is wrong; -1 is any."""
+        """Return an array of the state; require its number of dimensions and of columns."""
         values = (self._restored or {}).get(name)
         if values is None or len(values.shape) != len(shape) or shape[-1] != values.shape[-1]:
             problem = "missing" if values is None else f"of shape {values.shape}"

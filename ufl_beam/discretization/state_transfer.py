@@ -15,19 +15,20 @@ from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connectors import Connector
 
 APART = 1e-6
-"""Largest distance of places that a new joint may connect: fraction of the scene's size or of the
-largest velocity, or rad."""
+"""Largest difference of places that a new joint may connect: of positions as a fraction of the size
+of the scene, of rotations in rad, of velocities as a fraction of the largest one times this size,
+which counts as at least 1 m."""
 
 CELL_TABLES = ("cells", "changes of strains")
-"""Tables of internal variables whose rows are numbered like cells; all others like connectors."""
+"""Tables of internal variables whose rows begin with the number of a cell, not of a connector."""
 
 
 class Transfer:
     """Map between the degrees of freedom of two scenes.
 
-    Nodes of beams and bodies are the same if their records are equal; connectors are the same if
-    they connect the same points by laws of one type.  If a joint was removed, both places start at
-    the joint's position.  If a joint was added, its places must coincide.
+    Beams and bodies are the same if they are the same objects.  Connectors are the same if they
+    have the same relative motion of the same points, and laws of one type.  If a joint was removed,
+    both places start at the joint's position.  If a joint was added, its places must coincide.
     """
 
     def __init__(self, old: DofNumbering, new: DofNumbering) -> None:
@@ -51,11 +52,11 @@ class Transfer:
         self._from = np.concatenate([olds, old.multipliers[list(connectors.values())]])
 
     def _require_alike(self) -> None:
-        """Raise unless beams and vertices are equal and all bodies are in the old scene."""
+        """Raise unless beams, meshes and points are equal and the old scene has all bodies."""
         old, new = self._old, self._new
         if old.scene.beams != new.scene.beams or old.mesh != new.mesh:
             raise ModelError(
-                "start: the solution is of other beams, joints or cells; use the same Beam objects "
+                "start: the solution has other beams or another mesh; use the same Beam objects "
                 "in the same order, and the same Mesh. From a file: "
                 "start=ub.Solution.load(path, scene=scene) with the scene that was saved"
             )
@@ -64,13 +65,13 @@ class Transfer:
             beam = next(b for b, before, now in nodes if not np.array_equal(before, now))
             raise ModelError(
                 f"start: {beam.name} has other vertices than in the solution, because objects "
-                "are attached at other places; add these places to corners=(s, ...) of both beams"
+                "are attached at other places; add these places to corners=(s, ...) of the beam"
             )
         for body in new.scene.bodies:
             if body not in old.scene.bodies:
                 raise ModelError(
                     f"start: {body.name} is not in the scene of the solution, so its position is "
-                    "unknown; let it be in both scenes, held by supports in the first"
+                    "unknown; add it to the first scene, too, held by supports there"
                 )
 
     def state(self, q: Array) -> Array:
@@ -97,8 +98,8 @@ class Transfer:
                 unit = units[c == 2]
                 raise ModelError(
                     f"start: the new scene joins places that {how} {component.max():.3g} {unit} "
-                    f"apart at the end of the solution: {where}. Join them by springs, or where "
-                    "they are together"
+                    f"apart at the end of the solution: {where}. Connect them by springs, or start "
+                    "from a solution in which they coincide"
                 )
         if GROUND in self._new.scene.rigid_bodies:
             mapped[self._new.node(GROUND.middle)] = 0.0
@@ -122,7 +123,7 @@ class Transfer:
 
 
 def same_unknowns(old: DofNumbering, new: DofNumbering) -> bool:
-    """Return true if degrees of freedom and connectors have the same numbers in two scenes."""
+    """Return whether degrees of freedom and connectors have the same numbers in two scenes."""
     connectors = (
         [_geometry(connector) for connector in numbering.scene.all_connectors]
         for numbering in (old, new)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Forms of the user's virtual works and potentials, and checks of them."""
+"""Forms of a user's virtual works and potentials, and checks of their functions."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.works import VirtualWork, Work
 
 GROWTH = "growth of works"
-"""Name of the acting fraction of virtual works, which no parameter of a user can have."""
+"""Name of the load factor of virtual works; a user's parameter cannot have a name with spaces."""
 
 
 class Statement(NamedTuple):
     """Forms of a work."""
 
     residual: ufl.Form  # minus the virtual work
-    tangent: ufl.Form  # its derivative; empty if independent of the configuration
+    tangent: ufl.Form  # derivative of the residual; empty if it is zero
     parameters: Mapping[str, fem.Function]  # functions that hold the parameters, by name
     energy: ufl.Form | None = None  # energy of a potential at the end of the step
     lost: ufl.Form | None = None  # energy that the scheme dissipates in the step
@@ -54,10 +54,10 @@ class _Same:
 
 
 def statement(work: Work, element: Element, scheme: Scheme) -> Statement:
-    """State a work in a time scheme, once for all beams and values of parameters.
+    """Return the forms of a work in a time scheme, once for all beams and values of parameters.
 
     Raises:
-        ModelError: Its function is wrong.
+        ModelError: The function of the work is wrong.
     """
     names = tuple(work.numbers)
     return _statement(
@@ -81,7 +81,7 @@ def _statement(
 def _virtual_work_forms(
     work: Work, element: Element, scheme: Scheme, functions: Mapping[str, fem.Function]
 ) -> tuple[ufl.Form]:
-    """State minus the virtual work."""
+    """Return the form of minus the virtual work."""
     q0, q1, w = element.q0, element.q1, element.w
     weight, v = scheme.load_weight, (q1 - q0) / functions["dt"]
     q = (1.0 - weight) * q0 + weight * q1
@@ -89,7 +89,7 @@ def _virtual_work_forms(
     density, dx = _returned(work, known, element), element.dx(work.degree)
     try:
         check_form_arity(expand_derivatives(density * dx), (w,))
-    except (ArityMismatch, ValueError):  # UFL's own message may raise it
+    except (ArityMismatch, ValueError):  # UFL may fail while it writes the message
         raise ModelError(
             f"{work}: the function must return an expression that is linear in w, such as f * w[1]"
         ) from None
@@ -99,7 +99,7 @@ def _virtual_work_forms(
 def _potential_forms(
     work: Work, element: Element, scheme: Scheme, functions: Mapping[str, fem.Function]
 ) -> tuple[ufl.Form, ufl.Form, ufl.Form | None]:
-    """State minus the virtual work, the energy at the end of a step, and its dissipation."""
+    """Return forms of minus the virtual work, the energy at the end of a step, and its loss."""
     q0, q1, w, q, dx = (
         element.q0,
         element.q1,
@@ -115,7 +115,7 @@ def _potential_forms(
     def along(direction: Expr, at: Expr) -> Expr:
         return ufl.replace(gradient, {q: at, w: direction})
 
-    # Variation that equals the increment of q everywhere if w is the increment of the nodes.
+    # If w is the increment of the nodes, this variation is the increment of q everywhere.
     axis = element.anywhere
     (_, ψ0), (_, ψ1), (w_u, w_ψ) = map(split, (q0, q1, w))
     pairs = zip(axis.at_nodes(ψ1 - ψ0), axis.at_nodes(w_ψ), strict=True)
@@ -132,7 +132,7 @@ def _potential_forms(
 
 
 def _returned(work: Work, known: Mapping[str, Any], element: Element) -> Expr:
-    """Evaluate the function of a work, or raise :class:`ModelError` naming it."""
+    """Return what the function of a work returns, or raise :class:`ModelError` naming the work."""
     try:
         value = work.density(**{name: known[name] for name in work.used_arguments})
     except ModelError:

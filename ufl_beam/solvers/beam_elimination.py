@@ -2,8 +2,8 @@
 """Static condensation of chains of cells to their ends, without communication between processes.
 
 A beam of many cells is a chain of vertices that couple to their two neighbours only.  Each process
-eliminates them from its chains by blocks.  A small matrix remains for joints, ends, vertices at the
-border between processes, and all other unknowns that couple to more than two neighbours.
+eliminates such vertices by blocks.  A small matrix remains for joints, ends, vertices at the border
+between processes, and all other unknowns that couple to more than two neighbours.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ufl_beam.solvers.substructuring import BAD_PIVOT, GOOD, Klu, Summed, succee
 def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any, ...]:
     """Find the vertices of the cells of one process that couple only to their two neighbours.
 
-    They are found in the pattern of the matrix, so any kind of coupling is taken into account.
+    They are found from the pattern of the matrix, so any kind of coupling is taken into account.
     ``alone`` marks local degrees of freedom that no other process has.
 
     Returns:
@@ -36,8 +36,8 @@ def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -
         Degrees of freedom of the left and the right end of each chain; (num_chains, 6).
         Whether each chain has a left end, to which elimination couples all its vertices; other
         chains begin at a vertex with one neighbour, and have their right end twice.
-        Where the columns of the vertex before, of itself and of the vertex after begin in the rows
-        of each vertex; (num_vertices, 3).
+        Where, in the rows of each vertex, the columns of the previous vertex, of itself and of the
+        next vertex begin; (num_vertices, 3).
     """
     nodes = cell_dofs.shape[1] // 3
     start, end = cell_dofs[:, 0::nodes], cell_dofs[:, 1::nodes]
@@ -48,57 +48,57 @@ def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -
     counts = np.where(alone & (row_counts == column_counts), row_counts, 0)
 
     def has(number: int, dofs: Index) -> npt.NDArray[np.bool_]:
-        """Tell which vertices have ``number`` entries in rows and columns, and successive dofs."""
+        """Return which vertices have successive dofs, and ``number`` entries per row and column."""
         successive = (np.diff(dofs, axis=1) == 1).all(axis=1)
         return np.asarray((counts[dofs] == number).all(axis=1) & successive)
 
-    inside &= has(9, end[:-1])  # of the vertex and its two neighbours
+    inside &= has(9, end[:-1])  # of itself and its two neighbours, three each
     is_first = np.zeros(len(inside), dtype=bool)
     is_first[np.unique(end[:-1, 0], return_index=True)[1]] = True
     inside &= is_first
-    # Beams side by side may make an end of a chain the middle of another.
+    # If beams lie side by side, the end of a chain may be an interior vertex of another chain.
     middle = np.zeros(A.size, dtype=bool)
     middle[end[:-1][inside]] = True
     chain, first, last = _runs(inside)
     ends = np.hstack([start[:-1][first], end[1:][last]])
     inside[inside] = ~middle[ends].any(axis=1)[chain]
 
-    # A chain with one neighbour at both ends is eliminated from both, up to its middle.
+    # A chain between two free ends is divided at its middle, to be eliminated from both ends.
     _, first, last = _runs(inside)
-    free = has(6, start[:-1][first]) & has(6, end[1:][last])
-    free &= last - first > 1
-    inside[(first + last)[free] // 2] = False
+    both_free = has(6, start[:-1][first]) & has(6, end[1:][last])
+    both_free &= last - first > 1
+    inside[(first + last)[both_free] // 2] = False
 
     chain, first, last = _runs(inside)
     left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
     before, after = start[:-1][inside], end[1:][inside]
-    # A vertex with six entries has one neighbour, the first or last vertex of its chain.
-    dead_left, dead_right = has(6, left), has(6, right)
-    backward = dead_right & ~dead_left
-    dead = dead_left | dead_right
+    # A vertex with six entries per row is a free end: its only neighbour is in the chain.
+    free_left, free_right = has(6, left), has(6, right)
+    backward = free_right & ~free_left
+    free = free_left | free_right
     long = last - first + 1
-    chain_begin = np.append(0, np.cumsum(long + dead))
+    chain_begin = np.append(0, np.cumsum(long + free))
     begin = chain_begin[:-1]
     position = np.arange(len(chain)) - np.append(0, np.cumsum(long))[chain]
     position = np.where(backward[chain], long[chain] - 1 - position, position)
-    place = begin[chain] + dead[chain] + position
+    place = begin[chain] + free[chain] + position
     around = np.empty((chain_begin[-1], 3, 3), dtype=np.int32)
     around[place, 1] = middle_
     around[place, 0] = np.where(backward[chain, None], after, before)
     around[place, 2] = np.where(backward[chain, None], before, after)
-    around[begin[dead], 0] = A.size + np.arange(3)
-    around[begin[dead], 1] = np.where(backward[:, None], right, left)[dead]
-    around[begin[dead], 2] = around[begin[dead] + 1, 1]
+    around[begin[free], 0] = A.size + np.arange(3)
+    around[begin[free], 1] = np.where(backward[:, None], right, left)[free]
+    around[begin[free], 2] = around[begin[free] + 1, 1]
     right = np.where(backward[:, None], left, right)
-    ends = np.hstack([np.where(dead[:, None], right, left), right])
+    ends = np.hstack([np.where(free[:, None], right, left), right])
     at = np.zeros(around.shape[:2], dtype=np.uint8)
     for column in around.reshape(-1, 9).T:
         at += around[:, :, 0] > column[:, None]
-    return around[:, 1], chain_begin, ends, ~dead, at
+    return around[:, 1], chain_begin, ends, ~free, at
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
-    """Find runs of true values: the run of each; first and last position of each run."""
+    """Return the run of each true value, and the first and last position of each run."""
     edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
     first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
     return np.repeat(np.arange(len(first)), last - first + 1), first, last
@@ -115,11 +115,11 @@ INDICES = (
 def _plan(
     cell_dofs: Index, indptr: Index, indices: Index, alone: Index, dofs: Index, num_owned: int
 ) -> tuple[Index, ...]:
-    """Find the vertices that can be eliminated, and the places of entries in the reduced matrix.
+    """Find the vertices that can be eliminated, and the positions of entries in the reduced matrix.
 
     Returns:
-        Degrees of freedom that remain, in the global order; the last result of
-        :func:`_interior_vertices`; ``indptr`` and ``indices`` of the reduced matrix;
+        Degrees of freedom that remain, in the order of the scene's numbering; the last result of
+        :func:`_interior_vertices`; ``indptr`` and ``indices`` of the reduced matrix; the arrays of
         :data:`INDICES`.
     """
     A = Csr(np.empty(0), indices, indptr)
@@ -149,8 +149,9 @@ def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index,
     """Find the pattern of the reduced matrix; ``number`` of an eliminated dof is -1.
 
     Returns:
-        Its ``indptr`` and ``indices``; entries of ``A`` that stay, their positions in it, and the
-        positions of the blocks of the ``ends`` (num_chains, 6) of the chains.
+        ``indptr`` and ``indices`` of the reduced matrix; entries of ``A`` that stay, and their
+        positions in the reduced matrix; positions there of the blocks of the ``ends``, whose shape
+        is (num_chains, 6).
     """
     rows = np.flatnonzero(number >= 0)
     staying = A.entries_of(rows)
@@ -204,7 +205,7 @@ class Elimination:
         )  # fmt: skip
 
     def factor(self, b: Array) -> bool:
-        """Eliminate the chains from matrix and right-hand side; return whether all is finite."""
+        """Eliminate the chains; return whether the reduced matrix is finite."""
         lib.eliminate(self.c, doubles(b))
         return bool(lib.all_finite(len(self.left.data), doubles(self.left.data)))
 
@@ -213,33 +214,34 @@ class Elimination:
         lib.reduce(self.c, doubles(b))
 
     def expand(self, small: Array, x: Array) -> None:
-        """Find the solution from the solution ``small`` of the reduced system."""
+        """Compute the solution ``x`` from the solution ``small`` of the reduced system."""
         lib.expand(self.c, doubles(small), doubles(x))
 
 
 class CondensedSolver:
     """Direct solver: condensation along the beams, then factorization of the rest.
 
-    If processes share a scene, each eliminates the rest of its subdomain.  The system of shared
-    unknowns is small; each process factors it, so that none waits for another.
+    If processes share a scene, each also eliminates the other unknowns that only it has, except in
+    scenes with forces of connectors.  The remaining system is small; each process factors the sum
+    over all processes, so that none waits for another.
     """
 
     def __init__(self, subdomain: Subdomain, A: Csr) -> None:
         self._elimination, self._is_new, self._good = Elimination(subdomain, A), False, False
         # If only a connector holds a part, the part's own stiffness may leave zeros or round-off on
-        # the diagonal.  Several fronts exchange too few rows for that, KLU exchanges enough.
-        few_rows = not len(subdomain.numbering.multipliers)
+        # the diagonal.  Several fronts then exchange too few rows; KLU exchanges enough.
+        few_exchanges = not len(subdomain.numbering.multipliers)
         rest: Any = self._elimination
         if not subdomain.alone:
-            if few_rows:
+            if few_exchanges:
                 rest = Multifrontal(rest, self._elimination.shared)
             rest = Summed(rest, subdomain.comm)
         none = np.zeros(len(rest.dofs), dtype=bool)
-        fronts = few_rows or len(none) <= ONE_FRONT
+        fronts = few_exchanges or len(none) <= ONE_FRONT
         self._solved = Multifrontal(rest, none) if fronts else Klu(rest)
         self.factor = self._solved.factor
         if fronts:
-            del self._elimination.left.indices  # not needed any more
+            del self._elimination.left.indices  # fronts need positions only
 
     def drive(self, c: Any) -> None:
         """Let Newton's method in C use this solver; ``c`` is its ``equation`` of loops.h."""
@@ -252,7 +254,7 @@ class CondensedSolver:
         pc.setFailedReason(GOOD)
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Solve; x is zero after a failure, as an error would leave PETSc objects inconsistent."""
+        """Solve; ``x`` is zero after a failure, because an error would break objects of PETSc."""
         reduced, self._is_new = self._is_new, False
         if reduced:
             self._good = self.factor(b.array_r)

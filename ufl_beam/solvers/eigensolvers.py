@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Eigenvalues of sparse pencils by SLEPc, those nearest to zero first."""
+"""Eigenvalues of pencils: those nearest to a shift by SLEPc; all of a small one by LAPACK."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ TOLERANCE = 1e-12
 """Tolerance of the residual of an eigenpair, relative to its eigenvalue."""
 
 SHIFT = 1e-13
-"""Shift relative to the squared frequencies of single nodes; round-off hides smaller shifts."""
+"""Shift relative to the least squared frequency of a dof alone; round-off hides smaller shifts."""
 
 EXTRA = 8
-"""Additional eigenvalues that are computed, so that none of several similar ones is missed."""
+"""Number of additional eigenvalues, so that none of several close eigenvalues is missed."""
 
 DENSE = 200
 """Number of unknowns up to which LAPACK finds all eigenvalues with their multiplicities."""
@@ -29,8 +29,8 @@ ROUND_OFF = 64 * float(np.finfo(np.float64).eps)
 """Bound on the round-off of a matrix, relative to its largest entry."""
 
 ZERO = ROUND_OFF / 8
-"""Fraction of the sum of magnitudes in a quadratic form below which its value is round-off; a
-sixtieth was met."""
+"""Fraction of the sum of magnitudes in a quadratic form below which its value is round-off; the
+largest round-off that was observed is a sixtieth of it."""
 
 
 def _slepc() -> Any:
@@ -53,10 +53,11 @@ def _petsc(A: csr_array) -> PETSc.Mat:
 def linear(
     A: csr_array, B: csr_array, n: int, *, most: int, shift: float = 0.0, definite: bool
 ) -> tuple[Array, Array]:
-    """Compute the n eigenvalues of ``A x = λ B x`` nearest to ``shift``; (n,), vectors (size, n).
+    """Compute the n eigenvalues of ``A x = λ B x`` nearest to ``shift``, with eigenvectors.
 
     A and B are symmetric, ``A - shift B`` is regular, and B has no negative eigenvalue if
-    ``definite``.  The pencil has ``most`` eigenvalues; the result may have a few more than n.
+    ``definite``.  The pencil has ``most`` finite eigenvalues.  The results, (n,) and (size, n), may
+    have a few more than n eigenvalues.
     """
     size, n = A.shape[0], min(n + EXTRA, most)
     if size <= DENSE:
@@ -77,7 +78,7 @@ def quadratic(
 ) -> tuple[Complex, Complex]:
     """Compute the n exponents s of ``(K + s C + s² M) x = 0`` nearest to ``shift``.
 
-    Conjugate exponents count as two.
+    Conjugate exponents count as two.  Eigenvectors x are the second result, (size, n).
     """
     size, n = K.shape[0], min(n + EXTRA, most)
     if size <= DENSE:
@@ -98,7 +99,10 @@ def quadratic(
 
 
 def small(A: Array, B: Array) -> tuple[Array, Array]:
-    """Compute all eigenvalues of a small symmetric ``A x = λ B x``, any units; (n,), (size, n)."""
+    """Compute all finite eigenvalues of a small symmetric ``A x = λ B x``, with eigenvectors.
+
+    The unknowns may have any units.  The results have the shapes (n,) and (size, n).
+    """
     sizes = np.sqrt(np.abs(A.diagonal()) + np.abs(B.diagonal()))
     scale = 1 / np.where(sizes > 0, sizes, 1.0)
     across = np.outer(scale, scale)
@@ -107,7 +111,7 @@ def small(A: Array, B: Array) -> tuple[Array, Array]:
 
 
 def _inverse(A: Array, B: Array) -> tuple[Complex, Complex]:
-    """Compute the nonzero eigenvalues of A⁻¹ B, the largest first, and eigenvectors."""
+    """Compute the nonzero eigenvalues of A⁻¹ B, the largest first, and their eigenvectors."""
     θ, x = np.linalg.eig(np.linalg.solve(A, B))
     order = np.argsort(-np.abs(θ), kind="stable")
     order = order[np.abs(θ[order]) > 0]
@@ -115,7 +119,7 @@ def _inverse(A: Array, B: Array) -> tuple[Complex, Complex]:
 
 
 def _inverse_definite(A: Array, B: Array) -> tuple[Array, Array]:
-    """Compute the same from the symmetric matrix Fᵀ A⁻¹ F with B = F Fᵀ."""
+    """Compute the results of :func:`_inverse` from the symmetric Fᵀ A⁻¹ F with B = F Fᵀ."""
     scale = np.sqrt(B.diagonal())
     nonzero = np.flatnonzero(scale)
     F = np.zeros((len(A), len(nonzero)))
@@ -130,7 +134,7 @@ def _inverse_definite(A: Array, B: Array) -> tuple[Array, Array]:
 
 
 def _solved(solver: Any, size: int, n: int, shift: float) -> tuple[Complex, Complex]:
-    """Solve by SLEPc for the eigenvalues nearest to a shift."""
+    """Compute the eigenvalues nearest to a shift, and their eigenvectors, by SLEPc."""
     solver.setDimensions(n)
     solver.setTolerances(TOLERANCE, 500)
     solver.setTarget(shift)
@@ -140,9 +144,9 @@ def _solved(solver: Any, size: int, n: int, shift: float) -> tuple[Complex, Comp
     ksp = st.getKSP()
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
-    # Constraints leave zeros on the diagonal.
+    # KLU exchanges rows, because constraints leave zeros on the diagonal.
     ksp.getPC().setFactorSolverType("klu")
-    # The same first vector on every process and in every run.
+    # A fixed first vector gives the same results on every process and in every run.
     first = np.random.default_rng(0).uniform(0.5, 1.0, size)
     solver.setInitialSpace([PETSc.Vec().createWithArray(first, comm=PETSc.COMM_SELF)])
     solver.solve()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Direct factorisation of a square sparse matrix, and the number of its negative eigenvalues."""
+"""Direct factorization of a square sparse matrix, and the number of its negative eigenvalues."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ SCALINGS = 6
 """Number of scaling passes; each one reduces the range of magnitudes to its square root."""
 
 SYMMETRIC = 64 * float(np.finfo(np.float64).eps)
-"""Difference from the transposed scaled matrix up to which a matrix counts as symmetric."""
+"""Largest difference between a scaled matrix that counts as symmetric and its transpose."""
 
 DETERMINANT = 33
-"""Number of MUMPS's option that requests the determinant."""
+"""Index in ICNTL of MUMPS: request for the determinant."""
 
 NEGATIVE_PIVOTS = 12
-"""Number of MUMPS's output with the number of negative pivots of a symmetric matrix."""
+"""Index in INFOG of MUMPS: number of negative pivots of a symmetric matrix."""
 
 MANTISSA = 12
-"""Number of MUMPS's output with the sign of the determinant."""
+"""Index in RINFOG of MUMPS: mantissa of the determinant, which has its sign."""
 
 
 class Factorisation:
     """L D Lᵀ factors of a symmetric matrix, or L U factors of an unsymmetric one, by MUMPS.
 
     Rows and columns are scaled so that the largest entry of each is about one; so the result does
-    not depend on units.  Then they are exchanged, so the diagonal may have zeros.
+    not depend on units.  MUMPS exchanges rows and columns, so the diagonal may have zeros.
 
     Attributes:
         symmetric: Whether the matrix is symmetric up to round-off.
@@ -39,7 +39,7 @@ class Factorisation:
             is negative, and 0 if it is positive.
 
     Raises:
-        LinAlgError: The matrix has no inverse.
+        LinAlgError: The matrix has no inverse, or entries that are not finite.
     """
 
     def __init__(self, A: csr_array) -> None:

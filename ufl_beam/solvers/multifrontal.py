@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Multifrontal elimination of the system that the elimination along chains leaves."""
+"""Multifrontal elimination of the system that remains after the elimination along chains."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Multifrontal:
     """Multifrontal elimination of the unknowns of a system, except those that stay.
 
     Of :data:`ORDERINGS`, the ordering with the fewest operations is used.  Each front exchanges
-    rows among its pivots only, see fronts.c.  These are all rows of systems of up to
-    :data:`ONE_FRONT` unknowns, but few rows of larger systems, whose matrix must not have
-    structural zeros on the diagonal.
+    rows among its pivots only, see fronts.c.  In a system of up to :data:`ONE_FRONT` unknowns, all
+    eliminated unknowns are pivots of one front.  The fronts of a larger system have few pivots, so
+    its matrix must not have structural zeros on the diagonal.
 
     Args:
         inner: The system, see substructuring.py.
@@ -57,7 +57,7 @@ class Multifrontal:
         fill(c, fronts=self.c, found=np.zeros(self.c.size))
 
     def factor(self, b: Array) -> bool:
-        """Eliminate from the matrix and right-hand side; return whether all factors are finite."""
+        """Eliminate from matrix and right-hand side; return whether all factors are finite."""
         good: bool = self._inner.factor(b)
         good &= bool(lib.factor_fronts(self.c, doubles(self._inner.left.data)))
         lib.reduce_fronts(self.c, doubles(self._inner.f))
@@ -69,7 +69,7 @@ class Multifrontal:
         lib.reduce_fronts(self.c, doubles(self._inner.f))
 
     def expand(self, small: Array, x: Array) -> None:
-        """Find the solution from the solution ``small`` of the reduced system."""
+        """Compute the solution ``x`` from the solution ``small`` of the reduced system."""
         self.f[:] = small
         solution = np.empty(self.c.size)
         lib.expand_fronts(self.c, doubles(solution))
@@ -94,8 +94,8 @@ def _structure(
     """Find the fronts of a matrix.
 
     Returns:
-        :data:`STRUCTURE`; position at which the factors of each front begin, int64; largest numbers
-        of entries of a front, of pivots of a front, and of entries on the stack.
+        The arrays of :data:`STRUCTURE`; the position at which the factors of each front begin,
+        int64; the sizes of the space for a front, of the space for its pivots, and of the stack.
     """
     A = Csr(np.empty(0), indices, indptr)
     n = np.count_nonzero(stays)
@@ -129,7 +129,7 @@ def _structure(
 
 
 def _order(A: csr_array, stays: npt.NDArray[np.bool_], kind: str) -> Index:
-    """Return all unknowns in an elimination order of PETSc, followed by those that stay."""
+    """Return the unknowns to eliminate, in an order of PETSc, and then those that stay."""
     these: Index = np.arange(A.shape[0]) if kind == "nd" else np.flatnonzero(~stays)
     if len(these):
         block = A[these][:, these]
@@ -140,7 +140,7 @@ def _order(A: csr_array, stays: npt.NDArray[np.bool_], kind: str) -> Index:
 
 
 def _operations(first: Index, begin: Index) -> float:
-    """Return the number of multiplications in fronts; ``first`` and ``begin`` as in loops.h."""
+    """Return the number of multiplications in the fronts; for the arguments see loops.h."""
     pivots, others = (np.diff(x).astype(np.float64) for x in (first, begin))
     return float(np.sum(pivots * (pivots**2 / 3 + pivots * others + others**2)))
 

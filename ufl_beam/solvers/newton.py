@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Equilibrium of a step by Newton's method of newton.c, as a solver of PETSc.
 
-Its convergence test has dimensionless tolerances.
+The convergence test has dimensionless tolerances.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from ufl_beam.solvers.null_vectors import stiffen_zero_modes
 from ufl_beam.terms.term import from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
-"""Options for full steps: norms of a line search would add forces and moments, and cost residuals.
-"""
+"""Options for full steps: a line search of PETSc would add forces and moments in norms, and compute
+additional residuals."""
 
 REASONS = {
     lib.SINGULAR: "found a singular tangent",
@@ -46,13 +46,13 @@ REASONS = {
     lib.DIVERGED: "met a force that is not a finite number",
     -4: "met a force that is not a finite number",  # PETSc's name for it changed in 3.24
 }
-"""Explanations why Newton's method stops, by values of SNESConvergedReason."""
+"""Reasons for which Newton's method stops, by values of SNESConvergedReason."""
 
 
 def _vector(subdomain: Subdomain) -> tuple[PETSc.Vec, Array]:
     """Create a vector of the unknowns; return it and its local values.
 
-    It has ghosts if processes share a scene.  PETSc does not move the values.
+    The vector has ghosts if processes share a scene.  PETSc does not move its values.
     """
     if subdomain.alone:
         vector = PETSc.Vec().createSeq(subdomain.size)
@@ -66,16 +66,16 @@ def _vector(subdomain: Subdomain) -> tuple[PETSc.Vec, Array]:
 class Solver:
     """Newton's method of newton.c, and the PETSc objects that it uses.
 
-    By default it is the solver of SNES.  If options or monitors request PETSc's ``newtonls``, that
-    method calls the same residuals, tangents and convergence test.
+    By default, newton.c is the solver of SNES.  If there are PETSc options or :attr:`snes` has been
+    read, PETSc's ``newtonls`` calls the same residuals, tangents and convergence test.
 
     Args:
         equation: The :class:`StepEquation` of the steps.
-        least: Number of iterations before which a residual must be far below the tolerance.
+        least: Number of iterations; before it, a residual must be far below the tolerance.
 
     Attributes:
         c: ``equation`` of loops.h.
-        change: Change in the latest iteration; between solutions others may use the array.
+        change: Change in the latest iteration; between solutions other code may use the array.
         unknowns: Local values of the latest iterate, converged or not; C writes them.
     """
 
@@ -88,7 +88,7 @@ class Solver:
         )
         every = np.arange(subdomain.size, dtype=np.int32)
         self._diagonal = A.positions(every, every)
-        self._stiffness: Array | None = None  # of zero-energy modes, after a singular tangent
+        self._stiffness: Array | None = None  # against zero-energy modes, after a singular tangent
         self._moves = np.ones(subdomain.size, dtype=np.uint8)
         self._moves[equation.supports.dofs] = 0
         c = self.c = equation.c
@@ -127,7 +127,7 @@ class Solver:
         c.searches = "snes_linesearch_type" not in chosen
         petsc("SNESSetFunction", snes, self._f, *loop("snes_function", c))
         petsc("SNESSetConvergenceTest", snes, *loop("snes_test", c), ffi.NULL)
-        self._let_c_fill()
+        self._set_jacobian()
         snes.setTolerances(max_it=self._newton.max_iterations)
         snes.setType("newtonls")
         snes.setKSP(ksp)
@@ -138,12 +138,12 @@ class Solver:
             petsc("SNESShellSetContext", snes, context)
             petsc("SNESShellSetSolve", snes, solve)
 
-    def _let_c_fill(self) -> None:
+    def _set_jacobian(self) -> None:
         """Give SNES a matrix of PETSc if PETSc's own method needs it, else an empty matrix."""
         if self._subdomain.alone and self.c.monitored:
             self._matrix = self._equation.A.petsc()
         else:
-            # Only the preconditioner needs the matrix, and it has its own.
+            # Only the preconditioner needs the matrix, and the preconditioner has its own.
             self._equation.A.free()
             give_back_memory(self._subdomain.size)
             sizes = (self._subdomain.num_owned, self._subdomain.numbering.size)
@@ -159,7 +159,7 @@ class Solver:
         """SNES of the steps; reading it changes their method to PETSc's ``newtonls``."""
         if not self.c.monitored:
             self.c.monitored = 1
-            self._let_c_fill()
+            self._set_jacobian()
             self._snes.setType("newtonls")
             apply_options(self._snes, FULL_STEPS)  # setType has reset the line search
         return self._snes
@@ -183,14 +183,14 @@ class Solver:
                 values[k] = math.hypot(*column) if kind == lib.HYPOT else column.sum()
 
     def solve(self, anew: bool) -> bool:
-        """Solve for the change of an iteration on all processes; return whether that fails."""
+        """Compute the change, with a new factorization if ``anew``; return whether that fails."""
         owned = slice(self._subdomain.num_owned)
         if anew and not self._factors.factor(self._r[owned]):
             return True
         return not self._factors.solve(self._r[owned], self.change[owned], reduced=bool(anew))
 
     def find_conjugates(self, q: Array) -> None:
-        """Compute the conjugates, on which a residual does work in the change."""
+        """Compute the conjugates of residuals in the change, for works in a line search."""
         conjugate = self._equation.working(q, self.change)
         fill(self.c, conjugate=conjugate, start=np.empty(len(q)))
 
@@ -216,7 +216,8 @@ class Solver:
     def _set_stiffness(self, stiffness: Array) -> None:
         """Add stiffnesses against zero-energy modes to tangents from now on.
 
-        Degrees of freedom that these or supports hold do not count in the round-off of forces.
+        Degrees of freedom that these stiffnesses or supports hold do not count in the round-off of
+        forces.
         """
         dofs = np.flatnonzero(stiffness)
         arrays = {"idle_entry": self._diagonal[dofs], "idle_stiffness": stiffness[dofs]}
@@ -227,7 +228,7 @@ class Solver:
     # -- paths -----------------------------------------------------------------------------------
 
     def follow(self, border: Any) -> None:
-        """Solve also for the load factor of a :class:`PathCorrector`; None ends that."""
+        """Solve also for the load factor of a :class:`PathCorrector`; None ends this."""
         self._border, self.c.border = border, ffi.NULL
         if border is not None:
             self._t = np.array([border.t])
@@ -238,7 +239,7 @@ class Solver:
             self.c.border = self._border_in_c
 
     def arrive(self, x: Array) -> None:
-        """Pass an iterate to the border."""
+        """Pass an iterate and its load factor to the border."""
         self._border.t = float(self._t[0])
         self._border.arrive(x)
 
@@ -249,8 +250,9 @@ class Solver:
     def change_along(self, x: Array) -> bool:
         """Compute the change of an iteration of the bordered equation; return whether that fails.
 
-        The border is eliminated by one factorisation and two solutions, as only the tangent is
-        banded.  If the tangent is nearly singular, the next iteration recovers the lost digits.
+        The border is eliminated by one factorization and two solutions, because only the tangent
+        without the border is banded.  If the tangent is nearly singular, the next iteration
+        recovers the lost digits.
         """
         border, subdomain, owned = self._border, self._subdomain, slice(self._subdomain.num_owned)
         rates, y, z = np.zeros((3, len(x)))
@@ -271,16 +273,16 @@ class Solver:
     # -- sizes for dimensionless tolerances --------------------------------------------------------
 
     def size(self, forces: Array) -> float:
-        """Return the Euclidean norm of forces, and moments over the size of the scene; N."""
+        """Return the Euclidean norm of forces, and of moments divided by the scene's size; N."""
         local = lib.norm(self._subdomain.size, ffi.NULL, doubles(self._weights), doubles(forces))
         return float(lib.over_processes(self.c, lib.HYPOT, local))
 
     def scale(self) -> float:
-        """Return the size of the loads and of the internal forces in the latest residual; N."""
+        """Return the sum of the sizes of loads and of internal forces in the latest residual; N."""
         return float(self.c.loads + lib.over_processes(self.c, lib.HYPOT, self.c.inner_size))
 
     def random_work(self, x: Array, s: Array) -> float:
-        """Return the work of the round-off forces at ``x`` in a step ``s``, if independent; J."""
+        """Return the work of independent round-off forces at ``x`` in a step ``s``; J."""
         forces = np.empty(self._subdomain.size)
         lib.find_motion(self.c, doubles(x))
         lib.find_round_off(self.c, doubles(x), doubles(forces))
@@ -288,9 +290,9 @@ class Solver:
         return math.sqrt(self._subdomain.total(float(np.sum(works**2))))
 
     def _residuals(self) -> Array:
-        """Return magnitudes of the latest residual, moments over the size of the scene; N.
+        """Return magnitudes of the latest residual, with moments divided by the scene's size; N.
 
-        Ghosts are zero.
+        They are zero at ghosts and at forces of connectors.
         """
         return np.asarray(np.abs(self._r) * self._weights)
 
@@ -314,7 +316,7 @@ class Solver:
         return failure
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Serialize the number of iterations and the stiffnesses against zero-energy modes."""
+        """Save or restore the number of iterations and stiffnesses against zero-energy modes."""
         self.c.total = int(archive.number("iterations", self.c.total))
         known = float(self._stiffness is not None)
         if archive.number("idle motions are known", known):
@@ -332,7 +334,7 @@ def agree_in_python(handle: Any, number: int, how: Any, values: Any) -> None:
 
 
 def _call(method: str, error: int | None, handle: Any, *data: Any) -> int | None:
-    """Call a method of a solver from C, see c_library.py; an exception returns ``error``."""
+    """Call a method of a solver from C, see c_library.py; if it raises, C gets ``error``."""
     callbacks, solver, _ = ffi.from_handle(handle)
     size = 8 * callbacks.c.size
     vectors = (np.frombuffer(ffi.buffer(x, size)) if isinstance(x, ffi.CData) else x for x in data)

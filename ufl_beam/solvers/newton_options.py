@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Options of Newton's method, and checks that PETSc knows its options among them."""
+"""Options of Newton's method, and a check that PETSc uses the PETSc options among them."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Newton:
 
     Args:
         rtol: Tolerance of the residual, relative to the forces in the scene.
-        max_iterations: Number of iterations after which a step is divided.
+        max_iterations: Largest number of iterations of a step; a step that needs more is divided.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any option, PETSc's Newton method
-            is used, otherwise an equivalent method in C, which is faster for few cells.  A
-            ``snes_linesearch_type`` replaces the line search after full steps.  A run raises
-            :class:`ArgumentError` for options that PETSc does not use.
+            is used, otherwise an equivalent method in C, which is faster for few cells.
+            ``snes_linesearch_type`` also replaces the line search that follows when full steps
+            stall.  A run raises :class:`ArgumentError` for options that PETSc does not use.
         reference: Whether the reference solver computes the run: the equations of the paper with
             DOLFINx forms, a return map in NumPy and PETSc's SNES, for comparison or for reading.
             It is ten to a thousand times slower; :func:`simulate` accepts it with equal steps on
@@ -67,7 +67,7 @@ class Newton:
 
 
 def require_plain(newton: Newton | None, what: str) -> None:
-    """Raise :class:`ArgumentError` if the reference solver is chosen, which cannot do ``what``."""
+    """Raise :class:`ArgumentError` if ``newton`` has the reference solver, which lacks ``what``."""
     if newton is not None and newton.reference:
         raise ArgumentError(
             f"Newton: reference=True cannot be combined with {what}: the reference solver computes "
@@ -95,7 +95,7 @@ USUAL = (
     "snes_monitor", "snes_monitor_residual", "snes_monitor_short", "snes_monitor_solution",
     "snes_rtol", "snes_stol", "snes_type",
 )  # fmt: skip
-"""Options suggested for a misspelt one; PETSc has no list of its options."""
+"""Options that are suggested for a misspelt option, because PETSc has no list of its options."""
 
 
 def database() -> dict[str, Any]:
@@ -112,11 +112,11 @@ def apply_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
     options, before, unused = PETSc.Options(PREFIX), database(), list[str]()
     try:
         for name in before:
-            del options[name]  # which may be marked as used
+            del options[name]  # it may be marked as used
         for name, value in chosen.items():
             options[name] = value
         snes.setFromOptions()
-        # PETSc may have renamed options of versions before 3.24.
+        # PETSc may have replaced deprecated options by their new names.
         for name in chosen.keys() & database().keys():
             used = ffi.new("char[8]")  # a bool of any size
             option = ffi.new("char[]", (PREFIX + name).encode())

@@ -3,7 +3,7 @@
 
 The node where several members meet has no mass of its own.  When all plastic hinges around it have
 lost their strength, any rotation of the node is an equilibrium, and the tangent stiffness is
-singular.  Newton's method then keeps the node at its position by a stiffness on the diagonal of
+singular.  Newton's method then holds the rotation of the node by a stiffness on the diagonal of
 the tangent.  Residuals, and so forces, energies and solutions, do not contain this stiffness.
 """
 
@@ -22,14 +22,14 @@ DENSE = 300
 """Number of unknowns up to which null vectors come from a singular value decomposition."""
 
 SINGULAR = 1e-12
-"""Singular values of an equilibrated matrix that count as zero, relative to its entries."""
+"""Largest singular value that counts as zero, of a matrix whose entries are scaled to about 1."""
 
 ROUNDS = 40
 """Largest number of scaling passes."""
 
 
 def free_matrix(subdomain: Subdomain, A: Csr, constrained: Index) -> tuple[csc_array, Index]:
-    """Assemble the tangent of the dofs that no support holds; return it and their global numbers.
+    """Assemble the tangent of the dofs that no support holds; return it and their scene numbers.
 
     All processes call it together, each with its part ``A`` and its ``constrained`` local dofs.
     """
@@ -48,11 +48,11 @@ def free_matrix(subdomain: Subdomain, A: Csr, constrained: Index) -> tuple[csc_a
 
 
 def null_vectors(K: csc_array) -> tuple[Array, Array]:
-    """Compute null vectors of a matrix whose rows and columns are scaled to size one.
+    """Compute null vectors of a matrix after its rows and columns are scaled to size 1.
 
     Returns:
         Their dimensionless singular values, the least last; and the vectors in columns, in the
-        units of the unknowns.  There is at least one; for large matrices there is only one.
+        units of the unknowns.  There is at least one vector; for large matrices there is only one.
     """
     n, scaled, factors = K.shape[0], K, np.ones(K.shape[0])
     for _ in range(ROUNDS):
@@ -79,10 +79,11 @@ def null_vectors(K: csc_array) -> tuple[Array, Array]:
 # -- zero-energy modes -----------------------------------------------------------------------------
 
 STIFFNESS = 0.01
-"""Stiffness against a zero-energy mode in the tangent, relative to the largest in the scene.
+"""Stiffness against a zero-energy mode, relative to the largest diagonal entry of the tangent for
+displacements or for rotations.
 
-If forces resist the motion after all, a smaller stiffness makes it converge faster.  A larger
-stiffness reduces the motion of the mode by round-off.
+If forces resist the mode after all, iterations converge faster with a smaller stiffness.  A larger
+stiffness reduces the motion that round-off causes.
 """
 
 FORCED = 1e-6
@@ -99,9 +100,9 @@ def stiffen_zero_modes(
         stiffness: Stiffnesses of the local degrees of freedom; N/m, N m/rad.
         subdomain: Subdomain of this process.
         A: Tangent of this process.
-        diagonal: Positions of the diagonal entries in it.
-        constrained: Degrees of freedom that supports hold.
-        forces: Magnitudes of the latest residual, moments over the size of the scene; N.
+        diagonal: Positions of the diagonal entries in ``A``.
+        constrained: Local degrees of freedom that supports hold.
+        forces: Magnitudes of the latest residual, moments divided by the size of the scene; N.
         scale: Size of the forces in the scene; N.
 
     Returns:

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: MIT
 """Reduced systems, their sum over processes, and their factorization by KLU.
 
-Substructuring: each process factors the system that the elimination along chains leaves in its
-subdomain.  Only the Schur complement of the unknowns that several processes have is summed over
-them; each process factors the sum.
+Substructuring: each process eliminates chains and, in scenes without forces of connectors, all
+other unknowns that only this process has.  The Schur complements of the processes are summed; each
+process factors the sum.
 
-A reduced system (``Elimination``, ``Multifrontal``, ``Summed``, ``Klu``) is built on another one
-with more unknowns, except the first.  It has
+Each reduced system (``Multifrontal``, ``Summed``, ``Klu``) is built on another one with more
+unknowns; the first one, ``Elimination``, is built on the full matrix.  It has
 
-* ``numbers``: global numbers of the remaining unknowns, ascending;
+* ``dofs``: degrees of freedom that remain, in numbers of the scene;
 * ``factor(b)``: eliminates from the matrix and a right-hand side at the degrees of freedom owned by
-  this process; returns whether the whole matrix is finite;
+  this process; returns whether all results are finite;
 * ``reduce(b)``: eliminates from another right-hand side;
 * ``left``, ``f``: matrix and right-hand side of the reduced system, which the caller solves;
 * ``expand(small, x)``: computes the solution at the degrees of freedom owned by this process from
@@ -33,7 +33,7 @@ from ufl_beam.compiled.csr import Csr
 
 
 class Summed:
-    """Sum of the reduced systems of several processes, which all of them have."""
+    """Sum of the reduced systems of all processes; each process has the whole sum."""
 
     def __init__(self, inner: Any, comm: MPI.Intracomm) -> None:
         self._inner, self._comm = inner, comm
@@ -68,7 +68,7 @@ class Summed:
         self._comm.Allreduce(MPI.IN_PLACE, self.f)
 
     def expand(self, small: Array, x: Array) -> None:
-        """Find the solution from the solution ``small`` of the reduced system."""
+        """Compute the solution ``x`` from the solution ``small`` of the reduced system."""
         self._inner.expand(small[self._number], x)
 
 
@@ -79,7 +79,7 @@ BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
 
 def succeeds(function: Callable[..., None], *arguments: Any) -> bool:
-    """Return False if KLU finds a singular matrix; later factorisations work nevertheless."""
+    """Call a function; return False if KLU finds a singular matrix, after which KLU still works."""
     try:
         function(*arguments)
     except PETSc.Error as error:
@@ -131,5 +131,5 @@ class Klu:
         self._factors.apply(self._rhs, self._solution)
 
     def expand(self, small: Array, x: Array) -> None:
-        """Find the solution of all unknowns."""
+        """Compute the solution ``x``; the reduced system has no unknowns."""
         self._inner.expand(self._solution.array_r, x)
