@@ -99,9 +99,9 @@ class Checkpoint:
 class Keeper:
     """Reader and writer of the checkpoint of one run.
 
-    A restarted run must have the same arguments ``call``, by name.  A run with equal steps, of
-    length ``step`` (s), may continue to another end ``t1`` (s).  ``step`` is None for adaptive
-    steps.
+    ``call`` has the arguments of the run by name.  They must be the same after a restart, except
+    that a run with equal steps, of length ``step`` (s), may continue to another end ``t1`` (s).
+    ``step`` is None for adaptive steps.
 
     Attributes:
         lock: Lock of the file, until the run releases it.
@@ -224,7 +224,7 @@ class Keeper:
         return due
 
     def write(self, simulation: Simulation, pace: Any, seconds: float) -> None:
-        """Write the file ``seconds`` after the start or restart; all processes call it together."""
+        """Write the file, ``seconds`` after the start of the run. All processes call it."""
 
         def states() -> dict[str, Any]:
             by_name = dict[str, Any]()

@@ -40,7 +40,7 @@ LEAST_NAMED = 0.1
 node; least force that is named, as a fraction of the largest force."""
 
 SOFT = 1e-3
-"""Stiffness up to which a connector or cell yields, as a fraction of its elastic stiffness."""
+"""Stiffness up to which a connector or cell is soft, as a fraction of its elastic stiffness."""
 
 PROBE_DISTANCE = 1e-3
 """Largest distance from the initial state of a step to the state whose tangent shows which parts
@@ -68,8 +68,8 @@ NAMED = 3
 class Deformed(NamedTuple):
     """Connectors, or cells, that deform in a motion."""
 
-    soft: Index  # indices of those that yield, the largest deformation first
-    stiff: bool  # True if another one, which does not yield, deforms, too
+    soft: Index  # indices of connectors or cells that are soft, the largest deformation first
+    stiff: bool  # True if a connector or cell that is not soft deforms
 
 
 def no_equilibrium(
@@ -317,7 +317,7 @@ class LedgerWatch:
     Args:
         numbering: Vertices, cells and degrees of freedom of the scene.
         scheme: The time scheme.
-        claimed: Largest error of an entry, as a fraction of the energy transferred.
+        claimed: Error of an entry that is no fault, as a fraction of the energy transferred.
 
     Attributes:
         judged: Index of the last state that was checked; the run updates it when it deletes states.

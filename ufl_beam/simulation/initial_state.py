@@ -62,7 +62,7 @@ def checked_numbering(
     else:
         loose = require_no_mechanism(scene)
         warn_of_rates(scene)
-        if fresh and scheme.theta < 1:  # states would oscillate about equilibrium for ever
+        if fresh and scheme.theta < 1:  # the run would oscillate about equilibrium for ever
             instead = "begin with a run by Static() or EnergyMomentumStatic(theta=1), as start="
             require_no_prestress(scene, repr(scheme), instead)
     for work in scene.works:

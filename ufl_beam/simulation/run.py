@@ -224,7 +224,7 @@ def take_steps(
                 left = solution.every - pace.steps % solution.every
                 pace.advance(left if quiet else 1)
                 ended = simulation.together(after_step)
-                if until is not None:  # processes may find different conditions, and end together
+                if until is not None:  # the condition may differ between processes
                     ended = simulation.subdomain.largest(ended) > 0
             if not bar.disable:
                 bar.set_postfix_str(simulation.parameter.at(simulation.t), refresh=False)

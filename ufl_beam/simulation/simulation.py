@@ -48,7 +48,7 @@ MOST_VALUES = 2**20
 class Simulation(Stepper):
     """Time stepper of a scene: its present state and the step to the next state.
 
-    :func:`simulate` is a loop over steps of this class, which is meant for loops of your own.
+    :func:`simulate` is a loop over steps; use this class for loops of your own.
 
     Args:
         scene: Model.
@@ -161,8 +161,8 @@ class Simulation(Stepper):
         """Advance to the time ``t1`` in one step or, if it fails, in substeps.
 
         Raises:
-            ConvergenceError: Even the smallest substep failed.  The state, and the last state of
-                the solution in the error, is the end of the last accepted substep.
+            ConvergenceError: Even the smallest substep failed.  The state is then the end of the
+                last accepted substep, and the last state of the solution in the error.
             ModelError: The first static step failed, and a motion without strain is free.
         """
         self.steps_to(np.array([t1]))

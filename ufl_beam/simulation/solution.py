@@ -55,7 +55,7 @@ UNKNOWN = -2
 class Solution(States, Rich):
     """Results of a run: motions and forces at the kept times; the same on every process.
 
-    It can be saved, see :meth:`save`, and pickled with the same content.
+    A solution can be saved, see :meth:`save`, and pickled with the same content.
 
     Attributes:
         scene: Model.

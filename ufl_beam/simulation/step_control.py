@@ -151,7 +151,7 @@ class AdaptiveSteps:
         return (self._simulation.t - self._t0) / (self._t1 - self._t0)
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take one step, shortened to the tolerance of its error; ``keep`` appends its state."""
+        """Take one step, so short that its error is allowed; ``keep`` appends its state."""
         simulation = self._simulation
         stop = next(t for t in self._stops if t > simulation.t)
         stop = simulation.controllers.next_sample(simulation.t, stop)

@@ -363,7 +363,7 @@ class StepEquation:
         return self.A.data.copy()
 
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
-        """Return works of the tangent of :meth:`linearise`, xᵀ K y for columns of X and Y; J."""
+        """Return works of the tangent of :meth:`linearise`, xᵀ K y for pairs of columns; J."""
         self.A.data.fill(0.0)
         for term in (*self.connector_terms, *self.others):
             if term.kind != "inertia":
@@ -375,9 +375,10 @@ class StepEquation:
         return works
 
     def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
-        """Return Xᵀ K Y and Xᵀ K' Y, which must be symmetric; J.
+        """Return Xᵀ K Y and Xᵀ K' Y, of which only the upper triangles are computed; J.
 
-        K is the tangent of beams, connectors and loads, and K' its derivative along ``u``.
+        K is the tangent of beams, connectors and loads, and K' its derivative along ``u``.  Both
+        results must be symmetric.
         """
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
@@ -416,7 +417,7 @@ def forces_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Calla
 # -- checks of static steps ------------------------------------------------------------------------
 
 LARGEST_MOTION = 1e3
-"""Motion of a node in a step, beyond which it is a mechanism; in sizes of the scene, or rad."""
+"""Largest motion of a node in a step that is no mechanism; in sizes of the scene, or rad."""
 
 KINK_IMBALANCE = 1e-6
 """Imbalance of work that a kink of a law may cause, as a fraction of the energy transferred."""

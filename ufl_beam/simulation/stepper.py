@@ -41,9 +41,9 @@ class Prediction:
     """Initial guess of a step, extrapolated from the last steps.
 
     The guess continues with the velocity of the last step.  In dynamics (``in_motion``), after
-    steps of equal length, a fraction of the last second difference of the configuration is added.
-    The fraction measures how far the last two second differences agree: it is 1 in smooth motion,
-    and 0 if they have opposite signs, or if steps do not resolve the motion.
+    three steps of equal length, a fraction of the last second difference of the configuration is
+    added.  The fraction measures how far the last two second differences agree: it is 1 in smooth
+    motion, and 0 if they have opposite signs, or if steps do not resolve the motion.
 
     Args:
         weights: Weights of residuals, see :class:`StepEquation`.
@@ -254,7 +254,7 @@ class Stepper(StateView):
         self.together(self.controllers.evaluate, self)
 
     def _prepare(self) -> None:
-        """Accept the further rates of the scheme, reactions and connectors of a trial step."""
+        """Accept further rates, reactions and forces of connectors from a trial step."""
         c = self.time_loop
         _, *more = self.inertia.after(self._copy(c.s), c.step.dt)
         self.inertia.keep(*more)
