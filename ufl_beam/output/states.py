@@ -303,7 +303,7 @@ class States:
         return connection(self.column("connectors")[:, connector_indices(self.scene, connector)])
 
     def joint(self, joint: Joint) -> JointHistory:
-        """Return the motion of the second place of a joint relative to the first, and its forces.
+        """Return the motion between the first two places of a joint, and the forces of the joint.
 
         Raises:
             ArgumentError: The joint is not in the scene, or its places share unknowns.
