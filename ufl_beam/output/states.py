@@ -89,7 +89,7 @@ class States:
     Attributes:
         scene: Model.
         numbering: Vertices, cells and degrees of freedom of the scene.
-        between: Fraction of a step; forces are in equilibrium at the configuration there.
+        between: Fraction of a step at which its forces are in equilibrium on the deformed scene.
         begun: Whether forces depend on the configuration at the beginning of the step.
         cells: Functions for section forces and strains of all cells.
         forces_from_record: Function that computes the forces of cells, ``cell_number`` of loops.h,

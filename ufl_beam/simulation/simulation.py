@@ -315,7 +315,7 @@ class Simulation(Stepper):
         return forces
 
     def keep(self, solution: Solution | None = None) -> None:
-        """Append the state to a solution, by default its own; all processes call it together."""
+        """Append the state to a solution, by default :attr:`solution`; all processes call it."""
         solution = self.solution if solution is None else solution
         columns = self._writer.columns
         follows = not solution.begun or solution.parts_of_last == self.parts - 1

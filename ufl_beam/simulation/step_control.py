@@ -21,8 +21,8 @@ MOST = 2**14
 """Largest number of steps that one call of C gets; it returns earlier if steps take long."""
 
 SAMPLES = (0.01, 0.5, 0.99)
-"""Fractions of a step at which functions of time are sampled, to estimate the error of their
-midpoint rule.  At the ends of a step there may be jumps."""
+"""Fractions of a step at which functions of time are sampled, to estimate the error of the
+midpoint rule.  The ends are left out, because functions may jump there."""
 
 
 def step_count(time: float, dt: float) -> int:
@@ -49,7 +49,7 @@ class EqualSteps:
         return self.steps / self._all
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take up to ``most`` steps, in substeps if they fail; ``keep`` appends each state."""
+        """Take up to ``most`` steps, in substeps if they fail; with ``keep``, states are kept."""
         steps = np.arange(self.steps, min(self.steps + min(most, MOST), self._all)) + 1
         ends = self._t0 + self._time * steps / self._all
         self.steps += self._simulation.steps_to(ends, keep=keep)
@@ -151,7 +151,7 @@ class AdaptiveSteps:
         return (self._simulation.t - self._t0) / (self._t1 - self._t0)
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take one step, so short that its error is allowed; ``keep`` appends its state."""
+        """Take one step, so short that its error is allowed; with ``keep``, its end is kept."""
         simulation = self._simulation
         stop = next(t for t in self._stops if t > simulation.t)
         stop = simulation.controllers.next_sample(simulation.t, stop)
