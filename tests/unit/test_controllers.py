@@ -187,7 +187,7 @@ def test_bang_bang_at_the_end_of_a_beam_warns(dt):
         solution = ub.simulate(scene, DAMPED, t=(0, 150 * dt), dt=dt, comm=MPI.COMM_SELF)
     said = [str(one.message) for one in caught]
     assert len(said) == 2  # each once
-    assert "Turn(ground (0, 0), arm.start (0, 0)): the force changed" in said[0]
+    assert "Turn(ground (0, 0), arm.start (0, 0)): the force rose and fell in turn" in said[0]
     assert "the entry 'numerical'" in said[1]
     assert all(one in str(solution) for one in said)
 
