@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recorders of runs: their base class, their view of a run, and checks."""
+"""Recorders of runs: their base class, the state of a run that they read, and their checks."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from ufl_beam.terms.inertia_and_damping import Inertia
 
 
 class PresentState(ABC):
-    """Present state for objects of the scene; all processes call its methods together."""
+    """Present state of a run, for laws of the scene; all processes call its methods together."""
 
     scene: Scene
     numbering: DofNumbering
@@ -50,7 +50,7 @@ class PresentState(ABC):
         """The present state in the form of a solution; all processes call it together."""
 
     def entries(self) -> tuple[dict[str, float], ...]:
-        """Return the ledger over all processes: state, supplied, lost; J."""
+        """Return the parts of the ledger of all processes: state, supplied, lost; J."""
         columns, row = self.now.row(0)
         values: Any = row.tolist()
         return tuple({name: values[at] for name, at in group.items()} for group in columns.ledger)
@@ -60,7 +60,7 @@ class PresentState(ABC):
         return np.asarray(self.now.column("connectors")[0,])
 
     def connector(self, connector: Connector) -> Connection:
-        """Return motion, force, work and rate of a connector at the end of the last step.
+        """Return motion, force, work, rate and dissipation of a connector after the last step.
 
         Raises:
             ArgumentError: The connector is not in the scene.
@@ -68,11 +68,11 @@ class PresentState(ABC):
         return connection(self.connections()[connector_indices(self.scene, connector)])
 
     def displacement(self, place: AttachmentPoint) -> Array:
-        """Return displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""
+        """Return the present displacement and rotation (u, v, ψ) of a place; (3,); m, m, rad."""
         return np.asarray(self.now.displacement(place)[0])
 
     def velocity(self, place: AttachmentPoint) -> Array:
-        """Return the velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s.
+        """Return the present velocity (du/dt, dv/dt, dψ/dt) of a place; (3,); m/s, m/s, rad/s.
 
         Raises:
             ArgumentError: The run is static; it has no velocities.
@@ -85,10 +85,10 @@ class PresentState(ABC):
         return np.asarray(self.now.velocity(place)[0])
 
     def press(self, joint: Joint | Support) -> float:
-        """Return the magnitude of the force of a joint or support at the end of the step; N.
+        """Return the magnitude of the force of a joint or support in the last step; N.
 
         Raises:
-            ArgumentError: The joint shares its displacement; make it with ``multipliers=True``.
+            ArgumentError: The joint shares its displacement, or is not in the scene.
         """
         if isinstance(joint, Support):
             number = self.scene.supports.index(joint)
@@ -100,13 +100,13 @@ class PresentState(ABC):
     def section_forces(self) -> Array:
         """Return (N, V, M) in the middle of all cells; (num_cells, 3); N, N, N m.
 
-        They belong to the equation of the last step, see :meth:`Solution.diagram`.
+        Section forces belong to the equation of the last step, see :meth:`Solution.diagram`.
         """
         return np.asarray(self.now.cell_forces(0)[:, 0])
 
 
 class StateView(PresentState):
-    """State of a run for recorders and controllers."""
+    """Present state of a run, for recorders and controllers."""
 
     comm: MPI.Intracomm  # all processes of the run
     subdomain: Subdomain  # degrees of freedom of this process
@@ -138,16 +138,16 @@ class StateView(PresentState):
 
     @property
     def iterations(self) -> int:
-        """Newton iterations so far."""
+        """Number of Newton iterations so far."""
         return int(self.solver.c.total)
 
     @property
     def snes(self) -> Any:
         """SNES of petsc4py that solves the steps; it takes monitors, histories and other methods.
 
-        After the first access PETSc's ``newtonls`` solves the steps, also in the compiled path,
-        where an equivalent method in C is faster for few cells.  Its norms add forces (N), moments
-        (N m) and residuals of connectors; :class:`Newton`'s ``rtol`` determines convergence.
+        After the first access PETSc's ``newtonls`` solves the steps, instead of an equivalent
+        method in C that is faster for few cells.  Norms of SNES add forces (N), moments (N m) and
+        residuals of connectors.  Convergence is determined by ``rtol`` of :class:`Newton`.
         Monitors are also called in line searches and along paths.
 
         Example:
@@ -160,7 +160,7 @@ class StateView(PresentState):
         return self.solver.snes
 
     def velocities(self) -> list[Array]:
-        """Return velocities at the local degrees of freedom; none in statics."""
+        """Return the velocities at the local degrees of freedom in a list, empty in statics."""
         return [self.inertia.v] if has_inertia(self.scheme) else []
 
     @property
@@ -169,16 +169,16 @@ class StateView(PresentState):
         return bool(self.now.column("material")[0,].size or self.scene.hinges)
 
     def damage(self) -> tuple[Array, Array]:
-        """Return jump of rotation (rad) and dissipated energy (J) of cells; see :class:`States`."""
+        """Return jumps (rad) and dissipated energies (J) of cells; see :meth:`States.damage`."""
         return self.now.damage()
 
     def watch(self, parts: Array) -> Any:
-        """Let C update extremes after each step, or return None if that is not possible."""
+        """Return extremes that C updates after each step, or None if C cannot."""
         return None
 
 
 class Recorder(ABC):
-    """Base class of recorders, which get each accepted step; all processes call it together.
+    """Base class of recorders, which get each accepted step; all processes call them together.
 
     Attributes:
         files: Paths of output files; two outputs of a run must not share a file.
@@ -216,7 +216,7 @@ class Recorder(ABC):
         """End the record; also called when the run fails."""
 
     def state(self) -> State:
-        """Return the arrays for :meth:`resume` by name; the first process provides them.
+        """Return arrays by name for :meth:`resume`; those of the first process are saved.
 
         Raises:
             ArgumentError: The recorder cannot be restarted.
@@ -227,7 +227,7 @@ class Recorder(ABC):
         )
 
     def resume(self, simulation: StateView, state: State) -> None:
-        """Continue from a :meth:`state` instead of :meth:`open`; nothing is recorded yet.
+        """Continue from a :meth:`state`, instead of :meth:`open`, before anything is recorded.
 
         Raises:
             ArgumentError: Earlier output is missing or changed.
@@ -236,7 +236,7 @@ class Recorder(ABC):
 
 
 class Restartable(Recorder):
-    """Base of the recorders of the package: :meth:`begin` is for new and restarted runs."""
+    """Base of the recorders of the package; :meth:`begin` begins both new and restarted runs."""
 
     @abstractmethod
     def begin(self, simulation: StateView, state: State | None = None) -> None:
@@ -254,7 +254,7 @@ class Restartable(Recorder):
 def checked_recorders(
     record: Sequence[Recorder] | Recorder, comm: MPI.Intracomm, call: str, *others: Output
 ) -> tuple[tuple[Recorder, ...], list[Output]]:
-    """Check the recorders of a run; return them and all outputs, ``others`` included."""
+    """Check the recorders of a run; return them and all outputs, including ``others``."""
     recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
     outputs = []
     for i, recorder in enumerate(recorders):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """State of a scene as one row of numbers: the table of its columns, and growing arrays of rows.
 
-C writes the rows of running simulations, see :class:`StateWriter`; solutions, the view of a run
-and files read them by the names of the columns.
+C writes the rows of running simulations, see :class:`StateWriter`.  Solutions, the present state of
+a run, and files read the rows by the names of the columns.
 """
 
 from __future__ import annotations
@@ -31,25 +31,24 @@ LEDGER = ("state", "supplied", "lost")
 """Parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
 
 FORCES, RECORD, BEFORE = "cell forces", "record", "before"
-"""Columns of some states only: ``cell_number`` of loops.h of all cells; the record from which
-:meth:`CellForces.forces_from_record` computes these; q at the beginning of the step, if forces
-depend on it
-and it differs from q of the row before (in the first row, from q of the same row)."""
+"""Columns of some states only: forces of all cells, ``cell_number`` of loops.h; the record from
+which :meth:`CellForces.forces_from_record` computes these forces; q at the beginning of the step,
+if forces depend on it and it differs from q of the previous row (in the first row, from its q)."""
 
 
 @in_one_line
 class Connection(NamedTuple):
     """History of a connector.
 
-    Motion, force and rate of a :class:`Bushing` have all components; (n+1, 2) or (n+1, 3).
+    Motion, force and rate of a :class:`Bushing` have all its components; (n+1, 2) or (n+1, 3).
 
     Attributes:
         motion: Relative motion since the undeformed scene; (n+1,); m or rad.
-        force: Force that resisted the growth of the motion in the step that ends there; (n+1,); N
-            or N m.
+        force: Force that resisted the growth of the motion in the step that ends at each time;
+            (n+1,); N or N m.
         work: Work on the connector since the beginning: energy that springs store and dissipate
             and that dampers and friction dissipate, minus energy that motors supply; (n+1,); J.
-        rate: Mean rate of the motion in the step that ends there; (n+1,); m/s or rad/s.
+        rate: Mean rate of the motion in the step that ends at each time; (n+1,); m/s or rad/s.
         dissipated: Energy that yielding, softening and plastic hinges have dissipated, or that a
             :class:`ConnectorLaw` has lost; (n+1,); J.
     """
@@ -62,7 +61,10 @@ class Connection(NamedTuple):
 
 
 def connection(values: Array) -> Connection:
-    """Make a history of columns of k components, whose works are added; (..., k, columns)."""
+    """Make a history from the columns of k components; (..., k, columns).
+
+    Works and dissipated energies of the components are added.
+    """
     if values.shape[-2] == 1:
         columns = np.moveaxis(values[..., 0, :], -1, 0)
         return Connection(*(x if x.ndim else float(x) for x in columns))
@@ -71,11 +73,12 @@ def connection(values: Array) -> Connection:
 
 
 FORCE, WORK, DISSIPATED = map(Connection._fields.index, ("force", "work", "dissipated"))
-"""Columns of "connectors" in states: the indices of these fields."""
+"""Indices of these fields of :class:`Connection` in the column "connectors"."""
 
 
 PLASTIC, HINGE = 4, 5
-"""Columns of "material": (N, V, M), jump, plastic, hinge; see :class:`Material`."""
+"""Indices in the column "material", which has (N, V, M), jump, plastic, hinge of
+:class:`Material`."""
 
 
 class Columns:
@@ -85,7 +88,7 @@ class Columns:
         shapes: Shapes by name; () for a single number.
         at: Slices of a row, by name.
         width: Length of a row.
-        ledger: Indices of the entries of each part of the ledger, by name.
+        ledger: For each part of the ledger, indices in a row by the names of the entries.
     """
 
     def __init__(self, shapes: Mapping[str, Sequence[int]]) -> None:
@@ -110,14 +113,14 @@ class Columns:
             numbering: Numbering of the scene.
             moving: Whether there are velocities.
             ledger: Entries, such as "lost: plastic".
-            record: Length of the data for the forces of cells; None if the row has the forces.
+            record: Length of the column "record"; None if the row has the forces of cells instead.
         """
         size, scene = numbering.size, numbering.scene
         return cls({
             "t": (),  # time, s; or the load factor of a path
             "reactions": (len(scene.supports), 3),  # forces of supports, in their axes
             "connectors": (len(scene.all_connectors), len(Connection._fields)),
-            "material": (len(numbering.inelastic_cells), int(lib.POINT_KEPT)),  # `Points.kept`
+            "material": (len(numbering.inelastic_cells), int(lib.POINT_KEPT)),  # `Points.recorded`
             **dict.fromkeys(ledger, ()),  # J
             "q": (size,),  # configuration, all degrees of freedom in the order of the numbering
             **({"v": (size,)} if moving else {}),  # velocities
@@ -141,7 +144,8 @@ class Columns:
 def new_rows(number: int, width: int) -> Array:
     """Make rows of zeros.
 
-    NumPy requests large pages from 4 MiB on, whose first access takes longer.
+    A bytearray holds them, because NumPy requests large pages from 4 MiB on, and the first access
+    to a large page takes longer.
     """
     return np.frombuffer(bytearray(8 * number * width)).reshape(number, width)
 
@@ -180,15 +184,15 @@ class Column:
 
 
 class StateWriter:
-    """Writer of the state in C, as a row of the whole scene.
+    """Writer of the state that C holds, as a row of the whole scene.
 
-    Each process specifies which of its numbers are added to which entries of the row; then the
-    entries of all processes are added.  Vectors of degrees of freedom, which are last in the row
-    and most of it, are gathered from the processes that own them.
+    C adds numbers of each process to entries of the row of this process; then the rows of all
+    processes are added.  Vectors of degrees of freedom, which are last in the row and most of it,
+    are gathered from the processes that own them.
 
     Attributes:
-        records: True if the row has the record of the forces of cells.  Processes with entries of
-            forms, which differ in number and order, do not share a record.
+        records: True if the row has the record of the forces of cells.  Several processes have no
+            common record if forces depend on entries of forms, whose number and order differ.
         columns: Columns of a row.
     """
 
@@ -255,7 +259,7 @@ class StateWriter:
         fill(time_loop, kinds=len(kept), kept=kept, width=columns.width, sums=at["q"].start)
 
     def _place(self, values: Any) -> Any:
-        """Return a pointer to the address of a number of C, of an array, or of a view."""
+        """Return a pointer to the address of numbers of C, of an array, or of a view."""
         address = values
         if isinstance(values, np.ndarray):
             address = ffi.cast("double *", values.ctypes.data)
@@ -263,17 +267,17 @@ class StateWriter:
         return place
 
     def _copy(self, place: Any, first: int, number: int) -> None:
-        """Write contiguous numbers to contiguous entries of the row."""
+        """Let C write ``number`` contiguous numbers to the row, from entry ``first`` on."""
         self._kinds.append((place, number, first, ffi.NULL, ffi.NULL))
 
     def _add(self, place: Any, at: Index, to: Index) -> None:
-        """Add numbers at indices ``at`` to the entries ``to`` of the row."""
+        """Let C add the numbers at the indices ``at`` to the entries ``to`` of the row."""
         both = [np.ascontiguousarray(x.ravel(), dtype=np.int32) for x in (at, to)]
         self._alive.append(both)
         self._kinds.append((place, at.size, 0, *map(integers, both)))
 
     def write(self, row: Array) -> None:
-        """Write the state in C; all processes call it together."""
+        """Write the present state of C to ``row``; all processes call it together."""
         subdomain = self._subdomain
         lib.keep_state(self._time_loop, doubles(row))
         if not subdomain.alone:

@@ -53,12 +53,13 @@ from ufl_beam.output.state_rows import (
 from ufl_beam.terms.energy_ledger import Energy
 
 LEAST_ROWS, MOST_VALUES = 8, 2**17
-"""Least number of rows in a new block, and limit of the numbers in them.  Small blocks fit into
-used memory; the first access of new pages takes a considerable fraction of a step."""
+"""Least number of rows of a new block, and limit of the numbers in them.  Small blocks fit into
+memory that the process has already; the first access to new memory takes a considerable fraction
+of the time of a step."""
 
 
 class Cells:
-    """Results of the cells of a whole scene, each made at its first access.
+    """Functions that compute results of all cells of a scene; each is made at its first access.
 
     Processes do not communicate.
     """
@@ -73,12 +74,12 @@ class Cells:
 
     @cached_property
     def strains(self) -> Strains:
-        """Strains of all cells."""
+        """Functions for strains of all cells."""
         return Strains(self.fields)
 
     @cached_property
     def along(self) -> ForcesAlongCells:
-        """Section forces of all cells."""
+        """Functions for section forces of all cells."""
         return ForcesAlongCells(self.numbering)
 
 
@@ -87,12 +88,12 @@ class States:
 
     Attributes:
         scene: Model.
-        numbering: Its vertices, cells and numbering.
-        between: Fraction of a step at whose configuration its forces are in equilibrium.
+        numbering: Vertices, cells and degrees of freedom of the scene.
+        between: Fraction of a step at which its forces are in equilibrium on the deformed scene.
         begun: Whether forces depend on the configuration at the beginning of the step.
-        cells: Section forces, strains and masses of its cells.
-        forces_from_record: Function that computes the forces of cells from a record, q, and q at
-            the beginning of the step; ``cell_number`` of loops.h; (9, num_cells).
+        cells: Functions for section forces and strains of all cells.
+        forces_from_record: Function that computes the forces of cells, ``cell_number`` of loops.h,
+            from a record, q, and q at the beginning of the step; (9, num_cells).
     """
 
     def __init__(self, numbering: DofNumbering, like: States | None = None, *blocks: Block) -> None:
@@ -116,7 +117,7 @@ class States:
     def free_rows(self, columns: Columns, number: int = 1) -> Array:
         """Return up to ``number`` free rows after the last state; :meth:`grow` makes them states.
 
-        The process may keep freed memory, so rows are not copied to make room.
+        Rows are never copied to make room, because the process may keep the freed memory.
         """
         block = self._blocks[-1] if self._blocks else None
         if (
@@ -135,7 +136,7 @@ class States:
         self._blocks[-1].number += number
 
     def append(self, columns: Columns, *pieces: Array) -> None:
-        """Append a state: a row with these columns, in one or several parts."""
+        """Append a state: a row with these ``columns``, in one or several ``pieces``."""
         np.concatenate(pieces, out=self.free_rows(columns)[0])
         self.grow()
 
@@ -172,7 +173,7 @@ class States:
         return block.columns, block.rows[n]
 
     def column(self, name: str) -> Column:
-        """Return the column of this name in all states that have it; (n+1, ...)."""
+        """Return the column ``name`` of all states that have it; (n+1, ...)."""
         return Column(self._blocks, name)
 
     def _row(self, name: str, n: int) -> Array:
@@ -181,7 +182,10 @@ class States:
         return columns.column_of(name, row)
 
     def before(self, n: int) -> Array:
-        """Return q at the beginning of the step to the n-th state, if forces depend on it."""
+        """Return q at the beginning of the step to the n-th state.
+
+        It is q of this state if forces do not depend on it, or if no step led to the state.
+        """
         n = range(len(self))[n]
         columns, row = self.row(n)
         if BEFORE in columns.at:
@@ -189,7 +193,7 @@ class States:
         return self._row("q", n - 1 if n and self.begun else n)
 
     def cell_resultants(self, n: int) -> Array:
-        """Return ``cell_number`` of loops.h in the n-th state; (9, num_cells); N, N m."""
+        """Return the forces of cells, ``cell_number`` of loops.h, in a state; (9, num_cells)."""
         columns, row = self.row(n)
         if FORCES in columns.at:
             return columns.column_of(FORCES, row)
@@ -214,10 +218,10 @@ class States:
         return arrays
 
     def resume(self, history: State) -> None:
-        """Restore the states of a :meth:`history`; arrays that it lacks are zero.
+        """Restore the states of a :meth:`history`; missing arrays are zero.
 
         Raises:
-            ArgumentError: Shapes of arrays do not agree with the scene.
+            ArgumentError: Times, q or forces are missing, or shapes do not agree with the scene.
         """
         require_arrays(history, {"t": (-1,)})
         n, begins = len(history["t"]), BEFORE in history
@@ -242,7 +246,7 @@ class States:
 
     @property
     def q(self) -> Array:
-        """Configurations, all degrees of freedom in the order of the numbering; (n+1, size)."""
+        """Configurations: all degrees of freedom in the order of the numbering; (n+1, size)."""
         return self.column("q")[:,]
 
     @property
@@ -253,10 +257,11 @@ class States:
     def displacement(self, place: AttachmentPoint) -> Array:
         """Return displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
 
-        In cells they are interpolated with the degree of the mesh; for bodies they are exact.
+        Between nodes of a beam they are interpolated with the degree of the mesh.  In bodies they
+        are exact.
 
         Raises:
-            ArgumentError: The beam of the place is not in the scene.
+            ArgumentError: The beam or body of the place is not in the scene.
         """
         motion = values_at(self.numbering, place, self.column("q"))
         if isinstance(place, Spot):
@@ -267,7 +272,7 @@ class States:
         """Return the velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
 
         Raises:
-            ArgumentError: The run was static, or the beam of the place is not in the scene.
+            ArgumentError: The run was static, or the beam or body is not in the scene.
         """
         if not len(v := self.column("v")):
             raise ArgumentError("velocity: the run was static; there is none")
@@ -298,7 +303,7 @@ class States:
         return connection(self.column("connectors")[:, connector_indices(self.scene, connector)])
 
     def joint(self, joint: Joint) -> JointHistory:
-        """Return the relative motion and the forces of the first two places of a joint.
+        """Return the motion between the first two places of a joint, and the forces of the joint.
 
         Raises:
             ArgumentError: The joint is not in the scene, or its places share unknowns.
@@ -331,7 +336,7 @@ class States:
         return JointHistory(motion, force, in_a, in_b, moment)
 
     def _direction(self, holder: Connector, angle: Array) -> Array:
-        """Return unit vectors in the plane along which a motion grows; (n+1, 2)."""
+        """Return unit vectors along which b moves if the motion of ``holder`` grows; (n+1, 2)."""
         if holder.stretches:
             between = self.position(holder.b) - self.position(holder.a)
             return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
@@ -351,8 +356,8 @@ class States:
         Only components of motion that the support holds have reactions.
 
         In statics the first row belongs to the initial state: it is zero in the undeformed scene,
-        since loads act from the first step on, and with ``start=`` it has the reactions of that
-        equilibrium.  In dynamics reactions act during the step that ends at each time; the first
+        since loads act from the first step on, and with ``start=`` it has the reactions at the end
+        of that run.  In dynamics reactions act during the step that ends at each time; the first
         row is NaN.
 
         Raises:
@@ -368,12 +373,14 @@ class States:
     # -- forces of cells -----------------------------------------------------------------------
 
     def cell_forces(self, n: int, pieces: Array = MIDDLE) -> Array:
-        """Compute (N, V, M) of :meth:`diagram` at fractions of all cells in the n-th state.
+        """Compute (N, V, M) of :meth:`diagram` in all cells in the n-th state.
 
-        Fractions ``parts`` are from 0 to 1.
+        Args:
+            n: Number of the state.
+            pieces: Fractions of the length of a cell, from 0 to 1.
 
         Returns:
-            Section forces; (num_cells, len(parts), 3); N, N, N m.
+            Section forces; (num_cells, len(pieces), 3); N, N, N m.
         """
         key = range(len(self))[n], pieces.tobytes()
         if self._computed is None or self._computed[0] != key:
@@ -411,13 +418,13 @@ class States:
     def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
         """Return section forces along a beam, by equilibrium of cells, at the n-th kept time.
 
-        They belong to the equation of the step that ends at this time, with inertia, damping, loads
-        and works.  At a support they agree with its :meth:`reaction`, in the axes of the section,
-        which turns with the beam.  ``points`` is the number of points of each cell, equally
-        spaced, both ends included; V is linear between them under a uniform load.
+        Section forces belong to the equation of the step that ends at this time, with inertia,
+        damping, loads and works.  At a support they agree with its :meth:`reaction`, in the axes of
+        the section, which turn with the beam.  Each cell has ``points`` equally spaced points, both
+        ends included; under a uniform load V is linear between them.
 
         The initial state of a static run has no forces without ``start=``.  The initial state of a
-        dynamic run has the forces of the last step of ``start=``, or the forces of its strains.
+        dynamic run has the forces of the last step of ``start=``, or the forces by its own strains.
 
         Raises:
             ArgumentError: The beam is not in the scene, or ``points`` is less than 2.
@@ -435,7 +442,7 @@ class States:
     def strains(self, beam: Member, n: int = -1) -> Array:
         """Return (Σ, Γ, K) in the cells of a beam at the n-th time; (num_cells, 3); 1, 1, 1/m.
 
-        The curvature includes the jump of a hinge over the length of its cell.
+        The curvature includes the jump of a hinge divided by the length of its cell.
         """
         return self.mean_strains(n)[self.numbering.cells_of(beam)]
 
@@ -454,7 +461,7 @@ class States:
         """Return forces, jumps and dissipated energies in the cells of a beam at the n-th time.
 
         Raises:
-            ArgumentError: The scene is elastic.
+            ArgumentError: The scene is elastic, or the beam is not in it.
         """
         return self._material(n, self.numbering.cells_of(beam))
 
@@ -465,7 +472,7 @@ class States:
         return Material(chosen[:3].T, *chosen[3:])
 
     def cells_of(self, n: int, forces: Array | float = 0.0) -> Array:
-        """Return column "material" of all cells; elastic cells get ``forces``; (num_cells, 6)."""
+        """Return "material" of all cells, in elastic cells ``forces`` and zeros; (num_cells, 6)."""
         everything = np.zeros((len(self.numbering.cells), self.row(n)[0].shapes["material"][1]))
         everything[:, :3] = forces
         everything[self.numbering.inelastic_cells] = self._row("material", n)
@@ -474,9 +481,9 @@ class States:
     def material_at(self, place: Place) -> Material:
         """Return material states in the cell at a place at all kept times; (n+1, ...).
 
-        If a plastic hinge is at the place, ``forces[:, 2]``, ``jump`` and ``hinge`` are its moment
-        during the step that ends at each time, its rotation and the energy that it has dissipated.
-        The other forces belong to the middle of the cell.
+        If a plastic hinge is at the place, ``forces[:, 2]`` is its moment during the step that ends
+        at each time, ``jump`` its rotation, and ``hinge`` the energy that it has dissipated.  The
+        other forces belong to the middle of the cell.
 
         Raises:
             ArgumentError: The scene is elastic, or the beam of the place is not in it.
@@ -492,8 +499,8 @@ class States:
     def damage(self, n: int = -1) -> tuple[Array, Array]:
         """Return jump of rotation (rad) and dissipated energy (J) of each cell; (num_cells,).
 
-        Plastic hinges at the ends of cells are included.  If a cell has several jumps, the value
-        is the largest jump.
+        Plastic hinges at the ends of cells are included.  The jump of a cell with several jumps is
+        the largest of them.
         """
         states = self.cells_of(n)
         jump, dissipated = states[:, 3].copy(), states[:, PLASTIC] + states[:, HINGE]
@@ -507,7 +514,7 @@ class States:
     # -- balances ------------------------------------------------------------------------------
 
     def ledger(self) -> list[dict[str, Array]]:
-        """Return the parts of the ledger, with arrays by name; each (n+1,); J."""
+        """Return the three parts of the ledger, each with arrays by name; (n+1,); J."""
         pieces = []
         for k in range(len(LEDGER)):
             columns = [(block.rows, block.columns.ledger[k]) for block in self._blocks]

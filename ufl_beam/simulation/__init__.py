@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""From a scene to its motion: steps, solutions, checkpoints."""
+"""Simulation of a scene: steps and their control, solutions and checkpoints."""

@@ -38,27 +38,27 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 
 FORMAT = "checkpoint of ufl_beam, 4"
-"""Format of the file; its number grows whenever the meaning of files changes."""
+"""Format of the file; the number grows whenever the meaning of files changes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """Checkpoint file from which a run is restarted, and the interval of writing it.
+    """Checkpoint file from which a run is restarted, and the interval at which it is written.
 
-    If the file exists when the run begins, the run continues from it, bit for bit: after a crash,
-    run the same script again.
+    If the file exists when the run begins, the run continues from its state, with the same results
+    to the last bit.  So after a crash, run the same script again.
 
     Args:
         path: File.
-        every: Number of steps between two files.
-        minutes: Wall time between two files; min.
-        also: Further objects with a state, besides those that functions in the scene use: random
-            generators of NumPy, and objects with ``state()`` and ``restore(state)``, where the
-            state consists of numbers, texts, lists and dicts.
+        every: Number of steps after which the file is written again.
+        minutes: Wall time after which the file is written again; min.
+        also: Objects whose states are saved besides the states of objects that functions in the
+            scene use: random generators of NumPy, and objects with ``state()`` and
+            ``restore(state)``.  A state consists of numbers, texts, lists and dicts.
 
     Raises:
-        ArgumentError: Both ``every`` and ``minutes`` are missing, a number is out of range, or an
-            object in ``also`` has no state.
+        ArgumentError: ``path`` is no name of a file, both ``every`` and ``minutes`` are missing, a
+            number is out of range, or an object in ``also`` has no state.
 
     Example:
         >>> backup = ub.Checkpoint("run.checkpoint", every=1000)
@@ -97,11 +97,15 @@ class Checkpoint:
 
 
 class Keeper:
-    """The checkpoint of one run; its file is locked until the :attr:`lock` is released.
+    """Reader and writer of the checkpoint of one run.
 
-    The ``call`` holds the arguments of the run by name.  A run with equal steps of length ``step``
-    (s) may continue to another end ``t1`` (s).  ``content`` is the content of the
-    file until :meth:`resume`.
+    ``call`` has the arguments of the run by name.  They must be the same after a restart, except
+    that a run with equal steps, of length ``step`` (s), may continue to another end ``t1`` (s).
+    ``step`` is None for adaptive steps.
+
+    Attributes:
+        lock: Lock of the file, until the run releases it.
+        content: Content of the existing file until :meth:`resume`; else empty.
     """
 
     def __init__(
@@ -115,7 +119,7 @@ class Keeper:
     ) -> None:
         for recorder in recorders:
             if type(recorder).state is Recorder.state:
-                recorder.state()  # raises, as it cannot be restarted
+                recorder.state()  # raises, because this recorder cannot be restarted
         self._call, self._step, self._t1, self._comm = call, step, t1, comm
         self._checkpoint, self.path, self._recorders = checkpoint, Path(checkpoint.path), recorders
         self._described = Description(call)
@@ -135,7 +139,7 @@ class Keeper:
     # -- restart -------------------------------------------------------------------------------
 
     def _find(self) -> None:
-        """Lock the file, and read it if it exists."""
+        """Lock the file; if it exists, read it, and check that it belongs to this run."""
         folder = self.path.parent
         if not folder.is_dir():
             raise ArgumentError(f"checkpoint {self.path}: there is no directory {folder}; make it")
@@ -164,7 +168,7 @@ class Keeper:
                     )
                 step, before, differs = self._step, self.content["step"], difference(now, then)
                 if not differs and (step is None) != (before is None):
-                    differs = "steps are equal in one of both, and adaptive in the other"
+                    differs = "one run has equal steps, and the other has adaptive steps"
                 if not differs and step and abs(step - before) > 1e-9 * before:
                     differs = f"the step is {step!r} s, in the file {before!r} s"
                 if not differs and [*self._stateful] != [*self.content["stateful"]]:
@@ -177,7 +181,7 @@ class Keeper:
         require_writable(self.path)
 
     def resume(self, simulation: Simulation, pace: Any) -> None:
-        """Restore the run, its step control ``pace`` and recorders; then drop the content."""
+        """Restore simulation, step control ``pace`` and recorders; then release the content."""
         content, solution = self.content, simulation.solution
         with decoding(self.path, FORMAT):
             simulation.save_or_restore(Archive(simulation.subdomain, below("state/", content)))
@@ -209,8 +213,8 @@ class Keeper:
 
     def due(self, steps: int) -> bool:
         """Return whether to write after ``steps`` steps; all processes call it after each step."""
-        if self._last_step < 0:  # report an error now rather than after an hour
-            self._require_told()
+        if self._last_step < 0:  # raise after the first step, not when the first file is due
+            self._require_unchanged()
             self._last_step = 0
         every, minutes = self._checkpoint.every, self._checkpoint.minutes
         due = every is not None and steps - self._last_step >= every
@@ -220,7 +224,7 @@ class Keeper:
         return due
 
     def write(self, simulation: Simulation, pace: Any, seconds: float) -> None:
-        """Write the file after ``seconds`` of the run; all processes call it together."""
+        """Write the file, ``seconds`` after the start of the run. All processes call it."""
 
         def states() -> dict[str, Any]:
             by_name = dict[str, Any]()
@@ -242,7 +246,7 @@ class Keeper:
         }  # fmt: skip
         for i, recorder in enumerate(self._recorders):
             content |= above(f"recorder {i}/", recorder.state())
-        self._require_told()
+        self._require_unchanged()
         content |= {"python": PYTHON, "call": self._described.texts, "step": self._step}
         at = f" of t = {content['state/t'][0]:.9g} s"
         history = solution.history
@@ -252,8 +256,8 @@ class Keeper:
         )
         self._last_time, self._last_step = time.perf_counter(), pace.steps
 
-    def _require_told(self) -> None:
-        """Raise if functions have changed data that no checkpoint contains: it would be lost."""
+    def _require_unchanged(self) -> None:
+        """Raise if functions have changed data that no file contains: a restart would lose them."""
         changed = difference(Description(self._call).texts, self._described.texts)
         if changed:
             raise ArgumentError(
@@ -264,11 +268,11 @@ class Keeper:
 
 
 PYTHON = ".".join(map(str, sys.version_info[:2]))
-"""Version of Python, on which the code of functions depends."""
+"""Version of Python; functions are compared by their compiled code, which depends on it."""
 
 
 def checksum_at(start: Solution | None) -> str:
-    """Return a checksum of the state with which a run begins."""
+    """Return a checksum of the last state of ``start``, or "nothing" if there is no ``start``."""
     if start is None:
         return "nothing"
     total = hashlib.sha256()

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Forces of controllers and limits of friction: evaluation at the start of steps, and checks."""
+"""Forces of controllers and limits of friction: evaluation at the start of steps.
+
+The module also checks whether forces of controllers and force laws rise and fall in turn.
+"""
 
 from __future__ import annotations
 
@@ -21,17 +24,17 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Connector
 
 SAMPLE_TOLERANCE = 1e-9
-"""Distance between the end of a step and a sample that is round-off; fraction of a sample time."""
+"""Largest difference of times that counts as round-off, as a fraction of the sample time."""
 
 
 class Controllers:
-    """Forces of controllers and limits of friction in a step; the same on all processes.
+    """Forces of controllers and limits of friction in a step; equal on all processes.
 
     Attributes:
         at: Index of each connector in the arrays.
-        numbers: Forces and limits, which C reads; N or N m.
-        sampled: Sample times of sampled controllers, by index; s.
-        fresh: Whether controllers were evaluated since these flags were cleared.
+        values: Forces and limits, which C reads; N or N m.
+        sampled: Sample times by index, for controllers that have one; s.
+        fresh: For each connector, whether it was evaluated since C cleared the flag.
         asks: True if a force or limit is evaluated at the start of steps.
     """
 
@@ -55,7 +58,7 @@ class Controllers:
         self._indices = np.array(
             [i for i, connector in enumerate(connectors) if connector in self.at], dtype=int
         )
-        # Time of the first sample (s) and number of the last sample; NaN without a sample time.
+        # Time of the first sample (s) and number of the latest sample; NaN if there is none
         self._samples = np.full((len(active), 2), math.nan)
 
     def place(self, connector: Connector) -> Any:
@@ -66,13 +69,16 @@ class Controllers:
         """Evaluate forces and limits that are due at ``now.t``; all processes call it together."""
         for i, connector in self._changing:
             sample = self._due(i, now.t)
-            if sample[1] != self._samples[i, 1]:  # always for NaN, without a sample time
+            if sample[1] != self._samples[i, 1]:  # always true without a sample time, for NaN
                 self.values[i] = connector.law.evaluate(now, connector)  # type: ignore[union-attr]
                 self.fresh[i] = 1
                 self._samples[i] = sample
 
     def _due(self, i: int, t: float) -> tuple[float, float]:
-        """Return the time of the first sample and the number of the sample at ``t``, or NaN."""
+        """Return the time of the first sample and the number of the latest sample at ``t``.
+
+        Both are NaN without a sample time.
+        """
         if i not in self.sampled:
             return math.nan, math.nan
         first, sample = float(self._samples[i, 0]), self.sampled[i]
@@ -80,7 +86,7 @@ class Controllers:
         return first, math.floor((t - first + _rounding(sample, t, first)) / sample)
 
     def next_sample(self, t: float, end: float) -> float:
-        """Return the next sample time after ``t``, or ``end`` if that comes first; s."""
+        """Return the time of the next sample after ``t``, or ``end`` if the end comes first; s."""
         stop = end
         for i, sample in self.sampled.items():
             first, number = self._due(i, t)
@@ -92,7 +98,7 @@ class Controllers:
     def save_or_restore(self, archive: Archive, t: float) -> None:
         """Save or restore forces, limits and samples at the time ``t``.
 
-        Sampling begins anew if the run begins at another time.
+        Sampling begins anew if the state was saved at another time.
         """
         if not len(self.values):
             return
@@ -104,40 +110,44 @@ class Controllers:
 
 
 def _rounding(sample: float, *times: float) -> float:
-    """Return the difference of times that is round-off; s."""
+    """Return the largest difference of ``times`` that counts as round-off; s."""
     return SAMPLE_TOLERANCE * sample + 4 * math.ulp(max(map(abs, times)))
 
 
 # -- forces that alternate -------------------------------------------------------------------------
 
 ALTERNATIONS = 20
-"""Number of successive reversals of a force that is reported as a fault."""
+"""Number of successive changes of a force, each opposite to the previous change, that is reported.
+
+Changes are counted from step to step, or from sample to sample."""
 
 LEAST_CHANGE = 0.5
-"""Least change of such a force, as a fraction of the largest force so far."""
+"""Least size of such a change, as a fraction of the largest force so far."""
 
-MOVED = 1e-9
-"""Least motion in such a step, as a fraction of the size of the scene or in rad."""
+LEAST_MOTION = 1e-9
+"""Least motion in the step of such a change, as a fraction of the size of the scene, or in rad."""
 
 CONTROLLED = (
     "the controller is evaluated again after its force has changed the motion too much. A force of "
-    "kd times a rate that is constant for a time dt needs kd dt < 2 J; J is the inertia (along a "
-    "line the mass) that it moves within dt, and a beam without a body has hardly any inertia at a "
+    "kd times a rate, constant for a time dt, needs kd dt < 2 J. J is the inertia (along a line "
+    "the mass) that the force moves within dt; a beam without a body has hardly any inertia at a "
     "place, whatever the step. Give the place the inertia of its drive, as PointMass or Body, use "
     "smaller gains, or state the force as a ForceLaw, which has no delay; see docs/howto_machine.md"
 )
+"""Reason and remedies for a controller."""
+
 TOO_FAST = (
-    "it drives a motion that is too fast for the steps. Use smaller steps, or a scheme that damps "
-    "such motions, as EnergyMomentum(alpha=0.05, beta=0.05) does"
+    "the force drives a motion that is too fast for the steps. Use smaller steps, or a scheme that "
+    "damps such motions, as EnergyMomentum(alpha=0.05, beta=0.05) does"
 )
-"""Reasons and remedies for a controller and for a force law."""
+"""Reason and remedies for a force law."""
 
 
 class ForceWatch:
-    """Check for forces of controllers and force laws that reverse in each step.
+    """Check for forces of controllers and force laws that rise and fall in turn.
 
     Attributes:
-        c: ``force_watch`` of loops.h; None if there are no such laws.
+        c: ``force_watch`` of loops.h; None if no connector has such a law.
     """
 
     c: Any = None
@@ -163,7 +173,7 @@ class ForceWatch:
         )
         self._told, none = np.full(n, math.nan), np.zeros((3, n))
         self.c = struct(
-            "force_watch", number=n, most=ALTERNATIONS, large=LEAST_CHANGE, moved=MOVED,
+            "force_watch", number=n, most=ALTERNATIONS, large=LEAST_CHANGE, moved=LEAST_MOTION,
             dof=np.array([group.forces_at[k] for _, group, k in watched], dtype=np.int32),
             value=ffi.new("double *[]", values), fresh=ffi.new("int32_t *[]", fresh),
             rate=ffi.new("double *[]", [doubles(group.rate) + k for _, group, k in watched]),
@@ -174,7 +184,7 @@ class ForceWatch:
         self._alive = connector_terms, controllers
 
     def told(self) -> Iterator[str]:
-        """Yield new warnings, one for each connector."""
+        """Yield the warnings of all reported connectors, if C has reported one since last time."""
         if self.c is None or not self.c.tells:
             return
         self.c.tells = 0
@@ -185,6 +195,6 @@ class ForceWatch:
             if isinstance(connector.law, Controller):
                 times, why = "samples" if connector.law.sample else "steps", CONTROLLED
             yield (
-                f"{connector}: the force changed its direction at each of the {ALTERNATIONS} "
-                f"{times} before t = {t:.6g} s: {why}"
+                f"{connector}: the force rose and fell in turn in the last {ALTERNATIONS} {times} "
+                f"before t = {t:.6g} s: {why}"
             )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Diagnosis of failed steps (forces, mechanisms, limit loads) and of the energy ledger."""
+"""Diagnosis of failed steps (forces, mechanisms, limit loads) and check of the energy ledger."""
 
 from __future__ import annotations
 
@@ -36,39 +36,40 @@ from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vectors
 from ufl_beam.terms.term import KINDS
 
 LEAST_NAMED = 0.1
-"""Least motion or deformation that is named, as a fraction of the largest motion."""
+"""Least deformation of a connector or cell that counts, as a fraction of the largest motion of a
+node; least force that is named, as a fraction of the largest force."""
 
 SOFT = 1e-3
-"""Largest stiffness of a yielding connector or cell, as a fraction of its elastic stiffness."""
+"""Stiffness up to which a connector or cell is soft, as a fraction of its elastic stiffness."""
 
 PROBE_DISTANCE = 1e-3
-"""Distance from the initial state of a step, in sizes of the scene or radians, at which the tangent
-shows which parts yield at the start of the step."""
+"""Largest distance from the initial state of a step to the state whose tangent shows which parts
+yield at the start of the step; in sizes of the scene, or rad."""
 
 FREE_MOTION = (
     "Loads can hold it only in a state in which they balance, as a weight below its hinge, and the "
-    f"run does not begin near such a state. Begin in one. {INSTEAD}. In the first step: "
+    f"run does not begin near such a state. Begin near one. {INSTEAD}. In the first step: "
 )
-"""Message of a static run whose first step fails while a motion without strain is free."""
+"""Continuation of the description of a motion without strain, if the first static step fails."""
 
 LIMIT_STIFFNESS = 0.1
-"""Least stiffness near a limit load, as a fraction of the least stiffness in the first state.
+"""Ratio of the least stiffness to its value in the first state, up to which a limit load is near.
 
-The stiffness falls with the root of the distance to the limit load: to 1/64 at the distance of the
-smallest substep, 1/4096 of a step.  A tenth allows for steps that begin farther away."""
+The stiffness falls with the square root of the distance to the limit load: to 1/64 at the distance
+of the smallest substep, 1/4096 of a step.  A tenth allows for steps that begin farther away."""
 
 LEDGER_TOLERANCE = 10.0
-"""Largest ratio of the imbalance of an exact ledger to the tolerance of the solver."""
+"""Largest relative imbalance of an exact ledger, as a multiple of the ``rtol`` of the solver."""
 
 NAMED = 3
-"""Largest number of names in a list."""
+"""Largest number of names in a list of a message."""
 
 
 class Deformed(NamedTuple):
     """Connectors, or cells, that deform in a motion."""
 
-    soft: Index  # numbers of yielding connectors or cells, the largest deformation first
-    stiff: bool  # True if a connector or cell deforms that has not yielded
+    soft: Index  # indices of connectors or cells that are soft, the largest deformation first
+    stiff: bool  # True if a connector or cell that is not soft deforms
 
 
 def no_equilibrium(
@@ -81,9 +82,10 @@ def no_equilibrium(
     advice: str,
     loose: str,
 ) -> ConvergenceError | ArgumentError:
-    """Describe why even the smallest step, from ``q0``, failed; all processes call it together.
+    """Return an error that says why even the smallest step, from ``q0``, failed.
 
-    ``loose`` describes a motion without strain that no equilibrium has held yet; it may be empty.
+    All processes call it together.  ``loose`` describes a motion without strain; it is empty if
+    there is none, or if loads held the motion in an earlier equilibrium.
     """
     if loose:
         return ModelError(f"{loose}{FREE_MOTION}{failure}")
@@ -94,18 +96,18 @@ def no_equilibrium(
         try:
             term.add_residual(q1, vectors[term.kind])
         except Exception:
-            vectors[term.kind].fill(np.nan)  # it is why the step has failed
+            vectors[term.kind].fill(np.nan)  # the exception is why the step has failed
     forces = {kind: size for kind, force in vectors.items() if (size := newton.size(force))}
     sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
     where = f"at {named.at(t, '.9g')}"
     if end != t:
         where = f"after {named.at(t, '.9g')}, even with {named.over(end - t)}"
     why = ""
-    if not isinstance(failure, NoNumber):  # where a function has no value there is no tangent
+    if not isinstance(failure, NoNumber):  # without a value of a function there is no tangent
         probe = _probe_state(equation, q0, q1)
         why = _singularity(equation, q1)
-        # If the latest tangent is inconclusive, an earlier tangent may have sent Newton's method
-        # far away.  Then the tangent near the beginning of the step is examined.
+        # If the latest tangent is regular, an earlier tangent may have sent Newton's method far
+        # away.  So the tangent near the beginning of the step is examined, too.
         if not why and probe is not q0 and equation.evaluate(probe):
             why = _singularity(equation, probe)
         why = why or _limit_point(equation, solution, q0, probe)
@@ -117,11 +119,11 @@ def no_equilibrium(
 
 
 def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: Array) -> str:
-    """Return a message if a limit load or bifurcation is near ``q0`` in statics, else empty.
+    """Return a message if, in statics, a limit load or a bifurcation is near ``q0``; else "".
 
-    There the least stiffness is a small fraction of its value in the first state, or the number of
-    negative pivots of the tangent differs.  The pivots are also counted a little beyond ``q0``, at
-    ``probe``, because yielding reduces the stiffness there.
+    One is near if the least singular value of the tangent is a small fraction of its value in the
+    first state, or if the number of negative pivots of the tangent has changed.  The pivots are
+    also counted a little beyond ``q0``, at ``probe``, where yielding has reduced the stiffness.
     """
     if not len(equation.force) or not len(solution):
         return ""
@@ -146,7 +148,7 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
 
 
 def _probe_state(equation: StepEquation, q0: Array, q1: Array) -> Array:
-    """Return a state between ``q0`` and ``q1``, at most :data:`PROBE_DISTANCE` away from ``q0``."""
+    """Return a state from ``q0`` toward ``q1``, at most :data:`PROBE_DISTANCE` from ``q0``."""
     subdomain = equation.subdomain
     increment = np.abs(q1 - q0) * subdomain.numbering.scales[subdomain.dofs]
     far = subdomain.largest(float(increment.max(initial=0.0)))
@@ -154,7 +156,10 @@ def _probe_state(equation: StepEquation, q0: Array, q1: Array) -> Array:
 
 
 def _singularity(equation: StepEquation, q: Array) -> str:
-    """Describe why the latest tangent, evaluated at ``q``, is singular; empty if it is regular."""
+    """Describe the singularity, or the mechanism, in the latest tangent, which was evaluated at q.
+
+    The description is empty if there is none.
+    """
     numbering, scene = equation.subdomain.numbering, equation.subdomain.numbering.scene
     K, free = free_matrix(equation.subdomain, equation.A, equation.supports.dofs)
     if not len(free) or not np.isfinite(K.data).all():
@@ -186,7 +191,7 @@ def _singularity(equation: StepEquation, q: Array) -> str:
 
 
 def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
-    """Return the deformations of all connectors and of all cells in a motion ``x`` from ``q``."""
+    """Return which connectors and which cells deform in a small motion along ``x`` from ``q``."""
     subdomain, numbering, scene = (
         equation.subdomain,
         equation.subdomain.numbering,
@@ -198,13 +203,13 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
         try:
             change = (group.motion(q + ε * x_local) - group.motion(q - ε * x_local)) / (2 * ε)
         except StepFailed:
-            continue  # no motion beyond the end of a guide; the failure of the step reports it
+            continue  # beyond the end of a guide, which the failure of the step reports
         connectors[group.indices] = np.abs(change)
         left[group.indices] = group.response.remaining()
     connectors /= np.where(
         [connector.is_rotation for connector in scene.all_connectors], 1.0, scene.size
     )
-    # Strains of a small motion, times lengths of cells; (num_cells, 3); m, m, rad
+    # Strains in the small motion, times the lengths of cells; (num_cells, 3); m, m, rad
     first, last = numbering.cells[:, 0], numbering.cells[:, 1]
     position, motion = (
         numbering.points + subdomain.gather(q)[numbering.dofs[:, :2]],
@@ -239,8 +244,8 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
 def _describe(
     numbering: DofNumbering, motions: Array, connectors: Deformed, cells: Deformed
 ) -> str:
-    """Describe a motion without resistance; ``motions`` are the magnitudes of its components."""
-    alike = np.round(motions, 6)  # round-off must not determine the order of equal motions
+    """Describe a motion without resistance; ``motions`` are its magnitudes, at most 1; (size,)."""
+    alike = np.round(motions, 6)  # so that round-off does not determine the order of equal motions
     phrases = []
     for words in numbering.worst(np.where(alike >= 1 / 2, alike, 0.0)):
         component, _, place = words.partition(" of ")
@@ -277,13 +282,13 @@ def _describe(
 
 
 def _named(sizes: Array) -> Index:
-    """Return the indices of all sizes from :data:`LEAST_NAMED` on, in descending order."""
+    """Return the indices of sizes of at least :data:`LEAST_NAMED`, the largest size first."""
     order = np.argsort(-sizes, kind="stable")
     return order[sizes[order] >= LEAST_NAMED]
 
 
 def _list(names: list[str]) -> str:
-    """Join the first :data:`NAMED` names for a sentence, and count the rest."""
+    """Join names for a sentence: the first :data:`NAMED` names, and the number of the others."""
     names, more = names[:NAMED], len(names) - NAMED
     if more > 0:
         return f"{', '.join(names)} and {more} more"
@@ -292,34 +297,35 @@ def _list(names: list[str]) -> str:
 
 # -- signs in the ledger of a run ------------------------------------------------------------------
 
-STATES = 100
-"""Number of successive steps over which numerical losses are added."""
+GROUP_SIZE = 100
+"""Number of steps in a group, over which numerical losses are added."""
 
-TURNOVER = 5.0
-"""Numerical loss in these steps, over the largest energy of the scene in them, that is reported.
+LARGE_LOSS = 5.0
+"""Least numerical loss in a group that is reported, as a multiple of the largest energy of the
+scene in the group.
 
 A motion that the steps resolve loses a small fraction of its energy in each step.
 """
 
-LITTLE = 1e-6
-"""Negligible numerical loss, as a fraction of the energy transferred."""
+SMALL_LOSS = 1e-6
+"""Numerical loss that is never reported, as a fraction of the energy transferred."""
 
 
 class LedgerWatch:
-    """Check of the energy ledger in the kept states of a run, each once.
+    """Check of the energy ledger of a run; each kept state is checked once.
 
     Args:
-        numbering: Grid of the scene.
+        numbering: Vertices, cells and degrees of freedom of the scene.
         scheme: The time scheme.
-        claimed: Error of entries that the scheme allows; fraction of the energy transferred.
+        claimed: Error of an entry that is no fault, as a fraction of the energy transferred.
 
     Attributes:
-        judged: Number of the last checked state, or of the last state after some were deleted.
+        judged: Index of the last state that was checked; the run updates it when it deletes states.
     """
 
     def __init__(self, numbering: DofNumbering, scheme: Scheme, claimed: float) -> None:
         self._numbering, self._claimed = numbering, claimed
-        connectors, laws = numbering.scene.all_connectors, list[MaterialLaw]()  # of material points
+        connectors, laws = numbering.scene.all_connectors, list[MaterialLaw]()
         for beam in numbering.scene.beams:
             section_points = beam.section.section_points(beam.section.hinge)
             if section_points is not None and not section_points.elastic:
@@ -329,9 +335,11 @@ class LedgerWatch:
         ]
         laws += [law for law in springs if law is not None]
         grows = {"hinges": True, "plastic": all(map(judges_dissipation, laws))}
-        # Other schemes integrate works with the mean of the forces at both ends.
+        # Other schemes compute works by the mean of the forces at both ends of a step.  Its error
+        # can make these entries fall.
         exact = grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
-        at_once = scheme.theta == scheme.load_weight  # elastic forces and variables
+        # True if elastic forces and variables of laws belong to the same instant
+        at_once = scheme.theta == scheme.load_weight
         user_laws = [
             connector.law for connector in connectors if isinstance(connector.law, ConnectorLaw)
         ]
@@ -350,13 +358,13 @@ class LedgerWatch:
         self._told: set[str] = set()
 
     def faults(self, states: States, every: int, *, last: bool = False) -> Iterator[str]:
-        """Yield warnings of the states since the last call, in groups of :data:`STATES`.
+        """Check the states since the last call, in groups of :data:`GROUP_SIZE`; yield warnings.
 
-        ``every`` is the number of steps between states; ``last`` includes an incomplete group.
-        Only the first warning of each kind is yielded.
+        ``every`` is the number of steps between states.  With ``last``, an incomplete group is
+        checked, too.  Only the first warning of each kind is yielded.
         """
         number = len(states) - 1 - self.judged
-        number -= 0 if last else number % STATES
+        number -= 0 if last else number % GROUP_SIZE
         if number <= 0:
             return
         states = states.subset(self.judged, self.judged + number + 1)
@@ -392,27 +400,31 @@ class LedgerWatch:
                 "not negative: a law of material in the scene, or the step there, is wrong. Use "
                 "smaller steps; check elastic_energy of a law of your own"
             )
-        starts = np.arange(0, len(times) - STATES, STATES)
+        starts = np.arange(0, len(times) - GROUP_SIZE, GROUP_SIZE)
         if every > 1 or not self._in_motion or "numerical" not in lost or not len(starts):
             return
-        losses = lost["numerical"][starts + STATES] - lost["numerical"][starts]
+        losses = lost["numerical"][starts + GROUP_SIZE] - lost["numerical"][starts]
         most = np.maximum.reduceat(energy, starts)
-        wrong = losses > np.maximum(TURNOVER * most, LITTLE * self._transferred)
+        wrong = losses > np.maximum(LARGE_LOSS * most, SMALL_LOSS * self._transferred)
         if wrong.any() and "numerical" not in self._told:
             self._told.add("numerical")
             k = int(np.argmax(wrong))
-            begin, end = times[starts[k]], times[starts[k] + STATES]
+            begin, end = times[starts[k]], times[starts[k] + GROUP_SIZE]
             yield (
                 f"from t = {begin:.6g} to {end:.6g} s the time scheme took {losses[k]:.3g} J, the "
                 f"entry 'numerical', {losses[k] / most[k]:.3g} times the largest energy of the "
-                f"scene in these {STATES} steps. So most of the supplied work went into motions "
-                "that are too fast for the steps, and results depend on the scheme. Use smaller "
-                "steps, or smoother loads and supports; a controller that causes the loss needs "
-                "another sample time, inertia at its place, or a ForceLaw instead"
+                f"scene in these {GROUP_SIZE} steps. Motions that the steps resolve do not lose so "
+                "much, so some motions are too fast for the steps, and results depend on the "
+                "scheme. Use smaller steps, or smoother loads and supports; a controller that "
+                "causes the loss needs another sample time, inertia at its place, or a ForceLaw "
+                "instead"
             )
 
     def _where(self, name: str, states: States, n: int) -> str:
-        """Name the cell or connector whose dissipated energy falls most in a step."""
+        """Name the cell or connector whose part of the entry ``name`` falls most after state ``n``.
+
+        The result ends with ": "; it is empty if no part falls.
+        """
         kind = {"friction": Coulomb, "damping": Damper}.get(name)
         falls: dict[str, float] = {}
         for i, connector in enumerate(self._numbering.scene.all_connectors):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Grid and initial state of a run, and checks before anything is computed."""
+"""Numbering and initial state of a run, and checks before anything is computed."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ from ufl_beam.simulation.solution import Solution
 def checked_numbering(
     scene: Scene, scheme: Scheme, mesh: Mesh, *, fresh: bool
 ) -> tuple[DofNumbering, str]:
-    """Check that the scheme can compute a scene, and number its degrees of freedom.
+    """Check a scene and a scheme, and number the degrees of freedom of the scene.
 
-    ``fresh`` says that the run begins with the undeformed scene.  The second result describes a
-    motion that only loads may hold in statics; it is empty if there is none.
+    With ``fresh``, the run begins with the undeformed scene.  The second result describes a motion
+    that only loads may hold in statics; it is empty if there is none.
     """
     loose = ""
     require_kind(scene, Scene, "scene")
@@ -62,7 +62,7 @@ def checked_numbering(
     else:
         loose = require_no_mechanism(scene)
         warn_of_rates(scene)
-        if fresh and scheme.theta < 1:  # it would oscillate about equilibrium for ever
+        if fresh and scheme.theta < 1:  # the run would oscillate about equilibrium for ever
             instead = "begin with a run by Static() or EnergyMomentumStatic(theta=1), as start="
             require_no_prestress(scene, repr(scheme), instead)
     for work in scene.works:
@@ -77,7 +77,7 @@ def checked_numbering(
 
 
 def require_scheme(scheme: Any, what: str) -> None:
-    """Raise :class:`ArgumentError` naming ``what`` unless it is a complete time scheme."""
+    """Raise :class:`ArgumentError`, with the name ``what``, unless ``scheme`` is a time scheme."""
     tries = hasattr(scheme, "dynamic") or hasattr(scheme, "step")
     if isinstance(scheme, type) or not tries:
         raise ArgumentError(
@@ -96,7 +96,7 @@ def require_scheme(scheme: Any, what: str) -> None:
 
 
 def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
-    """Return the given mesh, else the mesh of the solution ``start``, else the default."""
+    """Return ``mesh`` if it is given, else the mesh of ``start``, else the default mesh."""
     if mesh is not None:
         require_kind(mesh, Mesh, "mesh")
         return mesh
@@ -117,7 +117,7 @@ def initial_state(numbering: DofNumbering, start: Solution | None) -> tuple[Arra
 
 
 def _initial_velocity(numbering: DofNumbering) -> Array:
-    """Return the initial velocities by :class:`Velocity`; zero elsewhere."""
+    """Return the velocities that :class:`Velocity` gives to beams; all others are zero."""
     v: Array = np.full(numbering.size, np.nan)
     for velocity in numbering.scene.initial:
         for beam in velocity.beams:
@@ -140,9 +140,10 @@ def _initial_velocity(numbering: DofNumbering) -> Array:
 
 
 def _require_agreement(numbering: DofNumbering, v: Array) -> None:
-    """Raise if initial velocities violate joints, which would vibrate for ever, or supports.
+    """Check that joints and supports allow the initial velocities.
 
-    It is an error if supports cancel all velocities of a beam, and a warning if they cancel some.
+    Joined parts that move apart are an error, because they would vibrate for ever.  Supports that
+    cancel all velocities of a beam are an error; if they cancel some, a warning is issued.
     """
     size, nodes = numbering.scene.size, np.vstack([numbering.dofs, numbering.dofs_of_bodies])
     fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()

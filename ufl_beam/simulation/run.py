@@ -67,16 +67,16 @@ def simulate(
         scene: Model.
         scheme: :class:`Static`, :class:`EnergyMomentum` or another scheme, see docs/schemes.md.
         t: Beginning and end; s.  In statics time is the load parameter.
-        dt: Time step; s.  All steps are a little shorter if ``dt`` does not divide the time.  A
+        dt: Time step; s.  All steps are a little shorter if the run is no multiple of ``dt``.  A
             step without convergence is divided into substeps.  :class:`Adaptive` steps are as long
             as a tolerance allows.
         record: Recorders of files or results, such as :class:`XDMF` and :class:`History`.
         every: Number of steps between kept states; the last state is always kept.
         max_states: Largest number of states in the solution, besides the initial and the last
-            state.  When it is exceeded, every other state is deleted and ``every`` is doubled.
-        start: Solution of the same beams whose last state is the initial state.  Joints may be
+            state.  If a run has more, every other state is deleted and ``every`` is doubled.
+        start: Solution whose last state is the initial state, with the same beams.  Joints may be
             removed, or added where places coincide.
-        newton: Tolerances and PETSc options.
+        newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default as in ``start``, or the cells of the beams.
         checkpoint: Checkpoint file from which the run continues if the script is run again.
         progress: Show a progress bar in a terminal or notebook.
@@ -103,8 +103,9 @@ def simulate(
         least = MOST_SUBSTEPS * math.ulp(max(abs(t0), abs(t1)))
         if dt < least:
             raise ArgumentError(
-                f"simulate: dt = {dt:g} s is too small: steps from t = {t0:g} to {t1:g} s can "
-                f"be told apart, and cut, from {least:.1e} s on; use a larger one, or begin at 0"
+                f"simulate: dt = {dt:g} s is too small: steps from t = {t0:g} to {t1:g} s, and "
+                f"substeps of them, exceed round-off from dt = {least:.1e} s on; use a larger dt, "
+                "or begin at 0"
             )
     elif not has_inertia(scheme):
         raise ArgumentError(
@@ -148,7 +149,7 @@ def simulate(
         solution = simulation.solution
         solution.every, solution.building = every, time.perf_counter() - begin
         stack.enter_context(running(simulation, recorders, outputs, begin))
-        pace: EqualSteps | AdaptiveSteps  # `error` sums estimated errors, NaN if there are none
+        pace: EqualSteps | AdaptiveSteps  # `error`: sum of estimated errors; NaN with equal steps
         if isinstance(dt, Adaptive):
             pace = AdaptiveSteps(simulation, t1, dt)
         else:
@@ -179,7 +180,7 @@ def take_steps(
         recorders: Recorders of each step.
         bar: Progress bar.
         max_states: Largest number of kept states, see :func:`simulate`.
-        until: The run ends after the first step for which this is true.
+        until: Condition; the run ends after the first step with a state that satisfies it.
         keeper: Writer of checkpoints.
         begin: Value of the clock at the beginning of the run, for checkpoints; s.
     """
@@ -190,7 +191,7 @@ def take_steps(
     def after_step() -> bool:
         solution.time_error = pace.error
         if recorders or keeper is not None:
-            simulation.copies.synchronize()  # before anything is written
+            simulation.copies.synchronize()  # raises before processes write different results
         if pace.steps % solution.every == 0 or pace.finished:
             simulation.keep()
             thins = len(solution) > max_states + 1 and not pace.finished
@@ -223,7 +224,7 @@ def take_steps(
                 left = solution.every - pace.steps % solution.every
                 pace.advance(left if quiet else 1)
                 ended = simulation.together(after_step)
-                if until is not None:  # on which processes may disagree
+                if until is not None:  # the condition may differ between processes
                     ended = simulation.subdomain.largest(ended) > 0
             if not bar.disable:
                 bar.set_postfix_str(simulation.parameter.at(simulation.t), refresh=False)
@@ -233,15 +234,16 @@ def take_steps(
 
 
 def check_ledger(simulation: Simulation) -> None:
-    """Warn, also in the solution, if a ledger is open although the scheme claims to close it.
+    """Warn, also in the solution, if the ledger is open but the scheme claims to close it.
 
-    All processes call it together at the end of a run.  Then all of them have all warnings.
+    All processes call it together at the end of a run.  Afterwards the solution has the warnings
+    of all processes.
 
     Warns:
         ModelWarning: The ledger is open, perhaps by round-off.
     """
     solution, subdomain = simulation.solution, simulation.subdomain
-    if not subdomain.alone:  # forces are watched by the process that has the connector
+    if not subdomain.alone:  # only the process that has a connector watches its force
         everyone = subdomain.comm.allgather(solution.warnings.splitlines(keepends=True))
         solution.warnings = "".join(dict.fromkeys(chain.from_iterable(everyone)))
     if getattr(simulation.scheme, "exact_ledger", False) and len(solution) > 1:
@@ -260,11 +262,11 @@ def check_ledger(simulation: Simulation) -> None:
 def running(
     simulation: Simulation, recorders: Sequence[Recorder], outputs: Sequence[Output], begin: float
 ) -> Iterator[None]:
-    """Close the simulation and its recorders at the end; errors carry ``error.solution``.
+    """Context of a run, which closes the simulation and its recorders at the end.
 
-    Meanwhile no other run may write the files.  ``begin`` is the value of the clock at the
-    beginning of the run.  After the last step the ledger and the mesh dependence of hinges are
-    checked.
+    An error gets the solution so far as its attribute ``solution``.  A run within the context must
+    not write the files ``outputs``.  ``begin`` is the value of the clock at the beginning of the
+    run.  After the last step the ledger and the mesh dependence of hinges are checked.
     """
     with ExitStack() as stack:
         stack.callback(simulation.close)
@@ -277,7 +279,7 @@ def running(
         except BaseException as error:
             simulation.copies.finish()
             if simulation.subdomain.comm.size == 1 or error is simulation.together.raised:
-                simulation.end()  # else some processes may not get here
+                simulation.end()  # else processes that do not call it would leave others waiting
             stopped: Any = error
             stopped.solution = simulation.solution
             raise
@@ -308,7 +310,10 @@ def simulate_by_reference(
     start: Solution | None, mesh: Mesh | None, every: int, max_states: int, comm: MPI.Intracomm,
     progress: bool,
 ) -> Solution:  # fmt: skip
-    """Simulate a scene in ``number`` equal steps; other arguments are as in ``simulate``."""
+    """Simulate by the reference solver, in ``number`` equal steps between the two ``times`` (s).
+
+    Other arguments are as in :func:`simulate`.
+    """
     if comm.size > 1:
         require_plain(newton, f"mpirun, here with {comm.size} processes")
     newton = checked_newton(newton, comm)

@@ -39,34 +39,34 @@ APPLYING = 1 / 8
 """Fraction of the first step in which loads that act from the start are applied."""
 
 LONGEST = 0.05
-"""Time after which C returns, so that a run can be interrupted and shows its progress; s."""
+"""Wall time after which C returns, so that a run can be interrupted and shows its progress; s."""
 
 MOST_VALUES = 2**20
-"""Limit of the numbers that C writes in a call, for the states of all its steps."""
+"""Limit of the numbers that C writes in a call for the states of all steps, at least one state."""
 
 
 class Simulation(Stepper):
     """Time stepper of a scene: its present state and the step to the next state.
 
-    :func:`simulate` is a loop over :meth:`step_to`; use this class for loops of your own.
+    :func:`simulate` is a loop over steps; use this class for loops of your own.
 
     Args:
         scene: Model.
         scheme: :class:`Static`, :class:`EnergyMomentum` or another scheme, see docs/schemes.md.
         t0: Time of the initial state; s.
-        start: Solution of the same beams whose last state is the initial state.  Joints may be
+        start: Solution whose last state is the initial state, with the same beams.  Joints may be
             removed, or added where places coincide.
-        newton: Tolerances and PETSc options.
+        newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default as in ``start``, or the cells of the beams.
         comm: Processes that share the scene; by default all, or in a :func:`study` this process
             alone.
-        kind: Class of the solution.
+        kind: Class of :attr:`solution`.
 
     Attributes:
         t: Time; s.
         solution: Solution so far.
-        parts: Number of substeps; an undivided step counts as one substep.
-        copies: Comparison of the processes if each computes a small scene as a whole.
+        parts: Number of substeps so far; an undivided step counts as one substep.
+        copies: Comparison of the processes if each of them computes a small scene as a whole.
 
     Example:
         >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
@@ -148,7 +148,7 @@ class Simulation(Stepper):
         )
         acts = any(isinstance(load, RotatingFrame) for load in scene.loads) or bool(scene.works)
         acts = acts or any(f(t0) != 0 for _, f in scene.time_functions())
-        # If forces act before the end of a step, loads that act from the start are applied first.
+        # Whether loads that act from the start are applied before the first step, see stepper.py
         self._applies = fresh and inertia is None and solution.between != 1.0 and acts
         give_back_memory(len(q_local))
         if inertia is not None and (scene.all_connectors or scene.supports):
@@ -161,13 +161,17 @@ class Simulation(Stepper):
         """Advance to the time ``t1`` in one step or, if it fails, in substeps.
 
         Raises:
-            ConvergenceError: Even the smallest substep failed.  The last accepted substep gives
-                the state, with which the solution of the error ends.
+            ConvergenceError: Even the smallest substep failed.  The state is then the end of the
+                last accepted substep, and the last state of the solution in the error.
+            ModelError: The first static step failed, and a motion without strain is free.
         """
         self.steps_to(np.array([t1]))
 
     def steps_to(self, ends: Array, *, keep: bool = False) -> int:
-        """Advance to the first of these times, and to more of them within ``LONGEST`` seconds.
+        """Advance to the first of the times ``ends``, and to later ones until C returns.
+
+        C returns after :data:`LONGEST`, after a divided step, and when the memory for new states is
+        full; with several processes that share the scene, after each step.
 
         Args:
             ends: Ends of steps; (n,); s.
@@ -215,7 +219,8 @@ class Simulation(Stepper):
             with self._in_c():
                 taken: int = lib.take_steps(c, number, doubles(ends), LONGEST, row_limit > 0, rows)
             if keep and taken:
-                # A divided step is written again: its last substep begins after the kept state.
+                # The row of a divided step lacks q at the beginning of the last substep, on which
+                # forces depend.  So `keep` writes this state instead.
                 divided = solution.begun and row_limit > 0 and c.parts_of_last > 1
                 if row_limit and taken > divided:
                     solution.grow(taken - divided)
@@ -229,7 +234,10 @@ class Simulation(Stepper):
         return taken
 
     def watch(self, parts: Array) -> ExtremesInC | None:
-        """Let C update extremes after each step, or return None if processes share the scene."""
+        """Return extremes at the fractions ``parts`` of cells, which C updates after each step.
+
+        The result is None if processes share the scene.
+        """
         if not self.subdomain.alone:
             return None
         along = ForcesAlongCells(self.numbering), self.solution.between
@@ -242,7 +250,8 @@ class Simulation(Stepper):
         """End the run in its present state, because even the smallest step, to ``end``, failed.
 
         Raises:
-            ConvergenceError: With the solution so far.
+            ConvergenceError: Error with the solution so far.
+            ModelError: Error instead, if a motion without strain is free in statics.
         """
         self.copies.finish()
         self.supports.go_back()
@@ -258,7 +267,7 @@ class Simulation(Stepper):
     def now(self) -> States:
         """The present state in the form of a solution; all processes call it together.
 
-        Before the first step of a dynamic run, reactions belong to the scene at rest.
+        Before the first step of a dynamic run, reactions are zero or the last ones of ``start``.
 
         Example:
             >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
@@ -289,11 +298,14 @@ class Simulation(Stepper):
 
     @property
     def _lacks_record(self) -> bool:
-        """True if the row has no record from which the forces of cells are computed."""
+        """True if the forces of cells cannot be computed from the row of the state."""
         return not self._writer.records or bool(self.cell_forces.c.given)
 
     def _gathered_forces(self, parts: int, *_: Array) -> Array:
-        """Return ``cell_number`` of loops.h of all cells; ``parts`` must be the present number."""
+        """Return the forces of all cells, ``cell_number`` of loops.h; (9, num_cells).
+
+        They belong to the state after ``parts`` substeps, which must be the present state.
+        """
         if parts != self.parts:
             raise ArgumentError("section forces of an earlier state: ask for simulation.now again")
         forces: Array = np.zeros((lib.CELL_NUMBERS, len(self.numbering.cells)))
@@ -303,7 +315,7 @@ class Simulation(Stepper):
         return forces
 
     def keep(self, solution: Solution | None = None) -> None:
-        """Append the state to a solution, by default its own; all processes call it together."""
+        """Append the state to a solution, by default :attr:`solution`; all processes call it."""
         solution = self.solution if solution is None else solution
         columns = self._writer.columns
         follows = not solution.begun or solution.parts_of_last == self.parts - 1
@@ -323,7 +335,7 @@ class Simulation(Stepper):
                 columns = columns.plus(BEFORE, before.shape)
                 parts.append(before)
             solution.append(columns, *parts)
-            if self.parts == 0 and has_inertia(self.scheme):  # reactions are not known
+            if self.parts == 0 and has_inertia(self.scheme):  # reactions are not yet known
                 columns, row = solution.row(-1)
                 columns.column_of("reactions", row).fill(math.nan)
         solution.count(self.parts, self.iterations)
@@ -336,11 +348,12 @@ class Simulation(Stepper):
         return DolfinxView(self)
 
     def end(self) -> None:
-        """Give the solution the last state and the internal variables for a continued run."""
+        """Store the last state, and the data for ``start=``, in the solution."""
         self.copies.synchronize()
         if self.t not in self.solution.times[-1:]:
             self.keep()
-        self.solution.parts, self.solution.iterations = self.parts, self.iterations  # with failures
+        # Iterations of failed steps count, too.
+        self.solution.parts, self.solution.iterations = self.parts, self.iterations
         self.solution.internal = self.equation.internal_variables(self.q, self.t)
 
     def snapshot(self) -> Solution:
@@ -352,7 +365,7 @@ class Simulation(Stepper):
         return now
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore the data of later steps; the number of processes may have changed.
+        """Save or restore the data for later steps, which may run on another number of processes.
 
         All processes call it together.
         """

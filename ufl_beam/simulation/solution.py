@@ -49,31 +49,32 @@ from ufl_beam.output.states import States
 from ufl_beam.parallel import active_comm, on_first
 
 UNKNOWN = -2
-"""Value of ``parts_of_last`` if no step begins at the last kept state."""
+"""Value of ``parts_of_last`` if the next step does not begin at the last kept state."""
 
 
 class Solution(States, Rich):
     """Results of a run: motions and forces at the kept times; the same on every process.
 
-    It can be saved, see :meth:`save`, and pickled with the same content.
+    A solution can be saved, see :meth:`save`, and pickled with the same content.
 
     Attributes:
         scene: Model.
-        numbering: Its vertices, cells and numbering.
-        parts: Number of steps taken; each substep is counted.
+        numbering: Vertices, cells and degrees of freedom of the scene.
+        parts: Number of substeps; an undivided step counts as one substep.
         iterations: Number of Newton iterations.
-        time_error: Sum of the estimated errors of :class:`Adaptive` steps, relative to the size of
-            the scene, or in rad; NaN with equal steps.
+        time_error: Sum of the estimated errors of all steps, see :class:`Adaptive`; NaN with equal
+            steps.
         seconds: Wall time of the run, building the scene included; s.
         building: Wall time of building the scene in :func:`simulate`, which is not saved; s.
         every: Number of steps between kept states.
         parameter: Names and formats of :attr:`times`, which are load factors in a path.
         open_ledger: Message on an open energy ledger; empty if the ledger closes as claimed.
-        warnings: Warnings of the run, one in a line; see docs/warnings.md.
-        internal: Internal variables of cells and connectors at the end of the run.
-        scheme: Time scheme of the run; None if the solution was loaded.
-        parts_of_last: Number of steps up to the last state; :data:`UNKNOWN` if no step begins
-            there.
+        warnings: Warnings of the run, one in each line; see docs/warnings.md.
+        internal: Data at the end of the run for a run that continues it: internal variables of
+            cells and connectors, reactions, rates and forces.
+        scheme: Time scheme of the run; None if the solution was loaded or unpickled.
+        parts_of_last: Number of substeps up to the last kept state; :data:`UNKNOWN` if the next
+            step does not begin there.
 
     Example:
         >>> print((1e3 * solution.displacement(beam.end)[-1]).round(1))  # mm, mm, mrad, at t = 1 s
@@ -97,7 +98,7 @@ class Solution(States, Rich):
         self.parts_of_last = UNKNOWN
 
     def count(self, parts: int, iterations: int) -> None:
-        """Store the numbers of steps and iterations up to the last state."""
+        """Store the numbers of substeps and iterations up to the last state."""
         self.parts, self.iterations, self.parts_of_last = parts, iterations, parts
 
     def downsample(self) -> None:
@@ -117,11 +118,12 @@ class Solution(States, Rich):
     # -- files ---------------------------------------------------------------------------------
 
     def save(self, path: str | Path) -> None:
-        """Write a file with a checksum, which :meth:`load` reads; all processes call it together.
+        """Write the solution to a file for :meth:`load`; all processes call it together.
 
-        It has all results and the numbers of the scene, but no code: functions of time are saved
-        as values at the kept times, curves as points, other functions and user laws by their names.
-        An existing file is replaced once the new file is complete.
+        The file has all results and the numbers of the scene, but no code: functions of time are
+        saved as values at the kept times, curves as points, other functions by their names, and
+        user laws by their names and numbers.  An existing file is replaced once the new file is
+        complete.
 
         Raises:
             ArgumentError: The file cannot be written, or an object of the scene is no dataclass.
@@ -143,9 +145,9 @@ class Solution(States, Rich):
                 names must agree with the file, and functions of time must have the same values.
 
         Raises:
-            ArgumentError: The file is missing, damaged, no solution, or of another scene; its
-                version numbers degrees of freedom differently; or it has user laws, and no scene
-                is given.
+            ArgumentError: The file is missing, damaged, no solution, or of another scene; the
+                version that wrote it numbers degrees of freedom differently; or it has user laws,
+                and no scene is given.
 
         Example:
             >>> solution.save("beam.h5")
@@ -163,7 +165,7 @@ class Solution(States, Rich):
         numbering = self.numbering
 
         def record(owner: Any, field: str, function: Any) -> Any:
-            """Return the record for a function that is a field of ``owner``."""
+            """Return the record that replaces a function in a field of ``owner``, or None."""
             if field == "curve" and isinstance(owner, Member):
                 return SavedCurve.sampled(function, 0.0, 1.0, numbering.parameters(owner))
             if field == "curve":
@@ -197,16 +199,17 @@ class Solution(States, Rich):
 
     @property
     def progress(self) -> Array:
-        """Increasing abscissa of the kept states, here the time; (n+1,)."""
+        """Increasing abscissa of the kept states, here the time; (n+1,); s."""
         return self.times
 
     def hinge_place_error(self) -> dict[Member, float]:
-        """Return the largest relative shift of the limit by the place of an embedded hinge.
+        """Return, for beams with open embedded hinges, the largest relative shift of their limit.
 
         A hinge of ``Section(hinge=)`` is in the middle of its cell of length h and opens when the
         moment there reaches the limit; at the ends of the cell the moment differs by ``|V| h/2``.
-        The shift is ``|V| h / (2 limit)`` with V at the last kept time before the opening.  Keys
-        are the beams with embedded hinges that opened in the run.
+        The shift is ``|V| h / (2 limit)``, with V at the last kept time before the opening; if
+        this is the initial time, V is taken at the next kept time.  Hinges that were open at the
+        beginning of the run are not included.
         """
         return {hinges.beam: hinges.error for hinges in Opened(self).hinges()}
 
@@ -237,7 +240,7 @@ class Solution(States, Rich):
 
 
 def restored(content: Content, scene: Scene | None = None) -> Solution:
-    """Make a solution from the content of a file, with the saved scene or the given scene."""
+    """Make a solution from the content of a file, with the given ``scene`` or the saved scene."""
     described = from_data(content["scene"]) if scene is None else scene
     numbering = DofNumbering(described, from_data(content["mesh"]))
     if numbering.checksum() != content["numbering"]:
@@ -266,38 +269,34 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
 
 # -- cells that opened -----------------------------------------------------------------------------
 #
-# An embedded hinge is in the middle of its cell and feels the mean moment of the cell.  At the ends
-# of the cell the moment differs by |V| h/2, so a hinge that belongs there opens at another load.
+# An embedded hinge is in the middle of its cell and opens by the mean moment of the cell.  At the
+# ends of the cell the moment differs by |V| h/2.  So a hinge at an end would open at another load.
 
 WARNED_SHIFT = 0.05
-"""Shift of a limit by the place of its hinge above which a run warns; fraction of the limit."""
+"""Largest shift, see :meth:`Solution.hinge_place_error`, without a warning."""
 
 INCREMENT = 1e-6
-"""Increment of the opening for the slope of a resistance, as a fraction of energy / limit."""
+"""Increment of the opening in a difference quotient, as a fraction of fracture energy / limit."""
 
 
 class OpenedHinges(NamedTuple):
-    """Embedded hinges of a beam that opened in a run.
-
-    The error is the largest |V| h / (2 limit): the difference between the moments in the middle and
-    at the ends of such a cell, as a fraction of the limit.
-    """
+    """Embedded hinges of a beam that opened in a run."""
 
     beam: Member
-    number: int  # of cells
-    error: float
-    place: Place  # middle of the cell with the largest error
+    number: int  # number of hinges that opened
+    error: float  # largest shift of their limit, see `Solution.hinge_place_error`
+    place: Place  # middle of the cell with the largest shift
 
 
 class Opened:
     """Cells that opened in a run.
 
     Attributes:
-        first: Number of the first kept time after the opening; 0 if the cell was open at the
+        first: Index of the first kept time after the opening; 0 if the cell was open at the
             beginning, -1 if it stayed closed; (num_cells,).
         shear: |V| at the kept time before ``first``, or at ``first`` if the time before is the
             beginning of the run; (num_cells,); N.
-        dissipated: Energy dissipated by hinges and cracks at the end; (num_cells,); J.
+        dissipated: Energy that hinges and cracks dissipated up to the end; (num_cells,); J.
     """
 
     def __init__(self, states: States) -> None:
@@ -313,12 +312,12 @@ class Opened:
         rows = np.searchsorted(numbering.inelastic_cells, cells)
         dissipated, V = (states.column("material")[:, rows, k] for k in (HINGE, 1))
         self.first[cells] = first = (dissipated > 0).argmax(axis=0)
-        # After a sudden opening V is dominated by vibrations.
+        # V is taken before the opening, because a sudden opening causes vibrations.
         n = np.where(first > 1, first - 1, first)
         self.shear[cells] = np.abs(V[n, np.arange(len(cells))])
 
     def hinges(self) -> list[OpenedHinges]:
-        """Return the embedded hinges (laws of sections) that opened in the run, beam by beam."""
+        """Return, beam by beam, the hinges of ``Section(hinge=)`` that opened in the run."""
         numbering = self._numbering
         hinges = []
         for beam in numbering.scene.beams:
@@ -336,8 +335,8 @@ class Opened:
     def warn(self, scheme: Scheme) -> None:
         """Issue a :class:`ModelWarning` for each beam whose results depend on the mesh.
 
-        Resistances that fall faster with the opening than the stress of the cell come first.  The
-        stiffness of a cell against an opening is θ EI/h, or θ E/h of a fibre.
+        The first warnings are of hinges whose resistance falls faster with the opening than the
+        stress of the cell.  This stress falls with the stiffness θ EI/h, or θ E/h of a fibre.
         """
         numbering, times = self._numbering, self._times
         for beam in numbering.scene.beams:
@@ -376,15 +375,15 @@ def _cells_in_words(number: int) -> str:
 
 
 def _percent(fraction: float) -> str:
-    """Return a fraction in words: "12 %", or "more than 100 %" if the limit is near zero."""
+    """Return a fraction in per cent: "12 %", or "more than 100 %" if the limit is near zero."""
     return f"{100 * fraction:.2g} %" if fraction <= 1 else "more than 100 %"
 
 
 def _fall(section_points: SectionPoints | None, scheme: Scheme) -> tuple[float, float]:
-    """Return the softening slope over θ times the stiffness of the points (1/m), and an energy.
+    """Return the steepest softening slope, divided by θ times the stiffness (1/m), and an energy.
 
-    The slope is taken at the opening where the traction falls most steeply.  The energy is the
-    least that a cell dissipates before that opening; J.
+    The stiffness is the least of the points that can break.  The energy is the least that a cell
+    dissipates up to the opening with the steepest slope; J.  Both are zero without softening.
     """
     law = None if section_points is None else section_points.softening
     if section_points is None or law is None or law.limit == 0:
@@ -405,20 +404,23 @@ def _fall(section_points: SectionPoints | None, scheme: Scheme) -> tuple[float, 
 # -- text in the file ------------------------------------------------------------------------------
 
 FORMAT = "solution of ufl_beam, 4"
-"""The number grows whenever the meaning of files changes."""
+"""Format of the file; the number grows whenever the meaning of files changes."""
 
 NAMED = {
     "seconds": float, "time_error": float, "between": float, "begun": bool, "open_ledger": str,
     "warnings": str,
 }  # fmt: skip
-"""Attributes that are saved as they are, and their types."""
+"""Attributes that a file contains unchanged, and their types."""
 
 TIME_FUNCTIONS = ("amplitude", "u", "v", "psi", "motion", "force", "numbers")
-"""Fields that are functions of time, except the forces of controllers and force laws."""
+"""Names of fields with functions of time; "force" of controllers and force laws is an exception."""
 
 
 def _used_curve(solution: Solution, curve: Curve) -> SavedCurve:
-    """Return the used interval of a guide curve, with a tenth and the steps of tangents added."""
+    """Sample the part of a guide curve that the motion used, extended at both ends.
+
+    The extension is a tenth of the part plus eight steps of :func:`parameter_step`.
+    """
     scene, used = solution.scene, [0.0]
     for connector in scene.all_connectors:
         if isinstance(connector.law, Guide) and connector.law.curve is curve:

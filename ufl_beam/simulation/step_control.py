@@ -18,19 +18,20 @@ GROWTH = 1.5
 """Largest ratio of the length of a step to the length of the previous step."""
 
 MOST = 2**14
-"""Largest number of steps in a call, which returns much sooner if steps take long."""
+"""Largest number of steps that one call of C gets; it returns earlier if steps take long."""
 
 SAMPLES = (0.01, 0.5, 0.99)
-"""Fractions of a step at which loads are evaluated."""
+"""Fractions of a step at which functions of time are sampled, to estimate the error of the
+midpoint rule.  The ends are left out, because functions may jump there."""
 
 
 def step_count(time: float, dt: float) -> int:
-    """Return the least number of equal steps not longer than ``dt``, up to rounding."""
+    """Return the least number of equal steps not longer than ``dt``, up to round-off."""
     return max(1, math.ceil(time / dt * (1 - 1e-9)))
 
 
 class EqualSteps:
-    """Steps of equal size, a little shorter than ``dt`` if ``dt`` does not divide the time."""
+    """Steps of equal length, a little shorter than ``dt`` if the run is no multiple of ``dt``."""
 
     def __init__(self, simulation: Simulation, t1: float, dt: float) -> None:
         self._simulation, self._t0, self._time = simulation, simulation.t, t1 - simulation.t
@@ -39,16 +40,16 @@ class EqualSteps:
 
     @property
     def finished(self) -> bool:
-        """True if all steps are done."""
+        """True if all steps have been taken."""
         return self.steps == self._all
 
     @property
     def progress(self) -> float:
-        """Fraction of the steps that are done."""
+        """Fraction of the steps that have been taken."""
         return self.steps / self._all
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take up to ``most`` steps, in substeps if they fail; ``keep`` keeps each state."""
+        """Take up to ``most`` steps, in substeps if they fail; with ``keep``, states are kept."""
         steps = np.arange(self.steps, min(self.steps + min(most, MOST), self._all)) + 1
         ends = self._t0 + self._time * steps / self._all
         self.steps += self._simulation.steps_to(ends, keep=keep)
@@ -64,24 +65,26 @@ class EqualSteps:
 
 @dataclass(frozen=True)
 class Adaptive:
-    """Adaptive time steps with a given local error, as an argument ``dt``.
+    """Adaptive time steps with a limited error of each step, for the argument ``dt``.
 
-    The error of a step is estimated from the change of accelerations between steps, and from the
-    error of loads that are evaluated in the middle of the step.  As in other integrators, the
-    tolerance applies to one step; the sum over a run is :attr:`Solution.time_error`.  Errors of
-    the spatial discretization are not included.
+    The error of a step is estimated from its acceleration, from the change of the acceleration
+    since the last step, and from the midpoint rule for loads and prescribed motions.  As in other
+    integrators, the tolerance applies to one step; the sum over a run is
+    :attr:`Solution.time_error`.  Errors of the spatial discretization are not included.
 
     Steps end at the times of every :class:`Table` in the scene, at the times in an attribute
-    ``kinks`` of other functions of time, and at ``stops``.
+    ``kinks`` of other functions of time, at ``stops``, and at samples of controllers.
 
     Args:
-        tolerance: Largest error of a step: of positions relative to the size of the scene, of
-            rotations in rad, of the impulse of a load relative to its largest value times the run.
+        tolerance: Largest error of a step.  Errors of positions are divided by the size of the
+            scene, errors of rotations are in rad, and errors of the impulse of a load are divided
+            by its largest value so far times the duration of the run.
         first: First step to be tried; s.  By default a hundredth of the run.
         longest: Longest step; s.
         shortest: Shortest step; s.  If a shorter step is needed, the run ends with an error.  By
-            default 1e-12 of the run.
-        stops: More times at which steps must end; s.
+            default 1e-12 of the run; never less than 16 units of the last digit of a time.
+        stops: Further times at which steps end; s.  Times closer than 1e-9 of the run, or than the
+            shortest step, to another time are left out.
 
     Raises:
         ArgumentError: A number is out of range.
@@ -124,7 +127,7 @@ class AdaptiveSteps:
         self._functions = list(dict.fromkeys(functions))
         self._largest = [0.0] * len(self._functions)
         kinks = {float(t) for f in self._functions for t in getattr(f, "kinks", ())}
-        # Times that differ by rounding alone are merged.
+        # Of times closer than this only the first is kept: they may differ by round-off alone.
         same = max(1e-9 * (t1 - t0), self._shortest)
         inside = sorted(t for t in (*kinks, *control.stops) if t0 + same < t < t1 - same)
         apart = [t for before, t in pairwise([t0, *inside]) if t - before > same]
@@ -133,22 +136,22 @@ class AdaptiveSteps:
         subdomain = simulation.subdomain
         self._rotations, (self._x, self._y) = subdomain.rotations, subdomain.translations()
         M = simulation.inertia.M
-        bears = np.bincount(M.rows(), weights=np.abs(M.data), minlength=subdomain.size)
-        self._massless = np.flatnonzero(bears == 0.0)
+        masses = np.bincount(M.rows(), weights=np.abs(M.data), minlength=subdomain.size)
+        self._massless = np.flatnonzero(masses == 0.0)
         self.steps, self.error = 0, 0.0
 
     @property
     def finished(self) -> bool:
-        """True if the end is reached."""
+        """True if the end of the run is reached."""
         return self._simulation.t == self._t1
 
     @property
     def progress(self) -> float:
-        """Fraction of the time that has passed."""
+        """Fraction of the duration of the run that has passed."""
         return (self._simulation.t - self._t0) / (self._t1 - self._t0)
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take one step, shortened until its error is allowed; ``keep`` keeps its state."""
+        """Take one step, so short that its error is allowed; with ``keep``, its end is kept."""
         simulation = self._simulation
         stop = next(t for t in self._stops if t > simulation.t)
         stop = simulation.controllers.next_sample(simulation.t, stop)
@@ -161,8 +164,8 @@ class AdaptiveSteps:
                     break
                 self._dt = dt * max(change, 0.1)
                 failure = StepFailed(
-                    f"its error {error:.1e} is above the tolerance {self._tolerance:.1e}; if a "
-                    "load or a motion jumps, name the time in `stops`"
+                    f"the error {error:.1e} of the step is above the tolerance "
+                    f"{self._tolerance:.1e}; if a load or a motion jumps, name the time in `stops`"
                 )
             except StepFailed as reason:
                 failure, self._dt = reason, self._dt / 4
@@ -172,23 +175,21 @@ class AdaptiveSteps:
         self.error += error
         self.steps += 1
         self._dt = min(dt * min(change, GROWTH), self._longest)
-        # The acceleration may jump at a stop, so earlier steps do not predict the next step.
+        # The acceleration may jump at a stop, so its change since the last step is no measure.
         self._fresh = simulation.t == stop
         if keep:
             simulation.keep()
 
     def _attempt(self, stop: float) -> tuple[Trial, float]:
-        """Solve the next step and estimate its error.
-
-        The error is the largest of a position over the size of the scene, a rotation, or a load.
-        """
+        """Solve the next step and estimate its error, as defined by :class:`Adaptive`."""
         simulation, supports = self._simulation, self._simulation.supports
         inertia = simulation.inertia
         left = stop - simulation.t
-        # Two equal steps to a stop instead of a long and a tiny step
+        # Two equal steps to a stop, because a long step could leave a tiny one
         dt = left if self._dt >= left else min(self._dt, left / 2)
         if self._fresh:
-            # Without an earlier step, half of the step is compared with the whole step.
+            # Without an earlier step, accelerations in half of the step and in the whole step are
+            # compared.
             whole = simulation.attempt(simulation.t + dt)
             before, between = (inertia.after(whole.s, whole.step.dt)[0] - inertia.v) / dt, -dt / 4
             dt /= 2
@@ -204,7 +205,7 @@ class AdaptiveSteps:
         error[self._rotations] += (trial.q1 - simulation.q - trial.s)[self._rotations]
         supports.into_axes(error)
         error[supports.dofs] = 0.0
-        # Rotations without inertia follow the other motions, and jump with a load.
+        # Motions without inertia follow the other motions, and jump with a load.
         error[self._massless] = 0.0
         supports.into_plane(error)
         moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
@@ -215,17 +216,19 @@ class AdaptiveSteps:
         )
 
     def _load_error(self, dt: float) -> float:
-        """Return the largest error of the midpoint rule for loads, relative to their impulses."""
+        """Return the largest error of the midpoint rule for the integral of a load over the step.
+
+        Each error is divided by the largest value of the load so far times the duration of the run.
+        """
         error, t = 0.0, self._simulation.t
         for i, function in enumerate(self._functions):
-            # Not at the ends, where there may be jumps
             before, middle, after = (float(function(t + fraction * dt)) for fraction in SAMPLES)
             self._largest[i] = max(self._largest[i], abs(before), abs(middle), abs(after))
             error = max(error, abs(before - 2 * middle + after) / (self._largest[i] or 1.0))
-        return error / 6 * dt / (self._t1 - self._t0)  # Simpson's rule less the midpoint's
+        return error / 6 * dt / (self._t1 - self._t0)  # Simpson's rule minus midpoint rule
 
     def state(self) -> dict[str, float]:
-        """Return the numbers that the next step depends on, and the counters."""
+        """Return the numbers that determine the next step, the number of steps, and the error."""
         largest = {f"largest {i}": value for i, value in enumerate(self._largest)}
         return {**{name: float(getattr(self, name)) for name in self._STATE}, **largest}
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Equation of a step: the terms of a scene and their sum; and checks of static steps."""
+"""Equation of a step, the sum of the terms of a scene, and checks of static steps."""
 
 from __future__ import annotations
 
@@ -50,24 +50,27 @@ MOVING = "inertia", "damping"
 class StepEquation:
     """Sum of the virtual works of all terms, minus reactions, at local degrees of freedom.
 
-    The terms are made for a scene that begins at t0 (s), on the subdomain of one process.  The
-    initial local velocities ``v`` are set to zero in place where supports do not move.
+    The terms are made on the subdomain of one process, for a run that begins at ``t0`` (s).  Where
+    supports do not move, the initial local velocities ``v`` are set to zero.
 
     Attributes:
         A: Matrix of the tangent.
         fields: Fields on the cells of this process.
         ledger: Energies of this process.
         controllers: Forces of controllers and limits of friction in the step.
-        beams: Terms of cells; ``inelastic`` cells, which have material points, come first.
+        beams: Terms of cells; ``inelastic``, the terms of cells with material points, come first.
         connector_terms: Terms of connectors, grouped by kind.
+        loads: Terms of loads and works.
+        supports: Prescribed motions and reactions.
         inertia: Inertia; None in statics.
-        terms: All terms; the forces of ``inner`` terms, ``beams`` and ``connectors``, are internal.
-        weights: Weights of residuals: 1 for forces, 1 over the size of the scene for moments, 0
-            for ghosts and forces of connectors.
+        terms: All terms: ``inner``, with the internal forces of ``beams`` and ``connector_terms``,
+            and ``others``.
+        weights: Weights of residuals: 1 for forces, 1 / (size of the scene) for moments, 0 for
+            ghosts and rows of connectors.
         force: Internal forces in the latest residual, in statics; else empty.
         c: ``equation`` of loops.h, which a solver completes with its own data.
         callbacks: Python functions that C calls.
-        phases: Phases of the terms.
+        phases: Phases of the terms, in the order of ``terms``.
         cell_forces: Forces of the terms on the nodes of cells.
     """
 
@@ -81,8 +84,8 @@ class StepEquation:
         self.A = A = fields.matrix()
         setting = (scheme, A, ledger)
 
-        # Each kind makes its entries of the ledger, in the order of the columns of tables.  The
-        # order follows from the scene alone, even if a process lacks cells or connectors of a kind.
+        # Terms create their entries of the ledger in the order of the columns of tables.  All
+        # processes have the same entries, even without cells or connectors of a kind.
         self.inelastic, elastic = list[InelasticBeams](), np.ones(len(subdomain.cells), dtype=bool)
         for section_points, cells in subdomain.numbering.inelastic:
             expect_entries(section_points, scheme, ledger)
@@ -135,7 +138,7 @@ class StepEquation:
         self.cell_forces = CellForces(subdomain, in_cells, *in_c)
 
     def _fill_c(self, search: Index, switched: Index) -> None:
-        """Fill ``equation`` of loops.h, and get the phases of the terms."""
+        """Fill ``equation`` of loops.h, and collect the phases of the terms."""
         subdomain, A, supports = self.subdomain, self.A, self.supports
         self.c = struct("equation", size=A.size, owned=subdomain.num_owned, weight=self.weights)
         self.callbacks = callbacks = Callbacks(self.c)
@@ -143,7 +146,7 @@ class StepEquation:
         stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
 
         def pop(name: str) -> Any:
-            """Remove the first stiffness of this name, and return its data, or null."""
+            """Remove the first stiffness with this C function; return its data, or null."""
             matches = (call for call in stiffnesses if call[0] == ffi.addressof(lib, name))
             if (match := next(matches, None)) is None:
                 return ffi.NULL
@@ -176,13 +179,13 @@ class StepEquation:
         self.force = np.zeros(0 if self.inertia is not None else subdomain.size)
         if self.inertia is None:
             fill(self.c, inner_force=self.force)
-        # The ledger has all its entries now.  Phases write to their addresses.
+        # The ledger has all entries now, so their addresses, to which phases write, do not change.
         self.phases = [term.phases(callbacks) for term in self.terms]
 
     # -- continued runs ------------------------------------------------------------------------
 
     def internal_variables(self, q: Array, t: float) -> State:
-        """Return the data for a run that starts here: internal variables, reactions, rates."""
+        """Return the data for a run that starts here: variables, reactions, rates and forces."""
         archive = Archive(self.subdomain)
         self.controllers.save_or_restore(archive, t)
         for term in (*self.inelastic, *self.connector_terms):
@@ -202,7 +205,8 @@ class StepEquation:
     def set_internal_variables(self, q: Array, t: float, internal: State, *, same: bool) -> None:
         """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
 
-        ``same`` says that no force has changed since, so that accelerations are unchanged.
+        With ``same``, time and scene are those at the end of the other run, so that accelerations
+        are unchanged.
         """
         archive = Archive(self.subdomain, internal)
         self.controllers.save_or_restore(archive, t)
@@ -238,7 +242,7 @@ class StepEquation:
             "motion_time": step.motion_time, "fraction": step.fraction, "at": step.at,
             "ratio": step.ratio, "q0": doubles(q0), "q_before": doubles(q_before),
         })  # fmt: skip
-        self._begun = c, q0, q_before  # as long as forms and terms refer to them
+        self._begun = c, q0, q_before  # kept alive while C refers to them
         with self.callbacks.raising():
             for term, phases in zip(self.terms, self.phases, strict=True):
                 for begin, data in phases.begin if term in some else ():
@@ -251,7 +255,7 @@ class StepEquation:
     def inner_forces(self, q: Array, t: float | None = None) -> Array:
         """Return the forces of beams at ``q``, in a step too short for viscous flow.
 
-        With a time ``t``, forces of connectors at ``t``, which are unknowns in ``q``, are added.
+        With a time ``t``, forces of connectors at that time, unknowns in ``q``, are added.
         """
         short, forces = sys.float_info.min, np.zeros(self.subdomain.size)
         self.begin(Step.of(self.scheme, 0.0, short, short, q), self.beams)
@@ -274,7 +278,7 @@ class StepEquation:
     def tangent_at(self, x: Array, v: Array, r: Array) -> Csr:
         """Return the tangent at ``x``; add its product with a motion ``v`` of supports to ``r``.
 
-        All are local, and in the axes of the supports.
+        All vectors are local and in the axes of the supports.
         """
         lib.fill_tangent(self.c, doubles(self.supports.in_plane(x)))
         if len(self.supports.moving):
@@ -285,7 +289,7 @@ class StepEquation:
         return self.A
 
     def evaluate(self, q1: Array) -> bool:
-        """Evaluate forces and tangent of the present step at ``q1``; False if a process fails."""
+        """Evaluate forces and tangent of the step at ``q1``; return False if a process fails."""
         lib.restart(self.c, lib.EXACT)
         self.c.raised = 0
         try:
@@ -304,17 +308,18 @@ class StepEquation:
         return r
 
     def tangent(self, q1: Array) -> None:
-        """Fill the matrix with the tangent at ``q1``, in the axes of supports, with these held.
+        """Fill the matrix with the tangent at ``q1``, in the axes of supports.
 
-        Errors of user functions are stored in :attr:`callbacks`.
+        Rows and columns of supports keep only their diagonal entries.  Errors of user functions are
+        stored in :attr:`callbacks`.
         """
         lib.fill_tangent(self.c, doubles(q1))
         lib.hold_tangent(self.c)
 
     def working(self, q: Array, y: Array) -> Array:
-        """Return the conjugates of residuals in a step ``y`` in the axes of supports; a new array.
+        """Return the motions on which residuals do work in a step ``y`` from ``q``; a new array.
 
-        They are the step itself, with motions of connectors instead of their forces.
+        They are ``y``, in the axes of supports, with motions of connectors instead of their forces.
         """
         v, works = self.supports.in_plane(y), y.copy()
         for group in self.connector_terms:
@@ -346,7 +351,7 @@ class StepEquation:
         return self.A.data.copy()
 
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
-        """Return works of the tangent of :meth:`linearise` for pairs of columns of X and Y; J."""
+        """Return works of the tangent of :meth:`linearise`, xᵀ K y for pairs of columns; J."""
         self.A.data.fill(0.0)
         for term in (*self.connector_terms, *self.others):
             if term.kind != "inertia":
@@ -358,7 +363,11 @@ class StepEquation:
         return works
 
     def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
-        """Return works of the tangent and of its derivative along u for X on Y; symmetric; J."""
+        """Return Xᵀ K Y and Xᵀ K' Y, of which only the upper triangles are computed; J.
+
+        K is the tangent of beams, connectors and loads, and K' its derivative along ``u``.  Both
+        results must be symmetric.
+        """
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
             x, y = (np.ascontiguousarray(column) for column in (X[:, i], Y[:, j]))
@@ -378,9 +387,9 @@ class StepEquation:
 
 
 def forces_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Callable[..., Array]:
-    """Return :meth:`CellForces.forces_from_record` of all cells, for a record of several processes.
+    """Return :meth:`CellForces.forces_from_record` for all cells of a scene on several processes.
 
-    The equation of the whole scene is made at the first call, without communication.
+    The first call of the result makes the equation of the whole scene, without communication.
     """
 
     @cache
@@ -396,7 +405,7 @@ def forces_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Calla
 # -- checks of static steps ------------------------------------------------------------------------
 
 LARGEST_MOTION = 1e3
-"""Largest motion of a node in a step without a mechanism; sizes of the scene or radians."""
+"""Largest motion of a node in a step that is no mechanism; in sizes of the scene, or rad."""
 
 KINK_IMBALANCE = 1e-6
 """Imbalance of work that a kink of a law may cause, as a fraction of the energy transferred."""
@@ -405,16 +414,17 @@ KINK_IMBALANCE = 1e-6
 class StaticPath:
     """Checks of each static step before it is accepted.
 
-    The work of the internal forces must equal the energy that a step stores and dissipates.
-    Otherwise Newton's method may have found another branch of equilibria: beyond a limit load, or
-    where softening releases more energy than it dissipates.  The ``slack`` of the scheme limits
-    the imbalance of work.  ``force`` are the internal forces at the end of the last step.
+    No node may move as a mechanism does, and the work of the internal forces must equal the energy
+    that the step stores and dissipates.  Otherwise Newton's method may have found another branch of
+    equilibria: beyond a limit load, or where softening releases more energy than it dissipates.
+    The ``slack`` of the scheme limits the imbalance of work.
 
     The first state, ``q`` at ``t0``, is in equilibrium with ``loads``, which are empty if nothing
-    acts yet.  Reactions are set from this equilibrium.  A path that ``goes_on`` from a static run
-    of the same scene has them already, with viscous forces.
+    acts yet.  Reactions are set from this equilibrium, unless the run ``goes_on`` from a static run
+    of the same scene, whose reactions include viscous forces.
 
     Attributes:
+        force: Internal forces at the end of the last step.
         c: ``static_path`` of loops.h.
     """
 
@@ -447,7 +457,7 @@ class StaticPath:
         self.force[:] = archive.added("internal forces", self.force)
 
     def failure(self, mechanism: bool) -> StepFailed:
-        """Return why the latest step is rejected: it leaves a mechanism, or changes the branch."""
+        """Return why the latest step is rejected: it is a ``mechanism``, or changes the branch."""
         c = self.c
         if mechanism:
             return StepFailed(

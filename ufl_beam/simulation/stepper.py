@@ -2,8 +2,8 @@
 """Steps of a scene in time_loop.c: they are solved, checked, accepted, and divided if they fail.
 
 In statics, if forces act before the end of a step, a step with large nodal rotations does not end
-in equilibrium.  So loads that act from the start are applied in substeps with small rotations, and
-the rest of the first step follows the loads.
+in equilibrium.  So the first part of the first step applies loads that act from the start, in
+substeps with small rotations.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
 
 
 class Prediction:
-    """Initial guess of a step by the last velocity and, ``in_motion``, by the last acceleration.
+    """Initial guess of a step, extrapolated from the last steps.
 
-    After steps of equal length, a fraction of the last second difference of the configuration is
-    added.  The fraction measures its agreement with the previous second difference: it is 1 in
-    smooth motion, and 0 if second differences change sign from step to step, or if steps do not
-    resolve the motion.
+    The guess continues with the velocity of the last step.  In dynamics (``in_motion``), after
+    three steps of equal length, a fraction of the last second difference of the configuration is
+    added.  The fraction measures how far the last two second differences agree: it is 1 in smooth
+    motion, and 0 if they have opposite signs, or if steps do not resolve the motion.
 
     Args:
         weights: Weights of residuals, see :class:`StepEquation`.
@@ -78,27 +78,29 @@ class Prediction:
 # -- check of static steps -------------------------------------------------------------------------
 
 LARGEST_ROTATION = 0.75 * math.pi
-"""Largest rotation of a node in a step; the algorithmic strains are valid up to π; rad."""
+"""Largest rotation of a node in a step; rad.  Algorithmic strains are valid up to π."""
 
 LEAST_AT_REST, LEAST_IN_MOTION = 2, 1
-"""Least iterations in statics and in dynamics, unless a residual is far below its tolerance.
+"""Least numbers of iterations in statics and in dynamics, unless a residual is far below its
+tolerance.
 
-Near buckling, a column magnifies a load that is hardly larger than the tolerance.  In dynamics its
-inertia prevents this.
+Near buckling, a load hardly larger than the tolerance moves a column far.  In dynamics the inertia
+of the column prevents this.
 """
 
 APPLYING_ROTATION = 0.02
 """Largest rotation of a node in a substep while loads are applied; rad.
 
-The relative error of a moment in a substep is a quarter of the square, about 1e-4.
+The relative error of a moment in a substep is a quarter of the square of this angle, about 1e-4.
 """
 
 FREE_STIFFNESS = 1e-3
-"""Stiffness against a motion without strain below which loads do not hold it, as a fraction of the
-forces over the size of the scene.  Weights and tensions reach some tenths."""
+"""Stiffness against a motion without strain up to which loads do not hold it, as a fraction of
+(size of the forces) / (size of the scene).  Weights and tensions provide some tenths of this."""
 
 SHORT_SUBSTEP = 512
-"""Substeps shorter by this factor have no such limit: still shorter substeps rotate as far."""
+"""Ratio of the time in which loads are applied to the length of a substep, from which the rotation
+in the substep is not limited, because still shorter substeps rotate as far."""
 
 MOST_SUBSTEPS: int = lib.MOST_SUBSTEPS
 """Largest number of substeps of a step."""
@@ -107,8 +109,7 @@ MOST_SUBSTEPS: int = lib.MOST_SUBSTEPS
 class Trial(NamedTuple):
     """Solved step that is not yet accepted, and the configuration ``q1`` at its end.
 
-    Forces do work on the nodal step ``s``, see :meth:`Scheme.nodal_step`; in dynamics it is the
-    mean velocity times ``dt``.
+    Forces do work on the nodal step ``s``, see :func:`~ufl_beam.mechanics.time_schemes.nodal_step`.
     """
 
     step: Step
@@ -119,27 +120,27 @@ class Trial(NamedTuple):
 class Stepper(StateView):
     """Steps of a scene in C, see time_loop.c: the base class of :class:`Simulation`.
 
-    C holds the state.  After each call Python has its time, configuration, velocities, reactions
-    and ledger.
+    C holds the state.  After each call of C, Python has the time, configuration, velocities,
+    reactions and ledger of the new state.
 
     Args:
         comm: Processes of the run.
-        newton: Tolerances and PETSc options.
+        newton: Tolerances and options of Newton's method.
         t: Time of the initial state; s.
         q: Local configuration of the initial state.
-        path: Check of static steps; None in dynamics.
+        path: Checks of static steps; None in dynamics.
         loose: Description of a motion that only loads may hold; empty if there is none.
 
     Attributes:
         t: Time; s.
-        parts: Number of substeps; an undivided step counts as one substep.
+        parts: Number of substeps so far; an undivided step counts as one substep.
         equation: Equation of a step, with its ``ledger``, ``controllers`` and terms.
         solver: Newton's method.
         prediction: Data of the last steps from which the initial guess is extrapolated.
         solution: Solution so far.
         time_loop: ``time_loop`` of loops.h.
-        copies: Comparison of the processes if each computes the scene as a whole.
-        together: Calls whose errors are raised on all processes that share the scene.
+        copies: Comparison of the processes if each of them computes the scene as a whole.
+        together: Caller of functions whose errors all processes that share the scene raise.
     """
 
     def __init__(
@@ -163,7 +164,7 @@ class Stepper(StateView):
         if equation.inertia is not None:
             self.inertia = equation.inertia
         in_motion, phases = equation.inertia is not None, equation.phases
-        self._begun_at: Array | None = None  # of the state before the first step
+        self._begun_at: Array | None = None  # `q_before` of the initial state
         self.parts = 0
         self.prediction = Prediction(subdomain, q, equation.weights, in_motion=in_motion)
 
@@ -214,7 +215,8 @@ class Stepper(StateView):
     def _add_callbacks(self) -> None:
         """Add functions of Python to the phases of the terms in a step.
 
-        `fill` does not store references to them, which would keep this object alive.
+        They are not added by `fill`, which would store references to them and so keep this object
+        alive.
         """
         c, callbacks, controllers = self.time_loop, self.equation.callbacks, self.controllers
         loops = {
@@ -227,7 +229,7 @@ class Stepper(StateView):
         if controllers.sampled:
             c.stop = lib.time_in_python
             c.stops = callbacks.handle(lambda t: controllers.next_sample(c.t, t))
-        # Calls that may raise come first, before other loops of C have accepted the step.
+        # Calls that may raise come first, before any loop of C has accepted the step.
         asking = lib.phase_in_python, ffi.addressof(lib, "accept_guides")
         mine = [call for call in loops["accept"] if call[0] in asking]
         if self._loose:
@@ -247,12 +249,12 @@ class Stepper(StateView):
     # -- callbacks -----------------------------------------------------------------------------
 
     def _evaluate_controllers(self, *_: Any) -> None:
-        """Evaluate controllers and limits of friction in the state of C."""
+        """Evaluate controllers and limits of friction in the present state of C."""
         self._moved(self.time_loop.t)
         self.together(self.controllers.evaluate, self)
 
     def _prepare(self) -> None:
-        """Store the quantities of a trial step that the scheme keeps besides the velocities."""
+        """Accept further rates, reactions and forces of connectors from a trial step."""
         c = self.time_loop
         _, *more = self.inertia.after(self._copy(c.s), c.step.dt)
         self.inertia.keep(*more)
@@ -264,8 +266,8 @@ class Stepper(StateView):
     def _require_stiffness(self, step: Any, q1: Any, s: Any) -> None:
         """Raise if a motion that only loads can hold is free in the equilibrium.
 
-        If loads hold it, the tangent is regular without stiffness against zero-energy modes.  All
-        processes call it together.
+        If loads hold this motion, the tangent is regular even without stiffness against zero-energy
+        modes.  All processes call it together.
         """
         equation, newton, numbering, loose = self.equation, self.solver, self.numbering, self._loose
         if not loose:
@@ -290,16 +292,16 @@ class Stepper(StateView):
             end: End of the whole step if this is a substep; s.
 
         Raises:
-            StepFailed: There is no equilibrium, or it is too far away.
+            StepFailed: No equilibrium was found, or the checks of a step reject it.
         """
         with self._in_c():
             solved = lib.attempt_step(self.time_loop, t1, t1 if end is None else end)
         return self._trial(solved)
 
     def attempt_along(self, step: Step, guess: Array, border: Any, *, hold: bool = True) -> Trial:
-        """Solve a step together with the load factor; its times belong to the guess.
+        """Solve a step together with the load factor; the times of ``step`` belong to the guess.
 
-        With ``hold`` points that do not flow are held closed if possible, see material_points.py.
+        With ``hold``, points that do not flow are held closed if possible, see material_points.py.
         The guess is in the axes of supports.
         """
         c = self.time_loop
@@ -340,7 +342,7 @@ class Stepper(StateView):
         try:
             yield
         except SystemError as error:
-            # Python's preconditioner under PETSc: its exception is still set when C returns.
+            # An exception in a preconditioner of Python is still set when PETSc and C return.
             raise error.__cause__ or error from None
         finally:
             self._moved(c.t)
@@ -355,7 +357,7 @@ class Stepper(StateView):
         """Raise the error of the latest step; all processes call it together."""
         c, callbacks = self.time_loop, self.equation.callbacks
         error, callbacks.error = callbacks.error, None
-        if not self.equation.c.raised:  # at a discarded iterate
+        if not self.equation.c.raised:  # a discarded iterate has raised the exception
             error = None
         failure, c.failure = c.failure, lib.SUCCEEDS
         if failure == lib.RAISED:
@@ -384,7 +386,10 @@ class Stepper(StateView):
         raise StepFailed("the step cannot be trusted")
 
     def warn(self, warnings: Iterable[str], *, local: bool = False) -> None:
-        """Issue and store warnings that the solution lacks; the first process warns, or this."""
+        """Store warnings that the solution lacks, and issue them on the first process.
+
+        With ``local``, this process issues them.
+        """
         for said in warnings:
             if said not in self.solution.warnings:
                 self.solution.warnings += f"{said}\n"
