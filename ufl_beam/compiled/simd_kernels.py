@@ -59,8 +59,8 @@ def in_vectors(kernel: str) -> str:
     """Rewrite the C code of an FFCx kernel with vectors instead of numbers.
 
     Divisions by constants become multiplications; divisions by variables that divide more than once
-    become calls of ``quotient`` in lanes.h.  Conditions become masks, whose bits in a lane are all
-    zero or all one, and logical operators become bitwise operators.
+    become calls of ``quotient`` in assembly_simd.h.  Conditions become masks, whose bits in a lane
+    are all zero or all one, and logical operators become bitwise operators.
 
     Raises:
         Refused: The kernel needs a function or a condition that assembly_simd.h does not provide.

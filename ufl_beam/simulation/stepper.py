@@ -109,7 +109,7 @@ MOST_SUBSTEPS: int = lib.MOST_SUBSTEPS
 class Trial(NamedTuple):
     """Solved step that is not yet accepted, and the configuration ``q1`` at its end.
 
-    Forces do work on the nodal step ``s``, see :func:`~ufl_beam.mechanics.time_schemes.nodal_step`.
+    Forces do work on the nodal step ``s``, see :func:`~ufl_beam.mechanics.time_scheme.nodal_step`.
     """
 
     step: Step
