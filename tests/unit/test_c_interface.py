@@ -217,7 +217,7 @@ def test_cells_with_more_entries_than_there_is_room_for():
 
 
 def test_arrays_of_other_sizes_are_refused(monkeypatch):
-    with pytest.raises(ValueError, match=r"4 entries .* on 2 cells, .* coordinates of \(3, 2, 2\)"):
+    with pytest.raises(ValueError, match=r"4 entries .* on 2 cells, .* of shape \(3, 2, 2\)"):
         kernel(coordinates=np.zeros((3, 2, 2)))
     pack = compiled_forms.pack
     monkeypatch.setattr(compiled_forms, "pack", lambda form: (pack(form)[0], np.zeros((2, 1))))

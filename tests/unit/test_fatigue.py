@@ -359,7 +359,7 @@ def test_bad_input_of_a_run():
         ub.simulate(scene, ub.EnergyMomentum(), record=elsewhere, **run)
     spot = ub.HotSpot(beam.start, stress=lambda N, V, M: M[0])  # one number
     single = ub.Fatigue(spot, CURVE)
-    with pytest.raises(ub.ArgumentError, match=r"mast\.start .* a finite number each"):
+    with pytest.raises(ub.ArgumentError, match=r"mast\.start .* a finite number for each"):
         ub.simulate(scene, ub.EnergyMomentum(), record=single, **run)
     with pytest.raises(ub.ArgumentError, match=r"nothing was counted at arm\.end"):
         single.cycles(ub.HotSpot(PLACE, stress=lambda N, V, M: M))

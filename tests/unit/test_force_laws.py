@@ -286,7 +286,7 @@ def test_the_reference_path():
         (lambda: ub.ForceLaw(lambda x, v, z: x), "force has a parameter 'z', which is unknown"),
         (
             lambda: ub.ForceLaw(lambda x, v, state: x),
-            "parameter 'state', which is unknown; there are t, dt, with ForceLaw(..., state=",
+            "'state', which is unknown; the known ones are t, dt, with ForceLaw(..., state=",
         ),
         (lambda: ub.ForceLaw(lambda x, v: x, [0.0]), "the function has no parameter for the state"),
         (lambda: ub.ForceLaw(lambda x, v: x, 3.0), "ForceLaw: state has shape ()"),

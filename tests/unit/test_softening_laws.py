@@ -14,7 +14,7 @@ from uniaxial_points import LENGTH, Bars
 from user_laws import Exponential, Fading, Kinked, Petersson, Rising
 
 import ufl_beam as ub
-from ufl_beam.model.softening_laws import SMALL
+from ufl_beam.model.softening_laws import SMALL_GROWTH
 
 f = ub.law_functions
 
@@ -67,7 +67,9 @@ def mean(law, ξ, a):
     return float(law.mean_traction(np.array([ξ]), np.array([a]))[0])
 
 
-@pytest.mark.parametrize("a", [1e-14, 1e-9, 0.99 * SMALL, 1.01 * SMALL, 1e-3, 0.1, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize(
+    "a", [1e-14, 1e-9, 0.99 * SMALL_GROWTH, 1.01 * SMALL_GROWTH, 1e-3, 0.1, 0.5, 1.0, 2.0]
+)
 @pytest.mark.parametrize("ξ", [0.0, 0.3, 0.79, 3.5, 4.0])
 @each_law
 def test_mean_traction_is_the_mean(law, ξ, a):

@@ -286,7 +286,7 @@ def test_another_newton_is_taken_if_it_changes_little(law, change, taken):
 def test_schemes_that_converge_to_different_limits_are_named(law):
     law(lambda h, dt, scheme, newton: smooth(h, dt, scheme, newton) + 0.1 * (scheme.alpha > 0))
     found = ask(scheme=[ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1)], tolerance=1e-3)
-    assert any("its limit of value is 0.1 away" in note for note in found.notes)
+    assert any("its limit of value differs by 0.1 from" in note for note in found.notes)
 
 
 def test_dials_that_a_scene_cannot_have_leave_the_others(law):

@@ -132,7 +132,7 @@ def test_a_damper_that_drives():
 
 def test_friction_that_drives(monkeypatch):
     """With the sign of the entry turned round."""
-    laws = connector_rows.PRESCRIBED
+    laws = connector_rows.LEDGER_ENTRIES
     monkeypatch.setitem(laws, ub.Coulomb, (*laws[ub.Coulomb][:3], -1.0))
     said, solution = run(held_at_the_end(ub.Coulomb(1e3)), t=(0, 0.05), dt=1e-3)
     about(said, solution, "'friction'", "falls by")

@@ -374,7 +374,7 @@ STRAY = ub.Beam((0, 1), (1, 1), SECTION, cells=2, name="stray")
         (lambda: ub.Potential("a", 3), ("Potential 'a': density = 3 must be a function of q",)),
         (lambda: ub.Potential("a", min), ("Potential 'a'", "have no names")),
         (lambda: ub.Potential("a", lambda q, k: q[0]), ("a parameter 'k', which is unknown",)),
-        (lambda: ub.Potential("a", lambda w: w[0]), ("'w'", "there are q, axis, t")),
+        (lambda: ub.Potential("a", lambda w: w[0]), ("'w'", "the known ones are q, axis, t")),
         (
             lambda: ub.Potential("a", lambda q: q[0], numbers={"k": 1}),
             ("Potential 'a': numbers['k'] is no parameter",),

@@ -14,7 +14,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import State
 from ufl_beam.display import TIME, Rich
-from ufl_beam.errors import require_kind, warn
+from ufl_beam.errors import ArgumentError, require_kind, warn
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_law import ForceLaw
@@ -249,7 +249,7 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
                 "it is a solution of another scene: its beams, cells, bodies or joints differ; "
                 "give the scene of that run, or load the file without scene="
             )
-        raise WrongReader(
+        raise ArgumentError(
             f"it was written by version {content['version']} of ufl_beam, which numbers degrees of "
             f"freedom differently from this version, {version()}; load it with the former version"
         )
