@@ -98,7 +98,7 @@ class Variant(NamedTuple):
             return ub.Simulation(scene, ub.EnergyMomentum(), newton=ub.Newton(**self.newton))
 
 
-CELL_BY_CELL = (compiled_forms, "in_lanes", nothing)
+CELL_BY_CELL = (compiled_forms, "interleaved", nothing)
 NO_CHAINS = (beam_elimination, "_plan", without_chains)
 NO_FRONTS = (beam_elimination, "Multifrontal", klu)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
