@@ -27,7 +27,8 @@ MOST_CACHED = 64
 LARGEST = 2**16
 """Largest size of the arguments of results that are kept: bytes of arrays plus whole numbers.
 
-Some 500 cells exceed it; a hundred steps of so many cells take longer than building their scene.
+Some 500 cells exceed it.  With this number of cells, a hundred steps take longer than building
+the scene.
 """
 
 

@@ -641,9 +641,8 @@ class _Search:
         """
         some, setting = next(iter(self.crosses.values())), self._runs.families[self.family]
         top = 2 ** (some.cells.finest + REACH), 2 ** (some.steps.finest + REACH)
-        first = math.ceil(
-            self._divisor / setting.mesh.degree
-        )  # as many nodes as the given cells at degree 1
+        # The coarsest mesh has about the number of nodes of the given cells at degree 1.
+        first = math.ceil(self._divisor / setting.mesh.degree)
         refine = [Fraction(k, self._divisor) for k in _geometric(first, self._divisor * top[0])]
         # Whole multiples of the number of the user's steps, so that all runs end at the same time.
         multiples = np.array(_geometric(1, top[1]), dtype=float)

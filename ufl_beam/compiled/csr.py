@@ -17,7 +17,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, loop, struc
 
 
 class Csr:
-    """Compressed sparse rows with 32-bit indices, which C needs; those of SciPy may have 64 bits.
+    """Compressed sparse rows with 32-bit indices, which C needs; SciPy may use 64 bits.
 
     ``again`` recomputes the column indices after :meth:`free` has freed them.
     """

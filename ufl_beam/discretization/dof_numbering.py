@@ -36,7 +36,7 @@ class DofNumbering:
 
     Cells of a higher degree also have nodes between their vertices.  A node has three degrees of
     freedom (u, v, ψ); nodes of a joint share degrees of freedom.  Degrees of freedom are numbered
-    along the beams; after them come those of bodies and joints, and last the forces of connectors.
+    along the beams, then at bodies and joints; the forces of connectors are last.
     Elimination in this order causes fill-in only where joints and connectors couple beams.
 
     Attributes:

@@ -132,7 +132,7 @@ def _potential_forms(
 
 
 def _returned(work: Work, known: Mapping[str, Any], element: Element) -> Expr:
-    """Return what the function of a work returns, or raise :class:`ModelError` naming the work."""
+    """Return the expression of the function of a work; :class:`ModelError` names the work."""
     try:
         value = work.density(**{name: known[name] for name in work.used_arguments})
     except ModelError:

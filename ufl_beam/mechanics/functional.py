@@ -47,7 +47,7 @@ def enhanced_strain(q: Expr, α: Expr, axis: Axis) -> Expr:
 
 
 def modified_functional(W: Energy, q: Expr, D: Expr, r: Expr, axis: Axis) -> Expr:
-    """Return the functional with D as the strains in addition to those of the configuration."""
+    """Return the functional with the strains D added to the strains of the configuration."""
     return W(strain(q, axis) + D) - ufl.dot(r, D)  # P(31)
 
 

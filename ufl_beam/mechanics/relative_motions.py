@@ -6,7 +6,7 @@ ends of a step and of virtual motions of the frames.  The function returns the m
 which is zero in the undeformed scene, and the variation of the motion.  In schemes of
 :class:`EnergyMomentumBase` the variation for the nodal step (Δu, 2 tan(Δψ/2)) is the increment of
 the motion: constraint forces do no work, and springs store the work that is done on them.
-Variations vanish for rigid virtual motions of both frames; that of :func:`parting` vanishes only if
+Variations vanish for rigid virtual motions of both frames, the variation of :func:`parting` only if
 the points coincide.
 """
 

@@ -44,7 +44,7 @@ class Step(NamedTuple):
     fraction: float  # of the remaining increment of loads and motions that is applied; 1: all
     at: float = 1.0  # fraction of the increment of loads in the step equation; 1: at the end
     q_before: Array | None = None  # configuration at the beginning of the last step, if ratio > 0
-    ratio: float = 0.0  # length divided by that of the last step; 0 if there is no last step
+    ratio: float = 0.0  # length divided by the length of the last step; 0 if there is none
 
     @classmethod
     def of(cls, scheme: Scheme, t0: float, t1: float, end: float, q0: Array) -> Step:

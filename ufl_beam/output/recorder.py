@@ -216,7 +216,7 @@ class Recorder(ABC):
         """End the record; also called when the run fails."""
 
     def state(self) -> State:
-        """Return arrays by name for :meth:`resume`; those of the first process are saved.
+        """Return arrays by name for :meth:`resume`; the arrays of the first process are saved.
 
         Raises:
             ArgumentError: The recorder cannot be restarted.
