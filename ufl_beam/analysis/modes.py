@@ -17,7 +17,7 @@ from ufl_beam.analysis.linearization import SmallMotions, reference_state
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.compiled_forms import Kernel
-from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.discretization.dof_numbering import DofNumbering, velocity_at
 from ufl_beam.discretization.function_spaces import Fields, section_forces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Subdomain
@@ -31,7 +31,6 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork
 from ufl_beam.output.paraview_files import VTKHDF, XDMF, TimeSeries
-from ufl_beam.output.section_forces import velocity_at
 from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of

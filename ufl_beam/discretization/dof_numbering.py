@@ -12,7 +12,7 @@ import struct
 from bisect import bisect_left
 from collections.abc import Sequence
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, TypeAlias
 from zlib import crc32
 
 import numpy as np
@@ -21,7 +21,17 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.display import counted
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.bodies import AttachmentPoint, Body, Member, Node, Place, node
+from ufl_beam.model.bodies import (
+    GROUND,
+    AttachmentPoint,
+    Body,
+    Member,
+    Node,
+    Place,
+    Spot,
+    arm,
+    node,
+)
 from ufl_beam.model.checks import require_kind
 from ufl_beam.model.connectors import Connector, place_of
 from ufl_beam.model.fibres import SectionPoints
@@ -398,3 +408,39 @@ class DofNumbering:
         groups = [*beam_dofs, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
         worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])
         return {self.describe(dof): float(sizes[dof]) for dof in worst if sizes[dof]}
+
+
+# -- motions of places -----------------------------------------------------------------------------
+
+Vectors: TypeAlias = Any
+"""Configurations or velocities at some times, an array or a ``Column``; (n, size)."""
+
+
+def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
+    """Rotate one vector, or a vector for each angle, by angles; (n, 2)."""
+    a, b = np.asarray(x, dtype=np.float64).T
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.column_stack([cos * a - sin * b, sin * a + cos * b])
+
+
+def values_at(numbering: DofNumbering, place: AttachmentPoint, states: Vectors) -> Array:
+    """Return values of the node of a body, or interpolated at a place of a beam; (n, 3)."""
+    if isinstance(place, Spot):
+        if node(place) is GROUND:
+            return np.zeros((len(states), 3))
+        dofs = numbering.node(place)
+        return np.ascontiguousarray(states[:, dofs])
+    nodes, weights = numbering.weights(place)
+    dofs = numbering.dofs[nodes]
+    return np.asarray(weights @ np.ascontiguousarray(states[:, dofs]))
+
+
+def velocity_at(
+    numbering: DofNumbering, place: AttachmentPoint, states: Vectors, velocities: Vectors
+) -> Array:
+    """Return the velocity of a place; (n, 3); m/s, m/s, rad/s."""
+    motion = values_at(numbering, place, velocities)
+    if isinstance(place, Spot):
+        x, y = turned(arm(place), values_at(numbering, place, states)[:, 2]).T
+        motion[:, :2] += motion[:, 2:] * np.column_stack([-y, x])
+    return motion

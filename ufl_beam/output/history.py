@@ -29,8 +29,7 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
 from ufl_beam.output.recorder import Restartable, StateView
-from ufl_beam.output.section_forces import connector_indices
-from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC
+from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC, connector_indices
 from ufl_beam.parallel import on_first
 
 # -- table -----------------------------------------------------------------------------------------

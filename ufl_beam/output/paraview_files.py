@@ -16,6 +16,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index, State
+from ufl_beam.discretization.dof_numbering import turned
 from ufl_beam.errors import ArgumentError, require_count
 from ufl_beam.model.bodies import AttachmentPoint, arm
 from ufl_beam.model.connectors import Connector
@@ -23,7 +24,6 @@ from ufl_beam.model.joints import Link, RigidLink
 from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
 from ufl_beam.output.recorder import Restartable, StateView
-from ufl_beam.output.section_forces import turned
 from ufl_beam.parallel import on_first
 
 # -- a scene as lines ------------------------------------------------------------------------------

@@ -26,8 +26,7 @@ from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import Output, require_apart, require_writable
-from ufl_beam.output.section_forces import connector_indices
-from ufl_beam.output.state_rows import FORCE, Connection, connection
+from ufl_beam.output.state_rows import FORCE, Connection, connection, connector_indices
 from ufl_beam.output.states import States
 from ufl_beam.parallel import on_first
 from ufl_beam.solvers.newton import Solver

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Results from states: motions of places, forces of joints, section forces along cells.
+"""Section forces along cells, from the forces between cells and nodes.
 
 At both ends of a cell the section forces are the forces between the cell and its nodes, by
 stresses, inertia, damping, loads and works (virtual works and potentials of users), see
@@ -11,94 +11,13 @@ of which the resultant, the couple and, without works, the first moments are kno
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.display import in_one_line
-from ufl_beam.errors import ArgumentError
-from ufl_beam.model.bodies import GROUND, AttachmentPoint, Spot, arm, node
-from ufl_beam.model.connectors import Connector
-from ufl_beam.model.joints import Joint
-from ufl_beam.model.scene import Scene
-
-# -- places and joints -----------------------------------------------------------------------------
-
-Vectors: TypeAlias = Any
-"""Configurations or velocities at some times, an array or a ``Column``; (n, size)."""
-
-
-@in_one_line
-class JointHistory(NamedTuple):
-    """History of a joint, whose first place is a and whose second place is b.
-
-    Attributes:
-        motion: Displacement of b relative to a, in axes that turn with a, and rotation of b
-            relative to a; zero in the undeformed scene; (n+1, 3); m, m, rad.
-        force: Force of the joint on b, in the plane; (n+1, 2); N.
-        in_a, in_b: The same force in axes that turn with a and with b; (n+1, 2); N.
-        moment: Moment of the joint on b, about the place b; (n+1,); N m.  It is unknown, NaN, if
-            the places share their rotation.
-    """
-
-    motion: Array
-    force: Array
-    in_a: Array
-    in_b: Array
-    moment: Array
-
-
-def connector_indices(scene: Scene, connector: Connector | Joint) -> list[int]:
-    """Return the indices of the components of a connector, or of a joint."""
-    if isinstance(connector, Connector):
-        connectors = connector.components or (connector,)
-        if connectors[0] not in scene.all_connectors:
-            raise ArgumentError(f"{connector} is not in the scene")
-        return [scene.all_connectors.index(connector) for connector in connectors]
-    if connector not in scene.joints:
-        raise ArgumentError(f"{connector} is not in the scene")
-    if not connector.holders:
-        raise ArgumentError(
-            f"{connector} shares unknowns, so that its force is not known; make it with "
-            "multipliers=True"
-        )
-    return [scene.all_connectors.index(holder) for holder in connector.holders]
-
-
-def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
-    """Rotate one vector, or a vector for each angle, by angles; (n, 2)."""
-    a, b = np.asarray(x, dtype=np.float64).T
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.column_stack([cos * a - sin * b, sin * a + cos * b])
-
-
-def values_at(numbering: DofNumbering, place: AttachmentPoint, states: Vectors) -> Array:
-    """Return values of the node of a body, or interpolated at a place of a beam; (n, 3)."""
-    if isinstance(place, Spot):
-        if node(place) is GROUND:
-            return np.zeros((len(states), 3))
-        dofs = numbering.node(place)
-        return np.ascontiguousarray(states[:, dofs])
-    nodes, weights = numbering.weights(place)
-    dofs = numbering.dofs[nodes]
-    return np.asarray(weights @ np.ascontiguousarray(states[:, dofs]))
-
-
-def velocity_at(
-    numbering: DofNumbering, place: AttachmentPoint, states: Vectors, velocities: Vectors
-) -> Array:
-    """Return the velocity of a place; (n, 3); m/s, m/s, rad/s."""
-    motion = values_at(numbering, place, velocities)
-    if isinstance(place, Spot):
-        x, y = turned(arm(place), values_at(numbering, place, states)[:, 2]).T
-        motion[:, :2] += motion[:, 2:] * np.column_stack([-y, x])
-    return motion
-
-
-# -- section forces along cells --------------------------------------------------------------------
 
 
 @in_one_line

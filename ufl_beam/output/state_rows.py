@@ -22,7 +22,11 @@ from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import in_one_line
+from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.time_scheme import V
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
+from ufl_beam.model.scene import Scene
 from ufl_beam.terms.boundary_conditions import Supports
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
@@ -284,3 +288,40 @@ class StateWriter:
             subdomain.comm.Allreduce(MPI.IN_PLACE, row[: self._time_loop.sums])
         for place, at in self._gathered:
             subdomain.gather(np.frombuffer(ffi.buffer(place[0], 8 * subdomain.size)), row[at])
+
+
+@in_one_line
+class JointHistory(NamedTuple):
+    """History of a joint, whose first place is a and whose second place is b.
+
+    Attributes:
+        motion: Displacement of b relative to a, in axes that turn with a, and rotation of b
+            relative to a; zero in the undeformed scene; (n+1, 3); m, m, rad.
+        force: Force of the joint on b, in the plane; (n+1, 2); N.
+        in_a, in_b: The same force in axes that turn with a and with b; (n+1, 2); N.
+        moment: Moment of the joint on b, about the place b; (n+1,); N m.  It is unknown, NaN, if
+            the places share their rotation.
+    """
+
+    motion: Array
+    force: Array
+    in_a: Array
+    in_b: Array
+    moment: Array
+
+
+def connector_indices(scene: Scene, connector: Connector | Joint) -> list[int]:
+    """Return the indices of the components of a connector, or of a joint."""
+    if isinstance(connector, Connector):
+        connectors = connector.components or (connector,)
+        if connectors[0] not in scene.all_connectors:
+            raise ArgumentError(f"{connector} is not in the scene")
+        return [scene.all_connectors.index(connector) for connector in connectors]
+    if connector not in scene.joints:
+        raise ArgumentError(f"{connector} is not in the scene")
+    if not connector.holders:
+        raise ArgumentError(
+            f"{connector} shares unknowns, so that its force is not known; make it with "
+            "multipliers=True"
+        )
+    return [scene.all_connectors.index(holder) for holder in connector.holders]

@@ -12,7 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.compiled.csr import Product
-from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.discretization.dof_numbering import DofNumbering, turned, values_at, velocity_at
 from ufl_beam.discretization.function_spaces import Fields, Strains, mass_matrix
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ArgumentError, require_number
@@ -24,17 +24,7 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import require_arrays
-from ufl_beam.output.section_forces import (
-    MIDDLE,
-    Diagram,
-    ForcesAlongCells,
-    JointHistory,
-    Material,
-    connector_indices,
-    turned,
-    values_at,
-    velocity_at,
-)
+from ufl_beam.output.section_forces import MIDDLE, Diagram, ForcesAlongCells, Material
 from ufl_beam.output.state_rows import (
     BEFORE,
     FORCE,
@@ -47,7 +37,9 @@ from ufl_beam.output.state_rows import (
     Column,
     Columns,
     Connection,
+    JointHistory,
     connection,
+    connector_indices,
     new_rows,
 )
 from ufl_beam.terms.energy_ledger import Energy

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.discretization.dof_numbering import DofNumbering, turned
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, has_inertia, nodal_step
 from ufl_beam.model.connector_laws import Controller, Coulomb, rubs
@@ -28,7 +28,6 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.output.recorder import PresentState
-from ufl_beam.output.section_forces import turned
 from ufl_beam.output.state_rows import BEFORE, FORCES, Block, Columns, Connection
 from ufl_beam.output.states import States
 from ufl_beam.reference.beam_residuals import (
