@@ -8,11 +8,11 @@ from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.model.connector_laws import Law
-from ufl_beam.model.loads import Damping
+from ufl_beam.model.loads import LOADS, Damping
 
 CLOSED = [
     *(law for law in Law.__args__ if law is not ub.ConnectorLaw), *Damping.__args__,
-    *(ub.PointLoad, ub.FollowerLoad, ub.LineLoad, ub.Gravity, ub.RotatingFrame),
+    *LOADS,
     *(ub.Softening, ub.LinearSoftening, ub.VirtualWork, ub.Potential, ub.Perzyna),
     *(ub.DuvautLions, ub.Table),
 ]  # fmt: skip

@@ -176,6 +176,10 @@ class RotatingFrame(Load):
         return steady
 
 
+LOADS = PointLoad, FollowerLoad, LineLoad, Gravity, RotatingFrame
+"""All kinds of loads; messages name them."""
+
+
 # -- viscous damping of the elastic motion ------------------------------------------------------
 
 

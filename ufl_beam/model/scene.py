@@ -37,6 +37,7 @@ from ufl_beam.model.connectors import Component, Connector, plastic_hinges
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along, value_at
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import (
+    LOADS,
     Damping,
     KelvinVoigt,
     Load,
@@ -86,7 +87,7 @@ class Scene(Record, Rich):
     _: KW_ONLY
     joints: Annotated[Sequence[Joint], _all(Joint)] = ()
     supports: Annotated[Sequence[Support], _all(Support)] = ()
-    loads: Annotated[Sequence[Load], _all(Load)] = ()
+    loads: Annotated[Sequence[Load], _all(*LOADS)] = ()
     masses: Annotated[Sequence[PointMass], _all(PointMass)] = ()
     initial: Annotated[Sequence[Velocity], _all(Velocity)] = ()
     damping: Annotated[Sequence[Damping], _all(*Damping.__args__)] = ()
