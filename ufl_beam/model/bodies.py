@@ -33,8 +33,6 @@ class Member(ABC):
     """Base of :class:`Beam`: an axis with places on it, and the attributes of a beam."""
 
     called: ClassVar[str] = "Beam"  # name of the class in messages
-    a: Point
-    b: Point
     name: str
     curve: Curve
     cells: int

@@ -43,8 +43,6 @@ from ufl_beam.reference.return_map import MaterialPoints
 class ElasticBeams(CellForce):
     """Elastic cells; the time scheme states the resultants and the virtual strains."""
 
-    inner = True
-
     def __init__(self, indices: Index, setting: Setting) -> None:
         cells, scheme = Cells(setting.numbering, indices), setting.scheme
         element = cells.element
@@ -112,8 +110,6 @@ class YieldingBeams(CellForce):
     b + D e, the resultants linearised around an iterate, in the strains e.  So it has a material
     and a geometric part.
     """
-
-    inner = True
 
     def __init__(self, indices: Index, section_points: SectionPoints, setting: Setting) -> None:
         cells, numbering = Cells(setting.numbering, indices), setting.numbering

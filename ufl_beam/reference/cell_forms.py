@@ -113,13 +113,11 @@ class Force:
     """Base of forces in the equation of a step; by default methods do nothing or return zero.
 
     Attributes:
-        inner: True for forces between parts of the scene: cells and connectors.
         size: Number of degrees of freedom of the scene.
         stored: Energies stored in the accepted state, by entry of the ledger; J.
         on_nodes: Forces of the nodes on the cells in the accepted step, see :func:`end_forces`.
     """
 
-    inner = False
     size: int
     stored: Mapping[str, float] = {}
     on_nodes: Array | float = 0.0

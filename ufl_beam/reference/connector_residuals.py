@@ -48,8 +48,6 @@ class Linked(Force):
         at_rest: Forces of the laws at the initial configuration.
     """
 
-    inner = True
-
     def __init__(self, indices: Index, setting: Setting) -> None:
         numbering, self.setting = setting.numbering, setting
         self.size, self.indices = numbering.size, indices
