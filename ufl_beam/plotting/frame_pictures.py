@@ -69,28 +69,17 @@ def plane_canvas(
     ax: Axes | None = None,
     size: tuple[float, float] | None = None,
 ) -> tuple[Canvas, tuple[float, float]]:
-    """Make a canvas whose symbols have a size in points.
+    """Make a canvas whose symbols have a size in points; return it and the size of the figure.
 
-    Args:
-        solution: Solution to draw.
-        shown: Numbers of the kept times.
-        magnify: Factor on the displacements.
-        ax: Axes of the user, or None.
-        size: Largest width and height of the figure; by default 9 inches, and the height that all
-            points need at this width; inch.
-
-    Returns:
-        The canvas, and the size of the figure.
+    ``size`` is the largest width and height of the figure; inch.  By default the width is 9 inches,
+    and the height as all points need at this width.
     """
     points = Canvas(solution, magnify, 0.02 * solution.scene.size, shown).points()
     extent = np.ptp(points, axis=0)
     high = float(np.clip(8.0 * extent[1] / max(extent[0], 1e-12), 3.2, 6.8))
     size = (9.0, high) if size is None else size
-    if ax is None:
-        space = np.subtract(size, (0.9, 0.9))  # without the numbers and words around the axes
-    else:
-        style.require_axes(ax)
-        space = style.axes_size(ax) / POINTS
+    # A new figure has numbers and words around the axes.
+    space = np.subtract(size, (0.9, 0.9)) if ax is None else style.axes_size(ax) / POINTS
     scale = float(np.max((1.12, 1.20) * extent / space)) / POINTS
     return Canvas.at_scale(solution, magnify, scale, shown), size
 
@@ -121,9 +110,6 @@ def draw_shape(
     equilibrium, see :meth:`Solution.diagram`.  Peaks of areas are labelled in the unit of the
     title; the largest and the least value are bold.  Yielded or cracked cells are orange; open
     hinges are circles as in :func:`draw_damage_state`.
-
-    Raises:
-        ArgumentError: There is no such time, ``magnify`` is not positive, or ``ax`` is no axes.
     """
     shape = plane_canvas(solution, [n], magnify, ax, MOST)[0].shape(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
@@ -323,19 +309,6 @@ def draw_damage_state(
     Yielded cells are coloured by the energy that plastic strains dissipated per length (J/m), in
     cells of fibres together with the energy of cracks.  Opened hinges are circles, which grow with
     the dissipated fraction of the fracture energy; from 99 % on they are hollow, as joints are.
-
-    Args:
-        solution: Solution to draw.
-        n: Number of the kept time; negative from the end.
-        magnify: Factor on the displacements.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: The scene is elastic, there is no such time, ``magnify`` is not positive, or
-            ``ax`` is no axes.
-
-    Example:
-        >>> ub.plot(broken, "damage").savefig("damage.png")
     """
     from matplotlib.collections import LineCollection
 

@@ -58,21 +58,7 @@ def draw_shapes(
 ) -> Figure:
     """Draw successive shapes in one picture, coloured by time or load factor.
 
-    Args:
-        solution: Solution to draw.
-        times: The times, or the load factors of a path, each replaced by the nearest kept time; s.
-            By default ``count`` times from the first to the last, evenly spaced in time or along
-            the path.
-        count: Number of shapes if ``times`` is not given.
-        magnify: Factor on the displacements.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: ``times`` is one number, ``count`` is less than 1, ``magnify`` is not
-            positive, or ``ax`` is no axes.
-
-    Example:
-        >>> ub.plot(solution, "shapes", count=5, magnify=10).savefig("shapes.png")
+    By default they are ``count`` kept states, evenly spaced in time or along the path.
     """
     from matplotlib.colors import to_hex
 
@@ -128,21 +114,7 @@ def draw_history(
     component: str = "v",
     ax: Axes | None = None,
 ) -> Figure:
-    """Draw a component of the motion of one or more places over time.
-
-    Args:
-        solution: Solution to draw.
-        places: The places.
-        component: "u", "v", "psi", "du/dt", "dv/dt" or "dpsi/dt".
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: ``component`` is unknown, or a velocity in a static run; a place is not in
-            the scene; or ``ax`` is no axes.
-
-    Example:
-        >>> ub.plot(solution, "history", beam.end, component="v").savefig("history.png")
-    """
+    """Draw a component of the motion of one or more places over time."""
     style.require_option(component, COMPONENTS, "plot: component")
     followed = (places,) if isinstance(places, AttachmentPoint) else tuple(places)
     number = list(COMPONENTS).index(component)
@@ -165,9 +137,6 @@ def draw_energy(solution: Solution) -> Figure:
     Above, energies in the scene are solid, supplied energies dashed, and lost energies dotted.
     Below is the imbalance divided by the transferred energy, with the machine precision for
     comparison.
-
-    Example:
-        >>> ub.plot(solution, "energy").savefig("energy.png")
     """
     energy, precision = solution.energy, float(np.finfo(np.float64).eps)
     along = solution.progress
@@ -203,19 +172,7 @@ def draw_energy(solution: Solution) -> Figure:
 
 
 def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float = 0.1) -> Figure:
-    """Draw modes side by side, in both directions from the undeformed scene, which is grey.
-
-    Args:
-        shapes: Result of :func:`modes` or :func:`buckling`.
-        numbers: Numbers of the modes; all by default.
-        amplitude: Largest displacement, as a fraction of the size of the scene.
-
-    Raises:
-        ArgumentError: There is no such shape, or ``amplitude`` is not positive.
-
-    Example:
-        >>> ub.plot(ub.modes(scene, 3)).savefig("modes.png")
-    """
+    """Draw modes side by side, in both directions from the undeformed scene, which is grey."""
     chosen = list(numbers) if len(numbers) else list(range(len(shapes)))
     if not chosen:
         raise ArgumentError("plot: there is no shape")
@@ -259,18 +216,6 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
     Each family of scheme, steps and cells has a colour and a marker.  The line joins runs that no
     other run beats in both time and error.  Errors are divided by the tolerance, or by the largest
     magnitude of the quantity if there is a budget.
-
-    Args:
-        tradeoff: Result of :func:`tradeoff`.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: ``ax`` is no axes.
-
-    Example:
-        >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
-        >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
-        >>> ub.plot(found).savefig("tradeoff.png")
     """
     errors = {run: max(tradeoff.ratio(run), LEAST_ERROR) for run in tradeoff.runs}
     with style.panel(ax, (9.0, 6.0)) as axes:
@@ -320,14 +265,6 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
     """Draw maxima and minima of a section force on the undeformed frame, as two diagrams.
 
     Positive values are red, negative values blue.  Values may occur at different times.
-
-    Raises:
-        ArgumentError: Nothing was run, or ``ax`` is no axes.
-
-    Example:
-        >>> extremes = ub.Extremes()
-        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=extremes)
-        >>> ub.plot(extremes, "M").savefig("extremes.png")
     """
     index, solution = list(style.RESULTANTS).index(quantity), extremes.solution
     reached = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
@@ -346,15 +283,6 @@ def draw_study(study: Study) -> Figure:
     """Draw each result of a study over each number that its cases vary.
 
     An array result is drawn by its largest magnitude; failed cases are omitted.
-
-    Raises:
-        ArgumentError: The cases have no number, or several numbers of which none varies, or all
-            members failed.
-
-    Example:
-        >>> spans = [{"length": 1.0 + 0.25 * k} for k in range(5)]
-        >>> found = ub.study(lambda length: {"deflection": length**3}, spans)
-        >>> ub.plot(found).savefig("study.png")
     """
     varied = {
         name: np.array([case[name] for case in study.cases], dtype=float)
@@ -378,26 +306,10 @@ def draw_study(study: Study) -> Figure:
 
 
 def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
-    """Draw rainflow matrix, spectrum and damage of the stress cycles at a place.
+    """Draw rainflow matrix, spectrum and damage of the stress cycles at a hot spot.
 
     On the left is the rainflow matrix; in the middle the number of cycles above each range, with
     the S-N curve; on the right the percentage of the damage by each class of ranges.
-
-    Args:
-        fatigue: Recorder of a run.
-        place: One of its hot spots.
-
-    Raises:
-        ArgumentError: The recorder does not have the hot spot, nothing was run, or the stress has
-            no cycle.
-
-    Example:
-        >>> place = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
-        >>> fatigue = ub.Fatigue(place, ub.SNCurve.eurocode(71e6))
-        >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), amplitude=np.sin)
-        >>> shaken = ub.Scene([beam], supports=scene.supports, loads=[shake])
-        >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)
-        >>> ub.plot(fatigue, "cycles", place).savefig("cycles.png")
     """
     from matplotlib.colors import LogNorm
 

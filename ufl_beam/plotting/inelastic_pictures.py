@@ -103,19 +103,7 @@ def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
     """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
     The curvature includes the jump of a hinge divided by the length of the cell, so the area of
-    loops is the dissipated energy per length.  A ring marks the first kept time, a dot the last.
-
-    Args:
-        solution: Solution to draw.
-        place: Place in the cell; at a vertex, the cell before the vertex is drawn.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: The scene is elastic, the beam of the place is not in it, or ``ax`` is no
-            axes.
-
-    Example:
-        >>> ub.plot(broken, "moment-curvature", weak.start).savefig("loops.png")
+    loops is the dissipated energy per length.  At a vertex, the cell before the vertex is drawn.
     """
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
     with style.panel(ax, (8.0, 5.4)) as axes:
@@ -130,20 +118,8 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
     """Draw the moment M (N m) of a hinge against its jump (rad), coloured by time.
 
     The area between the path and the axis is the energy that the hinge dissipated.  The title
-    states this energy (J), also as a percentage of the fracture energy.
-
-    Args:
-        solution: Solution to draw.
-        place: Place of a plastic hinge, or in a cell with a hinge; a vertex without a plastic hinge
-            is in the cell before it.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: The scene is elastic, there is no hinge, the beam of the place is not in the
-            scene, or ``ax`` is no axes.
-
-    Example:
-        >>> ub.plot(broken, "hinge", weak.start).savefig("hinge.png")
+    states this energy (J), also as a percentage of the fracture energy.  At a vertex without a
+    plastic hinge, the hinge of the cell before the vertex is drawn.
     """
     history, numbering = solution.material_at(place), solution.numbering
     hinge = numbering.hinge_at(place)
@@ -180,17 +156,6 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     The line above the areas is the supplied work plus the initial energy of the scene.  The gap
     between line and areas is the energy in the scene, which also has its own line.  The title
     states the largest imbalance of the ledger.
-
-    Args:
-        solution: Solution to draw.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: The scene is elastic or has no beams, and has no connectors; or ``ax`` is no
-            axes.
-
-    Example:
-        >>> ub.plot(broken, "dissipation").savefig("dissipation.png")
     """
     if not solution.scene.connectors:
         if not solution.scene.beams:

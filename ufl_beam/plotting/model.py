@@ -50,9 +50,6 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     hinges, loads (red), prescribed motions (orange), masses and initial velocities (green).  Loads
     that turn with their place have hollow arrow heads.  Drives are orange: filled if they prescribe
     the motion, hollow if they prescribe the force.  Names and sizes that find no space are omitted.
-
-    Raises:
-        ArgumentError: Constraints of the scene are redundant, or ``ax`` is no axes.
     """
     require_independent(scene)
     subject, notes = Subject(scene), model_notes(scene)

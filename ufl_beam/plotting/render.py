@@ -246,7 +246,7 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
         "title": "values", "color": "black", "n_labels": 5, "fmt": "%.3g", "width": 0.48,
         "height": 0.09, "position_x": 0.46, "position_y": 0.01, "label_font_size": size[1] // 36,
     }  # fmt: skip
-    xy = np.concatenate([shape.points() - camera.origin(shape) for shape in canvas.shapes()])
+    xy = canvas.points(camera.follow)
     margin, half = 2.2 * canvas.unit, solids.thickest(beams)[1] / 2
     box = np.array([[*(xy.min(axis=0) - margin), -half], [*(xy.max(axis=0) + margin), half]])
     with screen(pyvista):

@@ -21,7 +21,6 @@ from ufl_beam.model.bodies import GROUND, AttachmentPoint, Place, Spot, node
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Guided, Joint, Link, Prismatic, Release, RigidLink
-from ufl_beam.model.supports import Support
 from ufl_beam.plotting import positions
 from ufl_beam.plotting.positions import DeformedShape, directions, in_frame, normal, unit_vectors
 from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, shade, with_unit
@@ -50,7 +49,7 @@ class Stroke(NamedTuple):
 
 
 def draw_strokes(axes: Axes, groups: Mapping[str, Iterable[Stroke]], color: Any = None) -> None:
-    """Draw groups of lines and areas, in their own colours or all in one colour.
+    """Draw lines and areas by groups, in their own colours or all in one colour.
 
     Strokes that look alike share a collection, so that large scenes are drawn fast.
     """
@@ -98,8 +97,8 @@ _TRACK = ((-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0))
 _DIAMOND = ((-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0))
 
 SUPPORTS = ((_DIAMOND,), (_TRIANGLE, _TRACK), (_TRIANGLE, _PLATE), (_CLAMP,))
-"""Outlines by the number of constrained displacements; 3 includes the rotation.  The place is the
-origin, and the beam comes from above."""
+"""Outlines by the number of constrained displacements; the last ones also constrain the rotation.
+The place is the origin, and the beam comes from above."""
 
 
 class SupportSymbol(NamedTuple):
@@ -116,15 +115,20 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
     """Find supports, and points of the ground with joints or connectors."""
     scene = shape.canvas.scene
     for support in scene.supports:
-        angle = support_direction(support, shape.rotation(support.place))
+        place, held, inward = support.place, support.held, _inward(support.place)
+        if len(held) == 3:
+            number, angle = 3, inward + shape.rotation(place) - math.pi / 2
+        else:
+            number = len({0, 1} & set(held))
+            angle = _upright(inward, support.angle - (0.0 if 1 in held else math.pi / 2))
         color = ORANGE if support.moving else GROUND_GREY
-        number = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
-        yield SupportSymbol(shape.at(support.place), angle, SUPPORTS[number], color, support.place)
+        yield SupportSymbol(shape.at(place), angle, SUPPORTS[number], color, place)
     grounded: list[tuple[Sequence[AttachmentPoint], bool]] = [
         (j.places, _rotates(j)) for j in scene.joints if joint_symbol(j).grounded
     ]
     grounded += [((c.a, c.b), False) for c in scene.connectors if not c.is_rotation]
-    grounds: dict[Spot, tuple[float, bool]] = {}  # direction from it; if free to turn
+    # Direction from the point to the scene, and whether all that is there may turn.
+    grounds: dict[Spot, tuple[float, bool]] = {}
     for places, rotates in grounded:
         for point in places:
             if isinstance(point, Spot) and point.body is GROUND:
@@ -155,16 +159,8 @@ def supports(shape: DeformedShape) -> Iterator[Stroke]:
             )
 
 
-def support_direction(support: Support, turned: float) -> float:
-    """Return the angle of a support's symbol, away from its beam; a clamp is ``turned``; rad."""
-    inward = _inward(support.place)
-    if len(support.held) == 3:
-        return inward + turned - math.pi / 2
-    return _upright(inward, support.angle - (0.0 if 1 in support.held else math.pi / 2))
-
-
 def _upright(inward: float, angle: float = 0.0) -> float:
-    """Return an angle, or its opposite if the symbol would lie on the beam; rad."""
+    """Return the angle of a symbol, or the opposite angle if it would lie on the beam; rad."""
     return angle + (math.pi if math.sin(inward - angle) < -0.5 else 0.0)
 
 
@@ -192,9 +188,9 @@ def _hatches(line: Array, unit: float) -> Iterator[Stroke]:
 
 def bodies(shape: DeformedShape) -> list[Stroke]:
     """Draw outlines of the rigid bodies."""
-    outlines = shape.canvas.outlines.items()
     return [
-        Stroke(shape.body_points(body, line), EDGE, 1.6, FILLED, BEHIND) for body, line in outlines
+        Stroke(shape.body_points(body, outline), EDGE, 1.6, FILLED, BEHIND)
+        for body, outline in shape.canvas.outlines.items()
     ]
 
 
