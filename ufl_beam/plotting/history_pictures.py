@@ -95,11 +95,8 @@ def solution_page(solution: Solution) -> str:
 
     Small displacements are magnified.
     """
-    text = (
-        notebook.lines(*solution.summary())
-        + notebook.energy_page(solution.energy)
-        + notebook.lines(solution.open_ledger)
-    )
+    text = notebook.lines(*solution.summary()) + notebook.energy_page(solution.energy)
+    text += notebook.lines(solution.open_ledger)
     moved = solution.q[:, solution.numbering.dofs[:, :2]]
     fraction = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
     magnify = max(x for x in FACTORS if x == 1 or (fraction > 0.0 and x * fraction <= VISIBLE))
@@ -122,7 +119,7 @@ def draw_history(
     quantity, unit = COMPONENTS[component]
     with style.panel(ax, (8.0, 4.2)) as axes:
         style.time_axes(axes)
-        axes.axhline(0.0, color=style.GREY, linewidth=1.0, zorder=1)
+        axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
         for place in followed:
             axes.plot(solution.times, motion(place)[:, number % 3], label=str(place))
         axes.set_ylabel(f"{quantity} {component.replace('psi', 'ψ')} ({unit})")
@@ -153,10 +150,9 @@ def draw_energy(solution: Solution) -> Figure:
         figure.legend(loc="outside upper left", ncols=5)
         fraction = np.abs(energy.imbalance) / (energy.energy_transferred or 1.0)
         # An imbalance of exactly zero has no logarithm; it is drawn at the lower edge.
-        check.semilogy(
-            along, np.maximum(fraction, 1e-2 * precision), color=style.RED, linewidth=1.2
-        )
-        check.axhline(precision, color=style.GREY, linewidth=1.0, zorder=1)
+        drawn = np.maximum(fraction, 1e-2 * precision)
+        check.semilogy(along, drawn, color=RED, linewidth=1.2)
+        check.axhline(precision, color=GREY, linewidth=1.0, zorder=1)
         check.annotate(
             "machine precision", (1.0, precision), (0, -3), va="top", ha="right",
             fontsize=style.font_size(11.0),
@@ -253,11 +249,8 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
 def tradeoff_page(result: Tradeoff) -> str:
     """Write a trade-off as HTML: the runs that no other run beats, remarks, and a picture."""
     head, *rows = result.table()
-    text = (
-        notebook.lines(result.title())
-        + notebook.table(head, rows)
-        + notebook.lines(*result.remarks())
-    )
+    text = notebook.lines(result.title()) + notebook.table(head, rows)
+    text += notebook.lines(*result.remarks())
     return text + notebook.image("errors over wall times", partial(draw_tradeoff, result))
 
 
@@ -269,9 +262,7 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
     index, solution = list(style.RESULTANTS).index(quantity), extremes.solution
     reached = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
     diagrams = [
-        (beam, values[:, index].reshape(len(solution.numbering.cells_of(beam)), -1))
-        for beam, extent in reached
-        for values in (extent.high, extent.low)
+        (beam, values[:, index]) for beam, extent in reached for values in (extent.high, extent.low)
     ]
     until = f"until {solution.parameter.at(solution.times[-1])}"
     title = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}", until

@@ -107,8 +107,7 @@ def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
     """
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
     with style.panel(ax, (8.0, 5.4)) as axes:
-        _draw_path(axes, solution, K, M)
-        style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
+        _draw_path(axes, ax, solution, K, M)
         axes.set_xlabel("curvature K (1/m)")
         axes.set_title(f"cell at {place}", loc="left")
     return style.parent_figure(axes)
@@ -123,10 +122,8 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
     """
     history, numbering = solution.material_at(place), solution.numbering
     hinge = numbering.hinge_at(place)
-    in_cell = numbering.hinges(place.beam)[
-        numbering.cell(place) - int(numbering.cells_of(place.beam)[0])
-    ]
-    law = in_cell if hinge is None else law_of(hinge)
+    number = numbering.cell(place) - int(numbering.cells_of(place.beam)[0])
+    law = numbering.hinges(place.beam)[number] if hinge is None else law_of(hinge)
     if law is None or np.isinf(law.limit):
         raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
     M, jump, lost = history.forces[:, 2], history.jump, float(history.hinge[-1])
@@ -139,8 +136,7 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
             axes.fill_between(
                 jump[window], M[window], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2
             )
-        _draw_path(axes, solution, jump, M)
-        style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
+        _draw_path(axes, ax, solution, jump, M)
         _label_axis(axes.xaxis, jump, "jump of rotation", "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
         if math.isfinite(law.fracture_energy):
@@ -178,10 +174,8 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         _label_axis(axes.yaxis, np.concatenate([supplied, inside]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
         digits, power = f"{energy.worst:.1e}".split("e")
-        worst, through = (
-            rf"${digits}\times10^{{{int(power)}}}$",
-            with_unit(energy.energy_transferred, "J"),
-        )
+        worst = rf"${digits}\times10^{{{int(power)}}}$"
+        through = with_unit(energy.energy_transferred, "J")
         axes.set_title(f"worst imbalance {worst} of {through} transferred", loc="left")
         style.draw_legend(axes, ax, loc="outside upper left", ncols=3)
     return style.parent_figure(axes)
@@ -194,7 +188,7 @@ def _label_axis(axis: Axis, values: Array, quantity: str, unit: str) -> None:
     axis.set_label_text(f"{quantity} ({prefix}{unit})")
 
 
-def _draw_path(axes: Axes, solution: Solution, x: Array, M: Array) -> None:
+def _draw_path(axes: Axes, ax: Axes | None, solution: Solution, x: Array, M: Array) -> None:
     """Draw M against x, from light to dark in time; a ring marks the start, a dot the end."""
     from matplotlib.collections import LineCollection
 
@@ -215,3 +209,4 @@ def _draw_path(axes: Axes, solution: Solution, x: Array, M: Array) -> None:
     axes.autoscale_view()
     _label_axis(axes.yaxis, M, "bending moment M", "N m")
     style.draw_bar(axes, colors, named.progress)
+    style.draw_legend(axes, ax, loc="outside upper left", ncols=2)

@@ -273,11 +273,14 @@ LEADER = 10.0  # least distance of a label from its target at which it has a lea
 
 
 class Candidate(NamedTuple):
-    """Point that a label belongs to, and the direction from this point to the label."""
+    """Point that a label belongs to, and the direction from this point to the label.
+
+    Lengths are in points, or in m in a drawing that converts them.
+    """
 
     at: Array  # (2,)
     direction: Array  # unit vector; (2,)
-    gap: float = 0.0  # least distance of the label; points
+    gap: float = 0.0  # least distance of the label
 
 
 class Label(NamedTuple):

@@ -193,12 +193,11 @@ def shade(color: str) -> str:
     return str(chosen.get(color, color))
 
 
-def plane_axes(axes: Axes, title: str) -> Axes:
+def plane_axes(axes: Axes, title: str) -> None:
     """Set up axes of the plane of motion with one scale for x and y."""
     axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
     axes.margins(0.06, 0.10)
     axes.set_title(title, loc="left", wrap=True)
-    return axes
 
 
 def time_axes(axes: Axes) -> Axes:
