@@ -55,7 +55,7 @@ STYLE: dict[str, Any] = {
 
 
 def decimal_prefix(value: float) -> tuple[float, str]:
-    """Return the power of 1000 that suits a value as a unit, and its prefix: (1000.0, "k")."""
+    """Return the power of 1000 by which a written value is divided, and its prefix: (1e3, "k")."""
     rounded = abs(float(f"{value:.3g}"))
     power = min(max(math.floor(math.log10(rounded) / 3), -3), 3) if rounded > 0.0 else 0
     return 1000.0**power, ("n", "µ", "m", "", "k", "M", "G")[power + 3]
@@ -176,7 +176,7 @@ def _unless_chosen(ours: dict[str, Any]) -> dict[str, Any]:
 
 
 def font_size(size: float) -> float:
-    """Scale a font size, which suits texts of the size :data:`FONT`, to the texts; points."""
+    """Scale a font size from texts of the size :data:`FONT` to the user's size of texts; points."""
     import matplotlib as mpl
 
     return float(size / FONT * mpl.rcParams["font.size"])
@@ -232,7 +232,7 @@ def draw_legend(
 def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
     """Make a colour scale for values from ``low`` to ``high``.
 
-    It is the part of a colour map from ``first`` to ``last``, of 0 to 1, that is visible on white.
+    The colours are the part from ``first`` to ``last``, of 0 to 1, of the colour map ``name``.
     """
     import matplotlib as mpl
     from matplotlib.cm import ScalarMappable
