@@ -169,7 +169,7 @@ def draw_energy(solution: Solution) -> Figure:
 
 def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float = 0.1) -> Figure:
     """Draw modes side by side, in both directions from the undeformed scene, which is grey."""
-    chosen = list(numbers) if len(numbers) else list(range(len(shapes)))
+    chosen = list(numbers) or list(range(len(shapes)))
     if not chosen:
         raise ArgumentError("plot: there is no shape")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]

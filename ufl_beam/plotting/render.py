@@ -310,11 +310,10 @@ class Solids:
     def __post_init__(self) -> None:
         style.require_option(self.quantity, QUANTITIES, "quantity")
         require_number(self.thickness, "thickness", positive=True)
-        require_number(self.magnify, "magnify", positive=True)
         require_kind(self.camera, Camera, "camera")
         for pixels in self.size:
             require_number(pixels, "size", at_least=16)
-        shape = self.canvas.shape(self.shown[0])  # raises if there is no such time
+        shape = self.canvas.shape(self.shown[0])  # raises if ``magnify`` or the time is wrong
         if self.camera.follow is not None:
             shape.at(self.camera.follow)  # raises if the place is not in the scene
 
