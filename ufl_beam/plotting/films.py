@@ -66,8 +66,19 @@ def write_gif(path: Path, frames: Frames, fps: float) -> None:
 
 
 def write_mp4(path: Path, frames: Frames, fps: float) -> None:
-    """Write an MP4 file that browsers play (H.264), by ffmpeg."""
-    program, first = _ffmpeg(), next(frames)
+    """Write an MP4 file that browsers play (H.264), by ffmpeg of a package or of the system."""
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        program = get_ffmpeg_exe()
+    except (ImportError, RuntimeError) as error:  # no package, or no program in it
+        program = shutil.which("ffmpeg")
+        if program is None:
+            raise ImportError(
+                "MP4 needs ffmpeg, GIF does not; install it by: pip install imageio-ffmpeg, or: "
+                "apt-get install ffmpeg"
+            ) from error
+    first = next(frames)
     height, width = first.shape[:2]
     command = [
         program, "-y", "-loglevel", "error",
@@ -89,22 +100,6 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
         except BaseException:
             path.unlink(missing_ok=True)
             raise
-
-
-def _ffmpeg() -> str:
-    """Return the path of ffmpeg in the package imageio-ffmpeg, or else on the system."""
-    try:
-        from imageio_ffmpeg import get_ffmpeg_exe
-
-        return str(get_ffmpeg_exe())
-    except (ImportError, RuntimeError) as error:  # no package, or no program in it
-        program = shutil.which("ffmpeg")
-        if program is None:
-            raise ImportError(
-                "MP4 needs ffmpeg, GIF does not; install it by: pip install imageio-ffmpeg, or: "
-                "apt-get install ffmpeg"
-            ) from error
-        return program
 
 
 WRITERS = {".gif": write_gif, ".mp4": write_mp4}

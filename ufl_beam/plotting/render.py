@@ -248,10 +248,8 @@ def _frames(solids: Solids) -> Generator[Any, None, None]:
             plotter.set_background("white")
             plotter.enable_anti_aliasing("msaa")
             if beams:
-                undeformed = _lines(
-                    [numbering.points[numbering.vertices_of(beam)] for beam in beams]
-                )
-                plotter.add_mesh(undeformed, color="#A0A0A0", reset_camera=False)
+                axes = [numbering.points[numbering.vertices_of(beam)] for beam in beams]
+                plotter.add_mesh(_lines(axes), color="#A0A0A0", reset_camera=False)
                 plotter.add_text(f"{words} ({prefix}{unit})", position=(0.02, 0.025), **text)
             for n in solids.shown:
                 plotter.suppress_rendering = True
@@ -338,9 +336,8 @@ class Solids:
         solution, numbering = self.solution, self.solution.numbering
         if self.quantity == "rotation":
             return np.asarray(solution.q[n][numbering.dofs[numbering.cells, 2]])
-        index = list(RESULTANTS).index(self.quantity)
-        beams = solution.scene.beams
-        forces = [solution.diagram(beam, n, points=2)[1 + index] for beam in beams]
+        diagrams = (solution.diagram(beam, n, points=2) for beam in solution.scene.beams)
+        forces: list[Array] = [getattr(diagram, self.quantity) for diagram in diagrams]
         return np.concatenate([np.empty(0), *forces]).reshape(-1, 2)
 
     def beams(self, n: int, shape: DeformedShape, factor: float) -> Any:
