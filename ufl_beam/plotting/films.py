@@ -25,7 +25,7 @@ Frames = Iterator[Any]  # images (height, width, 3) of one size; np.uint8
 class Film(os.PathLike[str]):
     """Film in a file, as :func:`animate` returns it.
 
-    A notebook plays it and contains a copy of the film.  Everywhere else it acts as its path.
+    A notebook plays the film and contains a copy.  Everywhere else the object acts as a path.
 
     Attributes:
         path: GIF or MP4 file.
@@ -55,19 +55,30 @@ class Film(os.PathLike[str]):
 
 
 def write_gif(path: Path, frames: Frames, fps: float) -> None:
-    """Write a GIF, whose times are in hundredths of a second."""
+    """Write a GIF; its durations are in hundredths of a second."""
     from PIL import Image
 
     images = [Image.fromarray(frame).quantize(256) for frame in frames]
-    # Frames begin at the nearest hundredth, so that the film has the right length.
+    # Frames begin at the nearest hundredth, so that errors of rounding do not add up.
     durations = 10.0 * np.diff(np.rint(100.0 * np.arange(len(images) + 1) / fps))
     first, *others = images
     first.save(path, save_all=True, append_images=others, duration=durations.tolist(), loop=0)
 
 
 def write_mp4(path: Path, frames: Frames, fps: float) -> None:
-    """Write an MP4 file that browsers play (H.264), by ffmpeg."""
-    program, first = _ffmpeg(), next(frames)
+    """Write an MP4 file that browsers play (H.264), by ffmpeg of a package or of the system."""
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        program = get_ffmpeg_exe()
+    except (ImportError, RuntimeError) as error:  # no package, or no program in it
+        program = shutil.which("ffmpeg")
+        if program is None:
+            raise ImportError(
+                "MP4 needs ffmpeg, GIF does not; install it by: pip install imageio-ffmpeg, or: "
+                "apt-get install ffmpeg"
+            ) from error
+    first = next(frames)
     height, width = first.shape[:2]
     command = [
         program, "-y", "-loglevel", "error",
@@ -76,7 +87,7 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
         "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p",
         str(path.absolute()),
     ]  # fmt: skip
-    # No pipe: if it breaks, PETSc ends the interpreter at the signal.
+    # A file instead of a pipe: PETSc ends the interpreter at the signal of a broken pipe.
     with tempfile.TemporaryFile() as images:
         for frame in chain([first], frames):
             images.write(np.ascontiguousarray(frame).data)
@@ -89,22 +100,6 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
         except BaseException:
             path.unlink(missing_ok=True)
             raise
-
-
-def _ffmpeg() -> str:
-    """Find ffmpeg in the package imageio-ffmpeg, or else on the system."""
-    try:
-        from imageio_ffmpeg import get_ffmpeg_exe
-
-        return str(get_ffmpeg_exe())
-    except (ImportError, RuntimeError) as error:  # no package, or no program in it
-        program = shutil.which("ffmpeg")
-        if program is None:
-            raise ImportError(
-                "MP4 needs ffmpeg, GIF does not; install it by: pip install imageio-ffmpeg, or: "
-                "apt-get install ffmpeg"
-            ) from error
-        return program
 
 
 WRITERS = {".gif": write_gif, ".mp4": write_mp4}

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
+    from matplotlib.transforms import Transform
 
 LEAST_STRAIN = 1e-10  # largest strain that may be due to rounding and the tolerance of iterations
 DRAWN_AS_ZERO = 1e-4  # fraction of the largest value below which a value is drawn as zero
@@ -59,7 +60,7 @@ SIGNS = {
 }
 """Meaning of both signs; the arrow on a beam points from its start to its end."""
 
-Values = tuple[Member, Array]  # a beam, and values at points of its cells, (num_cells, points)
+Values = tuple[Member, Array]  # a beam, and values at the same number of points of each cell
 
 
 def plane_canvas(
@@ -69,28 +70,17 @@ def plane_canvas(
     ax: Axes | None = None,
     size: tuple[float, float] | None = None,
 ) -> tuple[Canvas, tuple[float, float]]:
-    """Make a canvas whose symbols have a size in points.
+    """Make a canvas whose symbols have a size in points; return it and the size of the figure.
 
-    Args:
-        solution: Solution to draw.
-        shown: Numbers of the kept times.
-        magnify: Factor on the displacements.
-        ax: Axes of the user, or None.
-        size: Largest width and height of the figure; by default 9 inches, and the height that all
-            points need at this width; inch.
-
-    Returns:
-        The canvas, and the size of the figure.
+    ``size`` is the largest width and height of the figure; inch.  By default the width is 9 inches,
+    and the height as all points need at this width.
     """
     points = Canvas(solution, magnify, 0.02 * solution.scene.size, shown).points()
     extent = np.ptp(points, axis=0)
     high = float(np.clip(8.0 * extent[1] / max(extent[0], 1e-12), 3.2, 6.8))
     size = (9.0, high) if size is None else size
-    if ax is None:
-        space = np.subtract(size, (0.9, 0.9))  # without the numbers and words around the axes
-    else:
-        style.require_axes(ax)
-        space = style.axes_size(ax) / POINTS
+    # A new figure has numbers and words around the axes.
+    space = np.subtract(size, (0.9, 0.9)) if ax is None else style.axes_size(ax) / POINTS
     scale = float(np.max((1.12, 1.20) * extent / space)) / POINTS
     return Canvas.at_scale(solution, magnify, scale, shown), size
 
@@ -121,19 +111,13 @@ def draw_shape(
     equilibrium, see :meth:`Solution.diagram`.  Peaks of areas are labelled in the unit of the
     title; the largest and the least value are bold.  Yielded or cracked cells are orange; open
     hinges are circles as in :func:`draw_damage_state`.
-
-    Raises:
-        ArgumentError: There is no such time, ``magnify`` is not positive, or ``ax`` is no axes.
     """
     shape = plane_canvas(solution, [n], magnify, ax, MOST)[0].shape(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
     if quantity == "shape":
         return draw_frame(ax, solution, n, shape, ("shape", when))
-    results = [
-        (beam, getattr(solution.diagram(beam, n), quantity)) for beam in solution.scene.beams
-    ]
     diagrams = [
-        (b, values.reshape(len(solution.numbering.cells_of(b)), -1)) for b, values in results
+        (beam, getattr(solution.diagram(beam, n), quantity)) for beam in solution.scene.beams
     ]
     name = f"{RESULTANTS[quantity][0]} {quantity}"
     return draw_frame(ax, solution, n, shape, (name, when), quantity, diagrams)
@@ -197,21 +181,22 @@ def _draw_diagrams(
     from matplotlib.collections import PolyCollection
 
     side = -1.0 if what == "M" else 1.0
-    cells = np.concatenate([solution.numbering.cells_of(beam) for beam, _ in diagrams])
-    all_values = np.concatenate([values for _, values in diagrams])
-    largest = float(np.abs(all_values).max())
+    cells_of = [solution.numbering.cells_of(beam) for beam, _ in diagrams]
+    cells = np.concatenate(cells_of)
+    values = np.concatenate([values for _, values in diagrams])
+    points, largest = len(values) // len(cells), float(np.abs(values).max())
     scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
-    values = np.where(np.abs(all_values) > DRAWN_AS_ZERO * largest, all_values, 0.0).ravel()
+    values = np.where(np.abs(values) > DRAWN_AS_ZERO * largest, values, 0.0)
     # A beam may have several diagrams, which are not connected.
-    diagram = np.repeat(np.arange(len(diagrams)), [len(cell_values) for _, cell_values in diagrams])
-    axis, left = _along(solution, cells, diagram, nodes, all_values.shape[1])
+    diagram = np.repeat(np.arange(len(diagrams)), [len(numbers) for numbers in cells_of])
+    axis, left = _along(solution, cells, diagram, nodes, points)
     ordinates = scale * values[:, None] * left
     rows: list[Array] = []
     outlines: defaultdict[str, list[Array]] = defaultdict(list)
-    diagram = np.repeat(diagram, all_values.shape[1])
-    for area in _areas(axis, axis + ordinates, values, diagram):
-        outlines[RED if area.peak > 0 else BLUE].append(area.outline)
-        rows.append(np.array([area.peak, *axis[area.place], *ordinates[area.place]]))
+    diagram = np.repeat(diagram, points)
+    for outline, peak, k in _areas(axis, axis + ordinates, values, diagram):
+        outlines[RED if peak > 0 else BLUE].append(outline)
+        rows.append(np.array([peak, *axis[k], *ordinates[k]]))
     if what != "N" and len(diagrams) <= MOST_BEAMS:
         firsts = {beam: k for k, (beam, _) in reversed([*enumerate(diagrams)])}
         for k in firsts.values():
@@ -281,26 +266,23 @@ def _along(
     return (mesh.weights(fractions) @ lines).reshape(-1, 2), left.reshape(-1, 2)
 
 
-class Area(NamedTuple):
-    """Section of a diagram along a beam with values of one sign."""
+def _areas(
+    axis: Array, tips: Array, values: Array, diagram: Index
+) -> Iterator[tuple[Array, float, int]]:
+    """Divide diagrams where signs change; ``diagram`` has the number of each point's diagram.
 
-    outline: Array  # (n, 2); m
-    peak: float  # value of the largest magnitude
-    place: int  # number of the point of the peak, the middle one of equal peaks
-
-
-def _areas(axis: Array, tips: Array, values: Array, diagram: Index) -> Iterator[Area]:
-    """Divide diagrams where signs change; ``diagram`` has the number of each point's diagram."""
+    Yields:
+        The outline of an area, (n, 2), m; its value of the largest magnitude; and the number of the
+        point with this value, the middle one of equal values.
+    """
     # At a change of sign both areas end at the zero on the axis.
     first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (diagram[:-1] == diagram[1:]))
     fraction = values[first] / (values[first] - values[first + 1])
     zeros = axis[first] + fraction[:, None] * (axis[first + 1] - axis[first])
     places = np.insert(np.arange(len(values)), first + 1, first)
     axis, tips = (np.insert(points, first + 1, zeros, axis=0) for points in (axis, tips))
-    values, diagram = (
-        np.insert(values, first + 1, 0.0),
-        np.insert(diagram, first + 1, diagram[first]),
-    )
+    values = np.insert(values, first + 1, 0.0)
+    diagram = np.insert(diagram, first + 1, diagram[first])
     signs = np.where(diagram[:-1] == diagram[1:], np.sign(values[:-1] + values[1:]), 0.0)
     ends = np.flatnonzero(np.diff(signs, append=np.nan))
     for begin, end in zip([0, *(ends[:-1] + 1)], ends, strict=True):
@@ -312,7 +294,7 @@ def _areas(axis: Array, tips: Array, values: Array, diagram: Index) -> Iterator[
             sizes = np.abs(values[chain])
             largest = float(sizes.max())
             equal = np.flatnonzero(sizes >= ALIKE * largest)
-            yield Area(outline, sign * largest, int(places[begin + equal[len(equal) // 2]]))
+            yield outline, sign * largest, int(places[begin + equal[len(equal) // 2]])
 
 
 def draw_damage_state(
@@ -323,19 +305,6 @@ def draw_damage_state(
     Yielded cells are coloured by the energy that plastic strains dissipated per length (J/m), in
     cells of fibres together with the energy of cracks.  Opened hinges are circles, which grow with
     the dissipated fraction of the fracture energy; from 99 % on they are hollow, as joints are.
-
-    Args:
-        solution: Solution to draw.
-        n: Number of the kept time; negative from the end.
-        magnify: Factor on the displacements.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: The scene is elastic, there is no such time, ``magnify`` is not positive, or
-            ``ax`` is no axes.
-
-    Example:
-        >>> ub.plot(broken, "damage").savefig("damage.png")
     """
     from matplotlib.collections import LineCollection
 
@@ -419,6 +388,8 @@ def _fit(axes: Axes, own: bool) -> None:
 
 def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
     """Write labels of peaks beside areas and lines; omit labels without space, except extremes."""
+    from matplotlib.transforms import Affine2D
+
     figure = style.parent_figure(axes)
     figure.draw_without_rendering()
     looks: tuple[dict[str, Any], ...] = (
@@ -430,20 +401,17 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
     chosen = [k for k, peak in enumerate(peaks) if peak.extreme or not crowded]
     if not chosen:
         return []
-
-    def in_points(xy: Any) -> Array:
-        return np.asarray(axes.transData.transform(xy) * POINTS / figure.dpi)
-
+    to_points = axes.transData + Affine2D().scale(POINTS / figure.dpi)
     labels = []
     for k in chosen:
         # Directions to try: first perpendicular to the axis, then more and more to the side.
         tilts = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
         x, y = peaks[k].outward
-        at, ways = in_points(peaks[k].tip), positions.directions(math.atan2(y, x) + tilts)
+        at, ways = to_points.transform(peaks[k].tip), positions.directions(math.atan2(y, x) + tilts)
         spots = tuple(Candidate(at, direction) for direction in ways)
         labels.append(Label(peaks[k].text, peaks[k].color, k, spots))
     written = []
-    for box in positions.place(labels, [halves[k] for k in chosen], _lines(axes, in_points)):
+    for box in positions.place(labels, [halves[k] for k in chosen], _lines(axes, to_points)):
         text, color, k, _ = box.label
         (x, y), (right, up), arrow = peaks[k].tip, box.center - box.target, None
         if len(box.leader):
@@ -459,7 +427,7 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
     return written
 
 
-def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
+def _lines(axes: Axes, to_points: Transform) -> Array:
     """Return lines that labels should not cover, and ordinates within areas; (n, 4); points."""
     lines = [np.asarray(line.get_xydata()) for line in axes.lines if line.get_linestyle() != "None"]
     areas = []
@@ -467,14 +435,15 @@ def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
         outlines = [np.asarray(path.vertices) for path in collection.get_paths()]
         lines += outlines
         areas += outlines if collection.get_gid() in (RED, BLUE) else []
-    pieces = segments(in_points(joined(lines)))
+    pieces = segments(to_points.transform(joined(lines)))
     groups = [pieces[np.isfinite(pieces).all(axis=1)]]
     for line in axes.lines:
         half = line.get_markersize() / 2
         diagonals = np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
         if line.get_linestyle() == "None":  # symbols
-            groups += [segments(point + diagonals) for point in in_points(line.get_xydata())]
-    for outline in map(in_points, areas[:MOST_AREAS]):
+            at = to_points.transform(line.get_xydata())
+            groups += [segments(point + diagonals) for point in at]
+    for outline in map(to_points.transform, areas[:MOST_AREAS]):
         # Ordinates, from a point of the outline to its opposite point on the axis.
         for fraction in (0.0, 0.5):
             between = outline[:-1] + fraction * np.diff(outline, axis=0)

@@ -58,21 +58,7 @@ def draw_shapes(
 ) -> Figure:
     """Draw successive shapes in one picture, coloured by time or load factor.
 
-    Args:
-        solution: Solution to draw.
-        times: The times, or the load factors of a path, each replaced by the nearest kept time; s.
-            By default ``count`` times from the first to the last, evenly spaced in time or along
-            the path.
-        count: Number of shapes if ``times`` is not given.
-        magnify: Factor on the displacements.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: ``times`` is one number, ``count`` is less than 1, ``magnify`` is not
-            positive, or ``ax`` is no axes.
-
-    Example:
-        >>> ub.plot(solution, "shapes", count=5, magnify=10).savefig("shapes.png")
+    By default they are ``count`` kept states, evenly spaced in time or along the path.
     """
     from matplotlib.colors import to_hex
 
@@ -109,11 +95,8 @@ def solution_page(solution: Solution) -> str:
 
     Small displacements are magnified.
     """
-    text = (
-        notebook.lines(*solution.summary())
-        + notebook.energy_page(solution.energy)
-        + notebook.lines(solution.open_ledger)
-    )
+    text = notebook.lines(*solution.summary()) + notebook.energy_page(solution.energy)
+    text += notebook.lines(solution.open_ledger)
     moved = solution.q[:, solution.numbering.dofs[:, :2]]
     fraction = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
     magnify = max(x for x in FACTORS if x == 1 or (fraction > 0.0 and x * fraction <= VISIBLE))
@@ -128,21 +111,7 @@ def draw_history(
     component: str = "v",
     ax: Axes | None = None,
 ) -> Figure:
-    """Draw a component of the motion of one or more places over time.
-
-    Args:
-        solution: Solution to draw.
-        places: The places.
-        component: "u", "v", "psi", "du/dt", "dv/dt" or "dpsi/dt".
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: ``component`` is unknown, or a velocity in a static run; a place is not in
-            the scene; or ``ax`` is no axes.
-
-    Example:
-        >>> ub.plot(solution, "history", beam.end, component="v").savefig("history.png")
-    """
+    """Draw a component of the motion of one or more places over time."""
     style.require_option(component, COMPONENTS, "plot: component")
     followed = (places,) if isinstance(places, AttachmentPoint) else tuple(places)
     number = list(COMPONENTS).index(component)
@@ -150,7 +119,7 @@ def draw_history(
     quantity, unit = COMPONENTS[component]
     with style.panel(ax, (8.0, 4.2)) as axes:
         style.time_axes(axes)
-        axes.axhline(0.0, color=style.GREY, linewidth=1.0, zorder=1)
+        axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
         for place in followed:
             axes.plot(solution.times, motion(place)[:, number % 3], label=str(place))
         axes.set_ylabel(f"{quantity} {component.replace('psi', 'ψ')} ({unit})")
@@ -165,9 +134,6 @@ def draw_energy(solution: Solution) -> Figure:
     Above, energies in the scene are solid, supplied energies dashed, and lost energies dotted.
     Below is the imbalance divided by the transferred energy, with the machine precision for
     comparison.
-
-    Example:
-        >>> ub.plot(solution, "energy").savefig("energy.png")
     """
     energy, precision = solution.energy, float(np.finfo(np.float64).eps)
     along = solution.progress
@@ -184,10 +150,9 @@ def draw_energy(solution: Solution) -> Figure:
         figure.legend(loc="outside upper left", ncols=5)
         fraction = np.abs(energy.imbalance) / (energy.energy_transferred or 1.0)
         # An imbalance of exactly zero has no logarithm; it is drawn at the lower edge.
-        check.semilogy(
-            along, np.maximum(fraction, 1e-2 * precision), color=style.RED, linewidth=1.2
-        )
-        check.axhline(precision, color=style.GREY, linewidth=1.0, zorder=1)
+        drawn = np.maximum(fraction, 1e-2 * precision)
+        check.semilogy(along, drawn, color=RED, linewidth=1.2)
+        check.axhline(precision, color=GREY, linewidth=1.0, zorder=1)
         check.annotate(
             "machine precision", (1.0, precision), (0, -3), va="top", ha="right",
             fontsize=style.font_size(11.0),
@@ -203,20 +168,8 @@ def draw_energy(solution: Solution) -> Figure:
 
 
 def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float = 0.1) -> Figure:
-    """Draw modes side by side, in both directions from the undeformed scene, which is grey.
-
-    Args:
-        shapes: Result of :func:`modes` or :func:`buckling`.
-        numbers: Numbers of the modes; all by default.
-        amplitude: Largest displacement, as a fraction of the size of the scene.
-
-    Raises:
-        ArgumentError: There is no such shape, or ``amplitude`` is not positive.
-
-    Example:
-        >>> ub.plot(ub.modes(scene, 3)).savefig("modes.png")
-    """
-    chosen = list(numbers) if len(numbers) else list(range(len(shapes)))
+    """Draw modes side by side, in both directions from the undeformed scene, which is grey."""
+    chosen = list(numbers) or list(range(len(shapes)))
     if not chosen:
         raise ArgumentError("plot: there is no shape")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
@@ -259,18 +212,6 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
     Each family of scheme, steps and cells has a colour and a marker.  The line joins runs that no
     other run beats in both time and error.  Errors are divided by the tolerance, or by the largest
     magnitude of the quantity if there is a budget.
-
-    Args:
-        tradeoff: Result of :func:`tradeoff`.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: ``ax`` is no axes.
-
-    Example:
-        >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
-        >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
-        >>> ub.plot(found).savefig("tradeoff.png")
     """
     errors = {run: max(tradeoff.ratio(run), LEAST_ERROR) for run in tradeoff.runs}
     with style.panel(ax, (9.0, 6.0)) as axes:
@@ -308,11 +249,8 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
 def tradeoff_page(result: Tradeoff) -> str:
     """Write a trade-off as HTML: the runs that no other run beats, remarks, and a picture."""
     head, *rows = result.table()
-    text = (
-        notebook.lines(result.title())
-        + notebook.table(head, rows)
-        + notebook.lines(*result.remarks())
-    )
+    text = notebook.lines(result.title()) + notebook.table(head, rows)
+    text += notebook.lines(*result.remarks())
     return text + notebook.image("errors over wall times", partial(draw_tradeoff, result))
 
 
@@ -320,21 +258,11 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
     """Draw maxima and minima of a section force on the undeformed frame, as two diagrams.
 
     Positive values are red, negative values blue.  Values may occur at different times.
-
-    Raises:
-        ArgumentError: Nothing was run, or ``ax`` is no axes.
-
-    Example:
-        >>> extremes = ub.Extremes()
-        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=extremes)
-        >>> ub.plot(extremes, "M").savefig("extremes.png")
     """
     index, solution = list(style.RESULTANTS).index(quantity), extremes.solution
     reached = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
     diagrams = [
-        (beam, values[:, index].reshape(len(solution.numbering.cells_of(beam)), -1))
-        for beam, extent in reached
-        for values in (extent.high, extent.low)
+        (beam, values[:, index]) for beam, extent in reached for values in (extent.high, extent.low)
     ]
     until = f"until {solution.parameter.at(solution.times[-1])}"
     title = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}", until
@@ -346,15 +274,6 @@ def draw_study(study: Study) -> Figure:
     """Draw each result of a study over each number that its cases vary.
 
     An array result is drawn by its largest magnitude; failed cases are omitted.
-
-    Raises:
-        ArgumentError: The cases have no number, or several numbers of which none varies, or all
-            members failed.
-
-    Example:
-        >>> spans = [{"length": 1.0 + 0.25 * k} for k in range(5)]
-        >>> found = ub.study(lambda length: {"deflection": length**3}, spans)
-        >>> ub.plot(found).savefig("study.png")
     """
     varied = {
         name: np.array([case[name] for case in study.cases], dtype=float)
@@ -378,26 +297,10 @@ def draw_study(study: Study) -> Figure:
 
 
 def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
-    """Draw rainflow matrix, spectrum and damage of the stress cycles at a place.
+    """Draw rainflow matrix, spectrum and damage of the stress cycles at a hot spot.
 
     On the left is the rainflow matrix; in the middle the number of cycles above each range, with
     the S-N curve; on the right the percentage of the damage by each class of ranges.
-
-    Args:
-        fatigue: Recorder of a run.
-        place: One of its hot spots.
-
-    Raises:
-        ArgumentError: The recorder does not have the hot spot, nothing was run, or the stress has
-            no cycle.
-
-    Example:
-        >>> place = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
-        >>> fatigue = ub.Fatigue(place, ub.SNCurve.eurocode(71e6))
-        >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), amplitude=np.sin)
-        >>> shaken = ub.Scene([beam], supports=scene.supports, loads=[shake])
-        >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)
-        >>> ub.plot(fatigue, "cycles", place).savefig("cycles.png")
     """
     from matplotlib.colors import LogNorm
 

@@ -103,24 +103,11 @@ def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
     """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
     The curvature includes the jump of a hinge divided by the length of the cell, so the area of
-    loops is the dissipated energy per length.  A ring marks the first kept time, a dot the last.
-
-    Args:
-        solution: Solution to draw.
-        place: Place in the cell; at a vertex, the cell before the vertex is drawn.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: The scene is elastic, the beam of the place is not in it, or ``ax`` is no
-            axes.
-
-    Example:
-        >>> ub.plot(broken, "moment-curvature", weak.start).savefig("loops.png")
+    loops is the dissipated energy per length.  At a vertex, the cell before the vertex is drawn.
     """
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
     with style.panel(ax, (8.0, 5.4)) as axes:
-        _draw_path(axes, solution, K, M)
-        style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
+        _draw_path(axes, ax, solution, K, M)
         axes.set_xlabel("curvature K (1/m)")
         axes.set_title(f"cell at {place}", loc="left")
     return style.parent_figure(axes)
@@ -130,27 +117,13 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
     """Draw the moment M (N m) of a hinge against its jump (rad), coloured by time.
 
     The area between the path and the axis is the energy that the hinge dissipated.  The title
-    states this energy (J), also as a percentage of the fracture energy.
-
-    Args:
-        solution: Solution to draw.
-        place: Place of a plastic hinge, or in a cell with a hinge; a vertex without a plastic hinge
-            is in the cell before it.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: The scene is elastic, there is no hinge, the beam of the place is not in the
-            scene, or ``ax`` is no axes.
-
-    Example:
-        >>> ub.plot(broken, "hinge", weak.start).savefig("hinge.png")
+    states this energy (J), also as a percentage of the fracture energy.  At a vertex without a
+    plastic hinge, the hinge of the cell before the vertex is drawn.
     """
     history, numbering = solution.material_at(place), solution.numbering
     hinge = numbering.hinge_at(place)
-    in_cell = numbering.hinges(place.beam)[
-        numbering.cell(place) - int(numbering.cells_of(place.beam)[0])
-    ]
-    law = in_cell if hinge is None else law_of(hinge)
+    number = numbering.cell(place) - int(numbering.cells_of(place.beam)[0])
+    law = numbering.hinges(place.beam)[number] if hinge is None else law_of(hinge)
     if law is None or np.isinf(law.limit):
         raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
     M, jump, lost = history.forces[:, 2], history.jump, float(history.hinge[-1])
@@ -163,8 +136,7 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
             axes.fill_between(
                 jump[window], M[window], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2
             )
-        _draw_path(axes, solution, jump, M)
-        style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
+        _draw_path(axes, ax, solution, jump, M)
         _label_axis(axes.xaxis, jump, "jump of rotation", "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
         if math.isfinite(law.fracture_energy):
@@ -180,17 +152,6 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     The line above the areas is the supplied work plus the initial energy of the scene.  The gap
     between line and areas is the energy in the scene, which also has its own line.  The title
     states the largest imbalance of the ledger.
-
-    Args:
-        solution: Solution to draw.
-        ax: Axes to draw in; by default a new figure.
-
-    Raises:
-        ArgumentError: The scene is elastic or has no beams, and has no connectors; or ``ax`` is no
-            axes.
-
-    Example:
-        >>> ub.plot(broken, "dissipation").savefig("dissipation.png")
     """
     if not solution.scene.connectors:
         if not solution.scene.beams:
@@ -213,10 +174,8 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         _label_axis(axes.yaxis, np.concatenate([supplied, inside]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
         digits, power = f"{energy.worst:.1e}".split("e")
-        worst, through = (
-            rf"${digits}\times10^{{{int(power)}}}$",
-            with_unit(energy.energy_transferred, "J"),
-        )
+        worst = rf"${digits}\times10^{{{int(power)}}}$"
+        through = with_unit(energy.energy_transferred, "J")
         axes.set_title(f"worst imbalance {worst} of {through} transferred", loc="left")
         style.draw_legend(axes, ax, loc="outside upper left", ncols=3)
     return style.parent_figure(axes)
@@ -229,7 +188,7 @@ def _label_axis(axis: Axis, values: Array, quantity: str, unit: str) -> None:
     axis.set_label_text(f"{quantity} ({prefix}{unit})")
 
 
-def _draw_path(axes: Axes, solution: Solution, x: Array, M: Array) -> None:
+def _draw_path(axes: Axes, ax: Axes | None, solution: Solution, x: Array, M: Array) -> None:
     """Draw M against x, from light to dark in time; a ring marks the start, a dot the end."""
     from matplotlib.collections import LineCollection
 
@@ -250,3 +209,4 @@ def _draw_path(axes: Axes, solution: Solution, x: Array, M: Array) -> None:
     axes.autoscale_view()
     _label_axis(axes.yaxis, M, "bending moment M", "N m")
     style.draw_bar(axes, colors, named.progress)
+    style.draw_legend(axes, ax, loc="outside upper left", ncols=2)

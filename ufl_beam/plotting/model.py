@@ -35,11 +35,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEAST, MOST = (5.5, 3.0), (9.0, 6.8)  # sizes of the figure; inch
-LEFT, RIGHT, BELOW, ABOVE, REMARK = 66.0, 14.0, 46.0, 34.0, 16.0  # space around axes; points
-LABEL_SIZE, TITLE_SIZE, ARROW_SIZE = 11.0, 14.0, 26.0  # of labels, title, arrows above; points
+LEFT, RIGHT, BELOW, ABOVE, REMARK = 66.0, 14.0, 46.0, 34.0, 16.0  # space around the axes; points
+LABEL_SIZE, TITLE_SIZE, ARROW_SIZE = 11.0, 14.0, 26.0  # of fonts; points
 ARROW_WIDTH = 60.0  # width for the arrow of a load on the whole scene, with spacing; points
 
-Measure = Callable[[str], Array]  # half of width and height of a text; (2,); points
+Measure = Callable[[str], Array]  # returns half the width and height of a text; (2,); points
 UNBOUNDED = np.array([-np.inf, -np.inf, np.inf, np.inf])  # frame before its position is known
 
 
@@ -50,9 +50,6 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     hinges, loads (red), prescribed motions (orange), masses and initial velocities (green).  Loads
     that turn with their place have hollow arrow heads.  Drives are orange: filled if they prescribe
     the motion, hollow if they prescribe the force.  Names and sizes that find no space are omitted.
-
-    Raises:
-        ArgumentError: Constraints of the scene are redundant, or ``ax`` is no axes.
     """
     require_independent(scene)
     subject, notes = Subject(scene), model_notes(scene)
@@ -102,12 +99,12 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
 
 @html_page.register
 def scene_page(scene: Scene) -> str:
-    """Write a scene: its parts, and its picture."""
+    """Write a scene as HTML: its parts, and its picture."""
     return notebook.lines(str(scene)) + notebook.image("model", partial(draw_model, scene))
 
 
 def model_notes(scene: Scene) -> list[str]:
-    """Return notes on damping, works, and hinges that may form, for a legend."""
+    """Return notes on damping, works, and hinges that may form, one for each line."""
     notes = []
     for damping in scene.damping:
         if isinstance(damping, Rayleigh):
@@ -132,7 +129,7 @@ def model_notes(scene: Scene) -> list[str]:
 
 
 def scene_load(load: Load) -> tuple[str, str, float]:
-    """Describe a load on the whole scene: words, an arrow, and its angle (degrees); or nothing."""
+    """Return words, an arrow and its angle (degrees), all empty unless all the scene is loaded."""
     if isinstance(load, Gravity):
         x, y = load.acceleration
         size, angle = math.hypot(x, y), math.degrees(math.atan2(y, x))
@@ -181,20 +178,18 @@ def _arrange(drawing: Drawing, measure: Measure, frame: Array) -> list[Placed]:
     for rank in (NAMES, CAPTIONS):
         if len(labels) > MOST_LABELS:
             labels = [label for label in labels if label.rank < rank]
-    in_points = [
-        label._replace(
-            spots=tuple(s._replace(at=np.divide(s.at, drawing.scale)) for s in label.spots)
-        )
-        for label in labels[:MOST_LABELS]
-    ]
+    labels = labels[:MOST_LABELS]
     lines = np.concatenate([segments(stroke.points) for stroke in chain(*drawing.strokes.values())])
-    halves = [measure(label.text) for label in in_points]
-    placed = place(in_points, halves, lines / drawing.scale, frame)
+    halves = [measure(label.text) for label in labels]
+    placed = place(labels, halves, lines / drawing.scale, frame)
     return [box for box in placed if box.overlap < 0.1]
 
 
 def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
-    """Set limits and ticks; make a new figure as large as the axes and the words around need."""
+    """Set limits and ticks; make a new figure as large as the axes and the words around need.
+
+    ``notes`` is the number of notes above the axes, or None for axes of the user.
+    """
     from matplotlib.ticker import MaxNLocator
 
     (x0, y0, x1, y1), (across, up) = frame, frame[2:] - frame[:2]

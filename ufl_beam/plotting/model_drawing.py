@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Strokes and labels of the picture of a model, at a scale to be determined."""
+"""Strokes and labels of the picture of a model, at a given scale."""
 
 from __future__ import annotations
 
@@ -22,14 +22,12 @@ from ufl_beam.plotting.style import GREEN, INK, RED, TEXT, WHITE, number, with_u
 from ufl_beam.plotting.symbols import FRONT, Stroke, disc
 
 LOADS, MOTIONS, CAPTIONS, NAMES = range(4)  # ranks of labels: labels of loads are placed first
-MOST_LABELS = 80  # number beyond which names and captions are left out
-MOST_CELLS = 300  # number of cells beyond which they are not marked
+MOST_LABELS = 80  # number of labels beyond which names, and then captions, are left out
+MOST_CELLS = 300  # number of cells beyond which neither cells nor possible hinges are marked
 
 HINGE = "#B0508A"  # colour of hinges
 MOVED = "#A86E00"  # colour of prescribed motions: the orange of drives, dark enough for text
 HEAD, SHAFT = 0.85, 1.9  # length of the head of an arrow in units, and width of its line in points
-
-Candidates = tuple[Candidate, ...]
 
 
 class Subject:
@@ -42,7 +40,7 @@ class Subject:
             for beam in scene.beams
         }
         self.cells = sum(len(axis) - 1 for axis in self.axes.values())
-        self.names: dict[Member | Body, str] = {}  # equal names get their number in the scene
+        self.names: dict[Member | Body, str] = {}  # with a number if several are equal
         kinds: tuple[Sequence[Member | Body], ...] = (scene.beams, scene.bodies)
         for objects in kinds:
             known = Counter(member.name for member in objects)
@@ -82,7 +80,7 @@ class Subject:
 
 
 class Drawing:
-    """Strokes of a picture by groups, and its labels; lengths in m."""
+    """Strokes of a picture by groups, in m, and its labels, in points."""
 
     def __init__(self, subject: Subject, scale: float) -> None:
         self.subject, self.scale = subject, scale  # the scale is the length of a point
@@ -91,28 +89,20 @@ class Drawing:
         self.strokes: defaultdict[str, list[Stroke]] = defaultdict(list)
         self.labels: list[positions.Label] = []
         self.stacks: defaultdict[object, float] = defaultdict(float)
-        """Heights of the symbols at a place in a direction."""
+        """Total height of the symbols that are stacked at a place in a direction; m."""
 
     def write(self, text: str, color: str, rank: int, spots: Iterable[Candidate]) -> None:
-        """Add a label with its candidate positions."""
-        self.labels.append(positions.Label(text, color, rank, tuple(spots)))
+        """Add a label with its candidate positions, which are given in m."""
+        in_points = tuple(
+            Candidate(np.divide(at, self.scale), direction, gap / self.scale)
+            for at, direction, gap in spots
+        )
+        self.labels.append(positions.Label(text, color, rank, in_points))
 
     def stack(self, key: object, height: float) -> float:
         """Stack a symbol onto the others at a place; return the height at which it begins."""
         self.stacks[key] += height
         return self.stacks[key] - height
-
-    def around(self, at: Array, radius: float) -> Candidates:
-        """List spots of a label on all sides of a symbol."""
-        ways = directions(np.radians([0, 180, 90, 270, 45, 135, 315, 225]))
-        return tuple(Candidate(at, x, radius / self.scale) for x in ways)
-
-    def along(self, axis: Array, distance: float) -> Candidates:
-        """List spots of a label on both sides of a beam, at least a distance away."""
-        gap = distance / self.scale
-        return tuple(
-            Candidate(at, s * left, gap) for at, left in _normals(axis) for s in (1.0, -1.0)
-        )
 
 
 def _normals(axis: Array) -> list[tuple[Array, Array]]:
@@ -120,6 +110,26 @@ def _normals(axis: Array) -> list[tuple[Array, Array]]:
     fractions = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9])
     steps = points_along(axis, fractions + 0.01) - points_along(axis, fractions - 0.01)
     return list(zip(points_along(axis, fractions), normal(unit_vectors(steps)), strict=True))
+
+
+def _around(at: Array, radius: float) -> list[Candidate]:
+    """List spots of a label on all sides of a symbol."""
+    ways = directions(np.radians([0, 180, 90, 270, 45, 135, 315, 225]))
+    return [Candidate(at, x, radius) for x in ways]
+
+
+def _along(axis: Array, gap: float) -> list[Candidate]:
+    """List spots of a label on both sides of a beam."""
+    return [Candidate(at, s * left, gap) for at, left in _normals(axis) for s in (1.0, -1.0)]
+
+
+def _beside(tail: Array, tip: Array) -> list[Candidate]:
+    """List spots of the label of an arrow: beyond its tail, and on both sides."""
+    ahead, middle = unit_vectors(tip - tail), (tail + tip) / 2
+    sides = normal(ahead), -normal(ahead)
+    aside = [Candidate(at, side) for at in (tail, middle) for side in sides]
+    oblique = (Candidate(tail, unit_vectors(side - ahead)) for side in sides)
+    return [Candidate(tail, -ahead), *aside, *oblique]
 
 
 def draw(subject: Subject, scale: float) -> Drawing:
@@ -132,7 +142,7 @@ def draw(subject: Subject, scale: float) -> Drawing:
     for support in scene.supports:
         _draw_prescribed(drawing, support)
     for mass in scene.masses:
-        spots = drawing.around(np.array(mass.place.point), 0.45 * drawing.unit)
+        spots = _around(np.array(mass.place.point), 0.45 * drawing.unit)
         drawing.write(f"{mass.mass:.4g} kg", INK, CAPTIONS, spots)
     # Line loads come first, so that forces are stacked above them.
     for load in sorted(scene.loads, key=lambda load: not isinstance(load, LineLoad)):
@@ -146,7 +156,7 @@ def draw(subject: Subject, scale: float) -> Drawing:
 
 
 def _draw_beams(drawing: Drawing) -> None:
-    """Draw axes, names and hinges; if few, also marks between cells and of possible hinges."""
+    """Draw axes, names and hinges of beams; mark few cells and the hinges that may form in them."""
     subject, scale, unit = drawing.subject, drawing.scale, drawing.unit
     weight = 2.8 * unit / scale / positions.SYMBOL
     drawing.strokes["beams"] += (Stroke(x, INK, weight, layer=4.0) for x in subject.axes.values())
@@ -163,7 +173,7 @@ def _draw_beams(drawing: Drawing) -> None:
                     disc(x, 0.14 * unit, HINGE, HINGE, 4.1) for x in middles
                 )
         if len(subject.axes) <= MOST_LABELS:
-            drawing.write(subject.names[beam], TEXT, NAMES, drawing.along(axis, 2.5 * scale))
+            drawing.write(subject.names[beam], TEXT, NAMES, _along(axis, 2.5 * scale))
     for hinge in subject.scene.hinges:
         place, r = place_of(hinge), 0.25 * unit
         axis, at = subject.axes[place.beam], np.array(place.point)
@@ -173,16 +183,16 @@ def _draw_beams(drawing: Drawing) -> None:
         drawing.strokes["hinges"] += [disc(at, r, HINGE, HINGE, 5.2)]
         if place.s in place.beam.hinges:
             words = f"hinge {with_unit(float(law_of(hinge).limit), 'N m')}"
-            drawing.write(words, HINGE, CAPTIONS, drawing.around(at, r))
+            drawing.write(words, HINGE, CAPTIONS, _around(at, r))
 
 
 def _name_bodies_and_connectors(drawing: Drawing) -> None:
     """Write names and masses of bodies, kinds and sizes of connectors."""
     scene, canvas = drawing.subject.scene, drawing.shape.canvas
-    unit, scale = drawing.unit, drawing.scale
+    unit = drawing.unit
     for body in scene.bodies if len(scene.bodies) <= symbols.MOST_BODIES else ():
-        arms, name = (canvas.outlines[body] - body.center) / scale, drawing.subject.names[body]
-        spots = drawing.around(np.array(body.center), 0.0)
+        arms, name = canvas.outlines[body] - body.center, drawing.subject.names[body]
+        spots = _around(np.array(body.center), 0.0)
         words = f"{name}, {body.mass:.4g} kg" if body.mass else name
         outside = (x._replace(gap=float((arms @ x.direction).max())) for x in spots)
         drawing.write(words, TEXT, NAMES, outside)
@@ -190,16 +200,16 @@ def _name_bodies_and_connectors(drawing: Drawing) -> None:
         offset = canvas.offsets[connector]
         a, b = symbols.connector_ends(drawing.shape, connector)
         if connector.is_rotation:
-            spots = drawing.around(b, (1.6 + offset + 0.8) * unit)
+            spots = _around(b, (1.6 + offset + 0.8) * unit)
         else:
             apart = math.dist(a, b) > 0.1 * unit
             across = normal(unit_vectors(b - a) if apart else np.array(connector.axis))
             outwards = math.copysign(1.0, offset) * across
-            spots = tuple(
-                Candidate(a + fraction * (b - a) + offset * unit * across, side, 0.8 * unit / scale)
+            spots = [
+                Candidate(a + fraction * (b - a) + offset * unit * across, side, 0.8 * unit)
                 for fraction in (0.5, 0.3, 0.7)
                 for side in (outwards, -outwards)
-            )
+            ]
         units = ("N m", "rad") if connector.is_rotation else ("N", "m")
         words = symbols.law_symbol(connector.law).words(connector.law, *units)
         drawing.write(words, TEXT, CAPTIONS, spots)
@@ -224,19 +234,10 @@ def _arrow(
     ]
 
 
-def _around(center: Array, radius: float, sense: float) -> Array:
+def _arc(center: Array, radius: float, sense: float) -> Array:
     """Return the arc of an arrow around a point, counter-clockwise if ``sense`` > 0; (n, 2)."""
     angles = math.copysign(1.0, sense) * np.linspace(-150.0, 120.0, 40)
     return np.asarray(center + radius * directions(np.radians(90.0 + angles)))
-
-
-def _beside(tail: Array, tip: Array) -> Candidates:
-    """List spots of the label of an arrow: beyond its tail, and on both sides."""
-    ahead, middle = unit_vectors(tip - tail), (tail + tip) / 2
-    sides = normal(ahead), -normal(ahead)
-    aside = [Candidate(at, side) for at in (tail, middle) for side in sides]
-    oblique = (Candidate(tail, unit_vectors(side - ahead)) for side in sides)
-    return Candidate(tail, -ahead), *aside, *oblique
 
 
 def in_time(text: str, time: TimeFunction) -> str:
@@ -260,19 +261,18 @@ def _draw_point_load(drawing: Drawing, load: LoadAtPlace) -> None:
         drawing.write(text, RED, LOADS, _beside(*line))
     if load.moment:
         radius = 1.7 * unit + drawing.stack((load.place.point, "moment"), 0.8 * unit)
-        drawing.strokes["loads"] += _arrow(
-            _around(at, radius, load.moment), RED, unit, hollow=hollow
-        )
+        drawing.strokes["loads"] += _arrow(_arc(at, radius, load.moment), RED, unit, hollow=hollow)
         text = in_time(with_unit(abs(load.moment), "N m"), load.amplitude) + more
-        drawing.write(text, RED, LOADS, drawing.around(at, radius))
+        drawing.write(text, RED, LOADS, _around(at, radius))
     if not size and not load.moment:
-        drawing.write("0 N", RED, LOADS, drawing.around(at, 0.0))
+        drawing.write("0 N", RED, LOADS, _around(at, 0.0))
 
 
 def _stand(drawing: Drawing, place: AttachmentPoint, direction: Array, fraction: float) -> Array:
-    """Return the line of the arrow of a force, which ends at its place; (2, 2); m.
+    """Return the line of the arrow of a force; (2, 2); m.
 
-    If it would lie on a beam, it begins at its place; if it still would, it is beside the beam.
+    The arrow ends at its place.  If it would lie on a beam, it begins at its place; if it would lie
+    on a beam there, too, it is beside the beam.
     """
     unit = drawing.outside
     at, length = np.array(place.point), (2.6 + 1.4 * fraction) * unit
@@ -320,17 +320,16 @@ def _draw_line_load(drawing: Drawing, load: LineLoad) -> None:
             for at in spaced(2.4 * unit) + aside * left:
                 ends = at + np.outer((-0.9 * unit, 0.9 * unit), direction)
                 drawing.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
-            gap = (aside + 0.3 * unit) / drawing.scale
-            spots = [Candidate(at, left, gap) for at, _ in _normals(axis)]
+            spots = [Candidate(at, left, aside + 0.3 * unit) for at, _ in _normals(axis)]
         drawing.write(in_time(with_unit(size, "N/m"), load.amplitude), RED, LOADS, spots)
     if load.moment:
         for at in spaced(3.2 * unit):
-            line = _around(at, 0.75 * unit, load.moment)
+            line = _arc(at, 0.75 * unit, load.moment)
             drawing.strokes["loads"] += _arrow(line, RED, 0.7 * unit)
         text = in_time(with_unit(abs(load.moment), "N m/m"), load.amplitude)
-        drawing.write(text, RED, LOADS, drawing.along(axis, 0.9 * unit))
+        drawing.write(text, RED, LOADS, _along(axis, 0.9 * unit))
     if not size and not load.moment:
-        drawing.write("0 N/m", RED, LOADS, drawing.along(axis, 0.0))
+        drawing.write("0 N/m", RED, LOADS, _along(axis, 0.0))
 
 
 # -- motions -----------------------------------------------------------------------------------
@@ -347,8 +346,8 @@ def _draw_prescribed(drawing: Drawing, support: Support) -> None:
         text = f"{name} = {with_unit(values.pop(), symbol)}" if len(values) == 1 else f"{name}(t)"
         if component == 2:
             radius = 1.9 * unit
-            drawing.strokes["motions"] += _arrow(_around(at, radius, 1.0), MOVED, unit, hollow=True)
-            drawing.write(text, MOVED, MOTIONS, drawing.around(at, radius))
+            drawing.strokes["motions"] += _arrow(_arc(at, radius, 1.0), MOVED, unit, hollow=True)
+            drawing.write(text, MOVED, MOTIONS, _around(at, radius))
             continue
         direction = directions(support.angle + component * math.pi / 2)
         # Beside the place, on the side from which no beam comes.
@@ -375,7 +374,7 @@ def _draw_velocity(drawing: Drawing, velocity: Velocity) -> None:
                 drawing.strokes["velocities"] += _arrow(np.array([at, tip]), GREEN, unit, size=0.8)
                 arrows.append((speed, at, tip))
         if velocity.angular and isinstance(member, Body):
-            line = _around(np.array(member.center), 1.5 * unit, velocity.angular)
+            line = _arc(np.array(member.center), 1.5 * unit, velocity.angular)
             drawing.strokes["velocities"] += _arrow(line, GREEN, 0.8 * unit)
     spin = f"{number(velocity.angular)} rad/s" if velocity.angular else ""
     if arrows:
@@ -384,5 +383,5 @@ def _draw_velocity(drawing: Drawing, velocity: Velocity) -> None:
         drawing.write(text, GREEN, MOTIONS, _beside(tip, at))
     elif velocity.beams:
         at = subject.velocity_points(velocity.beams[0])[0]
-        spots = drawing.around(at, 1.8 * unit if spin else 0.0)
+        spots = _around(at, 1.8 * unit if spin else 0.0)
         drawing.write(spin or "0 m/s", GREEN, MOTIONS, spots)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""HTML of models and results in notebooks: tables, and a picture drawn when a cell shows it."""
+"""HTML of models and results in notebooks: tables, and pictures drawn when a cell shows them."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from ufl_beam.terms.energy_ledger import Energy
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ROWS = 12  # most cases of a study in a table
+ROWS = 12  # largest number of cases of a study in a table
 
 
 @html_page.register
 def energy_page(energy: Energy) -> str:
-    """Write an energy ledger as a table of its final entries."""
+    """Write an energy ledger as HTML: its final entries and its balance."""
     rows = [(kind, name, f"{value:.6g}") for kind, name, value in energy.entries()]
     return table(("energy", "", "at the end (J)"), rows) + lines(energy.balance()) if rows else ""
 
 
 @html_page.register
 def study_page(results: Study) -> str:
-    """Write a study: its first cases with their scalar results."""
+    """Write a study as HTML: its first cases with scalar results, and remarks on all cases."""
     title, *failed = str(results).splitlines()
     scalars = {name: x for name, x in results.results.items() if x.ndim == 1}
     arrays = [f"{name}: {x.shape}" for name, x in results.results.items() if x.ndim > 1]
@@ -42,7 +42,7 @@ def study_page(results: Study) -> str:
 
 
 def lines(*texts: str) -> str:
-    """Write non-empty texts as lines."""
+    """Write texts as lines; leave out empty texts."""
     shown = "<br>".join(escape(text).replace("\n", "<br>") for text in texts if text)
     return f"<p>{shown}</p>" if shown else ""
 
@@ -57,7 +57,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def image(name: str, draw: Callable[[], Figure]) -> str:
-    """Draw a picture; if this fails, return the reason."""
+    """Return a picture as HTML, or the reason why it cannot be drawn."""
     try:
         data, look = png(draw())
     except Exception as error:

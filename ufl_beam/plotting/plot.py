@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.tradeoff_result import Tradeoff
-from ufl_beam.errors import ArgumentError
+from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
@@ -89,8 +89,9 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
         options: By name: ``n``, number of the kept time, negative from the end; ``magnify``, factor
             on displacements; ``times`` (s) of "shapes", each replaced by the nearest that was kept,
             or ``count`` of them; ``component`` of "history", "u", "v", "psi", "du/dt", "dv/dt" or
-            "dpsi/dt"; ``numbers`` of the modes, and ``amplitude``, their largest displacement as a
-            part of the size of the scene; ``ax``, axes to draw in, instead of a new figure.
+            "dpsi/dt"; ``numbers`` of the modes, all by default, and ``amplitude``, their largest
+            displacement as a fraction of the size of the scene; ``ax``, axes to draw in, instead
+            of a new figure.
 
     Raises:
         ArgumentError: There is no such picture, or an argument of it is wrong; the message says
@@ -114,11 +115,18 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             f"plot: quantity = {quantity!r} of a {type(shown).__name__} is not one of "
             f"{', '.join(pictures)}{hint}"
         )
-    draw = pictures[quantity] if quantity else next(iter(pictures.values()))
+    quantity = quantity or next(iter(pictures))
+    draw = pictures[quantity]
     try:
         inspect.signature(draw).bind(shown, *places, **options)
     except TypeError as error:
-        quantity = quantity or next(iter(pictures))
         takes = ", ".join([*inspect.signature(draw).parameters][1:]) or "no further arguments"
         raise ArgumentError(f"plot: {error}; the picture {quantity!r} takes {takes}") from None
+    from matplotlib.axes import Axes
+
+    ax = options.get("ax")
+    if not isinstance(ax, Axes | None):
+        raise ArgumentError(
+            f"ax = {shorten(ax)} must be axes of Matplotlib, as plt.subplots() makes"
+        )
     return draw(shown, *places, **options)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Positions of objects and labels in pictures, and plane geometry; arrays end with (x, y)."""
+"""Positions of objects and labels in pictures, and plane geometry with arrays (..., 2)."""
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -22,12 +22,12 @@ from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.states import States
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3
-"""Half the size of the symbol of a support, in points; length of beams, in points, below which it
-shrinks in proportion; smallest fraction to which it shrinks."""
+"""Half the size of a symbol, in points; median length of beams, in points, below which symbols
+shrink in proportion; smallest fraction to which they shrink."""
 
-FEW = 40  # supports and loads up to which their symbols shrink less than others
+FEW = 40  # largest number of supports and loads whose symbols shrink less than others
 
-Range = tuple[float, float]  # of a slider along its rail from its place, m; or guide parameters
+Range = tuple[float, float]  # of positions along a rail, m; or of parameters of a guide curve
 
 
 # -- geometry ----------------------------------------------------------------------------------
@@ -49,7 +49,7 @@ def normal(vectors: Array) -> Array:
 
 
 def in_frame(points: Any, at: Any, ahead: Array) -> Array:
-    """Convert coordinates along a vector and to its left, in its length, to points; (n, 2)."""
+    """Return points with coordinates from ``at``, along and to the left of ``ahead``; (n, 2)."""
     return np.asarray(at + np.array(points) @ np.array([ahead, normal(ahead)]))
 
 
@@ -90,7 +90,7 @@ class Canvas:
     """Scene before any run or in a solution, as pictures show it, and the size of its symbols.
 
     Displacements are multiplied by ``magnify``.  The picture shows the kept times ``shown`` of a
-    solution, by default all; rails are long enough for these times.
+    solution; rails are long enough for these times.
     """
 
     def __init__(
@@ -98,26 +98,21 @@ class Canvas:
         subject: Scene | States,
         magnify: float,
         unit: float,  # half the size of a symbol; m
-        shown: Sequence[int] | None = None,
+        shown: Sequence[int] = (),
         outside: float = 0.0,  # the same of supports, loads and prescribed motions; m
     ) -> None:
         require_number(magnify, "magnify", positive=True)
         self.magnify, self.unit, self.outside = magnify, unit, outside or unit
         self._solution = subject if isinstance(subject, States) else None
         self.scene = subject.scene if isinstance(subject, States) else subject
-        number = 0 if self._solution is None else len(self._solution.times)
-        self._shown = range(number) if shown is None else shown
+        self._shown = shown
         self.spots = attachment_points(self.scene)  # attachment points of bodies and of the ground
 
     @classmethod
     def at_scale(
-        cls,
-        subject: Scene | States,
-        magnify: float,
-        scale: float,
-        shown: Sequence[int] | None = None,
+        cls, subject: Scene | States, magnify: float, scale: float, shown: Sequence[int] = ()
     ) -> Canvas:
-        """Make a canvas for a picture in the plane at a scale, the length of a point (m)."""
+        """Make a canvas for a picture in the plane, where a point has the length ``scale`` (m)."""
         scene = subject.scene if isinstance(subject, States) else subject
         lengths = [math.dist(beam.start.point, beam.end.point) for beam in scene.beams]
         typical = float(np.median(lengths)) / scale if lengths else math.inf
@@ -127,7 +122,7 @@ class Canvas:
 
     @property
     def undeformed(self) -> DeformedShape:
-        """DeformedShape of the undeformed scene."""
+        """Shape of the undeformed scene."""
         nodes = np.empty((0, 2)) if self._solution is None else self._solution.numbering.points
         return DeformedShape(self, lambda place: np.zeros(3), nodes)
 
@@ -143,21 +138,27 @@ class Canvas:
         nodes = numbering.points + self.magnify * state.q[0, numbering.dofs[:, :2]]
         return DeformedShape(self, lambda place: state.displacement(place)[0], nodes)
 
-    def shapes(self) -> Iterator[DeformedShape]:
-        """Iterate over the undeformed shape and all shapes in the picture."""
-        yield self.undeformed
-        yield from map(self.shape, self._shown)
+    def points(self, origin: AttachmentPoint | None = None) -> Array:
+        """Return points of the undeformed and all shown shapes; (n, 2); m.
 
-    def points(self) -> Array:
-        """Return all points of all shapes; (n, 2); m."""
-        return np.concatenate([shape.points() for shape in self.shapes()])
+        These are nodes of beams, points of the ground, and outlines of bodies, relative to the
+        place ``origin`` at the same time.
+        """
+        ground = np.reshape([point.point for point in self.spots[GROUND]], (-1, 2))
+        found = []
+        for shape in (self.undeformed, *map(self.shape, self._shown)):
+            bodies = [shape.body_points(body, outline) for body, outline in self.outlines.items()]
+            points = np.concatenate([shape.nodes, ground, *bodies])
+            found.append(points if origin is None else points - shape.at(origin))
+        return np.concatenate(found)
 
     @cached_property
     def travels(self) -> dict[Connector, Range]:
-        """Ranges of sliders and guided points since the undeformed state, by connector.
+        """Ranges of sliders and guided points at the shown times, with the undeformed state.
 
-        On a rail, whose connector constrains the motion across it, the range is in positions.  On
-        a guide curve it is in parameters, extended by three units at ends where the curve goes on.
+        The range on a rail is in positions; its connector constrains the motion across the rail.
+        The range on a guide curve is in parameters, extended by three units at ends where the
+        curve goes on.
         """
         ranges: dict[Connector, Range] = {}
         solution, shown = self._solution, list(self._shown)
@@ -176,7 +177,7 @@ class Canvas:
         return ranges
 
     def _along_guide(self, holder: Connector, law: Guide) -> Range:
-        """Return the used parameters of a guide curve, extended by three units if it goes on."""
+        """Return the used parameters of a guide curve, extended by three units where it goes on."""
         curve, size, parameters = law.curve, self.scene.size, [0.0]
         for point in () if self._solution is None else self._solution.position(holder.b):
             step = parameter_step(curve, parameters[-1], size)
@@ -195,7 +196,7 @@ class Canvas:
 
     @cached_property
     def outlines(self) -> dict[Body, Array]:
-        """Closed convex outlines around the centre and points of each body; (n, 2); m."""
+        """Closed convex outline of each body around its centre and attachment points; (n, 2); m."""
         from scipy.spatial import ConvexHull
 
         outlines, circle = {}, self.unit * directions(np.arange(48) * math.pi / 24)
@@ -209,14 +210,13 @@ class Canvas:
 
     @cached_property
     def offsets(self) -> dict[Connector, float]:
-        """Offsets of connectors on the same line, or around the same pin, in units."""
+        """Distances of connectors from their common line, or from the first around a pin; units."""
         # Rails and rods stay in the middle.
         middles = {frozenset(joint.places) for joint in self.scene.joints if not joint.meets}
         groups: defaultdict[tuple[bool, frozenset[object]], list[Connector]] = defaultdict(list)
         for c in self.scene.connectors:
-            groups[c.is_rotation, frozenset((c.b.point,) if c.is_rotation else (c.a, c.b))].append(
-                c
-            )
+            where: tuple[object, ...] = (c.b.point,) if c.is_rotation else (c.a, c.b)
+            groups[c.is_rotation, frozenset(where)].append(c)
         offsets: dict[Connector, float] = {}
         for (rotated, ends), group in groups.items():
             for k, connector in enumerate(group):
@@ -234,9 +234,7 @@ class DeformedShape:
     """Drawn positions of a scene at one time."""
 
     canvas: Canvas
-    motion: Callable[
-        [AttachmentPoint], Array
-    ]  # (u, v, ψ) of a place, not magnified; (3,); m, m, rad
+    motion: Callable[[AttachmentPoint], Array]  # (u, v, ψ) of a place, not magnified; m, m, rad
     nodes: Array  # of all beams of a solution; (num_nodes, 2); m
 
     def at(self, place: AttachmentPoint) -> Array:
@@ -251,44 +249,42 @@ class DeformedShape:
         """Rotate a vector with a place; (2,)."""
         return in_frame(x, 0.0, directions(self.rotation(place)))
 
-    def points(self) -> Array:
-        """Return nodes of beams, outlines of bodies, and points of the ground; (n, 2); m."""
-        ground = np.reshape([point.point for point in self.canvas.spots[GROUND]], (-1, 2))
-        bodies = [self.body_points(body, outline) for body, outline in self.canvas.outlines.items()]
-        return np.concatenate([self.nodes, ground, *bodies])
-
     def body_points(self, body: Body, points: Array) -> Array:
-        """Move points of a body of the undeformed scene with it; (n, 2); m."""
+        """Move points of an undeformed body with the body; (n, 2); m."""
         u, v, ψ = self.motion(body.middle)
         arms = points - body.center
         moved = in_frame(arms, (u, v), directions(ψ)) - arms
         return np.asarray(points + self.canvas.magnify * moved)
 
 
-# -- labels, off lines and off each other ------------------------------------------------------
+# -- labels beside lines and other labels ------------------------------------------------------
 
 GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)  # candidate distances of a label from its point; points
 CLEARANCE = 2.0  # clearance around a label; points
 ROUNDS = 6  # most iterations of the placement
 
 LINE_COST, LABEL_COST, OUTSIDE_COST, DISTANCE_COST, RANK_COST = 8.0, 40.0, 100.0, 0.6, 0.4
-"""Costs of a candidate: per point of length of lines under the label, per square point of another
-label, per point beyond the frame, per point of distance, and per rank in the list of spots."""
+"""Costs of a candidate: per point of the length of lines under the label, per square point under
+other labels, per point beyond the frame, per point between the label and its target, and per number
+in the list of spots."""
 
-CROSSING_COST = 25.0  # of a label that the leader crosses; a crossed line costs a tenth of it
-LEADER = 10.0  # distance of a label from its point from which it has a leader line; points
+CROSSING_COST = 25.0  # per diagonal of a label that the leader crosses; a line costs a tenth of it
+LEADER = 10.0  # least distance of a label from its target at which it has a leader line; points
 
 
 class Candidate(NamedTuple):
-    """Point that a label belongs to, and the direction from this point to the label."""
+    """Point that a label belongs to, and the direction from this point to the label.
+
+    Lengths are in points, or in m in a drawing that converts them.
+    """
 
     at: Array  # (2,)
     direction: Array  # unit vector; (2,)
-    gap: float = 0.0  # least distance of the label; points
+    gap: float = 0.0  # least distance of the label
 
 
 class Label(NamedTuple):
-    """Text and its candidate positions, the best first."""
+    """Text, and points where it may be, the best one first."""
 
     text: str
     color: str
@@ -307,7 +303,7 @@ class Placed(NamedTuple):
 
     @property
     def leader(self) -> Array:
-        """Line from the target to the box if the box is distant; (2, 2) or (0, 2)."""
+        """Line from the target to the box, (2, 2); none if the box is close, (0, 2)."""
         edge = np.clip(self.target, self.center - self.half, self.center + self.half)
         ends = np.array([self.target, edge])
         return ends if np.linalg.norm(edge - self.target) >= LEADER else ends[:0]
@@ -318,8 +314,8 @@ def place(
 ) -> list[Placed]:
     """Place labels where they cover the least; iterate until their positions no longer change.
 
-    Candidates, half widths and heights, segments that should stay visible, (n, 4), and the corners
-    of a frame that labels should not leave, (4,), are in points.
+    Candidates, ``halves`` of widths and heights, segments that should stay visible, (n, 4), and the
+    corners of a frame that labels should not leave, (4,), are in points.
     """
     order = sorted(range(len(labels)), key=lambda k: labels[k].rank)
     placed: dict[int, Placed] = {}
@@ -336,20 +332,21 @@ def place(
 def _best(
     label: Label, half: Array, lines: Array, others: list[Placed], frame: Array | None
 ) -> Placed:
-    """Return the position of a label with the least cost, of all spots at all distances."""
+    """Place a label at the least cost, beside one of its spots at one of the distances GAPS."""
     boxes: Array = np.reshape([(*x.center - x.half, *x.center + x.half) for x in others], (-1, 4))
     lines = np.vstack([lines, *(x.leader.reshape(-1, 4) for x in others)])
     number = np.arange(len(label.spots))
     gaps, choices = np.repeat(GAPS, len(number)), np.tile(number, len(GAPS))
     ways = np.array([place.direction for place in label.spots])[choices]
     spots = np.array([place.at + place.gap * place.direction for place in label.spots])[choices]
-    # At this distance the box is beyond the line through its point, perpendicular to the direction.
+    # All of the box is beyond the line through its spot perpendicular to the direction.
     centers = spots + ways * (gaps + np.abs(ways) @ half)[:, None]
     low, high = centers - half - CLEARANCE, centers + half + CLEARANCE
     # Segments near the candidate boxes.
     first, last = np.minimum(lines[:, :2], lines[:, 2:]), np.maximum(lines[:, :2], lines[:, 2:])
     close = lines[((first <= high.max(axis=0)) & (last >= low.min(axis=0))).all(axis=1)]
-    covered = areas_covered(low, high, boxes)
+    sides = np.minimum(high[:, None], boxes[:, 2:]) - np.maximum(low[:, None], boxes[:, :2])
+    covered = np.prod(np.maximum(sides, 0.0), axis=2).sum(axis=1)  # area under other labels
     cost = DISTANCE_COST * gaps + RANK_COST * choices
     cost += LINE_COST * lengths_inside(low, high, close) + LABEL_COST * covered
     if frame is not None:
@@ -380,7 +377,7 @@ def crossings(first: Array, second: Array) -> Array:
 
 
 def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
-    """Measure segments (n, 4) inside each box, given by its corners (num_boxes, 2)."""
+    """Add up lengths of segments (n, 4) inside each box; its corners are (num_boxes, 2)."""
     first, step = lines[None, :, :2], (lines[:, 2:] - lines[:, :2])[None]
     lengths = np.linalg.norm(step[0], axis=1)
     # A segment perpendicular to an axis is either entirely inside along this axis, or outside.
@@ -388,9 +385,3 @@ def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
     ends = (low[:, None] - first) / step, (high[:, None] - first) / step
     enter, end = np.minimum(*ends).max(axis=2), np.maximum(*ends).min(axis=2)
     return np.asarray(np.maximum(np.minimum(end, 1.0) - np.maximum(enter, 0.0), 0.0) @ lengths)
-
-
-def areas_covered(low: Array, high: Array, boxes: Array) -> Array:
-    """Measure the area of boxes with corners (num_boxes, 2) that others (n, 4) cover."""
-    ends, starts = np.minimum(high[:, None], boxes[:, 2:]), np.maximum(low[:, None], boxes[:, :2])
-    return np.asarray(np.prod(np.maximum(ends - starts, 0.0), axis=2).sum(axis=1))

@@ -68,7 +68,7 @@ class Camera(Record):
     Attributes:
         direction: View direction; (x, y, z).  The frame is in the plane of x and y; y is upwards
             in the picture, and (0, 0, -1) is the front view.
-        follow: Place that the camera moves with, so that it is at rest in the picture.
+        follow: Place that the camera moves with, so that the place is at rest in the picture.
         width: Width of the picture around the followed place, or around the middle of the motion;
             m.  By default the picture contains the whole motion.
 
@@ -87,19 +87,16 @@ class Camera(Record):
     follow: Annotated[AttachmentPoint | None, _require_place] = None
     width: Annotated[float | None, partial(require_number, positive=True)] = None
 
-    def origin(self, shape: DeformedShape) -> Array:
-        """Return the point of the plane that the camera moves with; (2,); m."""
-        return np.zeros(2) if self.follow is None else shape.at(self.follow)
-
-    def aim(self, plotter: Any, box: Array, origin: Array, size: tuple[int, int]) -> None:
+    def aim(self, plotter: Any, box: Array, shape: DeformedShape, size: tuple[int, int]) -> None:
         """Fit a box into the picture, above the colour bar and below the time.
 
         Args:
             plotter: Plotter of PyVista.
-            box: Lower and upper corner, relative to the origin; (2, 3); m.
-            origin: Point of the plane; (2,); m.
+            box: Lower and upper corner, relative to the followed place; (2, 3); m.
+            shape: Shape of the scene with the followed place.
             size: Width and height of the picture; pixels.
         """
+        origin = np.zeros(2) if self.follow is None else shape.at(self.follow)
         towards = np.array(self.direction) / np.linalg.norm(self.direction)
         right = np.cross(towards, UP)
         right /= np.linalg.norm(right)
@@ -137,9 +134,9 @@ def render(
 ) -> None:
     """Write a rendered picture of the frame at the n-th kept time.
 
-    In the plane, beams have the depth of their section.  Their width is equal to it, or large
-    enough to be visible if they are slender.  Bodies are plates, see :func:`plot`.  Orange pins
-    mark opened hinges.  No screen is needed, see :func:`animate`.
+    In the plane, beams have the depth of their section.  Their width is equal to this depth, or
+    large enough to be visible if they are slender.  Bodies are plates around their places.  Orange
+    pins mark opened hinges.  No screen is needed, see :func:`animate`.
 
     Args:
         solution: Solution to draw.
@@ -161,12 +158,10 @@ def render(
     """
     from matplotlib.image import imsave
 
-    solids = Solids(solution, [n], quantity, thickness, magnify, size)
+    solids = Solids(solution, [n], quantity, thickness, magnify, camera, size)
     path = _require_suffix(path, (".png",))
-    require_kind(camera, Camera, "render: camera")
-    camera.origin(solids.canvas.shape(n))
     if active_comm().rank == 0:
-        with closing(_frames(solids, camera)) as frames:
+        with closing(_frames(solids)) as frames:
             imsave(path, next(frames))
 
 
@@ -185,7 +180,7 @@ def animate(
 ) -> Film:
     """Write an animation of the whole motion as GIF or MP4, and return it as a film to show.
 
-    All frames have the same colour scale.  No screen is needed: for VTK before 9.4, Xvfb runs
+    All frames have the same colour scale.  No screen is needed: with VTK before 9.4, Xvfb runs
     during the call.
 
     Args:
@@ -213,23 +208,21 @@ def animate(
         Film('beam.gif')
     """
     path = _require_suffix(path, WRITERS)
-    require_kind(camera, Camera, "animate: camera")
     require_switch(progress, "animate: progress")
     require_number(fps, "animate: fps", positive=True)
     require_number(seconds, "animate: seconds", positive=True)
     shown = evenly(solution.progress, max(1, round(fps * seconds)))
-    solids = Solids(solution, shown, quantity, thickness, magnify, size)
-    camera.origin(solids.canvas.undeformed)
+    solids = Solids(solution, shown, quantity, thickness, magnify, camera, size)
     if active_comm().rank == 0:
-        with closing(_frames(solids, camera)) as frames:
+        with closing(_frames(solids)) as frames:
             about = {"iterable": frames, "total": len(shown), "unit": "frame"}
             bar = progress_bar(progress, active_comm(), **about)
             WRITERS[path.suffix.lower()](path, iter(bar), fps)
     return Film(path)
 
 
-def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
-    """Yield images (height, width, 3) of the states; only moving objects are drawn anew."""
+def _frames(solids: Solids) -> Generator[Any, None, None]:
+    """Yield images (height, width, 3) of the shown times."""
     try:
         import pyvista
     except ImportError as error:
@@ -246,7 +239,7 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
         "title": "values", "color": "black", "n_labels": 5, "fmt": "%.3g", "width": 0.48,
         "height": 0.09, "position_x": 0.46, "position_y": 0.01, "label_font_size": size[1] // 36,
     }  # fmt: skip
-    xy = np.concatenate([shape.points() - camera.origin(shape) for shape in canvas.shapes()])
+    xy = canvas.points(solids.camera.follow)
     margin, half = 2.2 * canvas.unit, solids.thickest(beams)[1] / 2
     box = np.array([[*(xy.min(axis=0) - margin), -half], [*(xy.max(axis=0) + margin), half]])
     with screen(pyvista):
@@ -255,15 +248,13 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
             plotter.set_background("white")
             plotter.enable_anti_aliasing("msaa")
             if beams:
-                undeformed = _lines(
-                    [numbering.points[numbering.vertices_of(beam)] for beam in beams]
-                )
-                plotter.add_mesh(undeformed, color="#A0A0A0", reset_camera=False)
+                axes = [numbering.points[numbering.vertices_of(beam)] for beam in beams]
+                plotter.add_mesh(_lines(axes), color="#A0A0A0", reset_camera=False)
                 plotter.add_text(f"{words} ({prefix}{unit})", position=(0.02, 0.025), **text)
             for n in solids.shown:
                 plotter.suppress_rendering = True
                 shape = canvas.shape(n)
-                camera.aim(plotter, box, camera.origin(shape), size)
+                solids.camera.aim(plotter, box, shape, size)
                 # Meshes and texts replace the old ones of the same name.
                 if beams:
                     plotter.add_mesh(
@@ -311,14 +302,18 @@ class Solids:
     quantity: str
     thickness: float
     magnify: float
+    camera: Camera
     size: tuple[int, int]
 
     def __post_init__(self) -> None:
         style.require_option(self.quantity, QUANTITIES, "quantity")
         require_number(self.thickness, "thickness", positive=True)
-        require_number(self.magnify, "magnify", positive=True)
+        require_kind(self.camera, Camera, "camera")
         for pixels in self.size:
             require_number(pixels, "size", at_least=16)
+        shape = self.canvas.shape(self.shown[0])  # raises if ``magnify`` or the time is wrong
+        if self.camera.follow is not None:
+            shape.at(self.camera.follow)  # raises if the place is not in the scene
 
     @cached_property
     def canvas(self) -> Canvas:
@@ -328,9 +323,9 @@ class Solids:
         return Canvas(self.solution, self.magnify, symbol, sorted(set(self.shown)))
 
     def thickest(self, objects: Iterable[Member | AttachmentPoint]) -> tuple[float, float]:
-        """Return the largest depth in the plane and width across it of beams, or at places; m.
+        """Return the largest depth, in the plane, and width of beams or of beams at places; m.
 
-        Slender beams and bodies have a minimum width.
+        The width has a minimum, so that slender beams and bodies are visible.
         """
         beams = [x.beam if isinstance(x, Place) else x for x in objects if not isinstance(x, Spot)]
         depth = self.thickness * max((float(b.section.depth) for b in beams), default=0.0)
@@ -341,9 +336,8 @@ class Solids:
         solution, numbering = self.solution, self.solution.numbering
         if self.quantity == "rotation":
             return np.asarray(solution.q[n][numbering.dofs[numbering.cells, 2]])
-        index = list(RESULTANTS).index(self.quantity)
-        beams = solution.scene.beams
-        forces = [solution.diagram(beam, n, points=2)[1 + index] for beam in beams]
+        diagrams = (solution.diagram(beam, n, points=2) for beam in solution.scene.beams)
+        forces: list[Array] = [getattr(diagram, self.quantity) for diagram in diagrams]
         return np.concatenate([np.empty(0), *forces]).reshape(-1, 2)
 
     def beams(self, n: int, shape: DeformedShape, factor: float) -> Any:
@@ -433,7 +427,7 @@ class Solids:
 
 
 def _lines(lines: list[Array]) -> Any:
-    """Join lines in one mesh for speed, with separate segments: corners would thin the tubes."""
+    """Join lines in one mesh, for speed; segments are separate, because tubes thin at corners."""
     from pyvista import line_segments_from_points
 
     ends = np.concatenate([np.repeat(line, 2, axis=0)[1:-1] for line in lines])

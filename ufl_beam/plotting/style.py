@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ArgumentError, shorten
+from ufl_beam.errors import ArgumentError
 from ufl_beam.parallel import active_comm
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 # Okabe and Ito's palette, which colour-blind readers can distinguish.
@@ -34,17 +33,17 @@ INK, TEXT, GREY, WHITE = "#222222", "#444444", "#B5B5B5", "#FFFFFF"
 
 RESULTANTS = {"N": ("axial force", "N"), "V": ("shear force", "N"), "M": ("bending moment", "N m")}
 
-POINTS = 72.0  # points of an inch
-CSS_DPI = 80.0  # pixels of a page to an inch of a figure
+POINTS = 72.0  # points per inch
+CSS_DPI = 80.0  # pixels of a page per inch of a figure
 
-FONT = 13.0  # of numbers at axes and words beside them; points
+FONT = 13.0  # default size of texts; points
 FRAME = "#888888"  # colour of axes and their ticks
 
 SIZES = {
     "axes.titlesize": 14.0, "axes.labelsize": 13.0, "legend.fontsize": 12.0,
     "xtick.labelsize": 12.0, "ytick.labelsize": 12.0,
 }  # fmt: skip
-"""Sizes of fonts if texts have the size :data:`FONT`; points."""
+"""Sizes of other fonts if texts have the size :data:`FONT`; points."""
 
 STYLE: dict[str, Any] = {
     "text.color": INK, "figure.dpi": 150.0, "lines.linewidth": 2.0,
@@ -56,7 +55,7 @@ STYLE: dict[str, Any] = {
 
 
 def decimal_prefix(value: float) -> tuple[float, str]:
-    """Find the power of 1000 that scales a value to 1 to 1000, and its prefix: (1000.0, "k")."""
+    """Return the power of 1000 by which a written value is divided, and its prefix: (1e3, "k")."""
     rounded = abs(float(f"{value:.3g}"))
     power = min(max(math.floor(math.log10(rounded) / 3), -3), 3) if rounded > 0.0 else 0
     return 1000.0**power, ("n", "µ", "m", "", "k", "M", "G")[power + 3]
@@ -74,7 +73,7 @@ def number(value: float) -> str:
 
 
 def magnified(factor: float, before: str = ", ") -> str:
-    """Write the factor on displacements in words; empty if it is 1."""
+    """Return words on the factor on displacements, or an empty text if it is 1."""
     return f"{before}displacements × {factor:g}" if factor != 1 else ""
 
 
@@ -116,27 +115,26 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 
 
 def _save(figure: Figure, *args: Any, **options: Any) -> None:
-    """Save a figure on the first process only, as all processes run the same script."""
-    if active_comm().rank == 0:
-        for axes in figure.axes:
-            for axis in (axes.xaxis, axes.yaxis):
-                if axis.get_scale() == "log" and axis.isDefault_majloc:
-                    _label_logarithmic(axis)
-        type(figure).savefig(figure, *args, **options)
+    """Label logarithmic axes, and save a figure on the first process only.
 
-
-def _label_logarithmic(axis: Axis) -> None:
-    """Label powers of ten; if fewer than three are in view, also 2 and 5, else equal steps."""
+    Labels are at powers of ten, if three are in view; else at multiples by 1, 2 and 5, if two are
+    in view; else at equal steps.
+    """
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-    low, high = sorted(axis.get_view_interval())
-    equal = MaxNLocator(5, steps=[1, 2, 5, 10])
-    for locator, least in ((LogLocator(), 3), (LogLocator(subs=(1.0, 2.0, 5.0)), 2), (equal, 0)):
-        if sum(low <= tick <= high for tick in locator.tick_values(low, high)) >= least:
-            break
-    axis.set_major_locator(locator)
-    axis.set_major_formatter("{x:g}" if low > 5e-5 and high < 2e5 else _power_of_ten)
-    axis.set_minor_formatter(NullFormatter())
+    if active_comm().rank > 0:
+        return
+    fine, equal = LogLocator(subs=(1.0, 2.0, 5.0)), MaxNLocator(5, steps=[1, 2, 5, 10])
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        if axis.get_scale() == "log" and axis.isDefault_majloc:
+            low, high = sorted(axis.get_view_interval())
+            for locator, least in ((LogLocator(), 3), (fine, 2), (equal, 0)):
+                if sum(low <= tick <= high for tick in locator.tick_values(low, high)) >= least:
+                    break
+            axis.set_major_locator(locator)
+            axis.set_major_formatter("{x:g}" if low > 5e-5 and high < 2e5 else _power_of_ten)
+            axis.set_minor_formatter(NullFormatter())
+    type(figure).savefig(figure, *args, **options)
 
 
 def _power_of_ten(value: float, _: float) -> str:
@@ -162,23 +160,12 @@ def panel(ax: Axes | None, size: tuple[float, float]) -> Iterator[Axes]:
         with picture(size) as figure:
             yield figure.add_subplot()
         return
-    require_axes(ax)
     with mpl.rc_context(_unless_chosen(STYLE)):
         yield ax
 
 
-def require_axes(ax: Any) -> None:
-    """Raise :class:`ArgumentError` unless ``ax`` is an axes of Matplotlib."""
-    from matplotlib.axes import Axes
-
-    if not isinstance(ax, Axes):
-        raise ArgumentError(
-            f"ax = {shorten(ax)} must be axes of Matplotlib, as plt.subplots() makes"
-        )
-
-
 def _unless_chosen(ours: dict[str, Any]) -> dict[str, Any]:
-    """Return our settings and line colours, except settings that the user has changed."""
+    """Return our settings and line colours without those that the user has changed."""
     import matplotlib as mpl
     from cycler import cycler
 
@@ -189,14 +176,14 @@ def _unless_chosen(ours: dict[str, Any]) -> dict[str, Any]:
 
 
 def font_size(size: float) -> float:
-    """Scale a size of a font in proportion to the size of texts; points."""
+    """Scale a font size from texts of the size :data:`FONT` to the user's size of texts; points."""
     import matplotlib as mpl
 
     return float(size / FONT * mpl.rcParams["font.size"])
 
 
 def shade(color: str) -> str:
-    """Return the user's text colour for ink and axes colour for white; keep other colours."""
+    """Replace ink by the user's colour of texts and white by that of axes; keep other colours."""
     import matplotlib as mpl
 
     now = mpl.rcParams
@@ -206,12 +193,11 @@ def shade(color: str) -> str:
     return str(chosen.get(color, color))
 
 
-def plane_axes(axes: Axes, title: str) -> Axes:
+def plane_axes(axes: Axes, title: str) -> None:
     """Set up axes of the plane of motion with one scale for x and y."""
     axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
     axes.margins(0.06, 0.10)
     axes.set_title(title, loc="left", wrap=True)
-    return axes
 
 
 def time_axes(axes: Axes) -> Axes:
@@ -244,7 +230,10 @@ def draw_legend(
 
 
 def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
-    """Make a colour map for values from low to high, without its end that is invisible on white."""
+    """Make a colour scale for values from ``low`` to ``high``.
+
+    The colours are the part from ``first`` to ``last``, of 0 to 1, of the colour map ``name``.
+    """
     import matplotlib as mpl
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
@@ -261,7 +250,7 @@ def draw_bar(axes: Axes, colors: Any, label: str) -> None:
 
 
 def fit_texts(axes: Axes) -> None:
-    """Extend the limits so that texts are inside, and a legend below covers nothing."""
+    """Extend the limits so that texts are inside, and data above a legend at the bottom."""
     figure = parent_figure(axes)
     figure.draw_without_rendering()
     for text in axes.texts:

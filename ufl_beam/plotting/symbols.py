@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Symbols of bodies, joints, connector laws and supports for all kinds of pictures.
 
-Supports are entries of :data:`SUPPORTS`, joints of :data:`JOINTS`, and connector laws of
-:data:`LAWS`; joints and laws without an entry have a plain symbol.  Half a symbol has the length 1.
-Symbols of loads are in `model_drawing.py`.
+Symbols of supports are in :data:`SUPPORTS`, those of joints in :data:`JOINTS`, and those of
+connector laws in :data:`LAWS`; joints and laws without an entry have a plain symbol.  The unit of
+lengths is half a symbol.  Symbols of loads are in `model_drawing.py`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from ufl_beam.model.bodies import GROUND, AttachmentPoint, Place, Spot, node
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Guided, Joint, Link, Prismatic, Release, RigidLink
-from ufl_beam.model.supports import Support
 from ufl_beam.plotting import positions
 from ufl_beam.plotting.positions import DeformedShape, directions, in_frame, normal, unit_vectors
 from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, shade, with_unit
@@ -29,20 +28,20 @@ from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, shade, wit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Layers: below the beams, above the beams, on the areas of that layer, pins, and above pins.
+# Layers: below the beams, above the beams, on areas of the layer MIDDLE, pins, above pins.
 BEHIND, MIDDLE, UPON, PINS, FRONT = 2.5, 4.2, 4.3, 5.0, 5.5
 
 FILLED, EDGE = "#D6E2ED", "#5F7A94"  # colours of bodies
 STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"  # of rails, rods and fixed supports
 
-LEAST_SLIDE = 4.0  # least length of a sliding connector
+LEAST_SLIDE = 4.0  # least length of a sliding connector; units
 MOST_BODIES = 300  # number of bodies beyond which they are drawn as dots
 
 
 class Stroke(NamedTuple):
     """Line, or an area if it is filled."""
 
-    points: Array  # (n, 2); m, or halves of a symbol in the tables
+    points: Array  # (n, 2); m, or units in the tables of symbols
     color: str = INK
     weight: float = 1.6  # width of the line; points
     fill: str | None = None  # colour of the area
@@ -50,7 +49,7 @@ class Stroke(NamedTuple):
 
 
 def draw_strokes(axes: Axes, groups: Mapping[str, Iterable[Stroke]], color: Any = None) -> None:
-    """Draw groups of lines and areas, in their own colours or all in one colour.
+    """Draw lines and areas by groups, in their own colours or all in one colour.
 
     Strokes that look alike share a collection, so that large scenes are drawn fast.
     """
@@ -82,7 +81,7 @@ def _box(low: float, high: float, half: float, fill: str) -> Stroke:
 
 
 def disc(at: Array, radius: float, color: str, fill: str, layer: float = PINS) -> Stroke:
-    """Draw a filled circle; m."""
+    """Draw a filled circle; its centre and radius are in m."""
     circle = directions(np.linspace(0.0, 2 * math.pi, 25))
     return Stroke(at + radius * circle, color, 1.4, fill, layer)
 
@@ -98,8 +97,8 @@ _TRACK = ((-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0))
 _DIAMOND = ((-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0))
 
 SUPPORTS = ((_DIAMOND,), (_TRIANGLE, _TRACK), (_TRIANGLE, _PLATE), (_CLAMP,))
-"""Outlines by the number of constrained displacements; 3 includes the rotation.  The place is the
-origin, and the beam comes from above."""
+"""Outlines by the number of constrained displacements; the last ones also constrain the rotation.
+The place is the origin, and the beam comes from above."""
 
 
 class SupportSymbol(NamedTuple):
@@ -115,16 +114,21 @@ class SupportSymbol(NamedTuple):
 def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
     """Find supports, and points of the ground with joints or connectors."""
     scene = shape.canvas.scene
+    # Place, colour, index of SUPPORTS, direction away from the support, angle unless clamped
+    found: list[tuple[AttachmentPoint, str, int, float, float]] = []
     for support in scene.supports:
-        angle = support_direction(support, shape.rotation(support.place))
+        place, held = support.place, support.held
         color = ORANGE if support.moving else GROUND_GREY
-        number = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
-        yield SupportSymbol(shape.at(support.place), angle, SUPPORTS[number], color, support.place)
+        if len(held) == 3:
+            found.append((place, color, 3, _inward(place) + shape.rotation(place), 0.0))
+        else:
+            angle = support.angle - (0.0 if 1 in held else math.pi / 2)
+            found.append((place, color, len({0, 1} & set(held)), _inward(place), angle))
     grounded: list[tuple[Sequence[AttachmentPoint], bool]] = [
         (j.places, _rotates(j)) for j in scene.joints if joint_symbol(j).grounded
     ]
     grounded += [((c.a, c.b), False) for c in scene.connectors if not c.is_rotation]
-    grounds: dict[Spot, tuple[float, bool]] = {}  # direction from it; if free to turn
+    grounds: dict[Spot, tuple[float, bool]] = {}  # direction away; whether all joints there turn
     for places, rotates in grounded:
         for point in places:
             if isinstance(point, Spot) and point.body is GROUND:
@@ -137,35 +141,24 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
                 known, before = grounds.get(point, (inward, True))
                 grounds[point] = known, before and rotates
     for point, (inward, rotates) in grounds.items():
-        angle = _upright(inward) if rotates else inward - math.pi / 2
-        yield SupportSymbol(
-            np.array(point.point), angle, SUPPORTS[2 if rotates else 3], GROUND_GREY, point
-        )
+        found.append((point, GROUND_GREY, 2 if rotates else 3, inward, 0.0))
+    for place, color, fixed, inward, angle in found:
+        if fixed == 3:
+            angle = inward - math.pi / 2
+        elif math.sin(inward - angle) < -0.5:  # the symbol would lie on the beam
+            angle += math.pi
+        yield SupportSymbol(shape.at(place), angle, SUPPORTS[fixed], color, place)
 
 
 def supports(shape: DeformedShape) -> Iterator[Stroke]:
     """Draw supports; fixed supports are on hatched ground."""
+    unit = shape.canvas.outside
     for at, angle, outlines, color, _ in support_symbols(shape):
-        ahead = shape.canvas.outside * directions(angle)
+        ahead = unit * directions(angle)
         yield from (Stroke(in_frame(x, at, ahead), color, 0.5, color, 3.5) for x in outlines)
         if color != ORANGE:
             low = min(y for outline in outlines for _, y in outline)
-            yield from _hatches(
-                in_frame([(-1.0, low), (1.0, low)], at, ahead), shape.canvas.outside
-            )
-
-
-def support_direction(support: Support, turned: float) -> float:
-    """Return the angle of a support's symbol, away from its beam; a clamp is ``turned``; rad."""
-    inward = _inward(support.place)
-    if len(support.held) == 3:
-        return inward + turned - math.pi / 2
-    return _upright(inward, support.angle - (0.0 if 1 in support.held else math.pi / 2))
-
-
-def _upright(inward: float, angle: float = 0.0) -> float:
-    """Return an angle, or its opposite if the symbol would lie on the beam; rad."""
-    return angle + (math.pi if math.sin(inward - angle) < -0.5 else 0.0)
+            yield from _hatches(in_frame([(-1.0, low), (1.0, low)], at, ahead), unit)
 
 
 def _inward(place: AttachmentPoint) -> float:
@@ -192,9 +185,9 @@ def _hatches(line: Array, unit: float) -> Iterator[Stroke]:
 
 def bodies(shape: DeformedShape) -> list[Stroke]:
     """Draw outlines of the rigid bodies."""
-    outlines = shape.canvas.outlines.items()
     return [
-        Stroke(shape.body_points(body, line), EDGE, 1.6, FILLED, BEHIND) for body, line in outlines
+        Stroke(shape.body_points(body, outline), EDGE, 1.6, FILLED, BEHIND)
+        for body, outline in shape.canvas.outlines.items()
     ]
 
 
@@ -213,7 +206,7 @@ class Look(NamedTuple):
     """Symbol of a joint."""
 
     rod: float = 0.0  # width of a line from place to place; points
-    pins: tuple[int, ...] = ()  # numbers of the places with a pin; with a rail only if it turns
+    pins: tuple[int, ...] = ()  # numbers of places with a pin, with a rail only if it turns
     rail: Callable[[DeformedShape, Joint], Iterator[Stroke]] | None = None
     grounded: bool = True  # a point of the ground has the symbol of a support
 
@@ -225,7 +218,7 @@ def _rail(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
     ahead = -normal(shape.turned(across.axis, base))
     s = float((block - start) @ ahead)
     low, high = shape.canvas.travels[across]
-    # Magnified rotations may leave this range.
+    # With magnified rotations, the block may be outside of this range.
     low, high = min(low, s) - 1.8 * unit, max(high, s) + 1.8 * unit
     rail = block + np.outer((low - s, high - s), ahead)
     yield Stroke(rail, STEEL, 2.2)
@@ -234,7 +227,7 @@ def _rail(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
     else:
         foot = min(max(0.0, low), high)
         yield Stroke(np.array([start, block + (foot - s) * ahead]), STEEL, 2.2)
-    corners = [(-0.95, 0.55), (0.95, 0.55), (0.95, -0.55), (-0.95, -0.55), (-0.95, 0.55)]
+    corners = _box(-0.95, 0.95, 0.55, WHITE).points
     yield Stroke(in_frame(corners, block, unit * ahead), INK, 1.8, WHITE)
 
 
@@ -249,7 +242,7 @@ def _guide(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
 
 
 def _sleeve(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
-    """Draw two bars along the free direction of a release, or a box if both are free."""
+    """Draw two bars along the free direction of a release, or a box if both directions are free."""
     if 0 in joint.shared:
         return
     place = joint.places[0]
@@ -283,7 +276,7 @@ def _rotates(joint: Joint) -> bool:
 
 
 def rods(shape: DeformedShape) -> Iterator[Stroke]:
-    """Draw links, from place to place."""
+    """Draw rods of joints, from place to place."""
     for joint in shape.canvas.scene.joints:
         if weight := joint_symbol(joint).rod:
             yield Stroke(np.array([shape.at(place) for place in joint.places]), DARK, weight)
@@ -297,11 +290,11 @@ def rails(shape: DeformedShape) -> Iterator[Stroke]:
 
 
 class Pin(NamedTuple):
-    """Symbol of a joint of places at one point."""
+    """Pin of a joint."""
 
     at: Array  # (2,); m
-    rotates: bool  # freely
-    places: tuple[AttachmentPoint, ...]
+    rotates: bool  # whether the joint turns freely
+    places: tuple[AttachmentPoint, ...]  # that it joins at this point
 
 
 def pins(shape: DeformedShape) -> Iterator[Pin]:
@@ -349,10 +342,7 @@ _CYLINDER = [
         np.array([(-0.12, 0.34), (0.2, 0.0), (-0.12, -0.34), (-0.12, 0.34)]), INK, 1.0, ORANGE, UPON
     ),
 ]
-_CURVE = [
-    *_BOXED,
-    _line((-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35), layer=UPON),
-]
+_CURVE = [*_BOXED, _line((-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35), layer=UPON)]
 
 
 def _stop_in_words(law: laws.Stop, force: str, unit: str) -> str:
@@ -494,7 +484,7 @@ def _around(shape: DeformedShape, connector: Connector) -> Iterator[Stroke]:
 
 
 def in_plane(shape: DeformedShape) -> dict[str, list[Stroke]]:
-    """Draw bodies, joints, connectors, supports and masses in the plane; many bodies as dots."""
+    """Draw the symbols in the plane by groups; many bodies are dots."""
     scene, unit = shape.canvas.scene, shape.canvas.unit
     few = len(scene.bodies) <= MOST_BODIES
     square = 0.27 * unit * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])

@@ -136,20 +136,24 @@ def test_ffmpeg_writes_mp4(tmp_path):
     )
 
 
-def test_the_message_of_ffmpeg_is_passed_on(tmp_path, monkeypatch):
+@pytest.fixture
+def ffmpeg(tmp_path, monkeypatch):
+    """File of a script that runs instead of ffmpeg."""
     program = tmp_path / "ffmpeg"
-    program.write_text("#!/bin/sh\necho no such codec >&2\nexit 3\n")
-    program.chmod(0o755)
-    monkeypatch.setattr(films, "_ffmpeg", lambda: str(program))
+    program.touch(0o755)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    return program
+
+
+def test_the_message_of_ffmpeg_is_passed_on(tmp_path, ffmpeg):
+    ffmpeg.write_text("#!/bin/sh\necho no such codec >&2\nexit 3\n")
     with pytest.raises(RuntimeError, match="ffmpeg: no such codec"):
         films.write_mp4(tmp_path / "a.mp4", images(2000), fps=10)
 
 
-def test_an_interrupted_film_leaves_no_file(tmp_path, monkeypatch):
-    program = tmp_path / "ffmpeg"
-    program.write_text('#!/bin/sh\nfor last; do :; done\ncat > "$last"\n')
-    program.chmod(0o755)
-    monkeypatch.setattr(films, "_ffmpeg", lambda: str(program))
+def test_an_interrupted_film_leaves_no_file(tmp_path, ffmpeg):
+    ffmpeg.write_text('#!/bin/sh\nfor last; do :; done\ncat > "$last"\n')
 
     def interrupted():
         yield from images(3)

@@ -353,6 +353,9 @@ def test_values_have_a_decimal_prefix(value, text):
     assert with_unit(value, "N m") == text
 
 
+ELSEWHERE = ub.Camera(follow=ub.Body((0, 0), mass=1.0, inertia=1.0).middle)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -370,6 +373,8 @@ def test_values_have_a_decimal_prefix(value, text):
         (lambda s: ub.render(s, "a.png", thickness=-1), "thickness = -1 must be positive"),
         (lambda s: ub.render(s, "a.png", size=(800, 0)), "size = 0 must be at least"),
         (lambda s: ub.render(s, "a.png", camera="front"), "camera = 'front' is not a Camera"),
+        (lambda s: ub.render(s, "a.png", magnify=0), "magnify = 0 must be positive"),
+        (lambda s: ub.animate(s, "a.gif", camera=ELSEWHERE), "is not in the scene"),
         (lambda s: ub.animate(s, "a.gif", progress=2), "progress = 2 must be True or False"),
         (lambda s: ub.animate(s, "a.avi"), "must end in .gif or .mp4"),
         (lambda s: ub.animate(s, "a.gif", fps=0), "fps = 0 must be positive"),
