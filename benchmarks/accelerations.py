@@ -57,9 +57,11 @@ ACCELERATIONS = {
     ),
     "elimination along beams": Acceleration(
         "The unknowns of the vertices between the ends of beams are eliminated in blocks of three; "
-        "dense fronts factor the remaining matrix. Without it, dense fronts with the ordering "
-        "\"amd\" factor the whole tangent. On several processes only the unknowns at the borders "
-        "of subdomains are not divided among the processes.",
+        "dense fronts factor the remaining matrix, or KLU if more than 24 unknowns remain and "
+        "forces of connectors are among them. Without it, the same solver factors the whole "
+        "tangent. On several processes, each eliminates the unknowns that no other process has, in "
+        "scenes with forces of connectors only those along beams; every process then factors the "
+        "rest.",
         by.SHIPPED, by.WHOLE,
         (
             "compiled/c/beam_elimination.c", "solvers/beam_elimination.py:_interior_vertices",
@@ -70,15 +72,17 @@ ACCELERATIONS = {
     ),
     "dense fronts": Acceleration(
         "The unknowns that remain after the elimination along beams, mostly of joints, are "
-        "eliminated in dense matrices whose products stay in registers. Without it, KLU, called by "
-        "PETSc, factors this matrix. The gain grows with the number of joints: see docs/ranks.md.",
+        "eliminated in small dense matrices (fronts); partial sums of their products are kept in "
+        "registers. Without it, KLU, called by PETSc, factors this matrix, as it does with both "
+        "variants if more than 24 unknowns remain and forces of connectors are among them. The "
+        "gain grows with the number of joints: see docs/ranks.md.",
         by.SHIPPED, by.LEFT,
         ("compiled/c/fronts.c", "solvers/multifrontal.py"),
     ),
     "guess with the acceleration": Acceleration(
-        "The initial guess of a step contains the part of the last second difference of the "
-        "configuration that is expected to repeat. Without it, the guess extrapolates with the "
-        "velocity of the last step.",
+        "The initial guess extrapolates with the velocity of the last step and adds the fraction "
+        "of the last second difference of the configuration that is expected to repeat. Without "
+        "it, the guess extrapolates with the velocity of the last step.",
         by.SHIPPED, by.VELOCITY,
         (
             "compiled/c/time_loop.c:enter_step", "compiled/c/time_loop.c:compare_differences",
@@ -87,9 +91,9 @@ ACCELERATIONS = {
         (ELASTIC, LARGE, SWING, HINGED, JOINTED),
     ),
     "tangent kept in the last iteration": Acceleration(
-        "The tangent of the previous iterate is kept if the residual is expected to fall far below "
-        "the tolerance with it, at most once in a row. Without it, every iteration assembles and "
-        "factors a tangent.",
+        "An iteration reuses the tangent of the previous one if the residual is expected to fall "
+        "far below the tolerance with it; the next iteration then has a new tangent. Without it, "
+        "every iteration assembles and factors a tangent.",
         by.SHIPPED, by.TANGENTS,
         ("compiled/c/newton.c~e->near|\\bkept\\b|\\bclose\\b|CLOSE",),
         (ELASTIC, LARGE, HINGED, JOINTED),
