@@ -60,7 +60,7 @@ class Phases(NamedTuple):
     ``change``, of the type ``change_of_energy``, computes the energy that a step stores and
     dissipates.  ``opens`` has fields of ``openable``, if points or connectors may open.
     ``admits``, of the type ``admission``, checks a step before it is accepted.  ``again`` discards
-    the results of iterates before a step is solved anew.
+    the results of earlier iterates before stiffer tangents are tried in the same step.
     """
 
     begin: Sequence[Loop] = ()
