@@ -113,9 +113,7 @@ class Klu:
         """Eliminate from the matrix and right-hand side; return whether that succeeds."""
         good: bool = self._inner.factor(b)
         self._matrix.stateIncrease()
-        good = good and succeeds(self._factors.setUp)
-        good = good and int(self._factors.getFailedReason()) == GOOD
-        return good and succeeds(self._solve)
+        return good and succeeds(self._solve) and int(self._factors.getFailedReason()) == GOOD
 
     def reduce(self, b: Array) -> None:
         """Eliminate from another right-hand side.
