@@ -209,10 +209,7 @@ def _named_components(scene: Scene, followed: Connector | Joint) -> list[tuple[i
     connectors = connector_indices(scene, followed)
     if isinstance(followed, Connector):
         names = COMPONENTS if followed.components else (type(followed.law).__name__,)
-        return [
-            (connector, f"{followed}, {name}")
-            for connector, name in zip(connectors, names, strict=False)
-        ]
+        return [(n, f"{followed}, {name}") for n, name in zip(connectors, names, strict=False)]
     holders = [scene.all_connectors[connector] for connector in connectors]
     axes = ["psi" if c.is_rotation else "xy"[abs(c.axis[1]) > abs(c.axis[0])] for c in holders]
     return [
@@ -339,27 +336,20 @@ class Events(Restartable):
         changes = np.argwhere(in_cells & ~self._in_cells)
         new = [(t, int(cell), IN_CELLS[n]) for cell, n in changes]
         for k in np.flatnonzero(on != self._on):
-            begins, ends = CONNECTOR_EVENTS[
-                type(simulation.scene.all_connectors[self._followed[k]].law)
-            ]
-            new.append((t, self._followed[k], begins if on[k] else ends))
+            number = self._followed[k]
+            begins, ends = CONNECTOR_EVENTS[type(simulation.scene.all_connectors[number].law)]
+            new.append((t, number, begins if on[k] else ends))
         self._in_cells, self._on = in_cells, on
         events = self._add(simulation, new)
         if events:
             on_first(simulation.comm, lambda: [self._tell(event) for event in events])
 
     def _add(self, simulation: StateView, rows: list[Row]) -> list[Event]:
-        connectors, numbering = simulation.scene.all_connectors, simulation.numbering
-        named = simulation.parameter
-        events = [
-            Event(
-                t,
-                numbering.place_of(number) if what in IN_CELLS else connectors[number],
-                what,
-                named,
-            )
-            for t, number, what in rows
-        ]
+        connectors, place_of = simulation.scene.all_connectors, simulation.numbering.place_of
+        events = []
+        for t, number, what in rows:
+            where = place_of(number) if what in IN_CELLS else connectors[number]
+            events.append(Event(t, where, what, simulation.parameter))
         self._rows += rows
         self.found += events
         return events

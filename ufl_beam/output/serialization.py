@@ -227,21 +227,17 @@ def from_data(data: Data) -> Any:
         warnings.simplefilter("ignore", ModelWarning)
         for record in data["records"]:
             fields = {name: make(value) for name, value in record.items() if name != "is"}
-            made.append(make_record(RECORDS[record["is"]], fields))
+            kind = RECORDS[record["is"]]
+            known = {field.name for field in dataclasses.fields(kind) if field.init}
+            if fields.keys() != known:
+                others = ", ".join(sorted(fields.keys() ^ known))
+                raise TypeError(f"{kind.__name__}: fields {others} are missing or unknown")
+            # Constructors may have other arguments than the fields.
+            made.append(object.__new__(kind))
+            for name, value in fields.items():
+                object.__setattr__(made[-1], name, value)
+            getattr(made[-1], "__post_init__", lambda: None)()
     return make(data["root"])
-
-
-def make_record(kind: type[T], fields: Mapping[str, Any]) -> T:
-    """Make a dataclass from its fields, even if its constructor has other arguments."""
-    known = {field.name for field in dataclasses.fields(kind) if field.init}  # type: ignore[arg-type]
-    if fields.keys() != known:
-        others = ", ".join(sorted(fields.keys() ^ known))
-        raise TypeError(f"{kind.__name__}: fields {others} are missing or unknown")
-    record = object.__new__(kind)
-    for name, value in fields.items():
-        object.__setattr__(record, name, value)
-    getattr(record, "__post_init__", lambda: None)()
-    return record
 
 
 # -- comparison ------------------------------------------------------------------------------------

@@ -7,7 +7,6 @@ The convergence test has dimensionless tolerances.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -88,7 +87,7 @@ class Solver:
         )
         every = np.arange(subdomain.size, dtype=np.int32)
         self._diagonal = A.positions(every, every)
-        self._stiffness: Array | None = None  # against zero-energy modes, after a singular tangent
+        self._stiffness = np.zeros(subdomain.size)  # against zero-energy modes
         self._moves = np.ones(subdomain.size, dtype=np.uint8)
         self._moves[equation.supports.dofs] = 0
         c = self.c = equation.c
@@ -171,17 +170,6 @@ class Solver:
 
     # -- callbacks of C --------------------------------------------------------------------------
 
-    def agree(self, how: Sequence[int], values: Array) -> None:
-        """Combine numbers over all processes; a maximum is infinite if a number is NaN."""
-        comm = self._subdomain.comm
-        everywhere = np.empty((comm.size, len(values)))
-        comm.Allgather(values, everywhere)
-        for k, (kind, column) in enumerate(zip(how, everywhere.T, strict=True)):
-            if kind == lib.LARGEST:
-                values[k] = math.inf if np.isnan(column).any() else column.max()
-            else:
-                values[k] = math.hypot(*column) if kind == lib.HYPOT else column.sum()
-
     def solve(self, anew: bool) -> bool:
         """Compute the change, with a new factorization if ``anew``; return whether that fails."""
         owned = slice(self._subdomain.num_owned)
@@ -196,33 +184,30 @@ class Solver:
 
     def find_zero_modes(self) -> bool:
         """Find new zero-energy modes and hold them by springs; return whether there are any."""
-        if self._stiffness is None:
-            self._stiffness = np.zeros(self._subdomain.size)
         tangent = self._equation.A, self._diagonal, self._equation.supports.dofs
         forces = self._residuals(), self.scale()
         new = stiffen_zero_modes(self._stiffness, self._subdomain, *tangent, *forces)
-        self._set_stiffness(self._stiffness)
+        self._set_stiffness()
         return new
 
     def forget_zero_modes(self) -> bool:
         """Release all zero-energy modes; return whether any were held, on any process."""
         if self._subdomain.largest(float(self.c.idle)) == 0.0:
             return False
-        if self._stiffness is not None:
-            self._stiffness[:] = 0.0
-            self._set_stiffness(self._stiffness)
+        self._stiffness[:] = 0.0
+        self._set_stiffness()
         return True
 
-    def _set_stiffness(self, stiffness: Array) -> None:
-        """Add stiffnesses against zero-energy modes to tangents from now on.
+    def _set_stiffness(self) -> None:
+        """Let C add the stiffnesses against zero-energy modes to tangents from now on.
 
         Degrees of freedom that these stiffnesses or supports hold do not count in the round-off of
         forces.
         """
-        dofs = np.flatnonzero(stiffness)
-        arrays = {"idle_entry": self._diagonal[dofs], "idle_stiffness": stiffness[dofs]}
+        dofs = np.flatnonzero(self._stiffness)
+        arrays = {"idle_entry": self._diagonal[dofs], "idle_stiffness": self._stiffness[dofs]}
         fill(self.c, idle=len(dofs), **arrays)
-        self._moves[:] = stiffness == 0.0
+        self._moves[:] = self._stiffness == 0.0
         self._moves[self._equation.supports.dofs] = 0
 
     # -- paths -----------------------------------------------------------------------------------
@@ -232,11 +217,11 @@ class Solver:
         self._border, self.c.border = border, ffi.NULL
         if border is not None:
             self._t = np.array([border.t])
-            self._border_in_c = struct(
+            in_c = struct(
                 "border", t=self._t, handle=self.c.handle, arrive=lib.arrive_in_python,
                 change=lib.change_along_in_python, met=lib.met_in_python,
             )  # fmt: skip
-            self.c.border = self._border_in_c
+            fill(self.c, border=in_c)
 
     def arrive(self, x: Array) -> None:
         """Pass an iterate and its load factor to the border."""
@@ -257,8 +242,7 @@ class Solver:
         border, subdomain, owned = self._border, self._subdomain, slice(self._subdomain.num_owned)
         rates, y, z = np.zeros((3, len(x)))
         border.tangent(x, rates)
-        if self._stiffness is not None:
-            self._equation.A.data[self._diagonal] += self._stiffness
+        self._equation.A.data[self._diagonal] += self._stiffness
         rates = subdomain.added(rates)
         rates[self._equation.supports.dofs] = 0.0
         if not self._factors.factor(self._r[owned]):
@@ -318,19 +302,23 @@ class Solver:
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the number of iterations and stiffnesses against zero-energy modes."""
         self.c.total = int(archive.number("iterations", self.c.total))
-        known = float(self._stiffness is not None)
+        known = self._subdomain.largest(float(self._stiffness.any()))
         if archive.number("idle motions are known", known):
-            if self._stiffness is None:
-                self._stiffness = np.zeros(self._subdomain.size)
             self._stiffness[:] = archive.at_dofs("idle motions", self._stiffness)
-            self._set_stiffness(self._stiffness)
+            self._set_stiffness()
 
 
 @from_c()
 def agree_in_python(handle: Any, number: int, how: Any, values: Any) -> None:
-    """Callback of C, declared in c_library.py."""
-    solver = ffi.from_handle(handle)[1]
-    solver.agree(how[0:number], np.frombuffer(ffi.buffer(values, 8 * number)))
+    """Combine numbers over all processes; a maximum is infinite if a number is NaN."""
+    comm = ffi.from_handle(handle)[1]._subdomain.comm
+    everywhere = np.empty((comm.size, number))
+    comm.Allgather(np.frombuffer(ffi.buffer(values, 8 * number)), everywhere)
+    for k, column in enumerate(everywhere.T):
+        if how[k] == lib.LARGEST:
+            values[k] = math.inf if np.isnan(column).any() else column.max()
+        else:
+            values[k] = math.hypot(*column) if how[k] == lib.HYPOT else column.sum()
 
 
 def _call(method: str, error: int | None, handle: Any, *data: Any) -> int | None:

@@ -33,13 +33,9 @@ def free_matrix(subdomain: Subdomain, A: Csr, constrained: Index) -> tuple[csc_a
 
     All processes call it together, each with its part ``A`` and its ``constrained`` local dofs.
     """
-    local = (
-        subdomain.dofs[A.rows()],
-        subdomain.dofs[A.indices],
-        A.data,
-        subdomain.dofs[constrained],
-    )
-    gathered = subdomain.comm.allgather(local) if not subdomain.alone else [local]
+    dofs = subdomain.dofs
+    local = dofs[A.rows()], dofs[A.indices], A.data, dofs[constrained]
+    gathered = [local] if subdomain.alone else subdomain.comm.allgather(local)
     rows, columns, data, fixed = (np.concatenate(x) for x in zip(*gathered, strict=True))
     n = subdomain.numbering.size
     free = np.setdiff1d(np.arange(n), fixed)
@@ -124,10 +120,8 @@ def stiffen_zero_modes(
     forced = chosen & (forces > FORCED * scale)
     if not subdomain.total(float(new.any())) or subdomain.total(float(forced.any())):
         return False
-    rotations, owned = (
-        np.isin(subdomain.dofs, numbering.rotations),
-        np.arange(subdomain.size) < subdomain.num_owned,
-    )
+    rotations = np.isin(subdomain.dofs, numbering.rotations)
+    owned = np.arange(subdomain.size) < subdomain.num_owned
     owned[subdomain.multipliers] = False
     sizes = np.abs(A.data[diagonal])
     for alike in (rotations & owned, ~rotations & owned):
