@@ -61,21 +61,14 @@ class AlongCells(NamedTuple):
     """Form of the section forces at points of cells, and its coefficients.
 
     If all points are ends of cells, displacements and forces between the ends do not matter.
-
-    Attributes:
-        motions: Degrees of freedom of a cell: all, or for ends only the last, the rotations.
-        resultants: The first numbers ``cell_number`` of loops.h of the cells.
-        angles: :attr:`ForcesAlongCells.angles`.
-        first: Number of components of ``resultants``.
-        moves: Number of degrees of freedom in ``motions``.
     """
 
     form: ufl.Form
-    motions: fem.Function
-    resultants: fem.Function
-    angles: fem.Function
-    first: int
-    moves: int
+    motions: fem.Function  # degrees of freedom of a cell: all, or for ends only the rotations
+    resultants: fem.Function  # the first numbers ``cell_number`` of loops.h of the cells
+    angles: fem.Function  # `ForcesAlongCells.angles`
+    first: int  # number of components of ``resultants``
+    moves: int  # number of degrees of freedom in ``motions``
 
 
 @cached_forms

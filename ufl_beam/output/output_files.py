@@ -218,21 +218,6 @@ class OutputFile:
             )
 
 
-def put_in_place(path: Path, data: bytes | memoryview) -> None:
-    """Write a whole file; the previous file stays until the new file is on the disk."""
-    temporary = beside(path)
-    try:
-        with temporary.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    sync(path.parent)
-
-
 def changed(what: str) -> ArgumentError:
     """Return the error of an output that differs from its state in the checkpoint."""
     return ArgumentError(
@@ -320,10 +305,18 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
             f"{what} {path}{at} cannot be written: a state() must consist of numbers, "
             f"texts, lists and dicts: {error}"
         ) from None
+    temporary = beside(path)
     try:
-        with file.getbuffer() as data:
-            data[-DIGEST:] = hashlib.sha256(data[:-DIGEST]).hexdigest().encode()
-            put_in_place(path, data)
+        try:
+            with temporary.open("wb") as new, file.getbuffer() as data:
+                data[-DIGEST:] = hashlib.sha256(data[:-DIGEST]).hexdigest().encode()
+                new.write(data)
+            sync(temporary)
+            os.replace(temporary, path)
+            sync(path.parent)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
     except OSError as error:
         free = shutil.disk_usage(path.parent).free
         before = "the one before is still there" if path.exists() else "there is none yet"

@@ -13,6 +13,7 @@ from typing import Any
 from petsc4py import PETSc
 
 import numpy as np
+from scipy.linalg import qr
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import (
@@ -31,12 +32,23 @@ from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.beam_elimination import CondensedSolver
 from ufl_beam.solvers.newton_options import PREFIX, Newton, apply_options, database
-from ufl_beam.solvers.null_vectors import stiffen_zero_modes
+from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
 from ufl_beam.terms.term import from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
 """Options for full steps: a line search of PETSc would add forces and moments in norms, and compute
 additional residuals."""
+
+ZERO_MODE_STIFFNESS = 0.01
+"""Stiffness against a zero-energy mode, relative to the largest diagonal entry of the tangent for
+displacements or for rotations.
+
+If forces resist the mode after all, iterations converge faster with a smaller stiffness.  A larger
+stiffness reduces the motion that round-off causes.
+"""
+
+FORCED = 1e-6
+"""Force above which a motion is driven, not a zero-energy mode; relative to forces in the scene."""
 
 REASONS = {
     lib.SINGULAR: "found a singular tangent",
@@ -183,12 +195,39 @@ class Solver:
         fill(self.c, conjugate=conjugate, start=np.empty(len(q)))
 
     def find_zero_modes(self) -> bool:
-        """Find new zero-energy modes and hold them by springs; return whether there are any."""
-        tangent = self._equation.A, self._diagonal, self._equation.supports.dofs
-        forces = self._residuals(), self.scale()
-        new = stiffen_zero_modes(self._stiffness, self._subdomain, *tangent, *forces)
+        """Hold new motions that no force resists or drives; return whether there are any.
+
+        The node where several members meet has no mass of its own.  When all plastic hinges around
+        it have lost their strength, any rotation of the node is an equilibrium, and the tangent is
+        singular.  The rotation is then held by a stiffness on the diagonal of the tangent, which
+        residuals, and so forces, energies and solutions, do not contain.
+        """
+        subdomain, A, numbering = self._subdomain, self._equation.A, self._subdomain.numbering
+        K, free = free_matrix(subdomain, A, self._equation.supports.dofs)
+        if not len(free) or not np.isfinite(K.data).all():
+            return False
+        try:
+            _, vectors = null_vectors(K)
+        except (np.linalg.LinAlgError, RuntimeError):
+            return False
+        motions = numbering.scales[free, None] * vectors
+        # One degree of freedom for each mode, chosen so that the modes are independent there.
+        pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
+        dofs = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]
+        chosen = np.isin(subdomain.dofs, dofs)
+        new = chosen & (self._stiffness == 0.0)
+        forced = chosen & (self._residuals() > FORCED * self.scale())
+        if not subdomain.total(float(new.any())) or subdomain.total(float(forced.any())):
+            return False
+        rotations = np.isin(subdomain.dofs, numbering.rotations)
+        owned = np.arange(subdomain.size) < subdomain.num_owned
+        owned[subdomain.multipliers] = False
+        sizes = np.abs(A.data[self._diagonal])
+        for alike in (rotations & owned, ~rotations & owned):
+            stiffest = subdomain.largest(float(sizes[alike].max(initial=0.0)))
+            self._stiffness[new & alike] = ZERO_MODE_STIFFNESS * stiffest
         self._set_stiffness()
-        return new
+        return True
 
     def forget_zero_modes(self) -> bool:
         """Release all zero-energy modes; return whether any were held, on any process."""
