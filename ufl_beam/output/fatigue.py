@@ -18,11 +18,11 @@ from ufl_beam.arrays import Array, State
 from ufl_beam.display import compact_repr
 from ufl_beam.errors import (
     ArgumentError,
+    require_all,
     require_function,
     require_kind,
     require_number,
     require_row,
-    require_sequence,
 )
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.records import Instance, Positive, Record
@@ -344,9 +344,7 @@ class Fatigue(Restartable):
         self, spots: Sequence[HotSpot] | HotSpot, curve: SNCurve, *, resolution: float = 0.0
     ) -> None:
         several = (spots,) if isinstance(spots, HotSpot) else spots
-        self.spots: tuple[HotSpot, ...] = require_sequence(several, "Fatigue: spots")
-        for i, spot in enumerate(self.spots):
-            require_kind(spot, HotSpot, f"Fatigue: spots[{i}]")
+        self.spots: tuple[HotSpot, ...] = require_all(several, "Fatigue: spots", HotSpot)
         require_kind(curve, SNCurve, "Fatigue: curve")
         require_number(resolution, "Fatigue: resolution", at_least=0.0)
         self.curve = curve

@@ -17,9 +17,9 @@ from ufl_beam.arrays import State
 from ufl_beam.display import TIME, Parameter, bracketed
 from ufl_beam.errors import (
     ArgumentError,
+    require_all,
     require_count,
     require_function,
-    require_kind,
     require_sequence,
 )
 from ufl_beam.model.bodies import AttachmentPoint, Place, require_anchors
@@ -81,11 +81,11 @@ class History(Restartable):
         self._temporary = beside(self._path)  # replaces the file when rows are deleted
         self.files = (self._path,) if max_rows == sys.maxsize else (self._path, self._temporary)
         self._places = require_sequence(places, f"History {path}: places")
-        self._connectors = require_sequence(connectors, f"History {path}: connectors")
         for i, place in enumerate(self._places):
             require_anchors(f"History {path}: places[{i}]", place)
-        for i, connector in enumerate(self._connectors):
-            require_kind(connector, (Connector, Joint), f"History {path}: connectors[{i}]")
+        self._connectors = require_all(
+            connectors, f"History {path}: connectors", (Connector, Joint)
+        )
         self._open: list[OutputFile] = []
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:

@@ -281,11 +281,6 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
 
     The ``format`` names the content and a number, such as "solution of ufl_beam, 2"; the number
     grows whenever the meaning of files changes.  ``at`` is a part of messages, such as the time.
-
-    Raises:
-        ArgumentError: The file cannot be written, or the content has other types than numbers,
-            texts, lists and dicts.
-        OSError: The disk is full, or has another error.
     """
     require_writable(path)
     what, file = format.partition(" ")[0], io.BytesIO()

@@ -115,9 +115,6 @@ def in_section(plane: tuple[Any, Any, Any], c: Any, s: Any) -> tuple[Any, Any, A
 class ForcesAlongCells:
     """Section forces (N, V, M) at points of the cells of a scene.
 
-    Args:
-        numbering: Numbering of the scene.
-
     Attributes:
         angles: Angles of the smooth undeformed axis at both ends of cells; (num_cells, 2); rad.
         dofs: Degrees of freedom (u, v, ψ) of the nodes of cells; (num_cells, 3, degree + 1).

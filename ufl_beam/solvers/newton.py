@@ -100,8 +100,7 @@ class Solver:
         every = np.arange(subdomain.size, dtype=np.int32)
         self._diagonal = A.positions(every, every)
         self._stiffness = np.zeros(subdomain.size)  # against zero-energy modes
-        self._moves = np.ones(subdomain.size, dtype=np.uint8)
-        self._moves[equation.supports.dofs] = 0
+        self._moves = np.empty(subdomain.size, dtype=np.uint8)
         c = self.c = equation.c
         fill(
             c,
@@ -116,6 +115,7 @@ class Solver:
             forget_zero_modes=lib.forget_zero_modes_in_python,
             aside=np.zeros(subdomain.size if c.search != ffi.NULL else 0),
         )  # fmt: skip
+        self._set_stiffness()
         c.handle = equation.callbacks.handle(self)  # `fill` would keep this object alive
         if subdomain.alone:
             self._factors.drive(c)

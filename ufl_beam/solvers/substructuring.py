@@ -116,11 +116,7 @@ class Klu:
         return good and succeeds(self._solve) and int(self._factors.getFailedReason()) == GOOD
 
     def reduce(self, b: Array) -> None:
-        """Eliminate from another right-hand side.
-
-        Raises:
-            PETSc.Error: KLU finds the matrix singular.
-        """
+        """Eliminate from another right-hand side; PETSc.Error if KLU finds a singular matrix."""
         self._inner.reduce(b)
         self._solve()
 
