@@ -57,23 +57,18 @@ class Extent(NamedTuple):  # with the fields of ``extent`` of loops.h
 # -- extremes that C updates after each step -------------------------------------------------------
 
 
-class AlongCells(NamedTuple):
-    """Form of the section forces at points of cells, and its coefficients.
-
-    If all points are ends of cells, displacements and forces between the ends do not matter.
-    """
-
-    form: ufl.Form
-    motions: fem.Function  # degrees of freedom of a cell: all, or for ends only the rotations
-    resultants: fem.Function  # the first numbers ``cell_number`` of loops.h of the cells
-    angles: fem.Function  # `ForcesAlongCells.angles`
-    first: int  # number of components of ``resultants``
-    moves: int  # number of degrees of freedom in ``motions``
-
-
 @cached_forms
-def along_cells(element: Element, fractions: tuple[float, ...], works: bool) -> AlongCells:
-    """State :func:`section_force` as a form; its entries are (N, V, M)."""
+def along_cells(
+    element: Element, fractions: tuple[float, ...], works: bool
+) -> tuple[ufl.Form, fem.Function, fem.Function, fem.Function]:
+    """State :func:`section_force` as a form; its entries are (N, V, M).
+
+    If all fractions are ends of cells, displacements and forces between the ends do not matter.
+
+    Returns:
+        The form, and its coefficients: degrees of freedom of a cell, all or for ends only the last,
+        the rotations; the first numbers ``cell_number`` of loops.h; ``ForcesAlongCells.angles``.
+    """
     mesh, h, between = Mesh(degree=element.degree), element.axis.h, set(fractions) > {0.0, 1.0}
     n = len(mesh.nodes)
     first, moves = (lib.CELL_NUMBERS, 3 * n) if between else (lib.COUPLE, n)
@@ -104,7 +99,7 @@ def along_cells(element: Element, fractions: tuple[float, ...], works: bool) -> 
         rows += in_section(plane, ufl.cos(angle), ufl.sin(angle))
     test = ufl.TestFunction(values.function_space)
     form = ufl.dot(ufl.as_vector(rows), test) / h * element.dx(1)
-    return AlongCells(form, motions, resultants, angles, first, moves)
+    return form, motions, resultants, angles
 
 
 class ExtremesInC:
@@ -120,8 +115,11 @@ class ExtremesInC:
         fractions: Array,
     ) -> None:  # fmt: skip
         size, works = fields.subdomain.size, bool(fields.subdomain.numbering.scene.works)
-        form = along_cells(fields.element, tuple(map(float, fractions)), works)
-        self._kernel = fields.kernel(form.form, form.motions, fields.cell_dofs[:, -form.moves :])
+        form, motions, resultants, angles = along_cells(
+            fields.element, tuple(map(float, fractions)), works
+        )
+        moves, first = (x.ufl_shape[0] for x in (motions, resultants))
+        self._kernel = fields.kernel(form, motions, fields.cell_dofs[:, -moves:])
         _, self._batch, spare = self._kernel.keep_entries()
         self._cells, self._points, self._forces = len(along.angles), len(fractions), cell_forces
         sizes = spare.size, size
@@ -129,9 +127,9 @@ class ExtremesInC:
         cell_forces.keep_latest()
         self.c = struct(
             "watch", forces=cell_forces.c, along=self._kernel.cells, between=between,
-            angles=in_batches(along.angles, self._batch), q=np.zeros(size), first=form.first,
-            at_angles=self._kernel.position(form.angles),
-            at_numbers=self._kernel.position(form.resultants),
+            angles=in_batches(along.angles, self._batch), q=np.zeros(size), first=first,
+            at_angles=self._kernel.position(angles),
+            at_numbers=self._kernel.position(resultants),
             numbers=np.zeros(lib.CELL_NUMBERS * self._cells),
             some=np.zeros(lib.SOME * self._kernel.cells.width),
             in_order=cell_forces.in_order(self._batch),

@@ -354,14 +354,13 @@ def read(path: Path, format: str) -> Content:
     except OSError as error:
         raise ArgumentError(f"the file cannot be read: {error.strerror}") from None
     kind = format.rpartition(", ")[0]
-    actual = by = ""
-    if end := END.fullmatch(data[-256:]):
-        if hashlib.sha256(data[:-DIGEST]).hexdigest().encode() != data[-DIGEST:]:
-            raise ArgumentError("the file is damaged: its checksum does not match its content")
-        actual, by = end[1].decode(), end[2].decode()
-    if not actual:
+    end = END.fullmatch(data[-256:])
+    if end is None:
         why = "its last line is wrong" if data else "it is empty"
         raise ArgumentError(f"the file holds no {kind}, or is damaged: {why}")
+    if hashlib.sha256(data[:-DIGEST]).hexdigest().encode() != data[-DIGEST:]:
+        raise ArgumentError("the file is damaged: its checksum does not match its content")
+    actual, by = end[1].decode(), end[2].decode()
     if actual != format:
         raise ArgumentError(
             f"the file is a {actual}, written by version {by} of ufl_beam; this version, "

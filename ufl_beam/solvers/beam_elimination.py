@@ -231,7 +231,7 @@ class CondensedSolver:
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor with the next right-hand side; PETSc calls this if the matrix has changed."""
-        self._is_new, self._good = True, True
+        self._is_new = True
         pc.setFailedReason(GOOD)
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
