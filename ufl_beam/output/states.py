@@ -415,10 +415,9 @@ class States:
             ArgumentError: The beam is not in the scene, or ``points`` is less than 2.
         """
         require_number(points, "diagram: points", at_least=2)
-        s, pieces = self.numbering.parameters(beam), int(points)
-        at = s[:-1, None] + np.linspace(0.0, 1.0, pieces) * np.diff(s)[:, None]
-        forces = self.cell_forces(n, np.arange(pieces) / (pieces - 1))
-        forces = forces[self.numbering.cells_of(beam)]
+        s, fractions = self.numbering.parameters(beam), np.arange(int(points)) / (int(points) - 1)
+        at = s[:-1, None] + fractions * np.diff(s)[:, None]
+        forces = self.cell_forces(n, fractions)[self.numbering.cells_of(beam)]
         return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
 
     def strains(self, beam: Member, n: int = -1) -> Array:

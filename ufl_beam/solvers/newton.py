@@ -342,9 +342,9 @@ class Solver:
         """Save or restore the number of iterations and stiffnesses against zero-energy modes."""
         self.c.total = int(archive.number("iterations", self.c.total))
         known = self._subdomain.largest(float(self._stiffness.any()))
-        if archive.number("idle motions are known", known):
-            self._stiffness[:] = archive.at_dofs("idle motions", self._stiffness)
-            self._set_stiffness()
+        held = archive.number("idle motions are known", known)
+        self._stiffness[:] = archive.at_dofs("idle motions", self._stiffness) if held else 0.0
+        self._set_stiffness()
 
 
 @from_c()
