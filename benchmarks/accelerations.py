@@ -66,7 +66,6 @@ ACCELERATIONS = {
         (
             "compiled/c/beam_elimination.c", "solvers/beam_elimination.py:_interior_vertices",
             "solvers/beam_elimination.py:_runs", "solvers/beam_elimination.py:_plan",
-            "solvers/beam_elimination.py:_what_is_left",
             "solvers/beam_elimination.py:Elimination",
         ),
     ),

@@ -10,7 +10,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index, State
-from ufl_beam.compiled.c_library import doubles, lib, struct
+from ufl_beam.compiled.c_library import doubles, fill, lib, struct
 from ufl_beam.compiled.simd_kernels import in_batches
 from ufl_beam.discretization.compiled_forms import cached_forms
 from ufl_beam.discretization.dof_numbering import DofNumbering
@@ -25,36 +25,50 @@ from ufl_beam.output.recorder import Restartable, StateView
 from ufl_beam.output.section_forces import ForcesAlongCells, in_section, section_force
 from ufl_beam.terms.cell_forces import CellForces
 
-# -- extremes that C updates after each step -------------------------------------------------------
 
-EXTENT = ("low", "high", "time_low", "time_high")
-"""Fields of ``extent`` of loops.h."""
-
-
-class AlongCells(NamedTuple):
-    """Form of the section forces at points of cells, and its coefficients.
-
-    If all points are ends of cells, displacements and forces between the ends do not matter.
+@in_one_line
+class Extent(NamedTuple):  # with the fields of ``extent`` of loops.h
+    """Smallest and largest values of a run and their times; arrays of one shape.
 
     Attributes:
-        motions: Degrees of freedom of a cell: all, or for ends only the last, the rotations.
-        resultants: The first numbers ``cell_number`` of loops.h of the cells.
-        angles: :attr:`ForcesAlongCells.angles`.
-        first: Number of components of ``resultants``.
-        moves: Number of degrees of freedom in ``motions``.
+        low: The least values.
+        high: The largest values.
+        time_low: Times at which the least values were first reached; s.
+        time_high: Times at which the largest values were first reached; s.
+
+    Example:
+        >>> extremes = ub.Extremes()
+        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=extremes)
+        >>> v = extremes.displacement(beam).of((-1, 1))
+        >>> print(v.low.round(3), v.time_low)  # m, s
+        -0.019 1.0
     """
 
-    form: ufl.Form
-    motions: fem.Function
-    resultants: fem.Function
-    angles: fem.Function
-    first: int
-    moves: int
+    low: Array
+    high: Array
+    time_low: Array
+    time_high: Array
+
+    def of(self, rows: Index) -> Extent:
+        """Return the extremes of some of the rows."""
+        return Extent(*(values[rows] for values in self))
+
+
+# -- extremes that C updates after each step -------------------------------------------------------
 
 
 @cached_forms
-def along_cells(element: Element, fractions: tuple[float, ...], works: bool) -> AlongCells:
-    """State :func:`section_force` as a form; its entries are (N, V, M)."""
+def along_cells(
+    element: Element, fractions: tuple[float, ...], works: bool
+) -> tuple[ufl.Form, fem.Function, fem.Function, fem.Function]:
+    """State :func:`section_force` as a form; its entries are (N, V, M).
+
+    If all fractions are ends of cells, displacements and forces between the ends do not matter.
+
+    Returns:
+        The form, and its coefficients: degrees of freedom of a cell, all or for ends only the last,
+        the rotations; the first numbers ``cell_number`` of loops.h; ``ForcesAlongCells.angles``.
+    """
     mesh, h, between = Mesh(degree=element.degree), element.axis.h, set(fractions) > {0.0, 1.0}
     n = len(mesh.nodes)
     first, moves = (lib.CELL_NUMBERS, 3 * n) if between else (lib.COUPLE, n)
@@ -85,7 +99,7 @@ def along_cells(element: Element, fractions: tuple[float, ...], works: bool) -> 
         rows += in_section(plane, ufl.cos(angle), ufl.sin(angle))
     test = ufl.TestFunction(values.function_space)
     form = ufl.dot(ufl.as_vector(rows), test) / h * element.dx(1)
-    return AlongCells(form, motions, resultants, angles, first, moves)
+    return form, motions, resultants, angles
 
 
 class ExtremesInC:
@@ -101,27 +115,28 @@ class ExtremesInC:
         fractions: Array,
     ) -> None:  # fmt: skip
         size, works = fields.subdomain.size, bool(fields.subdomain.numbering.scene.works)
-        form = along_cells(fields.element, tuple(map(float, fractions)), works)
-        self._kernel = fields.kernel(form.form, form.motions, fields.cell_dofs[:, -form.moves :])
+        form, motions, resultants, angles = along_cells(
+            fields.element, tuple(map(float, fractions)), works
+        )
+        moves, first = (x.ufl_shape[0] for x in (motions, resultants))
+        self._kernel = fields.kernel(form, motions, fields.cell_dofs[:, -moves:])
         _, self._batch, spare = self._kernel.keep_entries()
         self._cells, self._points, self._forces = len(along.angles), len(fractions), cell_forces
         sizes = spare.size, size
-        self._extents = [dict(zip(EXTENT, np.zeros((4, n)), strict=True)) for n in sizes]
+        self._extents = [Extent(*np.zeros((4, n))) for n in sizes]
         cell_forces.keep_latest()
         self.c = struct(
             "watch", forces=cell_forces.c, along=self._kernel.cells, between=between,
-            angles=in_batches(along.angles, self._batch), q=np.zeros(size), first=form.first,
-            at_angles=self._kernel.position(form.angles),
-            at_numbers=self._kernel.position(form.resultants),
+            angles=in_batches(along.angles, self._batch), q=np.zeros(size), first=first,
+            at_angles=self._kernel.position(angles),
+            at_numbers=self._kernel.position(resultants),
             numbers=np.zeros(lib.CELL_NUMBERS * self._cells),
             some=np.zeros(lib.SOME * self._kernel.cells.width),
             in_order=cell_forces.in_order(self._batch),
         )  # fmt: skip
         self.seen = -1
         for c, extent in zip((self.c.of_forces, self.c.of_motion), self._extents, strict=True):
-            c.size = len(extent["low"])
-            for name, values in extent.items():
-                setattr(c, name, doubles(values))
+            fill(c, size=len(extent.low), **extent._asdict())
 
     def add(self, steps: int, t: float, q: Array, before: Array) -> None:
         """Include the state after ``steps`` steps, unless C has already included it."""
@@ -133,54 +148,26 @@ class ExtremesInC:
         self._forces.c.given = previous
         self.seen = steps
 
-    def begin(self, steps: int, extents: Any) -> None:
+    def begin(self, steps: int, forces: Extent, motion: Extent) -> None:
         """Begin with the extremes after ``steps`` steps, as :meth:`extents` returns them."""
-        for to, extent in zip(self._extents, extents, strict=True):
-            for name, values in zip(EXTENT, extent, strict=True):
-                batches = in_batches(values, self._batch) if values.ndim == 3 else values
-                to[name][:] = batches.ravel()
+        for to, values in zip(self._extents[0], forces, strict=True):
+            to[:] = in_batches(values, self._batch).ravel()
+        for to, values in zip(self._extents[1], motion, strict=True):
+            to[:] = values
         self.seen = steps
 
-    def extents(self) -> list[list[Array]]:
+    def extents(self) -> list[Extent]:
         """Return extremes and times: of forces, (num_cells, points, 3), and motions, (size,)."""
-        forces, motion = ([extent[name] for name in EXTENT] for extent in self._extents)
+        forces, motion = self._extents
         shape = -1, 3 * self._points, self._batch
-        in_cells = [
+        in_cells = (
             x.reshape(shape).transpose(0, 2, 1).reshape(-1, self._points, 3)[: self._cells].copy()
             for x in forces
-        ]
-        return [in_cells, [x.copy() for x in motion]]
+        )
+        return [Extent(*in_cells), Extent(*map(np.copy, motion))]
 
 
 # -- the recorder ----------------------------------------------------------------------------------
-
-
-@in_one_line
-class Extent(NamedTuple):
-    """Smallest and largest values of a run and their times; arrays of one shape.
-
-    Attributes:
-        low: The least values.
-        high: The largest values.
-        time_low: Times at which the least values were first reached; s.
-        time_high: Times at which the largest values were first reached; s.
-
-    Example:
-        >>> extremes = ub.Extremes()
-        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=extremes)
-        >>> v = extremes.displacement(beam).of((-1, 1))
-        >>> print(v.low.round(3), v.time_low)  # m, s
-        -0.019 1.0
-    """
-
-    low: Array
-    high: Array
-    time_low: Array
-    time_high: Array
-
-    def of(self, rows: Index) -> Extent:
-        """Return the extremes of some of the rows."""
-        return Extent(*(values[rows] for values in self))
 
 
 class Extremes(Restartable):
@@ -226,7 +213,7 @@ class Extremes(Restartable):
                 extent = Extent(*(state[name].copy() for name in names))
             self._taken.append(extent)
         if self._in_c is not None:
-            self._in_c.begin(-1 if state is None else simulation.parts, self._taken)
+            self._in_c.begin(-1 if state is None else simulation.parts, *self._taken)
         if state is None:
             self.write(simulation)
 
@@ -253,9 +240,7 @@ class Extremes(Restartable):
     @property
     def _extents(self) -> list[Extent]:
         """Extremes of forces and of motions."""
-        if self._in_c is not None:
-            return [Extent(*extent) for extent in self._in_c.extents()]
-        return self._taken
+        return self._taken if self._in_c is None else self._in_c.extents()
 
     def state(self) -> State:
         """Return the extremes so far, by name."""

@@ -18,11 +18,11 @@ from ufl_beam.arrays import Array, State
 from ufl_beam.display import compact_repr
 from ufl_beam.errors import (
     ArgumentError,
+    require_all,
     require_function,
     require_kind,
     require_number,
     require_row,
-    require_sequence,
 )
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.records import Instance, Positive, Record
@@ -85,6 +85,9 @@ def any_mean(range: Array, mean: Array) -> Array:
 Life = Annotated[float, partial(require_number, positive=True, infinite=True)]
 MeanStress = Annotated[
     Callable[[Array, Array], Array], partial(require_function, arguments="(range, mean)")
+]
+Stress = Annotated[
+    Callable[[Array, Array, Array], Array], partial(require_function, arguments="(N, V, M)")
 ]
 
 
@@ -224,9 +227,7 @@ class RainflowCounter:
         self, resolution: float | None = None, counted: Array | None = None,
         waiting: Iterable[float] = (),
     ) -> None:  # fmt: skip
-        self._rounds, self._unit = resolution is not None, 1.0
-        if resolution is not None:
-            self._unit = require_number(resolution, "RainflowCounter: resolution", positive=True)
+        self._resolution = resolution
         self._counts: defaultdict[tuple[float, float], float] = defaultdict(float)  # by ends
         for low, high, count in () if counted is None else counted:
             self._counts[float(low), float(high)] = float(count)
@@ -235,8 +236,8 @@ class RainflowCounter:
 
     def add(self, series: Array) -> None:
         """Count the next piece of the series, (n,), by the method of ASTM E1049."""
-        points = self._waiting
-        for value in map(float, np.rint(series / self._unit) if self._rounds else series):
+        points, unit = self._waiting, self._resolution
+        for value in map(float, series if unit is None else np.rint(series / unit)):
             if points and value == points[-1]:
                 continue
             if len(points) > 1 and (value > points[-1]) == (points[-1] > points[-2]):
@@ -254,7 +255,7 @@ class RainflowCounter:
         for ends in pairwise(self._waiting):
             counts[min(ends), max(ends)] += 0.5
         low, high = np.array(list(counts), dtype=float).reshape(-1, 2).T
-        order, unit = np.lexsort((low, high - low)), self._unit
+        order, unit = np.lexsort((low, high - low)), self._resolution or 1.0
         count = np.array(list(counts.values()), dtype=float)
         return Cycles(unit * (high - low)[order], unit / 2 * (low + high)[order], count[order])
 
@@ -288,14 +289,9 @@ class HotSpot(Record):
     _refused = ArgumentError
 
     place: Instance[Place]
-    stress: Callable[[Array, Array, Array], Array]
+    stress: Stress
 
     __repr__ = compact_repr
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not callable(self.stress):
-            raise ArgumentError(f"HotSpot {self.place}: stress = {self.stress!r} is not a function")
 
     @classmethod
     def fibre(cls, place: Place, *, y: float, E: float, factor: float = 1.0) -> HotSpot:
@@ -348,22 +344,20 @@ class Fatigue(Restartable):
         self, spots: Sequence[HotSpot] | HotSpot, curve: SNCurve, *, resolution: float = 0.0
     ) -> None:
         several = (spots,) if isinstance(spots, HotSpot) else spots
-        self.spots: tuple[HotSpot, ...] = require_sequence(several, "Fatigue: spots")
-        for i, spot in enumerate(self.spots):
-            require_kind(spot, HotSpot, f"Fatigue: spots[{i}]")
+        self.spots: tuple[HotSpot, ...] = require_all(several, "Fatigue: spots", HotSpot)
         require_kind(curve, SNCurve, "Fatigue: curve")
         require_number(resolution, "Fatigue: resolution", at_least=0.0)
         self.curve = curve
         self._resolution = resolution or curve.range / 100
         self._counters: dict[HotSpot, RainflowCounter] = {}
+        self._block: list[Array] = []
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Begin to count with the initial state, or continue from a :meth:`state`."""
         at = [simulation.numbering.cell_and_fraction(spot.place) for spot in self.spots]
         self._cells = np.array([cell for cell, _ in at], dtype=np.int64)
         self._fractions, self._column = np.unique([s for _, s in at], return_inverse=True)
-        self._block: list[Array] = []
-        self._counters = {}
+        self._counters, self._block = {}, []
         for i, spot in enumerate(dict.fromkeys(self.spots)):
             before = (state[f"counted {i}"], state[f"waiting {i}"]) if state else ()
             self._counters[spot] = RainflowCounter(self._resolution, *before)
@@ -372,7 +366,7 @@ class Fatigue(Restartable):
         else:
             self._begin = simulation.t
             self.write(simulation)
-            self._count()  # A stress that is no number raises an error at once.
+            self.close()  # A stress that is no number raises an error at once.
 
     def write(self, simulation: StateView) -> None:
         """Store the section forces, and count after each block of steps."""
@@ -380,9 +374,12 @@ class Fatigue(Restartable):
         self._block.append(forces[self._cells, self._column])
         self._end = simulation.t
         if len(self._block) == BLOCK:
-            self._count()
+            self.close()
 
-    def _count(self) -> None:
+    def close(self) -> None:
+        """Count the cycles of the stored steps."""
+        if not self._block:
+            return
         forces, self._block = np.stack(self._block, axis=-1), []
         for k, spot in enumerate(self.spots):
             N, V, M = (forces[k, i] for i in range(3))
@@ -392,11 +389,6 @@ class Fatigue(Restartable):
                     f"HotSpot {spot}: stress(N, V, M) must return a finite number for each N, V, M"
                 )
             self._counters[spot].add(stress)
-
-    def close(self) -> None:
-        """Count the remaining steps."""
-        if self._counters and self._block:
-            self._count()
 
     def state(self) -> State:
         """Return the counted time, and cycles and waiting turning points of each spot."""

@@ -17,9 +17,9 @@ from ufl_beam.arrays import State
 from ufl_beam.display import TIME, Parameter, bracketed
 from ufl_beam.errors import (
     ArgumentError,
+    require_all,
     require_count,
     require_function,
-    require_kind,
     require_sequence,
 )
 from ufl_beam.model.bodies import AttachmentPoint, Place, require_anchors
@@ -81,11 +81,10 @@ class History(Restartable):
         self._temporary = beside(self._path)  # replaces the file when rows are deleted
         self.files = (self._path,) if max_rows == sys.maxsize else (self._path, self._temporary)
         self._places = require_sequence(places, f"History {path}: places")
-        self._connectors = require_sequence(connectors, f"History {path}: connectors")
         for i, place in enumerate(self._places):
             require_anchors(f"History {path}: places[{i}]", place)
-        for i, connector in enumerate(self._connectors):
-            require_kind(connector, (Connector, Joint), f"History {path}: connectors[{i}]")
+        what = f"History {path}: connectors"
+        self._connectors = require_all(connectors, what, (Connector, Joint))
         self._open: list[OutputFile] = []
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
@@ -209,10 +208,7 @@ def _named_components(scene: Scene, followed: Connector | Joint) -> list[tuple[i
     connectors = connector_indices(scene, followed)
     if isinstance(followed, Connector):
         names = COMPONENTS if followed.components else (type(followed.law).__name__,)
-        return [
-            (connector, f"{followed}, {name}")
-            for connector, name in zip(connectors, names, strict=False)
-        ]
+        return [(n, f"{followed}, {name}") for n, name in zip(connectors, names, strict=False)]
     holders = [scene.all_connectors[connector] for connector in connectors]
     axes = ["psi" if c.is_rotation else "xy"[abs(c.axis[1]) > abs(c.axis[0])] for c in holders]
     return [
@@ -265,9 +261,8 @@ class Events(Restartable):
     """Recorder of events, for scenes with hinges, inelastic material, stops or friction.
 
     A hinge "is free" when it has dissipated 99.9 % of its fracture energy; a hinge that hardens
-    "yields".
-    Contact and sliding may begin and end repeatedly; all other events occur once in a cell or
-    hinge.
+    "yields".  Contact and sliding may begin and end repeatedly; all other events occur once in a
+    cell or hinge.
 
     Args:
         tell: Called on the first process with each event as it happens, such as ``print``.
@@ -306,32 +301,22 @@ class Events(Restartable):
         self._enough = np.where(breaking, BROKEN_FRACTION * energies, np.inf)
         self._breaks = np.isfinite(energies)
         connectors = simulation.scene.all_connectors
-        self._followed = [
-            i for i, connector in enumerate(connectors) if type(connector.law) in CONNECTOR_EVENTS
-        ]
+        self._followed = [i for i, c in enumerate(connectors) if type(c.law) in CONNECTOR_EVENTS]
         self._in_cells, self._on = self._look(simulation)
 
     def _look(self, simulation: StateView) -> tuple[Flags, Flags]:
         """Return events in cells and hinges, (n, 3), and which connectors touch or slide."""
-        in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
-        num_cells, hinges = len(simulation.numbering.cells), simulation.scene.hinges
         plastic, broken = simulation.now.cells_of(0)[:, [PLASTIC, HINGE]].T
-        happened = (plastic > 0, broken > 0, broken >= self._enough[:num_cells])
-        in_cells[:num_cells] = np.column_stack(happened)
-        if hinges:
-            lost = simulation.connections()[-len(hinges) :, DISSIPATED]
-            breaks, enough = self._breaks[num_cells:], self._enough[num_cells:]
-            happened = ((lost > 0) & ~breaks, (lost > 0) & breaks, lost >= enough)
-            in_cells[num_cells:] = np.column_stack(happened)
-        if not self._followed:
-            return in_cells, np.zeros(0, dtype=bool)
+        if hinges := len(simulation.scene.hinges):
+            lost, breaks = simulation.connections()[-hinges:, DISSIPATED], self._breaks[-hinges:]
+            plastic = np.append(plastic, np.where(breaks, 0.0, lost))
+            broken = np.append(broken, np.where(breaks, lost, 0.0))
+        in_cells = np.column_stack([plastic > 0, broken > 0, broken >= self._enough])
         forces = np.abs(simulation.connections()[self._followed, FORCE])
         # Forces above which they touch or slide; sliding forces have round-off
-        connectors = (simulation.scene.all_connectors[connector] for connector in self._followed)
-        limits = [
-            (1 - 1e-9) * simulation.requested_forces.get(connector, 0.0) for connector in connectors
-        ]
-        return in_cells, np.asarray(forces > limits)
+        connectors, limits = simulation.scene.all_connectors, simulation.requested_forces
+        most = [(1 - 1e-9) * limits.get(connectors[i], 0.0) for i in self._followed]
+        return in_cells, np.asarray(forces > most)
 
     def write(self, simulation: StateView) -> None:
         """Record the events of a step."""
@@ -339,27 +324,20 @@ class Events(Restartable):
         changes = np.argwhere(in_cells & ~self._in_cells)
         new = [(t, int(cell), IN_CELLS[n]) for cell, n in changes]
         for k in np.flatnonzero(on != self._on):
-            begins, ends = CONNECTOR_EVENTS[
-                type(simulation.scene.all_connectors[self._followed[k]].law)
-            ]
-            new.append((t, self._followed[k], begins if on[k] else ends))
+            number = self._followed[k]
+            begins, ends = CONNECTOR_EVENTS[type(simulation.scene.all_connectors[number].law)]
+            new.append((t, number, begins if on[k] else ends))
         self._in_cells, self._on = in_cells, on
         events = self._add(simulation, new)
         if events:
-            on_first(simulation.comm, lambda: [self._tell(event) for event in events])
+            on_first(simulation.comm, lambda: [*map(self._tell, events)])
 
     def _add(self, simulation: StateView, rows: list[Row]) -> list[Event]:
-        connectors, numbering = simulation.scene.all_connectors, simulation.numbering
-        named = simulation.parameter
-        events = [
-            Event(
-                t,
-                numbering.place_of(number) if what in IN_CELLS else connectors[number],
-                what,
-                named,
-            )
-            for t, number, what in rows
-        ]
+        connectors, place_of = simulation.scene.all_connectors, simulation.numbering.place_of
+        events = []
+        for t, number, what in rows:
+            where = place_of(number) if what in IN_CELLS else connectors[number]
+            events.append(Event(t, where, what, simulation.parameter))
         self._rows += rows
         self.found += events
         return events

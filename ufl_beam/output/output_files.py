@@ -218,21 +218,6 @@ class OutputFile:
             )
 
 
-def put_in_place(path: Path, data: bytes | memoryview) -> None:
-    """Write a whole file; the previous file stays until the new file is on the disk."""
-    temporary = beside(path)
-    try:
-        with temporary.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    sync(path.parent)
-
-
 def changed(what: str) -> ArgumentError:
     """Return the error of an output that differs from its state in the checkpoint."""
     return ArgumentError(
@@ -296,11 +281,6 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
 
     The ``format`` names the content and a number, such as "solution of ufl_beam, 2"; the number
     grows whenever the meaning of files changes.  ``at`` is a part of messages, such as the time.
-
-    Raises:
-        ArgumentError: The file cannot be written, or the content has other types than numbers,
-            texts, lists and dicts.
-        OSError: The disk is full, or has another error.
     """
     require_writable(path)
     what, file = format.partition(" ")[0], io.BytesIO()
@@ -320,10 +300,18 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
             f"{what} {path}{at} cannot be written: a state() must consist of numbers, "
             f"texts, lists and dicts: {error}"
         ) from None
+    temporary = beside(path)
     try:
-        with file.getbuffer() as data:
-            data[-DIGEST:] = hashlib.sha256(data[:-DIGEST]).hexdigest().encode()
-            put_in_place(path, data)
+        try:
+            with temporary.open("wb") as new, file.getbuffer() as data:
+                data[-DIGEST:] = hashlib.sha256(data[:-DIGEST]).hexdigest().encode()
+                new.write(data)
+            sync(temporary)
+            os.replace(temporary, path)
+            sync(path.parent)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
     except OSError as error:
         free = shutil.disk_usage(path.parent).free
         before = "the one before is still there" if path.exists() else "there is none yet"
@@ -366,14 +354,13 @@ def read(path: Path, format: str) -> Content:
     except OSError as error:
         raise ArgumentError(f"the file cannot be read: {error.strerror}") from None
     kind = format.rpartition(", ")[0]
-    actual = by = ""
-    if end := END.fullmatch(data[-256:]):
-        if hashlib.sha256(data[:-DIGEST]).hexdigest().encode() != data[-DIGEST:]:
-            raise ArgumentError("the file is damaged: its checksum does not match its content")
-        actual, by = end[1].decode(), end[2].decode()
-    if not actual:
+    end = END.fullmatch(data[-256:])
+    if end is None:
         why = "its last line is wrong" if data else "it is empty"
         raise ArgumentError(f"the file holds no {kind}, or is damaged: {why}")
+    if hashlib.sha256(data[:-DIGEST]).hexdigest().encode() != data[-DIGEST:]:
+        raise ArgumentError("the file is damaged: its checksum does not match its content")
+    actual, by = end[1].decode(), end[2].decode()
     if actual != format:
         raise ArgumentError(
             f"the file is a {actual}, written by version {by} of ufl_beam; this version, "

@@ -244,11 +244,7 @@ class XdmfWriter:
         self._data.cut(length)
 
     def sync(self) -> bytes:
-        """Write everything to the disk; return SHA-256 of the document up to its tail and of data.
-
-        Raises:
-            FileNotFoundError: A file was removed.
-        """
+        """Write all to the disk; return SHA-256 of the document up to its tail, and of the data."""
         self._data.sync()
         self._xml.sync()
         return self._xml.digest(self.complete.tail) + self._data.digest(self.complete.data)
@@ -377,11 +373,7 @@ class VtkhdfWriter:
         self._file.flush()
 
     def sync(self) -> bytes:
-        """Write everything to the disk; return the SHA-256 of all numbers; each is read once.
-
-        Raises:
-            OSError: The file was removed.
-        """
+        """Write everything to the disk; return the SHA-256 of all numbers; each is read once."""
         self._file.flush()
         self._output.sync()
         whole = hashlib.sha256()

@@ -132,8 +132,7 @@ class StateView(PresentState):
     @property
     def requested_forces(self) -> dict[Connector, float]:
         """Forces of controllers, and limits of friction; N or N m."""
-        values: Any = self.controllers.values
-        return dict(zip(self.controllers.at, values.tolist(), strict=True))
+        return dict(zip(self.controllers.at, map(float, self.controllers.values), strict=True))
 
     @property
     def iterations(self) -> int:

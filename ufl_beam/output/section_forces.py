@@ -66,12 +66,9 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 GAUSS = [(float(1 + x) / 2, float(w) / 2) for x, w in zip(POINTS, WEIGHTS, strict=True)]
 """Points and weights of the Gauss rule on a cell, which is exact for all integrals here."""
 
-Tangent = Callable[[Any], tuple[Any, Any]]
-"""Function that returns the derivative of the position by the fraction s of a cell, at s."""
-
 
 def section_force(
-    resultants: Any, tangent: Tangent, *, works: bool
+    resultants: Any, tangent: Callable[[Any], tuple[Any, Any]], *, works: bool
 ) -> Callable[[Any], tuple[Any, Any, Any]]:
     """Return a function that gives the force in the plane and the moment at a fraction of a cell.
 
@@ -79,7 +76,8 @@ def section_force(
 
     Args:
         resultants: Numbers ``cell_number`` of loops.h of the cell: arrays, or expressions of UFL.
-        tangent: Tangent of the cell in the configuration in which the forces are in equilibrium.
+        tangent: Derivative of the position by the fraction, at a fraction, in the configuration in
+            which the forces are in equilibrium.
         works: True if forces across the cell may have any distribution, as the scene has works.
     """
     start, end, skew = (
@@ -117,9 +115,6 @@ def in_section(plane: tuple[Any, Any, Any], c: Any, s: Any) -> tuple[Any, Any, A
 class ForcesAlongCells:
     """Section forces (N, V, M) at points of the cells of a scene.
 
-    Args:
-        numbering: Numbering of the scene.
-
     Attributes:
         angles: Angles of the smooth undeformed axis at both ends of cells; (num_cells, 2); rad.
         dofs: Degrees of freedom (u, v, ψ) of the nodes of cells; (num_cells, 3, degree + 1).
@@ -133,8 +128,18 @@ class ForcesAlongCells:
         self._works = bool(numbering.scene.works)
         self._places: Array = numbering.points[nodes[:, self._along]].transpose(2, 0, 1)
         x, y = self._places[:, :, -1] - self._places[:, :, 0]
-        angles = np.asarray(np.arctan2(y, x))
-        self.angles = angles[:, None] + _axis_angles(numbering, angles)
+        chords = np.asarray(np.arctan2(y, x))
+        # The axis halves the angle between two cells at a vertex, except at corners of the beam.
+        half = np.angle(np.exp(1j * np.diff(chords))) / 2
+        half[np.diff(numbering.beam_of_cell) != 0] = np.nan
+        for beam in numbering.scene.beams:
+            if beam.corners:
+                at_corners = np.isin(numbering.parameters(beam)[1:-1], beam.corners)
+                half[numbering.cells_of(beam)[:-1][at_corners]] = np.nan
+        # A cell with one smooth neighbour has a circular axis; a cell without one, a straight axis.
+        first, last = np.append(np.nan, -half), np.append(half, np.nan)
+        both = np.where(np.isnan(first), -last, first), np.where(np.isnan(last), -first, last)
+        self.angles: Array = chords[:, None] + np.nan_to_num(np.column_stack(both))
 
     def __call__(
         self, cells: Index | slice, fractions: Array, resultants: Array, q: Array
@@ -159,28 +164,7 @@ class ForcesAlongCells:
             slopes = mesh.slopes(np.ravel(s)).T
             return x @ slopes, y @ slopes
 
-        angle = (
-            np.outer(start, 1 - fractions)
-            + np.outer(end, fractions)
-            + ψ @ mesh.weights(fractions).T
-        )
+        angle = np.outer(start, 1 - fractions) + np.outer(end, fractions)
+        angle += ψ @ mesh.weights(fractions).T
         at = section_force(resultants[:, :, None], tangent, works=self._works)
         return np.stack(in_section(at(fractions), np.cos(angle), np.sin(angle)), axis=2)
-
-
-def _axis_angles(numbering: Any, angles: Array) -> Array:
-    """Return angles from chords of cells to the smooth axis at both ends; (num_cells, 2); rad.
-
-    The axis halves the angle between two cells at a vertex, except at corners of the beam.  A cell
-    with one smooth neighbour has a circular axis, a cell without one a straight axis.
-    """
-    half = np.angle(np.exp(1j * np.diff(angles))) / 2
-    half[np.diff(numbering.beam_of_cell) != 0] = np.nan
-    for beam in numbering.scene.beams:
-        if beam.corners:
-            at_corners = np.isin(numbering.parameters(beam)[1:-1], beam.corners)
-            half[numbering.cells_of(beam)[:-1][at_corners]] = np.nan
-    start, end = np.append(np.nan, -half), np.append(half, np.nan)
-    # NaN: no smooth neighbour there
-    both = np.where(np.isnan(start), -end, start), np.where(np.isnan(end), -start, end)
-    return np.nan_to_num(np.column_stack(both))

@@ -14,12 +14,13 @@ import hashlib
 import warnings
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from functools import partial
 from importlib import import_module
 from pkgutil import iter_modules
 from types import CodeType, FunctionType, MethodType, ModuleType
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn
 
 import numpy as np
 from scipy.interpolate import KroghInterpolator
@@ -31,7 +32,6 @@ from ufl_beam.model.functions import Point, steady
 from ufl_beam.model.supports import still
 from ufl_beam.output.output_files import WrongReader
 
-T = TypeVar("T")
 Data = Any  # data of JSON
 Sampling = Callable[[Any, str, Any], Any]
 """Function (record, field, function of a user) that returns a substitute, or None."""
@@ -50,7 +50,10 @@ class SavedFunction:
     @classmethod
     def sampled(cls, function: Callable[[float], float], times: Iterable[float]) -> SavedFunction:
         """Sample a function at times and at 0; times at which it fails are left out."""
-        known = _sampled(lambda t: float(function(t)), {0.0, *times})
+        known = {}
+        for t in sorted({0.0, *times}):
+            with suppress(Exception):
+                known[t] = float(function(t))
         return cls(function_name(function), tuple(known), tuple(known.values()))
 
     def __call__(self, t: float) -> float:
@@ -79,12 +82,11 @@ class SavedCurve:
     ) -> SavedCurve:
         """Sample a curve between two parameters and at ``more``, except where it fails."""
         even = (first + (last - first) * k / SAMPLES for k in range(SAMPLES + 1))
-
-        def point(s: float) -> Point:
-            x, y = curve(s)
-            return float(x), float(y)
-
-        known = _sampled(point, {*even, *more})
+        known = {}
+        for s in sorted({*even, *more}):
+            with suppress(Exception):
+                x, y = curve(s)
+                known[s] = float(x), float(y)
         return cls(function_name(curve), tuple(known), tuple(known.values()))
 
     def __call__(self, s: float) -> Point:
@@ -111,17 +113,6 @@ class LostFunction:
             f"the function {self.name} is not in the file of the solution, which has results and "
             "numbers; build the scene with the function to simulate it"
         )
-
-
-def _sampled(function: Callable[[float], T], at: Iterable[float]) -> dict[float, T]:
-    """Return the values of a function by argument, in ascending order, except where it fails."""
-    known = {}
-    for x in sorted(at):
-        try:
-            known[x] = function(x)
-        except Exception:
-            continue
-    return known
 
 
 def function_name(function: Any) -> str:
@@ -227,21 +218,17 @@ def from_data(data: Data) -> Any:
         warnings.simplefilter("ignore", ModelWarning)
         for record in data["records"]:
             fields = {name: make(value) for name, value in record.items() if name != "is"}
-            made.append(make_record(RECORDS[record["is"]], fields))
+            kind = RECORDS[record["is"]]
+            known = {field.name for field in dataclasses.fields(kind) if field.init}
+            if fields.keys() != known:
+                others = ", ".join(sorted(fields.keys() ^ known))
+                raise TypeError(f"{kind.__name__}: fields {others} are missing or unknown")
+            # Constructors may have other arguments than the fields.
+            made.append(object.__new__(kind))
+            for name, value in fields.items():
+                object.__setattr__(made[-1], name, value)
+            getattr(made[-1], "__post_init__", lambda: None)()
     return make(data["root"])
-
-
-def make_record(kind: type[T], fields: Mapping[str, Any]) -> T:
-    """Make a dataclass from its fields, even if its constructor has other arguments."""
-    known = {field.name for field in dataclasses.fields(kind) if field.init}  # type: ignore[arg-type]
-    if fields.keys() != known:
-        others = ", ".join(sorted(fields.keys() ^ known))
-        raise TypeError(f"{kind.__name__}: fields {others} are missing or unknown")
-    record = object.__new__(kind)
-    for name, value in fields.items():
-        object.__setattr__(record, name, value)
-    getattr(record, "__post_init__", lambda: None)()
-    return record
 
 
 # -- comparison ------------------------------------------------------------------------------------

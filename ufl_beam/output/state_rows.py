@@ -113,11 +113,8 @@ class Columns:
     ) -> Columns:
         """Make the table of a scene; columns of connectors are the fields of :class:`Connection`.
 
-        Args:
-            numbering: Numbering of the scene.
-            moving: Whether there are velocities.
-            ledger: Entries, such as "lost: plastic".
-            record: Length of the column "record"; None if the row has the forces of cells instead.
+        If the scene is ``moving``, it has velocities.  ``ledger`` has entries like "lost: plastic".
+        ``record`` is the length of this column; if it is None, the forces of cells are kept.
         """
         size, scene = numbering.size, numbering.scene
         return cls({

@@ -21,7 +21,6 @@ from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import nearest, parameter_step, tangent
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import require_arrays
 from ufl_beam.output.section_forces import MIDDLE, Diagram, ForcesAlongCells, Material
@@ -88,21 +87,18 @@ class States:
             from a record, q, and q at the beginning of the step; (9, num_cells).
     """
 
+    between = 1.0
+    begun = False
+    forces_from_record: Callable[[Array, Array, Array], Array] | None = None
+
     def __init__(self, numbering: DofNumbering, like: States | None = None, *blocks: Block) -> None:
-        self.scene: Scene = numbering.scene
-        self.numbering = numbering
-        self.between, self.begun = 1.0, False
-        self.forces_from_record: Callable[[Array, Array, Array], Array] | None = None
-        self._blocks = [*blocks]
+        self.numbering, self.scene = numbering, numbering.scene
         self.cells = Cells(numbering)
+        self._blocks = [*blocks]
         self._computed: tuple[tuple[int, bytes], Array] | None = None  # latest forces
         if like is not None:
-            self.between, self.begun, self.forces_from_record = (
-                like.between,
-                like.begun,
-                like.forces_from_record,
-            )
-            self.cells = like.cells
+            self.cells, self.between, self.begun = like.cells, like.between, like.begun
+            self.forces_from_record = like.forces_from_record
 
     # -- rows ----------------------------------------------------------------------------------
 
@@ -119,8 +115,8 @@ class States:
         ):
             most = MOST_VALUES // columns.width
             rows = max(number, min(max(len(self), LEAST_ROWS), most))
-            space = new_rows(rows, columns.width)
-            self._blocks.append(block := Block(columns, space, 0))
+            block = Block(columns, new_rows(rows, columns.width), 0)
+            self._blocks.append(block)
         return block.space[block.number : block.number + number]
 
     def grow(self, number: int = 1) -> None:
@@ -280,9 +276,8 @@ class States:
     def shape(self, beam: Member, n: int = -1) -> Array:
         """Return coordinates of the vertices of a beam at the n-th time; (num_vertices, 2); m."""
         vertices, numbering = self.numbering.vertices_of(beam), self.numbering
-        return np.asarray(
-            numbering.points[vertices] + self._row("q", n)[numbering.dofs[vertices, :2]]
-        )
+        moved = self._row("q", n)[numbering.dofs[vertices, :2]]
+        return np.asarray(numbering.points[vertices] + moved)
 
     # -- joints --------------------------------------------------------------------------------
 
@@ -308,10 +303,8 @@ class States:
             )
         rotations = [self.displacement(place)[:, 2] for place in (a, b)]
         between = self.position(b) - self.position(a)
-        apart = np.subtract(b.point, a.point)
-        motion = np.column_stack(
-            [turned(between, -rotations[0]) - apart, rotations[1] - rotations[0]]
-        )
+        apart = turned(between, -rotations[0]) - np.subtract(b.point, a.point)
+        motion = np.column_stack([apart, rotations[1] - rotations[0]])
         force, moment = np.zeros((len(self), 2)), np.zeros(len(self))
         if 2 in joint.shared:
             moment[:] = np.nan
@@ -422,13 +415,9 @@ class States:
             ArgumentError: The beam is not in the scene, or ``points`` is less than 2.
         """
         require_number(points, "diagram: points", at_least=2)
-        s, cells, pieces = (
-            self.numbering.parameters(beam),
-            self.numbering.cells_of(beam),
-            int(points),
-        )
-        at = s[:-1, None] + np.linspace(0.0, 1.0, pieces) * np.diff(s)[:, None]
-        forces = self.cell_forces(n, np.arange(pieces) / (pieces - 1))[cells]
+        s, fractions = self.numbering.parameters(beam), np.arange(int(points)) / (int(points) - 1)
+        at = s[:-1, None] + fractions * np.diff(s)[:, None]
+        forces = self.cell_forces(n, fractions)[self.numbering.cells_of(beam)]
         return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
 
     def strains(self, beam: Member, n: int = -1) -> Array:

@@ -137,34 +137,22 @@ def _plan(
     rows = np.stack([end_dofs, next_to], axis=1)[..., None]
     columns = np.stack([next_to, end_dofs], axis=1)[..., None, :]
     with_ends = A.positions(*map(np.ravel, np.broadcast_arrays(rows, columns)))
-    *structure, entry, place, places = _what_is_left(A, number, ends, len(remaining))
+    # The reduced matrix has entries that stay, and blocks between the ends of each chain.
+    rows, size = remaining, len(remaining)
+    entry = A.entries_of(rows)
+    row, column = np.repeat(number[rows], np.diff(A.indptr)[rows]), number[A.indices[entry]]
+    entry, row, column = entry[column >= 0], row[column >= 0], column[column >= 0]
+    key = row.astype(np.int64) * size + column
+    block = ends.astype(np.int64).reshape(-1, 2, 3)
+    block_keys = (block[:, :, None, :, None] * size + block[:, None, :, None, :]).ravel()
+    keys = np.unique(np.concatenate([key, block_keys]))
+    place, places = (np.searchsorted(keys, x) for x in (key, block_keys))
+    structure = np.searchsorted(keys, np.arange(size + 1) * size), keys % max(size, 1)
     arrays = (
         chain_begin, spikes, vertices[:, 0], A.indptr[vertices[:, 0]], with_ends,
         entry, place, places, owned, number[owned], ends,
     )  # fmt: skip
     return remaining, at, *structure, *(np.ascontiguousarray(x, np.int32) for x in arrays)
-
-
-def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index, ...]:
-    """Find the pattern of the reduced matrix; ``number`` of an eliminated dof is -1.
-
-    Returns:
-        ``indptr`` and ``indices`` of the reduced matrix; entries of ``A`` that stay, and their
-        positions in the reduced matrix; positions there of the blocks of the ``ends``, whose shape
-        is (num_chains, 6).
-    """
-    rows = np.flatnonzero(number >= 0)
-    staying = A.entries_of(rows)
-    row = np.repeat(number[rows], np.diff(A.indptr)[rows])
-    stay = number[A.indices[staying]] >= 0
-    staying, row = staying[stay], row[stay]
-    keys = row.astype(np.int64) * size + number[A.indices[staying]]
-    block = ends.astype(np.int64).reshape(-1, 2, 3)
-    chain_keys = (block[:, :, None, :, None] * size + block[:, None, :, None, :]).ravel()
-    all_ = np.unique(np.concatenate([keys, chain_keys]))
-    indptr = np.searchsorted(all_, np.arange(size + 1) * size)
-    positions = (np.searchsorted(all_, x) for x in (keys, chain_keys))
-    return indptr, all_ % max(size, 1), staying, *positions
 
 
 class Elimination:
@@ -181,15 +169,8 @@ class Elimination:
     def __init__(self, subdomain: Subdomain, A: Csr) -> None:
         ghosts = np.concatenate(subdomain.comm.allgather(subdomain.dofs[subdomain.num_owned :]))
         alone = ~np.isin(subdomain.dofs, ghosts)
-        pattern = (
-            subdomain.cell_dofs,
-            A.indptr,
-            A.indices,
-            alone,
-            subdomain.dofs,
-            subdomain.num_owned,
-        )
-        remaining, at, indptr, columns, *arrays = _plan(*pattern)
+        pattern = subdomain.cell_dofs, A.indptr, A.indices, alone, subdomain.dofs
+        remaining, at, indptr, columns, *arrays = _plan(*pattern, subdomain.num_owned)
         self.dofs, self.shared = subdomain.dofs[remaining], ~alone[remaining]
         self.left = Csr(np.zeros(len(columns)), columns, indptr)
         self.f: Array = np.zeros(len(remaining))
@@ -250,7 +231,7 @@ class CondensedSolver:
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor with the next right-hand side; PETSc calls this if the matrix has changed."""
-        self._is_new, self._good = True, True
+        self._is_new = True
         pc.setFailedReason(GOOD)
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:

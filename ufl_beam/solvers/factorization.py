@@ -17,15 +17,6 @@ SCALINGS = 6
 SYMMETRIC = 64 * float(np.finfo(np.float64).eps)
 """Largest difference between a scaled matrix that counts as symmetric and its transpose."""
 
-DETERMINANT = 33
-"""Index in ICNTL of MUMPS: request for the determinant."""
-
-NEGATIVE_PIVOTS = 12
-"""Index in INFOG of MUMPS: number of negative pivots of a symmetric matrix."""
-
-MANTISSA = 12
-"""Index in RINFOG of MUMPS: mantissa of the determinant, which has its sign."""
-
 
 class Factorisation:
     """L D Lᵀ factors of a symmetric matrix, or L U factors of an unsymmetric one, by MUMPS.
@@ -65,15 +56,13 @@ class Factorisation:
         pc.setFactorSolverType("mumps")
         pc.setFactorSetUpSolverType()
         factors = pc.getFactorMatrix()
-        factors.setMumpsIcntl(DETERMINANT, 0 if self.symmetric else 1)
+        factors.setMumpsIcntl(33, 0 if self.symmetric else 1)  # whether to find the determinant
         pc.setUp()
         if pc.getFailedReason():
             raise np.linalg.LinAlgError("the matrix has no inverse")
-        self.negative = (
-            int(factors.getMumpsInfog(NEGATIVE_PIVOTS))
-            if self.symmetric
-            else int(factors.getMumpsRinfog(MANTISSA) < 0)
-        )
+        # INFOG(12) is the number of negative pivots, RINFOG(12) the mantissa of the determinant.
+        pivots, mantissa = factors.getMumpsInfog(12), factors.getMumpsRinfog(12)
+        self.negative = int(pivots if self.symmetric else mantissa < 0)
 
     def solve(self, b: Array) -> Array:
         """Solve for one right-hand side, with one step of iterative refinement."""

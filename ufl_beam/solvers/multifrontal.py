@@ -100,8 +100,7 @@ def _structure(
     A = Csr(np.empty(0), indices, indptr)
     n = np.count_nonzero(stays)
     pattern = csr_array((np.ones(len(indices)), indices, indptr), shape=(A.size, A.size))
-    orders = [_order(pattern, stays, kind) for kind in ORDERINGS[: 1 + (A.size > ONE_FRONT)]]
-    candidates = [(order, *_fronts(pattern, order, A.size - n)) for order in orders]
+    candidates = [_fronts(pattern, stays, kind) for kind in ORDERINGS[: 1 + (A.size > ONE_FRONT)]]
     unknown, first, begin, rest = min(candidates, key=lambda c: _operations(*c[1:3]))
     number = np.empty(A.size, dtype=np.int32)
     number[unknown] = np.arange(A.size)
@@ -128,26 +127,29 @@ def _structure(
     )  # fmt: skip
 
 
-def _order(A: csr_array, stays: npt.NDArray[np.bool_], kind: str) -> Index:
-    """Return the unknowns to eliminate, in an order of PETSc, and then those that stay."""
-    these: Index = np.arange(A.shape[0]) if kind == "nd" else np.flatnonzero(~stays)
-    if len(these):
-        block = A[these][:, these]
-        _, positions = Csr(block.data, block.indices, block.indptr).petsc().getOrdering(kind)
-        these = these[positions.indices]
-    order = np.concatenate([these[~stays[these]], np.flatnonzero(stays)])
-    return np.asarray(order, dtype=np.int32)
-
-
 def _operations(first: Index, begin: Index) -> float:
     """Return the number of multiplications in the fronts; for the arguments see loops.h."""
     pivots, others = (np.diff(x).astype(np.float64) for x in (first, begin))
     return float(np.sum(pivots * (pivots**2 / 3 + pivots * others + others**2)))
 
 
-def _fronts(A: csr_array, order: Index, eliminated: int) -> tuple[Index, Index, Index]:
-    """Return ``first``, ``begin`` and ``rest`` of the fronts, see loops.h."""
-    size, pattern = A.shape[0], csr_array(A[order][:, order])
+def _fronts(A: csr_array, stays: npt.NDArray[np.bool_], kind: str) -> tuple[Index, ...]:
+    """Find the fronts if the unknowns are eliminated in an order of PETSc.
+
+    Returns:
+        All unknowns in this order, those that stay last; ``first``, ``begin`` and ``rest`` of the
+        fronts, see loops.h.
+    """
+    size = A.shape[0]
+    these: Index = np.arange(size) if kind == "nd" else np.flatnonzero(~stays)
+    if len(these):
+        block = A[these][:, these]
+        _, positions = Csr(block.data, block.indices, block.indptr).petsc().getOrdering(kind)
+        these = these[positions.indices]
+    these = these[~stays[these]]
+    eliminated = len(these)
+    order = np.concatenate([these, np.flatnonzero(stays)]).astype(np.int32)
+    pattern = csr_array(A[order][:, order])
     first, begin = np.empty((2, eliminated + 2), dtype=np.int32)
     capacity, space = 2 * A.nnz + 2 * size, np.empty(3 * size, dtype=np.int32)
     structure = [integers(x.astype(np.int32)) for x in (pattern.indptr, pattern.indices)]
@@ -159,4 +161,4 @@ def _fronts(A: csr_array, order: Index, eliminated: int) -> tuple[Index, Index, 
             break
         capacity *= 2
     first, begin = (x[: fronts + 1].copy() for x in (first, begin))
-    return first, begin, rest[: begin[-1]].copy()
+    return order, first, begin, rest[: begin[-1]].copy()

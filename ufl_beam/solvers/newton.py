@@ -7,13 +7,13 @@ The convergence test has dimensionless tolerances.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 from petsc4py import PETSc
 
 import numpy as np
+from scipy.linalg import qr
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import (
@@ -32,12 +32,23 @@ from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.beam_elimination import CondensedSolver
 from ufl_beam.solvers.newton_options import PREFIX, Newton, apply_options, database
-from ufl_beam.solvers.null_vectors import stiffen_zero_modes
+from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
 from ufl_beam.terms.term import from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
 """Options for full steps: a line search of PETSc would add forces and moments in norms, and compute
 additional residuals."""
+
+ZERO_MODE_STIFFNESS = 0.01
+"""Stiffness against a zero-energy mode, relative to the largest diagonal entry of the tangent for
+displacements or for rotations.
+
+If forces resist the mode after all, iterations converge faster with a smaller stiffness.  A larger
+stiffness reduces the motion that round-off causes.
+"""
+
+FORCED = 1e-6
+"""Force above which a motion is driven, not a zero-energy mode; relative to forces in the scene."""
 
 REASONS = {
     lib.SINGULAR: "found a singular tangent",
@@ -88,9 +99,8 @@ class Solver:
         )
         every = np.arange(subdomain.size, dtype=np.int32)
         self._diagonal = A.positions(every, every)
-        self._stiffness: Array | None = None  # against zero-energy modes, after a singular tangent
-        self._moves = np.ones(subdomain.size, dtype=np.uint8)
-        self._moves[equation.supports.dofs] = 0
+        self._stiffness = np.zeros(subdomain.size)  # against zero-energy modes
+        self._moves = np.empty(subdomain.size, dtype=np.uint8)
         c = self.c = equation.c
         fill(
             c,
@@ -105,6 +115,7 @@ class Solver:
             forget_zero_modes=lib.forget_zero_modes_in_python,
             aside=np.zeros(subdomain.size if c.search != ffi.NULL else 0),
         )  # fmt: skip
+        self._set_stiffness()
         c.handle = equation.callbacks.handle(self)  # `fill` would keep this object alive
         if subdomain.alone:
             self._factors.drive(c)
@@ -171,17 +182,6 @@ class Solver:
 
     # -- callbacks of C --------------------------------------------------------------------------
 
-    def agree(self, how: Sequence[int], values: Array) -> None:
-        """Combine numbers over all processes; a maximum is infinite if a number is NaN."""
-        comm = self._subdomain.comm
-        everywhere = np.empty((comm.size, len(values)))
-        comm.Allgather(values, everywhere)
-        for k, (kind, column) in enumerate(zip(how, everywhere.T, strict=True)):
-            if kind == lib.LARGEST:
-                values[k] = math.inf if np.isnan(column).any() else column.max()
-            else:
-                values[k] = math.hypot(*column) if kind == lib.HYPOT else column.sum()
-
     def solve(self, anew: bool) -> bool:
         """Compute the change, with a new factorization if ``anew``; return whether that fails."""
         owned = slice(self._subdomain.num_owned)
@@ -195,34 +195,58 @@ class Solver:
         fill(self.c, conjugate=conjugate, start=np.empty(len(q)))
 
     def find_zero_modes(self) -> bool:
-        """Find new zero-energy modes and hold them by springs; return whether there are any."""
-        if self._stiffness is None:
-            self._stiffness = np.zeros(self._subdomain.size)
-        tangent = self._equation.A, self._diagonal, self._equation.supports.dofs
-        forces = self._residuals(), self.scale()
-        new = stiffen_zero_modes(self._stiffness, self._subdomain, *tangent, *forces)
-        self._set_stiffness(self._stiffness)
-        return new
+        """Hold new motions that no force resists or drives; return whether there are any.
+
+        The node where several members meet has no mass of its own.  When all plastic hinges around
+        it have lost their strength, any rotation of the node is an equilibrium, and the tangent is
+        singular.  The rotation is then held by a stiffness on the diagonal of the tangent, which
+        residuals, and so forces, energies and solutions, do not contain.
+        """
+        subdomain, A, numbering = self._subdomain, self._equation.A, self._subdomain.numbering
+        K, free = free_matrix(subdomain, A, self._equation.supports.dofs)
+        if not len(free) or not np.isfinite(K.data).all():
+            return False
+        try:
+            _, vectors = null_vectors(K)
+        except (np.linalg.LinAlgError, RuntimeError):
+            return False
+        motions = numbering.scales[free, None] * vectors
+        # One degree of freedom for each mode, chosen so that the modes are independent there.
+        pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
+        dofs = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]
+        chosen = np.isin(subdomain.dofs, dofs)
+        new = chosen & (self._stiffness == 0.0)
+        forced = chosen & (self._residuals() > FORCED * self.scale())
+        if not subdomain.total(float(new.any())) or subdomain.total(float(forced.any())):
+            return False
+        rotations = np.isin(subdomain.dofs, numbering.rotations)
+        owned = np.arange(subdomain.size) < subdomain.num_owned
+        owned[subdomain.multipliers] = False
+        sizes = np.abs(A.data[self._diagonal])
+        for alike in (rotations & owned, ~rotations & owned):
+            stiffest = subdomain.largest(float(sizes[alike].max(initial=0.0)))
+            self._stiffness[new & alike] = ZERO_MODE_STIFFNESS * stiffest
+        self._set_stiffness()
+        return True
 
     def forget_zero_modes(self) -> bool:
         """Release all zero-energy modes; return whether any were held, on any process."""
         if self._subdomain.largest(float(self.c.idle)) == 0.0:
             return False
-        if self._stiffness is not None:
-            self._stiffness[:] = 0.0
-            self._set_stiffness(self._stiffness)
+        self._stiffness[:] = 0.0
+        self._set_stiffness()
         return True
 
-    def _set_stiffness(self, stiffness: Array) -> None:
-        """Add stiffnesses against zero-energy modes to tangents from now on.
+    def _set_stiffness(self) -> None:
+        """Let C add the stiffnesses against zero-energy modes to tangents from now on.
 
         Degrees of freedom that these stiffnesses or supports hold do not count in the round-off of
         forces.
         """
-        dofs = np.flatnonzero(stiffness)
-        arrays = {"idle_entry": self._diagonal[dofs], "idle_stiffness": stiffness[dofs]}
+        dofs = np.flatnonzero(self._stiffness)
+        arrays = {"idle_entry": self._diagonal[dofs], "idle_stiffness": self._stiffness[dofs]}
         fill(self.c, idle=len(dofs), **arrays)
-        self._moves[:] = stiffness == 0.0
+        self._moves[:] = self._stiffness == 0.0
         self._moves[self._equation.supports.dofs] = 0
 
     # -- paths -----------------------------------------------------------------------------------
@@ -232,11 +256,11 @@ class Solver:
         self._border, self.c.border = border, ffi.NULL
         if border is not None:
             self._t = np.array([border.t])
-            self._border_in_c = struct(
+            in_c = struct(
                 "border", t=self._t, handle=self.c.handle, arrive=lib.arrive_in_python,
                 change=lib.change_along_in_python, met=lib.met_in_python,
             )  # fmt: skip
-            self.c.border = self._border_in_c
+            fill(self.c, border=in_c)
 
     def arrive(self, x: Array) -> None:
         """Pass an iterate and its load factor to the border."""
@@ -257,8 +281,7 @@ class Solver:
         border, subdomain, owned = self._border, self._subdomain, slice(self._subdomain.num_owned)
         rates, y, z = np.zeros((3, len(x)))
         border.tangent(x, rates)
-        if self._stiffness is not None:
-            self._equation.A.data[self._diagonal] += self._stiffness
+        self._equation.A.data[self._diagonal] += self._stiffness
         rates = subdomain.added(rates)
         rates[self._equation.supports.dofs] = 0.0
         if not self._factors.factor(self._r[owned]):
@@ -318,19 +341,23 @@ class Solver:
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the number of iterations and stiffnesses against zero-energy modes."""
         self.c.total = int(archive.number("iterations", self.c.total))
-        known = float(self._stiffness is not None)
-        if archive.number("idle motions are known", known):
-            if self._stiffness is None:
-                self._stiffness = np.zeros(self._subdomain.size)
-            self._stiffness[:] = archive.at_dofs("idle motions", self._stiffness)
-            self._set_stiffness(self._stiffness)
+        known = self._subdomain.largest(float(self._stiffness.any()))
+        held = archive.number("idle motions are known", known)
+        self._stiffness[:] = archive.at_dofs("idle motions", self._stiffness) if held else 0.0
+        self._set_stiffness()
 
 
 @from_c()
 def agree_in_python(handle: Any, number: int, how: Any, values: Any) -> None:
-    """Callback of C, declared in c_library.py."""
-    solver = ffi.from_handle(handle)[1]
-    solver.agree(how[0:number], np.frombuffer(ffi.buffer(values, 8 * number)))
+    """Combine numbers over all processes; a maximum is infinite if a number is NaN."""
+    comm = ffi.from_handle(handle)[1]._subdomain.comm
+    everywhere = np.empty((comm.size, number))
+    comm.Allgather(np.frombuffer(ffi.buffer(values, 8 * number)), everywhere)
+    for k, column in enumerate(everywhere.T):
+        if how[k] == lib.LARGEST:
+            values[k] = math.inf if np.isnan(column).any() else column.max()
+        else:
+            values[k] = math.hypot(*column) if how[k] == lib.HYPOT else column.sum()
 
 
 def _call(method: str, error: int | None, handle: Any, *data: Any) -> int | None:

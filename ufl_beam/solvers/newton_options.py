@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from typing import Any
+from functools import partial
+from typing import Annotated, Any
 
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -17,10 +18,10 @@ from ufl_beam.errors import (
     ArgumentError,
     require_count,
     require_kind,
-    require_number,
     require_switch,
     require_text,
 )
+from ufl_beam.model.records import Positive, Record
 from ufl_beam.parallel import Agreement
 
 PREFIX = "ub_"
@@ -28,7 +29,7 @@ PREFIX = "ub_"
 
 
 @dataclass(frozen=True)
-class Newton:
+class Newton(Record):
     """Options of Newton's method: tolerance, number of iterations, PETSc options.
 
     Args:
@@ -49,19 +50,17 @@ class Newton:
         >>> run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=newton)
     """
 
-    rtol: float = 1e-10
-    max_iterations: int = 30
-    petsc: dict[str, Any] = field(default_factory=dict)
-    reference: bool = False
+    _refused = ArgumentError
+
+    rtol: Positive = 1e-10
+    max_iterations: Annotated[int, require_count] = 30
+    petsc: Annotated[dict[str, Any], partial(require_kind, kind=dict)] = field(default_factory=dict)
+    reference: Annotated[bool, require_switch] = False
 
     __repr__ = compact_repr
 
     def __post_init__(self) -> None:
-        require_number(self.rtol, "Newton: rtol", positive=True)
-        require_count(self.max_iterations, "Newton: max_iterations")
-        object.__setattr__(self, "max_iterations", int(self.max_iterations))
-        require_kind(self.petsc, dict, "Newton: petsc")
-        require_switch(self.reference, "Newton: reference")
+        super().__post_init__()
         for option in self.petsc:
             require_text(option, "Newton: petsc, an option")
 
@@ -100,8 +99,7 @@ USUAL = (
 
 def database() -> dict[str, Any]:
     """Return the options of the solver in PETSc's database, without their prefix."""
-    options: dict[str, Any] = PETSc.Options(PREFIX).getAll()
-    return options
+    return dict(PETSc.Options(PREFIX).getAll())
 
 
 def apply_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
@@ -142,14 +140,8 @@ def checked_newton(newton: Newton | None, comm: MPI.Intracomm) -> Newton:
 
 
 def _require_known(newton: Newton) -> None:
-    """Refuse options that PETSc would not use, before anything is solved.
-
-    Raises:
-        ArgumentError: An option of ``newton`` or of ``PETSC_OPTIONS`` has no effect, or PETSc
-            refuses its value.
-    """
-    stored = database()
-    chosen = {**stored, **newton.petsc}
+    """Refuse options that PETSc would not use, or whose values it refuses, before any solution."""
+    chosen = {**database(), **newton.petsc}
     if not chosen:
         return
     snes, ksp = PETSc.SNES().create(MPI.COMM_SELF), PETSc.KSP().create(MPI.COMM_SELF)
@@ -168,12 +160,10 @@ def _require_known(newton: Newton) -> None:
         snes.destroy()
         ksp.destroy()
     for name in unused:
-        if name in newton.petsc:
-            where = "Newton: petsc"
-        elif name in WHILE_SOLVING:
+        in_database = name not in newton.petsc
+        if in_database and name in WHILE_SOLVING:
             continue
-        else:
-            where = "PETSC_OPTIONS"
+        where = "PETSC_OPTIONS" if in_database else "Newton: petsc"
         matches = [PREFIX + match for match in get_close_matches(name, USUAL, n=3)]
         hint = f"; did you mean {' or '.join(matches)}?" if matches else "; leave it out"
         if name in WHILE_SOLVING:

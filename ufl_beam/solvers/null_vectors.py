@@ -1,16 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Null vectors of singular tangents, and zero-energy modes, which no force resists or drives.
-
-The node where several members meet has no mass of its own.  When all plastic hinges around it have
-lost their strength, any rotation of the node is an equilibrium, and the tangent stiffness is
-singular.  Newton's method then holds the rotation of the node by a stiffness on the diagonal of
-the tangent.  Residuals, and so forces, energies and solutions, do not contain this stiffness.
-"""
+"""Null vectors of singular tangents: motions that no force resists."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import qr
 from scipy.sparse import coo_array, csc_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
@@ -33,13 +26,9 @@ def free_matrix(subdomain: Subdomain, A: Csr, constrained: Index) -> tuple[csc_a
 
     All processes call it together, each with its part ``A`` and its ``constrained`` local dofs.
     """
-    local = (
-        subdomain.dofs[A.rows()],
-        subdomain.dofs[A.indices],
-        A.data,
-        subdomain.dofs[constrained],
-    )
-    gathered = subdomain.comm.allgather(local) if not subdomain.alone else [local]
+    dofs = subdomain.dofs
+    local = dofs[A.rows()], dofs[A.indices], A.data, dofs[constrained]
+    gathered = [local] if subdomain.alone else subdomain.comm.allgather(local)
     rows, columns, data, fixed = (np.concatenate(x) for x in zip(*gathered, strict=True))
     n = subdomain.numbering.size
     free = np.setdiff1d(np.arange(n), fixed)
@@ -74,63 +63,3 @@ def null_vectors(K: csc_array) -> tuple[Array, Array]:
         y = shifted.solve(shifted.solve(y / np.linalg.norm(y), trans="T"))
     y /= np.linalg.norm(y)
     return np.array([np.linalg.norm(scaled @ y)]), (factors * y)[:, None]
-
-
-# -- zero-energy modes -----------------------------------------------------------------------------
-
-STIFFNESS = 0.01
-"""Stiffness against a zero-energy mode, relative to the largest diagonal entry of the tangent for
-displacements or for rotations.
-
-If forces resist the mode after all, iterations converge faster with a smaller stiffness.  A larger
-stiffness reduces the motion that round-off causes.
-"""
-
-FORCED = 1e-6
-"""Force above which a motion is driven, not a zero-energy mode; relative to forces in the scene."""
-
-
-def stiffen_zero_modes(
-    stiffness: Array, subdomain: Subdomain, A: Csr, diagonal: Index, constrained: Index,
-    forces: Array, scale: float,
-) -> bool:  # fmt: skip
-    """Add stiffnesses against zero-energy modes of the latest tangent; all processes call it.
-
-    Args:
-        stiffness: Stiffnesses of the local degrees of freedom; N/m, N m/rad.
-        subdomain: Subdomain of this process.
-        A: Tangent of this process.
-        diagonal: Positions of the diagonal entries in ``A``.
-        constrained: Local degrees of freedom that supports hold.
-        forces: Magnitudes of the latest residual, moments divided by the size of the scene; N.
-        scale: Size of the forces in the scene; N.
-
-    Returns:
-        Whether there are new modes; false if a force drives a motion without resistance.
-    """
-    numbering, (K, free) = subdomain.numbering, free_matrix(subdomain, A, constrained)
-    if not len(free) or not np.isfinite(K.data).all():
-        return False
-    try:
-        _, vectors = null_vectors(K)
-    except (np.linalg.LinAlgError, RuntimeError):
-        return False
-    motions = numbering.scales[free, None] * vectors
-    # One degree of freedom for each mode, chosen so that the modes are independent there.
-    pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
-    dofs = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]
-    chosen = np.isin(subdomain.dofs, dofs)
-    new = chosen & (stiffness == 0.0)
-    forced = chosen & (forces > FORCED * scale)
-    if not subdomain.total(float(new.any())) or subdomain.total(float(forced.any())):
-        return False
-    rotations, owned = (
-        np.isin(subdomain.dofs, numbering.rotations),
-        np.arange(subdomain.size) < subdomain.num_owned,
-    )
-    owned[subdomain.multipliers] = False
-    sizes = np.abs(A.data[diagonal])
-    for alike in (rotations & owned, ~rotations & owned):
-        stiffest = subdomain.largest(float(sizes[alike].max(initial=0.0)))
-        stiffness[new & alike] = STIFFNESS * stiffest
-    return True

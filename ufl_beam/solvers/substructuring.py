@@ -113,16 +113,10 @@ class Klu:
         """Eliminate from the matrix and right-hand side; return whether that succeeds."""
         good: bool = self._inner.factor(b)
         self._matrix.stateIncrease()
-        good = good and succeeds(self._factors.setUp)
-        good = good and int(self._factors.getFailedReason()) == GOOD
-        return good and succeeds(self._solve)
+        return good and succeeds(self._solve) and int(self._factors.getFailedReason()) == GOOD
 
     def reduce(self, b: Array) -> None:
-        """Eliminate from another right-hand side.
-
-        Raises:
-            PETSc.Error: KLU finds the matrix singular.
-        """
+        """Eliminate from another right-hand side; PETSc.Error if KLU finds a singular matrix."""
         self._inner.reduce(b)
         self._solve()
 

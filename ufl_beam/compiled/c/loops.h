@@ -556,7 +556,7 @@ typedef struct {
   int turned;
   const turned_axes *axes;
   double *plane; /* unknowns in the axes of the plane, if some axes are turned */
-  int idle; /* zero-energy modes that springs in the tangent hold, see null_vectors.py */
+  int idle; /* zero-energy modes that springs in the tangent hold, see newton.py */
   const int32_t *idle_entry;
   const double *idle_stiffness;
 
