@@ -149,7 +149,7 @@ def test_perfectly_plastic_cells_in_a_row():
         pulled = ub.PrescribedDisplacement(beam.end, u=lambda t: 0.008 * t, v=0.0, psi=0.0)
         return pulled, clamped(beam, pulled, *held)
 
-    assert "if they are in a row, nothing tells which of them flows" in str(
+    assert "if they carry the same force, it does not determine which of them yields" in str(
         failure(rod()[1], t=(0, 1), dt=0.25)
     )
     pulled, hardens = rod(isotropic=200e9 * 1e-6)

@@ -155,7 +155,7 @@ def test_an_opening_in_a_jump_is_warned_about(law):
     ) as found:
         run(scene, scheme)
     text = " ".join(str(one.message) for one in found)
-    assert "cells shorter than 0.0281 m, or an energy 1.11 times as large" in text
+    assert "cells shorter than 0.0281 m, or a fracture energy 1.11 times as large" in text
     _, scene = pushed(law(LIMIT, 1.1 * energy), cells=64)
     assert run(scene, scheme).energy.lost["hinges"][-1] > 0
 

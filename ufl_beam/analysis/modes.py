@@ -153,7 +153,10 @@ class Shapes(Rich, ABC):
             recorder.close()
 
     def _scaled(self, k: int, amplitude: float) -> Array | Complex:
-        """Scale a shape to ``amplitude`` times the scene's size, or 1 rad if it only rotates."""
+        """Scale a shape so that its largest displacement is ``amplitude`` times the scene's size.
+
+        If it only rotates, its largest rotation is ``amplitude`` in rad.
+        """
         shape = self.shapes[:, k]
         lengths = np.r_[self.numbering.dofs, self.numbering.dofs_of_bodies][:, :2]
         size = self.scene.size if np.abs(shape[lengths]).max() > 0.5 else 1.0
@@ -201,8 +204,8 @@ class Modes(Shapes):
     """Vibration modes ``x exp(s t)`` about a state; made by :func:`modes`.
 
     Attributes:
-        exponents: s = -ζω ± iω√(1-ζ²) of each mode, imaginary part not negative, ``|s|`` ascending;
-            (n,); 1/s.
+        exponents: s = -ζω + iω√(1-ζ²) of each mode, ``|s|`` ascending; of a conjugate pair
+            only the exponent with positive imaginary part; (n,); 1/s.
 
     Example:
         >>> shapes = ub.modes(scene, 3)
@@ -325,8 +328,8 @@ def buckling(
     Loads and prescribed motions grow in proportion, from their values in the state ``at`` (λ = 0;
     zero without ``at``) to their values at the time ``t`` (λ = 1).  K' is the derivative of the
     stiffness along the initial tangent of this path, on which forces and displacements change.  So
-    factors are exact if the state is close to buckling; otherwise their error grows with the
-    curvature of the path.
+    factors are exact in the limit of a state that buckles; their error grows with the distance
+    from it and with the curvature of the path.
 
     Args:
         scene: Model.

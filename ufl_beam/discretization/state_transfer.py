@@ -15,9 +15,9 @@ from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connectors import Connector
 
 APART = 1e-6
-"""Largest difference of places that a new joint may connect: of positions as a fraction of the size
-of the scene, of rotations in rad, of velocities as a fraction of the largest one times this size,
-which counts as at least 1 m."""
+"""Largest difference between two places that a new joint may connect.  Positions: as a fraction of
+the size of the scene; rotations: in rad.  Velocities: as a fraction of the largest velocity in the
+scene times the larger of its size and 1 m."""
 
 CELL_TABLES = ("cells", "changes of strains")
 """Tables of internal variables whose rows begin with the number of a cell, not of a connector."""
@@ -77,12 +77,12 @@ class Transfer:
     def state(self, q: Array) -> Array:
         """Map a configuration to the new numbering; places of a new joint must coincide."""
         size = self._new.scene.size
-        return self._map(q, lambda c: APART * (size if c < 2 else 1.0), ("m", "rad"), "are")
+        return self._map(q, lambda c: APART * (size if c < 2 else 1.0), ("m", "rad"), "positions")
 
     def velocity(self, v: Array) -> Array:
         """Map velocities to the new numbering; places of a new joint must have equal velocities."""
         fastest = float(np.abs(v).max(initial=0.0)) * max(self._new.scene.size, 1.0)
-        return self._map(v, lambda c: APART * fastest, ("m/s", "rad/s"), "move")
+        return self._map(v, lambda c: APART * fastest, ("m/s", "rad/s"), "velocities")
 
     def _map(
         self, x: Array, allowed: Callable[[int], float], units: tuple[str, str], how: str
@@ -97,9 +97,9 @@ class Transfer:
                 where = self._new.describe(int(self._to[c + 3 * int(np.argmax(component))]))
                 unit = units[c == 2]
                 raise ModelError(
-                    f"start: the new scene joins places that {how} {component.max():.3g} {unit} "
-                    f"apart at the end of the solution: {where}. Connect them by springs, or start "
-                    "from a solution in which they coincide"
+                    f"start: the new scene joins places whose {how} differ by "
+                    f"{component.max():.3g} {unit} at the end of the solution: {where}. Connect "
+                    f"them by springs, or start from a solution in which their {how} are equal"
                 )
         if GROUND in self._new.scene.rigid_bodies:
             mapped[self._new.node(GROUND.middle)] = 0.0

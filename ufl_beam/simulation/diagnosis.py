@@ -47,8 +47,8 @@ PROBE_DISTANCE = 1e-3
 yield at the start of the step; in sizes of the scene, or rad."""
 
 FREE_MOTION = (
-    "Loads can hold it only in a state in which they balance, as a weight below its hinge, and the "
-    f"run does not begin near such a state. Begin near one. {INSTEAD}. In the first step: "
+    "Loads can hold the scene only near an equilibrium, as a weight below its hinge, and the run "
+    f"does not begin near one. Begin near an equilibrium. {INSTEAD}. In the first step: "
 )
 """Continuation of the description of a motion without strain, if the first static step fails."""
 
@@ -177,7 +177,10 @@ def _singularity(equation: StepEquation, q: Array) -> str:
     if largest == 0.0:
         forces = np.abs(x[numbering.multipliers])
         names = [str(scene.all_connectors[i]) for i in _named(forces / forces.max())]
-        said = f"the tangent stiffness is singular: {_list(names)} hold the same motion twice"
+        said = (
+            f"the tangent stiffness is singular: motions that {_list(names)} prevent are already "
+            "prevented"
+        )
         return said if size <= SINGULAR else ""
     x /= largest
     motions /= largest
@@ -275,8 +278,9 @@ def _describe(
     perfect = any(isinstance(law, ElastoPlastic) and law.bounded and law.opens for law in laws)
     if len(cells.soft) > 1 and perfect:
         said += (
-            "; if they are in a row, nothing tells which of them flows: let the law harden a "
-            "little, as ElastoPlastic(limit, modulus) with a millionth of the stiffness"
+            "; if they carry the same force, it does not determine which of them yields: let the "
+            "law harden a little, as ElastoPlastic(limit, isotropic=...) with a millionth of the "
+            "elastic stiffness"
         )
     return said
 
@@ -317,7 +321,8 @@ class LedgerWatch:
     Args:
         numbering: Vertices, cells and degrees of freedom of the scene.
         scheme: The time scheme.
-        claimed: Error of an entry that is no fault, as a fraction of the energy transferred.
+        claimed: Largest error of an entry of the ledger that causes no warning, as a fraction of
+            the energy transferred.
 
     Attributes:
         judged: Index of the last state that was checked; the run updates it when it deletes states.
@@ -335,8 +340,8 @@ class LedgerWatch:
         ]
         laws += [law for law in springs if law is not None]
         grows = {"hinges": True, "plastic": all(map(judges_dissipation, laws))}
-        # Other schemes compute works by the mean of the forces at both ends of a step.  Its error
-        # can make these entries fall.
+        # Schemes with forces at the end of a step compute works by the mean of the forces at both
+        # ends.  The error of this mean can make these entries fall.
         exact = grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
         # True if elastic forces and variables of laws belong to the same instant
         at_once = scheme.theta == scheme.load_weight

@@ -68,7 +68,8 @@ class Solution(States, Rich):
         building: Wall time of building the scene in :func:`simulate`, which is not saved; s.
         every: Number of steps between kept states.
         parameter: Names and formats of :attr:`times`, which are load factors in a path.
-        open_ledger: Message on an open energy ledger; empty if the ledger closes as claimed.
+        open_ledger: Message if the imbalance of the energy ledger exceeds the tolerance of the
+            scheme; empty otherwise.
         warnings: Warnings of the run, one in each line; see docs/warnings.md.
         internal: Data at the end of the run for a run that continues it: internal variables of
             cells and connectors, reactions, rates and forces.
@@ -335,8 +336,10 @@ class Opened:
     def warn(self, scheme: Scheme) -> None:
         """Issue a :class:`ModelWarning` for each beam whose results depend on the mesh.
 
-        The first warnings are of hinges whose resistance falls faster with the opening than the
-        stress of the cell.  This stress falls with the stiffness θ EI/h, or θ E/h of a fibre.
+        One kind of warning names a hinge whose resistance falls faster with the opening than the
+        stress of its cell, which falls with the stiffness θ EI/h, or θ E/h of a fibre.  The other
+        names hinges of ``Section(hinge=)`` whose place in the cell shifts their limit by more than
+        :data:`WARNED_SHIFT`.
         """
         numbering, times = self._numbering, self._times
         for beam in numbering.scene.beams:
@@ -355,7 +358,8 @@ class Opened:
                     f"t = {t:.6g} s: its resistance falls {ratio:.3g} times as fast as its cell of "
                     f"{length:.3g} m can follow. Energy that the cell released and the opening did "
                     "not dissipate went to the rest of the scene. Use cells shorter than "
-                    f"{length / ratio:.3g} m, or an energy {ratio:.3g} times as large"
+                    f"{length / ratio:.3g} m, or a fracture energy "
+                    f"{ratio:.3g} times as large"
                 )
         for member, number, error, place in self.hinges():
             if error > WARNED_SHIFT:

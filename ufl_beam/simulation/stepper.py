@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Steps of a scene in time_loop.c: they are solved, checked, accepted, and divided if they fail.
 
-In statics, if forces act before the end of a step, a step with large nodal rotations does not end
-in equilibrium.  So the first part of the first step applies loads that act from the start, in
-substeps with small rotations.
+In statics, a scheme whose forces act at an instant inside the step, not at its end, leaves the end
+of a step with large nodal rotations out of equilibrium.  So with these schemes the first eighth of
+the first step applies the loads that act from the start, in substeps with small rotations.
 """
 
 from __future__ import annotations
@@ -95,12 +95,12 @@ The relative error of a moment in a substep is a quarter of the square of this a
 """
 
 FREE_STIFFNESS = 1e-3
-"""Stiffness against a motion without strain up to which loads do not hold it, as a fraction of
-(size of the forces) / (size of the scene).  Weights and tensions provide some tenths of this."""
+"""Loads hold a motion without strain only if its stiffness exceeds this fraction of (size of the
+forces) / (size of the scene).  A weight or a tension gives some tenths of this quotient."""
 
 SHORT_SUBSTEP = 512
-"""Ratio of the time in which loads are applied to the length of a substep, from which the rotation
-in the substep is not limited, because still shorter substeps rotate as far."""
+"""The rotation in a substep is not limited if the substep is at most 1/512 of the time in which
+loads are applied, because still shorter substeps would rotate as far."""
 
 MOST_SUBSTEPS: int = lib.MOST_SUBSTEPS
 """Largest number of substeps of a step."""
@@ -140,7 +140,8 @@ class Stepper(StateView):
         solution: Solution so far.
         time_loop: ``time_loop`` of loops.h.
         copies: Comparison of the processes if each of them computes the scene as a whole.
-        together: Caller of functions whose errors all processes that share the scene raise.
+        together: Calls a function on all processes that share the scene; if it raises
+            on one of them, all raise.
     """
 
     def __init__(
@@ -254,7 +255,10 @@ class Stepper(StateView):
         self.together(self.controllers.evaluate, self)
 
     def _prepare(self) -> None:
-        """Accept further rates, reactions and forces of connectors from a trial step."""
+        """Take rates other than velocities, reactions and forces of connectors from a short step.
+
+        The first step of the scheme needs them; the state itself does not advance.
+        """
         c = self.time_loop
         _, *more = self.inertia.after(self._copy(c.s), c.step.dt)
         self.inertia.keep(*more)
@@ -299,10 +303,11 @@ class Stepper(StateView):
         return self._trial(solved)
 
     def attempt_along(self, step: Step, guess: Array, border: Any, *, hold: bool = True) -> Trial:
-        """Solve a step together with the load factor; the times of ``step`` belong to the guess.
+        """Solve for a step and its load factor, which is the time at its end.
 
-        With ``hold``, points that do not flow are held closed if possible, see material_points.py.
-        The guess is in the axes of supports.
+        The times in ``step`` are those of the guess, which is in the axes of supports.  With
+        ``hold``, hinges and springs that did not open further in the last step stay closed if an
+        equilibrium exists in which they bear their limits at most, see material_points.py.
         """
         c = self.time_loop
         self.solver.follow(border)
