@@ -84,8 +84,8 @@ ACCELERATIONS = {
         "it, the guess extrapolates with the velocity of the last step.",
         by.SHIPPED, by.VELOCITY,
         (
-            "compiled/c/time_loop.c:enter_step", "compiled/c/time_loop.c:compare_differences",
-            "compiled/c/time_loop.c~p->both|compare_differences",
+            "compiled/c/steps.c:enter_step", "compiled/c/steps.c:compare_differences",
+            "compiled/c/steps.c~p->both|compare_differences",
         ),
         (ELASTIC, LARGE, SWING, HINGED, JOINTED),
     ),

@@ -16,7 +16,7 @@ import ufl_beam as ub
 from ufl_beam.model.material_law import has_quadratic_energies, judges_dissipation
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms import connector_rows
+from ufl_beam.terms import energy_ledger
 
 STEEL = {"EA": 4e8, "GA": 1e8, "EI": 1.4e6, "rhoA": 40.0}
 
@@ -132,7 +132,7 @@ def test_a_damper_that_drives():
 
 def test_friction_that_drives(monkeypatch):
     """With the sign of the entry turned round."""
-    laws = connector_rows.LEDGER_ENTRIES
+    laws = energy_ledger.LEDGER_ENTRIES
     monkeypatch.setitem(laws, ub.Coulomb, (*laws[ub.Coulomb][:3], -1.0))
     said, solution = run(held_at_the_end(ub.Coulomb(1e3)), t=(0, 0.05), dt=1e-3)
     about(said, solution, "'friction'", "falls by")

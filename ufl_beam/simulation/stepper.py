@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Steps of a scene in time_loop.c: they are solved, checked, accepted, and divided if they fail.
+"""Steps of a scene in steps.c: they are solved, checked, accepted, and divided if they fail.
 
 In statics, a scheme whose forces act at an instant inside the step, not at its end, leaves the end
 of a step with large nodal rotations out of equilibrium.  So with these schemes the first eighth of
@@ -118,7 +118,7 @@ class Trial(NamedTuple):
 
 
 class Stepper(StateView):
-    """Steps of a scene in C, see time_loop.c: the base class of :class:`Simulation`.
+    """Steps of a scene in C, see steps.c: the base class of :class:`Simulation`.
 
     C holds the state.  After each call of C, Python has the time, configuration, velocities,
     reactions and ledger of the new state.

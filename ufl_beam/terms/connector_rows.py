@@ -43,7 +43,7 @@ from ufl_beam.model.functions import TimeFunction
 from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.softening_laws import SofteningLaw
-from ufl_beam.terms.energy_ledger import Account, Ledger
+from ufl_beam.terms.energy_ledger import LEDGER_ENTRIES, Account, Ledger
 from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS, Points, expect_entries
 from ufl_beam.terms.term import Callbacks
 
@@ -199,15 +199,6 @@ class Response:
 
 
 # -- laws that give a motion or a force ------------------------------------------------------------
-
-LEDGER_ENTRIES = {
-    PrescribedMotion: ("_Driven", "supplied", "motors", -1.0),
-    PrescribedForce: ("_Pushed", "supplied", "loads", -1.0),
-    Controller: ("_Controlled", "supplied", "controllers", -1.0),
-    Damper: ("_Damped", "lost", "damping", 1.0),
-    Coulomb: ("_Rubbing", "lost", "friction", 1.0),
-}
-"""For each law: name in files; part, entry and sign of the work of its forces in the ledger."""
 
 
 class PrescribedLaws(Response):

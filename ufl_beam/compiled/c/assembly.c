@@ -27,6 +27,21 @@ static inline void put_in_cell(const cells *c, int cell, int at, int number, con
   for (int i = 0; i < number; ++i) w[i * c->lanes] = values[i];
 }
 
+/* Add the entries of a cell to a matrix, a vector or a number; see insert_batch for several cells. */
+static inline void insert_cell(const cells *c, const double *e, int k, double *b)
+{
+  const int32_t *dofs = c->dofs + (size_t)k * c->of_cell;
+  if (c->row)
+    for (int i = 0; i < c->rows; ++i) b[c->row[(size_t)k * c->rows + i]] += e[i];
+  else if (c->pattern) {
+    const uint8_t *pattern = c->pattern + (size_t)c->has[k] * c->rows;
+    for (int i = 0; i < c->rows; ++i) b[c->begin[dofs[i / c->of_cell]] + pattern[i]] += e[i];
+  } else if (c->is_functional)
+    *b += *e;
+  else
+    for (int i = 0; i < c->rows; ++i) b[dofs[i]] += e[i];
+}
+
 /* Add the form at the unknowns q to a vector, to the entries of a matrix, or to nothing if b is
  * null. */
 void add_cells(void *self, const double *q, double *b)
@@ -50,16 +65,7 @@ void add_cells(void *self, const double *q, double *b)
     x[0] = at[0], x[1] = at[1], x[3] = at[2], x[4] = at[3];
     CALL(c->tabulate, e, w, c->constants, x);
     if (c->each) memcpy(c->each + first, e, c->rows * sizeof *e);
-    if (!b) continue;
-    if (c->row)
-      for (int i = 0; i < c->rows; ++i) b[c->row[first + i]] += e[i];
-    else if (c->pattern) {
-      const uint8_t *pattern = c->pattern + (size_t)c->has[k] * c->rows;
-      for (int i = 0; i < c->rows; ++i) b[c->begin[dofs[i / c->of_cell]] + pattern[i]] += e[i];
-    } else if (c->is_functional)
-      *b += *e;
-    else
-      for (int i = 0; i < c->rows; ++i) b[dofs[i]] += e[i];
+    if (b) insert_cell(c, e, k, b);
   }
 }
 

@@ -623,7 +623,7 @@ int snes_newton(void *snes, void *x);
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason,
               void *self);
 
-/* -- prediction of the end of a step, see time_loop.c ------------------------------------------------- */
+/* -- prediction of the end of a step, see steps.c ------------------------------------------------- */
 
 /* The last steps. `second` is the second difference of the configuration; in dynamics only. */
 typedef struct {
@@ -644,7 +644,7 @@ void predict(const prediction *p, double dt, const double *q, double *out);
 void enter_step(prediction *p, double dt, const double *q, const double *q1);
 void compare_differences(prediction *p);
 
-/* -- steps one after the other, see time_loop.c ----------------------------------------------------- */
+/* -- steps one after the other, see steps.c ----------------------------------------------------- */
 
 /* A step, see Step in time_scheme.py. */
 typedef struct {

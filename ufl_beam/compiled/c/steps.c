@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The time loop without Python; see stepper.py.
+/* A step from its initial guess to its acceptance, its substeps if it fails, and many steps without
+ * Python; see stepper.py.
  *
  * A step that fails leaves the state unchanged and is divided into substeps.
  */
