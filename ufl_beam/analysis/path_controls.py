@@ -21,7 +21,6 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, StepFailed, require_kind, require_number
 from ufl_beam.mechanics.time_scheme import Step
 from ufl_beam.model.bodies import Place
-from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
@@ -123,16 +122,6 @@ class PathCorrector:
                 return more
         return 0.0
 
-    def predict_dissipation(self, energy: float) -> Array:
-        """Predict a step that dissipates ``energy`` (J); :class:`StepFailed` if none does.
-
-        If nothing dissipated before, the direction of the path changes at the onset of dissipation.
-        """
-        self.begin()
-        step = self._until(energy, 0.0 * self.direction, self.direction)
-        kink = self.kink(step)
-        return step if kink is None else self._until(energy, *kink)
-
     def kink(self, step: Array) -> tuple[Array, Array] | None:
         """Find the step to the onset of dissipation, and the direction of the path there.
 
@@ -148,7 +137,7 @@ class PathCorrector:
         _, direction = self.direction_at(q, t)
         return increment, -direction if self.dissipation_side(q, direction) < 0 else direction
 
-    def _until(self, energy: float, increment: Array, direction: Array) -> Array:
+    def until(self, energy: float, increment: Array, direction: Array) -> Array:
         """Extend the step ``increment`` along a direction until it dissipates ``energy`` (J)."""
         q = self.simulation.q + increment[:-1]
 
@@ -305,25 +294,14 @@ class Control(ABC):
     """
 
     step: float
+    factor = 1.0  # change of the load factor that counts as much as a length of 1
+    quantity = ""  # name of the controlled quantity if it may turn back along a path
     least_rest = 0.0  # least fraction of a step that remains beyond a kink
 
     def __post_init__(self) -> None:
         require_number(self.step, f"{type(self).__name__}: step")
         if self.step == 0:
             raise ArgumentError(f"{type(self).__name__}: step = 0 leads nowhere")
-
-    @property
-    def factor(self) -> float:
-        """Change of the load factor that counts as much as a length of 1."""
-        return 1.0
-
-    @property
-    def quantity(self) -> str:
-        """Name of the controlled quantity if it may turn back along a path, else an empty text."""
-        return ""
-
-    def require(self, scene: Scene) -> None:
-        """Raise :class:`ArgumentError` if the control does not fit the scene."""
 
     @abstractmethod
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
@@ -478,15 +456,8 @@ class DisplacementControl(Control):
             )
         super().__post_init__()
 
-    def require(self, scene: Scene) -> None:
-        """Raise :class:`ArgumentError` unless the beam of the place is in the scene."""
-        if self.place.beam not in scene.beams:
-            raise ArgumentError(
-                f"DisplacementControl of {self.place}: {self.place.beam.name} is not in the scene"
-            )
-
     @property
-    def quantity(self) -> str:
+    def quantity(self) -> str:  # type: ignore[override]
         """Name of the component and the place."""
         return f"{self.component} of {self.place}"
 
@@ -529,7 +500,7 @@ class DissipationControl(Control):
         require_kind(self.otherwise, ArcLength, "DissipationControl: otherwise")
 
     @property
-    def factor(self) -> float:
+    def factor(self) -> float:  # type: ignore[override]
         """Factor of the arc length."""
         return self.otherwise.factor
 
@@ -552,11 +523,13 @@ class DissipationControl(Control):
                 trial = self.otherwise.solve_step(corrector, fraction)
                 if corrector.dissipation(trial.q1) == 0.0:
                     return trial
-        energy = self.step * fraction
+        energy, direction = self.step * fraction, corrector.direction
         try:
-            return corrector.attempt(
-                corrector.predict_dissipation(energy), None, energy, hold=False
-            )
+            corrector.begin()
+            step = corrector.until(energy, 0.0 * direction, direction)
+            if (kink := corrector.kink(step)) is not None:
+                step = corrector.until(energy, *kink)
+            return corrector.attempt(step, None, energy, hold=False)
         except StepFailed:
             if not corrector.dissipates:
                 raise

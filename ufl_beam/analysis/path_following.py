@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from ufl_beam.analysis.critical_points import Branch, Candidate, CriticalPoint, Stiffness
-from ufl_beam.analysis.path_controls import Control, Crossing, PathCorrector
+from ufl_beam.analysis.path_controls import Control, Crossing, DisplacementControl, PathCorrector
 from ufl_beam.arrays import Array
 from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
@@ -177,7 +177,10 @@ def follow(
             f"follow: control = {control!r} must be ArcLength(...), LoadControl(...), "
             "DisplacementControl(...) or DissipationControl(...)"
         )
-    control.require(scene)
+    if isinstance(control, DisplacementControl) and control.place.beam not in scene.beams:
+        raise ArgumentError(
+            f"DisplacementControl of {control.place}: {control.place.beam.name} is not in the scene"
+        )
     require_count(steps, "follow: steps")
     require_switch(progress, "follow: progress")
     if start is not None:
