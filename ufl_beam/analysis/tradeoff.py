@@ -150,17 +150,7 @@ def tradeoff(
             require_number(step, what, positive=True)
     families = [Setting(*x, newtons[0]) for x in product(schemes, steps, meshes)]
     with progress_bar(progress, comm, unit="run", bar_format=BAR) as bar:
-        runs = _Runs(
-            scene,
-            quantities,
-            simulate,
-            families,
-            newtons,
-            t=t,
-            max_seconds=max_seconds,
-            comm=comm,
-            bar=bar,
-        )
+        runs = _Runs(scene, quantities, families, newtons, t, max_seconds, comm, bar)
         best, others, notes = _find(runs, target)
         run = best.best()
     for search in others:
@@ -257,7 +247,6 @@ class _Runs:
 
     scene: Scene
     quantities: Mapping[str, Quantity]
-    simulate: Callable[..., Solution]
     families: Sequence[Setting]  # coarsest setting of each family
     newtons: Sequence[Newton]
     t: tuple[float, float]
@@ -276,33 +265,32 @@ class _Runs:
         until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
         with alone():
             try:
-                self._simulate(first, until)
+                settings = vars(self.setting(first))
+                simulate(self.scene, t=(self.t[0], until), progress=False, **settings)
                 self._store(first, self._member(*first))
                 self.bar.update(1)
             except ConvergenceError as error:
                 self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may converge
 
-    def allowed(self, refinements: Sequence[Refinement]) -> bool:
-        """Return whether ``max_seconds`` leave time for runs."""
-        return self.spent + sum(map(self._longest, refinements)) <= self.max_seconds
+    def run(self, refinements: Sequence[Refinement], *, optional: bool = False) -> None:
+        """Do the runs that are missing, several at a time if there are several processes.
 
-    def run(self, refinements: Sequence[Refinement]) -> None:
-        """Do the runs that are missing, several at a time if there are several processes."""
+        If ``max_seconds`` leave no time for them, omit ``optional`` runs; else raise TradeoffError.
+        """
         missing = [r for r in refinements if r not in self.runs and r not in self.failed]
         if not missing:
             return
-        if not self.allowed(missing):
-            needed = sum(map(self._longest, missing))
+        finest, needed = self.setting(missing[-1]), sum(map(self._longest, missing))
+        if self.spent + needed > self.max_seconds:
+            if optional:
+                return
             raise TradeoffError(
                 f"the next {len(missing)} runs would take about {needed:.3g} s after "
-                f"{self.spent:.3g} s of runs, more than max_seconds = "
-                f"{self.max_seconds:g} s; the finest is "
-                f"{self.setting(missing[-1])}"
+                f"{self.spent:.3g} s of runs, more than max_seconds = {self.max_seconds:g} s; the "
+                f"finest is {finest}"
             )
-        self.bar.set_postfix_str(f"{len(missing)} more up to {self.setting(missing[-1])}")
-        cases = [
-            refinement._asdict() | {"refine": str(refinement.refine)} for refinement in missing
-        ]
+        self.bar.set_postfix_str(f"{len(missing)} more up to {finest}")
+        cases = [r._asdict() | {"refine": str(r.refine)} for r in missing]
         try:
             done = study(self._member, cases, progress=False, comm=self.comm)
         except RuntimeError as error:  # all of them failed
@@ -354,15 +342,12 @@ class _Runs:
         )
         return min(times, default=0.0)
 
-    def _simulate(self, refinement: Refinement, until: float) -> Solution:
-        t = self.t[0], until
-        return self.simulate(self.scene, t=t, progress=False, **self.setting(refinement).arguments)
-
     def _member(
         self, family: int, refine: str | Fraction, level: float, newton: int
     ) -> dict[str, Any]:
         """Compute one run, as a member of a study."""
-        solution = self._simulate(Refinement(family, Fraction(refine), level, newton), self.t[1])
+        setting = self.setting(Refinement(family, Fraction(refine), level, newton))
+        solution = simulate(self.scene, t=self.t, progress=False, **vars(setting))
         content: dict[str, Any] = {
             "seconds": solution.seconds,
             "building": solution.building,
@@ -406,11 +391,6 @@ class _Candidate(NamedTuple):
     likely: float  # largest error, see _Search; errors of cells and steps may cancel
     bound: float  # largest error if errors of cells and steps do not cancel
 
-    @property
-    def levels(self) -> tuple[float, float]:
-        """Levels of cells and of steps."""
-        return math.log2(self.refine), self.level
-
 
 class _Search:
     """Search with one family: three levels of cells and of steps from a base, and a finer run.
@@ -441,16 +421,16 @@ class _Search:
     def find(self) -> None:
         """Do the runs that determine the setting and its error; TradeoffError if none serves."""
         while True:
-            candidate = self._choose(
-                min(self.uncertainty, NEGLIGIBLE)
-            )  # expected uncertainty after refinement
+            expected = min(self.uncertainty, NEGLIGIBLE)  # uncertainty after refinement
+            candidate = self._choose(expected)
+            levels = math.log2(candidate.refine), candidate.level
             some, base = next(iter(self.crosses.values())), self._base
             finest = some.cells.finest, some.steps.finest
-            far = any(level > last for level, last in zip(candidate.levels, finest, strict=True))
+            far = any(level > last for level, last in zip(levels, finest, strict=True))
             if far or self.uncertainty > self._negligible(candidate):
                 base = [
                     min(max(old, round(level) - 1), old + FURTHER)
-                    for old, level in zip(base, candidate.levels, strict=True)
+                    for old, level in zip(base, levels, strict=True)
                 ]
             before = self._base.copy()
             if base == self._base:
@@ -494,12 +474,11 @@ class _Search:
                 notes[-1] += "; begin with coarser steps and cells"
         return notes
 
-    def ratio(self, run: Run) -> float:
-        """Return the largest distance of a run from a limit, divided by its unit."""
-        return self._largest({n: run.values[n] - c.limit for n, c in self.crosses.items()})
-
-    def _largest(self, differences: Mapping[str, Array]) -> float:
-        return max(size(d) / self.units[name] for name, d in differences.items())
+    def ratio(self, run: Run, other: Run | None = None) -> float:
+        """Return the largest distance of a run from a limit, or another run, divided by units."""
+        limits = {name: convergence.limit for name, convergence in self.crosses.items()}
+        goal = other.values if other else limits
+        return max(size(run.values[name] - goal[name]) / unit for name, unit in self.units.items())
 
     # -- runs ----------------------------------------------------------------------------------
 
@@ -584,8 +563,7 @@ class _Search:
         i, j = self._base
         intervals = 2 * max(round(2**candidate.level), 2**j)
         finer = self._at(2 * max(candidate.refine, Fraction(2**i)), math.log2(intervals))
-        if self._runs.allowed([finer]):
-            self._runs.run([finer])
+        self._runs.run([finer], optional=True)
         if finer in self._runs.runs:
             values, at = self._runs.runs[finer].values, (math.log2(finer.refine), finer.level)
             for name, convergence in self.crosses.items():
@@ -599,15 +577,12 @@ class _Search:
         least = (1 - SCATTER) * strict.stepping
         for newton in range(1, len(self._runs.newtons)):
             second = first._replace(newton=newton)
-            if self._runs.allowed([second]):
-                self._runs.run([second])
+            self._runs.run([second], optional=True)
             run = self._runs.runs.get(second)
             if run is None:
                 continue
             self._time_ratios[newton] = run.seconds / strict.seconds
-            if run.stepping >= least:
-                continue
-            if self._largest({n: run.values[n] - x for n, x in strict.values.items()}) <= most:
+            if run.stepping < least and self.ratio(run, strict) <= most:
                 self._newton, least = newton, run.stepping
 
     def _try_settings(self) -> None:
@@ -615,13 +590,11 @@ class _Search:
         for _ in range(MOST_TRIALS):
             candidate = self._choose(self.uncertainty)
             setting = self._at(candidate.refine, candidate.level, self._newton)
-            if not self._rank(self.best())[0] and not self._runs.allowed([setting]):
-                return
-            self._runs.run([setting])
+            self._runs.run([setting], optional=not self._rank(self.best())[0])
             if setting in self._runs.failed:
                 raise TradeoffError(f"the chosen setting failed: {self._runs.failed[setting]}")
-            run = self._runs.runs[setting]
-            if self._accepts(run):
+            run = self._runs.runs.get(setting)
+            if run is None or self._accepts(run):
                 return
             self._time_ratios[self._newton] *= run.seconds / candidate.seconds
             if candidate.likely > 0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -43,11 +43,6 @@ class Setting:
             dt = replace(self.dt, tolerance=self.dt.tolerance / 8**level)
         return replace(self, dt=dt, mesh=replace(self.mesh, refine=self.mesh.refine * refine))
 
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """Arguments of :func:`simulate`, by name."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
-
     def __str__(self) -> str:
         step = f"dt={self.dt:.4g}" if isinstance(self.dt, float | int) else compact_repr(self.dt)
         scheme, mesh, newton = map(compact_repr, (self.scheme, self.mesh, self.newton))
@@ -83,8 +78,10 @@ class Run:
         """Wall time of the steps alone; s."""
         return self.seconds - self.building
 
-    def __repr__(self) -> str:
-        return f"<Run: {self.dials}: {self.seconds:.3g} s>"
+    def __str__(self) -> str:
+        return f"{self.dials}: {self.seconds:.3g} s"
+
+    __repr__ = bracketed
 
 
 @dataclass(frozen=True)
@@ -149,7 +146,7 @@ class Tradeoff(Rich):
     @property
     def recommended(self) -> dict[str, Any]:
         """Arguments for ``ub.simulate(scene, **recommended)``: scheme, t, dt, mesh, newton."""
-        return {"t": self.t, **self.best.dials.arguments}
+        return {"t": self.t, **vars(self.best.dials)}
 
     @property
     def limit(self) -> dict[str, Array]:
@@ -208,11 +205,7 @@ class Tradeoff(Rich):
             f"{self.spent / self.best.seconds:.2g} times the recommended one; their steps "
             f"{self.effort:.2g} times"
         )
-        return [*lines, *self.notes, f"recommended: {self._recommended}"]
-
-    @property
-    def _recommended(self) -> str:
-        return f"{self.best.dials}: {self.best.seconds:.3g} s"
+        return [*lines, *self.notes, f"recommended: {self.best}"]
 
     def __str__(self) -> str:
         rows = self.table()
@@ -222,4 +215,4 @@ class Tradeoff(Rich):
         return "\n".join([self.title(), *lines, *self.remarks()])
 
     def __repr__(self) -> str:
-        return f"<Tradeoff: {len(self.runs)} runs; recommended {self._recommended}>"
+        return f"<Tradeoff: {len(self.runs)} runs; recommended {self.best}>"
