@@ -173,12 +173,8 @@ class _Frame:
     def __init__(
         self, shapes: Shapes, subdomain: Subdomain, forces: Kernel, t: float, change: Array
     ) -> None:
-        self.scene, self.numbering, self.comm, self.subdomain = (
-            shapes.scene,
-            shapes.numbering,
-            subdomain.comm,
-            subdomain,
-        )
+        self.scene, self.numbering = shapes.scene, shapes.numbering
+        self.comm, self.subdomain = subdomain.comm, subdomain
         self.q, self.t = shapes.q + change, t
         self._forces, self._state, self._change = forces, shapes.q, change
 

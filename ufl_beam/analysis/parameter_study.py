@@ -87,14 +87,6 @@ class Study(Rich):
         seconds = np.array([seconds for _, seconds in records.values()])
         return cls(member, tuple(map(json.loads, records)), results, failed, seconds)
 
-    def records(self) -> dict[str, Record]:
-        """Return the data from which :meth:`from_records` makes this study."""
-        records: dict[str, Record] = {}
-        for i, case in enumerate(self.cases):
-            row = {name: values[i] for name, values in self.results.items()}
-            records[_case_text(case)] = self.failed.get(i, row), float(self.seconds[i])
-        return records
-
     def __len__(self) -> int:
         return len(self.cases)
 
@@ -226,9 +218,10 @@ def study(
             if not anew:
                 if old.member != name:
                     raise ArgumentError(f"study {path} has results of {old.member}, not of {name}")
-                for key, (outcome, seconds) in old.records().items():
-                    if key not in todo or not isinstance(outcome, str):
-                        records[key] = outcome, seconds
+                for i, key in enumerate(map(_case_text, old.cases)):
+                    if key not in todo or i not in old.failed:
+                        row = {result: values[i] for result, values in old.results.items()}
+                        records[key] = old.failed.get(i, row), float(old.seconds[i])
         save()  # fails early if the file cannot be written
 
     def save() -> None:
@@ -291,14 +284,9 @@ def _distributed(
 ) -> Generator[tuple[str, Outcome, float], None, None]:
     """Yield key, outcome and seconds of cases; this process runs the last, others the first."""
     futures = {pool.submit(_run, case): key for key, case in cases.items()}
-    ended: SimpleQueue[Any] = SimpleQueue()
-
-    def finish(future: Any) -> None:
-        if not future.cancelled():
-            ended.put(future)
-
+    ended: SimpleQueue[Any] = SimpleQueue()  # also has the futures that this process cancels
     for future in futures:
-        future.add_done_callback(finish)
+        future.add_done_callback(ended.put)
     # While this process runs members, a thread of the pool communicates: not every MPI allows it.
     left = [*futures] if MPI.Query_thread() == MPI.THREAD_MULTIPLE else []
     finished = 0
@@ -311,6 +299,8 @@ def _distributed(
                 outcome = _run(cases[futures[future]])
             else:
                 future = ended.get()
+                if future.cancelled():
+                    continue  # this process has run it
                 outcome = future.result()
             finished += 1
             yield futures[future], *outcome
@@ -320,14 +310,35 @@ def _distributed(
 
 
 def _run(case: Case) -> Record:
-    """Run one member on this process; an exception is also an outcome."""
+    """Run one member on this process; an exception is also an outcome.
+
+    Raises:
+        ArgumentError: The member returned anything but numbers and arrays of floats by name.
+    """
     begin = time.perf_counter()
     try:
         with alone():
             returned = _MEMBER.get()(**case)
     except Exception as error:
         return f"{type(error).__name__}: {error}", time.perf_counter() - begin
-    return _result_arrays(case, returned), time.perf_counter() - begin
+    seconds = time.perf_counter() - begin
+    if not isinstance(returned, dict) or not returned:
+        raise ArgumentError(
+            f"study: {case} returned {returned!r}; return a dict of numbers or arrays"
+        )
+    arrays = {}
+    for name, value in returned.items():
+        if not isinstance(name, str) or name in {"", "."} or "/" in name or not name.isprintable():
+            raise ArgumentError(f"study: {case} returned {name!r}, which names no result")
+        array = np.asarray(None)  # kept, and refused below, if rows have different lengths
+        with suppress(ValueError):
+            array = np.asarray(value)
+        if array.dtype.kind not in "biuf":
+            raise ArgumentError(
+                f"study: {case} returned {name} = {value!r}, which is no number or array of numbers"
+            )
+        arrays[name] = array.astype(float)
+    return arrays, seconds
 
 
 def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> None:
@@ -358,24 +369,3 @@ def _case_text(case: dict[str, Any], what: str = "case") -> str:
             f"{what} = {case}: values must be numbers, texts or lists of them; let the member "
             "make other objects from these"
         ) from None
-
-
-def _result_arrays(case: dict[str, Any], returned: Any) -> dict[str, Array]:
-    """Return the result of a member as arrays of floats, or raise :class:`ArgumentError`."""
-    if not isinstance(returned, dict) or not returned:
-        raise ArgumentError(
-            f"study: {case} returned {returned!r}; return a dict of numbers or arrays"
-        )
-    arrays = {}
-    for name, value in returned.items():
-        if not isinstance(name, str) or name in {"", "."} or "/" in name or not name.isprintable():
-            raise ArgumentError(f"study: {case} returned {name!r}, which names no result")
-        array = np.asarray(None)  # kept, and refused below, if rows have different lengths
-        with suppress(ValueError):
-            array = np.asarray(value)
-        if array.dtype.kind not in "biuf":
-            raise ArgumentError(
-                f"study: {case} returned {name} = {value!r}, which is no number or array of numbers"
-            )
-        arrays[name] = array.astype(float)
-    return arrays
