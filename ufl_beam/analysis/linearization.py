@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from contextlib import closing, suppress
-from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -20,12 +18,10 @@ from scipy.sparse.linalg import splu
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.errors import ArgumentError, ModelWarning
-from ufl_beam.mechanics.classical_schemes import Newmark, Static
+from ufl_beam.mechanics.classical_schemes import Newmark
 from ufl_beam.mechanics.time_scheme import Coefficients, Step
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.constraint_checks import require_no_mechanism
 from ufl_beam.model.functions import value_at
-from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
@@ -37,28 +33,6 @@ V = TypeVar("V", Array, Complex)
 MODAL_TOLERANCE = 1e-9  # couplings below this fraction of the largest damping do not count
 BALANCED = 1e-13  # forces below this fraction of the stiffness times the scene's size are round-off
 AT_REST = 1e150  # time step so long that rates vanish; its square is finite; s
-
-
-def reference_state(scene: Scene, mesh: Mesh | None) -> tuple[Scene, Solution | None]:
-    """Return the scene without loads; if only its loads hold it, the scene and its equilibrium.
-
-    Loads are left out because the undeformed scene is not in equilibrium with them.
-
-    Raises:
-        ArgumentError: The scene has a :class:`RotatingFrame`, so a state must be given.
-    """
-    if any(isinstance(load, RotatingFrame) for load in scene.loads):
-        raise ArgumentError(
-            "modes: the undeformed scene is not at rest in a RotatingFrame; give the state of "
-            "steady rotation, at=simulate(scene, Static(), ...), or leave the frame out"
-        )
-    if scene.loads and require_no_mechanism(scene):
-        simulation = Simulation(replace(scene, damping=()), Static(), mesh=mesh)
-        # If there is no equilibrium, as for a falling body, loads are left out, too.
-        with suppress(ArgumentError), closing(simulation):
-            simulation.step_to(1.0)
-            return scene, simulation.snapshot()
-    return replace(scene, loads=()), None
 
 
 class _Standstill(Newmark):

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from contextlib import closing, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.analysis.linearization import SmallMotions, reference_state
+from ufl_beam.analysis.linearization import SmallMotions
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.compiled_forms import Kernel
@@ -34,6 +35,7 @@ from ufl_beam.output.paraview_files import VTKHDF, XDMF, TimeSeries
 from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of
+from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.beam_forces import elastic_forms
 from ufl_beam.terms.cell_forces import CellForces
@@ -300,7 +302,19 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     n = require_count(n, "modes: n")
     if at is None:
         require_no_prestress(scene, "modes", IN_EQUILIBRIUM)
-        scene, at = reference_state(scene, mesh)
+        if any(isinstance(load, RotatingFrame) for load in scene.loads):
+            raise ArgumentError(
+                "modes: the undeformed scene is not at rest in a RotatingFrame; give the state of "
+                "steady rotation, at=simulate(scene, Static(), ...), or leave the frame out"
+            )
+        if scene.loads and require_no_mechanism(scene):
+            simulation = Simulation(replace(scene, damping=()), Static(), mesh=mesh)
+            # There may be no equilibrium, as for a falling body.
+            with suppress(ArgumentError), closing(simulation):
+                simulation.step_to(1.0)
+                at = simulation.snapshot()
+        if at is None:
+            scene = replace(scene, loads=())  # the undeformed scene is in no equilibrium with them
     else:
         _require_same_scene(at, scene, mesh, "modes")
     small = SmallMotions(scene, at, mesh=mesh)

@@ -23,6 +23,7 @@ from ufl_beam.errors import (
     ArgumentError,
     ConvergenceError,
     TradeoffError,
+    require_all,
     require_kind,
     require_number,
     require_switch,
@@ -236,9 +237,7 @@ def _several(values: Value | Sequence[Value], kind: type, what: str) -> tuple[Va
         return (values,)  # type: ignore[return-value]
     if not values:
         raise ArgumentError(f"tradeoff: {what} is empty")
-    for i, value in enumerate(values):
-        require_kind(value, kind, f"tradeoff: {what}[{i}]")
-    return tuple(values)
+    return require_all(values, f"tradeoff: {what}", kind)
 
 
 @dataclass(eq=False)
@@ -256,7 +255,6 @@ class _Runs:
     runs: dict[Refinement, Run] = field(default_factory=dict, init=False)
     failed: dict[Refinement, str] = field(default_factory=dict, init=False)  # reasons of failures
     spent: float = field(default=0.0, init=False)  # wall time of all runs; s
-    _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False)
 
     def begin(self, family: int) -> None:
         """Compile in a first run, of one step if steps are equal; then time the coarsest run."""
@@ -311,9 +309,22 @@ class _Runs:
                 self.failed[refinement] = done.failed[k]
 
     def setting(self, refinement: Refinement) -> Setting:
-        """Return the setting of a refinement."""
-        finer = self.families[refinement.family].finer(refinement.refine, refinement.level, self.t)
-        return replace(finer, newton=self.newtons[refinement.newton])
+        """Return the setting of a refinement.
+
+        The error of an adaptive step is of third order, so the number of steps is proportional to
+        the cube root of 1/tolerance.
+        """
+        family, refine, level, newton = refinement
+        coarsest = replace(self.families[family], newton=self.newtons[newton])
+        if refine == 1 and level == 0:
+            return coarsest  # unchanged, so that checks see the user's arguments
+        dt, mesh, duration = coarsest.dt, coarsest.mesh, self.t[1] - self.t[0]
+        if isinstance(dt, Adaptive):
+            dt = replace(dt, tolerance=dt.tolerance / 8**level)
+        else:
+            number = max(1, math.ceil(duration / dt * (1 - 1e-9)))
+            dt = duration / round(number * 2**level)
+        return replace(coarsest, dt=dt, mesh=replace(mesh, refine=mesh.refine * refine))
 
     def in_family(self, family: int) -> list[Run]:
         """Return the runs of a family."""
@@ -355,11 +366,12 @@ class _Runs:
             "cells": len(solution.numbering.cells),
             "iterations": solution.iterations / solution.parts,
         }
+        known = next(iter(self.runs.values())).values if self.runs else {}
         for n, (name, quantity) in enumerate(self.quantities.items()):
             value = np.asarray(quantity(solution), dtype=float)
             if not np.isfinite(value).all():
                 raise ArgumentError(f"tradeoff: quantity {name!r} is not finite")
-            before = self._shapes.get(name, value.shape)
+            before = np.shape(known.get(name, value))
             if before != value.shape:
                 raise ArgumentError(
                     f"tradeoff: quantity {name!r} has shape {before} in a run and {value.shape} "
@@ -369,15 +381,13 @@ class _Runs:
             content[f"quantity {n}"] = value
         return content
 
-    def _store(self, refinement: Refinement, content: Mapping[str, Any]) -> None:
+    def _store(self, refinement: Refinement, content: dict[str, Any]) -> None:
         """Store a run with the data of the first process."""
         content = self.comm.bcast(content)
         values = {
-            name: np.asarray(content[f"quantity {n}"]) for n, name in enumerate(self.quantities)
+            name: np.asarray(content.pop(f"quantity {n}")) for n, name in enumerate(self.quantities)
         }
-        self._shapes |= {name: value.shape for name, value in values.items()}
-        measured = ("seconds", "building", "steps", "cells", "iterations")
-        took = {name: float(content[name]) for name in measured}
+        took = {name: float(measured) for name, measured in content.items()}
         self.spent += took["seconds"]
         self.runs[refinement] = Run(refinement, self.setting(refinement), values, **took)
 
