@@ -44,8 +44,6 @@ from ufl_beam.terms.term import InCells
 MOST_TITLES = 4  # most modes that a text of one line names
 AMPLITUDE = 0.1  # largest displacement of a mode in pictures, as a fraction of the scene's size
 
-IN_EQUILIBRIUM = "give at=, a static solution"
-
 
 @dataclass(frozen=True, eq=False)
 class Shapes(Rich, ABC):
@@ -298,10 +296,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         >>> print(shapes.frequencies.round(1))  # Hz
         [ 41.5 250.6 646.8]
     """
-    require_kind(scene, Scene, "modes: scene")
-    n = require_count(n, "modes: n")
+    n = _checked_count("modes", scene, n, at, mesh)
     if at is None:
-        require_no_prestress(scene, "modes", IN_EQUILIBRIUM)
         if any(isinstance(load, RotatingFrame) for load in scene.loads):
             raise ArgumentError(
                 "modes: the undeformed scene is not at rest in a RotatingFrame; give the state of "
@@ -315,8 +311,6 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
                 at = simulation.snapshot()
         if at is None:
             scene = replace(scene, loads=())  # the undeformed scene is in no equilibrium with them
-    else:
-        _require_same_scene(at, scene, mesh, "modes")
     small = SmallMotions(scene, at, mesh=mesh)
     if at is None and (said := small.unbalanced()):
         warn(said)
@@ -356,8 +350,7 @@ def buckling(
         >>> print(f"{critical / (np.pi**2 * section.EI / (2 * 2) ** 2):.2f}")  # times Euler's load
         1.00
     """
-    require_kind(scene, Scene, "buckling: scene")
-    n = require_count(n, "buckling: n")
+    n = _checked_count("buckling", scene, n, at, mesh)
     require_number(t, "buckling: t")
     for load in (*scene.loads, *scene.works):
         if isinstance(load, FollowerLoad | RotatingFrame | VirtualWork):
@@ -366,23 +359,24 @@ def buckling(
                 "modes(..., at=) about states with an increasing load, and find where a frequency "
                 "vanishes or a damping ratio becomes negative"
             )
-    if at is None:
-        if said := require_no_mechanism(scene):
-            raise ArgumentError(
-                f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)"
-            )
-        require_no_prestress(scene, "buckling", IN_EQUILIBRIUM)
-    else:
-        _require_same_scene(at, scene, mesh, "buckling")
+    if at is None and (said := require_no_mechanism(scene)):
+        raise ArgumentError(f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)")
     small = SmallMotions(scene, at, t, mesh)
     factors, shapes = small.buckling(n)
     return Buckling(scene, small.numbering, small.q, shapes, factors)
 
 
-def _require_same_scene(at: Solution, scene: Scene, mesh: Mesh | None, what: str) -> None:
+def _checked_count(what: str, scene: Scene, n: int, at: Solution | None, mesh: Mesh | None) -> int:
+    """Check the arguments of a call ``what``, and return ``n`` as a number of modes."""
+    require_kind(scene, Scene, f"{what}: scene")
+    n = require_count(n, f"{what}: n")
+    if at is None:
+        require_no_prestress(scene, what, "give at=, a static solution")
+        return n
     require_kind(at, Solution, f"{what}: at")
     if not DofNumbering(scene, mesh_of(at, mesh)).agrees(at.numbering):
         raise ArgumentError(
             f"{what}: at is a solution of other beams, joints or cells; use the same Beam "
             "objects, joined alike, and the same Mesh"
         )
+    return n

@@ -24,7 +24,13 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import Rich
-from ufl_beam.errors import ArgumentError, require_kind, require_sequence, require_switch, shorten
+from ufl_beam.errors import (
+    ArgumentError,
+    require_function,
+    require_kind,
+    require_sequence,
+    require_switch,
+)
 from ufl_beam.output.output_files import (
     above,
     below,
@@ -201,10 +207,7 @@ def study(
     records: dict[str, Record] = {}
 
     def prepare() -> None:
-        if not callable(member):
-            raise ArgumentError(
-                f"study: member = {shorten(member)} cannot be called; give a function"
-            )
+        require_function(member, "study: member", "the names in the cases")
         for i, case in enumerate(require_sequence(cases, "study: cases")):
             key = _case_text(case, f"study: cases[{i}]")
             if key in todo:

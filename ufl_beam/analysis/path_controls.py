@@ -8,8 +8,6 @@ unknowns.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field
 from typing import NamedTuple
@@ -131,27 +129,31 @@ class PathCorrector:
         self.begin()
         if self.dissipates or not (whole := self.dissipation(q + motion)) > 0:
             return None
-        onset = ONSET_FRACTION * whole
-        increment = bisect(lambda p: self.dissipation(q + p * motion) > onset, 0.0, 1.0, 40) * step
+        increment = self._length_to(ONSET_FRACTION * whole, q, motion, (0.0, 1.0), 40) * step
         q, t = q + increment[:-1], self.simulation.t + increment[-1]
         _, direction = self.direction_at(q, t)
         return increment, -direction if self.dissipation_side(q, direction) < 0 else direction
 
     def until(self, energy: float, increment: Array, direction: Array) -> Array:
         """Extend the step ``increment`` along a direction until it dissipates ``energy`` (J)."""
-        q = self.simulation.q + increment[:-1]
-
-        def enough(length: float) -> bool:
-            return self.dissipation(q + length * direction[:-1]) >= energy
-
+        q, motion = self.simulation.q + increment[:-1], direction[:-1]
         low, high = 0.0, 1e-6 / self.length(direction)
         for _ in range(MOST_DOUBLINGS):
-            if enough(high):
-                break
+            if self.dissipation(q + high * motion) >= energy:
+                return increment + self._length_to(energy, q, motion, (low, high), 12) * direction
             low, high = high, 2 * high
-        else:
-            raise StepFailed("nothing dissipates in the direction of the path")
-        return increment + bisect(enough, low, high, 12) * direction
+        raise StepFailed("nothing dissipates in the direction of the path")
+
+    def _length_to(
+        self, energy: float, q: Array, motion: Array, between: tuple[float, float], halvings: int
+    ) -> float:
+        """Find by bisection the factor of a motion from ``q`` that dissipates ``energy`` (J)."""
+        low, high = between
+        for _ in range(halvings):
+            middle = (low + high) / 2
+            enough = self.dissipation(q + middle * motion) >= energy
+            low, high = (low, middle) if enough else (middle, high)
+        return high
 
     # -- the border ----------------------------------------------------------------------------
 
@@ -279,15 +281,7 @@ class PathCorrector:
         return stiffness, direction / size
 
 
-def bisect(reached: Callable[[float], bool], low: float, high: float, halvings: int) -> float:
-    """Find by bisection where ``reached`` becomes true; return the upper end of the interval."""
-    for _ in range(halvings):
-        middle = (low + high) / 2
-        low, high = (low, middle) if reached(middle) else (middle, high)
-    return high
-
-
-class Control(ABC):
+class Control:
     """Base class of path controls, which set the lengths of steps.
 
     A step changes the controlled quantity by ``step``, or by a fraction of ``step``.
@@ -303,9 +297,12 @@ class Control(ABC):
         if self.step == 0:
             raise ArgumentError(f"{type(self).__name__}: step = 0 leads nowhere")
 
-    @abstractmethod
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
-        """Return the gradient of the quantity or of its negative, whichever grows in a step."""
+        """Return the gradient of the quantity or of its negative, whichever grows in a step.
+
+        By default the quantity is the arc length in a step along ``direction``.
+        """
+        return np.asarray(corrector.weights * direction / corrector.length(direction))
 
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return a positive number if the path continues along ``direction``.
@@ -382,10 +379,6 @@ class ArcLength(Control):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_number(self.factor, "ArcLength: factor", positive=True)
-
-    def normal(self, corrector: PathCorrector, direction: Array) -> Array:
-        """Return the gradient of the arc length in a step along ``direction``."""
-        return np.asarray(corrector.weights * direction / corrector.length(direction))
 
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return the sense: initially by the sign of ``step``, later such that dissipation grows.
@@ -503,10 +496,6 @@ class DissipationControl(Control):
     def factor(self) -> float:  # type: ignore[override]
         """Factor of the arc length."""
         return self.otherwise.factor
-
-    def normal(self, corrector: PathCorrector, direction: Array) -> Array:
-        """Return the gradient of the arc length; used where nothing dissipates."""
-        return self.otherwise.normal(corrector, direction)
 
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return the sense of the arc length; used where nothing dissipates."""

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar
 
 from mpi4py import MPI
 
@@ -24,11 +24,11 @@ from ufl_beam.errors import (
     ConvergenceError,
     TradeoffError,
     require_all,
+    require_function,
     require_kind,
     require_number,
     require_switch,
     require_text,
-    shorten,
 )
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.beams import Mesh
@@ -129,11 +129,7 @@ def tradeoff(
         raise ArgumentError("tradeoff: quantities is empty; name at least one quantity")
     for name, quantity in quantities.items():
         require_text(name, "tradeoff: the name of a quantity")
-        if not callable(quantity):
-            raise ArgumentError(
-                f"tradeoff: quantity {name!r} = {shorten(quantity)} cannot be called; give a "
-                "function of a Solution"
-            )
+        require_function(quantity, f"tradeoff: quantity {name!r}", "a Solution")
     target = _checked_target(quantities, tolerance, budget)
     require_number(max_seconds, "tradeoff: max_seconds", positive=True)
     require_switch(progress, "tradeoff: progress")
@@ -215,11 +211,10 @@ def _checked_target(
     if (tolerance is None) == (budget is None):
         raise ArgumentError("tradeoff: give either a tolerance or a budget")
     if budget is not None:
-        require_number(budget, "tradeoff: budget", positive=True)
-        return Target({}, 1.0, budget)
+        return Target({}, 1.0, require_number(budget, "tradeoff: budget", positive=True))
     if not isinstance(tolerance, Mapping):
-        require_number(cast("float", tolerance), "tradeoff: tolerance", positive=True)
-        return Target({}, cast("float", tolerance), math.inf)
+        relative = require_number(tolerance, "tradeoff: tolerance", positive=True)
+        return Target({}, relative, math.inf)
     if set(tolerance) != set(quantities):
         raise ArgumentError(
             f"tradeoff: tolerance is of {', '.join(tolerance)}, quantities are "
