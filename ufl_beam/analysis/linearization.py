@@ -115,10 +115,7 @@ class SmallMotions:
         return csr_array(self._Z.T @ T @ self._Z)
 
     def unbalanced(self) -> str:
-        """Name works, connectors and motions of supports that disturb the equilibrium of the state.
-
-        The text is empty if the state is in equilibrium.
-        """
+        """Name works, connectors and motions of supports that disturb the equilibrium, if any."""
         t = self._simulation.t
         r, T = self._linearised(self.q)
         sizes = abs(T).max(axis=1).toarray().ravel()

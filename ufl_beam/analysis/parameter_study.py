@@ -313,11 +313,7 @@ def _distributed(
 
 
 def _run(case: Case) -> Record:
-    """Run one member on this process; an exception is also an outcome.
-
-    Raises:
-        ArgumentError: The member returned anything but numbers and arrays of floats by name.
-    """
+    """Run one member on this process; its exception is an outcome, a wrong result an error."""
     begin = time.perf_counter()
     try:
         with alone():
@@ -348,16 +344,14 @@ def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> 
     """Raise unless names and shapes agree with the first member that did not fail."""
     if isinstance(outcome, str):
         return
-    new = {name: outcome[name].shape for name in sorted(outcome)}
-    for known, (row, _) in records.items():
-        if not isinstance(row, str):
-            old = {name: row[name].shape for name in sorted(row)}
-            if new != old:
-                raise ArgumentError(
-                    f"study: {case} returned names and shapes {new}, but {known} {old}; return "
-                    "the same from all members, and begin a new file if they have changed"
-                )
-            return
+    known = ((key, row) for key, (row, _) in records.items() if not isinstance(row, str))
+    key, row = next(known, ("", outcome))
+    new, old = ({name: x[name].shape for name in sorted(x)} for x in (outcome, row))
+    if new != old:
+        raise ArgumentError(
+            f"study: {case} returned names and shapes {new}, but {key} {old}; return the same from "
+            "all members, and begin a new file if they have changed"
+        )
 
 
 def _case_text(case: dict[str, Any], what: str = "case") -> str:

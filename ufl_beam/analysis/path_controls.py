@@ -121,10 +121,7 @@ class PathCorrector:
         return 0.0
 
     def kink(self, step: Array) -> tuple[Array, Array] | None:
-        """Find the step to the onset of dissipation, and the direction of the path there.
-
-        Return None if no dissipation begins in ``step``.
-        """
+        """Find the part of ``step`` up to an onset of dissipation, and the direction there."""
         q, motion = self.simulation.q, step[:-1]
         self.begin()
         if self.dissipates or not (whole := self.dissipation(q + motion)) > 0:

@@ -270,10 +270,7 @@ class PathStepper:
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
         """Take a step to its end or to the first critical point in it; shorten steps that fail.
 
-        The end is stored in the solution if ``keep``.
-
-        Raises:
-            StepFailed: Even the shortest step fails.
+        The end is stored in the solution if ``keep``.  StepFailed: even the shortest step fails.
         """
         while True:
             iterations = self._simulation.iterations

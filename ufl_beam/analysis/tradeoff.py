@@ -171,7 +171,7 @@ def tradeoff(
 def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str]]:
     """Search with the family that coarse runs predict to be the best; if this fails, the next.
 
-    The results are the successful search, the other searches, and notes on the other searches.
+    Return the successful search, the other searches, and notes on these.
     """
     searches: list[_Search] = []
     notes: list[str] = []
@@ -286,22 +286,19 @@ class _Runs:
         cases = [r._asdict() | {"refine": str(r.refine)} for r in missing]
         try:
             done = study(self._member, cases, progress=False, comm=self.comm)
+            failed = done.failed
         except RuntimeError as error:  # all of them failed
-            text = str(error)
-            if WRONG in text:
-                raise ArgumentError(text.partition(WRONG)[2]) from None
-            self.failed |= dict.fromkeys(missing, text)
-            return
+            failed = dict.fromkeys(range(len(missing)), str(error))
         finally:
             self.bar.set_postfix_str("", refresh=False)
             self.bar.update(len(missing))
         for k, refinement in enumerate(missing):
-            if k not in done.failed:
+            if k not in failed:
                 self._store(refinement, {name: done[name][k] for name in done.results})
-            elif done.failed[k].startswith(WRONG):
-                raise ArgumentError(done.failed[k].removeprefix(WRONG))
+            elif WRONG in failed[k]:
+                raise ArgumentError(failed[k].partition(WRONG)[2])
             else:
-                self.failed[refinement] = done.failed[k]
+                self.failed[refinement] = failed[k]
 
     def setting(self, refinement: Refinement) -> Setting:
         """Return the setting of a refinement.
@@ -554,8 +551,7 @@ class _Search:
     def _move_base(self, said: str, axis: int | None = None) -> None:
         """Refine cells (``axis=0``) or steps (1) of the base, by default the more uncertain.
 
-        Raises:
-            TradeoffError: ``MOST_DOUBTS`` bases have not shown convergence.
+        TradeoffError: ``MOST_DOUBTS`` bases have not shown convergence.
         """
         where = self._runs.setting(self._at(2 ** self._base[0], self._base[1]))
         self._doubts.append(f"\n  from {where} on: {said}")
