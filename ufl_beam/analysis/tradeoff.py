@@ -428,12 +428,9 @@ class _Search:
             levels = math.log2(candidate.refine), candidate.level
             some, base = next(iter(self.crosses.values())), self._base
             finest = some.cells.finest, some.steps.finest
-            far = any(level > last for level, last in zip(levels, finest, strict=True))
+            far = np.greater(levels, finest).any()
             if far or self.uncertainty > self._negligible(candidate):
-                base = [
-                    min(max(old, round(level) - 1), old + FURTHER)
-                    for old, level in zip(base, levels, strict=True)
-                ]
+                base = [int(x) for x in np.clip(np.round(levels) - 1, base, np.add(base, FURTHER))]
             before = self._base.copy()
             if base == self._base:
                 self._confirm(candidate)
