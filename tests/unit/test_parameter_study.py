@@ -294,7 +294,7 @@ def test_the_file_is_written_on_the_way(tmp_path):
 @pytest.mark.parametrize(
     ("member", "cases", "says"),
     [
-        ("square", numbers(1), ("member = 'square' cannot be called",)),
+        ("square", numbers(1), ("member = 'square' must be a function of the names in",)),
         (square, [], ("cases is empty",)),
         (square, 3, ("cases = 3 must be a list",)),
         (square, [{"x": 1}, 2], ("cases[1] = 2 is not a dict",)),

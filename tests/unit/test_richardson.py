@@ -106,8 +106,8 @@ def cross(base, *, cells=(0.3, 2.0), steps=(0.1, 1.0), mixed=0.0):
 def test_errors_of_both_dials_add_up(base):
     one, value = cross(base)
     assert np.abs(one.limit - 7.0).max() < 1e-12
-    for level in ((base[0] + 1, base[1] + 2), (base[0] + 0.5, base[1] + 3.7)):
-        assert np.allclose(one.lack(*level), 7.0 - value(*level), rtol=1e-9)
+    for i, j in ((base[0] + 1, base[1] + 2), (base[0] + 0.5, base[1] + 3.7)):
+        assert np.allclose(one.cells.lack(i) + one.steps.lack(j), 7.0 - value(i, j), rtol=1e-9)
 
 
 @pytest.mark.parametrize("mixed", [0.05, -0.05, -0.25])

@@ -388,7 +388,7 @@ def test_wrong_calls_are_refused(call, says):
     [
         ({}, ("quantities is empty",)),
         ([1], ("quantities = [1] is not a Mapping",)),
-        ({"tip": 1.0}, ("quantity 'tip' = 1.0 cannot be called",)),
+        ({"tip": 1.0}, ("quantity 'tip' = 1.0 must be a function of a Solution",)),
         ({"q": lambda s: s.times}, ("quantity 'q' has shape (3,)", "np.interp")),
         ({"q": lambda s: math.nan}, ("quantity 'q' is not finite",)),
         ({"q": lambda s: 0.0}, ("quantity 'q' is zero",)),

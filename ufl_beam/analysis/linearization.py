@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from contextlib import closing, suppress
-from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -20,12 +18,10 @@ from scipy.sparse.linalg import splu
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.errors import ArgumentError, ModelWarning
-from ufl_beam.mechanics.classical_schemes import Newmark, Static
+from ufl_beam.mechanics.classical_schemes import Newmark
 from ufl_beam.mechanics.time_scheme import Coefficients, Step
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.constraint_checks import require_no_mechanism
 from ufl_beam.model.functions import value_at
-from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
@@ -37,43 +33,6 @@ V = TypeVar("V", Array, Complex)
 MODAL_TOLERANCE = 1e-9  # couplings below this fraction of the largest damping do not count
 BALANCED = 1e-13  # forces below this fraction of the stiffness times the scene's size are round-off
 AT_REST = 1e150  # time step so long that rates vanish; its square is finite; s
-
-
-def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array]:
-    """Return all forces except inertia at ``q``, and the entries of their derivative K + C / dt.
-
-    See :meth:`StepEquation.linearise`.  Yielding and opening stay frozen afterwards, so no step may
-    follow.
-    """
-    simulation.controllers.evaluate(simulation)
-    for cells in simulation.inelastic:
-        cells.points.freeze()
-    for group in simulation.connector_terms:
-        group.response.freeze()
-    step = Step(0.0, dt, simulation.q, simulation.t, simulation.t, fraction=1.0)
-    return simulation.equation.linearise(q, step)
-
-
-def reference_state(scene: Scene, mesh: Mesh | None) -> tuple[Scene, Solution | None]:
-    """Return the scene without loads; if only its loads hold it, the scene and its equilibrium.
-
-    Loads are left out because the undeformed scene is not in equilibrium with them.
-
-    Raises:
-        ArgumentError: The scene has a :class:`RotatingFrame`, so a state must be given.
-    """
-    if any(isinstance(load, RotatingFrame) for load in scene.loads):
-        raise ArgumentError(
-            "modes: the undeformed scene is not at rest in a RotatingFrame; give the state of "
-            "steady rotation, at=simulate(scene, Static(), ...), or leave the frame out"
-        )
-    if scene.loads and require_no_mechanism(scene):
-        simulation = Simulation(replace(scene, damping=()), Static(), mesh=mesh)
-        # If there is no equilibrium, as for a falling body, loads are left out, too.
-        with suppress(ArgumentError), closing(simulation):
-            simulation.step_to(1.0)
-            return scene, simulation.snapshot()
-    return replace(scene, loads=()), None
 
 
 class _Standstill(Newmark):
@@ -110,7 +69,19 @@ class SmallMotions:
         self.scene, self._simulation = scene, simulation
         self.numbering, self.q = simulation.numbering, simulation.q
         simulation.close()
-        T = self._derivative(self.q, AT_REST)
+        # Yielding and opening stay frozen from now on.
+        simulation.controllers.evaluate(simulation)
+        for cells in simulation.inelastic:
+            cells.points.freeze()
+        for group in simulation.connector_terms:
+            group.response.freeze()
+        Q = eye_array(self.numbering.size, format="lil")
+        for support in (support for support in scene.supports if support.angle):
+            i, j = self.numbering.node(support.place)[:2]
+            c, s = math.cos(support.angle), math.sin(support.angle)
+            Q[i, i], Q[i, j], Q[j, i], Q[j, j] = c, -s, s, c
+        self._axes = csr_array(Q)  # columns: the unit motions along the axes of supports
+        _, T = self._linearised(self.q)
         multipliers = self.numbering.multipliers
         about_forces = T.diagonal()[multipliers] != 0.0
         self._laws, constraints = multipliers[about_forces], multipliers[~about_forces]
@@ -119,7 +90,7 @@ class SmallMotions:
         scale = np.ones(self.numbering.size)
         scale[constraints] = abs(T.data).max()  # its entries become as large as stiffnesses
         # Columns: the free motions, in the axes of supports, and the forces of constraints.
-        self._Z = (self._axes() @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
+        self._Z = (self._axes @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
         self.K, self.M = self._reduced(T), self._reduced(self._matrix(simulation.inertia.M.data))
         # Number of modes: a constraint removes its force and a motion; massless motions add none.
         self.most = self.K.shape[0] - len(constraints) - int(np.sum(self.M.diagonal() == 0.0))
@@ -128,18 +99,12 @@ class SmallMotions:
         A: Csr = self._simulation.inertia.M  # all matrices have one structure
         return csr_array((data.copy(), A.indices.copy(), A.indptr.copy()), shape=(A.size, A.size))
 
-    def _derivative(self, q: Array, dt: float) -> csr_array:
-        """Return K + C / dt at ``q`` for all degrees of freedom."""
-        return self._matrix(linearise(self._simulation, q, dt)[1])
-
-    def _axes(self) -> csr_array:
-        """Return the unit motions along the axes of supports, in columns."""
-        Q = eye_array(self.numbering.size, format="lil")
-        for support in (support for support in self.scene.supports if support.angle):
-            i, j = self.numbering.node(support.place)[:2]
-            c, s = math.cos(support.angle), math.sin(support.angle)
-            Q[i, i], Q[i, j], Q[j, i], Q[j, j] = c, -s, s, c
-        return csr_array(Q)
+    def _linearised(self, q: Array, dt: float = AT_REST) -> tuple[Array, csr_array]:
+        """Return all forces except inertia at ``q``, and their derivative K + C / dt."""
+        simulation = self._simulation
+        step = Step(0.0, dt, simulation.q, simulation.t, simulation.t, fraction=1.0)
+        r, data = simulation.equation.linearise(q, step)
+        return r, self._matrix(data)
 
     def _reduced(self, T: csr_array) -> csr_array:
         """Reduce a matrix to free motions and forces of constraints; eliminate forces of laws."""
@@ -150,14 +115,11 @@ class SmallMotions:
         return csr_array(self._Z.T @ T @ self._Z)
 
     def unbalanced(self) -> str:
-        """Name works, connectors and motions of supports that disturb the equilibrium of the state.
-
-        The text is empty if the state is in equilibrium.
-        """
+        """Name works, connectors and motions of supports that disturb the equilibrium, if any."""
         t = self._simulation.t
-        r, data = linearise(self._simulation, self.q, AT_REST)
-        sizes = abs(self._matrix(data)).max(axis=1).toarray().ravel()
-        apart = np.abs(self._axes().T @ r) > BALANCED * self.scene.size * sizes
+        r, T = self._linearised(self.q)
+        sizes = abs(T).max(axis=1).toarray().ravel()
+        apart = np.abs(self._axes.T @ r) > BALANCED * self.scene.size * sizes
         apart[self._simulation.supports.dofs] = False
         connectors = zip(self.scene.all_connectors, self.numbering.multipliers, strict=True)
         names = [str(connector) for connector, force in connectors if apart[force]]
@@ -181,7 +143,7 @@ class SmallMotions:
         squares = np.abs(K.diagonal()[heavy]) / M.diagonal()[heavy]
         highest, low = (squares.max(), squares.min()) if heavy.any() else (1.0, 1.0)
         τ = highest**-0.5
-        C = (self._reduced(self._derivative(self.q, τ)) - K) * τ
+        C = (self._reduced(self._linearised(self.q, τ)[1]) - K) * τ
         round_off = ROUND_OFF * abs(K).max()
         symmetric = abs(K - K.T).max() <= round_off
         matrix = (K + K.T) / 2 if symmetric else K
@@ -230,21 +192,18 @@ class SmallMotions:
             A.resize(K.shape)
         most = 2 * (self.most - B.shape[1])
         s, x = eigensolvers.quadratic(K, C, M, 2 * n, most=most, shift=lowest)
-        s, x = self._with_zeros(s, x[: len(free)], free)
-        decay, mix = np.linalg.eig(-Λ)
-        decay = np.where(np.abs(decay.imag) <= MODAL_TOLERANCE * np.abs(decay), decay.real, decay)
-        nonzero = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
-        return np.concatenate([s, decay[nonzero]]), np.hstack([x, N @ mix[:, nonzero]])
-
-    def _with_zeros(self, s: Complex, x: Complex, free: Array) -> tuple[Complex, Complex]:
-        """Replace nearly zero exponents of motions without stiffness, ``free``, by exact zeros."""
+        # Nearly zero exponents of the motions without stiffness become exact zeros.
+        x = x[: len(free)]
         momentum, mass = free.T @ (self.M @ x), np.sum(x.conj() * (self.M @ x), axis=0).real
         own = np.linalg.solve(free.T @ (self.M @ free), momentum)
         fraction = np.sum(momentum.conj() * own, axis=0).real / mass
         noise = 16 * ROUND_OFF * np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0) / mass
         elastic = (fraction < 0.5) | (np.abs(s) ** 2 > noise)
-        zeros = np.zeros(free.shape[1])
-        return np.concatenate([zeros, s[elastic]]), np.hstack([free, x[:, elastic]])
+        decay, mix = np.linalg.eig(-Λ)
+        decay = np.where(np.abs(decay.imag) <= MODAL_TOLERANCE * np.abs(decay), decay.real, decay)
+        nonzero = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
+        exponents = np.concatenate([np.zeros(free.shape[1]), s[elastic], decay[nonzero]])
+        return exponents, np.hstack([free, x[:, elastic], N @ mix[:, nonzero]])
 
     # -- buckling ------------------------------------------------------------------------------
 
@@ -268,7 +227,7 @@ class SmallMotions:
         The product of virtual motions, tangent and motions is K; with the derivative of the
         tangent it is the derivative of K.
         """
-        T, laws, Z = self._derivative(self.q, AT_REST), self._laws, self._Z
+        (_, T), laws, Z = self._linearised(self.q), self._laws, self._Z
         flexibility = diags_array(1 / T.diagonal()[laws])
         columns = eye_array(self.numbering.size, format="csr")[:, laws]
         right = Z - columns @ (flexibility @ (T[laws, :] @ Z))
@@ -278,8 +237,7 @@ class SmallMotions:
     def _path(self) -> Array:
         """Compute the linear change of the configuration due to loads and prescribed motions."""
         simulation, supports = self._simulation, self._simulation.supports
-        r, data = linearise(simulation, self.q, AT_REST)
-        T, Q = self._matrix(data), self._axes()
+        (r, T), Q = self._linearised(self.q), self._axes
         before = supports.in_axes(self.q)
         after = before.copy()
         supports.move(after, before, Step(0.0, 1.0, self.q, simulation.t, simulation.t, 1.0))

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from contextlib import closing, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.analysis.linearization import SmallMotions, reference_state
+from ufl_beam.analysis.linearization import SmallMotions
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.compiled_forms import Kernel
@@ -34,6 +35,7 @@ from ufl_beam.output.paraview_files import VTKHDF, XDMF, TimeSeries
 from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of
+from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.beam_forces import elastic_forms
 from ufl_beam.terms.cell_forces import CellForces
@@ -41,8 +43,6 @@ from ufl_beam.terms.term import InCells
 
 MOST_TITLES = 4  # most modes that a text of one line names
 AMPLITUDE = 0.1  # largest displacement of a mode in pictures, as a fraction of the scene's size
-
-IN_EQUILIBRIUM = "give at=, a static solution"
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,12 +176,8 @@ class _Frame:
     def __init__(
         self, shapes: Shapes, subdomain: Subdomain, forces: Kernel, t: float, change: Array
     ) -> None:
-        self.scene, self.numbering, self.comm, self.subdomain = (
-            shapes.scene,
-            shapes.numbering,
-            subdomain.comm,
-            subdomain,
-        )
+        self.scene, self.numbering = shapes.scene, shapes.numbering
+        self.comm, self.subdomain = subdomain.comm, subdomain
         self.q, self.t = shapes.q + change, t
         self._forces, self._state, self._change = forces, shapes.q, change
 
@@ -303,13 +299,21 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         >>> print(shapes.frequencies.round(1))  # Hz
         [ 41.5 250.6 646.8]
     """
-    require_kind(scene, Scene, "modes: scene")
-    n = require_count(n, "modes: n")
+    n = _checked_count("modes", scene, n, at, mesh)
     if at is None:
-        require_no_prestress(scene, "modes", IN_EQUILIBRIUM)
-        scene, at = reference_state(scene, mesh)
-    else:
-        _require_same_scene(at, scene, mesh, "modes")
+        if any(isinstance(load, RotatingFrame) for load in scene.loads):
+            raise ArgumentError(
+                "modes: the undeformed scene is not at rest in a RotatingFrame; give the state of "
+                "steady rotation, at=simulate(scene, Static(), ...), or leave the frame out"
+            )
+        if scene.loads and require_no_mechanism(scene):
+            simulation = Simulation(replace(scene, damping=()), Static(), mesh=mesh)
+            # There may be no equilibrium, as for a falling body.
+            with suppress(ArgumentError), closing(simulation):
+                simulation.step_to(1.0)
+                at = simulation.snapshot()
+        if at is None:
+            scene = replace(scene, loads=())  # the undeformed scene is in no equilibrium with them
     small = SmallMotions(scene, at, mesh=mesh)
     if at is None and (said := small.unbalanced()):
         warn(said)
@@ -349,8 +353,7 @@ def buckling(
         >>> print(f"{critical / (np.pi**2 * section.EI / (2 * 2) ** 2):.2f}")  # times Euler's load
         1.00
     """
-    require_kind(scene, Scene, "buckling: scene")
-    n = require_count(n, "buckling: n")
+    n = _checked_count("buckling", scene, n, at, mesh)
     require_number(t, "buckling: t")
     for load in (*scene.loads, *scene.works):
         if isinstance(load, FollowerLoad | RotatingFrame | VirtualWork):
@@ -359,23 +362,24 @@ def buckling(
                 "modes(..., at=) about states with an increasing load, and find where a frequency "
                 "vanishes or a damping ratio becomes negative"
             )
-    if at is None:
-        if said := require_no_mechanism(scene):
-            raise ArgumentError(
-                f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)"
-            )
-        require_no_prestress(scene, "buckling", IN_EQUILIBRIUM)
-    else:
-        _require_same_scene(at, scene, mesh, "buckling")
+    if at is None and (said := require_no_mechanism(scene)):
+        raise ArgumentError(f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)")
     small = SmallMotions(scene, at, t, mesh)
     factors, shapes = small.buckling(n)
     return Buckling(scene, small.numbering, small.q, shapes, factors)
 
 
-def _require_same_scene(at: Solution, scene: Scene, mesh: Mesh | None, what: str) -> None:
+def _checked_count(what: str, scene: Scene, n: int, at: Solution | None, mesh: Mesh | None) -> int:
+    """Check the arguments of a call ``what``, and return ``n`` as a number of modes."""
+    require_kind(scene, Scene, f"{what}: scene")
+    n = require_count(n, f"{what}: n")
+    if at is None:
+        require_no_prestress(scene, what, "give at=, a static solution")
+        return n
     require_kind(at, Solution, f"{what}: at")
     if not DofNumbering(scene, mesh_of(at, mesh)).agrees(at.numbering):
         raise ArgumentError(
             f"{what}: at is a solution of other beams, joints or cells; use the same Beam "
             "objects, joined alike, and the same Mesh"
         )
+    return n

@@ -24,7 +24,13 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import Rich
-from ufl_beam.errors import ArgumentError, require_kind, require_sequence, require_switch, shorten
+from ufl_beam.errors import (
+    ArgumentError,
+    require_function,
+    require_kind,
+    require_sequence,
+    require_switch,
+)
 from ufl_beam.output.output_files import (
     above,
     below,
@@ -86,14 +92,6 @@ class Study(Rich):
         results = {name: np.array([row[name] for row in rows]) for name in none}
         seconds = np.array([seconds for _, seconds in records.values()])
         return cls(member, tuple(map(json.loads, records)), results, failed, seconds)
-
-    def records(self) -> dict[str, Record]:
-        """Return the data from which :meth:`from_records` makes this study."""
-        records: dict[str, Record] = {}
-        for i, case in enumerate(self.cases):
-            row = {name: values[i] for name, values in self.results.items()}
-            records[_case_text(case)] = self.failed.get(i, row), float(self.seconds[i])
-        return records
 
     def __len__(self) -> int:
         return len(self.cases)
@@ -209,10 +207,7 @@ def study(
     records: dict[str, Record] = {}
 
     def prepare() -> None:
-        if not callable(member):
-            raise ArgumentError(
-                f"study: member = {shorten(member)} cannot be called; give a function"
-            )
+        require_function(member, "study: member", "the names in the cases")
         for i, case in enumerate(require_sequence(cases, "study: cases")):
             key = _case_text(case, f"study: cases[{i}]")
             if key in todo:
@@ -226,9 +221,10 @@ def study(
             if not anew:
                 if old.member != name:
                     raise ArgumentError(f"study {path} has results of {old.member}, not of {name}")
-                for key, (outcome, seconds) in old.records().items():
-                    if key not in todo or not isinstance(outcome, str):
-                        records[key] = outcome, seconds
+                for i, key in enumerate(map(_case_text, old.cases)):
+                    if key not in todo or i not in old.failed:
+                        row = {result: values[i] for result, values in old.results.items()}
+                        records[key] = old.failed.get(i, row), float(old.seconds[i])
         save()  # fails early if the file cannot be written
 
     def save() -> None:
@@ -291,14 +287,9 @@ def _distributed(
 ) -> Generator[tuple[str, Outcome, float], None, None]:
     """Yield key, outcome and seconds of cases; this process runs the last, others the first."""
     futures = {pool.submit(_run, case): key for key, case in cases.items()}
-    ended: SimpleQueue[Any] = SimpleQueue()
-
-    def finish(future: Any) -> None:
-        if not future.cancelled():
-            ended.put(future)
-
+    ended: SimpleQueue[Any] = SimpleQueue()  # also has the futures that this process cancels
     for future in futures:
-        future.add_done_callback(finish)
+        future.add_done_callback(ended.put)
     # While this process runs members, a thread of the pool communicates: not every MPI allows it.
     left = [*futures] if MPI.Query_thread() == MPI.THREAD_MULTIPLE else []
     finished = 0
@@ -311,6 +302,8 @@ def _distributed(
                 outcome = _run(cases[futures[future]])
             else:
                 future = ended.get()
+                if future.cancelled():
+                    continue  # this process has run it
                 outcome = future.result()
             finished += 1
             yield futures[future], *outcome
@@ -320,48 +313,14 @@ def _distributed(
 
 
 def _run(case: Case) -> Record:
-    """Run one member on this process; an exception is also an outcome."""
+    """Run one member on this process; its exception is an outcome, a wrong result an error."""
     begin = time.perf_counter()
     try:
         with alone():
             returned = _MEMBER.get()(**case)
     except Exception as error:
         return f"{type(error).__name__}: {error}", time.perf_counter() - begin
-    return _result_arrays(case, returned), time.perf_counter() - begin
-
-
-def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> None:
-    """Raise unless names and shapes agree with the first member that did not fail."""
-    if isinstance(outcome, str):
-        return
-    new = {name: outcome[name].shape for name in sorted(outcome)}
-    for known, (row, _) in records.items():
-        if not isinstance(row, str):
-            old = {name: row[name].shape for name in sorted(row)}
-            if new != old:
-                raise ArgumentError(
-                    f"study: {case} returned names and shapes {new}, but {known} {old}; return "
-                    "the same from all members, and begin a new file if they have changed"
-                )
-            return
-
-
-def _case_text(case: dict[str, Any], what: str = "case") -> str:
-    """Write a case as JSON with all digits and sorted names, for comparison of cases."""
-    require_kind(case, dict, what)
-    for name in case:
-        require_kind(name, str, f"{what}: name")
-    try:
-        return json.dumps(case, sort_keys=True, ensure_ascii=False, default=plain)
-    except (TypeError, ValueError):
-        raise ArgumentError(
-            f"{what} = {case}: values must be numbers, texts or lists of them; let the member "
-            "make other objects from these"
-        ) from None
-
-
-def _result_arrays(case: dict[str, Any], returned: Any) -> dict[str, Array]:
-    """Return the result of a member as arrays of floats, or raise :class:`ArgumentError`."""
+    seconds = time.perf_counter() - begin
     if not isinstance(returned, dict) or not returned:
         raise ArgumentError(
             f"study: {case} returned {returned!r}; return a dict of numbers or arrays"
@@ -378,4 +337,32 @@ def _result_arrays(case: dict[str, Any], returned: Any) -> dict[str, Array]:
                 f"study: {case} returned {name} = {value!r}, which is no number or array of numbers"
             )
         arrays[name] = array.astype(float)
-    return arrays
+    return arrays, seconds
+
+
+def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> None:
+    """Raise unless names and shapes agree with the first member that did not fail."""
+    if isinstance(outcome, str):
+        return
+    known = ((key, row) for key, (row, _) in records.items() if not isinstance(row, str))
+    key, row = next(known, ("", outcome))
+    new, old = ({name: x[name].shape for name in sorted(x)} for x in (outcome, row))
+    if new != old:
+        raise ArgumentError(
+            f"study: {case} returned names and shapes {new}, but {key} {old}; return the same from "
+            "all members, and begin a new file if they have changed"
+        )
+
+
+def _case_text(case: dict[str, Any], what: str = "case") -> str:
+    """Write a case as JSON with all digits and sorted names, for comparison of cases."""
+    require_kind(case, dict, what)
+    for name in case:
+        require_kind(name, str, f"{what}: name")
+    try:
+        return json.dumps(case, sort_keys=True, ensure_ascii=False, default=plain)
+    except (TypeError, ValueError):
+        raise ArgumentError(
+            f"{what} = {case}: values must be numbers, texts or lists of them; let the member "
+            "make other objects from these"
+        ) from None

@@ -8,8 +8,6 @@ unknowns.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field
 from typing import NamedTuple
@@ -21,7 +19,6 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, StepFailed, require_kind, require_number
 from ufl_beam.mechanics.time_scheme import Step
 from ufl_beam.model.bodies import Place
-from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
@@ -123,46 +120,37 @@ class PathCorrector:
                 return more
         return 0.0
 
-    def predict_dissipation(self, energy: float) -> Array:
-        """Predict a step that dissipates ``energy`` (J); :class:`StepFailed` if none does.
-
-        If nothing dissipated before, the direction of the path changes at the onset of dissipation.
-        """
-        self.begin()
-        step = self._until(energy, 0.0 * self.direction, self.direction)
-        kink = self.kink(step)
-        return step if kink is None else self._until(energy, *kink)
-
     def kink(self, step: Array) -> tuple[Array, Array] | None:
-        """Find the step to the onset of dissipation, and the direction of the path there.
-
-        Return None if no dissipation begins in ``step``.
-        """
+        """Find the part of ``step`` up to an onset of dissipation, and the direction there."""
         q, motion = self.simulation.q, step[:-1]
         self.begin()
         if self.dissipates or not (whole := self.dissipation(q + motion)) > 0:
             return None
-        onset = ONSET_FRACTION * whole
-        increment = bisect(lambda p: self.dissipation(q + p * motion) > onset, 0.0, 1.0, 40) * step
+        increment = self._length_to(ONSET_FRACTION * whole, q, motion, (0.0, 1.0), 40) * step
         q, t = q + increment[:-1], self.simulation.t + increment[-1]
         _, direction = self.direction_at(q, t)
         return increment, -direction if self.dissipation_side(q, direction) < 0 else direction
 
-    def _until(self, energy: float, increment: Array, direction: Array) -> Array:
+    def until(self, energy: float, increment: Array, direction: Array) -> Array:
         """Extend the step ``increment`` along a direction until it dissipates ``energy`` (J)."""
-        q = self.simulation.q + increment[:-1]
-
-        def enough(length: float) -> bool:
-            return self.dissipation(q + length * direction[:-1]) >= energy
-
+        q, motion = self.simulation.q + increment[:-1], direction[:-1]
         low, high = 0.0, 1e-6 / self.length(direction)
         for _ in range(MOST_DOUBLINGS):
-            if enough(high):
-                break
+            if self.dissipation(q + high * motion) >= energy:
+                return increment + self._length_to(energy, q, motion, (low, high), 12) * direction
             low, high = high, 2 * high
-        else:
-            raise StepFailed("nothing dissipates in the direction of the path")
-        return increment + bisect(enough, low, high, 12) * direction
+        raise StepFailed("nothing dissipates in the direction of the path")
+
+    def _length_to(
+        self, energy: float, q: Array, motion: Array, between: tuple[float, float], halvings: int
+    ) -> float:
+        """Find by bisection the factor of a motion from ``q`` that dissipates ``energy`` (J)."""
+        low, high = between
+        for _ in range(halvings):
+            middle = (low + high) / 2
+            enough = self.dissipation(q + middle * motion) >= energy
+            low, high = (low, middle) if enough else (middle, high)
+        return high
 
     # -- the border ----------------------------------------------------------------------------
 
@@ -290,21 +278,15 @@ class PathCorrector:
         return stiffness, direction / size
 
 
-def bisect(reached: Callable[[float], bool], low: float, high: float, halvings: int) -> float:
-    """Find by bisection where ``reached`` becomes true; return the upper end of the interval."""
-    for _ in range(halvings):
-        middle = (low + high) / 2
-        low, high = (low, middle) if reached(middle) else (middle, high)
-    return high
-
-
-class Control(ABC):
+class Control:
     """Base class of path controls, which set the lengths of steps.
 
     A step changes the controlled quantity by ``step``, or by a fraction of ``step``.
     """
 
     step: float
+    factor = 1.0  # change of the load factor that counts as much as a length of 1
+    quantity = ""  # name of the controlled quantity if it may turn back along a path
     least_rest = 0.0  # least fraction of a step that remains beyond a kink
 
     def __post_init__(self) -> None:
@@ -312,22 +294,12 @@ class Control(ABC):
         if self.step == 0:
             raise ArgumentError(f"{type(self).__name__}: step = 0 leads nowhere")
 
-    @property
-    def factor(self) -> float:
-        """Change of the load factor that counts as much as a length of 1."""
-        return 1.0
-
-    @property
-    def quantity(self) -> str:
-        """Name of the controlled quantity if it may turn back along a path, else an empty text."""
-        return ""
-
-    def require(self, scene: Scene) -> None:
-        """Raise :class:`ArgumentError` if the control does not fit the scene."""
-
-    @abstractmethod
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
-        """Return the gradient of the quantity or of its negative, whichever grows in a step."""
+        """Return the gradient of the quantity or of its negative, whichever grows in a step.
+
+        By default the quantity is the arc length in a step along ``direction``.
+        """
+        return np.asarray(corrector.weights * direction / corrector.length(direction))
 
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return a positive number if the path continues along ``direction``.
@@ -405,10 +377,6 @@ class ArcLength(Control):
         super().__post_init__()
         require_number(self.factor, "ArcLength: factor", positive=True)
 
-    def normal(self, corrector: PathCorrector, direction: Array) -> Array:
-        """Return the gradient of the arc length in a step along ``direction``."""
-        return np.asarray(corrector.weights * direction / corrector.length(direction))
-
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return the sense: initially by the sign of ``step``, later such that dissipation grows.
 
@@ -478,15 +446,8 @@ class DisplacementControl(Control):
             )
         super().__post_init__()
 
-    def require(self, scene: Scene) -> None:
-        """Raise :class:`ArgumentError` unless the beam of the place is in the scene."""
-        if self.place.beam not in scene.beams:
-            raise ArgumentError(
-                f"DisplacementControl of {self.place}: {self.place.beam.name} is not in the scene"
-            )
-
     @property
-    def quantity(self) -> str:
+    def quantity(self) -> str:  # type: ignore[override]
         """Name of the component and the place."""
         return f"{self.component} of {self.place}"
 
@@ -529,13 +490,9 @@ class DissipationControl(Control):
         require_kind(self.otherwise, ArcLength, "DissipationControl: otherwise")
 
     @property
-    def factor(self) -> float:
+    def factor(self) -> float:  # type: ignore[override]
         """Factor of the arc length."""
         return self.otherwise.factor
-
-    def normal(self, corrector: PathCorrector, direction: Array) -> Array:
-        """Return the gradient of the arc length; used where nothing dissipates."""
-        return self.otherwise.normal(corrector, direction)
 
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return the sense of the arc length; used where nothing dissipates."""
@@ -552,11 +509,13 @@ class DissipationControl(Control):
                 trial = self.otherwise.solve_step(corrector, fraction)
                 if corrector.dissipation(trial.q1) == 0.0:
                     return trial
-        energy = self.step * fraction
+        energy, direction = self.step * fraction, corrector.direction
         try:
-            return corrector.attempt(
-                corrector.predict_dissipation(energy), None, energy, hold=False
-            )
+            corrector.begin()
+            step = corrector.until(energy, 0.0 * direction, direction)
+            if (kink := corrector.kink(step)) is not None:
+                step = corrector.until(energy, *kink)
+            return corrector.attempt(step, None, energy, hold=False)
         except StepFailed:
             if not corrector.dissipates:
                 raise

@@ -123,10 +123,6 @@ class SelfConvergence:
         limit = np.asarray(value + cells.lacks[0] + steps.lacks[0])
         return cls(cells, steps, limit, cells.error_bound + steps.error_bound)
 
-    def lack(self, i: float, j: float) -> Array:
-        """Predict the limit minus the value of a run on the levels i of cells and j of steps."""
-        return self.cells.lack(i) + self.steps.lack(j)
-
     def confirmed(self, value: Array, i: float, j: float) -> SelfConvergence:
         """Return a copy with the limit extrapolated from a run with finer cells and finer steps.
 
@@ -135,7 +131,7 @@ class SelfConvergence:
         steps remain in the run.  The fraction (1 - c) (1 - s) of this term moves the limit; the
         rest of the term is uncertain.
         """
-        limit = np.asarray(value + self.lack(i, j))
+        limit = np.asarray(value + self.cells.lack(i) + self.steps.lack(j))
         c, s = (
             2.0 ** (-x.used * (level - x.coarsest))
             for x, level in ((self.cells, i), (self.steps, j))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar
 
 from mpi4py import MPI
 
@@ -23,11 +23,12 @@ from ufl_beam.errors import (
     ArgumentError,
     ConvergenceError,
     TradeoffError,
+    require_all,
+    require_function,
     require_kind,
     require_number,
     require_switch,
     require_text,
-    shorten,
 )
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.beams import Mesh
@@ -128,11 +129,7 @@ def tradeoff(
         raise ArgumentError("tradeoff: quantities is empty; name at least one quantity")
     for name, quantity in quantities.items():
         require_text(name, "tradeoff: the name of a quantity")
-        if not callable(quantity):
-            raise ArgumentError(
-                f"tradeoff: quantity {name!r} = {shorten(quantity)} cannot be called; give a "
-                "function of a Solution"
-            )
+        require_function(quantity, f"tradeoff: quantity {name!r}", "a Solution")
     target = _checked_target(quantities, tolerance, budget)
     require_number(max_seconds, "tradeoff: max_seconds", positive=True)
     require_switch(progress, "tradeoff: progress")
@@ -150,17 +147,7 @@ def tradeoff(
             require_number(step, what, positive=True)
     families = [Setting(*x, newtons[0]) for x in product(schemes, steps, meshes)]
     with progress_bar(progress, comm, unit="run", bar_format=BAR) as bar:
-        runs = _Runs(
-            scene,
-            quantities,
-            simulate,
-            families,
-            newtons,
-            t=t,
-            max_seconds=max_seconds,
-            comm=comm,
-            bar=bar,
-        )
+        runs = _Runs(scene, quantities, families, newtons, t, max_seconds, comm, bar)
         best, others, notes = _find(runs, target)
         run = best.best()
     for search in others:
@@ -184,7 +171,7 @@ def tradeoff(
 def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str]]:
     """Search with the family that coarse runs predict to be the best; if this fails, the next.
 
-    The results are the successful search, the other searches, and notes on the other searches.
+    Return the successful search, the other searches, and notes on these.
     """
     searches: list[_Search] = []
     notes: list[str] = []
@@ -224,11 +211,10 @@ def _checked_target(
     if (tolerance is None) == (budget is None):
         raise ArgumentError("tradeoff: give either a tolerance or a budget")
     if budget is not None:
-        require_number(budget, "tradeoff: budget", positive=True)
-        return Target({}, 1.0, budget)
+        return Target({}, 1.0, require_number(budget, "tradeoff: budget", positive=True))
     if not isinstance(tolerance, Mapping):
-        require_number(cast("float", tolerance), "tradeoff: tolerance", positive=True)
-        return Target({}, cast("float", tolerance), math.inf)
+        relative = require_number(tolerance, "tradeoff: tolerance", positive=True)
+        return Target({}, relative, math.inf)
     if set(tolerance) != set(quantities):
         raise ArgumentError(
             f"tradeoff: tolerance is of {', '.join(tolerance)}, quantities are "
@@ -246,9 +232,7 @@ def _several(values: Value | Sequence[Value], kind: type, what: str) -> tuple[Va
         return (values,)  # type: ignore[return-value]
     if not values:
         raise ArgumentError(f"tradeoff: {what} is empty")
-    for i, value in enumerate(values):
-        require_kind(value, kind, f"tradeoff: {what}[{i}]")
-    return tuple(values)
+    return require_all(values, f"tradeoff: {what}", kind)
 
 
 @dataclass(eq=False)
@@ -257,7 +241,6 @@ class _Runs:
 
     scene: Scene
     quantities: Mapping[str, Quantity]
-    simulate: Callable[..., Solution]
     families: Sequence[Setting]  # coarsest setting of each family
     newtons: Sequence[Newton]
     t: tuple[float, float]
@@ -267,7 +250,6 @@ class _Runs:
     runs: dict[Refinement, Run] = field(default_factory=dict, init=False)
     failed: dict[Refinement, str] = field(default_factory=dict, init=False)  # reasons of failures
     spent: float = field(default=0.0, init=False)  # wall time of all runs; s
-    _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False)
 
     def begin(self, family: int) -> None:
         """Compile in a first run, of one step if steps are equal; then time the coarsest run."""
@@ -276,56 +258,65 @@ class _Runs:
         until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
         with alone():
             try:
-                self._simulate(first, until)
+                settings = vars(self.setting(first))
+                simulate(self.scene, t=(self.t[0], until), progress=False, **settings)
                 self._store(first, self._member(*first))
                 self.bar.update(1)
             except ConvergenceError as error:
                 self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may converge
 
-    def allowed(self, refinements: Sequence[Refinement]) -> bool:
-        """Return whether ``max_seconds`` leave time for runs."""
-        return self.spent + sum(map(self._longest, refinements)) <= self.max_seconds
+    def run(self, refinements: Sequence[Refinement], *, optional: bool = False) -> None:
+        """Do the runs that are missing, several at a time if there are several processes.
 
-    def run(self, refinements: Sequence[Refinement]) -> None:
-        """Do the runs that are missing, several at a time if there are several processes."""
+        If ``max_seconds`` leave no time for them, omit ``optional`` runs; else raise TradeoffError.
+        """
         missing = [r for r in refinements if r not in self.runs and r not in self.failed]
         if not missing:
             return
-        if not self.allowed(missing):
-            needed = sum(map(self._longest, missing))
+        finest, needed = self.setting(missing[-1]), sum(map(self._longest, missing))
+        if self.spent + needed > self.max_seconds:
+            if optional:
+                return
             raise TradeoffError(
                 f"the next {len(missing)} runs would take about {needed:.3g} s after "
-                f"{self.spent:.3g} s of runs, more than max_seconds = "
-                f"{self.max_seconds:g} s; the finest is "
-                f"{self.setting(missing[-1])}"
+                f"{self.spent:.3g} s of runs, more than max_seconds = {self.max_seconds:g} s; the "
+                f"finest is {finest}"
             )
-        self.bar.set_postfix_str(f"{len(missing)} more up to {self.setting(missing[-1])}")
-        cases = [
-            refinement._asdict() | {"refine": str(refinement.refine)} for refinement in missing
-        ]
+        self.bar.set_postfix_str(f"{len(missing)} more up to {finest}")
+        cases = [r._asdict() | {"refine": str(r.refine)} for r in missing]
         try:
             done = study(self._member, cases, progress=False, comm=self.comm)
+            failed = done.failed
         except RuntimeError as error:  # all of them failed
-            text = str(error)
-            if WRONG in text:
-                raise ArgumentError(text.partition(WRONG)[2]) from None
-            self.failed |= dict.fromkeys(missing, text)
-            return
+            failed = dict.fromkeys(range(len(missing)), str(error))
         finally:
             self.bar.set_postfix_str("", refresh=False)
             self.bar.update(len(missing))
         for k, refinement in enumerate(missing):
-            if k not in done.failed:
+            if k not in failed:
                 self._store(refinement, {name: done[name][k] for name in done.results})
-            elif done.failed[k].startswith(WRONG):
-                raise ArgumentError(done.failed[k].removeprefix(WRONG))
+            elif WRONG in failed[k]:
+                raise ArgumentError(failed[k].partition(WRONG)[2])
             else:
-                self.failed[refinement] = done.failed[k]
+                self.failed[refinement] = failed[k]
 
     def setting(self, refinement: Refinement) -> Setting:
-        """Return the setting of a refinement."""
-        finer = self.families[refinement.family].finer(refinement.refine, refinement.level, self.t)
-        return replace(finer, newton=self.newtons[refinement.newton])
+        """Return the setting of a refinement.
+
+        The error of an adaptive step is of third order, so the number of steps is proportional to
+        the cube root of 1/tolerance.
+        """
+        family, refine, level, newton = refinement
+        coarsest = replace(self.families[family], newton=self.newtons[newton])
+        if refine == 1 and level == 0:
+            return coarsest  # unchanged, so that checks see the user's arguments
+        dt, mesh, duration = coarsest.dt, coarsest.mesh, self.t[1] - self.t[0]
+        if isinstance(dt, Adaptive):
+            dt = replace(dt, tolerance=dt.tolerance / 8**level)
+        else:
+            number = max(1, math.ceil(duration / dt * (1 - 1e-9)))
+            dt = duration / round(number * 2**level)
+        return replace(coarsest, dt=dt, mesh=replace(mesh, refine=mesh.refine * refine))
 
     def in_family(self, family: int) -> list[Run]:
         """Return the runs of a family."""
@@ -354,15 +345,12 @@ class _Runs:
         )
         return min(times, default=0.0)
 
-    def _simulate(self, refinement: Refinement, until: float) -> Solution:
-        t = self.t[0], until
-        return self.simulate(self.scene, t=t, progress=False, **self.setting(refinement).arguments)
-
     def _member(
         self, family: int, refine: str | Fraction, level: float, newton: int
     ) -> dict[str, Any]:
         """Compute one run, as a member of a study."""
-        solution = self._simulate(Refinement(family, Fraction(refine), level, newton), self.t[1])
+        setting = self.setting(Refinement(family, Fraction(refine), level, newton))
+        solution = simulate(self.scene, t=self.t, progress=False, **vars(setting))
         content: dict[str, Any] = {
             "seconds": solution.seconds,
             "building": solution.building,
@@ -370,11 +358,12 @@ class _Runs:
             "cells": len(solution.numbering.cells),
             "iterations": solution.iterations / solution.parts,
         }
+        known = next(iter(self.runs.values())).values if self.runs else {}
         for n, (name, quantity) in enumerate(self.quantities.items()):
             value = np.asarray(quantity(solution), dtype=float)
             if not np.isfinite(value).all():
                 raise ArgumentError(f"tradeoff: quantity {name!r} is not finite")
-            before = self._shapes.get(name, value.shape)
+            before = np.shape(known.get(name, value))
             if before != value.shape:
                 raise ArgumentError(
                     f"tradeoff: quantity {name!r} has shape {before} in a run and {value.shape} "
@@ -384,15 +373,13 @@ class _Runs:
             content[f"quantity {n}"] = value
         return content
 
-    def _store(self, refinement: Refinement, content: Mapping[str, Any]) -> None:
+    def _store(self, refinement: Refinement, content: dict[str, Any]) -> None:
         """Store a run with the data of the first process."""
         content = self.comm.bcast(content)
         values = {
-            name: np.asarray(content[f"quantity {n}"]) for n, name in enumerate(self.quantities)
+            name: np.asarray(content.pop(f"quantity {n}")) for n, name in enumerate(self.quantities)
         }
-        self._shapes |= {name: value.shape for name, value in values.items()}
-        measured = ("seconds", "building", "steps", "cells", "iterations")
-        took = {name: float(content[name]) for name in measured}
+        took = {name: float(measured) for name, measured in content.items()}
         self.spent += took["seconds"]
         self.runs[refinement] = Run(refinement, self.setting(refinement), values, **took)
 
@@ -405,11 +392,6 @@ class _Candidate(NamedTuple):
     seconds: float  # wall time; s
     likely: float  # largest error, see _Search; errors of cells and steps may cancel
     bound: float  # largest error if errors of cells and steps do not cancel
-
-    @property
-    def levels(self) -> tuple[float, float]:
-        """Levels of cells and of steps."""
-        return math.log2(self.refine), self.level
 
 
 class _Search:
@@ -441,17 +423,14 @@ class _Search:
     def find(self) -> None:
         """Do the runs that determine the setting and its error; TradeoffError if none serves."""
         while True:
-            candidate = self._choose(
-                min(self.uncertainty, NEGLIGIBLE)
-            )  # expected uncertainty after refinement
+            expected = min(self.uncertainty, NEGLIGIBLE)  # uncertainty after refinement
+            candidate = self._choose(expected)
+            levels = math.log2(candidate.refine), candidate.level
             some, base = next(iter(self.crosses.values())), self._base
             finest = some.cells.finest, some.steps.finest
-            far = any(level > last for level, last in zip(candidate.levels, finest, strict=True))
+            far = np.greater(levels, finest).any()
             if far or self.uncertainty > self._negligible(candidate):
-                base = [
-                    min(max(old, round(level) - 1), old + FURTHER)
-                    for old, level in zip(base, candidate.levels, strict=True)
-                ]
+                base = [int(x) for x in np.clip(np.round(levels) - 1, base, np.add(base, FURTHER))]
             before = self._base.copy()
             if base == self._base:
                 self._confirm(candidate)
@@ -494,12 +473,11 @@ class _Search:
                 notes[-1] += "; begin with coarser steps and cells"
         return notes
 
-    def ratio(self, run: Run) -> float:
-        """Return the largest distance of a run from a limit, divided by its unit."""
-        return self._largest({n: run.values[n] - c.limit for n, c in self.crosses.items()})
-
-    def _largest(self, differences: Mapping[str, Array]) -> float:
-        return max(size(d) / self.units[name] for name, d in differences.items())
+    def ratio(self, run: Run, other: Run | None = None) -> float:
+        """Return the largest distance of a run from a limit, or another run, divided by units."""
+        limits = {name: convergence.limit for name, convergence in self.crosses.items()}
+        goal = other.values if other else limits
+        return max(size(run.values[name] - goal[name]) / unit for name, unit in self.units.items())
 
     # -- runs ----------------------------------------------------------------------------------
 
@@ -570,8 +548,7 @@ class _Search:
     def _move_base(self, said: str, axis: int | None = None) -> None:
         """Refine cells (``axis=0``) or steps (1) of the base, by default the more uncertain.
 
-        Raises:
-            TradeoffError: ``MOST_DOUBTS`` bases have not shown convergence.
+        TradeoffError: ``MOST_DOUBTS`` bases have not shown convergence.
         """
         where = self._runs.setting(self._at(2 ** self._base[0], self._base[1]))
         self._doubts.append(f"\n  from {where} on: {said}")
@@ -584,8 +561,7 @@ class _Search:
         i, j = self._base
         intervals = 2 * max(round(2**candidate.level), 2**j)
         finer = self._at(2 * max(candidate.refine, Fraction(2**i)), math.log2(intervals))
-        if self._runs.allowed([finer]):
-            self._runs.run([finer])
+        self._runs.run([finer], optional=True)
         if finer in self._runs.runs:
             values, at = self._runs.runs[finer].values, (math.log2(finer.refine), finer.level)
             for name, convergence in self.crosses.items():
@@ -599,15 +575,12 @@ class _Search:
         least = (1 - SCATTER) * strict.stepping
         for newton in range(1, len(self._runs.newtons)):
             second = first._replace(newton=newton)
-            if self._runs.allowed([second]):
-                self._runs.run([second])
+            self._runs.run([second], optional=True)
             run = self._runs.runs.get(second)
             if run is None:
                 continue
             self._time_ratios[newton] = run.seconds / strict.seconds
-            if run.stepping >= least:
-                continue
-            if self._largest({n: run.values[n] - x for n, x in strict.values.items()}) <= most:
+            if run.stepping < least and self.ratio(run, strict) <= most:
                 self._newton, least = newton, run.stepping
 
     def _try_settings(self) -> None:
@@ -615,13 +588,11 @@ class _Search:
         for _ in range(MOST_TRIALS):
             candidate = self._choose(self.uncertainty)
             setting = self._at(candidate.refine, candidate.level, self._newton)
-            if not self._rank(self.best())[0] and not self._runs.allowed([setting]):
-                return
-            self._runs.run([setting])
+            self._runs.run([setting], optional=not self._rank(self.best())[0])
             if setting in self._runs.failed:
                 raise TradeoffError(f"the chosen setting failed: {self._runs.failed[setting]}")
-            run = self._runs.runs[setting]
-            if self._accepts(run):
+            run = self._runs.runs.get(setting)
+            if run is None or self._accepts(run):
                 return
             self._time_ratios[self._newton] *= run.seconds / candidate.seconds
             if candidate.likely > 0:

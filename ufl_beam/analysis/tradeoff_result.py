@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -27,26 +27,6 @@ class Setting:
     dt: Any  # step (s), or adaptive steps
     mesh: Mesh  # the cells
     newton: Newton  # options of Newton's method
-
-    def finer(self, refine: Fraction, level: float, t: tuple[float, float]) -> Setting:
-        """Divide each cell by ``refine`` and multiply the number of steps by about ``2**level``.
-
-        The error of an adaptive step is of third order, so the number of steps is proportional to
-        the cube root of 1/tolerance.
-        """
-        if refine == 1 and level == 0:
-            return self  # unchanged, so that checks see the user's arguments
-        if isinstance(self.dt, float | int):
-            number = max(1, math.ceil((t[1] - t[0]) / self.dt * (1 - 1e-9)))
-            dt: Any = (t[1] - t[0]) / round(number * 2**level)
-        else:
-            dt = replace(self.dt, tolerance=self.dt.tolerance / 8**level)
-        return replace(self, dt=dt, mesh=replace(self.mesh, refine=self.mesh.refine * refine))
-
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """Arguments of :func:`simulate`, by name."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def __str__(self) -> str:
         step = f"dt={self.dt:.4g}" if isinstance(self.dt, float | int) else compact_repr(self.dt)
@@ -83,8 +63,10 @@ class Run:
         """Wall time of the steps alone; s."""
         return self.seconds - self.building
 
-    def __repr__(self) -> str:
-        return f"<Run: {self.dials}: {self.seconds:.3g} s>"
+    def __str__(self) -> str:
+        return f"{self.dials}: {self.seconds:.3g} s"
+
+    __repr__ = bracketed
 
 
 @dataclass(frozen=True)
@@ -99,11 +81,6 @@ class Target:
     def measure(self) -> str:
         """Name of the measure by which errors are divided."""
         return "tolerances" if math.isinf(self.budget) else "largest values"
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Largest wall time (s), and largest error divided by its measure."""
-        return self.budget, 1.0 if math.isinf(self.budget) else math.inf
 
     def __str__(self) -> str:
         if math.isfinite(self.budget):
@@ -149,7 +126,7 @@ class Tradeoff(Rich):
     @property
     def recommended(self) -> dict[str, Any]:
         """Arguments for ``ub.simulate(scene, **recommended)``: scheme, t, dt, mesh, newton."""
-        return {"t": self.t, **self.best.dials.arguments}
+        return {"t": self.t, **vars(self.best.dials)}
 
     @property
     def limit(self) -> dict[str, Array]:
@@ -208,11 +185,7 @@ class Tradeoff(Rich):
             f"{self.spent / self.best.seconds:.2g} times the recommended one; their steps "
             f"{self.effort:.2g} times"
         )
-        return [*lines, *self.notes, f"recommended: {self._recommended}"]
-
-    @property
-    def _recommended(self) -> str:
-        return f"{self.best.dials}: {self.best.seconds:.3g} s"
+        return [*lines, *self.notes, f"recommended: {self.best}"]
 
     def __str__(self) -> str:
         rows = self.table()
@@ -222,4 +195,4 @@ class Tradeoff(Rich):
         return "\n".join([self.title(), *lines, *self.remarks()])
 
     def __repr__(self) -> str:
-        return f"<Tradeoff: {len(self.runs)} runs; recommended {self._recommended}>"
+        return f"<Tradeoff: {len(self.runs)} runs; recommended {self.best}>"

@@ -233,10 +233,9 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
         axes.set(xscale="log", yscale="log", xlabel="wall time of a run (s)")
         axes.set_ylabel(f"error ({tradeoff.target.measure})")
         axes.set_title(f"recommended: {best.dials}", loc="left", fontsize=style.font_size(11.0))
-        time, ratio = tradeoff.target.bounds
-        for draw, bound in ((axes.axvline, time), (axes.axhline, ratio)):
-            if np.isfinite(bound):
-                draw(bound, color=GREY, ls="--", lw=1.2, zorder=1)
+        budget = tradeoff.target.budget
+        draw, bound = (axes.axvline, budget) if np.isfinite(budget) else (axes.axhline, 1.0)
+        draw(bound, color=GREY, ls="--", lw=1.2, zorder=1)
         small = style.font_size(9.0)
         style.draw_legend(
             axes, ax, loc="outside lower center", ncols=2, fontsize=small, title="size: cells",
