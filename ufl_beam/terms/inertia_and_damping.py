@@ -192,8 +192,8 @@ class Inertia(Term):
 
     def times(self, product: StepProduct, **pointers: Any) -> Any:
         """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
-        v, momentum = np.zeros(self.c.size), np.zeros(len(self._slip))
-        c = struct("matrix_of_rates", product=product.c, v=v, momentum=momentum, **pointers)
+        v = np.zeros(self.c.size)
+        c = struct("matrix_of_rates", product=product.c, v=v, **pointers)
         return fill(c, rates=self.c)
 
     # -- in files ------------------------------------------------------------------------------

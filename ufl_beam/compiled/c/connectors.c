@@ -209,10 +209,8 @@ double missed_by_connectors(void *self, const double *q, const double *r, double
                                                     : weight * scale * c->size / length[j];
       double reach = 0; /* of the motions in the row */
       for (int l = 0; l < n; ++l) reach += fabs(row[l * lanes]) * length[l];
-      const double round_off = 8 * reach * (nextafter(far, INFINITY) - far);
-      const double left = fabs(r[c->force[n * i + j]]) - round_off;
-      const double missed = left > 0 ? left / size : left <= 0 ? 0 : NAN;
-      if (!(missed <= most)) most = missed;
+      const double left = fabs(r[c->force[n * i + j]]) - 8 * reach * last_digit(far);
+      if (left > 0) most = fmax(most, left / size);
     }
   }
   return most;

@@ -33,6 +33,15 @@ void change_of_form(void *self, const double *q1, energy_change *sum)
   sum->in_beams += value_of_cells(f->form, q1) - f->held;
 }
 
+/* x A y for the matrix A of m */
+static double product_with(const matrix_of_rates *m, const double *x, const double *y)
+{
+  const step_product *p = m->product;
+  memset(p->space, 0, p->size * sizeof *p->space);
+  add_product(p->A, y, p->space);
+  return dot(p->size, x, p->space);
+}
+
 void accept_second_differences(void *self, const time_step *step, const double *q1, const double *s)
 {
   const second_differences *d = self;
@@ -102,13 +111,11 @@ void accept_works(void *self, const time_step *step, const double *q1, const dou
     const user_work *w = all->work[k];
     memset(r, 0, all->size * sizeof *r);
     add_cells((void *)w->residual, q1, r);
-    for (int i = 0; i < all->size; ++i) all->force[i] -= r[i];
+    for (int i = 0; i < all->size; ++i) r[i] = -r[i], all->force[i] += r[i];
     if (w->energy) account_for(w, all, step->q0, q1);
     else {
-      double work = 0;
-      for (int i = 0; i < all->size; ++i) work += (a * w->before[i] - (1 - a) * r[i]) * s[i];
-      *w->supplied += work;
-      for (int i = 0; i < all->size; ++i) w->before[i] = -r[i];
+      *w->supplied += work_in_step(all->size, 0, a, w->before, r, s);
+      memcpy(w->before, r, all->size * sizeof *r);
     }
   }
   all->t = all->t_at_end, all->grown = all->grown_at_end;
@@ -129,18 +136,15 @@ void accept_inertia(void *self, const time_step *step, const double *q1, const d
 {
   const matrix_of_rates *m = self;
   rates *r = m->rates;
-  const step_product *p = m->product;
   r->rate[0] = (double *)s;
   combine_rates(r, r->now->rates[0], 0, r->new_rate[1]);
   for (int j = 3; j < r->number; ++j) combine_rates(r, r->now->rates[j - 2], 0, r->new_rate[j]);
   if (m->lost) {
     double *change = m->v;
     for (int i = 0; i < r->size; ++i) change[i] = r->new_rate[1][i] - r->rate[1][i];
-    memset(m->momentum, 0, r->size * sizeof *m->momentum);
-    add_product(p->A, change, m->momentum);
     r->rate[0] = change;
     combine_rates(r, r->now->slip, 0, r->new_rate[2]);
-    *m->lost += dot(r->size, r->new_rate[2], m->momentum);
+    *m->lost += product_with(m, r->new_rate[2], change);
   }
   double *last = r->rate[2] == r->new_rate[1] ? r->rate[1] : r->rate[2]; /* v becomes the previous velocity */
   r->rate[2] = r->rate[1], r->rate[1] = r->new_rate[1], r->new_rate[1] = last;
@@ -154,15 +158,14 @@ void accept_inertia(void *self, const time_step *step, const double *q1, const d
 void add_kinetic_energy(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
-  const step_product *p = m->product;
-  *m->kept += quadratic_form(p->A, m->rates->rate[1]) / 2;
+  const double *v = m->rates->rate[1];
+  *m->kept += product_with(m, v, v) / 2;
 }
 
 void accept_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
-  const step_product *p = m->product;
-  *m->lost += quadratic_form(p->A, s) / step->dt;
+  *m->lost += product_with(m, s, s) / step->dt;
 }
 
 /* Add the dissipation of points in the step to the ledger. */

@@ -14,8 +14,6 @@ static const double TRUSTED = 32, NOTHING_LEFT = 1e-12, CLOSE_ENOUGH = 1e-9;
 
 static double product_of(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1]; }
 
-static double last_digit(double x) { return nextafter(x, INFINITY) - x; }
-
 /* Compute the polynomial around the parameter s. */
 static void expand_curve(const guides *g, int k, double s, curve_around *c)
 {
@@ -184,8 +182,7 @@ double missed_by_guides(void *self, const double *q, const double *r, double sca
     const double *p = g->point + 2 * k, *on0 = g->on0 + 2 * k;
     const double far = g->size + fmax(fabs(p[0] + on0[0]), fabs(p[1] + on0[1]));
     const double left = fabs(r[g->dofs[7 * k + 6]]) - 8 * last_digit(far);
-    const double missed = left > 0 ? left / (0.01 * g->size) : left <= 0 ? 0 : NAN;
-    if (!(missed <= most)) most = missed;
+    if (left > 0) most = fmax(most, left / (0.01 * g->size));
   }
   return most;
 }

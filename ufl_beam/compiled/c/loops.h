@@ -114,7 +114,6 @@ int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int num
 int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *dof, int32_t *begin,
                      int32_t *group, int32_t *seen, int32_t *indptr, int32_t *indices);
 void add_product(const constant_matrix *A, const double *x, double *y);
-double quadratic_form(const constant_matrix *A, const double *x);
 void give_back_memory(void);
 double norm(int rows, const int32_t *at, const double *w, const double *f);
 
@@ -819,7 +818,7 @@ int find_numbers(rates *r, double dt);
 typedef struct {
   step_product *product;
   rates *rates;
-  double *v, *momentum; /* space */
+  double *v;            /* space */
   double *kept, *lost; /* entries of the ledger, energy stored and dissipated; or none */
 } matrix_of_rates;
 

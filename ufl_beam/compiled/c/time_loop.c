@@ -102,27 +102,6 @@ static void guess(time_loop *m)
   }
 }
 
-/* Begin the step and compute its initial guess; returns whether no function of a user has raised an
- * exception. */
-static int begin_at_guess(time_loop *m)
-{
-  run(&m->begin, &m->step, 0, 0);
-  guess(m);
-  return raised_anywhere(m->equation) == NOTHING;
-}
-
-/* Size of the loads in the step, on all processes. */
-static double size_of_loads(const time_loop *m)
-{
-  const equation *e = m->equation;
-  double size = 0;
-  for (int k = 0; k < m->loads; ++k) {
-    const vector *l = m->load[k];
-    size += over_processes(e, HYPOT, norm(l->size, l->dof, e->weight, l->values));
-  }
-  return size;
-}
-
 /* -- places that open: see material_points.py ------------------------------------------------------------ */
 
 /* Held places open in rounds: first places with the largest excess over their limit, then places
@@ -181,7 +160,11 @@ static int solve(time_loop *m, int hold)
 {
   equation *e = m->equation;
   const double t = e->border ? *e->border->t : 0;
-  e->loads = size_of_loads(m);
+  e->loads = 0;
+  for (int k = 0; k < m->loads; ++k) {
+    const vector *l = m->load[k];
+    e->loads += over_processes(e, HYPOT, norm(l->size, l->dof, e->weight, l->values));
+  }
   if (!m->opens) return find_equilibrium(e, m->guess) > 0;
   int opened = 0;
   if (hold) {
@@ -285,6 +268,17 @@ static int solve_step(time_loop *m, int hold)
   return !m->path || followed(m);
 }
 
+/* Begin a step to t1, a substep of one to `end`, and solve it from its initial guess. */
+static int solve_to(time_loop *m, double t1, double end)
+{
+  if (set_step(m, t1, end)) {
+    run(&m->begin, &m->step, 0, 0);
+    guess(m);
+    if (raised_anywhere(m->equation) == NOTHING) return solve_step(m, 1);
+  }
+  return fails(m, RAISED);
+}
+
 /* Fraction of the first step after which the acceleration is taken as the initial one. Shorter
  * trial steps come closer to it, but amplify velocities of supports that do not fit the initial
  * velocities. */
@@ -293,16 +287,12 @@ static const double FIRST_TRIAL = 1. / 16;
 /* Solve the step to t1, a substep of one to `end`; the state changes only if it is accepted. */
 int attempt_step(time_loop *m, double t1, double end)
 {
-  equation *e = m->equation;
-  e->raised = NOTHING;
+  m->equation->raised = NOTHING;
   if (m->rates && m->prepare && !m->rates->ready) {
-    const double first = m->t + FIRST_TRIAL * (t1 - m->t);
-    if (!set_step(m, first, t1) || !begin_at_guess(m)) return fails(m, RAISED);
-    if (!solve_step(m, 1)) return 0;
+    if (!solve_to(m, m->t + FIRST_TRIAL * (t1 - m->t), t1)) return 0;
     m->prepare(m->handle);
   }
-  if (!set_step(m, t1, end) || !begin_at_guess(m)) return fails(m, RAISED);
-  return solve_step(m, 1);
+  return solve_to(m, t1, end);
 }
 
 /* Solve a step of a path that Python has set. */
