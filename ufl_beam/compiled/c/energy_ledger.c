@@ -229,7 +229,7 @@ void add_energy_of_connectors(void *self, const time_step *step, const double *q
   const connector_laws *l = t->connectors->laws;
   if (t->connectors->points) enter_stored(t->points, t->connectors->points->sum);
   if (t->connectors->asked) *t->points->stored += *t->connectors->asked->held;
-  for (int i = 0; l && i < l->number; ++i) *t->points->stored += l->stored[i];
+  for (int i = 0; l && i < t->connectors->number; ++i) *t->points->stored += l->stored[i];
   if (t->connectors->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
 }
 
@@ -265,7 +265,7 @@ void change_of_connectors(void *self, const double *q1, energy_change *sum)
     sum->effort += fabs(work);
   }
   for (int i = 0; !loses && i < c->number; ++i)
-    taken += end_of_law(c->laws, i, c->e1 + n * i)[LAW_STORED] - c->laws->stored[i];
+    taken += end_of_law(c, i)[LAW_STORED] - c->laws->stored[i];
   if (c->points) {
     respond_springs(c);
     taken = change_by_response(c->points, t->points->copy);

@@ -273,14 +273,13 @@ typedef struct {
   const double *slope;         /* r > 0 of the equation of each, see rigid_plastic.c */
   double *excess;              /* |force - back force| / limit - 1 of held connectors beyond the limit */
   int32_t *way;                /* direction in which each slips in the present iterate, or 0 */
-  double *rows;                /* three of each connector */
 } rigid_plastic;
 
 typedef struct friction friction;
 
 /* Connectors whose laws are Python functions of a user, see compiled_connector_laws.py. */
 typedef struct {
-  double *force, *rows; /* forces in the iterate; linearized rows of the laws, three of each */
+  double *force;        /* in the iterate, for find_rows, which writes the rows of `connectors` */
   double *held;         /* energy that the connectors store */
   void *begin_self, *rows_self, *again_self; /* data of the functions */
   void (*begin)(void *self, double t, double dt);
@@ -294,13 +293,12 @@ enum law_output { LAW_STORED, LAW_NUMERICAL, LAW_OUTPUTS };
  * before the step, dt, theta, the variables before the step, and the parameters of the law. */
 typedef struct {
   kernel *force, *end;        /* forces and their derivatives by the motions; outputs at the end of a step */
-  int number, width, variables;
-  int components;             /* motions of each connector */
+  int width, variables;
   int loses;                  /* 1: work that is not stored is dissipated; 0: the ledger stays open by it */
   double *w;                  /* data of the kernels, `width` numbers of each connector */
   double *stored, *lost;      /* energy in the accepted state; energy dissipated by each since the
                                * beginning */
-  double *rows, *answer;      /* rows as in `connectors`; space for the outputs of a law */
+  double *answer;             /* space for the outputs of a law */
   double *sum;                /* energy lost in the last step: by the laws, by the scheme */
 } connector_laws;
 
@@ -310,8 +308,8 @@ enum connector_number { CONNECTOR_WORK, CONNECTOR_RATE, CONNECTOR_NUMBERS };
 
 /* Connectors with the same components of motion, in cells whose unknowns include the forces. The
  * law of a component is a row a·e + b f = c in all motions e of the connector and the force f of
- * the component. Material points supply the rows of springs. Arrays have one number for each
- * component of each connector. */
+ * the component. Material points supply the rows of springs. Arrays without another comment have
+ * one number for each component of each connector. */
 typedef struct {
   const cells *work, *tangent, *motion;
   points *points;                  /* or none */
@@ -320,9 +318,10 @@ typedef struct {
   friction *friction;              /* or none */
   called_laws *asked;               /* or none; if all of these are none, the rows are constant in a step */
   int number, components;          /* components: 1, except for compiled laws */
-  const int32_t *connector, *force;     /* connector of each cell; indices of the forces among the unknowns */
+  const int32_t *force;            /* indices of the forces among the unknowns */
+  double *rows;                    /* latest (a, b, c) of each component */
   int row, row_of_tangent;         /* positions of the rows in the coefficients of work and tangent */
-  double *by_cell, *e1;            /* space; motions at the latest unknowns */
+  double *e1;                      /* motions at the latest unknowns */
   double *e0, *before, *kept[CONNECTOR_NUMBERS]; /* accepted state: motion, force, numbers kept */
   double weight_of_before;         /* weight of the force before the step in the work of the step */
   const int32_t *dofs;             /* of each connector: six of its nodes, then the forces */
@@ -332,7 +331,7 @@ typedef struct {
 
 void find_motions(const connectors *c, const double *q);
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
-void find_rows(const connectors *c, const double *q, double *rows);
+void find_rows(const connectors *c, const double *q);
 void ask_law(kernel *law, const double *w, int answers, double *s);
 part add_connectors_force, add_guides_force, add_guides_tangent;
 void respond(points *p);
@@ -808,7 +807,6 @@ struct friction {
   int32_t *search, *free;      /* of laws: the flags of points; whether each may change in the iterates */
   double *excess;              /* of laws: violation of the present branch */
   int guessed;                 /* whether the next iterate is the initial guess */
-  double *force, *rows;        /* in the iterate; three numbers of each */
 };
 
 /* Set `now` to the coefficients of a step of length dt; returns whether that succeeds. */

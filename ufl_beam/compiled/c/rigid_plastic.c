@@ -51,7 +51,7 @@ static void set_rows_of_rigid_plastic(const connectors *c, const double *q)
   for (int i = 0; i < c->number; ++i, w += p->width) {
     const double motion = c->e1[i] - w[SLIP_START];
     const int way = direction_of_slip(p, i, w, motion, q[c->force[i]]);
-    double *row = p->rows + 3 * i;
+    double *row = c->rows + 3 * i;
     row[0] = 1, row[1] = 0, row[2] = w[SLIP_START];
     p->way[i] = way;
     if (!way) continue;

@@ -241,24 +241,23 @@ void begin_inelastic(void *self, const time_step *step, const double *q1, const 
 static void put_rows_of_step(const connector_term *t, const time_step *step)
 {
   const connectors *c = t->connectors;
-  for (int k = 0; k < c->number; ++k) {
-    const int i = c->connector[k];
-    double a = 0, b = 1, y;
+  for (int i = 0; i < c->number; ++i) {
+    double *row = c->rows + 3 * i;
+    row[0] = 0, row[1] = 1;
     if (t->viscosity) {
-      a = -t->viscosity[i] / step->dt;
-      y = a * c->e0[i];
+      row[0] = -t->viscosity[i] / step->dt;
+      row[2] = row[0] * c->e0[i];
     } else if (t->wanted_motion) {
       const double wanted = value_at(t->wanted_motion + i, step->motion_time);
-      a = 1, b = 0;
-      y = c->e0[i] + step->fraction * (wanted - c->e0[i]);
+      row[0] = 1, row[1] = 0;
+      row[2] = c->e0[i] + step->fraction * (wanted - c->e0[i]);
     } else {
       const double wanted = -value_at(t->wanted_force + i, step->load_time);
       t->end[i] = t->reached[i] + step->fraction * (wanted - t->reached[i]);
-      y = t->reached[i] + step->at * (t->end[i] - t->reached[i]);
+      row[2] = t->reached[i] + step->at * (t->end[i] - t->reached[i]);
     }
-    const double row[3] = {a, b, y};
-    put_row(c, k, row);
   }
+  put_rows(c);
 }
 
 static void begin_friction_again(friction *f)
@@ -270,26 +269,24 @@ static void begin_friction_again(friction *f)
 
 /* A sticking connector moves by `way` in the step, so that its velocity is zero at the end. Without
  * this motion, the previous velocity would come back. */
-static void begin_friction(const connectors *c, const time_step *step)
+static void begin_friction(friction *f, const time_step *step)
 {
-  friction *f = c->friction;
   double way_to_rest = 0;
-  memset(c->by_cell, 0, c->number * sizeof *c->by_cell);
+  memset(f->way, 0, f->number * sizeof *f->way);
   if (f->rates) {
     const double *of = f->rates->now->rates[0]; /* v1 as a function of the step and v, with v instead of
                                                  * v_before */
     way_to_rest = -(of[1] + of[2]) / of[0];
     set_cells(f->rate, f->rates->rate[1], f->at_v);
-    add_cells((void *)f->rate, step->q0, c->by_cell);
+    add_cells((void *)f->rate, step->q0, f->way);
   }
-  for (int k = 0; k < c->number; ++k) {
-    const int i = c->connector[k];
+  for (int i = 0; i < f->number; ++i) {
     if (f->laws) {
       ask_law(f->limit_of_law, f->laws->w + i * f->laws->width, 1, f->limit[i]);
       *f->limit[i] = fmax(*f->limit[i], 0);
     }
     const double limit = *f->limit[i];
-    f->way[i] = way_to_rest * c->by_cell[k];
+    f->way[i] *= way_to_rest;
     f->creep[i] = limit > 0 ? f->softness[i] / limit : 0;
   }
   begin_friction_again(f);
@@ -302,12 +299,12 @@ void begin_connectors(void *self, const time_step *step, const double *q1, const
   const rigid_plastic *p = c->rigid_plastic;
   const connector_laws *l = c->laws;
   if (t->entry && !c->friction && !c->asked) put_rows_of_step(t, step);
-  for (int i = 0; l && i < l->number; ++i) {
+  for (int i = 0; l && i < c->number; ++i) {
     double *w = l->w + i * l->width;
     memcpy(w + c->components, c->e0 + i * c->components, c->components * sizeof *w);
     w[2 * c->components] = step->dt;
   }
-  if (c->friction) begin_friction(c, step);
+  if (c->friction) begin_friction(c->friction, step);
   if (c->asked) {
     /* Substeps go in proportion to the loads of the step. A path has no beginning, as its fractions
      * are 1. */
