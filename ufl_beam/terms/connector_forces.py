@@ -202,14 +202,15 @@ class ConnectorForces(ConnectorTerm):
         fields = {name for name, _ in ffi.typeof("connector_term").fields}
         mine = {name: x for name, x in law_fields.items() if name in fields}
         points = struct(
-            "inelastic_term", **{k: x for k, x in law_fields.items() if k not in fields}
-        )
+            "inelastic_term", points=response.in_c.get("points", ffi.NULL), springs=self._in_c,
+            **{k: x for k, x in law_fields.items() if k not in fields},
+        )  # fmt: skip
         c = struct("connector_term", connectors=self._in_c, points=points, **mine)
 
         begin = beginning(self._step_kernels, self.forms.q0)
         phases = ("begin_connectors", "accept_connectors", "add_energy_of_connectors")
         first, accept, state = ([loop(name, c)] for name in phases)
-        admits = loop("springs_dissipate", c) if response.must_dissipate else None
+        admits = loop("points_dissipate", points) if response.must_dissipate else None
         change, opens, again = loop("change_of_connectors", c), None, None
         if response.asks_at_ends:
 

@@ -59,10 +59,9 @@ void accept_second_differences(void *self, const time_step *step, const double *
 void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
 {
   dead_loads *l = self;
-  memcpy(l->parts[2], l->parts[1], l->vectors * sizeof *l->parts[2]);
-  if (!l->acts) return;
   *l->work += work_in_step(l->size, l->dof, l->weight_of_before, l->before, l->force, s);
-  memcpy(l->before, l->end, l->size * sizeof *l->end);
+  memcpy(l->factors_before, l->factors_at_end, l->vectors * sizeof *l->factors_before);
+  sum_loads(l, l->factors_before, l->before);
 }
 
 void accept_follower_loads(void *self, const time_step *step, const double *q1, const double *s)
@@ -168,33 +167,32 @@ void accept_rayleigh(void *self, const time_step *step, const double *q1, const 
   *m->lost += product_with(m, s, s) / step->dt;
 }
 
-/* Add the dissipation of points in the step to the ledger. */
-static void enter_losses(const inelastic_term *t, const double *sum)
+static void respond_in_term(const inelastic_term *t, const double *q)
 {
+  if (t->cells) respond_at(t->cells, q);
+  else {
+    find_motions(t->springs, q);
+    respond_springs(t->springs);
+  }
+}
+
+void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const inelastic_term *t = self;
+  const double *sum = t->points->sum;
+  respond_in_term(t, q1);
+  commit(t->points);
   if (t->plastic) *t->plastic += sum[0];
   if (t->hinges) *t->hinges += sum[1];
   if (t->numerical) *t->numerical += 2 * t->alpha * sum[2];
   if (t->released) *t->released += sum[5];
 }
 
-static void enter_stored(const inelastic_term *t, const double *sum)
-{
-  *t->stored += sum[3];
-  if (t->hardening) *t->hardening += sum[4];
-}
-
-void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const inelastic_term *t = self;
-  respond_at(t->cells, q1);
-  commit(t->cells->points);
-  enter_losses(t, t->cells->points->sum);
-}
-
 void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
-  enter_stored(t, t->cells->points->sum);
+  *t->stored += t->points->sum[3];
+  if (t->hardening) *t->hardening += t->points->sum[4];
 }
 
 void accept_connectors(void *self, const time_step *step, const double *q1, const double *s)
@@ -207,11 +205,7 @@ void accept_connectors(void *self, const time_step *step, const double *q1, cons
   if (c->friction) memcpy(c->friction->accepted, c->friction->slip, c->number * sizeof(double));
   if (t->lost) *t->lost += c->laws->sum[0];
   if (c->laws && t->points->numerical) *t->points->numerical += c->laws->sum[1];
-  if (c->points) {
-    respond_springs(c);
-    commit(c->points);
-    enter_losses(t->points, c->points->sum);
-  }
+  if (c->points) accept_inelastic(t->points, step, q1, s);
   if (c->rigid_plastic) {
     double sums[3];
     const rigid_plastic *p = c->rigid_plastic;
@@ -227,29 +221,28 @@ void add_energy_of_connectors(void *self, const time_step *step, const double *q
 {
   const connector_term *t = self;
   const connector_laws *l = t->connectors->laws;
-  if (t->connectors->points) enter_stored(t->points, t->connectors->points->sum);
+  if (t->connectors->points) add_energy_of_points(t->points, step, q1, s);
   if (t->connectors->asked) *t->points->stored += *t->connectors->asked->held;
   for (int i = 0; l && i < t->connectors->number; ++i) *t->points->stored += l->stored[i];
   if (t->connectors->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
 }
 
-/* Energy stored and dissipated by points in the latest response, less the present one; see
- * Points.change. */
-static double change_by_response(const points *p, points *copy)
+/* Energy stored and dissipated by points in a step to q1; see Points.change. */
+static double change_by_response(const inelastic_term *t, const double *q1)
 {
+  const points *p = t->points, *copy = t->copy;
+  respond_in_term(t, q1);
   memcpy(copy->w, p->w, (size_t)p->cells * p->of_cell * p->width * sizeof *p->w);
   memcpy(copy->e0, p->e0, 3 * (size_t)p->cells * sizeof *p->e0);
   memcpy(copy->kept, p->kept, POINT_KEPT * (size_t)p->cells * sizeof *p->kept);
-  commit(copy);
+  commit(t->copy);
   const double *after = copy->sum, *before = p->sum;
   return after[0] + after[1] + (after[3] - before[3]) + (after[4] - before[4]) + after[5] + after[6];
 }
 
 void change_of_points(void *self, const double *q1, energy_change *sum)
 {
-  const inelastic_term *t = self;
-  respond_at(t->cells, q1);
-  sum->in_beams += change_by_response(t->cells->points, t->copy);
+  sum->in_beams += change_by_response(self, q1);
 }
 
 void change_of_connectors(void *self, const double *q1, energy_change *sum)
@@ -266,26 +259,15 @@ void change_of_connectors(void *self, const double *q1, energy_change *sum)
   }
   for (int i = 0; !loses && i < c->number; ++i)
     taken += end_of_law(c, i)[LAW_STORED] - c->laws->stored[i];
-  if (c->points) {
-    respond_springs(c);
-    taken = change_by_response(c->points, t->points->copy);
-  }
+  if (c->points) taken = change_by_response(t->points, q1);
   sum->in_connectors += taken;
 }
 
 int points_dissipate(void *self, const double *q1)
 {
   const inelastic_term *t = self;
-  respond_at(t->cells, q1);
-  return gives_energy(t->cells->points) < 0;
-}
-
-int springs_dissipate(void *self, const double *q1)
-{
-  const connector_term *t = self;
-  find_motions(t->connectors, q1);
-  respond_springs(t->connectors);
-  return gives_energy(t->connectors->points) < 0;
+  respond_in_term(t, q1);
+  return gives_energy(t->points) < 0;
 }
 
 static void accept_supports(time_loop *m)

@@ -713,11 +713,11 @@ typedef struct {
   const int32_t *dof;
   const double *const *vector;
   const time_function *factor;
-  double *factors; /* of the latest step; NaN before the first */
-  double *force, *end, *before;
-  double *parts[3]; /* coefficients of the vectors in `force`, `end` and `before` */
+  double *asked; /* factors that the functions gave for the latest step; NaN before the first */
+  double *factors, *factors_at_end, *factors_before; /* in the equation; at the ends of this step and the
+                                                      * last one */
+  double *force, *before; /* in the equation; at the end of the last step */
   double weight_of_before;
-  int acts; /* whether a force, now or before, is not zero */
   double *work; /* entry of the ledger */
 } dead_loads;
 
@@ -816,6 +816,7 @@ int find_numbers(rates *r, double dt);
 typedef struct {
   step_product *product;
   rates *rates;
+  int damps;            /* whether it multiplies velocities */
   double *v;            /* space */
   double *kept, *lost; /* entries of the ledger, energy stored and dissipated; or none */
 } matrix_of_rates;
@@ -830,9 +831,11 @@ typedef struct {
   double weight_of_before;
 } moving_supports;
 
-/* Cells with material points, and their entries of the ledger, or none. */
+/* Material points of cells or of springs, and their entries of the ledger, or none. */
 typedef struct {
-  inelastic *cells;
+  points *points;
+  inelastic *cells;          /* or none */
+  const connectors *springs; /* or none */
   double alpha, *dt;
   points *copy; /* in statics: space for the points in the state at the end of a step */
   double *plastic, *hinges, *numerical, *released, *stored, *hardening;
@@ -852,7 +855,7 @@ typedef struct {
   double *hardened, loss; /* energy stored by rigid-plastic connectors; fraction of the loss of backward
                            * Euler */
   double *lost;           /* ledger entry of compiled laws */
-  const inelastic_term *points; /* ledger entries of springs, rigid-plastic connectors and laws */
+  inelastic_term *points; /* ledger entries of springs, rigid-plastic connectors and laws */
 } connector_term;
 
 /* Forces of laws of a user, watched for changes of direction at every step; see controllers.py. */
@@ -895,10 +898,10 @@ typedef struct {
 } static_path;
 
 /* Places that open beyond a limit: points of cells or of springs, rigid-plastic connectors, or
- * friction connectors. */
+ * friction connectors; the other pointers are none. */
 typedef struct {
-  inelastic *cells;
   points *points;
+  inelastic *cells;
   friction *rubs;
   rigid_plastic *slips;
   const int32_t *way_before; /* of rigid-plastic connectors, after the last step */
@@ -968,11 +971,11 @@ typedef struct {
 phase begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
   accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_frame, accept_frame, begin_works,
   accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
-  accept_second_differences, begin_inertia, accept_inertia, add_kinetic_energy, begin_rayleigh,
-  accept_rayleigh, begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,
+  accept_second_differences, begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
+  begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,
   accept_connectors, add_energy_of_connectors, begin_guides, accept_guides;
 void begin_connectors_again(void *self);
-admission points_dissipate, springs_dissipate;
+admission points_dissipate;
 change_of_energy change_of_form, change_of_points, change_of_connectors;
 double value_at(const time_function *f, double t);
 void keep_state(const time_loop *m, double *row);

@@ -114,8 +114,7 @@ static double largest_excess(const time_loop *m)
   double most = 0;
   for (int k = 0; k < m->places; ++k) {
     const openable *o = m->place + k;
-    if (o->cells) most = fmax(most, *o->cells->points->over);
-    else if (o->points) most = fmax(most, *o->points->over);
+    if (o->points) most = fmax(most, *o->points->over);
     for (int i = 0; o->slips && i < o->slips->number; ++i) most = fmax(most, o->slips->excess[i]);
     for (int i = 0; o->rubs && i < o->rubs->number; ++i) most = fmax(most, o->rubs->excess[i]);
   }
@@ -128,11 +127,8 @@ static void open_places(time_loop *m, double least)
   for (int k = 0; k < m->places; ++k) {
     const openable *o = m->place + k;
     const rigid_plastic *p = o->slips;
-    if (o->cells) {
-      release(o->cells->points, least);
-      o->cells->latest[0] = NAN;
-    } else if (o->points)
-      release(o->points, least);
+    if (o->points) release(o->points, least);
+    if (o->cells) o->cells->latest[0] = NAN;
     for (int i = 0; p && i < p->number; ++i)
       if (p->excess[i] > 0 && p->excess[i] >= least) p->slipped[i] = RELEASED;
     for (int i = 0; o->rubs && i < o->rubs->number; ++i)
@@ -146,7 +142,7 @@ static void end_search(time_loop *m, int opened)
   memset(m->equation->search, 0, SEARCH_FLAGS * sizeof(int32_t));
   for (int k = 0; opened && k < m->places; ++k) {
     const openable *o = m->place + k;
-    const points *p = o->cells ? o->cells->points : o->points;
+    const points *p = o->points;
     for (int i = 0; p && i < p->cells * p->of_cell; ++i)
       if (p->w[i * p->width + FLOWS] == RELEASED) p->w[i * p->width + FLOWS] = CLOSED;
     for (int i = 0; o->slips && i < o->slips->number; ++i) o->slips->slipped[i] = abs(o->way_before[i]);
