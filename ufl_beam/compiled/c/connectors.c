@@ -160,9 +160,9 @@ void add_connectors_force(void *self, const double *q, double *r)
   add_cells((void *)c->work, q, r);
 }
 
-/* Largest residual of a row. Motions are relative to 1 % of the largest motion in the scene, at
- * most to 1 % of the scene; forces are relative to the scale. Round-off of the motions does not
- * count; it grows with the distance from the initial position and with the number of turns. */
+/* Largest residual of a row. Residuals of motions are divided by 1 % of `moved`, which is at most
+ * the size of the scene; residuals of forces are divided by `scale`. Round-off of the motions does
+ * not count; it grows with the distance from the initial position and with the number of turns. */
 double missed_by_connectors(void *self, const double *q, const double *r, double scale, double moved)
 {
   const connectors *c = self;
@@ -189,7 +189,7 @@ double missed_by_connectors(void *self, const double *q, const double *r, double
   return most;
 }
 
-/* Work that component i takes in a step to the motion e1. */
+/* Work that component i takes in a step to the latest motions. */
 static double taken_by(const connectors *c, int i, const double *q)
 {
   const double a = c->weight_of_before, force = a * c->before[i] + (1 - a) * q[c->force[i]];
@@ -197,7 +197,7 @@ static double taken_by(const connectors *c, int i, const double *q)
 }
 
 /* Accept the end of the step as the new state; returns the work that all connectors have taken in
- * it. */
+ * the step. */
 static double commit_connectors(const connectors *c, const double *q, double dt)
 {
   double sum = 0;

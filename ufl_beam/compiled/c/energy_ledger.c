@@ -2,17 +2,9 @@
 /* Energy ledger: each term accepts a step and enters its works and losses, and adds its energies; see
  * energy_ledger.py. */
 
-static double dot(int size, const double *x, const double *y)
-{
-  double sum = 0;
-#pragma omp simd reduction(+ : sum)
-  for (int i = 0; i < size; ++i) sum += x[i] * y[i];
-  return sum;
-}
-
 /* Work in a step s of the weighted mean of the forces in the previous equation (weight a) and in
- * the equation of this step. The forces are at the degrees of freedom `dof`, or at all if that is
- * null. */
+ * the equation of this step. The forces are at the degrees of freedom `dof`, or at all degrees of
+ * freedom if `dof` is null. */
 static double work_in_step(int size, const int32_t *dof, double a, const double *before, const double *force,
                            const double *s)
 {
@@ -37,9 +29,12 @@ void change_of_form(void *self, const double *q1, energy_change *sum)
 static double product_with(const matrix_of_rates *m, const double *x, const double *y)
 {
   const step_product *p = m->product;
-  memset(p->space, 0, p->size * sizeof *p->space);
-  add_product(p->A, y, p->space);
-  return dot(p->size, x, p->space);
+  double *Ay = p->space, sum = 0;
+  memset(Ay, 0, p->size * sizeof *Ay);
+  add_product(p->A, y, Ay);
+#pragma omp simd reduction(+ : sum)
+  for (int i = 0; i < p->size; ++i) sum += x[i] * Ay[i];
+  return sum;
 }
 
 void accept_second_differences(void *self, const time_step *step, const double *q1, const double *s)
@@ -227,7 +222,7 @@ void add_energy_of_connectors(void *self, const time_step *step, const double *q
   if (t->connectors->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
 }
 
-/* Energy stored and dissipated by points in a step to q1; see Points.change. */
+/* Energy that points store and dissipate in a step to q1. */
 static double change_by_response(const inelastic_term *t, const double *q1)
 {
   const points *p = t->points, *copy = t->copy;

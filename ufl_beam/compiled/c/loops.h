@@ -59,9 +59,9 @@ typedef struct {
   int size, of_cell;              /* of_cell: strains of a cell */
   const double *weight;           /* of each strain of a cell */
   const double *q0, *q_before;    /* configurations at the beginnings of this step and the last one */
-  double ratio;                   /* length of this step over length of the last one */
-  int begins, exact;              /* begins: the next strains are extrapolated; exact: others are at the
-                                   * iterate */
+  double ratio;                   /* length of this step divided by the length of the last one */
+  int begins, exact;              /* begins: the next strains are extrapolated; exact: later strains
+                                   * are strains at the iterate, not predicted */
   double *about, *change, *e;     /* configuration of the latest tangent; space; strains */
   int stale;                      /* whether a tangent has been computed since the strains */
 } predicted_strains;
@@ -119,20 +119,21 @@ double norm(int rows, const int32_t *at, const double *w, const double *f);
 
 /* -- forces in cells --------------------------------------------------------------------------- */
 
-/* Resultants of the forces of a cell in the equation of a step, see cell_forces.py. */
+/* Resultants of the forces on the nodes of a cell in the equation of a step, see cell_forces.py. */
 enum cell_number {
   START_X, START_Y, START_M, END_X, END_Y, END_M, COUPLE, SKEW_X, SKEW_Y, CELL_NUMBERS
 };
 
-/* Origin of forces on nodes of cells: stresses; a work of a user; densities along the cell. */
+/* Origin of forces on nodes of cells: stresses, a work of a user, or densities along the cell. */
 enum force_kind { STRESS, WORK, DENSITY };
 
 /* A form whose entries are forces on nodes of cells. `latest` and `accepted` are these entries in
  * the latest residual and in the residual of the accepted step; if the form is linear in a vector,
- * they are the vector. Entries that depend only on configurations are computed on demand. */
+ * they are this vector instead. Entries that depend only on configurations are computed on demand. */
 typedef struct {
-  const cells *form; /* that is linear in the vector; or none */
-  double **latest, *accepted; /* latest: or none; also none if another form has the same vector */
+  const cells *form; /* form that is linear in the vector; or none */
+  double **latest, *accepted; /* latest: none if entries are computed on demand, or if another form has
+                               * the same vector */
   double *const *vector;
   double *const *entries; /* of the accepted step, in batches */
   double *const *tee;     /* entries in the latest residual, in batches; or none */
@@ -153,8 +154,8 @@ typedef struct {
   int cells, nodes, forces; /* nodes: of a cell */
   force_in_cells *force;
   const loads_in_cells *loads; /* or none */
-  const double *from_middle;   /* position of the nodes of a cell from its middle, as a fraction of the
-                                * cell */
+  const double *from_middle;   /* position of each node of a cell relative to its middle, divided by the
+                                * length of the cell */
   const double *given;         /* known resultants of the state before the first step; then none */
 } cell_forces;
 
@@ -186,10 +187,10 @@ void watch_step(const watch *w, int now, double t, const double *before, const d
 
 /* Python reads the names in these enums in their order; the last name is their number. */
 
-/* The first inputs of the law of a point. Further inputs follow from `strain` of points on: strains
- * at the end of the step, strains before the step, and stiffnesses, `components` of each;
- * `variables` before the step; if `solves`, the same number of variables that are solved for; and
- * parameters of the law. */
+/* The first inputs of the law of a point. Further inputs begin at the index `strain` of `points`:
+ * strains at the end of the step, strains before the step, and stiffnesses, `components` of each;
+ * `variables` before the step; if `solves`, as many variables that are solved for; and parameters of
+ * the law. */
 enum point_input {
   GROWTH, DIRECTION,             /* of an iterate */
   TRACTION, JUMP, OPENING, FLOWS, /* the state before the step */
@@ -208,23 +209,23 @@ enum point_output {
 
 enum { MOST_VARIABLES = 16, MOST_CORRECTIONS = 100 }; /* of a law */
 
-enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell in `kept` of points; sums over cells in `sum` */
+enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell in `kept`, numbers in `sum`, see commit */
 
 extern const double NO_ENERGY; /* relative size below which dissipation counts as zero */
 
 enum { LINE = 3 }; /* strain, stress and slope of the tangent line of a point */
 
 /* Flags of the present search for an equilibrium, which all points and connectors of a scene share.
- * OPENED: a point has opened. STIFF: points that do not open answer elastically. HOLD: points that
- * do not flow stay closed. OVER: a held point has borne more than its limit. */
+ * OPENED: a point has opened. STIFF: points that do not open answer with their elastic stiffness.
+ * HOLD: points that do not flow stay closed. OVER: a held point has borne more than its limit. */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 
 /* Points in cells, `of_cell` in each, with `width` numbers of each in w; see material_points.py. */
 typedef struct {
   int32_t *search;
-  /* Law: stresses and their derivatives by strains; if it solves for variables, also residuals and
-   * their derivatives, see solve_law. Resistance of a discontinuity, and its derivative by the
-   * growth. */
+  /* law: stresses and their derivatives by strains; if `solves`, also residuals and their
+   * derivatives, see solve_law. resistance: of a discontinuity, and its derivative by the growth.
+   * end: outputs at the end of a step, see point_output. */
   kernel *law, *resistance, *end;
   kernel *own; /* dissipation of a law that must not give energy, and its size; or none */
   int solves, components, variables, strain;
@@ -234,8 +235,8 @@ typedef struct {
   double *e0, *e1, *w, *r, *D, *kept, *sum;
   double *over; /* largest excess of a closed point over its limit in the latest response */
   int tried;    /* whether the law has answered an iterate of this step */
-  /* Tangent lines of points of one strain: in the latest response, and in the last tangent if it
-   * `predicts`; see follow_prediction. */
+  /* Tangent lines of points of one strain: in the latest response, and in the last tangent, if
+   * `predicts` says that there is one in this step; see follow_prediction. */
   double *line, *predicted;
   int predicts;
   const double *linear; /* strains of cells that a static iteration predicts; or none */
@@ -302,8 +303,8 @@ typedef struct {
   double *sum;                /* energy lost in the last step: by the laws, by the scheme */
 } connector_laws;
 
-/* Numbers of an accepted step that are kept, with the names of fields of `Connection`: work taken since
- * the beginning, rate. */
+/* Numbers of an accepted step that are kept, with the names of fields of `Connection`: work taken
+ * since the beginning, and rate of the motion. */
 enum connector_number { CONNECTOR_WORK, CONNECTOR_RATE, CONNECTOR_NUMBERS };
 
 /* Connectors with the same components of motion, in cells whose unknowns include the forces. The
@@ -454,7 +455,7 @@ void expand_fronts(const fronts *c, double *found);
 /* -- Newton's method, see newton.c ------------------------------------------------------------- */
 
 /* Functions of PETSc, which Python looks up under these names; PETSc's objects are opaque here.
- * Each returns an error code or zero, as the callbacks of SNES do. */
+ * Each function returns an error code or zero, as the callbacks of SNES do. */
 typedef struct {
   int (*PetscErrorMessage)(int error, const char **text, char **specific);
   int (*PetscOptionsUsed)(void *options, const char *name, void *used); /* a bool or an int */
@@ -664,11 +665,12 @@ typedef struct {
   void *handle;
 } time_function;
 
-/* Form with the configuration q0 at the beginning of a step in its coefficients, from `at` on. */
+/* Form with numbers of a step in its coefficients, from `at` on; for example, with the configuration
+ * q0 at the beginning of the step. */
 typedef struct { const cells *form; int at; } form_of_step;
 
-/* Forms with a time constant over the time step in their coefficients, for each point of a cell,
- * from `at` on. */
+/* Forms whose coefficients have a time constant divided by the time step, for each of the `of_cell`
+ * points of a cell. */
 typedef struct {
   int forms, of_cell;
   const form_of_step *form;
@@ -743,7 +745,7 @@ enum work_number { WORK_TIME, WORK_STEP, WORK_PART, WORK_NUMBERS };
 /* A work of a user on cells, see user_forces.py. */
 typedef struct {
   const cells *residual;
-  int forms, numbers;
+  int forms, numbers;           /* numbers: of the parameters */
   const form_of_step *form;     /* all forms of the work, and the position of q0 in each, or -1 */
   const int32_t *at;            /* forms x numbers: positions of the parameters, or -1 */
   double *number;               /* current values in the forms */
@@ -933,8 +935,7 @@ typedef struct {
   int in_parts;          /* whether substeps go in proportion to loads and motions at the end of the step */
   int rotations, half_tangents, multipliers;
   const int32_t *rotation, *half_tangent, *multiplier;
-  int limits_rotation;
-  double turn, largest_turn; /* turn: largest rotation in the step */
+  double turn, largest_turn; /* largest rotation in the step; limit of it, infinite if there is none */
   rates *rates;       /* in dynamics */
   int admissions, judges; /* checks of laws; whether any process has checks */
   const admission_call *admission;

@@ -162,10 +162,10 @@ static void take_tangent(const inelastic *m)
   for (int c = 0; c < p->cells; ++c) subtract(p->D + 9 * c, p->e1 + 3 * c, m->last_b + 3 * c);
 }
 
-/* Forces for the tangent of a static step. The first are the forces before the step, or, for points
- * with tangent lines, forces at the extrapolated strains. Later ones are predicted by the latest
- * tangent for the strains that it predicts; see predicted_strains in beam_forces.py. Stiff points predict
- * nothing. */
+/* Forces for the tangent of a static step. The first forces are the forces before the step, or, for
+ * points with tangent lines, forces at the extrapolated strains. Later forces are predicted by the
+ * latest tangent for the strains that it predicts; see predicted_strains in beam_forces.py. Stiff
+ * points predict nothing. */
 static const double *predict_forces(const inelastic *m, const double *q)
 {
   const points *p = m->points;

@@ -18,8 +18,7 @@ double over_processes(const equation *e, enum agreement how, double here)
   return here;
 }
 
-/* Norm of forces, and of moments over the size of the scene; each process passes its degrees of
- * freedom. */
+/* Norm of forces, and of moments divided by the size of the scene, over all processes. */
 static double norm_of(const equation *e, const double *forces)
 {
   return over_processes(e, HYPOT, norm(e->size, 0, e->weight, forces));

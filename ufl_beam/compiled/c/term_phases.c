@@ -133,7 +133,7 @@ static void put_time(const user_work *w, double t)
   for (int k = WORK_NUMBERS; k < w->numbers; ++k) put_number(w, k, value_at(w->of_time + k - WORK_NUMBERS, t));
 }
 
-/* Longest time step that works get; all rates vanish with it. */
+/* Longest time step that works get, instead of an infinite one; all rates are practically zero. */
 static const double AT_REST = 1e300;
 
 void begin_works(void *self, const time_step *step, const double *q1, const double *s)

@@ -9,8 +9,8 @@
 /* Root mean square of motions up to which a step resolves them, relative to the scene's size. */
 static const double FAR = 1. / 8;
 
-/* Return 1 if a step is as long as the last one. Differences of times have fewer digits than the
- * times. */
+/* Whether a step is as long as the last one. The tolerance is far above round-off, because
+ * differences of times have fewer digits than the times. */
 static int as_last(const prediction *p, double dt)
 {
   return fabs(dt - p->dt) <= 1e-6 * dt;
@@ -75,7 +75,7 @@ static int set_step(time_loop *m, double t1, double end)
   return !m->rates || find_numbers(m->rates, dt);
 }
 
-/* Begin the step in all terms; returns whether no function of a user has raised an exception. */
+/* Begin the step in all terms; returns 0 if a function of a user has raised an exception. */
 static int begin_terms(time_loop *m)
 {
   run(&m->begin, &m->step, 0, 0);
@@ -206,7 +206,7 @@ static int measure(time_loop *m)
   m->turn = over_processes(e, LARGEST, turn);
   if (m->applies && m->turn > m->applying_turn && m->short_part * m->step.dt > m->applied_by - m->begin_of_run)
     return fails(m, APPLIED_TOO_FAST);
-  if (m->limits_rotation && !(m->turn <= m->largest_turn)) return fails(m, TURNS_TOO_FAR);
+  if (!(m->turn <= m->largest_turn)) return fails(m, TURNS_TOO_FAR);
   for (int k = 0; k < m->half_tangents; ++k) {
     const int i = m->half_tangent[k];
     m->s[i] = 2 * tan(m->s[i] / 2);
@@ -317,8 +317,8 @@ static void watch_forces(force_watch *w, const time_loop *m)
   }
 }
 
-/* Accept the end of the step as the state. Returns whether no function of a user has raised an
- * exception. The step is accepted even if one has, because some terms have accepted it already. */
+/* Accept the end of the step as the state. Returns 0 if a function of a user has raised an
+ * exception. The step is accepted nevertheless, because some terms have accepted it already. */
 int accept_step(time_loop *m)
 {
   equation *e = m->equation;
