@@ -125,7 +125,6 @@ def test_products_with_runs_of_rows(lumped):
     product, x = Product(A), np.random.default_rng(5).normal(size=A.size)
     assert product.c.runs <= (3 if lumped else 12)
     assert np.allclose(product(x), dense @ x, rtol=1e-14, atol=1e-14)
-    assert product.square(x) == pytest.approx(x @ dense @ x, rel=1e-13)
     row, column = product.pairs()
     assert np.array_equal(np.sort(row * A.size + column), np.flatnonzero(dense))
     assert np.array_equal(product.data, dense[row, column])
@@ -133,7 +132,7 @@ def test_products_with_runs_of_rows(lumped):
 
 def test_an_empty_constant_matrix():
     product = Product(zero_matrix(0))
-    assert len(product(np.empty(0))) == product.square(np.empty(0)) == 0
+    assert len(product(np.empty(0))) == 0
 
 
 @pytest.mark.parametrize("lumped", [False, True])

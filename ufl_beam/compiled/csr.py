@@ -172,11 +172,6 @@ class Product:
         lib.add_product(self.c, doubles(x), doubles(y))
         return y
 
-    def square(self, x: Array) -> float:
-        """Return ``x A x``."""
-        square: float = lib.quadratic_form(self.c, doubles(x))
-        return square
-
 
 class StepProduct:
     """Forces ``A (factor s - back v)`` with s = (Δu, 2 tan(Δψ/2)), and their derivative.

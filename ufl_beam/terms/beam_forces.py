@@ -317,12 +317,15 @@ class InelasticBeams(Cells):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the points that begin and accept a step, and enter energies."""
-        c = struct("inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger))
+        c = struct(
+            "inelastic_term", points=self.points.c, cells=self._in_c,
+            **self.points.in_steps(self._ledger),
+        )  # fmt: skip
         begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
         if self.predicted is not None:
             begin.append(loop("begin_predicted_strains", self.predicted))
         ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
-        opens = {"cells": self._in_c} if self.points.softens else None
+        opens = {"points": self.points.c, "cells": self._in_c} if self.points.softens else None
         change = loop("change_of_points", c)
         admits = loop("points_dissipate", c) if self.must_dissipate else None
         return Phases(begin, *ends, change, opens, admits)

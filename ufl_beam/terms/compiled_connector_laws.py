@@ -126,10 +126,9 @@ class CompiledLaws(Response):
         self._forms = _law_forms(law.with_parameters(dict.fromkeys(law.parameters(), 1.0)), scheme)
         outputs = int(lib.LAW_OUTPUTS) + len(law.variables)
         self._c = struct(
-            "connector_laws", number=n, width=len(columns), variables=len(law.variables),
-            components=k, force=self._forms.force, end=self._forms.end, loses=not law.elastic, w=w,
-            stored=self._stored, lost=lost, rows=np.zeros((n, k * (k + 2))),
-            answer=np.zeros(outputs), sum=np.zeros(2),
+            "connector_laws", width=len(columns), variables=len(law.variables), w=w,
+            force=self._forms.force, end=self._forms.end, loses=not law.elastic,
+            stored=self._stored, lost=lost, answer=np.zeros(outputs), sum=np.zeros(2),
         )  # fmt: skip
         self.in_c = {"laws": self._c}
         if law.holds:
@@ -352,9 +351,8 @@ class UserLaws(Response):
             UserLaw(connector, record, size, weight, x) for connector, record, size, x in arguments
         ]
         self.asks_at_ends = any(law.state.size or law.energy for law in self._each)
-        self._stored, self._force, self._rows = np.zeros(1), np.zeros(n), np.zeros((n, 3))
-        self._rows[:, 1] = 1.0
-        self._c = struct("called_laws", force=self._force, rows=self._rows, held=self._stored)
+        self._stored, self._force = np.zeros(1), np.zeros(n)
+        self._c = struct("called_laws", force=self._force, held=self._stored)
         self.in_c = {"asked": self._c}
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
@@ -366,8 +364,8 @@ class UserLaws(Response):
         return super().in_steps(callbacks)
 
     def know(self, term: Any) -> None:
-        """Take the arrays of the motions in the accepted state and in the iterate."""
-        self._e0, self._e1 = term.motions
+        """Take the arrays of motions and rows in the accepted state and in the iterate."""
+        (self._e0, self._e1), self._rows = term.motions, term.latest_rows
 
     def _begin(self, t: float, dt: float) -> None:
         for law, e0 in zip(self._each, self._e0.tolist(), strict=True):
@@ -383,7 +381,7 @@ class UserLaws(Response):
         motions = zip(self._each, self._e1.tolist(), self._force.tolist(), strict=True)
         for row, (law, e1, λ) in zip(self._rows, motions, strict=True):
             slope, intercept = law.line(e1, λ)
-            row[0], row[2] = -slope, intercept
+            row[:] = -slope, 1.0, intercept
 
     def bends(self, e1: Array) -> Array:
         """Return minus the second derivatives of the forces; (num_connectors,)."""

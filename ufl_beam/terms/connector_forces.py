@@ -151,6 +151,7 @@ class ConnectorForces(ConnectorTerm):
     Attributes:
         forms: Forms of a connector, and the functions in them.
         motions: Motions in the accepted state and in the latest iterate, which C writes.
+        latest_rows: Rows of the laws about the latest iterate; (num_connectors, k + 2).
     """
 
     def __init__(self, subdomain: Subdomain, positions: Index, setting: Setting, A: Csr) -> None:
@@ -167,19 +168,18 @@ class ConnectorForces(ConnectorTerm):
         work, tangent, value = (self._form(form) for form in step_forms)
         tangent.place(A)
         self._step_kernels = work, tangent
-        self._now, self._rows = np.zeros(n), np.zeros((n, k + 2))
+        self._now, self.latest_rows = np.zeros(n), np.zeros((n, k + 2))
         self.motions = self._e, self._now
-        self._rows[:, 0] = 1.0  # a constraint, unless a law changes the row
+        self.latest_rows[:, 0] = 1.0  # a constraint, unless a law changes the row
         for kernel in self._step_kernels:
-            kernel.put(forms.row, self._rows.reshape(self._cells, -1))
+            kernel.put(forms.row, self.latest_rows.reshape(self._cells, -1))
         self._in_c = struct(
-            "connectors", number=self._cells, components=k,
-            connector=np.arange(self._cells, dtype=np.int32), dofs=self._dofs,
+            "connectors", number=self._cells, components=k, dofs=self._dofs, rows=self.latest_rows,
             force=self.forces_at.copy(), size=setting.size,
             length=np.where([c.is_rotation for c in connectors], 1.0, setting.size),
             work=work.cells, tangent=tangent.cells, motion=value.cells,
             row=work.position(forms.row), row_of_tangent=tangent.position(forms.row),
-            by_cell=np.zeros(n), e0=self._e, e1=self._now, before=self._before,
+            e0=self._e, e1=self._now, before=self._before,
             kept=[doubles(saved) for saved in self._recorded],
             weight_of_before=scheme.weight_of_before, **self.response.in_c,
         )  # fmt: skip
@@ -202,14 +202,15 @@ class ConnectorForces(ConnectorTerm):
         fields = {name for name, _ in ffi.typeof("connector_term").fields}
         mine = {name: x for name, x in law_fields.items() if name in fields}
         points = struct(
-            "inelastic_term", **{k: x for k, x in law_fields.items() if k not in fields}
-        )
+            "inelastic_term", points=response.in_c.get("points", ffi.NULL), springs=self._in_c,
+            **{k: x for k, x in law_fields.items() if k not in fields},
+        )  # fmt: skip
         c = struct("connector_term", connectors=self._in_c, points=points, **mine)
 
         begin = beginning(self._step_kernels, self.forms.q0)
         phases = ("begin_connectors", "accept_connectors", "add_energy_of_connectors")
         first, accept, state = ([loop(name, c)] for name in phases)
-        admits = loop("springs_dissipate", c) if response.must_dissipate else None
+        admits = loop("points_dissipate", points) if response.must_dissipate else None
         change, opens, again = loop("change_of_connectors", c), None, None
         if response.asks_at_ends:
 
@@ -259,8 +260,8 @@ class ConnectorForces(ConnectorTerm):
 
     def rows(self, q: Array) -> Array:
         """Return rows of the laws, linearised at ``q``; (num_connectors, k + 2), k components."""
-        lib.find_rows(self._in_c, doubles(q), doubles(self._rows))
-        return self._rows
+        lib.find_rows(self._in_c, doubles(q))
+        return self.latest_rows
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""

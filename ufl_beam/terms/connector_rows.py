@@ -130,7 +130,7 @@ class Response:
             "friction", number=n, limit=ffi.new("double *[]", limits), slip=self._direction,
             accepted=self._accepted, way=distance, creep=creep, softness=softness * self._lengths,
             tiny=1e-14 * self._lengths, sticks=self.sticks, against=against,
-            switched=setting.switched, force=np.zeros(n), rows=np.zeros((n, 3)), **law_fields,
+            switched=setting.switched, **law_fields,
         )  # fmt: skip
         if self.opens:
             search, free = setting.search, np.zeros(n, dtype=np.int32)
@@ -421,7 +421,7 @@ class RigidPlasticLaws(Response):
             force=self._forms.force, end=self._forms.end, search=setting.search,
             limit=self._limit, back_force=back_force, dissipated=dissipated,
             slope=np.array([_slope(connector, setting.size) for connector in connectors]),
-            excess=excess, slipped=self._slipped, way=self.way, rows=np.zeros((n, 3)),
+            excess=excess, slipped=self._slipped, way=self.way,
         )  # fmt: skip
         self.in_c = {"rigid_plastic": self._c}
         self._in_steps = {

@@ -15,7 +15,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, struct
+from ufl_beam.compiled.c_library import doubles, ffi, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.function_spaces import (
@@ -150,7 +150,7 @@ class Inertia(Term):
         lost = self._ledger.lost.pointer("numerical") if self.loses_energy else ffi.NULL
         kinetic = self._ledger.state.pointer("kinetic")
         c = self.times(self._times, kept=kinetic, lost=lost)
-        begin, accept = loop("begin_inertia", c), loop("accept_inertia", c)
+        begin, accept = loop("begin_product", c), loop("accept_inertia", c)
         return Phases([begin], [accept], [loop("add_kinetic_energy", c)])
 
     # -- the rates -----------------------------------------------------------------------------
@@ -190,11 +190,10 @@ class Inertia(Term):
         rows = _coefficients(known, dt, self.c.last_dt, self.c.more).rates
         return [combined(row, s, self) for row in rows]
 
-    def times(self, product: StepProduct, **pointers: Any) -> Any:
-        """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
-        v, momentum = np.zeros(self.c.size), np.zeros(len(self._slip))
-        c = struct("matrix_of_rates", product=product.c, v=v, momentum=momentum, **pointers)
-        return fill(c, rates=self.c)
+    def times(self, product: StepProduct, **fields: Any) -> Any:
+        """Return ``matrix_of_rates`` of loops.h for a matrix, with further ``fields``."""
+        v = np.zeros(self.c.size)
+        return struct("matrix_of_rates", product=product.c, rates=self.c, v=v, **fields)
 
     # -- in files ------------------------------------------------------------------------------
 
@@ -298,8 +297,8 @@ class RayleighForces(Term):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the matrix and the velocities."""
-        c = self._rates.times(self._times, lost=self._ledger.lost.pointer("damping"))
-        return Phases([loop("begin_rayleigh", c)], [loop("accept_rayleigh", c)])
+        c = self._rates.times(self._times, damps=1, lost=self._ledger.lost.pointer("damping"))
+        return Phases([loop("begin_product", c)], [loop("accept_rayleigh", c)])
 
 
 def damping_forces(

@@ -122,8 +122,8 @@ class DeadLoads(_AtDofs):
         for key, along in in_cells.items():
             np.add.at(vectors[key][1], subdomain.cell_dofs, along)
         owners, whole = zip(*vectors.values(), strict=True)
-        # Forces in the equation, at the end of the step, and at the end of the last step.
-        self._set_dofs(subdomain, np.any(whole, axis=0) * 1.0, owners, rows=3)
+        # Forces in the equation, and at the end of the last step.
+        self._set_dofs(subdomain, np.any(whole, axis=0) * 1.0, owners, rows=2)
         self._vectors = [vector[self.dofs] for vector in whole]
         # Factors of the vectors: in the equation, at the end of the step, at the end of the last
         # step, and in the equation of the last step.
@@ -147,9 +147,9 @@ class DeadLoads(_AtDofs):
         number = len(self._vectors)
         c = self._c = struct(
             "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=number,
-            force=self._forces[0], end=self._forces[1], before=self._forces[2],
-            parts=[doubles(row) for row in self._factors[:3]],
-            factors=np.full(number, math.nan), factor=callbacks.time_functions(self._in_time),
+            force=self._forces[0], before=self._forces[1], factors=self._factors[0],
+            factors_at_end=self._factors[1], factors_before=self._factors[2],
+            asked=np.full(number, math.nan), factor=callbacks.time_functions(self._in_time),
             vector=ffi.new("double *[]", [doubles(vector) for vector in self._vectors]),
             work=self._ledger.supplied.pointer("loads"),
             weight_of_before=self._scheme.weight_of_before,
@@ -164,9 +164,9 @@ class DeadLoads(_AtDofs):
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the forces at the end of the last step, and their factors."""
-        self._forces[:] = archive.added("dead loads", self._whole(self._forces[2]))[self.dofs]
+        self._forces[:] = archive.added("dead loads", self._whole(self._forces[1]))[self.dofs]
         for k, factor in enumerate(self._factors[2]):
-            self._c.factors[k] = math.nan
+            self._c.asked[k] = math.nan
             self._factors[2, k] = archive.number(f"part of dead loads {k}", factor)
 
 

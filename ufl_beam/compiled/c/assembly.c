@@ -69,7 +69,7 @@ void add_cells(void *self, const double *q, double *b)
   }
 }
 
-/* Index of an entry of a matrix with sorted columns, or -1 if it has none. */
+/* Index of an entry of a matrix with sorted columns; -1 if the matrix has no such entry. */
 static inline int32_t find_entry(int rows, const int32_t *indptr, const int32_t *indices, int32_t row,
                                  int32_t column)
 {
@@ -118,10 +118,10 @@ static int in_order(const void *a, const void *b)
   return (i > j) - (i < j);
 }
 
-/* Find the pattern of a matrix with its diagonal and all pairs of the unknowns of each group. Group
- * g is dof[first[g]...first[g + 1]]. `begin` and `group` get the groups of each unknown; `seen` is
- * space. Fills indptr and, unless it is null, `indices`. Returns the number of entries, or -1 if
- * there are too many. */
+/* Find the pattern of a matrix that has the diagonal and all pairs of the unknowns of each group.
+ * The unknowns of group g are dof[first[g]] to dof[first[g + 1] - 1]. The groups of each unknown
+ * are written to `begin` and `group`; `seen` is space. Fills indptr and, unless it is null,
+ * `indices`. Returns the number of entries, or -1 if there are too many. */
 int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *dof, int32_t *begin,
                      int32_t *group, int32_t *seen, int32_t *indptr, int32_t *indices)
 {
@@ -145,17 +145,7 @@ int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *
           ++number;
         }
     if (number > INT32_MAX) return -1;
-    if (!indices) continue;
-    if (number - start > 64) {
-      qsort(indices + start, number - start, sizeof *indices, in_order);
-      continue;
-    }
-    for (int64_t k = start + 1; k < number; ++k) {
-      const int32_t column = indices[k];
-      int64_t l = k;
-      for (; l > start && indices[l - 1] > column; --l) indices[l] = indices[l - 1];
-      indices[l] = column;
-    }
+    if (indices) qsort(indices + start, number - start, sizeof *indices, in_order);
   }
   indptr[size] = (int32_t)number;
   return number;

@@ -19,12 +19,6 @@ static inline void solve_block(const double *D, const uint8_t *swap, const doubl
   x[0] = (x0 - D[1] * x[1] - D[2] * x[2]) * D[0];
 }
 
-/* y -= A x */
-static inline void subtract(const double *A, const double *x, double *y)
-{
-  for (int i = 0; i < 3; ++i) y[i] -= A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
-}
-
 /* Read the block of a vertex, whose rows have `width` entries, with a neighbour in its chain or
  * with itself. The numbers are written `apart` from each other. */
 static inline void read_block(const chains *c, int vertex, int neighbour, int width, double *block,
@@ -164,8 +158,11 @@ static inline double largest_entry(const pair *block, int lane)
   return largest;
 }
 
-static void begin_chain(const chains *c, chain_fronts *at, int lane, int chain)
+/* Begin the next chain; if none is left, repeat the other chain, whose results are not used. */
+static void begin_chain(const chains *c, chain_fronts *at, int lane)
 {
+  at->counts[lane] = at->next < c->chains;
+  const int chain = at->counts[lane] ? at->next++ : at->chain[1 - lane];
   const int v = c->first[chain], width = c->spike[chain] ? 9 : 6;
   at->chain[lane] = chain, at->vertex[lane] = v, at->last[lane] = c->first[chain + 1] - 1;
   read_block(c, v, 1, width, (double *)at->pivot + lane, PAIR);
@@ -286,13 +283,6 @@ static inline int to_go(const chain_fronts *at, int lane)
   return at->last[lane] - at->vertex[lane] + 1;
 }
 
-/* Begin the next chain; if none is left, repeat the other chain, whose results are not used. */
-static void take_chain(const chains *c, chain_fronts *at, int lane)
-{
-  at->counts[lane] = at->next < c->chains;
-  begin_chain(c, at, lane, at->counts[lane] ? at->next++ : at->chain[1 - lane]);
-}
-
 /* Eliminate all vertices from the matrix and from the right-hand side b. The reduced system
  * consists of the entries that stay and the Schur complements of the chains. */
 void eliminate(const chains *c, const double *b)
@@ -303,7 +293,7 @@ void eliminate(const chains *c, const double *b)
   for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->kept[k]];
   chain_fronts at = {.next = 0};
   if (c->chains)
-    for (int l = 0; l < PAIR; ++l) take_chain(c, &at, l);
+    for (int l = 0; l < PAIR; ++l) begin_chain(c, &at, l);
   for (int ended = 0; ended < c->chains;) {
     int both = to_go(&at, 0) < to_go(&at, 1) ? to_go(&at, 0) : to_go(&at, 1);
     if (c->spike[at.chain[0]] || c->spike[at.chain[1]]) {
@@ -316,7 +306,7 @@ void eliminate(const chains *c, const double *b)
     for (int l = 0; l < PAIR; ++l) {
       if (to_go(&at, l)) continue;
       if (at.counts[l]) end_chain(c, &at, l), ++ended;
-      take_chain(c, &at, l);
+      begin_chain(c, &at, l);
     }
   }
 }

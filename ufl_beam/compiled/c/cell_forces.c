@@ -130,7 +130,7 @@ void watch_step(const watch *w, int now, double t, const double *before, const d
   const double *at = q;
   widen(&w->of_motion, 0, w->of_motion.size, q, t);
   if (b != 1) {
-    combine(w->of_motion.size, 1 - b, before, b, q, w->q);
+    for (int i = 0; i < w->of_motion.size; ++i) w->q[i] = (1 - b) * before[i] + b * q[i];
     at = w->q;
   }
   if (!in_order) find_cell_forces(w->forces, now, w->numbers);

@@ -4,21 +4,18 @@
 /* Motions of the connectors at q. */
 void find_motions(const connectors *c, const double *q)
 {
-  const int n = c->components;
-  memset(c->by_cell, 0, (size_t)n * c->number * sizeof *c->by_cell);
-  add_cells((void *)c->motion, q, c->by_cell);
-  for (int k = 0; k < c->number; ++k) memcpy(c->e1 + n * c->connector[k], c->by_cell + n * k, n * sizeof(double));
+  memset(c->e1, 0, (size_t)c->components * c->number * sizeof *c->e1);
+  add_cells((void *)c->motion, q, c->e1);
 }
 
-/* Numbers in the rows of a connector; each row has a coefficient for each motion and for the force,
- * and the right side. */
-static int numbers_of_rows(const connectors *c) { return c->components * (c->components + 2); }
-
-/* Write the rows of a connector into the coefficients of its cell. */
-static void put_row(const connectors *c, int cell, const double *row)
+/* Write the rows of all connectors into the coefficients of their cells. */
+static void put_rows(const connectors *c)
 {
-  put_in_cell(c->work, cell, c->row, numbers_of_rows(c), row);
-  put_in_cell(c->tangent, cell, c->row_of_tangent, numbers_of_rows(c), row);
+  const int all = c->components * (c->components + 2);
+  for (int k = 0; k < c->number; ++k) {
+    put_in_cell(c->work, k, c->row, all, c->rows + all * k);
+    put_in_cell(c->tangent, k, c->row_of_tangent, all, c->rows + all * k);
+  }
 }
 
 /* Compute the response of springs to their motions e1. */
@@ -33,10 +30,9 @@ static void set_rows_of_springs(const connectors *c)
 {
   const points *p = c->points;
   respond_springs(c);
-  for (int k = 0; k < c->number; ++k) {
-    const int i = c->connector[k];
-    const double D = p->D[9 * i], row[3] = {-D, 1, p->r[3 * i] - D * c->e1[i]};
-    put_row(c, k, row);
+  for (int i = 0; i < c->number; ++i) {
+    double D = p->D[9 * i], *row = c->rows + 3 * i;
+    row[0] = -D, row[1] = 1, row[2] = p->r[3 * i] - D * c->e1[i];
   }
 }
 
@@ -47,21 +43,21 @@ void ask_law(kernel *law, const double *w, int answers, double *s)
   else memset(s, 0, answers * sizeof *s);
 }
 
-/* Rows of dry friction at the motions e1. A connector sticks while its force is below the limit. It
- * slips until the sliding velocity reverses, in the middle of the step or at its end. In a long
- * step, both slip with a reversed velocity and rest can be solutions; rest is taken if it gives no
- * energy.
+/* Rows of dry friction at q. A connector sticks while its force is below the limit. It slips until
+ * the sliding velocity reverses, in the middle of the step or at its end. In a long step, both slip
+ * with a reversed velocity and rest can be solutions; rest is taken if it gives no energy.
  *
  * If the sliding force can be below the limit, both sticking and sliding can be solutions. While
  * HOLD is set, each connector of such a law stays on the branch of the last step until an
  * equilibrium is found. The excess measures the violation of that branch; the time loop lets
- * connectors change by it.
- */
-static void find_rows_of_friction(friction *f, const double *e0, const double *e1, const double *force)
+ * connectors change by it. */
+static void set_rows_of_friction(const connectors *c, const double *q)
 {
-  for (int i = 0; i < f->number; ++i) {
-    const double step = e1[i] - e0[i], λ = force[i], limit = *f->limit[i];
-    double *slip = f->slip + i, *row = f->rows + 3 * i;
+  friction *f = c->friction;
+  const double *e0 = c->e0, *e1 = c->e1;
+  for (int i = 0; i < c->number; ++i) {
+    const double step = e1[i] - e0[i], λ = q[c->force[i]], limit = *f->limit[i];
+    double *slip = f->slip + i, *row = c->rows + 3 * i;
     const int stuck = *slip == 0;
     const int slows = !f->against[i] && *slip * f->way[i] > 0;
     const int back = !stuck && *slip * (slows ? step - f->way[i] : step) < -f->tiny[i];
@@ -95,17 +91,14 @@ static void find_rows_of_friction(friction *f, const double *e0, const double *e
   f->guessed = 0;
 }
 
-static void get_forces(const connectors *c, const double *q, double *force)
-{
-  for (int i = 0; i < c->number; ++i) force[i] = q[c->force[i]];
-}
-
 /* Rows of compiled laws, linearized at the motions e1. */
-static void find_rows_of_laws(const connector_laws *p, const double *e1)
+static void set_rows_of_laws(const connectors *c)
 {
-  const int n = p->components;
-  double *w = p->w, *row = p->rows, s[12]; /* for up to three components */
-  for (int i = 0; i < p->number; ++i, w += p->width, e1 += n) {
+  const connector_laws *p = c->laws;
+  const int n = c->components;
+  double *w = p->w, *row = c->rows, s[12]; /* for up to three components */
+  const double *e1 = c->e1;
+  for (int i = 0; i < c->number; ++i, w += p->width, e1 += n) {
     memcpy(w, e1, n * sizeof *e1);
     ask_law(p->force, w, n + n * n, s);
     for (int j = 0; j < n; ++j, row += n + 2) {
@@ -116,20 +109,22 @@ static void find_rows_of_laws(const connector_laws *p, const double *e1)
   }
 }
 
-/* Outputs of the law of connector i at the end of a step to the motions e1. */
-static const double *end_of_law(const connector_laws *p, int i, const double *e1)
+/* Outputs of the law of connector i at the end of a step to the latest motions. */
+static const double *end_of_law(const connectors *c, int i)
 {
+  const connector_laws *p = c->laws;
   double *w = p->w + i * p->width;
-  memcpy(w, e1, p->components * sizeof *e1);
+  memcpy(w, c->e1 + c->components * i, c->components * sizeof *w);
   ask_law(p->end, w, LAW_OUTPUTS + p->variables, p->answer);
   return p->answer;
 }
 
-/* Accept the motions e1 as the new state of connector i, which has taken the work `work`. */
-static void commit_law(const connector_laws *p, int i, const double *e1, double work)
+/* Accept the latest motions as the new state of connector i, which has taken the work `work`. */
+static void commit_law(const connectors *c, int i, double work)
 {
-  const int n = p->components;
-  const double *s = end_of_law(p, i, e1);
+  const connector_laws *p = c->laws;
+  const int n = c->components;
+  const double *s = end_of_law(c, i);
   if (p->loses) {
     const double lost = work - (s[LAW_STORED] - p->stored[i]) - s[LAW_NUMERICAL];
     p->lost[n * i] += lost;
@@ -139,86 +134,62 @@ static void commit_law(const connector_laws *p, int i, const double *e1, double 
   p->stored[i] = s[LAW_STORED];
   double *w = p->w + i * p->width;
   memcpy(w + 2 * n + 2, s + LAW_OUTPUTS, p->variables * sizeof *s);
-  memcpy(w + n, e1, n * sizeof *e1);
+  memcpy(w + n, w, n * sizeof *w);
 }
 
-/* Write the rows that depend on the iterate, linearized at q. */
-static void set_rows(const connectors *c, const double *q)
+/* Linearize the rows at q, except those that are constant in a step. */
+void find_rows(const connectors *c, const double *q)
 {
-  const double *rows = 0;
   if (!c->points && !c->rigid_plastic && !c->laws && !c->friction && !c->asked) return;
   find_motions(c, q);
   if (c->points) set_rows_of_springs(c);
-  if (c->rigid_plastic) {
-    set_rows_of_rigid_plastic(c, q);
-    rows = c->rigid_plastic->rows;
-  } else if (c->friction) {
-    get_forces(c, q, c->friction->force);
-    find_rows_of_friction(c->friction, c->e0, c->e1, c->friction->force);
-    rows = c->friction->rows;
-  } else if (c->laws) {
-    find_rows_of_laws(c->laws, c->e1);
-    rows = c->laws->rows;
-  } else if (c->asked) {
-    get_forces(c, q, c->asked->force);
+  else if (c->rigid_plastic) set_rows_of_rigid_plastic(c, q);
+  else if (c->friction) set_rows_of_friction(c, q);
+  else if (c->laws) set_rows_of_laws(c);
+  else {
+    for (int i = 0; i < c->number; ++i) c->asked->force[i] = q[c->force[i]];
     c->asked->find_rows(c->asked->rows_self);
-    rows = c->asked->rows;
   }
-  for (int k = 0; rows && k < c->number; ++k) put_row(c, k, rows + numbers_of_rows(c) * c->connector[k]);
-}
-
-/* Rows of all connectors, linearized at q; rows that are constant in a step are as its beginning
- * has written them. */
-void find_rows(const connectors *c, const double *q, double *rows)
-{
-  const int n = numbers_of_rows(c);
-  set_rows(c, q);
-  for (int k = 0; k < c->number; ++k) {
-    const double *row = in_cell(c->work, k, c->row);
-    for (int i = 0; i < n; ++i) rows[n * c->connector[k] + i] = row[i * c->work->lanes];
-  }
+  put_rows(c);
 }
 
 void add_connectors_force(void *self, const double *q, double *r)
 {
   const connectors *c = self;
-  set_rows(c, q);
+  find_rows(c, q);
   add_cells((void *)c->work, q, r);
 }
 
-/* Largest residual of a row. Motions are relative to 1 % of the largest motion in the scene, at
- * most to 1 % of the scene; forces are relative to the scale. Round-off of the motions does not
- * count; it grows with the distance from the initial position and with the number of turns. */
+/* Largest residual of a row. Residuals of motions are divided by 1 % of `moved`, which is at most
+ * the size of the scene; residuals of forces are divided by `scale`. Round-off of the motions does
+ * not count; it grows with the distance from the initial position and with the number of turns. */
 double missed_by_connectors(void *self, const double *q, const double *r, double scale, double moved)
 {
   const connectors *c = self;
-  const int n = c->components, lanes = c->work->lanes;
-  const double amplitude = moved / c->size;
+  const int n = c->components;
+  const double amplitude = moved / c->size, *row = c->rows;
   double most = 0;
-  for (int k = 0; k < c->number; ++k) {
-    const int i = c->connector[k];
+  for (int i = 0; i < c->number; ++i) {
     const int32_t *dofs = c->dofs + (6 + n) * i;
-    const double *row = in_cell(c->work, k, c->row), *length = c->length + n * i;
+    const double *length = c->length + n * i;
     double far = amplitude;
     for (int j = 0; j < 4; ++j) far = fmax(far, amplitude + fabs(q[dofs[j]]) / c->size);
     for (int j = 4; j < 6; ++j) far = fmax(far, amplitude + fabs(q[dofs[j]]));
-    for (int j = 0; j < n; ++j, row += (n + 2) * lanes) {
-      const double weight = fabs(row[n * lanes]);
+    for (int j = 0; j < n; ++j, row += n + 2) {
+      const double weight = fabs(row[n]);
       const double unit = c->rigid_plastic ? c->rigid_plastic->slope[i] : 1;
       const double size = weight * unit < 1 - 1e-12 ? 0.01 * length[j] * amplitude
                                                     : weight * scale * c->size / length[j];
       double reach = 0; /* of the motions in the row */
-      for (int l = 0; l < n; ++l) reach += fabs(row[l * lanes]) * length[l];
-      const double round_off = 8 * reach * (nextafter(far, INFINITY) - far);
-      const double left = fabs(r[c->force[n * i + j]]) - round_off;
-      const double missed = left > 0 ? left / size : left <= 0 ? 0 : NAN;
-      if (!(missed <= most)) most = missed;
+      for (int l = 0; l < n; ++l) reach += fabs(row[l]) * length[l];
+      const double left = fabs(r[c->force[n * i + j]]) - 8 * reach * last_digit(far);
+      if (left > 0) most = fmax(most, left / size);
     }
   }
   return most;
 }
 
-/* Work that component i takes in a step to the motion e1. */
+/* Work that component i takes in a step to the latest motions. */
 static double taken_by(const connectors *c, int i, const double *q)
 {
   const double a = c->weight_of_before, force = a * c->before[i] + (1 - a) * q[c->force[i]];
@@ -226,7 +197,7 @@ static double taken_by(const connectors *c, int i, const double *q)
 }
 
 /* Accept the end of the step as the new state; returns the work that all connectors have taken in
- * it. */
+ * the step. */
 static double commit_connectors(const connectors *c, const double *q, double dt)
 {
   double sum = 0;
@@ -243,7 +214,7 @@ static double commit_connectors(const connectors *c, const double *q, double dt)
       c->e0[j] = c->e1[j];
       of_all += work;
     }
-    if (c->laws) commit_law(c->laws, i, c->e1 + n * i, of_all);
+    if (c->laws) commit_law(c, i, of_all);
     sum += of_all;
   }
   return sum;

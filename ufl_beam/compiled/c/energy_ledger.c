@@ -2,17 +2,9 @@
 /* Energy ledger: each term accepts a step and enters its works and losses, and adds its energies; see
  * energy_ledger.py. */
 
-static double dot(int size, const double *x, const double *y)
-{
-  double sum = 0;
-#pragma omp simd reduction(+ : sum)
-  for (int i = 0; i < size; ++i) sum += x[i] * y[i];
-  return sum;
-}
-
 /* Work in a step s of the weighted mean of the forces in the previous equation (weight a) and in
- * the equation of this step. The forces are at the degrees of freedom `dof`, or at all if that is
- * null. */
+ * the equation of this step. The forces are at the degrees of freedom `dof`, or at all degrees of
+ * freedom if `dof` is null. */
 static double work_in_step(int size, const int32_t *dof, double a, const double *before, const double *force,
                            const double *s)
 {
@@ -33,6 +25,18 @@ void change_of_form(void *self, const double *q1, energy_change *sum)
   sum->in_beams += value_of_cells(f->form, q1) - f->held;
 }
 
+/* x A y for the matrix A of m */
+static double product_with(const matrix_of_rates *m, const double *x, const double *y)
+{
+  const step_product *p = m->product;
+  double *Ay = p->space, sum = 0;
+  memset(Ay, 0, p->size * sizeof *Ay);
+  add_product(p->A, y, Ay);
+#pragma omp simd reduction(+ : sum)
+  for (int i = 0; i < p->size; ++i) sum += x[i] * Ay[i];
+  return sum;
+}
+
 void accept_second_differences(void *self, const time_step *step, const double *q1, const double *s)
 {
   const second_differences *d = self;
@@ -50,10 +54,9 @@ void accept_second_differences(void *self, const time_step *step, const double *
 void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
 {
   dead_loads *l = self;
-  memcpy(l->parts[2], l->parts[1], l->vectors * sizeof *l->parts[2]);
-  if (!l->acts) return;
   *l->work += work_in_step(l->size, l->dof, l->weight_of_before, l->before, l->force, s);
-  memcpy(l->before, l->end, l->size * sizeof *l->end);
+  memcpy(l->factors_before, l->factors_at_end, l->vectors * sizeof *l->factors_before);
+  sum_loads(l, l->factors_before, l->before);
 }
 
 void accept_follower_loads(void *self, const time_step *step, const double *q1, const double *s)
@@ -102,13 +105,11 @@ void accept_works(void *self, const time_step *step, const double *q1, const dou
     const user_work *w = all->work[k];
     memset(r, 0, all->size * sizeof *r);
     add_cells((void *)w->residual, q1, r);
-    for (int i = 0; i < all->size; ++i) all->force[i] -= r[i];
+    for (int i = 0; i < all->size; ++i) r[i] = -r[i], all->force[i] += r[i];
     if (w->energy) account_for(w, all, step->q0, q1);
     else {
-      double work = 0;
-      for (int i = 0; i < all->size; ++i) work += (a * w->before[i] - (1 - a) * r[i]) * s[i];
-      *w->supplied += work;
-      for (int i = 0; i < all->size; ++i) w->before[i] = -r[i];
+      *w->supplied += work_in_step(all->size, 0, a, w->before, r, s);
+      memcpy(w->before, r, all->size * sizeof *r);
     }
   }
   all->t = all->t_at_end, all->grown = all->grown_at_end;
@@ -129,18 +130,15 @@ void accept_inertia(void *self, const time_step *step, const double *q1, const d
 {
   const matrix_of_rates *m = self;
   rates *r = m->rates;
-  const step_product *p = m->product;
   r->rate[0] = (double *)s;
   combine_rates(r, r->now->rates[0], 0, r->new_rate[1]);
   for (int j = 3; j < r->number; ++j) combine_rates(r, r->now->rates[j - 2], 0, r->new_rate[j]);
   if (m->lost) {
     double *change = m->v;
     for (int i = 0; i < r->size; ++i) change[i] = r->new_rate[1][i] - r->rate[1][i];
-    memset(m->momentum, 0, r->size * sizeof *m->momentum);
-    add_product(p->A, change, m->momentum);
     r->rate[0] = change;
     combine_rates(r, r->now->slip, 0, r->new_rate[2]);
-    *m->lost += dot(r->size, r->new_rate[2], m->momentum);
+    *m->lost += product_with(m, r->new_rate[2], change);
   }
   double *last = r->rate[2] == r->new_rate[1] ? r->rate[1] : r->rate[2]; /* v becomes the previous velocity */
   r->rate[2] = r->rate[1], r->rate[1] = r->new_rate[1], r->new_rate[1] = last;
@@ -154,44 +152,42 @@ void accept_inertia(void *self, const time_step *step, const double *q1, const d
 void add_kinetic_energy(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
-  const step_product *p = m->product;
-  *m->kept += quadratic_form(p->A, m->rates->rate[1]) / 2;
+  const double *v = m->rates->rate[1];
+  *m->kept += product_with(m, v, v) / 2;
 }
 
 void accept_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
-  const step_product *p = m->product;
-  *m->lost += quadratic_form(p->A, s) / step->dt;
+  *m->lost += product_with(m, s, s) / step->dt;
 }
 
-/* Add the dissipation of points in the step to the ledger. */
-static void enter_losses(const inelastic_term *t, const double *sum)
+static void respond_in_term(const inelastic_term *t, const double *q)
 {
+  if (t->cells) respond_at(t->cells, q);
+  else {
+    find_motions(t->springs, q);
+    respond_springs(t->springs);
+  }
+}
+
+void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const inelastic_term *t = self;
+  const double *sum = t->points->sum;
+  respond_in_term(t, q1);
+  commit(t->points);
   if (t->plastic) *t->plastic += sum[0];
   if (t->hinges) *t->hinges += sum[1];
   if (t->numerical) *t->numerical += 2 * t->alpha * sum[2];
   if (t->released) *t->released += sum[5];
 }
 
-static void enter_stored(const inelastic_term *t, const double *sum)
-{
-  *t->stored += sum[3];
-  if (t->hardening) *t->hardening += sum[4];
-}
-
-void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const inelastic_term *t = self;
-  respond_at(t->cells, q1);
-  commit(t->cells->points);
-  enter_losses(t, t->cells->points->sum);
-}
-
 void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
-  enter_stored(t, t->cells->points->sum);
+  *t->stored += t->points->sum[3];
+  if (t->hardening) *t->hardening += t->points->sum[4];
 }
 
 void accept_connectors(void *self, const time_step *step, const double *q1, const double *s)
@@ -204,11 +200,7 @@ void accept_connectors(void *self, const time_step *step, const double *q1, cons
   if (c->friction) memcpy(c->friction->accepted, c->friction->slip, c->number * sizeof(double));
   if (t->lost) *t->lost += c->laws->sum[0];
   if (c->laws && t->points->numerical) *t->points->numerical += c->laws->sum[1];
-  if (c->points) {
-    respond_springs(c);
-    commit(c->points);
-    enter_losses(t->points, c->points->sum);
-  }
+  if (c->points) accept_inelastic(t->points, step, q1, s);
   if (c->rigid_plastic) {
     double sums[3];
     const rigid_plastic *p = c->rigid_plastic;
@@ -224,29 +216,28 @@ void add_energy_of_connectors(void *self, const time_step *step, const double *q
 {
   const connector_term *t = self;
   const connector_laws *l = t->connectors->laws;
-  if (t->connectors->points) enter_stored(t->points, t->connectors->points->sum);
+  if (t->connectors->points) add_energy_of_points(t->points, step, q1, s);
   if (t->connectors->asked) *t->points->stored += *t->connectors->asked->held;
-  for (int i = 0; l && i < l->number; ++i) *t->points->stored += l->stored[i];
+  for (int i = 0; l && i < t->connectors->number; ++i) *t->points->stored += l->stored[i];
   if (t->connectors->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
 }
 
-/* Energy stored and dissipated by points in the latest response, less the present one; see
- * Points.change. */
-static double change_by_response(const points *p, points *copy)
+/* Energy that points store and dissipate in a step to q1. */
+static double change_by_response(const inelastic_term *t, const double *q1)
 {
+  const points *p = t->points, *copy = t->copy;
+  respond_in_term(t, q1);
   memcpy(copy->w, p->w, (size_t)p->cells * p->of_cell * p->width * sizeof *p->w);
   memcpy(copy->e0, p->e0, 3 * (size_t)p->cells * sizeof *p->e0);
   memcpy(copy->kept, p->kept, POINT_KEPT * (size_t)p->cells * sizeof *p->kept);
-  commit(copy);
+  commit(t->copy);
   const double *after = copy->sum, *before = p->sum;
   return after[0] + after[1] + (after[3] - before[3]) + (after[4] - before[4]) + after[5] + after[6];
 }
 
 void change_of_points(void *self, const double *q1, energy_change *sum)
 {
-  const inelastic_term *t = self;
-  respond_at(t->cells, q1);
-  sum->in_beams += change_by_response(t->cells->points, t->copy);
+  sum->in_beams += change_by_response(self, q1);
 }
 
 void change_of_connectors(void *self, const double *q1, energy_change *sum)
@@ -262,27 +253,16 @@ void change_of_connectors(void *self, const double *q1, energy_change *sum)
     sum->effort += fabs(work);
   }
   for (int i = 0; !loses && i < c->number; ++i)
-    taken += end_of_law(c->laws, i, c->e1 + n * i)[LAW_STORED] - c->laws->stored[i];
-  if (c->points) {
-    respond_springs(c);
-    taken = change_by_response(c->points, t->points->copy);
-  }
+    taken += end_of_law(c, i)[LAW_STORED] - c->laws->stored[i];
+  if (c->points) taken = change_by_response(t->points, q1);
   sum->in_connectors += taken;
 }
 
 int points_dissipate(void *self, const double *q1)
 {
   const inelastic_term *t = self;
-  respond_at(t->cells, q1);
-  return gives_energy(t->cells->points) < 0;
-}
-
-int springs_dissipate(void *self, const double *q1)
-{
-  const connector_term *t = self;
-  find_motions(t->connectors, q1);
-  respond_springs(t->connectors);
-  return gives_energy(t->connectors->points) < 0;
+  respond_in_term(t, q1);
+  return gives_energy(t->points) < 0;
 }
 
 static void accept_supports(time_loop *m)

@@ -14,9 +14,7 @@ static const double TRUSTED = 32, NOTHING_LEFT = 1e-12, CLOSE_ENOUGH = 1e-9;
 
 static double product_of(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1]; }
 
-static double last_digit(double x) { return nextafter(x, INFINITY) - x; }
-
-/* Compute the polynomial around the parameter s. */
+/* Compute the polynomial of the curve of guide k around the parameter s. */
 static void expand_curve(const guides *g, int k, double s, curve_around *c)
 {
   double p[CURVE_POINTS][2];
@@ -84,8 +82,8 @@ static int find_nearest(const guides *g, int k, const double *p, double *on, dou
   return 0;
 }
 
-/* Direction of a short chord, taken as the tangent in its middle, and its derivative by the end
- * point. */
+/* Direction d of a short chord, taken as the tangent in its middle; `change` gets the derivative of
+ * d by the distance of the end point along the curve. */
 static void find_direction_in_middle(const guides *g, int k, double *d, double *change)
 {
   curve_around c;
@@ -96,8 +94,8 @@ static void find_direction_in_middle(const guides *g, int k, double *d, double *
   for (int i = 0; i < 2; ++i) change[i] = (bend[i] - d[i] * along) / 2;
 }
 
-/* Distance of a point from the curve, normals, and the derivative of the normal over the step by
- * the point. */
+/* Compute the frame of guide k at the position p; returns whether p has a nearest point on the
+ * curve. */
 static int find_frame(const guides *g, int k, const double *p, guide_frame *f)
 {
   double bend[2], t[2], d[2], change[2];
@@ -184,8 +182,7 @@ double missed_by_guides(void *self, const double *q, const double *r, double sca
     const double *p = g->point + 2 * k, *on0 = g->on0 + 2 * k;
     const double far = g->size + fmax(fabs(p[0] + on0[0]), fabs(p[1] + on0[1]));
     const double left = fabs(r[g->dofs[7 * k + 6]]) - 8 * last_digit(far);
-    const double missed = left > 0 ? left / (0.01 * g->size) : left <= 0 ? 0 : NAN;
-    if (!(missed <= most)) most = missed;
+    if (left > 0) most = fmax(most, left / (0.01 * g->size));
   }
   return most;
 }

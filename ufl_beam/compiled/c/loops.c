@@ -54,12 +54,6 @@ double value_of_cells(const cells *c, const double *q)
   return value;
 }
 
-/* out = a x + b y */
-static void combine(int size, double a, const double *x, double b, const double *y, double *out)
-{
-  for (int i = 0; i < size; ++i) out[i] = a * x[i] + b * y[i];
-}
-
 /* Add all contributions. */
 void add_calls(void *self, const double *q, double *out)
 {
@@ -136,35 +130,6 @@ void add_product(const constant_matrix *A, const double *x, double *y)
     FOR_WIDTH(A->begin[g + 1] - A->begin[g], ADD)
 #undef ADD
   }
-}
-
-/* x A x of a run of rows */
-static inline double square_of_rows(const int width, int rows, const double *data,
-                                    const int32_t *away, const double *x)
-{
-  double sum = 0;
-#pragma omp simd reduction(+ : sum)
-  for (int i = 0; i < rows; ++i) {
-    double row = 0;
-    for (int k = 0; k < width; ++k) row += data[(size_t)k * rows + i] * x[i + away[k]];
-    sum += x[i] * row;
-  }
-  return sum;
-}
-
-/* x A x */
-double quadratic_form(const constant_matrix *A, const double *x)
-{
-  double sum = 0;
-  for (int g = 0; g < A->runs; ++g) {
-    const int first = A->first[g], rows = A->first[g + 1] - first;
-    const int32_t *away = A->away + A->begin[g];
-    const double *data = A->data + A->at[g];
-#define ADD(width) sum += square_of_rows(width, rows, data, away, x + first)
-    FOR_WIDTH(A->begin[g + 1] - A->begin[g], ADD)
-#undef ADD
-  }
-  return sum;
 }
 
 void subtract_frame_forces(void *self, const double *q, double *r)
@@ -285,6 +250,14 @@ double norm(int rows, const int32_t *at, const double *w, const double *f)
     scaled += W(i) * (f[i] / largest) * (W(i) * (f[i] / largest));
 #undef W
   return largest * sqrt(scaled);
+}
+
+/* Difference between a number x >= 0 and the next number, which has the next pattern of bits. */
+static inline double last_digit(double x)
+{
+  union { double number; int64_t bits; } next = {x};
+  next.bits += 1;
+  return next.number - x;
 }
 
 /* Largest displacement in q, or rotation times the size of the scene; w are the weights of

@@ -59,9 +59,9 @@ typedef struct {
   int size, of_cell;              /* of_cell: strains of a cell */
   const double *weight;           /* of each strain of a cell */
   const double *q0, *q_before;    /* configurations at the beginnings of this step and the last one */
-  double ratio;                   /* length of this step over length of the last one */
-  int begins, exact;              /* begins: the next strains are extrapolated; exact: others are at the
-                                   * iterate */
+  double ratio;                   /* length of this step divided by the length of the last one */
+  int begins, exact;              /* begins: the next strains are extrapolated; exact: later strains
+                                   * are strains at the iterate, not predicted */
   double *about, *change, *e;     /* configuration of the latest tangent; space; strains */
   int stale;                      /* whether a tangent has been computed since the strains */
 } predicted_strains;
@@ -114,26 +114,26 @@ int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int num
 int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *dof, int32_t *begin,
                      int32_t *group, int32_t *seen, int32_t *indptr, int32_t *indices);
 void add_product(const constant_matrix *A, const double *x, double *y);
-double quadratic_form(const constant_matrix *A, const double *x);
 void give_back_memory(void);
 double norm(int rows, const int32_t *at, const double *w, const double *f);
 
 /* -- forces in cells --------------------------------------------------------------------------- */
 
-/* Resultants of the forces of a cell in the equation of a step, see cell_forces.py. */
+/* Resultants of the forces on the nodes of a cell in the equation of a step, see cell_forces.py. */
 enum cell_number {
   START_X, START_Y, START_M, END_X, END_Y, END_M, COUPLE, SKEW_X, SKEW_Y, CELL_NUMBERS
 };
 
-/* Origin of forces on nodes of cells: stresses; a work of a user; densities along the cell. */
+/* Origin of forces on nodes of cells: stresses, a work of a user, or densities along the cell. */
 enum force_kind { STRESS, WORK, DENSITY };
 
 /* A form whose entries are forces on nodes of cells. `latest` and `accepted` are these entries in
  * the latest residual and in the residual of the accepted step; if the form is linear in a vector,
- * they are the vector. Entries that depend only on configurations are computed on demand. */
+ * they are this vector instead. Entries that depend only on configurations are computed on demand. */
 typedef struct {
-  const cells *form; /* that is linear in the vector; or none */
-  double **latest, *accepted; /* latest: or none; also none if another form has the same vector */
+  const cells *form; /* form that is linear in the vector; or none */
+  double **latest, *accepted; /* latest: none if entries are computed on demand, or if another form has
+                               * the same vector */
   double *const *vector;
   double *const *entries; /* of the accepted step, in batches */
   double *const *tee;     /* entries in the latest residual, in batches; or none */
@@ -154,8 +154,8 @@ typedef struct {
   int cells, nodes, forces; /* nodes: of a cell */
   force_in_cells *force;
   const loads_in_cells *loads; /* or none */
-  const double *from_middle;   /* position of the nodes of a cell from its middle, as a fraction of the
-                                * cell */
+  const double *from_middle;   /* position of each node of a cell relative to its middle, divided by the
+                                * length of the cell */
   const double *given;         /* known resultants of the state before the first step; then none */
 } cell_forces;
 
@@ -187,10 +187,10 @@ void watch_step(const watch *w, int now, double t, const double *before, const d
 
 /* Python reads the names in these enums in their order; the last name is their number. */
 
-/* The first inputs of the law of a point. Further inputs follow from `strain` of points on: strains
- * at the end of the step, strains before the step, and stiffnesses, `components` of each;
- * `variables` before the step; if `solves`, the same number of variables that are solved for; and
- * parameters of the law. */
+/* The first inputs of the law of a point. Further inputs begin at the index `strain` of `points`:
+ * strains at the end of the step, strains before the step, and stiffnesses, `components` of each;
+ * `variables` before the step; if `solves`, as many variables that are solved for; and parameters of
+ * the law. */
 enum point_input {
   GROWTH, DIRECTION,             /* of an iterate */
   TRACTION, JUMP, OPENING, FLOWS, /* the state before the step */
@@ -209,23 +209,23 @@ enum point_output {
 
 enum { MOST_VARIABLES = 16, MOST_CORRECTIONS = 100 }; /* of a law */
 
-enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell in `kept` of points; sums over cells in `sum` */
+enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell in `kept`, numbers in `sum`, see commit */
 
 extern const double NO_ENERGY; /* relative size below which dissipation counts as zero */
 
 enum { LINE = 3 }; /* strain, stress and slope of the tangent line of a point */
 
 /* Flags of the present search for an equilibrium, which all points and connectors of a scene share.
- * OPENED: a point has opened. STIFF: points that do not open answer elastically. HOLD: points that
- * do not flow stay closed. OVER: a held point has borne more than its limit. */
+ * OPENED: a point has opened. STIFF: points that do not open answer with their elastic stiffness.
+ * HOLD: points that do not flow stay closed. OVER: a held point has borne more than its limit. */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 
 /* Points in cells, `of_cell` in each, with `width` numbers of each in w; see material_points.py. */
 typedef struct {
   int32_t *search;
-  /* Law: stresses and their derivatives by strains; if it solves for variables, also residuals and
-   * their derivatives, see solve_law. Resistance of a discontinuity, and its derivative by the
-   * growth. */
+  /* law: stresses and their derivatives by strains; if `solves`, also residuals and their
+   * derivatives, see solve_law. resistance: of a discontinuity, and its derivative by the growth.
+   * end: outputs at the end of a step, see point_output. */
   kernel *law, *resistance, *end;
   kernel *own; /* dissipation of a law that must not give energy, and its size; or none */
   int solves, components, variables, strain;
@@ -235,8 +235,8 @@ typedef struct {
   double *e0, *e1, *w, *r, *D, *kept, *sum;
   double *over; /* largest excess of a closed point over its limit in the latest response */
   int tried;    /* whether the law has answered an iterate of this step */
-  /* Tangent lines of points of one strain: in the latest response, and in the last tangent if it
-   * `predicts`; see follow_prediction. */
+  /* Tangent lines of points of one strain: in the latest response, and in the last tangent, if
+   * `predicts` says that there is one in this step; see follow_prediction. */
   double *line, *predicted;
   int predicts;
   const double *linear; /* strains of cells that a static iteration predicts; or none */
@@ -274,14 +274,13 @@ typedef struct {
   const double *slope;         /* r > 0 of the equation of each, see rigid_plastic.c */
   double *excess;              /* |force - back force| / limit - 1 of held connectors beyond the limit */
   int32_t *way;                /* direction in which each slips in the present iterate, or 0 */
-  double *rows;                /* three of each connector */
 } rigid_plastic;
 
 typedef struct friction friction;
 
 /* Connectors whose laws are Python functions of a user, see compiled_connector_laws.py. */
 typedef struct {
-  double *force, *rows; /* forces in the iterate; linearized rows of the laws, three of each */
+  double *force;        /* in the iterate, for find_rows, which writes the rows of `connectors` */
   double *held;         /* energy that the connectors store */
   void *begin_self, *rows_self, *again_self; /* data of the functions */
   void (*begin)(void *self, double t, double dt);
@@ -295,24 +294,23 @@ enum law_output { LAW_STORED, LAW_NUMERICAL, LAW_OUTPUTS };
  * before the step, dt, theta, the variables before the step, and the parameters of the law. */
 typedef struct {
   kernel *force, *end;        /* forces and their derivatives by the motions; outputs at the end of a step */
-  int number, width, variables;
-  int components;             /* motions of each connector */
+  int width, variables;
   int loses;                  /* 1: work that is not stored is dissipated; 0: the ledger stays open by it */
   double *w;                  /* data of the kernels, `width` numbers of each connector */
   double *stored, *lost;      /* energy in the accepted state; energy dissipated by each since the
                                * beginning */
-  double *rows, *answer;      /* rows as in `connectors`; space for the outputs of a law */
+  double *answer;             /* space for the outputs of a law */
   double *sum;                /* energy lost in the last step: by the laws, by the scheme */
 } connector_laws;
 
-/* Numbers of an accepted step that are kept, with the names of fields of `Connection`: work taken since
- * the beginning, rate. */
+/* Numbers of an accepted step that are kept, with the names of fields of `Connection`: work taken
+ * since the beginning, and rate of the motion. */
 enum connector_number { CONNECTOR_WORK, CONNECTOR_RATE, CONNECTOR_NUMBERS };
 
 /* Connectors with the same components of motion, in cells whose unknowns include the forces. The
  * law of a component is a row a·e + b f = c in all motions e of the connector and the force f of
- * the component. Material points supply the rows of springs. Arrays have one number for each
- * component of each connector. */
+ * the component. Material points supply the rows of springs. Arrays without another comment have
+ * one number for each component of each connector. */
 typedef struct {
   const cells *work, *tangent, *motion;
   points *points;                  /* or none */
@@ -321,9 +319,10 @@ typedef struct {
   friction *friction;              /* or none */
   called_laws *asked;               /* or none; if all of these are none, the rows are constant in a step */
   int number, components;          /* components: 1, except for compiled laws */
-  const int32_t *connector, *force;     /* connector of each cell; indices of the forces among the unknowns */
+  const int32_t *force;            /* indices of the forces among the unknowns */
+  double *rows;                    /* latest (a, b, c) of each component */
   int row, row_of_tangent;         /* positions of the rows in the coefficients of work and tangent */
-  double *by_cell, *e1;            /* space; motions at the latest unknowns */
+  double *e1;                      /* motions at the latest unknowns */
   double *e0, *before, *kept[CONNECTOR_NUMBERS]; /* accepted state: motion, force, numbers kept */
   double weight_of_before;         /* weight of the force before the step in the work of the step */
   const int32_t *dofs;             /* of each connector: six of its nodes, then the forces */
@@ -333,7 +332,7 @@ typedef struct {
 
 void find_motions(const connectors *c, const double *q);
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
-void find_rows(const connectors *c, const double *q, double *rows);
+void find_rows(const connectors *c, const double *q);
 void ask_law(kernel *law, const double *w, int answers, double *s);
 part add_connectors_force, add_guides_force, add_guides_tangent;
 void respond(points *p);
@@ -456,7 +455,7 @@ void expand_fronts(const fronts *c, double *found);
 /* -- Newton's method, see newton.c ------------------------------------------------------------- */
 
 /* Functions of PETSc, which Python looks up under these names; PETSc's objects are opaque here.
- * Each returns an error code or zero, as the callbacks of SNES do. */
+ * Each function returns an error code or zero, as the callbacks of SNES do. */
 typedef struct {
   int (*PetscErrorMessage)(int error, const char **text, char **specific);
   int (*PetscOptionsUsed)(void *options, const char *name, void *used); /* a bool or an int */
@@ -666,11 +665,12 @@ typedef struct {
   void *handle;
 } time_function;
 
-/* Form with the configuration q0 at the beginning of a step in its coefficients, from `at` on. */
+/* Form with numbers of a step in its coefficients, from `at` on; for example, with the configuration
+ * q0 at the beginning of the step. */
 typedef struct { const cells *form; int at; } form_of_step;
 
-/* Forms with a time constant over the time step in their coefficients, for each point of a cell,
- * from `at` on. */
+/* Forms whose coefficients have a time constant divided by the time step, for each of the `of_cell`
+ * points of a cell. */
 typedef struct {
   int forms, of_cell;
   const form_of_step *form;
@@ -715,11 +715,11 @@ typedef struct {
   const int32_t *dof;
   const double *const *vector;
   const time_function *factor;
-  double *factors; /* of the latest step; NaN before the first */
-  double *force, *end, *before;
-  double *parts[3]; /* coefficients of the vectors in `force`, `end` and `before` */
+  double *asked; /* factors that the functions gave for the latest step; NaN before the first */
+  double *factors, *factors_at_end, *factors_before; /* in the equation; at the ends of this step and the
+                                                      * last one */
+  double *force, *before; /* in the equation; at the end of the last step */
   double weight_of_before;
-  int acts; /* whether a force, now or before, is not zero */
   double *work; /* entry of the ledger */
 } dead_loads;
 
@@ -745,7 +745,7 @@ enum work_number { WORK_TIME, WORK_STEP, WORK_PART, WORK_NUMBERS };
 /* A work of a user on cells, see user_forces.py. */
 typedef struct {
   const cells *residual;
-  int forms, numbers;
+  int forms, numbers;           /* numbers: of the parameters */
   const form_of_step *form;     /* all forms of the work, and the position of q0 in each, or -1 */
   const int32_t *at;            /* forms x numbers: positions of the parameters, or -1 */
   double *number;               /* current values in the forms */
@@ -809,7 +809,6 @@ struct friction {
   int32_t *search, *free;      /* of laws: the flags of points; whether each may change in the iterates */
   double *excess;              /* of laws: violation of the present branch */
   int guessed;                 /* whether the next iterate is the initial guess */
-  double *force, *rows;        /* in the iterate; three numbers of each */
 };
 
 /* Set `now` to the coefficients of a step of length dt; returns whether that succeeds. */
@@ -819,7 +818,8 @@ int find_numbers(rates *r, double dt);
 typedef struct {
   step_product *product;
   rates *rates;
-  double *v, *momentum; /* space */
+  int damps;            /* whether it multiplies velocities */
+  double *v;            /* space */
   double *kept, *lost; /* entries of the ledger, energy stored and dissipated; or none */
 } matrix_of_rates;
 
@@ -833,9 +833,11 @@ typedef struct {
   double weight_of_before;
 } moving_supports;
 
-/* Cells with material points, and their entries of the ledger, or none. */
+/* Material points of cells or of springs, and their entries of the ledger, or none. */
 typedef struct {
-  inelastic *cells;
+  points *points;
+  inelastic *cells;          /* or none */
+  const connectors *springs; /* or none */
   double alpha, *dt;
   points *copy; /* in statics: space for the points in the state at the end of a step */
   double *plastic, *hinges, *numerical, *released, *stored, *hardening;
@@ -855,7 +857,7 @@ typedef struct {
   double *hardened, loss; /* energy stored by rigid-plastic connectors; fraction of the loss of backward
                            * Euler */
   double *lost;           /* ledger entry of compiled laws */
-  const inelastic_term *points; /* ledger entries of springs, rigid-plastic connectors and laws */
+  inelastic_term *points; /* ledger entries of springs, rigid-plastic connectors and laws */
 } connector_term;
 
 /* Forces of laws of a user, watched for changes of direction at every step; see controllers.py. */
@@ -898,10 +900,10 @@ typedef struct {
 } static_path;
 
 /* Places that open beyond a limit: points of cells or of springs, rigid-plastic connectors, or
- * friction connectors. */
+ * friction connectors; the other pointers are none. */
 typedef struct {
-  inelastic *cells;
   points *points;
+  inelastic *cells;
   friction *rubs;
   rigid_plastic *slips;
   const int32_t *way_before; /* of rigid-plastic connectors, after the last step */
@@ -933,8 +935,7 @@ typedef struct {
   int in_parts;          /* whether substeps go in proportion to loads and motions at the end of the step */
   int rotations, half_tangents, multipliers;
   const int32_t *rotation, *half_tangent, *multiplier;
-  int limits_rotation;
-  double turn, largest_turn; /* turn: largest rotation in the step */
+  double turn, largest_turn; /* largest rotation in the step; limit of it, infinite if there is none */
   rates *rates;       /* in dynamics */
   int admissions, judges; /* checks of laws; whether any process has checks */
   const admission_call *admission;
@@ -971,11 +972,11 @@ typedef struct {
 phase begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
   accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_frame, accept_frame, begin_works,
   accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
-  accept_second_differences, begin_inertia, accept_inertia, add_kinetic_energy, begin_rayleigh,
-  accept_rayleigh, begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,
+  accept_second_differences, begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
+  begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,
   accept_connectors, add_energy_of_connectors, begin_guides, accept_guides;
 void begin_connectors_again(void *self);
-admission points_dissipate, springs_dissipate;
+admission points_dissipate;
 change_of_energy change_of_form, change_of_points, change_of_connectors;
 double value_at(const time_function *f, double t);
 void keep_state(const time_loop *m, double *row);

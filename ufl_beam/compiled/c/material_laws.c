@@ -121,7 +121,7 @@ static inline int improve_sized(int m, int d, const points *p, double *w, double
   }
 }
 
-/* The same; the compiler knows frequent sizes as constants. */
+/* Call improve_sized, with constants for frequent sizes, which the compiler can use. */
 static int improve(const points *p, double *w, double *s)
 {
   const int m = p->variables, d = p->components;
@@ -130,7 +130,8 @@ static int improve(const points *p, double *w, double *s)
   return improve_sized(m, d, p, w, s);
 }
 
-/* Relative precision of the variables; the square of the last correction is negligible. */
+/* The variables of a law have this relative precision, since the square of the last correction is
+ * negligible. */
 const double NO_ENERGY = 1e-9;
 
 /* Dissipation of a law in the step, relative to its size; zero if that is not finite. */

@@ -133,10 +133,10 @@ void respond(points *p)
   p->tried = 1;
 }
 
-/* x = D e */
-static inline void multiply(const double *D, const double *e, double *x)
+/* y -= A x */
+static inline void subtract(const double *A, const double *x, double *y)
 {
-  for (int k = 0; k < 3; ++k) x[k] = D[3 * k] * e[0] + D[3 * k + 1] * e[1] + D[3 * k + 2] * e[2];
+  for (int i = 0; i < 3; ++i) y[i] -= A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
 }
 
 /* Write the resultants as affine functions b + D e of the strains into the tangent. Their values at
@@ -146,9 +146,8 @@ static void linearise(const inelastic *m, const double *forces)
   const points *p = m->points;
   const double *e = p->e1, *D = p->D;
   for (int c = 0; c < p->cells; ++c, e += 3, forces += 3, D += 9) {
-    double b[3];
-    multiply(D, e, b);
-    for (int k = 0; k < 3; ++k) b[k] = forces[k] - b[k];
+    double b[3] = {forces[0], forces[1], forces[2]};
+    subtract(D, e, b);
     put_in_cell(m->tangent, c, m->at_b, 3, b);
     put_in_cell(m->tangent, c, m->at_D, 9, D);
   }
@@ -159,17 +158,14 @@ static void take_tangent(const inelastic *m)
 {
   const points *p = m->points;
   memcpy(m->last_D, p->D, 9 * (size_t)p->cells * sizeof *p->D);
-  for (int c = 0; c < p->cells; ++c) {
-    double *b = m->last_b + 3 * c;
-    multiply(p->D + 9 * c, p->e1 + 3 * c, b);
-    for (int k = 0; k < 3; ++k) b[k] = p->r[3 * c + k] - b[k];
-  }
+  memcpy(m->last_b, p->r, 3 * (size_t)p->cells * sizeof *p->r);
+  for (int c = 0; c < p->cells; ++c) subtract(p->D + 9 * c, p->e1 + 3 * c, m->last_b + 3 * c);
 }
 
-/* Forces for the tangent of a static step. The first are the forces before the step, or, for points
- * with tangent lines, forces at the extrapolated strains. Later ones are predicted by the latest
- * tangent for the strains that it predicts; see predicted_strains in beam_forces.py. Stiff points predict
- * nothing. */
+/* Forces for the tangent of a static step. The first forces are the forces before the step, or, for
+ * points with tangent lines, forces at the extrapolated strains. Later forces are predicted by the
+ * latest tangent for the strains that it predicts; see predicted_strains in beam_forces.py. Stiff
+ * points predict nothing. */
 static const double *predict_forces(const inelastic *m, const double *q)
 {
   const points *p = m->points;
@@ -183,9 +179,9 @@ static const double *predict_forces(const inelastic *m, const double *q)
   }
   if (s->begins) take_tangent(m);
   if (!p->line || s->stale) predict_strains(s, q);
-  for (int c = 0; c < p->cells; ++c) {
-    multiply(m->last_D + 9 * c, s->e + 3 * c, f + 3 * c);
-    for (int k = 3 * c; k < 3 * c + 3; ++k) f[k] += m->last_b[k];
+  for (int k = 0; k < 3 * p->cells; ++k) {
+    const double *D = m->last_D + 3 * k, *e = s->e + k / 3 * 3;
+    f[k] = m->last_b[k] + (D[0] * e[0] + D[1] * e[1] + D[2] * e[2]);
   }
   return f;
 }

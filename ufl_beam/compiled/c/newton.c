@@ -18,13 +18,14 @@ double over_processes(const equation *e, enum agreement how, double here)
   return here;
 }
 
-/* Norm of forces, and of moments over the size of the scene; each process passes its degrees of
- * freedom. */
+/* Norm of forces, and of moments divided by the size of the scene, over all processes. */
 static double norm_of(const equation *e, const double *forces)
 {
   return over_processes(e, HYPOT, norm(e->size, 0, e->weight, forces));
 }
 
+/* Update the ghost values of a PETSc vector (INSERT_VALUES, FORWARD), or add them to the values of
+ * the processes that own them (ADD_VALUES, REVERSE). */
 static int exchange_ghosts(const equation *e, void *v, int mode, int way)
 {
   if (!e->agree) return 0;
@@ -32,10 +33,7 @@ static int exchange_ghosts(const equation *e, void *v, int mode, int way)
   return error ? error : petsc.VecGhostUpdateEnd(v, mode, way);
 }
 
-/* Update the ghost values of a PETSc vector; or add them to the values of the processes that own
- * them. */
 static int update_ghosts(const equation *e, void *v) { return exchange_ghosts(e, v, INSERT_VALUES, FORWARD); }
-static int add_ghosts(const equation *e, void *v) { return exchange_ghosts(e, v, ADD_VALUES, REVERSE); }
 
 /* Exception raised by a function of a user on any process, see enum raised; synchronizes
  * e->raised. */
@@ -74,13 +72,6 @@ static void turn_entries(double *data, int number, const int32_t *first, const i
 
 /* -- residual and tangent ---------------------------------------------------------------------- */
 
-/* Store the norm and a copy of the internal forces, which r consists of so far. */
-static void note_inner_forces(equation *e, const double *r)
-{
-  e->inner_size = norm(e->size, 0, e->weight, r);
-  if (e->inner_force) memcpy(e->inner_force, r, e->size * sizeof *r);
-}
-
 /* Residual r at x, the array of the PETSc vector f. Support reactions are stored and removed from
  * r. */
 int residual(equation *e, const double *x, double *r, void *f)
@@ -88,10 +79,11 @@ int residual(equation *e, const double *x, double *r, void *f)
   const double *q = in_plane(e, x);
   memset(r, 0, e->size * sizeof *r);
   for (int k = 0; k < e->inner; ++k) e->force[k].add(e->force[k].self, q, r);
-  note_inner_forces(e, r);
+  e->inner_size = norm(e->size, 0, e->weight, r);
+  if (e->inner_force) memcpy(e->inner_force, r, e->size * sizeof *r);
   for (int k = e->inner; k < e->forces; ++k) e->force[k].add(e->force[k].self, q, r);
   turn_axes(e->turned, e->axes, r, 1);
-  const int error = add_ghosts(e, f);
+  const int error = exchange_ghosts(e, f, ADD_VALUES, REVERSE);
   for (int k = 0; k < e->held; ++k) {
     e->reactions[k] = r[e->hold[k]];
     r[e->hold[k]] = 0;
@@ -180,8 +172,8 @@ static int laws_met(const equation *e, const double *x, double scale)
   const double *q = in_plane(e, x);
   double most = 0;
   for (int k = 0; k < e->law_residuals; ++k) {
-    const double missed = e->law_residual[k].missed(e->law_residual[k].self, q, e->residual, scale, e->moved);
-    if (!(missed <= most)) most = isnan(missed) ? INFINITY : missed;
+    const law_residual *law = e->law_residual + k;
+    most = fmax(most, law->missed(law->self, q, e->residual, scale, e->moved));
   }
   return over_processes(e, LARGEST, most) <= e->rtol;
 }
@@ -227,16 +219,13 @@ static int judge(equation *e, const double *q, int iteration, double residual, d
 }
 
 /* Forces from the round-off of displacements and rotations, estimated with the diagonal of the
- * tangent. Strains have their own relative precision as long as rotations are small. The next
- * floating-point number has the next pattern of bits. */
+ * tangent. Strains have their own relative precision as long as rotations are small. */
 void find_round_off(const equation *e, const double *q, double *forces)
 {
   const double amplitude = e->moved / e->scene;
   for (int i = 0; i < e->size; ++i) {
     const double far = fabs(q[i]) + amplitude * e->lengths[i];
-    union { double number; int64_t bits; } next = {far};
-    next.bits += 1;
-    forces[i] = e->moves[i] * (next.number - far) * e->tangent[e->diagonal[i]];
+    forces[i] = e->moves[i] * last_digit(far) * e->tangent[e->diagonal[i]];
   }
 }
 
@@ -492,14 +481,6 @@ static int go_to(equation *e, const double *guess, enum tangents kind)
   return 0;
 }
 
-/* Remove the locks that PETSc leaves on a vector after a failed linear solution. */
-static void unlock(void *v)
-{
-  petsc_int locks = 0;
-  petsc.VecLockGet(v, &locks);
-  while (locks-- > 0) petsc.VecLockReadPop(v);
-}
-
 /* Iterations in a row that do not halve the least residual, at which the method stalls: for full
  * steps; for steps that a line search shortens or with stiffer tangents; along paths. Iterates that
  * wander longer find a solution by luck: round-off of the data would decide. */
@@ -523,7 +504,11 @@ static int iterate(equation *e, int patience, int careful)
     petsc.SNESGetConvergedReason(e->snes, &e->reason);
     e->error = update_ghosts(e, e->x); /* PETSc copies only the values that a process owns */
   }
-  if (e->reason <= 0 && by_petsc) unlock(e->f);
+  if (e->reason <= 0 && by_petsc) { /* PETSc leaves locks on f after a failed linear solution */
+    petsc_int locks = 0;
+    petsc.VecLockGet(e->f, &locks);
+    while (locks-- > 0) petsc.VecLockReadPop(e->f);
+  }
   return e->reason;
 }
 

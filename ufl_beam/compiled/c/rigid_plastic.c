@@ -42,8 +42,8 @@ static int direction_of_slip(const rigid_plastic *p, int i, double *w, double mo
   return way;
 }
 
-/* Rows of the connectors at their motions c->e1 and forces in q: the equations above over -r, so
- * that the tangent of held connectors is symmetric. */
+/* Rows of the connectors at their motions c->e1 and forces in q: the equations above divided by r.
+ * So the rows of held connectors are motions, and their tangent is symmetric. */
 static void set_rows_of_rigid_plastic(const connectors *c, const double *q)
 {
   const rigid_plastic *p = c->rigid_plastic;
@@ -51,7 +51,7 @@ static void set_rows_of_rigid_plastic(const connectors *c, const double *q)
   for (int i = 0; i < c->number; ++i, w += p->width) {
     const double motion = c->e1[i] - w[SLIP_START];
     const int way = direction_of_slip(p, i, w, motion, q[c->force[i]]);
-    double *row = p->rows + 3 * i;
+    double *row = c->rows + 3 * i;
     row[0] = 1, row[1] = 0, row[2] = w[SLIP_START];
     p->way[i] = way;
     if (!way) continue;

@@ -10,8 +10,8 @@
 /* Root mean square of motions up to which a step resolves them, relative to the scene's size. */
 static const double FAR = 1. / 8;
 
-/* Return 1 if a step is as long as the last one. Differences of times have fewer digits than the
- * times. */
+/* Whether a step is as long as the last one. The tolerance is far above round-off, because
+ * differences of times have fewer digits than the times. */
 static int as_last(const prediction *p, double dt)
 {
   return fabs(dt - p->dt) <= 1e-6 * dt;
@@ -76,7 +76,7 @@ static int set_step(time_loop *m, double t1, double end)
   return !m->rates || find_numbers(m->rates, dt);
 }
 
-/* Begin the step in all terms; returns whether no function of a user has raised an exception. */
+/* Begin the step in all terms; returns 0 if a function of a user has raised an exception. */
 static int begin_terms(time_loop *m)
 {
   run(&m->begin, &m->step, 0, 0);
@@ -103,27 +103,6 @@ static void guess(time_loop *m)
   }
 }
 
-/* Begin the step and compute its initial guess; returns whether no function of a user has raised an
- * exception. */
-static int begin_at_guess(time_loop *m)
-{
-  run(&m->begin, &m->step, 0, 0);
-  guess(m);
-  return raised_anywhere(m->equation) == NOTHING;
-}
-
-/* Size of the loads in the step, on all processes. */
-static double size_of_loads(const time_loop *m)
-{
-  const equation *e = m->equation;
-  double size = 0;
-  for (int k = 0; k < m->loads; ++k) {
-    const vector *l = m->load[k];
-    size += over_processes(e, HYPOT, norm(l->size, l->dof, e->weight, l->values));
-  }
-  return size;
-}
-
 /* -- places that open: see material_points.py ------------------------------------------------------------ */
 
 /* Held places open in rounds: first places with the largest excess over their limit, then places
@@ -136,8 +115,7 @@ static double largest_excess(const time_loop *m)
   double most = 0;
   for (int k = 0; k < m->places; ++k) {
     const openable *o = m->place + k;
-    if (o->cells) most = fmax(most, *o->cells->points->over);
-    else if (o->points) most = fmax(most, *o->points->over);
+    if (o->points) most = fmax(most, *o->points->over);
     for (int i = 0; o->slips && i < o->slips->number; ++i) most = fmax(most, o->slips->excess[i]);
     for (int i = 0; o->rubs && i < o->rubs->number; ++i) most = fmax(most, o->rubs->excess[i]);
   }
@@ -150,11 +128,8 @@ static void open_places(time_loop *m, double least)
   for (int k = 0; k < m->places; ++k) {
     const openable *o = m->place + k;
     const rigid_plastic *p = o->slips;
-    if (o->cells) {
-      release(o->cells->points, least);
-      o->cells->latest[0] = NAN;
-    } else if (o->points)
-      release(o->points, least);
+    if (o->points) release(o->points, least);
+    if (o->cells) o->cells->latest[0] = NAN;
     for (int i = 0; p && i < p->number; ++i)
       if (p->excess[i] > 0 && p->excess[i] >= least) p->slipped[i] = RELEASED;
     for (int i = 0; o->rubs && i < o->rubs->number; ++i)
@@ -168,7 +143,7 @@ static void end_search(time_loop *m, int opened)
   memset(m->equation->search, 0, SEARCH_FLAGS * sizeof(int32_t));
   for (int k = 0; opened && k < m->places; ++k) {
     const openable *o = m->place + k;
-    const points *p = o->cells ? o->cells->points : o->points;
+    const points *p = o->points;
     for (int i = 0; p && i < p->cells * p->of_cell; ++i)
       if (p->w[i * p->width + FLOWS] == RELEASED) p->w[i * p->width + FLOWS] = CLOSED;
     for (int i = 0; o->slips && i < o->slips->number; ++i) o->slips->slipped[i] = abs(o->way_before[i]);
@@ -182,7 +157,11 @@ static int solve(time_loop *m, int hold)
 {
   equation *e = m->equation;
   const double t = e->border ? *e->border->t : 0;
-  e->loads = size_of_loads(m);
+  e->loads = 0;
+  for (int k = 0; k < m->loads; ++k) {
+    const vector *l = m->load[k];
+    e->loads += over_processes(e, HYPOT, norm(l->size, l->dof, e->weight, l->values));
+  }
   if (!m->opens) return find_equilibrium(e, m->guess) > 0;
   int opened = 0;
   if (hold) {
@@ -228,7 +207,7 @@ static int measure(time_loop *m)
   m->turn = over_processes(e, LARGEST, turn);
   if (m->applies && m->turn > m->applying_turn && m->short_part * m->step.dt > m->applied_by - m->begin_of_run)
     return fails(m, APPLIED_TOO_FAST);
-  if (m->limits_rotation && !(m->turn <= m->largest_turn)) return fails(m, TURNS_TOO_FAR);
+  if (!(m->turn <= m->largest_turn)) return fails(m, TURNS_TOO_FAR);
   for (int k = 0; k < m->half_tangents; ++k) {
     const int i = m->half_tangent[k];
     m->s[i] = 2 * tan(m->s[i] / 2);
@@ -286,6 +265,17 @@ static int solve_step(time_loop *m, int hold)
   return !m->path || followed(m);
 }
 
+/* Begin a step to t1, a substep of one to `end`, and solve it from its initial guess. */
+static int solve_to(time_loop *m, double t1, double end)
+{
+  if (set_step(m, t1, end)) {
+    run(&m->begin, &m->step, 0, 0);
+    guess(m);
+    if (raised_anywhere(m->equation) == NOTHING) return solve_step(m, 1);
+  }
+  return fails(m, RAISED);
+}
+
 /* Fraction of the first step after which the acceleration is taken as the initial one. Shorter
  * trial steps come closer to it, but amplify velocities of supports that do not fit the initial
  * velocities. */
@@ -294,16 +284,12 @@ static const double FIRST_TRIAL = 1. / 16;
 /* Solve the step to t1, a substep of one to `end`; the state changes only if it is accepted. */
 int attempt_step(time_loop *m, double t1, double end)
 {
-  equation *e = m->equation;
-  e->raised = NOTHING;
+  m->equation->raised = NOTHING;
   if (m->rates && m->prepare && !m->rates->ready) {
-    const double first = m->t + FIRST_TRIAL * (t1 - m->t);
-    if (!set_step(m, first, t1) || !begin_at_guess(m)) return fails(m, RAISED);
-    if (!solve_step(m, 1)) return 0;
+    if (!solve_to(m, m->t + FIRST_TRIAL * (t1 - m->t), t1)) return 0;
     m->prepare(m->handle);
   }
-  if (!set_step(m, t1, end) || !begin_at_guess(m)) return fails(m, RAISED);
-  return solve_step(m, 1);
+  return solve_to(m, t1, end);
 }
 
 /* Solve a step of a path that Python has set. */
@@ -332,8 +318,8 @@ static void watch_forces(force_watch *w, const time_loop *m)
   }
 }
 
-/* Accept the end of the step as the state. Returns whether no function of a user has raised an
- * exception. The step is accepted even if one has, because some terms have accepted it already. */
+/* Accept the end of the step as the state. Returns 0 if a function of a user has raised an
+ * exception. The step is accepted nevertheless, because some terms have accepted it already. */
 int accept_step(time_loop *m)
 {
   equation *e = m->equation;

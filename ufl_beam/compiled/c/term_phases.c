@@ -67,6 +67,14 @@ void begin_static_tangent(void *self, const time_step *step, const double *q1, c
   t->predicted->ratio = 0;
 }
 
+/* forces = sum of factors times vectors of loads */
+static void sum_loads(const dead_loads *l, const double *factors, double *forces)
+{
+  for (int i = 0; i < l->size; ++i) forces[i] = factors[0] * l->vector[0][i];
+  for (int k = 1; k < l->vectors; ++k)
+    for (int i = 0; i < l->size; ++i) forces[i] += factors[k] * l->vector[k][i];
+}
+
 void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
 {
   dead_loads *l = self;
@@ -74,28 +82,13 @@ void begin_dead_loads(void *self, const time_step *step, const double *q1, const
   int same = whole && l->whole;
   l->whole = whole;
   for (int k = 0; k < l->vectors; ++k) {
-    const double factor = value_at(l->factor + k, step->load_time);
-    if (factor != l->factors[k]) l->factors[k] = factor, same = 0;
+    const double factor = value_at(l->factor + k, step->load_time), before = l->factors_before[k];
+    const double change = step->fraction * (factor - before), end = whole ? factor : before + change;
+    if (factor != l->asked[k]) l->asked[k] = factor, same = 0;
+    l->factors_at_end[k] = end;
+    l->factors[k] = step->at == 1 ? end : before + step->at * change;
   }
-  if (same) return;
-  for (int k = 0; k < l->vectors; ++k) {
-    const double before = l->parts[2][k], change = step->fraction * (l->factors[k] - before);
-    l->parts[1][k] = whole ? l->factors[k] : before + change;
-    l->parts[0][k] = step->at == 1 ? l->parts[1][k] : before + step->at * change;
-  }
-  l->acts = 0;
-  for (int i = 0; i < l->size; ++i) l->end[i] = l->factors[0] * l->vector[0][i];
-  for (int k = 1; k < l->vectors; ++k)
-    for (int i = 0; i < l->size; ++i) l->end[i] += l->factors[k] * l->vector[k][i];
-  for (int i = 0; i < l->size; ++i) {
-    if (!whole) {
-      const double change = step->fraction * (l->end[i] - l->before[i]);
-      l->end[i] = l->before[i] + change;
-      l->force[i] = step->at == 1 ? l->end[i] : l->before[i] + step->at * change;
-    } else
-      l->force[i] = l->end[i];
-    l->acts |= l->force[i] != 0 || l->end[i] != 0 || l->before[i] != 0;
-  }
+  if (!same) sum_loads(l, l->factors, l->force);
 }
 
 void begin_follower_loads(void *self, const time_step *step, const double *q1, const double *s)
@@ -140,7 +133,7 @@ static void put_time(const user_work *w, double t)
   for (int k = WORK_NUMBERS; k < w->numbers; ++k) put_number(w, k, value_at(w->of_time + k - WORK_NUMBERS, t));
 }
 
-/* Longest time step that works get; all rates vanish with it. */
+/* Longest time step that works get, instead of an infinite one; all rates are practically zero. */
 static const double AT_REST = 1e300;
 
 void begin_works(void *self, const time_step *step, const double *q1, const double *s)
@@ -193,14 +186,16 @@ int find_numbers(rates *r, double dt)
   return 1;
 }
 
-/* Write a row of coefficients as factor s - back v. v is a rate, or a sum if several coefficients
- * are nonzero. */
-static void begin_product(const matrix_of_rates *m, const time_step *step, const double *row)
+/* Write the coefficients of the rates as factor s - back v. v is a rate, or a sum if several
+ * coefficients are nonzero. */
+void begin_product(void *self, const time_step *step, const double *q1, const double *s)
 {
+  const matrix_of_rates *m = self;
   step_product *p = m->product;
-  p->q0 = step->q0;
   const rates *r = m->rates;
+  const double *row = m->damps ? r->now->velocity : r->now->inertia;
   int last = 0, some = 0;
+  p->q0 = step->q0;
   for (int j = 1; j < r->number; ++j)
     if (row[j] != 0) last = j, ++some;
   p->factor = row[0];
@@ -209,56 +204,39 @@ static void begin_product(const matrix_of_rates *m, const time_step *step, const
   if (some != 1) combine_rates(r, row, 1, m->v);
 }
 
-void begin_inertia(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const matrix_of_rates *m = self;
-  begin_product(m, step, m->rates->now->inertia);
-}
-
-void begin_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const matrix_of_rates *m = self;
-  begin_product(m, step, m->rates->now->velocity);
-}
-
-static void begin_points(points *p, double *dt, double new_dt)
-{
-  if (new_dt != *dt) {
-    *dt = new_dt;
-    for (int k = 0; k < p->cells * p->of_cell; ++k) p->w[k * p->width + DT] = new_dt;
-  }
-  p->tried = p->predicts = 0;
-}
-
 void begin_inelastic(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
-  begin_points(t->cells->points, t->dt, step->dt);
-  t->cells->latest[0] = NAN; /* compute the next response in any case */
+  points *p = t->points;
+  if (step->dt != *t->dt) {
+    *t->dt = step->dt;
+    for (int k = 0; k < p->cells * p->of_cell; ++k) p->w[k * p->width + DT] = step->dt;
+  }
+  p->tried = p->predicts = 0;
+  if (t->cells) t->cells->latest[0] = NAN; /* compute the next response in any case */
 }
 
 /* Rows of dampers, motors and actuators, which are constant during a step. */
 static void put_rows_of_step(const connector_term *t, const time_step *step)
 {
   const connectors *c = t->connectors;
-  for (int k = 0; k < c->number; ++k) {
-    const int i = c->connector[k];
-    double a = 0, b = 1, y;
+  for (int i = 0; i < c->number; ++i) {
+    double *row = c->rows + 3 * i;
+    row[0] = 0, row[1] = 1;
     if (t->viscosity) {
-      a = -t->viscosity[i] / step->dt;
-      y = a * c->e0[i];
+      row[0] = -t->viscosity[i] / step->dt;
+      row[2] = row[0] * c->e0[i];
     } else if (t->wanted_motion) {
       const double wanted = value_at(t->wanted_motion + i, step->motion_time);
-      a = 1, b = 0;
-      y = c->e0[i] + step->fraction * (wanted - c->e0[i]);
+      row[0] = 1, row[1] = 0;
+      row[2] = c->e0[i] + step->fraction * (wanted - c->e0[i]);
     } else {
       const double wanted = -value_at(t->wanted_force + i, step->load_time);
       t->end[i] = t->reached[i] + step->fraction * (wanted - t->reached[i]);
-      y = t->reached[i] + step->at * (t->end[i] - t->reached[i]);
+      row[2] = t->reached[i] + step->at * (t->end[i] - t->reached[i]);
     }
-    const double row[3] = {a, b, y};
-    put_row(c, k, row);
   }
+  put_rows(c);
 }
 
 static void begin_friction_again(friction *f)
@@ -270,26 +248,24 @@ static void begin_friction_again(friction *f)
 
 /* A sticking connector moves by `way` in the step, so that its velocity is zero at the end. Without
  * this motion, the previous velocity would come back. */
-static void begin_friction(const connectors *c, const time_step *step)
+static void begin_friction(friction *f, const time_step *step)
 {
-  friction *f = c->friction;
   double way_to_rest = 0;
-  memset(c->by_cell, 0, c->number * sizeof *c->by_cell);
+  memset(f->way, 0, f->number * sizeof *f->way);
   if (f->rates) {
     const double *of = f->rates->now->rates[0]; /* v1 as a function of the step and v, with v instead of
                                                  * v_before */
     way_to_rest = -(of[1] + of[2]) / of[0];
     set_cells(f->rate, f->rates->rate[1], f->at_v);
-    add_cells((void *)f->rate, step->q0, c->by_cell);
+    add_cells((void *)f->rate, step->q0, f->way);
   }
-  for (int k = 0; k < c->number; ++k) {
-    const int i = c->connector[k];
+  for (int i = 0; i < f->number; ++i) {
     if (f->laws) {
       ask_law(f->limit_of_law, f->laws->w + i * f->laws->width, 1, f->limit[i]);
       *f->limit[i] = fmax(*f->limit[i], 0);
     }
     const double limit = *f->limit[i];
-    f->way[i] = way_to_rest * c->by_cell[k];
+    f->way[i] *= way_to_rest;
     f->creep[i] = limit > 0 ? f->softness[i] / limit : 0;
   }
   begin_friction_again(f);
@@ -302,12 +278,12 @@ void begin_connectors(void *self, const time_step *step, const double *q1, const
   const rigid_plastic *p = c->rigid_plastic;
   const connector_laws *l = c->laws;
   if (t->entry && !c->friction && !c->asked) put_rows_of_step(t, step);
-  for (int i = 0; l && i < l->number; ++i) {
+  for (int i = 0; l && i < c->number; ++i) {
     double *w = l->w + i * l->width;
     memcpy(w + c->components, c->e0 + i * c->components, c->components * sizeof *w);
     w[2 * c->components] = step->dt;
   }
-  if (c->friction) begin_friction(c, step);
+  if (c->friction) begin_friction(c->friction, step);
   if (c->asked) {
     /* Substeps go in proportion to the loads of the step. A path has no beginning, as its fractions
      * are 1. */
@@ -315,7 +291,7 @@ void begin_connectors(void *self, const time_step *step, const double *q1, const
     const double t1 = way == 1 ? step->load_time : step->t0 + way * (step->load_time - step->t0);
     c->asked->begin(c->asked->begin_self, t1, step->dt);
   }
-  if (c->points) begin_points(c->points, t->points->dt, step->dt);
+  if (c->points) begin_inelastic(t->points, step, q1, s);
   for (int i = 0; p && i < p->number; ++i) {
     p->w[i * p->width + t->dt_of_law] = step->dt;
     p->way[i] = t->way_before[i];
