@@ -208,11 +208,6 @@ def _circle_around(points: Array, few: list[int]) -> tuple[list[int], Array, flo
 TimeFunction = Callable[[float], float]
 
 
-def steady(t: float) -> float:
-    """Return 1: the time function of a steady load."""
-    return 1.0
-
-
 @dataclass(frozen=True)
 class Constant:
     """Time function with a constant value."""
@@ -222,6 +217,13 @@ class Constant:
     def __call__(self, t: float) -> float:
         """Return the value, at any time."""
         return self.value
+
+
+steady = Constant(1.0)
+"""Time function of a steady load."""
+
+still = Constant(0.0)
+"""Time function of a component of motion that is fixed."""
 
 
 def ramp(duration: float) -> TimeFunction:

@@ -7,10 +7,9 @@ from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, dataclass
 
 from ufl_beam.errors import ModelError, closed
-from ufl_beam.model.bodies import AttachmentPoint, Beams, Member, carries, require_anchors
-from ufl_beam.model.checks import require_kind
+from ufl_beam.model.bodies import Anchor, Beams, Member, carries
 from ufl_beam.model.functions import Timed, TimeFunction, steady
-from ufl_beam.model.records import NotNegative, Number, Positive, Record, Vector
+from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Record, Vector
 
 
 class Load(Record, ABC):
@@ -26,14 +25,10 @@ class Load(Record, ABC):
 class LoadAtPlace(Load):
     """Base of the loads that act at one place."""
 
-    place: AttachmentPoint
+    place: Anchor
     force: Vector = (0.0, 0.0)
     moment: Number = 0.0
     amplitude: Timed = steady
-
-    def __post_init__(self) -> None:
-        require_anchors(type(self).__name__, self.place)
-        super().__post_init__()
 
     def __str__(self) -> str:
         return f"{type(self).__name__} at {self.place}"
@@ -110,14 +105,10 @@ class LineLoad(Load):
         [2000. 2000.]
     """
 
-    beam: Member
+    beam: Instance[Member]
     force: Vector = (0.0, 0.0)
     moment: Number = 0.0
     amplitude: Timed = steady
-
-    def __post_init__(self) -> None:
-        require_kind(self.beam, Member, "LineLoad: beam")
-        super().__post_init__()
 
     def __str__(self) -> str:
         return f"LineLoad on {self.beam.name}"

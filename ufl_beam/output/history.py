@@ -22,7 +22,7 @@ from ufl_beam.errors import (
     require_kind,
     require_sequence,
 )
-from ufl_beam.model.bodies import AttachmentPoint, Place, require_anchors
+from ufl_beam.model.bodies import AttachmentPoint, Place, require_place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.joints import Joint
@@ -83,7 +83,7 @@ class History(Restartable):
         self._places = require_sequence(places, f"History {path}: places")
         self._connectors = require_sequence(connectors, f"History {path}: connectors")
         for i, place in enumerate(self._places):
-            require_anchors(f"History {path}: places[{i}]", place)
+            require_place(place, f"History {path}: places[{i}]")
         for i, connector in enumerate(self._connectors):
             require_kind(connector, (Connector, Joint), f"History {path}: connectors[{i}]")
         self._open: list[OutputFile] = []
