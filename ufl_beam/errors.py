@@ -10,7 +10,7 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 import numpy as np
@@ -180,13 +180,18 @@ def warn(message: str) -> None:
     warnings.warn(message, ModelWarning, stacklevel=level)
 
 
-def raised_at(error: BaseException) -> str:
-    """Return the place of the user's code that raised an error, " (file, line n)", or ""."""
-    library = (PACKAGE, functools.__file__)  # functools calls functions of ub.law_functions
-    for frame in traceback.extract_tb(error.__traceback__):
-        if not frame.filename.startswith(library):
-            return f" ({frame.filename}, line {frame.lineno})"
-    return ""
+@contextlib.contextmanager
+def calling(what: str, remedy: str = "") -> Iterator[None]:
+    """Raise :class:`ModelError` with ``what`` and the line of the user's code that fails."""
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except Exception as error:
+        library = (PACKAGE, functools.__file__)  # functools calls functions of ub.law_functions
+        frames = traceback.extract_tb(error.__traceback__)
+        own = [frame for frame in frames if not frame.filename.startswith(library)]
+        at = f" ({own[0].filename}, line {own[0].lineno})" if own else ""
+        raise ModelError(f"{what}: {error}{at}{remedy}") from error
 
 
 def shorten(value: object) -> str:

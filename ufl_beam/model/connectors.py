@@ -310,6 +310,9 @@ def require_apart(connector: Connector) -> None:
 
 # -- plastic hinges of zero length --------------------------------------------------------------
 
+HINGE = "Hinge"
+"""Owner of the connectors that are plastic hinges."""
+
 
 def plastic_hinges(
     may_have: Mapping[Place, HingeLaw],  # laws of the hinges that the beams may have
@@ -348,7 +351,7 @@ def plastic_hinges(
         if stays(place):
             beyond = Place(place.beam, place.s, beyond=True)
             before, after = (beyond, place) if place.s == 1.0 else (place, beyond)
-            hinges.append(Component("Hinge", "turning", before, after, RigidPlastic(law)))
+            hinges.append(Component(HINGE, "turning", before, after, RigidPlastic(law)))
     return tuple(hinges)
 
 

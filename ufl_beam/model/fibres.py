@@ -19,7 +19,7 @@ from ufl_beam.display import compact_repr
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.model.checks import require_count, require_kind
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_law import MaterialLaw, require_bulk_law, uniform
+from ufl_beam.model.material_law import MaterialLaw, require_law, uniform
 from ufl_beam.model.records import Positive, Record
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
@@ -124,7 +124,7 @@ class Fibres(Record):
         1.39e+07
     """
 
-    law: Annotated[MaterialLaw, require_bulk_law]
+    law: Annotated[MaterialLaw, require_law]
     _: KW_ONLY
     number: Annotated[int, require_count] = 20
     softening: Annotated[SofteningLaw | None, require_softening] = None
