@@ -263,11 +263,13 @@ def require_returned(value: object, function: str, at: str, *, finite: bool = Fa
     return number
 
 
-def require_count(value: Any, what: str) -> int:
-    """Return ``value`` as a positive whole number, or raise :class:`ArgumentError`."""
+def require_count(value: Any, what: str, at_least: int = 1) -> int:
+    """Return ``value`` as a whole number in range, or raise :class:`ArgumentError`."""
     number = require_number(value, what)
-    if number != int(number) or number < 1:
-        raise ArgumentError(f"{what} = {shorten(value)} must be a whole number, at least 1")
+    if number != int(number) or number < at_least or isinstance(value, bool):
+        raise ArgumentError(
+            f"{what} = {shorten(value)} must be a whole number, at least {at_least}"
+        )
     return int(value)
 
 

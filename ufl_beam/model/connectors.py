@@ -357,15 +357,13 @@ def plastic_hinges(
 
 def law_of(connector: Connector) -> HingeLaw:
     """Return the law of a plastic hinge or of another rigid-plastic connector."""
-    if not isinstance(connector.law, RigidPlastic):
-        raise ModelError(f"{connector}: its law is not rigid-plastic")
+    assert isinstance(connector.law, RigidPlastic)
     return connector.law.law
 
 
 def place_of(hinge: Connector) -> Place:
     """Return the place of a plastic hinge, on the side of joints and loads."""
-    if not isinstance(hinge.a, Place):
-        raise ModelError(f"{hinge}: it is not a plastic hinge of a beam")
+    assert isinstance(hinge.a, Place)
     return hinge.a.beam.at(hinge.a.s)
 
 
