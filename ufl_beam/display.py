@@ -89,7 +89,7 @@ class Parameter(NamedTuple):
 
     name: str  # title of an axis or a colour bar
     value: str  # format of a value in a sentence
-    step: str  # format of a step in a sentence
+    step: str  # format of a step in a sentence, with three digits
     column: str  # title of a column
     progress: str  # title of an axis for a quantity that never decreases along the solution
 
@@ -97,17 +97,13 @@ class Parameter(NamedTuple):
         """Write a value with its name or unit."""
         return self.value.format(format(value, digits))
 
-    def over(self, step: float) -> str:
-        """Write a step with its name or unit."""
-        return self.step.format(format(step, ".3g"))
 
-
-TIME = Parameter("time t (s)", "t = {} s", "dt = {} s", "t [s]", "time t (s)")
+TIME = Parameter("time t (s)", "t = {} s", "dt = {:.3g} s", "t [s]", "time t (s)")
 
 FACTOR = Parameter(
     "load factor",
     "load factor {}",
-    "a change of the load factor by {}",
+    "a change of the load factor by {:.3g}",
     "load factor [-]",
     "path length (m)",
 )

@@ -10,7 +10,7 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 import numpy as np
@@ -180,13 +180,18 @@ def warn(message: str) -> None:
     warnings.warn(message, ModelWarning, stacklevel=level)
 
 
-def raised_at(error: BaseException) -> str:
-    """Return the place of the user's code that raised an error, " (file, line n)", or ""."""
-    library = (PACKAGE, functools.__file__)  # functools calls functions of ub.law_functions
-    for frame in traceback.extract_tb(error.__traceback__):
-        if not frame.filename.startswith(library):
-            return f" ({frame.filename}, line {frame.lineno})"
-    return ""
+@contextlib.contextmanager
+def calling(what: str, remedy: str = "") -> Iterator[None]:
+    """Raise :class:`ModelError` with ``what`` and the line of the user's code that fails."""
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except Exception as error:
+        library = (PACKAGE, functools.__file__)  # functools calls functions of ub.law_functions
+        frames = traceback.extract_tb(error.__traceback__)
+        own = [frame for frame in frames if not frame.filename.startswith(library)]
+        at = f" ({own[0].filename}, line {own[0].lineno})" if own else ""
+        raise ModelError(f"{what}: {error}{at}{remedy}") from error
 
 
 def shorten(value: object) -> str:
@@ -258,11 +263,13 @@ def require_returned(value: object, function: str, at: str, *, finite: bool = Fa
     return number
 
 
-def require_count(value: Any, what: str) -> int:
-    """Return ``value`` as a positive whole number, or raise :class:`ArgumentError`."""
+def require_count(value: Any, what: str, at_least: int = 1) -> int:
+    """Return ``value`` as a whole number in range, or raise :class:`ArgumentError`."""
     number = require_number(value, what)
-    if number != int(number) or number < 1:
-        raise ArgumentError(f"{what} = {shorten(value)} must be a whole number, at least 1")
+    if number != int(number) or number < at_least or isinstance(value, bool):
+        raise ArgumentError(
+            f"{what} = {shorten(value)} must be a whole number, at least {at_least}"
+        )
     return int(value)
 
 

@@ -10,8 +10,6 @@ from __future__ import annotations
 import fcntl
 import os
 import socket
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
@@ -33,10 +31,11 @@ def sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def _open_and_lock(path: Path, more: int = 0) -> IO[str]:
-    """Open a file with an exclusive lock; open a new one if another process has just removed it.
+def locked(path: Path, more: int = 0) -> IO[str]:
+    """Open a file with an exclusive lock, which is released when the file is closed.
 
-    ``more`` are flags of ``flock``.
+    The process that has the lock may remove the file: processes that wait for it then create a new
+    one.  ``more`` are flags of ``flock``.
     """
     while True:
         file = path.open("a+", encoding="utf-8", errors="replace")
@@ -53,16 +52,6 @@ def _open_and_lock(path: Path, more: int = 0) -> IO[str]:
         file.close()
 
 
-@contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """Wait until no other process is in such a context with the same path; the file stays.
-
-    The file may be removed within the context: processes that wait for it then create a new one.
-    """
-    with _open_and_lock(path):
-        yield
-
-
 class Lock:
     """Exclusive lock of a file, by a second file with ``.lock`` after the name of the first."""
 
@@ -77,7 +66,7 @@ class Lock:
             OSError: The file of the lock cannot be written.
         """
         try:
-            self._file = _open_and_lock(self.path, fcntl.LOCK_NB)
+            self._file = locked(self.path, fcntl.LOCK_NB)
         except BlockingIOError as error:
             return str(error)
         self._file.truncate(0)

@@ -8,7 +8,7 @@ from scipy.optimize import minimize_scalar
 
 from ufl_beam.model.bodies import GROUND, Body, Spot
 from ufl_beam.model.connector_laws import Guide, PrescribedMotion
-from ufl_beam.model.supports import still
+from ufl_beam.model.functions import still
 
 COUPLES = {
     # kind of a joint -> whether it keeps the point, and the rotation
@@ -71,7 +71,7 @@ def _of_support(solution, support):
     u, v, ψ = moved.T
     in_axes = [cos * u + sin * v, cos * v - sin * u, ψ]
     for component, value in support.held.items():
-        if support.moving and value is not still:
+        if support.moving and value != still:
             wanted = np.array([value(t) for t in solution.times])
             wanted[0] = in_axes[component][0]  # nothing has moved yet
         else:

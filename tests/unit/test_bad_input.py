@@ -135,7 +135,7 @@ PARTS = [
     (lambda: push(lambda t: math.nan), "the time function is nan at t = 0"),
     (
         lambda: push(lambda t: "x"),
-        "PointLoad at girder.end...returned 'x' at t = 0; it must",
+        "PointLoad at girder.end...returned 'x' at t = 0 s; it must",
     ),
     (lambda: push(lambda: 1.0), "the time function fails at t = 0: TypeError"),
     (lambda: push(2.0), "amplitude = 2.0 must be a function of t, such as ub.Table"),

@@ -18,7 +18,6 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.display import compact_repr, counted, html_page
-from ufl_beam.model.supports import still
 from ufl_beam.plotting import history_pictures
 
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
@@ -51,7 +50,7 @@ def test_numbers_have_six_digits():
 
 
 def test_functions_have_their_names():
-    assert compact_repr(Pair(still)) == "Pair(first=still)"
+    assert compact_repr(Pair(ub.ramp)) == "Pair(first=ramp)"
 
 
 def test_long_arrays_have_their_shapes():

@@ -30,7 +30,7 @@ PLACE = beam().end
 BAD = {
     "no mass to be negative": (lambda: body(mass=-1.0), "body: mass = -1 must be at least 0"),
     "centre": (lambda: body(x=math.nan), "body: center[0] = nan is not finite"),
-    "no place": (lambda: ub.Prismatic(3, PLACE), "Prismatic: 3 is not a place"),
+    "no place": (lambda: ub.Prismatic(3, PLACE), "Prismatic: rail = 3 is not a place"),
     "axis": (
         lambda: ub.Prismatic(ub.ground(0, 0), PLACE, axis=(0, 0)),
         "Prismatic(ground (0, 0), beam.end (1, 0)): the axis has zero length",

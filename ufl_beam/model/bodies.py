@@ -281,26 +281,30 @@ def carries(place: AttachmentPoint) -> bool:
     return isinstance(place, Place) or math.hypot(*arm(place)) == 0.0
 
 
-def require_anchors(owner: str, *anchors: object) -> None:
-    """Raise :class:`ModelError` naming ``owner`` unless all are attachment points."""
-    for place in anchors:
-        if not isinstance(place, Place | Spot):
-            raise ModelError(
-                f"{owner}: {shorten(place)} is not a place; use beam.start, .end or .at(s), "
-                "body.at(x, y) or ground(x, y)"
-            )
-
-
-def require_node(place: object, owner: str) -> None:
-    """Raise :class:`ModelError` unless a place is on a beam or the centre of a moving body."""
-    require_anchors(owner, place)
-    if isinstance(place, Spot) and place.body is GROUND:
-        raise ModelError(f"{owner}: {place} does not move")
-    if not carries(place):  # type: ignore[arg-type]
+def require_place(place: Any, what: str) -> None:
+    """Raise :class:`ModelError` naming ``what`` unless ``place`` is an attachment point."""
+    if not isinstance(place, Place | Spot):
         raise ModelError(
-            f"{owner}: {place} is not the centre of the body; hold other points by joints to "
+            f"{what} = {shorten(place)} is not a place; use beam.start, .end or .at(s), "
+            "body.at(x, y) or ground(x, y)"
+        )
+
+
+def require_node(place: Any, what: str) -> None:
+    """Raise :class:`ModelError` unless a place is on a beam or the centre of a moving body."""
+    require_place(place, what)
+    if isinstance(place, Spot) and place.body is GROUND:
+        raise ModelError(f"{what} = {place} does not move")
+    if not carries(place):
+        raise ModelError(
+            f"{what} = {place} is not the centre of the body; hold other points by joints to "
             "ground(x, y), and give masses to the body itself"
         )
+
+
+Anchor = Annotated[AttachmentPoint, require_place]
+Carried = Annotated[AttachmentPoint, require_node]
+"""Fields of a record with any place, and with a place whose displacement is that of a node."""
 
 
 # -- point masses, initial velocities -----------------------------------------------------------
@@ -323,13 +327,9 @@ class PointMass(Record):
         True
     """
 
-    place: AttachmentPoint
+    place: Carried
     mass: NotNegative
     inertia: NotNegative = 0.0
-
-    def __post_init__(self) -> None:
-        require_node(self.place, "PointMass")
-        super().__post_init__()
 
     def _label(self) -> str:
         return f"PointMass at {self.place}"

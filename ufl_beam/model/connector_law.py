@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from ufl_beam.errors import ModelError, closed, shorten
+from ufl_beam.errors import ModelError, calling, closed, shorten
 from ufl_beam.model.checks import require_function, require_number, require_row, require_text
 from ufl_beam.model.material_law import (
     State,
@@ -215,13 +215,8 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
     calls = {"energy": (motion, state), "limit": (state,)}
     calls |= dict.fromkeys(CALLED[2:], (motion, motion, state, 1.0))
     for name, arguments in calls.items():
-        try:
-            with np.errstate(all="ignore"):
-                result = getattr(law, name)(*arguments)
-        except Exception as error:
-            raise ModelError(
-                f"{what}.{name} fails at no motion: {error}{source_location(law)}"
-            ) from error
+        with calling(f"{what}.{name} fails at no motion"):
+            result = getattr(law, name)(*arguments)
         if name == "increments":
             require_names(result, law, f"{what}.{name}")
         if name == "resistance" and law.components > 1:
@@ -295,10 +290,6 @@ def judges_loss(law: ConnectorLaw) -> bool:
 # -- functions of users ------------------------------------------------------------------------
 
 
-def _require_state(value: Any, what: str) -> tuple[float, ...]:
-    return tuple(map(float, require_row(value, what)))
-
-
 @closed("give it a function of your own")
 @dataclass(frozen=True, repr=False)
 class ForceLaw(Record):
@@ -342,7 +333,7 @@ class ForceLaw(Record):
     """
 
     force: Annotated[Callable[..., Any], partial(require_function, arguments="(motion, rate)")]
-    state: Annotated[Sequence[float], _require_state] = ()
+    state: Annotated[Sequence[float], require_row] = ()
     stored: Annotated[
         Callable[..., float] | None,
         partial(require_function, arguments="the motion, or (motion, state)"),
@@ -350,6 +341,7 @@ class ForceLaw(Record):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "state", tuple(map(float, self.state)))
         if self.state and "state" not in self.arguments:
             raise ModelError(
                 "ForceLaw: the function has no parameter for the state; give it a parameter state, "

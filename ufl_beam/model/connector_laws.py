@@ -16,7 +16,7 @@ from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_law import ForceLaw as ForceLaw
 from ufl_beam.model.functions import Constant, Curve, Timed
 from ufl_beam.model.law_functions import Values, larger, positive, smaller, sqrt
-from ufl_beam.model.material_law import MaterialLaw, State, require_bulk_law
+from ufl_beam.model.material_law import MaterialLaw, State, require_law
 from ufl_beam.model.material_laws import DuvautLions, ElastoPlastic
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 from ufl_beam.model.softening_laws import (
@@ -146,7 +146,7 @@ class Spring(Record):
     """
 
     stiffness: Positive
-    law: Annotated[MaterialLaw | None, require_bulk_law] = None
+    law: Annotated[MaterialLaw | None, require_law] = None
     softening: Annotated[SofteningLaw | None, require_softening] = None
 
 

@@ -9,10 +9,12 @@ from abc import ABC
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
+from typing import Annotated, Any
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import (
+    Anchor,
     AttachmentPoint,
     Node,
     NodeDof,
@@ -20,19 +22,28 @@ from ufl_beam.model.bodies import (
     arm,
     merged,
     node,
-    require_anchors,
 )
 from ufl_beam.model.checks import require_kind, require_vector
 from ufl_beam.model.connector_law import ConnectorLaw, require_connector_law
 from ufl_beam.model.connector_laws import HingeLaw, Law, RigidPlastic
 from ufl_beam.model.functions import Point
-from ufl_beam.model.records import Record
+from ufl_beam.model.records import Record, Vector
+
+
+def _require_law(law: Any, what: str) -> None:
+    require_kind(law, Law.__args__, what)
+    if isinstance(law, ConnectorLaw) and not isinstance(law, Record):
+        require_connector_law(law, what)
+
+
+Acting = Annotated[Law, _require_law]
+"""Field of a connector with its law."""
 
 Factors = tuple[float, float, float]
 """Derivatives of a relative motion with respect to (u, v, ψ) of a node."""
 
 
-class Connector(ABC):
+class Connector(Record, ABC):
     """Relative motion of two places with a force law; base of :class:`Turn` and others.
 
     The motion is zero in the undeformed scene.  The force of a connector resists growth of the
@@ -59,9 +70,9 @@ class Connector(ABC):
     """
 
     motion: str
-    a: AttachmentPoint
-    b: AttachmentPoint
-    law: Law
+    a: Anchor
+    b: Anchor
+    law: Acting
     axis: Point = (1.0, 0.0)
     corner: Point | None = None
     component: int = 0
@@ -70,19 +81,18 @@ class Connector(ABC):
     __repr__ = bracketed
 
     def __post_init__(self) -> None:
-        require_anchors(self.kind, self.a, self.b)
-        require_kind(self.law, Law.__args__, f"{self}: law")
-        if isinstance(self.law, ConnectorLaw):
-            if not isinstance(self.law, Record):
-                require_connector_law(self.law, f"{self}: law")
-            if self.law.components > 1 and self.kind != "Bushing":
-                raise ModelError(
-                    f"{self}: {type(self.law).__name__} acts on {self.law.components} components "
-                    "of a relative motion; use Bushing(a, b, law)"
-                )
+        super().__post_init__()
+        components = self.law.components if isinstance(self.law, ConnectorLaw) else 1
+        if components > 1 and self.kind != "Bushing":
+            raise ModelError(
+                f"{self}: {type(self.law).__name__} acts on {components} components of a relative "
+                "motion; use Bushing(a, b, law)"
+            )
 
     def __str__(self) -> str:
         return f"{self.kind}({self.a}, {self.b})"
+
+    _label = __str__
 
     @property
     def kind(self) -> str:
@@ -138,9 +148,9 @@ class Turn(Connector):
         True
     """
 
-    a: AttachmentPoint
-    b: AttachmentPoint
-    law: Law
+    a: Anchor
+    b: Anchor
+    law: Acting
     motion = "turning"
 
 
@@ -156,9 +166,9 @@ class Stretch(Connector):
         >>> stayed = ub.Scene([beam], supports=scene.supports, connectors=[rod])
     """
 
-    a: AttachmentPoint
-    b: AttachmentPoint
-    law: Law
+    a: Anchor
+    b: Anchor
+    law: Acting
     motion = "stretching"
 
     def __post_init__(self) -> None:
@@ -184,16 +194,16 @@ class Slide(Connector):
         >>> propped = ub.Scene([beam], supports=scene.supports, connectors=[spring])
     """
 
-    a: AttachmentPoint
-    b: AttachmentPoint
-    law: Law
+    a: Anchor
+    b: Anchor
+    law: Acting
     _: KW_ONLY
     axis: Point = None  # type: ignore[assignment]  # replaced by a unit vector
     motion = "sliding"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axis", unit_axis(self.a, self.b, self.axis, "Slide"))
         super().__post_init__()
+        object.__setattr__(self, "axis", unit_axis(self.a, self.b, self.axis, "Slide"))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -223,23 +233,22 @@ class Bushing(Connector):
         0.001
     """
 
-    a: AttachmentPoint
-    b: AttachmentPoint
-    law: ConnectorLaw
+    a: Anchor
+    b: Anchor
+    law: Annotated[ConnectorLaw, _require_law]
     _: KW_ONLY
-    axis: Point = (1.0, 0.0)
+    axis: Vector = (1.0, 0.0)
     motion = "sliding"
 
     def __post_init__(self) -> None:
-        axis = require_vector(self.axis, "Bushing: axis")
-        object.__setattr__(self, "axis", unit_axis(self.a, self.b, axis, "Bushing"))
+        super().__post_init__()
+        object.__setattr__(self, "axis", unit_axis(self.a, self.b, self.axis, "Bushing"))
         require_kind(self.law, ConnectorLaw, f"{self}: law")
         if self.law.components == 1:
             raise ModelError(
                 f"{self}: {type(self.law).__name__} acts on one component of a relative motion; "
                 "use Turn, Stretch or Slide, or give the law components = 2 or 3"
             )
-        super().__post_init__()
 
     @cached_property
     def components(self) -> tuple[Connector, ...]:  # type: ignore[override]
@@ -277,7 +286,6 @@ UNIT_TOLERANCE = 4 * sys.float_info.epsilon
 
 def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: str) -> Point:
     """Return the unit vector along ``axis``, by default along the line from ``a`` to ``b``."""
-    require_anchors(kind, a, b)
     (ax, ay), (bx, by) = a.point, b.point
     x, y = (bx - ax, by - ay) if axis is None else require_vector(axis, f"{kind}: axis")
     length = math.hypot(x, y)
@@ -301,6 +309,9 @@ def require_apart(connector: Connector) -> None:
 
 
 # -- plastic hinges of zero length --------------------------------------------------------------
+
+HINGE = "Hinge"
+"""Owner of the connectors that are plastic hinges."""
 
 
 def plastic_hinges(
@@ -340,21 +351,19 @@ def plastic_hinges(
         if stays(place):
             beyond = Place(place.beam, place.s, beyond=True)
             before, after = (beyond, place) if place.s == 1.0 else (place, beyond)
-            hinges.append(Component("Hinge", "turning", before, after, RigidPlastic(law)))
+            hinges.append(Component(HINGE, "turning", before, after, RigidPlastic(law)))
     return tuple(hinges)
 
 
 def law_of(connector: Connector) -> HingeLaw:
     """Return the law of a plastic hinge or of another rigid-plastic connector."""
-    if not isinstance(connector.law, RigidPlastic):
-        raise ModelError(f"{connector}: its law is not rigid-plastic")
+    assert isinstance(connector.law, RigidPlastic)
     return connector.law.law
 
 
 def place_of(hinge: Connector) -> Place:
     """Return the place of a plastic hinge, on the side of joints and loads."""
-    if not isinstance(hinge.a, Place):
-        raise ModelError(f"{hinge}: it is not a plastic hinge of a beam")
+    assert isinstance(hinge.a, Place)
     return hinge.a.beam.at(hinge.a.s)
 
 

@@ -30,7 +30,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import Point
 from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.model.material_law import MaterialLaw, initial_state
+from ufl_beam.model.material_law import initial_state
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 
@@ -339,49 +339,33 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
 
     Then the undeformed scene, from which the analysis ``what`` starts, is not in equilibrium.
     """
-    size = scene.size
-    laws: list[tuple[object, MaterialLaw, Array, Array]] = [
-        (
-            connector,
-            spring.law,
-            np.array([spring.stiffness]),
-            np.array([1.0 if connector.is_rotation else size]),
-        )
-        for connector in scene.connectors
-        if isinstance(spring := connector.law, Spring) and spring.law is not None
-    ]
-    for beam in scene.beams:
-        if (section_points := beam.section.section_points(None)) is not None:
-            first = np.cumsum([0, *(n for _, n in section_points.laws)])
-            stiffness, points = (
-                np.reshape(x, (len(section_points.weights), -1))
-                for x in (
-                    section_points.stiffness,
-                    np.abs(section_points.strains) @ [1.0, 1.0, 1.0 / size],
-                )
-            )
-            laws += [
-                (beam.name, law, stiffness[k], points[k])
-                for (law, _), k in zip(section_points.laws, first[:-1], strict=True)
-            ]
+    wrong: list[tuple[object, object, str]] = []
     for connector in scene.all_connectors:
-        if isinstance(connector.law, ConnectorLaw):
-            rest, i = [np.zeros(1)] * connector.law.components, connector.component
-            moved = LAST_DIGITS * (1.0 if connector.is_rotation else size)
+        law, moved = connector.law, LAST_DIGITS * (1.0 if connector.is_rotation else scene.size)
+        if isinstance(law, ConnectorLaw):
+            rest, i = [np.zeros(1)] * law.components, connector.component
             ends = (rest, [*rest[:i], rest[i] + moved, *rest[i + 1 :]])
-            state = initial_state(connector.law)
-            at_rest, strained = (connector.law.elastic_forces(e, state)[i][0] for e in ends)
+            state = initial_state(law)
+            at_rest, strained = (law.elastic_forces(e, state)[i][0] for e in ends)
             if abs(at_rest) > abs(strained - at_rest):
-                raise ModelError(
-                    f"{what}: {type(connector.law).__name__} of {connector} bears a force at no "
-                    f"motion, so that the undeformed scene is not in equilibrium; {instead}"
-                )
-    for owner, law, C, strains in laws:
-        if law.stressed(tuple(C), tuple(LAST_DIGITS * strains)):
-            raise ModelError(
-                f"{what}: {type(law).__name__} of {owner} bears a stress at no strain, so that "
-                f"the undeformed scene is not in equilibrium; {instead}"
-            )
+                wrong.append((connector, law, "a force at no motion"))
+        elif isinstance(law, Spring) and law.law is not None:
+            if law.law.stressed((np.float64(law.stiffness),), (moved,)):
+                wrong.append((connector, law.law, "a stress at no strain"))
+    for beam in scene.beams:
+        if (points := beam.section.section_points(None)) is not None:
+            strains = LAST_DIGITS * np.abs(points.strains) @ [1.0, 1.0, 1.0 / scene.size]
+            by_point = np.stack([points.stiffness, strains], axis=1)
+            by_point = by_point.reshape(len(points.weights), -1, 2)
+            first = np.cumsum([0, *(n for _, n in points.laws)])
+            for (bulk, _), k in zip(points.laws, first[:-1], strict=True):
+                if bulk.stressed(*map(tuple, by_point[k].T)):
+                    wrong.append((beam.name, bulk, "a stress at no strain"))
+    for owner, stressed, force in wrong:
+        raise ModelError(
+            f"{what}: {type(stressed).__name__} of {owner} bears {force}, so that the undeformed "
+            f"scene is not in equilibrium; {instead}"
+        )
 
 
 class Rated(Protocol):

@@ -6,8 +6,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
-from functools import cached_property
-from numbers import Integral
+from functools import cached_property, partial
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -16,10 +15,10 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import compact_repr
-from ufl_beam.errors import ModelError, shorten
+from ufl_beam.errors import ModelError
 from ufl_beam.model.checks import require_count, require_kind
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_law import MaterialLaw, require_bulk_law, uniform
+from ufl_beam.model.material_law import MaterialLaw, require_law, uniform
 from ufl_beam.model.records import Positive, Record
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
@@ -124,7 +123,7 @@ class Fibres(Record):
         1.39e+07
     """
 
-    law: Annotated[MaterialLaw, require_bulk_law]
+    law: Annotated[MaterialLaw, require_law]
     _: KW_ONLY
     number: Annotated[int, require_count] = 20
     softening: Annotated[SofteningLaw | None, require_softening] = None
@@ -183,11 +182,6 @@ class PlacedFibres:
 # -- distributions of yield stresses ------------------------------------------------------------
 
 
-def _require_seed(value: Any, what: str) -> None:
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < 0:
-        raise ModelError(f"{what} = {shorten(value)} must be a whole number, 0 or more")
-
-
 @dataclass(frozen=True)
 class Distribution(Record, ABC):
     """Base of the distributions: a random positive quantity, the same on every process.
@@ -198,7 +192,8 @@ class Distribution(Record, ABC):
     """
 
     _: KW_ONLY
-    seed: Annotated[int, _require_seed]  # the same seed gives the same scene again
+    # The same seed gives the same scene again.
+    seed: Annotated[int, partial(require_count, at_least=0)]
 
     @abstractmethod
     def _law(self) -> Any:
@@ -206,7 +201,7 @@ class Distribution(Record, ABC):
 
     def draw(self, n: int, key: tuple[int, int]) -> npt.NDArray[np.float64]:
         """Draw ``n`` independent values from the stream ``key``, at least zero; shape (n,)."""
-        stream = np.random.default_rng(np.random.SeedSequence(int(self.seed), spawn_key=key))
+        stream = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
         return np.asarray(np.maximum(self._law().rvs(n, random_state=stream), 0.0))
 
 

@@ -183,34 +183,24 @@ def enclosing_diameter(points: Array) -> float:
         outside = int(np.argmax(distances))
         if distances[outside] <= radius + slack:
             return 2 * radius
-        chosen, center, larger = _circle_around(points, [*chosen, outside])
+        few, circles = [*chosen, outside], []
+        for through in (*combinations(few, 2), *combinations(few, 3)):
+            first, *others = points[list(through)]
+            ways = np.array(others) - first
+            # The centre is equidistant from all points, in least squares if they are collinear.
+            middle = first + np.linalg.lstsq(2 * ways, (ways**2).sum(axis=1), rcond=None)[0]
+            reach = float(np.hypot(*(points[few] - middle).T).max())
+            circles.append((reach, list(through), middle))
+        larger, chosen, center = min(circles, key=lambda circle: circle[0])
         if larger <= radius:  # only round-off is left
             return 2 * radius
         radius = larger
-
-
-def _circle_around(points: Array, few: list[int]) -> tuple[list[int], Array, float]:
-    """Return indices on the smallest circle around the points ``few``, its centre and radius."""
-    circles = []
-    for chosen in (*combinations(few, 2), *combinations(few, 3)):
-        first, *others = points[list(chosen)]
-        ways = np.array(others) - first
-        # The centre is equidistant from all points, in least squares if they are collinear.
-        center = first + np.linalg.lstsq(2 * ways, (ways**2).sum(axis=1), rcond=None)[0]
-        circles.append((float(np.hypot(*(points[few] - center).T).max()), list(chosen), center))
-    radius, through, center = min(circles, key=lambda circle: circle[0])
-    return through, center, radius
 
 
 # -- functions of time --------------------------------------------------------------------------
 
 
 TimeFunction = Callable[[float], float]
-
-
-def steady(t: float) -> float:
-    """Return 1: the time function of a steady load."""
-    return 1.0
 
 
 @dataclass(frozen=True)
@@ -222,6 +212,13 @@ class Constant:
     def __call__(self, t: float) -> float:
         """Return the value, at any time."""
         return self.value
+
+
+steady = Constant(1.0)
+"""Time function of a steady load."""
+
+still = Constant(0.0)
+"""Time function of a component of motion that is fixed."""
 
 
 def ramp(duration: float) -> TimeFunction:
@@ -292,12 +289,11 @@ def require_time_function(function: TimeFunction, what: str) -> None:
     if not callable(function):
         raise ModelError(f"{what} = {shorten(function)} must be a function of t, such as ub.Table")
     try:
-        value = function(0.0)
+        value_at(function, 0.0, what)
+    except ModelError:
+        raise
     except Exception as error:
         raise ModelError(f"{what}: the time function fails at t = 0: {shorten(error)}") from error
-    number = require_returned(value, f"{what}: the time function", "t = 0")
-    if not math.isfinite(number):
-        raise ModelError(f"{what}: the time function is {number} at t = 0")
 
 
 Timed = Annotated[TimeFunction, require_time_function]

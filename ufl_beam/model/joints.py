@@ -6,11 +6,11 @@ from __future__ import annotations
 import math
 from abc import ABC
 from dataclasses import KW_ONLY, dataclass
-from functools import cached_property
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import (
+    Anchor,
     AttachmentPoint,
     NodeDof,
     Place,
@@ -18,15 +18,15 @@ from ufl_beam.model.bodies import (
     carries,
     ground,
     node,
-    require_anchors,
+    require_place,
 )
-from ufl_beam.model.checks import require_kind, require_switch, require_text
 from ufl_beam.model.connector_laws import RIGID, Bearing, Guide
 from ufl_beam.model.connectors import Component, Connector, require_apart, unit_axis
 from ufl_beam.model.functions import Curve, Point, curve_point
+from ufl_beam.model.records import Instance, Record, Switch, Text
 
 
-class Joint(Bearing, ABC):
+class Joint(Bearing, Record, ABC):
     """Joint by shared unknowns or constraint forces; base of :class:`Rigid` and other joints.
 
     Attributes:
@@ -57,8 +57,15 @@ class Joint(Bearing, ABC):
 
     __repr__ = bracketed
 
+    def __post_init__(self) -> None:
+        places = (x for x in vars(self).values() if isinstance(x, Place | Spot))
+        vars(self).setdefault("places", tuple(places))
+        super().__post_init__()
+
     def __str__(self) -> str:
         return f"{type(self).__name__}({', '.join(map(str, self.places))})"
+
+    _label = __str__
 
     def equal(self, component: int) -> list[NodeDof]:
         """Return equal degrees of freedom of nodes; displacements only of places at their nodes."""
@@ -84,39 +91,29 @@ class _AtPoint(Joint):
     multipliers: bool
 
     def __init__(self, *places: AttachmentPoint, multipliers: bool = False) -> None:
+        vars(self).update(places=places, multipliers=multipliers)
+        self.__post_init__()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
         kind = type(self).__name__
-        if len(places) < 2:
+        if len(self.places) < 2:
             raise ModelError(f"{kind}: a joint needs at least two places")
-        require_anchors(kind, *places)
-        require_switch(multipliers, f"{kind}: multipliers")
-        object.__setattr__(self, "places", places)
-        object.__setattr__(self, "multipliers", multipliers)
-
-    @property
-    def shared(self) -> tuple[int, ...]:  # type: ignore[override]
-        return () if self.multipliers else self.joined
-
-    @cached_property
-    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        return _constraints_at_point(self, self.multipliers, self.joined)
-
-
-def _constraints_at_point(
-    joint: Joint, multipliers: bool, joined: tuple[int, ...]
-) -> tuple[Connector, ...]:
-    """Return connectors for places away from their nodes; with ``multipliers`` for all places."""
-    carriers = [place for place in joint.places if carries(place) and not multipliers]
-    base = (carriers or joint.places)[0]
-    others = [place for place in joint.places if place not in (*carriers, base)]
-    motions = [("parting", (1.0, 0.0)), ("parting", (0.0, 1.0))]
-    if multipliers and 2 in joined:
-        motions.append(("turning", (1.0, 0.0)))
-    kind = type(joint).__name__
-    return tuple(
-        Component(kind, motion, base, second, RIGID, axis)
-        for second in others
-        for motion, axis in motions
-    )
+        for i, place in enumerate(self.places):
+            require_place(place, f"{kind}: places[{i}]")
+        shared = () if self.multipliers else self.joined
+        moving = [place for place in self.places if self.multipliers or not carries(place)]
+        base = next((place for place in self.places if place not in moving), self.places[0])
+        motions = [("parting", (1.0, 0.0)), ("parting", (0.0, 1.0))]
+        if self.multipliers and 2 in self.joined:
+            motions.append(("turning", (1.0, 0.0)))
+        holders = tuple(
+            Component(kind, motion, base, place, RIGID, axis)
+            for place in moving
+            if place != base
+            for motion, axis in motions
+        )
+        vars(self).update(shared=shared, holders=holders)
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -136,7 +133,7 @@ class Rigid(_AtPoint):
     """
 
     places: tuple[AttachmentPoint, ...]
-    multipliers: bool
+    multipliers: Switch
     joined = (0, 1, 2)
 
 
@@ -155,7 +152,7 @@ class Revolute(_AtPoint):
     """
 
     places: tuple[AttachmentPoint, ...]
-    multipliers: bool
+    multipliers: Switch
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -178,33 +175,17 @@ class Prismatic(Joint):
         Prismatic(beam.end (2, 0), slider (2, 0))
     """
 
-    rail: AttachmentPoint
-    slider: AttachmentPoint
+    rail: Anchor
+    slider: Anchor
     _: KW_ONLY
     axis: Point | None = None
-    turning: bool = False
+    turning: Switch = False
 
     def __post_init__(self) -> None:
-        require_switch(self.turning, "Prismatic: turning")
-        axis = unit_axis(self.rail, self.slider, self.axis, "Prismatic")
-        object.__setattr__(self, "axis", axis)
-
-    @property
-    def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
-        """The rail, then the slider."""
-        return self.rail, self.slider
-
-    @property
-    def shared(self) -> tuple[int, ...]:  # type: ignore[override]
-        """The rotation, unless the slider turns."""
-        return () if self.turning else (2,)
-
-    @cached_property
-    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """Connector that prevents motion across the axis."""
-        assert self.axis is not None
-        x, y = self.axis
-        return (self._hold("sliding", (-y, x)),)
+        super().__post_init__()
+        x, y = unit_axis(self.rail, self.slider, self.axis, "Prismatic")
+        vars(self).update(axis=(x, y), shared=() if self.turning else (2,))
+        vars(self).update(holders=(self._hold("sliding", (-y, x)),))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -221,27 +202,17 @@ class RigidLink(Joint):
         ... )
     """
 
-    a: AttachmentPoint
-    b: AttachmentPoint
+    a: Anchor
+    b: Anchor
     shared = (2,)
 
     def __post_init__(self) -> None:
-        require_anchors("RigidLink", self.a, self.b)
-        if self.a.point == self.b.point:
-            raise ModelError(f"{self}: zero length; join the places with Rigid")
-
-    @property
-    def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
-        """Both ends of the link."""
-        return self.a, self.b
-
-    @cached_property
-    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """Connectors that hold the displacement of ``b`` relative to the frame of ``a``."""
+        super().__post_init__()
         corner = self.b.point
-        return tuple(
-            self._hold("parting", axis, corner=corner) for axis in ((1.0, 0.0), (0.0, 1.0))
-        )
+        if self.a.point == corner:
+            raise ModelError(f"{self}: zero length; join the places with Rigid")
+        axes = (1.0, 0.0), (0.0, 1.0)
+        vars(self).update(holders=tuple(self._hold("parting", axis, corner) for axis in axes))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -261,22 +232,14 @@ class Link(Joint):
         1540.0
     """
 
-    a: AttachmentPoint
-    b: AttachmentPoint
+    a: Anchor
+    b: Anchor
 
     def __post_init__(self) -> None:
-        require_anchors("Link", self.a, self.b)
-        require_apart(self.holders[0])
-
-    @property
-    def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
-        """Both ends of the link."""
-        return self.a, self.b
-
-    @cached_property
-    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """Connector that keeps the distance of the ends."""
-        return (self._hold("stretching", (1.0, 0.0)),)
+        super().__post_init__()
+        rod = self._hold("stretching", (1.0, 0.0))
+        require_apart(rod)
+        vars(self).update(holders=(rod,))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -299,37 +262,24 @@ class Guided(Joint):
         ... )
     """
 
-    place: AttachmentPoint
+    place: Anchor
     curve: Curve
     meets = True
     advice = "curve(0) must be at the place"
 
     def __post_init__(self) -> None:
-        require_anchors("Guided", self.place)
+        super().__post_init__()
         if not carries(self.place):
             raise ModelError(f"Guided({self.place}): the place must be the centre of the body")
-        _ = self.holders  # checks the curve
-
-    @cached_property
-    def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
-        """The point of the curve at s = 0, and the guided place."""
-        return self._start, self.place
-
-    @cached_property
-    def _start(self) -> Spot:
-        return ground(*curve_point(self.curve, 0.0, f"Guided({self.place}): curve"))
-
-    @cached_property
-    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """Connector that keeps the distance from the curve zero."""
         law, name = Guide(self.curve), f"Guided({self.place}): curve"
-        start = self._start
+        start = ground(*curve_point(self.curve, 0.0, name))
         (x0, y0), (x1, y1) = (curve_point(self.curve, s, name) for s in START_INTERVAL)
         length = math.hypot(x1 - x0, y1 - y0)
         if length == 0.0:
             raise ModelError(f"Guided({self.place}): the curve has no direction at s = 0")
         across = (y0 - y1) / length, (x1 - x0) / length
-        return (Component("Guided", "guided", start, self.place, law, across),)
+        holder = Component("Guided", "guided", start, self.place, law, across)
+        vars(self).update(places=(start, self.place), holders=(holder,))
 
 
 START_INTERVAL = (-1e-6, 1e-6)
@@ -337,7 +287,7 @@ START_INTERVAL = (-1e-6, 1e-6)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Release(Joint):
+class Release(_AtPoint):
     """Joint at one point that releases some of the resultants of the beam of ``a``.
 
     Args:
@@ -356,46 +306,29 @@ class Release(Joint):
         Release(beam.end (2, 0), girder.start (2, 0))
     """
 
-    a: Place
-    b: AttachmentPoint
+    a: Instance[Place]
+    b: Anchor
     _: KW_ONLY
-    free: str
-    multipliers: bool = False
-    meets = True
+    free: Text
+    multipliers: Switch = False
 
     def __post_init__(self) -> None:
-        require_kind(self.a, Place, "Release: a")
-        require_anchors("Release: b", self.b)
-        require_text(self.free, f"{self}: free")
-        require_switch(self.multipliers, f"{self}: multipliers")
+        super().__post_init__()
         if not self.free or set(self.free) - set("NVM"):
             raise ModelError(f"{self}: free = {self.free!r} must be letters of 'NVM'")
-
-    @property
-    def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
-        """Both places of the joint."""
-        return self.a, self.b
-
-    @property
-    def _joined(self) -> tuple[int, ...]:
-        displacement = () if set(self.free) & set("NV") else (0, 1)
-        return displacement if "M" in self.free else (*displacement, 2)
-
-    @property
-    def shared(self) -> tuple[int, ...]:  # type: ignore[override]
-        """Components that share an unknown; none with ``multipliers``."""
-        return () if self.multipliers else self._joined
-
-    @cached_property
-    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """Connectors that hold the components that are neither released nor shared."""
-        if 0 in self._joined:
-            return _constraints_at_point(self, self.multipliers, self._joined)
+        if 0 in self.joined:
+            return
         x, y = self.a.direction
         axes = {"N": (x, y), "V": (-y, x)}
-        constraints = [
+        holders = [
             self._hold("sliding", axis) for name, axis in axes.items() if name not in self.free
         ]
-        if self.multipliers and 2 in self._joined:
-            constraints.append(self._hold("turning", (1.0, 0.0)))
-        return tuple(constraints)
+        if self.multipliers and 2 in self.joined:
+            holders.append(self._hold("turning", (1.0, 0.0)))
+        vars(self).update(holders=tuple(holders))
+
+    @property
+    def joined(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Components that are not released."""
+        displacement = () if set(self.free) & set("NV") else (0, 1)
+        return displacement if "M" in self.free else (*displacement, 2)

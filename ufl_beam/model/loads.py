@@ -3,37 +3,33 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from dataclasses import KW_ONLY, dataclass
+from typing import ClassVar
 
 from ufl_beam.errors import ModelError, closed
-from ufl_beam.model.bodies import AttachmentPoint, Beams, Member, carries, require_anchors
-from ufl_beam.model.checks import require_kind
-from ufl_beam.model.functions import Timed, TimeFunction, steady
-from ufl_beam.model.records import NotNegative, Number, Positive, Record, Vector
+from ufl_beam.model.bodies import Anchor, Beams, Member, carries, ground
+from ufl_beam.model.connector_laws import PrescribedForce
+from ufl_beam.model.connectors import Component, Connector
+from ufl_beam.model.functions import Timed, TimeFunction, steady, value_at
+from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Record, Vector
 
 
 class Load(Record, ABC):
     """Base of the loads; their forces are in terms/load_forces.py."""
 
-    @property
-    @abstractmethod
-    def amplitude(self) -> Timed:
-        """Factor at time t."""
+    amplitude: TimeFunction
+    """Factor at time t."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoadAtPlace(Load):
     """Base of the loads that act at one place."""
 
-    place: AttachmentPoint
+    place: Anchor
     force: Vector = (0.0, 0.0)
     moment: Number = 0.0
     amplitude: Timed = steady
-
-    def __post_init__(self) -> None:
-        require_anchors(type(self).__name__, self.place)
-        super().__post_init__()
 
     def __str__(self) -> str:
         return f"{type(self).__name__} at {self.place}"
@@ -65,6 +61,24 @@ class PointLoad(LoadAtPlace):
         >>> print(run.section_forces_at(beam.start)[1, 1:].round())  # V, M at t = 0.5 s
         [-100000. -199989.]
     """
+
+    @property
+    def pushes(self) -> tuple[Connector, ...]:
+        """Connectors that apply the load at a point off the centre of a body; else none."""
+        if carries(self.place):
+            return ()
+        (x, y), fixed = self.force, ground(*self.place.point)
+        parts = [("parting", x, (1.0, 0.0)), ("parting", y, (0.0, 1.0))]
+        parts += [("turning", self.moment, (1.0, 0.0))] * bool(self.moment)
+        connectors = []
+        for motion, size, axis in parts:
+
+            def push(t: float, size: float = size) -> float:
+                return size * value_at(self.amplitude, t, self)
+
+            law = PrescribedForce(push)
+            connectors.append(Component("PointLoad", motion, fixed, self.place, law, axis))
+        return tuple(connectors)
 
 
 @closed(OWN_LOAD)
@@ -110,14 +124,10 @@ class LineLoad(Load):
         [2000. 2000.]
     """
 
-    beam: Member
+    beam: Instance[Member]
     force: Vector = (0.0, 0.0)
     moment: Number = 0.0
     amplitude: Timed = steady
-
-    def __post_init__(self) -> None:
-        require_kind(self.beam, Member, "LineLoad: beam")
-        super().__post_init__()
 
     def __str__(self) -> str:
         return f"LineLoad on {self.beam.name}"
@@ -170,10 +180,8 @@ class RotatingFrame(Load):
     rate: Number
     about: Vector = (0.0, 0.0)
 
-    @property
-    def amplitude(self) -> TimeFunction:
-        """Constant 1, because a rate that changes would cause a further force, the Euler force."""
-        return steady
+    # A rate that changes would cause a further force, the Euler force.
+    amplitude: ClassVar[TimeFunction] = steady  # type: ignore[misc]
 
 
 LOADS = PointLoad, FollowerLoad, LineLoad, Gravity, RotatingFrame

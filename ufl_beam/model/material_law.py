@@ -6,15 +6,15 @@ from __future__ import annotations
 import copy
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import fields
 from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ufl_beam.errors import ModelError, raised_at, shorten
+from ufl_beam.errors import ModelError, calling, shorten
 
 Values = Any
 """Array of real or complex numbers, or a UFL expression; for interacting resultants a tuple."""
@@ -194,28 +194,11 @@ def initial_state(law: Any) -> State:
 # -- checks --------------------------------------------------------------------------------------
 
 
-def require_bulk_law(law: object, what: str) -> None:
-    """Raise :class:`ModelError` naming ``what`` unless a law is valid for one stress and strain."""
-    require_law(law, what)
-    if resultants := law.resultants:  # type: ignore[attr-defined]
-        raise ModelError(
-            f"{what} = {shorten(law)} couples the resultants {resultants}; use it as "
-            "Section(interaction=)"
-        )
+def require_law(law: object, what: str, interaction: bool = False) -> None:
+    """Raise :class:`ModelError` unless a law is complete; it is called at zero strain.
 
-
-def require_interaction(law: object, what: str) -> None:
-    """Raise :class:`ModelError` naming ``what`` unless a law couples resultants of a section."""
-    require_law(law, what)
-    if law.resultants not in ("NM", "NVM"):  # type: ignore[attr-defined]
-        raise ModelError(
-            f"{what} = {shorten(law)} is no law of N and M together, which has resultants = 'NM' "
-            "or 'NVM'; use it as axial, shear or bending"
-        )
-
-
-def require_law(law: object, what: str) -> None:
-    """Raise :class:`ModelError` unless a law is complete; it is called at zero strain."""
+    With ``interaction`` it must couple resultants of a section, else it must have one stress.
+    """
     if not isinstance(law, MaterialLaw):
         raise ModelError(f"{what} = {shorten(law)} is not an ElastoPlastic or another MaterialLaw")
     kind = f"{what}: {type(law).__name__}"
@@ -241,13 +224,8 @@ def require_law(law: object, what: str) -> None:
         "dissipation": (strain, state, state, 1.0),
     }
     for name, arguments in calls.items():
-        try:
-            with np.errstate(all="ignore"):
-                result = getattr(tried, name)(*arguments)
-        except Exception as error:
-            raise ModelError(
-                f"{kind}.{name} fails at zero strain: {error}{raised_at(error)}"
-            ) from error
+        with calling(f"{kind}.{name} fails at zero strain"):
+            result = getattr(tried, name)(*arguments)
         if name == method:
             require_names(result, law, f"{kind}.{name}")
         elif name == "stress" and not np.all(np.isfinite(law.as_tuple(result))):
@@ -256,6 +234,16 @@ def require_law(law: object, what: str) -> None:
             )
         elif name == "stress" and len(law.as_tuple(result)) != len(law.resultants or "x"):
             raise ModelError(f"{kind}.stress must return one stress for each of {law.resultants}")
+    if interaction and law.resultants not in ("NM", "NVM"):
+        raise ModelError(
+            f"{what} = {shorten(law)} is no law of N and M together, which has resultants = 'NM' "
+            "or 'NVM'; use it as axial, shear or bending"
+        )
+    if law.resultants and not interaction:
+        raise ModelError(
+            f"{what} = {shorten(law)} couples the resultants {law.resultants}; use it as "
+            "Section(interaction=)"
+        )
 
 
 def require_fields(law: Any, base: type, what: str, but: Collection[str] = ()) -> None:
@@ -288,17 +276,12 @@ EVOLUTION_METHODS = ("increments", "residuals")
 """Methods for the evolution of variables; a law with variables defines one of the two."""
 
 
-@contextmanager
-def traced(law: object) -> Iterator[None]:
+def traced(law: object) -> AbstractContextManager[None]:
     """Raise :class:`ModelError` naming a law that cannot be called with symbols of UFL."""
-    try:
-        yield
-    except Exception as error:
-        raise ModelError(
-            f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}"
-            f"{raised_at(error)}. Laws are written with + - * / ** and the functions of "
-            "ub.law_functions"
-        ) from error
+    return calling(f"{type(law).__name__}: it cannot be called with symbols of UFL", WRITTEN)
+
+
+WRITTEN = ". Laws are written with + - * / ** and the functions of ub.law_functions"
 
 
 def require_names(result: object, law: Any, what: str) -> None:

@@ -27,6 +27,7 @@ from ufl_beam.errors import (
     ModelError,
     require_kind,
     require_number,
+    require_switch,
     require_text,
     require_vector,
 )
@@ -41,8 +42,12 @@ FromZero = Annotated[float, partial(require_number, at_least=0.0, infinite=True)
 
 Vector = Annotated[tuple[float, float], require_vector]
 Text = Annotated[str, require_text]
+Switch = Annotated[bool, require_switch]
 Instance = Annotated[T, require_kind]
 """An object of the annotated class, or of one of several classes."""
+
+NAMING = ("name", "place", "beam", "a", "b", "rail", "slider")
+"""Fields that name a record in messages, so that messages about them name its class only."""
 
 
 class Record:
@@ -63,7 +68,7 @@ class Record:
         for name, word, default, check in _checks(type(self)):  # type: ignore[arg-type]
             value = getattr(self, name)
             if value is not default:
-                owner = type(self).__name__ if name == "name" else self._label()
+                owner = type(self).__name__ if name in NAMING else self._label()
                 try:
                     checked = check(value, what=f"{owner}: {word}")
                 except ArgumentError as error:

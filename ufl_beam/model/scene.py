@@ -26,15 +26,13 @@ from ufl_beam.model.bodies import (
     Representatives,
     Spot,
     Velocity,
-    carries,
-    ground,
     merged,
     node,
 )
 from ufl_beam.model.checks import require_all
 from ufl_beam.model.connector_laws import Bearing, Coulomb, PrescribedForce, PrescribedMotion
-from ufl_beam.model.connectors import Component, Connector, plastic_hinges
-from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along, value_at
+from ufl_beam.model.connectors import HINGE, Connector, plastic_hinges
+from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import (
     LOADS,
@@ -176,30 +174,24 @@ class Scene(Record, Rich):
     @cached_property
     def all_connectors(self) -> tuple[Connector, ...]:
         """Connectors of joints, of the scene and of off-centre loads, and plastic hinges."""
-        return (*self._connectors_but_hinges, *self.hinges)
-
-    @cached_property
-    def _connectors_but_hinges(self) -> tuple[Connector, ...]:
-        constraints = [holder for joint in self.joints for holder in joint.holders]
-        pushing = (load for load in self.loads if isinstance(load, PointLoad))
-        loads = [push for load in pushing for push in _off_center(load)]
-        between = [connector for x in self.connectors for connector in x.components or (x,)]
-        return (*constraints, *between, *loads)
+        connectors = [holder for joint in self.joints for holder in joint.holders]
+        connectors += [one for x in self.connectors for one in x.components or (x,)]
+        connectors += [push for x in self.loads if isinstance(x, PointLoad) for push in x.pushes]
+        laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
+        bearing = [support.place for support in self.supports if 2 in support.held]
+        bearing += [mass.place for mass in self.masses if mass.inertia]
+        for connector in connectors if laws else ():
+            by_a, by_b = connector.rigidly()
+            bearing += [connector.a] * bool(by_a[2] or connector.follows_a)
+            bearing += [connector.b] * bool(by_b[2])
+        loaded = [load.place for load in self.moments]
+        rigid = [joint.equal(2) for joint in self.joints if 2 in joint.shared]
+        return (*connectors, *plastic_hinges(laws, rigid, bearing, loaded))
 
     @cached_property
     def hinges(self) -> tuple[Connector, ...]:
         """Plastic hinges of zero length: ``hinges`` of beams, and of sections at ends of beams."""
-        laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
-        bearing = [support.place for support in self.supports if 2 in support.held]
-        bearing += [mass.place for mass in self.masses if mass.inertia]
-        for connector in self._connectors_but_hinges if laws else ():
-            by_a, by_b = connector.rigidly()
-            bearing += [connector.a] * bool(by_a[2] or connector.follows_a) + [connector.b] * bool(
-                by_b[2]
-            )
-        loaded = [load.place for load in self.moments]
-        rigid = [joint.equal(2) for joint in self.joints if 2 in joint.shared]
-        return plastic_hinges(laws, rigid, bearing, loaded)
+        return tuple(x for x in self.all_connectors if x.kind == HINGE)
 
     @property
     def moments(self) -> list[LoadAtPlace]:
@@ -215,7 +207,7 @@ class Scene(Record, Rich):
 
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
         """Iterate over (owner, function of time): loads, supports, connectors, and works."""
-        yield from ((x, x.amplitude) for x in self.loads if not isinstance(x, RotatingFrame))
+        yield from ((load, load.amplitude) for load in self.loads)
         yield from ((x, motion) for x in self.supports for motion in x.held.values())
         for connector in self.all_connectors:
             if isinstance(connector.law, PrescribedMotion):
@@ -354,23 +346,6 @@ def attachment_points(scene: Scene) -> dict[Body, list[Spot]]:
         if isinstance(attached, Spot):
             points[attached.body][attached] = None
     return {body: list(spots) for body, spots in points.items()}
-
-
-def _off_center(load: PointLoad) -> tuple[Connector, ...]:
-    """Return connectors that apply a load at a point off the centre of a body; else nothing."""
-    if carries(load.place):
-        return ()
-
-    def push(motion: str, size: float, axis: tuple[float, float] = (1.0, 0.0)) -> Connector:
-        law = PrescribedForce(lambda t: size * value_at(load.amplitude, t, load))
-        return Component("PointLoad", motion, ground(*load.place.point), load.place, law, axis)
-
-    (x, y), moment = load.force, load.moment
-    return (
-        push("parting", x, (1.0, 0.0)),
-        push("parting", y, (0.0, 1.0)),
-        *((push("turning", moment),) if moment else ()),
-    )
 
 
 def _again(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -17,12 +18,12 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError
 from ufl_beam.model.checks import require_array, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, PlacedFibres, SectionPoints
-from ufl_beam.model.material_law import MaterialLaw, require_bulk_law, require_interaction
+from ufl_beam.model.material_law import MaterialLaw, require_law
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
-ResultantLaw = Annotated[MaterialLaw | None, require_bulk_law]
+ResultantLaw = Annotated[MaterialLaw | None, require_law]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,7 +73,7 @@ class Section(Record):
     bending: ResultantLaw = None
     hinge: Annotated[SofteningLaw | None, require_softening] = None
     fibres: Instance[PlacedFibres | None] = None
-    interaction: Annotated[MaterialLaw | None, require_interaction] = None
+    interaction: Annotated[MaterialLaw | None, partial(require_law, interaction=True)] = None
     massless_by_default: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

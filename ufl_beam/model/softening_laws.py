@@ -13,10 +13,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ModelError, closed, raised_at, shorten
+from ufl_beam.errors import ModelError, calling, closed, shorten
 from ufl_beam.model.checks import require_kind
 from ufl_beam.model.law_functions import Values, below, exp, positive, where
-from ufl_beam.model.material_law import require_field, require_fields
+from ufl_beam.model.material_law import WRITTEN, require_field, require_fields
 from ufl_beam.model.records import FromZero, Positive, Record
 
 OWN_LAW = "state a SofteningLaw of your own"
@@ -185,7 +185,13 @@ class Softening(_LimitAndEnergy):
 
     def mean_traction(self, ξ: Values, a: Values) -> Values:
         """Return the mean resistance from ξ to ξ + a; its product with a is dissipated."""
-        return self.traction(ξ) * _decay_mean(self.limit / self.fracture_energy * a)
+        x = self.limit / self.fracture_energy * a
+        small = below(x, 0.1)  # where the series of (1 - exp(-x))/x is exact
+        series = 1.0
+        for k in range(12, 1, -1):
+            series = 1 - x / k * series
+        safe = where(small, 1.0, x)
+        return self.traction(ξ) * where(small, series, (1 - exp(-safe)) / safe)
 
 
 @closed(OWN_LAW)
@@ -210,16 +216,6 @@ class LinearSoftening(_LimitAndEnergy):
         ends = below(now - slope * a, 0.0)
         safe = where(ends, slope * a, 1.0)
         return where(ends, now**2 / (2 * safe), now - slope * a / 2)
-
-
-def _decay_mean(x: Values) -> Values:
-    """Return the mean of exp(-t) for t from 0 to x, (1 - exp(-x))/x; its series if x < 0.1."""
-    small = below(x, 0.1)
-    series = 1.0
-    for k in range(12, 1, -1):
-        series = 1 - x / k * series
-    safe = where(small, 1.0, x)
-    return where(small, series, (1 - exp(-safe)) / safe)
 
 
 def require_softening(law: object, what: str) -> None:
@@ -310,14 +306,9 @@ def _require_not_negative(kind: str, jumps: Array, t: Array) -> None:
 def _called(law: SofteningLaw, method: str, jumps: Array) -> Array:
     """Call a method of a law with openings; raise :class:`ModelError` unless it returns numbers."""
     what = f"{type(law).__name__}.{method}"
-    try:
-        with np.errstate(all="ignore"):
-            values = getattr(law, method)(jumps) + 0 * jumps
-    except Exception as error:
-        raise ModelError(
-            f"{what} fails: {error}{raised_at(error)}. It is called with arrays of openings, real "
-            "or complex, and written with + - * / ** and the functions of ub.law_functions"
-        ) from error
+    remedy = ". It is called with arrays of openings, real or complex"
+    with calling(f"{what} fails", remedy + WRITTEN):
+        values = getattr(law, method)(jumps) + 0 * jumps
     if np.shape(values) != jumps.shape:
         raise ModelError(
             f"{what} returns an array of shape {np.shape(values)} for {len(jumps)} openings; it "

@@ -11,22 +11,18 @@ from typing import ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
-from ufl_beam.model.bodies import AttachmentPoint, require_node
-from ufl_beam.model.checks import require_number, require_vector
+from ufl_beam.model.bodies import Carried
+from ufl_beam.model.checks import require_number
 from ufl_beam.model.connector_laws import Bearing
-from ufl_beam.model.functions import Constant, Point, TimeFunction, require_time_function
+from ufl_beam.model.functions import Constant, TimeFunction, require_time_function, still
+from ufl_beam.model.records import Record, Vector
 
 COMPONENTS = ("u", "v", "psi")
 
 Motion = float | TimeFunction
 
 
-def still(t: float) -> float:
-    """Return 0: the time function of a fixed component."""
-    return 0.0
-
-
-class Support(Bearing, ABC):
+class Support(Bearing, Record, ABC):
     """Held or prescribed motion of a place; base of :class:`Clamped` and other supports.
 
     Attributes:
@@ -43,7 +39,7 @@ class Support(Bearing, ABC):
         100000.0
     """
 
-    place: AttachmentPoint
+    place: Carried
     angle: float = 0.0
 
     __repr__ = bracketed
@@ -54,7 +50,7 @@ class Support(Bearing, ABC):
         """Function of time of each held component."""
 
     def __post_init__(self) -> None:
-        require_node(self.place, type(self).__name__)
+        super().__post_init__()
         if not self.held:
             raise ModelError(f"{self} holds nothing; give at least one of u, v, psi")
         for component, value in self.held.items():
@@ -63,10 +59,12 @@ class Support(Bearing, ABC):
     @property
     def moving(self) -> dict[int, TimeFunction]:
         """The held components without those that are fixed at zero."""
-        return {c: f for c, f in self.held.items() if f is not still}
+        return {c: f for c, f in self.held.items() if f != still}
 
     def __str__(self) -> str:
         return f"{type(self).__name__} at {self.place}"
+
+    _label = __str__
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,7 +77,7 @@ class Clamped(Support):
         [0, 1, 2]
     """
 
-    place: AttachmentPoint
+    place: Carried
     held: ClassVar = {0: still, 1: still, 2: still}
 
 
@@ -93,7 +91,7 @@ class Pinned(Support):
         [0, 1]
     """
 
-    place: AttachmentPoint
+    place: Carried
     held: ClassVar = {0: still, 1: still}
 
 
@@ -112,16 +110,14 @@ class Roller(Support):
         True
     """
 
-    place: AttachmentPoint
+    place: Carried
     _: KW_ONLY
-    along: Point = (1.0, 0.0)
+    along: Vector = (1.0, 0.0)
 
     def __post_init__(self) -> None:
-        x, y = require_vector(self.along, f"{self}: along")
-        if x == y == 0.0:
-            raise ModelError(f"{self}: along = (0, 0) is no direction")
-        object.__setattr__(self, "along", (x, y))
         super().__post_init__()
+        if not any(self.along):
+            raise ModelError(f"{self}: along = (0, 0) is no direction")
 
     @property
     def held(self) -> dict[int, TimeFunction]:
@@ -150,7 +146,7 @@ class PrescribedDisplacement(Support):
         True
     """
 
-    place: AttachmentPoint
+    place: Carried
     _: KW_ONLY
     u: Motion | None = None
     v: Motion | None = None
@@ -165,5 +161,5 @@ class PrescribedDisplacement(Support):
                 components[component] = value
             elif value is not None:
                 number = require_number(value, f"{self}: {COMPONENTS[component]}")
-                components[component] = Constant(number) if number else still
+                components[component] = Constant(number)
         return components

@@ -22,7 +22,7 @@ from ufl_beam.errors import (
     require_function,
     require_sequence,
 )
-from ufl_beam.model.bodies import AttachmentPoint, Place, require_anchors
+from ufl_beam.model.bodies import AttachmentPoint, Place, require_place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.joints import Joint
@@ -82,7 +82,7 @@ class History(Restartable):
         self.files = (self._path,) if max_rows == sys.maxsize else (self._path, self._temporary)
         self._places = require_sequence(places, f"History {path}: places")
         for i, place in enumerate(self._places):
-            require_anchors(f"History {path}: places[{i}]", place)
+            require_place(place, f"History {path}: places[{i}]")
         what = f"History {path}: connectors"
         self._connectors = require_all(connectors, what, (Connector, Joint))
         self._open: list[OutputFile] = []

@@ -28,8 +28,7 @@ from scipy.interpolate import KroghInterpolator
 from ufl_beam.errors import ArgumentError, ModelWarning
 from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connector_laws import RIGID
-from ufl_beam.model.functions import Point, steady
-from ufl_beam.model.supports import still
+from ufl_beam.model.functions import Point, steady, still
 from ufl_beam.output.output_files import WrongReader
 
 Data = Any  # data of JSON

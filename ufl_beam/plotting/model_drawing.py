@@ -242,7 +242,7 @@ def _arc(center: Array, radius: float, sense: float) -> Array:
 
 def in_time(text: str, time: TimeFunction) -> str:
     """Mark the text of a quantity that varies in time."""
-    return text if time is steady else f"{text} × f(t)"
+    return text if time == steady else f"{text} × f(t)"
 
 
 # -- loads -------------------------------------------------------------------------------------

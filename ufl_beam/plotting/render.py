@@ -16,7 +16,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, require_kind, require_number, require_row, require_switch
-from ufl_beam.model.bodies import AttachmentPoint, Member, Place, Spot, require_anchors
+from ufl_beam.model.bodies import AttachmentPoint, Member, Place, Spot, require_place
 from ufl_beam.model.records import Record
 from ufl_beam.parallel import active_comm, progress_bar
 from ufl_beam.plotting import style, symbols
@@ -55,10 +55,6 @@ def _require_direction(value: Any, what: str) -> Direction:
     return x, y, z
 
 
-def _require_place(value: Any, what: str) -> None:
-    require_anchors(what, value)
-
-
 @dataclass(frozen=True)
 class Camera(Record):
     """Camera of :func:`render` and :func:`animate`, without perspective.
@@ -84,7 +80,7 @@ class Camera(Record):
     _refused = ArgumentError
 
     direction: Annotated[Direction, _require_direction] = (-0.20, -0.28, -1.0)
-    follow: Annotated[AttachmentPoint | None, _require_place] = None
+    follow: Annotated[AttachmentPoint | None, require_place] = None
     width: Annotated[float | None, partial(require_number, positive=True)] = None
 
     def aim(self, plotter: Any, box: Array, shape: DeformedShape, size: tuple[int, int]) -> None:

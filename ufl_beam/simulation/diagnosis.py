@@ -101,7 +101,7 @@ def no_equilibrium(
     sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
     where = f"at {named.at(t, '.9g')}"
     if end != t:
-        where = f"after {named.at(t, '.9g')}, even with {named.over(end - t)}"
+        where = f"after {named.at(t, '.9g')}, even with {named.step.format(end - t)}"
     why = ""
     if not isinstance(failure, NoNumber):  # without a value of a function there is no tangent
         probe = _probe_state(equation, q0, q1)

@@ -26,9 +26,9 @@ from ufl_beam.errors import ModelError, NoNumber, shorten
 from ufl_beam.mechanics.connector_equations import law_step
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.checks import require_returned
-from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw, source_location
+from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_law import State
+from ufl_beam.model.material_law import State, traced
 from ufl_beam.terms.connector_rows import Response, Setting
 from ufl_beam.terms.term import Callbacks
 
@@ -59,7 +59,7 @@ class LawForms:
         at, motions = self._pointwise.at, [f"motion {i}" for i in range(law.components)]
         self._at = at | {name: ufl.variable(at[name]) for name in motions}
         self._motions = [self._at[name] for name in motions]
-        try:
+        with traced(law):
             forces, *energies, variables = law_step(law, self._at, scheme)
             self.force = self._compile(*forces, *self._slopes(forces))
             by_name = dict(zip(("stored", "numerical"), energies, strict=True))
@@ -68,12 +68,6 @@ class LawForms:
             old = State({name: at[f"state {name}"] for name in law.variables})
             parameters = {name: at[f"number {name}"] for name in law.parameters()}
             self.limit = self._compile(ufl.as_ufl(law.with_parameters(parameters).limit(old)))
-        except Exception as error:
-            raise ModelError(
-                f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
-                "written with + - * / ** and the functions of ub.law_functions"
-                f"{source_location(law)}"
-            ) from error
 
     @cached_property
     def frozen(self) -> tuple[Any, Any]:

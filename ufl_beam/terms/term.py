@@ -25,7 +25,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import StepFailed
-from ufl_beam.model.functions import Constant, Table, TimeFunction, steady, value_at
+from ufl_beam.model.functions import Constant, Table, TimeFunction, value_at
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of terms, by the cause of their forces."""
@@ -148,8 +148,6 @@ class Callbacks:
         """
         functions_in_c = ffi.new("time_function[]", len(functions))
         for place, (function, owner) in zip(functions_in_c, functions, strict=True):
-            if function is steady:
-                function = Constant(1.0)
             if isinstance(function, Constant):
                 function = Table((0.0,), (function.value,))
             if isinstance(function, Table):
