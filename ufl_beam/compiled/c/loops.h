@@ -270,10 +270,10 @@ typedef struct {
   double *w;                   /* data of the kernels, `width` numbers of each connector */
   double *limit, *back_force;  /* of the accepted state: |force - back force| up to which it is held */
   double *dissipated;          /* energy, by each connector since the beginning */
-  int32_t *slipped;            /* whether each slipped in the last step, or may in this one; as FLOWS */
   const double *slope;         /* r > 0 of the equation of each, see rigid_plastic.c */
   double *excess;              /* |force - back force| / limit - 1 of held connectors beyond the limit */
-  int32_t *way;                /* direction in which each slips in the present iterate, or 0 */
+  int32_t *free;               /* whether the search lets each slip while others are held */
+  int32_t *way, *way_before;   /* directions of slip, or 0: in the present iterate, in the last step */
 } rigid_plastic;
 
 typedef struct friction friction;
@@ -853,7 +853,6 @@ typedef struct {
   double *end, *reached;              /* forces of actuators at the end of this step, and of the last one */
   double *entry, sign;                /* of the work in the ledger */
   int dt_of_law;       /* position of dt in the data of a rigid-plastic law */
-  int32_t *way_before; /* direction of slip of rigid-plastic connectors after the last step */
   double *hardened, loss; /* energy stored by rigid-plastic connectors; fraction of the loss of backward
                            * Euler */
   double *lost;           /* ledger entry of compiled laws */
@@ -904,9 +903,9 @@ typedef struct {
 typedef struct {
   points *points;
   inelastic *cells;
-  friction *rubs;
-  rigid_plastic *slips;
-  const int32_t *way_before; /* of rigid-plastic connectors, after the last step */
+  int number; /* of connectors */
+  const double *excess;
+  int32_t *free;
 } openable;
 
 enum { MOST_SUBSTEPS = 4096 }; /* largest number of substeps of a step */

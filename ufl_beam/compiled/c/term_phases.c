@@ -294,7 +294,7 @@ void begin_connectors(void *self, const time_step *step, const double *q1, const
   if (c->points) begin_inelastic(t->points, step, q1, s);
   for (int i = 0; p && i < p->number; ++i) {
     p->w[i * p->width + t->dt_of_law] = step->dt;
-    p->way[i] = t->way_before[i];
+    p->way[i] = p->way_before[i];
   }
 }
 
@@ -302,8 +302,8 @@ void begin_connectors_again(void *self)
 {
   const connector_term *t = self;
   const connectors *c = t->connectors;
-  if (c->rigid_plastic)
-    memcpy(c->rigid_plastic->way, t->way_before, c->rigid_plastic->number * sizeof *t->way_before);
+  const rigid_plastic *p = c->rigid_plastic;
+  if (p) memcpy(p->way, p->way_before, p->number * sizeof *p->way);
   if (c->friction) begin_friction_again(c->friction);
   if (c->asked) c->asked->again(c->asked->again_self);
 }
