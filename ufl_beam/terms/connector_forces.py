@@ -323,7 +323,7 @@ class Guides(ConnectorTerm):
             distance=self._e, s0=self._s0, s=self._s, step=self._steps, on0=self._on0,
             frame=ffi.new("guide_frame[]", n), around=ffi.new("curve_around[]", n),
         )  # fmt: skip
-        lib.begin_guides_again(self._c)
+        self._begin_again()
         self.loops = loop("add_guides_force", self._c), loop("add_guides_tangent", self._c)
         self.law_residual = loop("missed_by_guides", self._c)
 
@@ -334,7 +334,11 @@ class Guides(ConnectorTerm):
         fill(self._c, ask=lib.curve_in_python, curve=ffi.new("void *[]", curves))
         self._c.report, self._c.handle = lib.run_in_python, callbacks.handle(self._report)
         begin, accept = (loop(name, self._c) for name in ("begin_guides", "accept_guides"))
-        return Phases([begin], [accept], again=loop("begin_guides_again", self._c))
+        return Phases([begin], [accept], again=begin)
+
+    def _begin_again(self) -> None:
+        """Begin at the points of the last step."""
+        lib.begin_guides(self._c, ffi.NULL, ffi.NULL, ffi.NULL)
 
     def _report(self) -> None:
         place = self.connectors[self._c.lost].b
@@ -342,7 +346,7 @@ class Guides(ConnectorTerm):
 
     def motion(self, q: Array) -> Array:
         """Return the distances from the curves; m."""
-        lib.begin_guides_again(self._c)
+        self._begin_again()
         with self._callbacks.raising():
             lib.find_frames(self._c, doubles(q))
         return np.array([self._c.frame[k].distance for k in range(len(self.connectors))])

@@ -18,11 +18,6 @@ double value_at(const time_function *f, double t)
   return (f->y[high] - f->y[low]) / (f->t[high] - f->t[low]) * (t - f->t[low]) + f->y[low];
 }
 
-static void run(const phases *p, const time_step *step, const double *q1, const double *s)
-{
-  for (int k = 0; k < p->number; ++k) p->call[k].run(p->call[k].self, step, q1, s);
-}
-
 void begin_forms(void *self, const time_step *step, const double *q1, const double *s)
 {
   const form_of_step *f = self;
@@ -298,7 +293,7 @@ void begin_connectors(void *self, const time_step *step, const double *q1, const
   }
 }
 
-void begin_connectors_again(void *self)
+void begin_connectors_again(void *self, const time_step *step, const double *q1, const double *s)
 {
   const connector_term *t = self;
   const connectors *c = t->connectors;
