@@ -158,10 +158,8 @@ def interleaved(
     names = ("LANES", "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "AT", "UNKNOWNS")
     values = LANES, math.isqrt(sizes[0]), *sizes, *unknowns
     defined = [f"#define {x} {n}" for x, n in zip(names, values, strict=True)]
-    head, loop = (
-        "\n".join([HEADERS, DECLARATIONS, *defined, text("assembly_simd.h")]),
-        text("assembly_simd.c"),
-    )
+    head = "\n".join([HEADERS, DECLARATIONS, *defined, text("assembly_simd.h")])
+    loop = text("assembly_simd.c")
     try:
         module = compiled(
             "ufl_beam_lanes",

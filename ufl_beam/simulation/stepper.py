@@ -170,7 +170,8 @@ class Stepper(StateView):
         self.prediction = Prediction(subdomain, q, equation.weights, in_motion=in_motion)
 
         again = [phase.again for phase in phases if phase.again is not None]
-        fill(equation.c, agains=len(again), again=ffi.new("again_call[]", again))
+        self._again = equation.c.again.call = ffi.new("phase_call[]", again)
+        equation.c.again.number = len(again)
         least = LEAST_IN_MOTION if in_motion else LEAST_AT_REST
         self.solver = solver = Solver(subdomain, equation, newton, least)
         rotations = subdomain.rotations

@@ -99,7 +99,7 @@ class CompiledLaws(Response):
         super().__init__(connectors, setting, f"{type(law).__qualname__}{[*law.variables]}")
         scheme, ledger, k = setting.scheme, setting.ledger, law.components
         n = len(connectors) // k
-        self._law, self._components, self.opens = law, k, law.holds
+        self._law, self._components = law, k
         self._enter(stored=(ledger.state, "stored"))
         if not law.elastic:
             self._enter(lost=(ledger.lost, law.entry))

@@ -15,7 +15,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, names, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, names, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.partition import Subdomain
@@ -211,7 +211,7 @@ class ConnectorForces(ConnectorTerm):
         phases = ("begin_connectors", "accept_connectors", "add_energy_of_connectors")
         first, accept, state = ([loop(name, c)] for name in phases)
         admits = loop("points_dissipate", points) if response.must_dissipate else None
-        change, opens, again = loop("change_of_connectors", c), None, None
+        change, again = loop("change_of_connectors", c), None
         if response.asks_at_ends:
 
             def accept_user_laws(step: Any, q1: Any, s: Any) -> None:
@@ -220,16 +220,9 @@ class ConnectorForces(ConnectorTerm):
                 response.accept_end(self._now)
 
             accept.insert(0, callbacks.phase(accept_user_laws))
-        if response.opens:
-            wanted, laws = ("points", "slips", "rubs", "way_before"), response.in_c
-            data = {**laws, "slips": laws.get("rigid_plastic"), "rubs": laws.get("friction")}
-            data |= law_fields
-            opens = {name: data[name] for name in wanted if data.get(name) is not None}
-            if "way_before" in opens:
-                opens["way_before"] = integers(opens["way_before"])
         if response.in_c.keys() & {"rigid_plastic", "friction", "asked"}:
             again = loop("begin_connectors_again", c)
-        return Phases([*begin, *first], accept, state, change, opens, admits, again)
+        return Phases([*begin, *first], accept, state, change, response.opens, admits, again)
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -330,7 +323,7 @@ class Guides(ConnectorTerm):
             distance=self._e, s0=self._s0, s=self._s, step=self._steps, on0=self._on0,
             frame=ffi.new("guide_frame[]", n), around=ffi.new("curve_around[]", n),
         )  # fmt: skip
-        lib.begin_guides_again(self._c)
+        self._begin_again()
         self.loops = loop("add_guides_force", self._c), loop("add_guides_tangent", self._c)
         self.law_residual = loop("missed_by_guides", self._c)
 
@@ -341,7 +334,11 @@ class Guides(ConnectorTerm):
         fill(self._c, ask=lib.curve_in_python, curve=ffi.new("void *[]", curves))
         self._c.report, self._c.handle = lib.run_in_python, callbacks.handle(self._report)
         begin, accept = (loop(name, self._c) for name in ("begin_guides", "accept_guides"))
-        return Phases([begin], [accept], again=loop("begin_guides_again", self._c))
+        return Phases([begin], [accept], again=begin)
+
+    def _begin_again(self) -> None:
+        """Begin at the points of the last step."""
+        lib.begin_guides(self._c, ffi.NULL, ffi.NULL, ffi.NULL)
 
     def _report(self) -> None:
         place = self.connectors[self._c.lost].b
@@ -349,7 +346,7 @@ class Guides(ConnectorTerm):
 
     def motion(self, q: Array) -> Array:
         """Return the distances from the curves; m."""
-        lib.begin_guides_again(self._c)
+        self._begin_again()
         with self._callbacks.raising():
             lib.find_frames(self._c, doubles(q))
         return np.array([self._c.frame[k].distance for k in range(len(self.connectors))])

@@ -21,7 +21,7 @@ import numpy.typing as npt
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, names, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, integers, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms
 from ufl_beam.mechanics.connector_equations import parameters, rigid_plastic_step
 from ufl_beam.mechanics.time_scheme import Scheme
@@ -81,7 +81,8 @@ class Response:
         in_c: Fields of ``connectors`` of loops.h that the laws set.
         must_dissipate: True if :meth:`require_dissipation` has to be called before a step is
             accepted.
-        opens: True if connectors may open or slip by the rule in material_points.py.
+        opens: Fields of ``openable`` of loops.h if connectors may open or slip by the rule in
+            material_points.py; else None.
         asks_at_ends: True if :meth:`accept_end` must be called when a step is accepted.
         motion: Motions of the accepted state in solutions, (num_connectors,); None if they are the
             motions of the nodes.
@@ -92,7 +93,8 @@ class Response:
             :class:`Connection`; (num_connectors,) each; J.
     """
 
-    must_dissipate = opens = asks_at_ends = False
+    must_dissipate = asks_at_ends = False
+    opens: dict[str, Any] | None = None
     motion: Array | None = None
     sticks: Index | None = None
     dissipated: Sequence[Array] = ()
@@ -132,9 +134,10 @@ class Response:
             tiny=1e-14 * self._lengths, sticks=self.sticks, against=against,
             switched=setting.switched, **law_fields,
         )  # fmt: skip
-        if self.opens:
-            search, free = setting.search, np.zeros(n, dtype=np.int32)
-            fill(friction, search=search, free=free, excess=np.zeros(n))
+        if law_fields:
+            excess, free = np.zeros(n), np.zeros(n, dtype=np.int32)
+            fill(friction, search=setting.search, excess=excess, free=free)
+            self.opens = {"number": n, "excess": doubles(excess), "free": integers(free)}
         if setting.rates is not None:
             fill(friction, rates=setting.rates)
         self._variables.insert(0, self._accepted)
@@ -269,7 +272,8 @@ class Springs(Response):
         expect_entries(section_points, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
         self.must_dissipate = section_points.kind.law.must_dissipate
-        self.in_c, self.opens = {"points": self.points.c}, self.points.softens
+        self.in_c = {"points": self.points.c}
+        self.opens = self.in_c if self.points.softens else None
         self.dissipated = self.points.recorded[:, 4], self.points.recorded[:, 5]
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
@@ -383,8 +387,6 @@ class RigidPlasticLaws(Response):
     gives the force as a function of the slip in the step.
     """
 
-    opens = True
-
     def __init__(
         self, law: RigidPlastic, connectors: Sequence[Connector], setting: Setting
     ) -> None:
@@ -407,10 +409,11 @@ class RigidPlasticLaws(Response):
         self._initial_limit = self._at["number yield_limit" if self._hardens else "number limit"]
         self._limit = self._initial_limit.copy()
         back_force, dissipated, excess = np.zeros((3, n))
-        self._slipped, self.way, self._direction_before = np.zeros((3, n), dtype=np.int32)
+        self.way, direction_before, free = np.zeros((3, n), dtype=np.int32)
+        self.opens = {"number": n, "excess": doubles(excess), "free": integers(free)}
         self._stored = np.zeros(1)  # energy of hardening of all connectors together; J
         at = self._at["slipped"], self._at["start"]
-        self._variables = [*at, self._limit, back_force, dissipated, self._direction_before]
+        self._variables = [*at, self._limit, back_force, dissipated, direction_before]
         # Accumulated motions do not have the round-off of the constraints
         self.motion, self.dissipated = self._at["start"], (dissipated,)
 
@@ -421,13 +424,14 @@ class RigidPlasticLaws(Response):
             force=self._forms.force, end=self._forms.end, search=setting.search,
             limit=self._limit, back_force=back_force, dissipated=dissipated,
             slope=np.array([_slope(connector, setting.size) for connector in connectors]),
-            excess=excess, slipped=self._slipped, way=self.way,
+            excess=excess, free=free, way=self.way, way_before=direction_before,
         )  # fmt: skip
         self.in_c = {"rigid_plastic": self._c}
         self._in_steps = {
-            "dt_of_law": INPUTS.index("dt"), "way_before": self._direction_before,
-            "hardened": self._stored, "loss": loss,
-        }  # fmt: skip
+            "dt_of_law": INPUTS.index("dt"),
+            "hardened": self._stored,
+            "loss": loss,
+        }
 
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Return the energy dissipated in a step to the motions ``e1``; J.
@@ -446,7 +450,6 @@ class RigidPlasticLaws(Response):
     def restore(self, rows: Array) -> None:
         """Restore the variables of :meth:`state`."""
         super().restore(rows[:, :-1])
-        self._slipped[:] = np.abs(self._direction_before)
         self._stored[0] = rows[:, -1].sum()
 
     def start(self, e: Array) -> None:

@@ -205,7 +205,6 @@ void accept_connectors(void *self, const time_step *step, const double *q1, cons
     double sums[3];
     const rigid_plastic *p = c->rigid_plastic;
     commit_rigid_plastic(p, c->e1, sums);
-    for (int i = 0; i < p->number; ++i) t->way_before[i] = p->way[i] * p->slipped[i];
     *t->points->hinges += sums[0];
     if (t->points->numerical) *t->points->numerical += t->loss * sums[1];
     *t->hardened = sums[2];

@@ -189,18 +189,13 @@ double missed_by_guides(void *self, const double *q, const double *r, double sca
 
 /* Begin at the points of the last step. Later results of iterates are discarded, as a restart from
  * a checkpoint does not have them. */
-void begin_guides_again(void *self)
+void begin_guides(void *self, const time_step *step, const double *q1, const double *s)
 {
   const guides *g = self;
   for (int k = 0; k < g->number; ++k) {
     g->s[k] = g->s0[k];
     g->around[k].middle = g->frame[k].at[0] = NAN;
   }
-}
-
-void begin_guides(void *self, const time_step *step, const double *q1, const double *s)
-{
-  begin_guides_again(self);
 }
 
 /* Store the points on the curves as the accepted state, unless a guide is lost. */
@@ -215,5 +210,5 @@ void accept_guides(void *self, const time_step *step, const double *q1, const do
     g->distance[k] = f->distance;
     g->s0[k] = g->s[k];
   }
-  begin_guides_again(g);
+  begin_guides(g, step, q1, s);
 }

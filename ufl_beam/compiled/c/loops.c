@@ -259,13 +259,3 @@ static inline double last_digit(double x)
   next.bits += 1;
   return next.number - x;
 }
-
-/* Largest displacement in q, or rotation times the size of the scene; w are the weights of
- * forces. */
-static double largest_motion(int rows, const double *w, const double *q)
-{
-  double largest = 0;
-  for (int i = 0; i < rows; ++i)
-    if (w[i] > 0 && !(fabs(q[i]) <= largest * w[i])) largest = fabs(q[i]) / w[i];
-  return largest;
-}

@@ -270,10 +270,10 @@ typedef struct {
   double *w;                   /* data of the kernels, `width` numbers of each connector */
   double *limit, *back_force;  /* of the accepted state: |force - back force| up to which it is held */
   double *dissipated;          /* energy, by each connector since the beginning */
-  int32_t *slipped;            /* whether each slipped in the last step, or may in this one; as FLOWS */
   const double *slope;         /* r > 0 of the equation of each, see rigid_plastic.c */
   double *excess;              /* |force - back force| / limit - 1 of held connectors beyond the limit */
-  int32_t *way;                /* direction in which each slips in the present iterate, or 0 */
+  int32_t *free;               /* whether the search lets each slip while others are held */
+  int32_t *way, *way_before;   /* directions of slip, or 0: in the present iterate, in the last step */
 } rigid_plastic;
 
 typedef struct friction friction;
@@ -379,7 +379,6 @@ typedef struct {
 } guides;
 
 int find_frames(guides *g, const double *q);
-void begin_guides_again(void *self);
 
 /* -- elimination along chains ------------------------------------------------------------------ */
 
@@ -498,7 +497,7 @@ enum { INSERT_VALUES = 1, ADD_VALUES = 2, FORWARD = 0, REVERSE = 1 }; /* of Inse
 enum { OF_LIBRARY = 76 }; /* PETSC_ERR_LIB: KLU reports a singular matrix by this error */
 
 /* Relative violation of a law at an iterate q with the residual r. scale is the size of the forces;
- * moved is the largest motion, see largest_motion. */
+ * moved is the largest motion, see find_motion. */
 typedef double (miss)(void *self, const double *q, const double *r, double scale, double moved);
 typedef struct { miss *missed; void *self; } law_residual;
 miss missed_by_connectors, missed_by_points, missed_by_guides;
@@ -534,8 +533,17 @@ typedef struct {
   int (*met)(void *handle);
 } border;
 
-/* Functions that restart a step: they discard the trial values of iterates. */
-typedef struct { void (*run)(void *self); void *self; } again_call;
+/* A step, see Step in time_scheme.py. */
+typedef struct {
+  double t0, t1, dt, load_time, motion_time, fraction, at, ratio;
+  const double *q0, *q_before;
+} time_step;
+
+/* Phase of a term when a step begins or is accepted: q1 is the end of the step, s the step of the
+ * nodes. Both are none when the step begins. */
+typedef void (phase)(void *self, const time_step *step, const double *q1, const double *s);
+typedef struct { phase *run; void *self; } phase_call;
+typedef struct { int number; const phase_call *call; } phases;
 
 /* The equation of a step and the state of its solution. Unknowns and residuals are in the axes of
  * supports. */
@@ -589,8 +597,7 @@ typedef struct {
   int predictions;
   predicted_strains *const *predicted;
   int32_t *search;       /* flags of points that may open; or none */
-  int agains;
-  const again_call *again;
+  phases again;          /* restart a step: discard the trial values of iterates */
   double *conjugate, *start, *aside; /* space: of a line search; of a solution with stiffer tangents */
   void *handle;
   void (*agree)(void *handle, int number, const int *how, double *values); /* none on one process */
@@ -644,18 +651,6 @@ void enter_step(prediction *p, double dt, const double *q, const double *q1);
 void compare_differences(prediction *p);
 
 /* -- steps one after the other, see steps.c ----------------------------------------------------- */
-
-/* A step, see Step in time_scheme.py. */
-typedef struct {
-  double t0, t1, dt, load_time, motion_time, fraction, at, ratio;
-  const double *q0, *q_before;
-} time_step;
-
-/* Phase of a term when a step begins or is accepted: q1 is the end of the step, s the step of the
- * nodes. Both are none when the step begins. */
-typedef void (phase)(void *self, const time_step *step, const double *q1, const double *s);
-typedef struct { phase *run; void *self; } phase_call;
-typedef struct { int number; const phase_call *call; } phases;
 
 /* A function of time: piecewise linear and constant outside the points, or a Python function. */
 typedef struct {
@@ -853,7 +848,6 @@ typedef struct {
   double *end, *reached;              /* forces of actuators at the end of this step, and of the last one */
   double *entry, sign;                /* of the work in the ledger */
   int dt_of_law;       /* position of dt in the data of a rigid-plastic law */
-  int32_t *way_before; /* direction of slip of rigid-plastic connectors after the last step */
   double *hardened, loss; /* energy stored by rigid-plastic connectors; fraction of the loss of backward
                            * Euler */
   double *lost;           /* ledger entry of compiled laws */
@@ -904,9 +898,9 @@ typedef struct {
 typedef struct {
   points *points;
   inelastic *cells;
-  friction *rubs;
-  rigid_plastic *slips;
-  const int32_t *way_before; /* of rigid-plastic connectors, after the last step */
+  int number; /* of connectors */
+  const double *excess;
+  int32_t *free;
 } openable;
 
 enum { MOST_SUBSTEPS = 4096 }; /* largest number of substeps of a step */
@@ -974,8 +968,7 @@ phase begin_forms, add_values, begin_static_tangent, begin_predicted_strains, be
   accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
   accept_second_differences, begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
   begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,
-  accept_connectors, add_energy_of_connectors, begin_guides, accept_guides;
-void begin_connectors_again(void *self);
+  begin_connectors_again, accept_connectors, add_energy_of_connectors, begin_guides, accept_guides;
 admission points_dissipate;
 change_of_energy change_of_form, change_of_points, change_of_connectors;
 double value_at(const time_function *f, double t);

@@ -229,10 +229,16 @@ void find_round_off(const equation *e, const double *q, double *forces)
   }
 }
 
-/* Largest motion in an iterate on all processes, at most the size of the scene. */
+/* Largest motion in an iterate on all processes, at most the size of the scene: a displacement, or a
+ * rotation times that size. */
 void find_motion(equation *e, const double *x)
 {
-  e->moved = fmin(over_processes(e, LARGEST, largest_motion(e->size, e->weight, x)), e->scene);
+  double largest = 0;
+  for (int i = 0; i < e->size; ++i) {
+    const double w = e->weight[i];
+    if (w > 0 && !(fabs(x[i]) <= largest * w)) largest = fabs(x[i]) / w;
+  }
+  e->moved = fmin(over_processes(e, LARGEST, largest), e->scene);
 }
 
 /* Check an iterate x with the latest residual: the reason to stop, or ITERATING. */
@@ -529,13 +535,18 @@ static int iterate_from(equation *e, const double *guess, int patience, enum tan
   }
 }
 
+static void run(const phases *p, const time_step *step, const double *q1, const double *s)
+{
+  for (int k = 0; k < p->number; ++k) p->call[k].run(p->call[k].self, step, q1, s);
+}
+
 /* Set stiffer tangents of points that do not open, or restore the true ones; returns whether they
  * differ. */
 static int stiffen(equation *e, int stiff)
 {
   const int opened = over_processes(e, LARGEST, e->search && e->search[OPENED]) > 0;
   if (e->search) e->search[STIFF] = stiff && opened;
-  for (int k = 0; stiff && k < e->agains; ++k) e->again[k].run(e->again[k].self);
+  if (stiff) run(&e->again, 0, 0, 0);
   return opened;
 }
 

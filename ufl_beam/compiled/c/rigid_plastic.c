@@ -23,7 +23,7 @@ static int direction_of_slip(const rigid_plastic *p, int i, double *w, double mo
   double s[2];
   p->excess[i] = 0;
   if (limit == 0) return motion < 0 ? -1 : 1;
-  if (p->search[HOLD] && p->slipped[i] == CLOSED) {
+  if (p->search[HOLD] && !p->way_before[i] && !p->free[i]) {
     if (fabs(tested) > limit) {
       p->excess[i] = fabs(tested) / p->limit[i] - 1;
       p->search[OVER] = 1;
@@ -94,7 +94,7 @@ static void commit_rigid_plastic(const rigid_plastic *p, const double *e1, doubl
       p->dissipated[i] += s[SLIP_DISSIPATED];
       p->limit[i] = s[SLIP_LIMIT], p->back_force[i] = s[SLIP_BACK_FORCE];
     }
-    p->slipped[i] = w[SLIP] > 0 ? FLOWING : CLOSED;
+    p->way_before[i] = w[SLIP] > 0 ? way : 0;
     w[SLIPPED] += w[SLIP];
     w[SLIP_START] += way * w[SLIP];
   }

@@ -116,8 +116,7 @@ static double largest_excess(const time_loop *m)
   for (int k = 0; k < m->places; ++k) {
     const openable *o = m->place + k;
     if (o->points) most = fmax(most, *o->points->over);
-    for (int i = 0; o->slips && i < o->slips->number; ++i) most = fmax(most, o->slips->excess[i]);
-    for (int i = 0; o->rubs && i < o->rubs->number; ++i) most = fmax(most, o->rubs->excess[i]);
+    for (int i = 0; i < o->number; ++i) most = fmax(most, o->excess[i]);
   }
   return most;
 }
@@ -127,13 +126,9 @@ static void open_places(time_loop *m, double least)
 {
   for (int k = 0; k < m->places; ++k) {
     const openable *o = m->place + k;
-    const rigid_plastic *p = o->slips;
     if (o->points) release(o->points, least);
     if (o->cells) o->cells->latest[0] = NAN;
-    for (int i = 0; p && i < p->number; ++i)
-      if (p->excess[i] > 0 && p->excess[i] >= least) p->slipped[i] = RELEASED;
-    for (int i = 0; o->rubs && i < o->rubs->number; ++i)
-      o->rubs->free[i] |= o->rubs->excess[i] > 0 && o->rubs->excess[i] >= least;
+    for (int i = 0; i < o->number; ++i) o->free[i] |= o->excess[i] > 0 && o->excess[i] >= least;
   }
 }
 
@@ -146,8 +141,7 @@ static void end_search(time_loop *m, int opened)
     const points *p = o->points;
     for (int i = 0; p && i < p->cells * p->of_cell; ++i)
       if (p->w[i * p->width + FLOWS] == RELEASED) p->w[i * p->width + FLOWS] = CLOSED;
-    for (int i = 0; o->slips && i < o->slips->number; ++i) o->slips->slipped[i] = abs(o->way_before[i]);
-    if (o->rubs) memset(o->rubs->free, 0, o->rubs->number * sizeof *o->rubs->free);
+    if (o->number) memset(o->free, 0, o->number * sizeof *o->free);
   }
 }
 

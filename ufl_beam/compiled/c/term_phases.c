@@ -18,11 +18,6 @@ double value_at(const time_function *f, double t)
   return (f->y[high] - f->y[low]) / (f->t[high] - f->t[low]) * (t - f->t[low]) + f->y[low];
 }
 
-static void run(const phases *p, const time_step *step, const double *q1, const double *s)
-{
-  for (int k = 0; k < p->number; ++k) p->call[k].run(p->call[k].self, step, q1, s);
-}
-
 void begin_forms(void *self, const time_step *step, const double *q1, const double *s)
 {
   const form_of_step *f = self;
@@ -294,16 +289,16 @@ void begin_connectors(void *self, const time_step *step, const double *q1, const
   if (c->points) begin_inelastic(t->points, step, q1, s);
   for (int i = 0; p && i < p->number; ++i) {
     p->w[i * p->width + t->dt_of_law] = step->dt;
-    p->way[i] = t->way_before[i];
+    p->way[i] = p->way_before[i];
   }
 }
 
-void begin_connectors_again(void *self)
+void begin_connectors_again(void *self, const time_step *step, const double *q1, const double *s)
 {
   const connector_term *t = self;
   const connectors *c = t->connectors;
-  if (c->rigid_plastic)
-    memcpy(c->rigid_plastic->way, t->way_before, c->rigid_plastic->number * sizeof *t->way_before);
+  const rigid_plastic *p = c->rigid_plastic;
+  if (p) memcpy(p->way, p->way_before, p->number * sizeof *p->way);
   if (c->friction) begin_friction_again(c->friction);
   if (c->asked) c->asked->again(c->asked->again_self);
 }
