@@ -156,7 +156,7 @@ from ufl_beam.simulation.checkpoint import Checkpoint
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_control import Adaptive
+from ufl_beam.simulation.step_lengths import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.energy_ledger import Energy as Energy
 

@@ -37,7 +37,7 @@ from ufl_beam.parallel import alone, communicator, progress_bar
 from ufl_beam.simulation.initial_state import require_scheme
 from ufl_beam.simulation.run import require_times, simulate
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_control import Adaptive
+from ufl_beam.simulation.step_lengths import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
 MESHES = Mesh(degree=2), Mesh()  # meshes that compete by default

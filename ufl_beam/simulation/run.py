@@ -38,7 +38,7 @@ from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch
 from ufl_beam.simulation.initial_state import checked_numbering, initial_state, mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
-from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, step_count
+from ufl_beam.simulation.step_lengths import Adaptive, AdaptiveSteps, EqualSteps, step_count
 from ufl_beam.simulation.stepper import MOST_SUBSTEPS
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 

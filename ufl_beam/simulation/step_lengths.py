@@ -157,7 +157,7 @@ class AdaptiveSteps:
         stop = simulation.controllers.next_sample(simulation.t, stop)
         while True:
             try:
-                trial, error = self._attempt(stop)
+                trial, error = self._solve_and_estimate_error(stop)
                 dt = trial.step.dt
                 change = 0.9 * (self._tolerance / max(error, 1e-300)) ** (1 / 3)
                 if error <= self._tolerance:
@@ -180,7 +180,7 @@ class AdaptiveSteps:
         if keep:
             simulation.keep()
 
-    def _attempt(self, stop: float) -> tuple[Trial, float]:
+    def _solve_and_estimate_error(self, stop: float) -> tuple[Trial, float]:
         """Solve the next step and estimate its error, as defined by :class:`Adaptive`."""
         simulation, supports = self._simulation, self._simulation.supports
         inertia = simulation.inertia
