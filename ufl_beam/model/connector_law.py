@@ -276,15 +276,7 @@ def judges_loss(law: ConnectorLaw) -> bool:
     The loss of a law with variables has an integration error, unless its energy is quadratic.  An
     active law may supply energy.
     """
-
-    def energy(factor: float) -> list[float]:
-        draw = np.random.default_rng(0).uniform
-        state = State({name: factor * draw(-1.0, 1.0, 1) for name in law.variables})
-        with np.errstate(all="ignore"):
-            motions = [factor * draw(-1.0, 1.0, 1) for _ in range(law.components)]
-            return [float(np.sum(law.energy(law.as_argument(motions), state)))]
-
-    return not law.active and (not law.variables or quadratic(energy))
+    return not law.active and (not law.variables or quadratic(law, law.components, law.energy))
 
 
 # -- functions of users ------------------------------------------------------------------------

@@ -282,6 +282,7 @@ def traced(law: object) -> AbstractContextManager[None]:
 
 
 WRITTEN = ". Laws are written with + - * / ** and the functions of ub.law_functions"
+"""Remedy in the errors of laws that cannot be called."""
 
 
 def require_names(result: object, law: Any, what: str) -> None:
@@ -315,19 +316,19 @@ def judges_dissipation(law: MaterialLaw) -> bool:
 def has_quadratic_energies(law: MaterialLaw) -> bool:
     """Return whether the energies of a law are quadratic in strains and variables."""
     tried = _sample(law)
+    hardening = quadratic(law, 1, lambda _, state: tried.hardening_energy(state))
+    return hardening and quadratic(law, len(law.resultants or "x"), tried.elastic_energy)
 
-    def energies(factor: float) -> list[float]:
+
+def quadratic(law: Any, number: int, energy: Callable[[Any, State], Values]) -> bool:
+    """Return whether an energy is quadratic in ``number`` strains or motions and the variables."""
+
+    def value(factor: float) -> float:
         draw = np.random.default_rng(0).uniform
-        strain = law.as_argument(tuple(factor * draw(-1.0, 1.0, 1) for _ in law.resultants or "x"))
+        strains = tuple(factor * draw(-1.0, 1.0, 1) for _ in range(number))
         state = State({name: factor * draw(-1.0, 1.0, 1) for name in law.variables})
         with np.errstate(all="ignore"):
-            pair = tried.elastic_energy(strain, state), tried.hardening_energy(state)
-        return [float(np.sum(x)) for x in pair]
+            return float(np.sum(energy(law.as_argument(strains), state)))
 
-    return quadratic(energies)
-
-
-def quadratic(energies: Callable[[float], list[float]]) -> bool:
-    """Return whether energies grow with the square of a factor on their arguments."""
     # A factor of two keeps all digits of the arguments.
-    return bool(np.allclose(energies(2.0), 4.0 * np.array(energies(1.0)), rtol=1e-12, atol=0.0))
+    return bool(np.isclose(value(2.0), 4.0 * value(1.0), rtol=1e-12, atol=0.0))

@@ -100,36 +100,29 @@ class Section(Record):
         """Return the material points of a cell with this hinge law; None if the cell is elastic."""
         if self.fibres is not None:
             return self.fibres.section_points(self.GA)
-        stiffness = np.array([self.EA, self.GA, self.EI])
-        if self.interaction is not None:
-            together = np.array([name in self.interaction.resultants for name in "NVM"])
-            if hinge is not None and hinge.opens:
-                raise ModelError("Section: a hinge beside interaction of N and M; leave one out")
-            return SectionPoints(
-                strains=np.eye(3)[together],
-                weights=np.ones(1),
-                stiffness=stiffness[together],
-                laws=((self.interaction, 1),),
-                rest=np.where(together, 0.0, stiffness),
-                softening=None,
-                breaking=slice(None),
-            )
-        laws = [self.axial, self.shear, self.bending]
-        if hinge is not None and hinge.opens:
-            laws[2] = self.bending or ElastoPlastic(yield_limit=math.inf)
-        else:
+        if hinge is not None and not hinge.opens:
             hinge = None
-        inelastic = np.array([law is not None for law in laws])
-        if not inelastic.any():
+        stiffness, bending = np.array([self.EA, self.GA, self.EI]), self.bending
+        if self.interaction is not None:
+            if hinge is not None:
+                raise ModelError("Section: a hinge beside interaction of N and M; leave one out")
+            inelastic = np.array([name in self.interaction.resultants for name in "NVM"])
+            laws = [(self.interaction, 1)]
+        else:
+            if hinge is not None and bending is None:
+                bending = ElastoPlastic(yield_limit=math.inf)
+            inelastic = np.array([law is not None for law in (self.axial, self.shear, bending)])
+            laws = [(law, 1) for law in (self.axial, self.shear, bending) if law is not None]
+        if not laws:
             return None
         return SectionPoints(
             strains=np.eye(3)[inelastic],
-            weights=np.ones(inelastic.sum()),
+            weights=np.ones(len(laws)),
             stiffness=stiffness[inelastic],
-            laws=tuple((law, 1) for law in laws if law is not None),
+            laws=tuple(laws),
             rest=np.where(inelastic, 0.0, stiffness),
             softening=hinge,
-            breaking=slice(inelastic.sum() - 1, None),
+            breaking=slice(len(laws) - 1, None),
             hinges=hinge is not None,
         )
 

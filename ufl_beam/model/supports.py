@@ -22,6 +22,7 @@ COMPONENTS = ("u", "v", "psi")
 Motion = float | TimeFunction
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Support(Bearing, Record, ABC):
     """Held or prescribed motion of a place; base of :class:`Clamped` and other supports.
 
@@ -40,7 +41,7 @@ class Support(Bearing, Record, ABC):
     """
 
     place: Carried
-    angle: float = 0.0
+    angle: ClassVar[float] = 0.0
 
     __repr__ = bracketed
 
@@ -67,7 +68,6 @@ class Support(Bearing, Record, ABC):
     _label = __str__
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Clamped(Support):
     """Clamped support: holds displacement and rotation.
 
@@ -77,11 +77,9 @@ class Clamped(Support):
         [0, 1, 2]
     """
 
-    place: Carried
     held: ClassVar = {0: still, 1: still, 2: still}
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Pinned(Support):
     """Pinned support: holds the displacement; the place turns freely.
 
@@ -91,7 +89,6 @@ class Pinned(Support):
         [0, 1]
     """
 
-    place: Carried
     held: ClassVar = {0: still, 1: still}
 
 
@@ -110,7 +107,6 @@ class Roller(Support):
         True
     """
 
-    place: Carried
     _: KW_ONLY
     along: Vector = (1.0, 0.0)
 
@@ -146,7 +142,6 @@ class PrescribedDisplacement(Support):
         True
     """
 
-    place: Carried
     _: KW_ONLY
     u: Motion | None = None
     v: Motion | None = None
