@@ -90,18 +90,30 @@ class DampedVelocities(ub.EnergyMomentumBase, ub.MidpointLoads):
         return 0.0, 1 / 12 + self.c
 
 
-@pytest.mark.parametrize("scheme", [DampedVelocities(), ub.EnergyMomentumDecaying()])
-def test_a_scheme_that_uses_the_last_step_carries_on(scheme):
-    """The second part knows the change of velocities in the last step of the first part."""
+@pytest.mark.parametrize(
+    "scheme", [DampedVelocities(), ub.EnergyMomentumDecaying(), ub.GeneralizedAlpha()]
+)
+@pytest.mark.parametrize(("middle", "dt"), [(0.1, 0.01), (0.12, 0.002), (0.07 + 0.02, 0.003)])
+def test_a_scheme_that_uses_the_last_step_carries_on(scheme, middle, dt):
+    """The second part knows the change of velocities in the last step of the first part.
+
+    In floating point 60 · 0.12 / 60 is less than 0.12, and 0.07 + 0.02 is more than 0.09.
+    """
     scene = pushed_beam()
-    whole = ub.simulate(scene, scheme, t=(0, 0.2), dt=0.01)
-    first = ub.simulate(scene, scheme, t=(0, 0.1), dt=0.01)
-    second = ub.simulate(scene, scheme, t=(0.1, 0.2), dt=0.01, start=first)
+    whole = ub.simulate(scene, scheme, t=(0, 2 * middle), dt=dt)
+    first = ub.simulate(scene, scheme, t=(0, round(middle, 2)), dt=dt)
+    assert first.times[-1] == round(middle, 2)
+    second = ub.simulate(scene, scheme, t=(middle, 2 * middle), dt=dt, start=first)
     size = np.abs(whole.q).max()
     assert size > 0.01
     np.testing.assert_allclose(second.q[-1], whole.q[-1], atol=1e-12 * size)
     reference = ub.simulate(
-        scene, scheme, t=(0.1, 0.2), dt=0.01, start=first, newton=ub.Newton(reference=True)
+        scene,
+        scheme,
+        t=(middle, 2 * middle),
+        dt=dt,
+        start=first,
+        newton=ub.Newton(reference=True),
     )
     np.testing.assert_allclose(reference.q[-1], whole.q[-1], atol=1e-9 * size)
 

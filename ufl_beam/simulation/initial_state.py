@@ -103,6 +103,23 @@ def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
     return Mesh() if start is None else start.numbering.mesh
 
 
+SAME_TIME = 1e-12
+"""Largest difference between the end of a run and the beginning of the next one that is round-off,
+as a fraction of the largest time."""
+
+
+def continuation(start: Solution | None, scene: Scene, t0: float) -> tuple[float, bool]:
+    """Return the time of the initial state, and whether ``start`` ended there with this scene.
+
+    Then no force has jumped, so that accelerations and forces of the last step are still true.
+    """
+    if start is None or start.scene is not scene:
+        return t0, False
+    end = float(start.times[-1])
+    same = abs(end - t0) <= SAME_TIME * float(np.abs(start.times[[0, -1]]).max())
+    return (end, True) if same else (t0, False)
+
+
 def initial_state(numbering: DofNumbering, start: Solution | None) -> tuple[Array, Array, State]:
     """Return configuration, velocities and internal variables at the beginning of a run."""
     v = _initial_velocity(numbering)

@@ -35,7 +35,12 @@ from ufl_beam.parallel import communicator, print_once, progress_bar
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, checksum_at
 from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch
-from ufl_beam.simulation.initial_state import checked_numbering, initial_state, mesh_of
+from ufl_beam.simulation.initial_state import (
+    checked_numbering,
+    continuation,
+    initial_state,
+    mesh_of,
+)
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
 from ufl_beam.simulation.step_lengths import Adaptive, AdaptiveSteps, EqualSteps, step_count
@@ -320,9 +325,9 @@ def simulate_by_reference(
     begin, (t0, t1) = time.perf_counter(), times
     numbering, _ = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=start is None)
     q, v, internal = initial_state(numbering, start)
+    t0, same = continuation(start, scene, t0)
     options: dict[str, Any] = {"max_iterations": newton.max_iterations, "petsc": newton.petsc}
     solver = Solver(numbering, scheme, t0, q, v, rtol=newton.rtol, **options)
-    same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
     between = float(scheme.average(0.0, 1.0))
     solver.start(None if start is None else internal, same=same)
     if start is not None and start.between == between and same_unknowns(start.numbering, numbering):

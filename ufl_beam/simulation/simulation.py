@@ -29,7 +29,12 @@ from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWrite
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, communicator, sharing
 from ufl_beam.simulation.diagnosis import no_equilibrium
-from ufl_beam.simulation.initial_state import checked_numbering, initial_state, mesh_of
+from ufl_beam.simulation.initial_state import (
+    checked_numbering,
+    continuation,
+    initial_state,
+    mesh_of,
+)
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StaticPath, StepEquation, forces_of_scene
 from ufl_beam.simulation.stepper import Stepper
@@ -108,9 +113,9 @@ class Simulation(Stepper):
         numbering, loose = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=fresh)
         subdomain = Subdomain(numbering, sharing(comm, len(numbering.cells)))
         together, q, v, internal = Agreement(subdomain.comm), *initial_state(numbering, start)
+        t0, same = continuation(start, scene, t0)
         equation = StepEquation(subdomain, scheme, t0, v[subdomain.dofs], together)
         inertia, q_local, loaded = equation.inertia, q[subdomain.dofs], list[Array]()
-        same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
         goes_on = same and "reactions" in internal and start is not None and not len(start.v)
         if not fresh or (inertia is not None and inertia.scheme.kept):
             rates = None if inertia is None else inertia.v

@@ -34,8 +34,8 @@ class EqualSteps:
     """Steps of equal length, a little shorter than ``dt`` if the run is no multiple of ``dt``."""
 
     def __init__(self, simulation: Simulation, t1: float, dt: float) -> None:
-        self._simulation, self._t0, self._time = simulation, simulation.t, t1 - simulation.t
-        self._all = step_count(self._time, dt)
+        self._simulation, self._t0, self._t1 = simulation, simulation.t, t1
+        self._all = step_count(t1 - simulation.t, dt)
         self.steps, self.error = 0, math.nan
 
     @property
@@ -51,7 +51,8 @@ class EqualSteps:
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
         """Take up to ``most`` steps, in substeps if they fail; with ``keep``, states are kept."""
         steps = np.arange(self.steps, min(self.steps + min(most, MOST), self._all)) + 1
-        ends = self._t0 + self._time * steps / self._all
+        ends = self._t0 + (self._t1 - self._t0) * steps / self._all
+        ends[steps == self._all] = self._t1  # exactly, for a run that goes on at this time
         self.steps += self._simulation.steps_to(ends, keep=keep)
 
     def state(self) -> dict[str, float]:
