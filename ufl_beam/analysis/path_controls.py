@@ -19,6 +19,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, StepFailed, require_kind, require_number
 from ufl_beam.mechanics.time_scheme import Step
 from ufl_beam.model.bodies import Place
+from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
@@ -294,6 +295,9 @@ class Control:
         if self.step == 0:
             raise ArgumentError(f"{type(self).__name__}: step = 0 leads nowhere")
 
+    def require(self, scene: Scene) -> None:
+        """Raise :class:`ArgumentError` if the control does not fit the scene."""
+
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
         """Return the gradient of the quantity or of its negative, whichever grows in a step.
 
@@ -445,6 +449,13 @@ class DisplacementControl(Control):
                 f"{', '.join(COMPONENTS)}"
             )
         super().__post_init__()
+
+    def require(self, scene: Scene) -> None:
+        """Raise :class:`ArgumentError` unless the beam of the place is in the scene."""
+        if self.place.beam not in scene.beams:
+            raise ArgumentError(
+                f"DisplacementControl of {self.place}: {self.place.beam.name} is not in the scene"
+            )
 
     @property
     def quantity(self) -> str:  # type: ignore[override]

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from ufl_beam.analysis.critical_points import Branch, Candidate, CriticalPoint, Stiffness
-from ufl_beam.analysis.path_controls import Control, Crossing, DisplacementControl, PathCorrector
+from ufl_beam.analysis.path_controls import Control, Crossing, PathCorrector
 from ufl_beam.arrays import Array
 from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
@@ -177,10 +177,7 @@ def follow(
             f"follow: control = {control!r} must be ArcLength(...), LoadControl(...), "
             "DisplacementControl(...) or DissipationControl(...)"
         )
-    if isinstance(control, DisplacementControl) and control.place.beam not in scene.beams:
-        raise ArgumentError(
-            f"DisplacementControl of {control.place}: {control.place.beam.name} is not in the scene"
-        )
+    control.require(scene)
     require_count(steps, "follow: steps")
     require_switch(progress, "follow: progress")
     if start is not None:
@@ -270,7 +267,8 @@ class PathStepper:
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
         """Take a step to its end or to the first critical point in it; shorten steps that fail.
 
-        The end is stored in the solution if ``keep``.  StepFailed: even the shortest step fails.
+        The end is stored in the solution if ``keep``.  Raise :class:`StepFailed` if even the
+        shortest step fails.
         """
         while True:
             iterations = self._simulation.iterations

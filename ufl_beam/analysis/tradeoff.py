@@ -268,7 +268,8 @@ class _Runs:
     def run(self, refinements: Sequence[Refinement], *, optional: bool = False) -> None:
         """Do the runs that are missing, several at a time if there are several processes.
 
-        If ``max_seconds`` leave no time for them, omit ``optional`` runs; else raise TradeoffError.
+        If ``max_seconds`` leave no time for them, omit ``optional`` runs, but raise
+        :class:`TradeoffError` for other runs.
         """
         missing = [r for r in refinements if r not in self.runs and r not in self.failed]
         if not missing:
@@ -548,7 +549,7 @@ class _Search:
     def _move_base(self, said: str, axis: int | None = None) -> None:
         """Refine cells (``axis=0``) or steps (1) of the base, by default the more uncertain.
 
-        TradeoffError: ``MOST_DOUBTS`` bases have not shown convergence.
+        Raise :class:`TradeoffError` if ``MOST_DOUBTS`` bases have not shown convergence.
         """
         where = self._runs.setting(self._at(2 ** self._base[0], self._base[1]))
         self._doubts.append(f"\n  from {where} on: {said}")

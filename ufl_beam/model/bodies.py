@@ -302,9 +302,11 @@ def require_node(place: Any, what: str) -> None:
         )
 
 
-Anchor = Annotated[AttachmentPoint, require_place]
-Carried = Annotated[AttachmentPoint, require_node]
-"""Fields of a record with any place, and with a place whose displacement is that of a node."""
+PlaceField = Annotated[AttachmentPoint, require_place]
+"""Field of a record for a place."""
+
+NodeField = Annotated[AttachmentPoint, require_node]
+"""Field of a record for a place that has a node: on a beam, or the centre of a moving body."""
 
 
 # -- point masses, initial velocities -----------------------------------------------------------
@@ -327,7 +329,7 @@ class PointMass(Record):
         True
     """
 
-    place: Carried
+    place: NodeField
     mass: NotNegative
     inertia: NotNegative = 0.0
 

@@ -14,11 +14,11 @@ from typing import Annotated, Any
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import (
-    Anchor,
     AttachmentPoint,
     Node,
     NodeDof,
     Place,
+    PlaceField,
     arm,
     merged,
     node,
@@ -36,8 +36,8 @@ def _require_law(law: Any, what: str) -> None:
         require_connector_law(law, what)
 
 
-Acting = Annotated[Law, _require_law]
-"""Field of a connector with its law."""
+LawField = Annotated[Law, _require_law]
+"""Field of a connector for its law."""
 
 Factors = tuple[float, float, float]
 """Derivatives of a relative motion with respect to (u, v, ψ) of a node."""
@@ -70,9 +70,9 @@ class Connector(Record, ABC):
     """
 
     motion: str
-    a: Anchor
-    b: Anchor
-    law: Acting
+    a: PlaceField
+    b: PlaceField
+    law: LawField
     axis: Point = (1.0, 0.0)
     corner: Point | None = None
     component: int = 0
@@ -148,9 +148,9 @@ class Turn(Connector):
         True
     """
 
-    a: Anchor
-    b: Anchor
-    law: Acting
+    a: PlaceField
+    b: PlaceField
+    law: LawField
     motion = "turning"
 
 
@@ -166,9 +166,9 @@ class Stretch(Connector):
         >>> stayed = ub.Scene([beam], supports=scene.supports, connectors=[rod])
     """
 
-    a: Anchor
-    b: Anchor
-    law: Acting
+    a: PlaceField
+    b: PlaceField
+    law: LawField
     motion = "stretching"
 
     def __post_init__(self) -> None:
@@ -194,9 +194,9 @@ class Slide(Connector):
         >>> propped = ub.Scene([beam], supports=scene.supports, connectors=[spring])
     """
 
-    a: Anchor
-    b: Anchor
-    law: Acting
+    a: PlaceField
+    b: PlaceField
+    law: LawField
     _: KW_ONLY
     axis: Point = None  # type: ignore[assignment]  # replaced by a unit vector
     motion = "sliding"
@@ -233,8 +233,8 @@ class Bushing(Connector):
         0.001
     """
 
-    a: Anchor
-    b: Anchor
+    a: PlaceField
+    b: PlaceField
     law: Annotated[ConnectorLaw, _require_law]
     _: KW_ONLY
     axis: Vector = (1.0, 0.0)
@@ -310,9 +310,6 @@ def require_apart(connector: Connector) -> None:
 
 # -- plastic hinges of zero length --------------------------------------------------------------
 
-HINGE = "Hinge"
-"""Owner of the connectors that are plastic hinges."""
-
 
 def plastic_hinges(
     may_have: Mapping[Place, HingeLaw],  # laws of the hinges that the beams may have
@@ -351,7 +348,7 @@ def plastic_hinges(
         if stays(place):
             beyond = Place(place.beam, place.s, beyond=True)
             before, after = (beyond, place) if place.s == 1.0 else (place, beyond)
-            hinges.append(Component(HINGE, "turning", before, after, RigidPlastic(law)))
+            hinges.append(Component("Hinge", "turning", before, after, RigidPlastic(law)))
     return tuple(hinges)
 
 

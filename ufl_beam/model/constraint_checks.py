@@ -361,7 +361,8 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
             for (bulk, _), k in zip(points.laws, first[:-1], strict=True):
                 if bulk.stressed(*map(tuple, by_point[k].T)):
                     wrong.append((beam.name, bulk, "a stress at no strain"))
-    for owner, stressed, force in wrong:
+    if wrong:
+        owner, stressed, force = wrong[0]
         raise ModelError(
             f"{what}: {type(stressed).__name__} of {owner} bears {force}, so that the undeformed "
             f"scene is not in equilibrium; {instead}"

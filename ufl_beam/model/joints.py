@@ -10,10 +10,10 @@ from dataclasses import KW_ONLY, dataclass
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import (
-    Anchor,
     AttachmentPoint,
     NodeDof,
     Place,
+    PlaceField,
     Spot,
     carries,
     ground,
@@ -175,8 +175,8 @@ class Prismatic(Joint):
         Prismatic(beam.end (2, 0), slider (2, 0))
     """
 
-    rail: Anchor
-    slider: Anchor
+    rail: PlaceField
+    slider: PlaceField
     _: KW_ONLY
     axis: Point | None = None
     turning: Switch = False
@@ -202,8 +202,8 @@ class RigidLink(Joint):
         ... )
     """
 
-    a: Anchor
-    b: Anchor
+    a: PlaceField
+    b: PlaceField
     shared = (2,)
 
     def __post_init__(self) -> None:
@@ -232,8 +232,8 @@ class Link(Joint):
         1540.0
     """
 
-    a: Anchor
-    b: Anchor
+    a: PlaceField
+    b: PlaceField
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -262,7 +262,7 @@ class Guided(Joint):
         ... )
     """
 
-    place: Anchor
+    place: PlaceField
     curve: Curve
     meets = True
     advice = "curve(0) must be at the place"
@@ -307,7 +307,7 @@ class Release(_AtPoint):
     """
 
     a: Instance[Place]
-    b: Anchor
+    b: PlaceField
     _: KW_ONLY
     free: Text
     multipliers: Switch = False

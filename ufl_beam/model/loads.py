@@ -8,7 +8,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar
 
 from ufl_beam.errors import ModelError, closed
-from ufl_beam.model.bodies import Anchor, Beams, Member, carries, ground
+from ufl_beam.model.bodies import Beams, Member, PlaceField, carries, ground
 from ufl_beam.model.connector_laws import PrescribedForce
 from ufl_beam.model.connectors import Component, Connector
 from ufl_beam.model.functions import Timed, TimeFunction, steady, value_at
@@ -26,7 +26,7 @@ class Load(Record, ABC):
 class LoadAtPlace(Load):
     """Base of the loads that act at one place."""
 
-    place: Anchor
+    place: PlaceField
     force: Vector = (0.0, 0.0)
     moment: Number = 0.0
     amplitude: Timed = steady

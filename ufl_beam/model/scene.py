@@ -30,8 +30,14 @@ from ufl_beam.model.bodies import (
     node,
 )
 from ufl_beam.model.checks import require_all
-from ufl_beam.model.connector_laws import Bearing, Coulomb, PrescribedForce, PrescribedMotion
-from ufl_beam.model.connectors import HINGE, Connector, plastic_hinges
+from ufl_beam.model.connector_laws import (
+    Bearing,
+    Coulomb,
+    PrescribedForce,
+    PrescribedMotion,
+    RigidPlastic,
+)
+from ufl_beam.model.connectors import Component, Connector, plastic_hinges
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import (
@@ -191,7 +197,11 @@ class Scene(Record, Rich):
     @cached_property
     def hinges(self) -> tuple[Connector, ...]:
         """Plastic hinges of zero length: ``hinges`` of beams, and of sections at ends of beams."""
-        return tuple(x for x in self.all_connectors if x.kind == HINGE)
+        return tuple(
+            connector
+            for connector in self.all_connectors
+            if isinstance(connector, Component) and isinstance(connector.law, RigidPlastic)
+        )
 
     @property
     def moments(self) -> list[LoadAtPlace]:

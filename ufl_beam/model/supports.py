@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
-from ufl_beam.model.bodies import Carried
+from ufl_beam.model.bodies import NodeField
 from ufl_beam.model.checks import require_number
 from ufl_beam.model.connector_laws import Bearing
 from ufl_beam.model.functions import Constant, TimeFunction, require_time_function, still
@@ -40,7 +40,7 @@ class Support(Bearing, Record, ABC):
         100000.0
     """
 
-    place: Carried
+    place: NodeField
     angle: ClassVar[float] = 0.0
 
     __repr__ = bracketed

@@ -183,7 +183,7 @@ def font_size(size: float) -> float:
 
 
 def shade(color: str) -> str:
-    """Replace ink by the user's colour of texts and white by that of axes; keep other colours."""
+    """Replace the ink by the user's text colour and white by the user's background of axes."""
     import matplotlib as mpl
 
     now = mpl.rcParams

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Symbols of bodies, joints, connector laws and supports for all kinds of pictures.
 
-Symbols of supports are in :data:`SUPPORTS`, those of joints in :data:`JOINTS`, and those of
-connector laws in :data:`LAWS`; joints and laws without an entry have a plain symbol.  The unit of
+Supports have their symbols in :data:`SUPPORTS`, joints in :data:`JOINTS` and connector laws in
+:data:`LAWS`; joints and laws without an entry have a plain symbol.  The unit of
 lengths is half a symbol.  Symbols of loads are in `model_drawing.py`.
 """
 

@@ -306,7 +306,7 @@ class Stepper(StateView):
     def attempt_along(self, step: Step, guess: Array, border: Any, *, hold: bool = True) -> Trial:
         """Solve for a step and its load factor, which is the time at its end.
 
-        The times in ``step`` are those of the guess, which is in the axes of supports.  With
+        ``step`` has the times of the initial guess.  The guess is in the axes of supports.  With
         ``hold``, hinges and springs that did not open further in the last step stay closed if an
         equilibrium exists in which they bear their limits at most, see material_points.py.
         """

@@ -189,8 +189,8 @@ void watch_step(const watch *w, int now, double t, const double *before, const d
 
 /* The first inputs of the law of a point. Further inputs begin at the index `strain` of `points`:
  * strains at the end of the step, strains before the step, and stiffnesses, `components` of each;
- * `variables` before the step; if `solves`, as many variables that are solved for; and parameters of
- * the law. */
+ * `variables` before the step; if `solves`, the variables at the end of the step, which are unknowns;
+ * and parameters of the law. */
 enum point_input {
   GROWTH, DIRECTION,             /* of an iterate */
   TRACTION, JUMP, OPENING, FLOWS, /* the state before the step */
