@@ -272,6 +272,25 @@ def test_hanging_rods_stretch_under_their_weight(scheme):
     np.testing.assert_allclose(sunk, [0, -2 * 9.81 / 1e6, 0], rtol=1e-4, atol=1e-12)
 
 
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()], ids=str)
+@pytest.mark.parametrize("tip", [(8, 10), (8, 12), (6, 4)])
+def test_a_weight_hangs_from_a_flexible_arm(scheme, tip):
+    """The slack rope resists no swing before the first step; then it follows the tip sideways."""
+    steel = ub.Section.tube(0.3, 0.012, E=210e9, nu=0.3, rho=7850.0)
+    arm = ub.Beam((0, 10), tip, steel, cells=4)
+    (x, y), weight = tip, 9.81 * 3000.0
+    load = ub.Body((x, y - 5.0), mass=3000.0, inertia=900.0)
+    rope = ub.Link(arm.end, load.at(x, y - 4.5))
+    gravity, foot = ub.Gravity(), ub.Clamped(arm.start)
+    scene = ub.Scene([arm], bodies=[load], joints=[rope], supports=[foot], loads=[gravity])
+    run = ub.simulate(scene, scheme, t=(0, 1), dt=0.25)
+    hung, held = (run.displacement(place)[-1] for place in (load.at(x, y - 5.0), arm.end))
+    np.testing.assert_allclose(hung[:2], held[:2], atol=1e-7)
+    assert abs(hung[2]) < 1e-7
+    assert abs(held[0]) > 1e-3
+    np.testing.assert_allclose(run.joint(rope).force[-1], [0, weight], atol=1e-7 * weight)
+
+
 def test_a_path_of_what_its_weight_holds():
     """[closed] A force F across a hanging rod at its end: tan of its angle is F over W/2.
 

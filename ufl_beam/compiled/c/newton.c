@@ -518,19 +518,21 @@ static int iterate(equation *e, int patience, int careful)
   return e->reason;
 }
 
-/* Iterate from an initial guess. If the tangent is singular, hold zero-energy modes by springs; if
- * that does not help, iterate again without these. */
+/* Iterate from an initial guess. If the tangent is singular, hold zero-energy modes by springs. If
+ * that does not help, go on without the springs, because forces at the last iterate may resist the
+ * modes: a rope that was slack at the guess is taut there. */
 static int iterate_from(equation *e, const double *guess, int patience, enum tangents kind)
 {
   const double start = e->border ? *e->border->t : 0;
   enum { FRESH, HELD, FREE } motions = FRESH;
-  for (;;) {
-    if (e->border) *e->border->t = start;
-    go_to(e, guess, kind);
+  for (int from_guess = 1;;) {
+    if (from_guess && e->border) *e->border->t = start;
+    if (from_guess) go_to(e, guess, kind);
     const int reason = iterate(e, patience, 0);
     if (motions == FREE || reason > 0 || e->error || raised_anywhere(e) == OTHER) return reason;
     if (reason == SINGULAR && e->find_zero_modes(e->handle)) motions = HELD;
-    else if ((reason == SINGULAR || motions == HELD) && e->forget_zero_modes(e->handle)) motions = FREE;
+    else if ((reason == SINGULAR || motions == HELD) && e->forget_zero_modes(e->handle))
+      from_guess = motions != HELD, motions = FREE;
     else return reason;
   }
 }
