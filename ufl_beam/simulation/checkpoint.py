@@ -38,23 +38,23 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 
 FORMAT = "checkpoint of ufl_beam, 4"
-"""Format of the file; the number grows whenever the meaning of files changes."""
+"""Format of the file; its number is increased by each incompatible change of the format."""
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """Checkpoint file from which a run is restarted, and the interval at which it is written.
+    """Checkpoint file of a run, and the interval at which the file is written.
 
-    If the file exists when the run begins, the run continues from its state, with the same results
-    to the last bit.  So after a crash, run the same script again.
+    After a crash, run the same script again.  If the file exists, the run continues from the stored
+    state.  On one process the results then equal an uninterrupted run to the last bit.
 
     Args:
         path: File.
         every: Number of steps after which the file is written again.
         minutes: Wall time after which the file is written again; min.
-        also: Objects whose states are saved besides the states of objects that functions in the
-            scene use: random generators of NumPy, and objects with ``state()`` and
-            ``restore(state)``.  A state consists of numbers, texts, lists and dicts.
+        also: Further objects to save: random generators of NumPy, or objects with ``state()`` and
+            ``restore(state)``.  Such objects that functions in the scene use are always saved.  A
+            state consists of numbers, strings, lists and dicts.
 
     Raises:
         ArgumentError: ``path`` is no name of a file, both ``every`` and ``minutes`` are missing, a
@@ -99,13 +99,13 @@ class Checkpoint:
 class Keeper:
     """Reader and writer of the checkpoint of one run.
 
-    ``call`` has the arguments of the run by name.  They must be the same after a restart, except
-    that a run with equal steps, of length ``step`` (s), may continue to another end ``t1`` (s).
-    ``step`` is None for adaptive steps.
+    ``call`` contains the arguments of the run by name, which must be the same after a restart.
+    The end ``t1`` (s) may differ in runs with equal steps; ``step`` is their length (s), or None
+    for adaptive steps.
 
     Attributes:
         lock: Lock of the file, until the run releases it.
-        content: Content of the existing file until :meth:`resume`; else empty.
+        content: Content of the existing file; empty without a file and after :meth:`resume`.
     """
 
     def __init__(
@@ -181,7 +181,7 @@ class Keeper:
         require_writable(self.path)
 
     def resume(self, simulation: Simulation, pace: Any) -> None:
-        """Restore simulation, step control ``pace`` and recorders; then release the content."""
+        """Restore simulation, step control ``pace``, objects with a state, and recorders."""
         content, solution = self.content, simulation.solution
         with decoding(self.path, FORMAT):
             simulation.save_or_restore(Archive(simulation.subdomain, below("state/", content)))
@@ -212,8 +212,8 @@ class Keeper:
     # -- writing -------------------------------------------------------------------------------
 
     def due(self, steps: int) -> bool:
-        """Return whether to write after ``steps`` steps; all processes call it after each step."""
-        if self._last_step < 0:  # raise after the first step, not when the first file is due
+        """Return whether the file is due after ``steps`` steps; all processes call it together."""
+        if self._last_step < 0:  # so that an error comes after the first step
             self._require_unchanged()
             self._last_step = 0
         every, minutes = self._checkpoint.every, self._checkpoint.minutes
@@ -257,7 +257,7 @@ class Keeper:
         self._last_time, self._last_step = time.perf_counter(), pace.steps
 
     def _require_unchanged(self) -> None:
-        """Raise if functions have changed data that no file contains: a restart would lose them."""
+        """Raise if functions have changed data that a restart would lose."""
         changed = difference(Description(self._call).texts, self._described.texts)
         if changed:
             raise ArgumentError(
@@ -272,7 +272,7 @@ PYTHON = ".".join(map(str, sys.version_info[:2]))
 
 
 def checksum_at(start: Solution | None) -> str:
-    """Return a checksum of the last state of ``start``, or "nothing" if there is no ``start``."""
+    """Return a checksum of the last state of ``start``, or "nothing" if ``start`` is None."""
     if start is None:
         return "nothing"
     total = hashlib.sha256()

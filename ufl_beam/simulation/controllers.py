@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Forces of controllers and limits of friction: evaluation at the start of steps.
+"""Forces of controllers and friction limits, which are evaluated at the start of steps.
 
-The module also checks whether forces of controllers and force laws rise and fall in turn.
+The module also detects forces of controllers and force laws that alternately rise and fall.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Connector
 
 SAMPLE_TOLERANCE = 1e-9
-"""Largest difference of times that counts as round-off, as a fraction of the sample time."""
+"""Largest difference of two times that counts as round-off, as a fraction of the sample time."""
 
 
 class Controllers:
-    """Forces of controllers and limits of friction in a step; equal on all processes.
+    """Forces of controllers and friction limits in a step; equal on all processes.
 
     Attributes:
-        at: Index of each connector in the arrays.
-        values: Forces and limits, which C reads; N or N m.
-        sampled: Sample times by index, for controllers that have one; s.
-        fresh: For each connector, whether it was evaluated since C cleared the flag.
-        asks: True if a force or limit is evaluated at the start of steps.
+        at: Index of each connector in ``values`` and ``fresh``.
+        values: Forces and friction limits, which C reads; (n,); N or N m.
+        sampled: Sample time by index, for controllers with a sample time; s.
+        fresh: 1 for connectors that were evaluated since C last cleared this flag; (n,).
+        asks: True if any force or limit is evaluated at the start of steps.
     """
 
     def __init__(self, subdomain: Subdomain) -> None:
@@ -58,7 +58,7 @@ class Controllers:
         self._indices = np.array(
             [i for i, connector in enumerate(connectors) if connector in self.at], dtype=int
         )
-        # Time of the first sample (s) and number of the latest sample; NaN if there is none
+        # Time of the first sample (s) and number of the latest sample; NaN before the first sample
         self._samples = np.full((len(active), 2), math.nan)
 
     def place(self, connector: Connector) -> Any:
@@ -69,13 +69,13 @@ class Controllers:
         """Evaluate forces and limits that are due at ``now.t``; all processes call it together."""
         for i, connector in self._changing:
             sample = self._due(i, now.t)
-            if sample[1] != self._samples[i, 1]:  # always true without a sample time, for NaN
+            if sample[1] != self._samples[i, 1]:  # always true without a sample time: NaN
                 self.values[i] = connector.law.evaluate(now, connector)  # type: ignore[union-attr]
                 self.fresh[i] = 1
                 self._samples[i] = sample
 
     def _due(self, i: int, t: float) -> tuple[float, float]:
-        """Return the time of the first sample and the number of the latest sample at ``t``.
+        """Return the time of the first sample (s) and the number of the latest sample at ``t``.
 
         Both are NaN without a sample time.
         """
@@ -117,34 +117,34 @@ def _rounding(sample: float, *times: float) -> float:
 # -- forces that alternate -------------------------------------------------------------------------
 
 ALTERNATIONS = 20
-"""Number of successive changes of a force, each opposite to the previous change, that is reported.
+"""Number of successive changes of a force, alternately up and down, that causes a warning.
 
 Changes are counted from step to step, or from sample to sample."""
 
 LEAST_CHANGE = 0.5
-"""Least size of such a change, as a fraction of the largest force so far."""
+"""Least size of a counted change, as a fraction of the largest force so far."""
 
 LEAST_MOTION = 1e-9
-"""Least motion in the step of such a change, as a fraction of the size of the scene, or in rad."""
+"""Least motion of a connector in the step of a counted change; in sizes of the scene, or rad."""
 
 CONTROLLED = (
-    "the controller is evaluated again after its force has changed the motion too much. A force of "
-    "kd times a rate, constant for a time dt, needs kd dt < 2 J. J is the inertia (along a line "
-    "the mass) that the force moves within dt; a beam without a body has hardly any inertia at a "
-    "place, whatever the step. Give the place the inertia of its drive, as PointMass or Body, use "
-    "smaller gains, or state the force as a ForceLaw, which has no delay; see docs/howto_machine.md"
+    "the force changes the motion too much before the controller is evaluated again. A force of "
+    "kd times a rate, constant for a time dt, needs kd dt < 2 J. J is the inertia (for a "
+    "displacement, the mass) that the force moves within dt. A point of a beam without a body has "
+    "hardly any inertia. Add the inertia of the drive there by PointMass or Body, use smaller "
+    "gains, or write the force as a ForceLaw, which has no delay; see docs/howto_machine.md"
 )
-"""Reason and remedies for a controller."""
+"""Reason and remedies in the warning of a controller."""
 
 TOO_FAST = (
     "the force drives a motion that is too fast for the steps. Use smaller steps, or a scheme that "
     "damps such motions, as EnergyMomentum(alpha=0.05, beta=0.05) does"
 )
-"""Reason and remedies for a force law."""
+"""Reason and remedies in the warning of a force law."""
 
 
 class ForceWatch:
-    """Check for forces of controllers and force laws that rise and fall in turn.
+    """Check for forces of controllers and force laws that alternately rise and fall.
 
     Attributes:
         c: ``force_watch`` of loops.h; None if no connector has such a law.
@@ -184,7 +184,7 @@ class ForceWatch:
         self._alive = connector_terms, controllers
 
     def told(self) -> Iterator[str]:
-        """Yield the warnings of all reported connectors, if C has reported one since last time."""
+        """Yield warnings for all connectors reported so far, if C has reported another one."""
         if self.c is None or not self.c.tells:
             return
         self.c.tells = 0

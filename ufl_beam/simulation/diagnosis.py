@@ -36,33 +36,34 @@ from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vectors
 from ufl_beam.terms.term import KINDS
 
 LEAST_NAMED = 0.1
-"""Least deformation of a connector or cell that counts, as a fraction of the largest motion of a
-node; least force that is named, as a fraction of the largest force."""
+"""Least deformation of a connector or cell that counts, relative to the largest nodal motion; also
+the least force that a message names, relative to the largest force."""
 
 SOFT = 1e-3
 """Stiffness up to which a connector or cell is soft, as a fraction of its elastic stiffness."""
 
 PROBE_DISTANCE = 1e-3
-"""Largest distance from the initial state of a step to the state whose tangent shows which parts
-yield at the start of the step; in sizes of the scene, or rad."""
+"""Largest distance of the probe state from the initial state of a step; in sizes of the scene, or
+rad.  The tangent in the probe state shows which material yields at the start of the step."""
 
 FREE_MOTION = (
     "Loads can hold the scene only near an equilibrium, as a weight below its hinge, and the run "
     f"does not begin near one. Begin near an equilibrium. {INSTEAD}. In the first step: "
 )
-"""Continuation of the description of a motion without strain, if the first static step fails."""
+"""Text that follows the description of a motion without strain if the first static step fails."""
 
 LIMIT_STIFFNESS = 0.1
-"""Ratio of the least stiffness to its value in the first state, up to which a limit load is near.
+"""Ratio of the least singular value of the tangent to its value in the first state, up to which a
+limit load is near.
 
-The stiffness falls with the square root of the distance to the limit load: to 1/64 at the distance
-of the smallest substep, 1/4096 of a step.  A tenth allows for steps that begin farther away."""
+The ratio falls with the square root of the distance to the limit load.  A distance of 1/4096 of a
+step, the smallest substep, gives 1/64; a tenth allows for larger distances."""
 
 LEDGER_TOLERANCE = 10.0
-"""Largest relative imbalance of an exact ledger, as a multiple of the ``rtol`` of the solver."""
+"""Largest relative imbalance of a ledger that should be exact, as a multiple of ``Newton.rtol``."""
 
 NAMED = 3
-"""Largest number of names in a list of a message."""
+"""Largest number of names that a message lists."""
 
 
 class Deformed(NamedTuple):
@@ -82,10 +83,10 @@ def no_equilibrium(
     advice: str,
     loose: str,
 ) -> ConvergenceError | ArgumentError:
-    """Return an error that says why even the smallest step, from ``q0``, failed.
+    """Return the error of a run whose smallest substep, from ``q0`` between ``times`` (s), failed.
 
-    All processes call it together.  ``loose`` describes a motion without strain; it is empty if
-    there is none, or if loads held the motion in an earlier equilibrium.
+    All processes call it together.  ``loose`` describes a motion without strain; it is empty if no
+    such motion exists, or if loads resisted the motion in an earlier equilibrium.
     """
     if loose:
         return ModelError(f"{loose}{FREE_MOTION}{failure}")
@@ -106,8 +107,8 @@ def no_equilibrium(
     if not isinstance(failure, NoNumber):  # without a value of a function there is no tangent
         probe = _probe_state(equation, q0, q1)
         why = _singularity(equation, q1)
-        # If the latest tangent is regular, an earlier tangent may have sent Newton's method far
-        # away.  So the tangent near the beginning of the step is examined, too.
+        # If the latest tangent is regular, an earlier, nearly singular tangent may have caused the
+        # failure.  So the tangent near the beginning of the step is examined, too.
         if not why and probe is not q0 and equation.evaluate(probe):
             why = _singularity(equation, probe)
         why = why or _limit_point(equation, solution, q0, probe)
@@ -121,9 +122,9 @@ def no_equilibrium(
 def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: Array) -> str:
     """Return a message if, in statics, a limit load or a bifurcation is near ``q0``; else "".
 
-    One is near if the least singular value of the tangent is a small fraction of its value in the
-    first state, or if the number of negative pivots of the tangent has changed.  The pivots are
-    also counted a little beyond ``q0``, at ``probe``, where yielding has reduced the stiffness.
+    The criteria are a least singular value of the tangent that is a small fraction of its value in
+    the first state, and a changed number of negative pivots.  The pivots are also counted at
+    ``probe``, a little beyond ``q0``, where yielding has reduced the stiffness.
     """
     if not len(equation.force) or not len(solution):
         return ""
@@ -156,10 +157,7 @@ def _probe_state(equation: StepEquation, q0: Array, q1: Array) -> Array:
 
 
 def _singularity(equation: StepEquation, q: Array) -> str:
-    """Describe the singularity, or the mechanism, in the latest tangent, which was evaluated at q.
-
-    The description is empty if there is none.
-    """
+    """Describe a singularity or a mechanism in the latest tangent, evaluated at ``q``; else ""."""
     numbering, scene = equation.subdomain.numbering, equation.subdomain.numbering.scene
     K, free = free_matrix(equation.subdomain, equation.A, equation.supports.dofs)
     if not len(free) or not np.isfinite(K.data).all():
@@ -178,8 +176,8 @@ def _singularity(equation: StepEquation, q: Array) -> str:
         forces = np.abs(x[numbering.multipliers])
         names = [str(scene.all_connectors[i]) for i in _named(forces / forces.max())]
         said = (
-            f"the tangent stiffness is singular: motions that {_list(names)} prevent are already "
-            "prevented"
+            f"the tangent stiffness is singular: the constraints of {_list(names)} are not "
+            "independent"
         )
         return said if size <= SINGULAR else ""
     x /= largest
@@ -194,7 +192,7 @@ def _singularity(equation: StepEquation, q: Array) -> str:
 
 
 def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
-    """Return which connectors and which cells deform in a small motion along ``x`` from ``q``."""
+    """Find the connectors and the cells that deform in a small motion along ``x`` from ``q``."""
     subdomain, numbering, scene = (
         equation.subdomain,
         equation.subdomain.numbering,
@@ -247,7 +245,7 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
 def _describe(
     numbering: DofNumbering, motions: Array, connectors: Deformed, cells: Deformed
 ) -> str:
-    """Describe a motion without resistance; ``motions`` are its magnitudes, at most 1; (size,)."""
+    """Describe a motion that no force resists; ``motions`` are its magnitudes, up to 1; (size,)."""
     alike = np.round(motions, 6)  # so that round-off does not determine the order of equal motions
     phrases = []
     for words in numbering.worst(np.where(alike >= 1 / 2, alike, 0.0)):
@@ -302,7 +300,7 @@ def _list(names: list[str]) -> str:
 # -- signs in the ledger of a run ------------------------------------------------------------------
 
 GROUP_SIZE = 100
-"""Number of steps in a group, over which numerical losses are added."""
+"""Number of steps in a group; numerical losses are summed over each group."""
 
 LARGE_LOSS = 5.0
 """Least numerical loss in a group that is reported, as a multiple of the largest energy of the
@@ -316,7 +314,7 @@ SMALL_LOSS = 1e-6
 
 
 class LedgerWatch:
-    """Check of the energy ledger of a run; each kept state is checked once.
+    """Check of the energy ledger of a run; each stored state is checked once.
 
     Args:
         numbering: Vertices, cells and degrees of freedom of the scene.
@@ -340,8 +338,8 @@ class LedgerWatch:
         ]
         laws += [law for law in springs if law is not None]
         grows = {"hinges": True, "plastic": all(map(judges_dissipation, laws))}
-        # Schemes with forces at the end of a step compute works by the mean of the forces at both
-        # ends.  The error of this mean can make these entries fall.
+        # Schemes with forces at the end of a step compute works from the mean of the forces at both
+        # ends.  The error of this mean can make the entries of friction and damping fall.
         exact = grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
         # True if elastic forces and variables of laws belong to the same instant
         at_once = scheme.theta == scheme.load_weight
@@ -401,9 +399,9 @@ class LedgerWatch:
             self._told.add("stored")
             t = times[int(np.argmin(state["stored"]))]
             yield (
-                f"the stored energy is {least:.3g} J at t = {t:.6g} s, and a sum of squares is "
-                "not negative: a law of material in the scene, or the step there, is wrong. Use "
-                "smaller steps; check elastic_energy of a law of your own"
+                f"the stored energy is {least:.3g} J at t = {t:.6g} s, but is a sum of squares: "
+                "a material law in the scene, or the step there, is wrong. Use smaller steps; "
+                "check elastic_energy of a law of your own"
             )
         starts = np.arange(0, len(times) - GROUP_SIZE, GROUP_SIZE)
         if every > 1 or not self._in_motion or "numerical" not in lost or not len(starts):

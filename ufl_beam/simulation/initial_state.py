@@ -47,7 +47,7 @@ def checked_numbering(
     """Check a scene and a scheme, and number the degrees of freedom of the scene.
 
     With ``fresh``, the run begins with the undeformed scene.  The second result describes a motion
-    that only loads may hold in statics; it is empty if there is none.
+    without strain that only loads can resist in statics; it is empty if no such motion exists.
     """
     loose = ""
     require_kind(scene, Scene, "scene")
@@ -62,7 +62,7 @@ def checked_numbering(
     else:
         loose = require_no_mechanism(scene)
         warn_of_rates(scene)
-        if fresh and scheme.theta < 1:  # the run would oscillate about equilibrium for ever
+        if fresh and scheme.theta < 1:  # the run would oscillate about equilibrium
             instead = "begin with a run by Static() or EnergyMomentumStatic(theta=1), as start="
             require_no_prestress(scene, repr(scheme), instead)
     for work in scene.works:
@@ -104,14 +104,14 @@ def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
 
 
 SAME_TIME = 1e-12
-"""Largest difference between the end of a run and the beginning of the next one that is round-off,
-as a fraction of the largest time."""
+"""Largest round-off between the end of a run and the beginning of its continuation, as a fraction
+of the largest time."""
 
 
 def continuation(start: Solution | None, scene: Scene, t0: float) -> tuple[float, bool]:
-    """Return the time of the initial state, and whether ``start`` ended there with this scene.
+    """Return the time of the initial state (s), and whether ``start`` ended then with this scene.
 
-    Then no force has jumped, so that accelerations and forces of the last step are still true.
+    If it did, no force has jumped, so accelerations and forces of its last step are still valid.
     """
     if start is None or start.scene is not scene:
         return t0, False
@@ -121,7 +121,7 @@ def continuation(start: Solution | None, scene: Scene, t0: float) -> tuple[float
 
 
 def initial_state(numbering: DofNumbering, start: Solution | None) -> tuple[Array, Array, State]:
-    """Return configuration, velocities and internal variables at the beginning of a run."""
+    """Return the initial configuration and velocities of a run, (size,), and internal variables."""
     v = _initial_velocity(numbering)
     if start is None:
         return np.zeros(numbering.size), v, {}
@@ -134,7 +134,7 @@ def initial_state(numbering: DofNumbering, start: Solution | None) -> tuple[Arra
 
 
 def _initial_velocity(numbering: DofNumbering) -> Array:
-    """Return the velocities that :class:`Velocity` gives to beams; all others are zero."""
+    """Return the velocities that :class:`Velocity` gives to beams, and zero elsewhere; (size,)."""
     v: Array = np.full(numbering.size, np.nan)
     for velocity in numbering.scene.initial:
         for beam in velocity.beams:
@@ -159,8 +159,8 @@ def _initial_velocity(numbering: DofNumbering) -> Array:
 def _require_agreement(numbering: DofNumbering, v: Array) -> None:
     """Check that joints and supports allow the initial velocities.
 
-    Joined parts that move apart are an error, because they would vibrate for ever.  Supports that
-    cancel all velocities of a beam are an error; if they cancel some, a warning is issued.
+    Joined parts that move apart are an error, because they would vibrate.  Supports that cancel
+    all velocities of a beam are an error; supports that cancel some of them cause a warning.
     """
     size, nodes = numbering.scene.size, np.vstack([numbering.dofs, numbering.dofs_of_bodies])
     fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()

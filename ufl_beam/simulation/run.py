@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Run from beginning to end: steps, kept states, output files and checkpoints."""
+"""Run from beginning to end: steps, stored states, output files and checkpoints."""
 
 from __future__ import annotations
 
@@ -76,24 +76,24 @@ def simulate(
             step without convergence is divided into substeps.  :class:`Adaptive` steps are as long
             as a tolerance allows.
         record: Recorders of files or results, such as :class:`XDMF` and :class:`History`.
-        every: Number of steps between kept states; the last state is always kept.
-        max_states: Largest number of states in the solution, besides the initial and the last
-            state.  If a run has more, every other state is deleted and ``every`` is doubled.
+        every: Number of steps between stored states; the last state is always stored.
+        max_states: Largest number of stored states, besides the initial and the last state.  If a
+            run has more, every other state is deleted and ``every`` is doubled.
         start: Solution whose last state is the initial state, with the same beams.  Joints may be
             removed, or added where places coincide.
         newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default as in ``start``, or the cells of the beams.
-        checkpoint: Checkpoint file from which the run continues if the script is run again.
+        checkpoint: File from which the run continues if the script is run again.
         progress: Show a progress bar in a terminal or notebook.
         comm: Processes that share the scene; by default all, or in a :func:`study` this process
-            alone.  Each process computes a small scene as a whole.
+            alone.  A small scene is not divided: each process computes all of it.
 
     Returns:
         The motion, the forces and the energy ledger.
 
     Raises:
-        ArgumentError: The call or the scene is wrong; nothing was computed.
-        ConvergenceError: A step failed; the error has the solution so far, and files are complete.
+        ArgumentError: An argument or the scene is wrong; :class:`ModelError` is a kind of it.
+        ConvergenceError: Even the smallest step failed; ``solution`` has the results so far.
 
     Example:
         >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05)
@@ -154,7 +154,7 @@ def simulate(
         solution = simulation.solution
         solution.every, solution.building = every, time.perf_counter() - begin
         stack.enter_context(running(simulation, recorders, outputs, begin))
-        pace: EqualSteps | AdaptiveSteps  # `error`: sum of estimated errors; NaN with equal steps
+        pace: EqualSteps | AdaptiveSteps  # `error`: sum of estimated errors, or NaN
         if isinstance(dt, Adaptive):
             pace = AdaptiveSteps(simulation, t1, dt)
         else:
@@ -177,17 +177,17 @@ def take_steps(
     keeper: Keeper | None = None,
     begin: float = 0.0,
 ) -> None:
-    """Take the steps of a run: keep states, check the ledger, write files, show the progress.
+    """Take the steps of a run: store states, check the ledger, write files, show the progress.
 
     Args:
         simulation: Simulation in its initial state.
         pace: Step control: :class:`EqualSteps`, :class:`AdaptiveSteps`, or a path.
         recorders: Recorders of each step.
         bar: Progress bar.
-        max_states: Largest number of kept states, see :func:`simulate`.
+        max_states: Largest number of stored states, see :func:`simulate`.
         until: Condition; the run ends after the first step with a state that satisfies it.
         keeper: Writer of checkpoints.
-        begin: Value of the clock at the beginning of the run, for checkpoints; s.
+        begin: ``time.perf_counter()`` at the beginning of the run, for checkpoints; s.
     """
     solution, ended = simulation.solution, False
     claimed = LEDGER_TOLERANCE * simulation.solver.c.rtol
@@ -239,13 +239,13 @@ def take_steps(
 
 
 def check_ledger(simulation: Simulation) -> None:
-    """Warn, also in the solution, if the ledger is open but the scheme claims to close it.
+    """Warn if the ledger does not balance although the scheme claims that it does.
 
-    All processes call it together at the end of a run.  Afterwards the solution has the warnings
-    of all processes.
+    The solution gets this warning and the warnings of all processes.  All processes call the
+    function together at the end of a run.
 
     Warns:
-        ModelWarning: The ledger is open, perhaps by round-off.
+        ModelWarning: The ledger does not balance, perhaps because of round-off.
     """
     solution, subdomain = simulation.solution, simulation.subdomain
     if not subdomain.alone:  # only the process that has a connector watches its force
@@ -254,7 +254,7 @@ def check_ledger(simulation: Simulation) -> None:
     if getattr(simulation.scheme, "exact_ledger", False) and len(solution) > 1:
         energy, claimed = solution.energy, LEDGER_TOLERANCE * simulation.solver.c.rtol
         if energy.opened(claimed, 0.0):
-            # Errors of steps are independent: their squares add up.
+            # Round-off errors of steps are independent, so their squares add up.
             q = solution.q[:, subdomain.dofs]
             steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
             round_off = simulation.solver.random_work(np.abs(q).max(axis=0), steps)
@@ -269,9 +269,9 @@ def running(
 ) -> Iterator[None]:
     """Context of a run, which closes the simulation and its recorders at the end.
 
-    An error gets the solution so far as its attribute ``solution``.  A run within the context must
-    not write the files ``outputs``.  ``begin`` is the value of the clock at the beginning of the
-    run.  After the last step the ledger and the mesh dependence of hinges are checked.
+    An error gets the solution so far as its attribute ``solution``.  A nested run must not write
+    the files ``outputs``.  ``begin`` is ``time.perf_counter()`` at the beginning of the run (s).
+    After the last step the ledger and the mesh dependence of hinges are checked.
     """
     with ExitStack() as stack:
         stack.callback(simulation.close)
@@ -284,7 +284,7 @@ def running(
         except BaseException as error:
             simulation.copies.finish()
             if simulation.subdomain.comm.size == 1 or error is simulation.together.raised:
-                simulation.end()  # else processes that do not call it would leave others waiting
+                simulation.end()  # otherwise only some processes would call it, and wait
             stopped: Any = error
             stopped.solution = simulation.solution
             raise
@@ -295,7 +295,7 @@ def running(
 
 
 def require_times(t: tuple[float, float], call: str = "simulate") -> tuple[float, float]:
-    """Return the beginning and the end of a run, checked; ``call`` names the caller in errors."""
+    """Check and return the beginning and end of a run (s); ``call`` names the caller in errors."""
     try:
         t0, t1 = t
     except (TypeError, ValueError):
