@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Simulation: the present state of a scene and the step to the next state."""
+"""Simulation: present state of a scene, and steps to later states."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ LONGEST = 0.05
 """Wall time after which C returns, so that a run can be interrupted and shows its progress; s."""
 
 MOST_VALUES = 2**20
-"""Limit of the numbers that C writes in a call for the states of all steps, at least one state."""
+"""Limit of the numbers that C stores in one call for states; at least one state is stored."""
 
 
 class Simulation(Stepper):
-    """Time stepper of a scene: its present state and the step to the next state.
+    """Time stepper of a scene: its present state, and steps to later states.
 
     :func:`simulate` is a loop over steps; use this class for loops of your own.
 
@@ -153,7 +153,7 @@ class Simulation(Stepper):
         )
         acts = any(isinstance(load, RotatingFrame) for load in scene.loads) or bool(scene.works)
         acts = acts or any(f(t0) != 0 for _, f in scene.time_functions())
-        # Whether loads that act from the start are applied before the first step, see stepper.py
+        # Whether loads that act from the start are applied in substeps at first, see stepper.py
         self._applies = fresh and inertia is None and solution.between != 1.0 and acts
         give_back_memory(len(q_local))
         if inertia is not None and (scene.all_connectors or scene.supports):
@@ -166,14 +166,14 @@ class Simulation(Stepper):
         """Advance to the time ``t1`` in one step or, if it fails, in substeps.
 
         Raises:
-            ConvergenceError: Even the smallest substep failed.  The state is then the end of the
-                last accepted substep, and the last state of the solution in the error.
-            ModelError: The first static step failed, and a motion without strain is free.
+            ConvergenceError: Even the smallest substep failed.  The present state is then the end of
+                the last accepted substep, as is the last state of ``error.solution``.
+            ArgumentError: Loads of the first static step do not resist a motion without strain.
         """
         self.steps_to(np.array([t1]))
 
     def steps_to(self, ends: Array, *, keep: bool = False) -> int:
-        """Advance to the first of the times ``ends``, and to later ones until C returns.
+        """Advance to one or more of the times ``ends``, until C returns.
 
         C returns after :data:`LONGEST`, after a divided step, and when the memory for new states is
         full; with several processes that share the scene, after each step.
@@ -239,9 +239,9 @@ class Simulation(Stepper):
         return taken
 
     def watch(self, parts: Array) -> ExtremesInC | None:
-        """Return extremes at the fractions ``parts`` of cells, which C updates after each step.
+        """Return extremes of motions, and of section forces at the fractions ``parts`` of cells.
 
-        The result is None if processes share the scene.
+        C updates them after each step.  The result is None if processes share the scene.
         """
         if not self.subdomain.alone:
             return None
@@ -252,11 +252,11 @@ class Simulation(Stepper):
         return extremes
 
     def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:
-        """End the run in its present state, because even the smallest step, to ``end``, failed.
+        """End the run in its present state, because even the smallest step, to ``end`` (s), failed.
 
         Raises:
-            ConvergenceError: Error with the solution so far.
-            ModelError: Error instead, if a motion without strain is free in statics.
+            ConvergenceError: Always, except in the next case; the error has the solution so far.
+            ModelError: The first static step failed, and the scene can move without strain.
         """
         self.copies.finish()
         self.supports.go_back()
@@ -270,9 +270,9 @@ class Simulation(Stepper):
 
     @property
     def now(self) -> States:
-        """The present state in the form of a solution; all processes call it together.
+        """Present state in the form of a solution; all processes read it together.
 
-        Before the first step of a dynamic run, reactions are zero or the last ones of ``start``.
+        Before the first step of a dynamic run, reactions are zero or taken from ``start``.
 
         Example:
             >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
@@ -303,7 +303,7 @@ class Simulation(Stepper):
 
     @property
     def _lacks_record(self) -> bool:
-        """True if the forces of cells cannot be computed from the row of the state."""
+        """True if the forces of cells cannot be computed from the stored numbers of a state."""
         return not self._writer.records or bool(self.cell_forces.c.given)
 
     def _gathered_forces(self, parts: int, *_: Array) -> Array:
@@ -320,7 +320,7 @@ class Simulation(Stepper):
         return forces
 
     def keep(self, solution: Solution | None = None) -> None:
-        """Append the state to a solution, by default :attr:`solution`; all processes call it."""
+        """Append the state to ``solution``, by default :attr:`solution`; all processes call it."""
         solution = self.solution if solution is None else solution
         columns = self._writer.columns
         follows = not solution.begun or solution.parts_of_last == self.parts - 1
@@ -397,5 +397,5 @@ class Simulation(Stepper):
             give_back_memory(len(self.q))
 
     def close(self) -> None:
-        """Free the objects of PETSc."""
+        """Destroy the PETSc objects."""
         self.solver.destroy()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Solutions: kept states of a run, their files and summary, and cells with open hinges."""
+"""Solutions: stored states of a run, their files and summary, and cells with open hinges."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ from ufl_beam.output.states import States
 from ufl_beam.parallel import active_comm, on_first
 
 UNKNOWN = -2
-"""Value of ``parts_of_last`` if the next step does not begin at the last kept state."""
+"""Value of ``parts_of_last`` if the next step does not begin at the last stored state."""
 
 
 class Solution(States, Rich):
-    """Results of a run: motions and forces at the kept times; the same on every process.
+    """Results of a run: motions and forces at the stored times; the same on every process.
 
     A solution can be saved, see :meth:`save`, and pickled with the same content.
 
@@ -66,15 +66,15 @@ class Solution(States, Rich):
             steps.
         seconds: Wall time of the run, building the scene included; s.
         building: Wall time of building the scene in :func:`simulate`, which is not saved; s.
-        every: Number of steps between kept states.
-        parameter: Names and formats of :attr:`times`, which are load factors in a path.
+        every: Number of steps between stored states.
+        parameter: Labels and formats of :attr:`times`, which are load factors in a path.
         open_ledger: Message if the imbalance of the energy ledger exceeds the tolerance of the
             scheme; empty otherwise.
         warnings: Warnings of the run, one in each line; see docs/warnings.md.
-        internal: Data at the end of the run for a run that continues it: internal variables of
-            cells and connectors, reactions, rates and forces.
+        internal: Data for a run that continues at the end of this run: internal variables of cells
+            and connectors, reactions, rates and forces.
         scheme: Time scheme of the run; None if the solution was loaded or unpickled.
-        parts_of_last: Number of substeps up to the last kept state; :data:`UNKNOWN` if the next
+        parts_of_last: Number of substeps up to the last stored state; :data:`UNKNOWN` if the next
             step does not begin there.
 
     Example:
@@ -108,7 +108,7 @@ class Solution(States, Rich):
         super().downsample()
 
     def history(self) -> State:
-        """Return all states, as arrays by name."""
+        """Return all states as arrays by name, such as "q"."""
         return {**super().history(), "every": np.array([self.every])}
 
     def resume(self, history: State) -> None:
@@ -122,8 +122,8 @@ class Solution(States, Rich):
         """Write the solution to a file for :meth:`load`; all processes call it together.
 
         The file has all results and the numbers of the scene, but no code: functions of time are
-        saved as values at the kept times, curves as points, other functions by their names, and
-        user laws by their names and numbers.  An existing file is replaced once the new file is
+        saved as values at the stored times, curves as points, other functions by their names, and
+        user laws by their names and numbers.  An existing file is replaced when the new file is
         complete.
 
         Raises:
@@ -141,14 +141,14 @@ class Solution(States, Rich):
 
         Args:
             path: File.
-            scene: Scene of the run, built by the script.  The solution then uses this scene with
-                its functions and user laws, which files do not contain.  All numbers, classes and
-                names must agree with the file, and functions of time must have the same values.
+            scene: Scene of the run, built anew by its script.  It supplies the functions and user
+                laws, which files do not contain.  All its numbers, classes and names must agree
+                with the file, and its functions of time must have the same values.
 
         Raises:
-            ArgumentError: The file is missing, damaged, no solution, or of another scene; the
-                version that wrote it numbers degrees of freedom differently; or it has user laws,
-                and no scene is given.
+            ArgumentError: The file is missing, damaged, no solution, or of another scene; a version
+                with another numbering of degrees of freedom wrote it; or it has user laws, and no
+                scene is given.
 
         Example:
             >>> solution.save("beam.h5")
@@ -166,7 +166,7 @@ class Solution(States, Rich):
         numbering = self.numbering
 
         def record(owner: Any, field: str, function: Any) -> Any:
-            """Return the record that replaces a function in a field of ``owner``, or None."""
+            """Return a record to save for a function in a field of ``owner``, or None."""
             if field == "curve" and isinstance(owner, Member):
                 return SavedCurve.sampled(function, 0.0, 1.0, numbering.parameters(owner))
             if field == "curve":
@@ -200,16 +200,16 @@ class Solution(States, Rich):
 
     @property
     def progress(self) -> Array:
-        """Increasing abscissa of the kept states, here the time; (n+1,); s."""
+        """Increasing abscissa of the stored states, here the time; (n+1,); s."""
         return self.times
 
     def hinge_place_error(self) -> dict[Member, float]:
-        """Return, for beams with open embedded hinges, the largest relative shift of their limit.
+        """Return the largest relative error of the hinge limit, by beam with open embedded hinges.
 
         A hinge of ``Section(hinge=)`` is in the middle of its cell of length h and opens when the
         moment there reaches the limit; at the ends of the cell the moment differs by ``|V| h/2``.
-        The shift is ``|V| h / (2 limit)``, with V at the last kept time before the opening; if
-        this is the initial time, V is taken at the next kept time.  Hinges that were open at the
+        The error is ``|V| h / (2 limit)``, with V at the last stored time before the opening; if
+        this is the initial time, V is taken at the next stored time.  Hinges that were open at the
         beginning of the run are not included.
         """
         return {hinges.beam: hinges.error for hinges in Opened(self).hinges()}
@@ -241,7 +241,7 @@ class Solution(States, Rich):
 
 
 def restored(content: Content, scene: Scene | None = None) -> Solution:
-    """Make a solution from the content of a file, with the given ``scene`` or the saved scene."""
+    """Make a solution from the content of a file, with ``scene``, by default the saved scene."""
     described = from_data(content["scene"]) if scene is None else scene
     numbering = DofNumbering(described, from_data(content["mesh"]))
     if numbering.checksum() != content["numbering"]:
@@ -270,11 +270,11 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
 
 # -- cells that opened -----------------------------------------------------------------------------
 #
-# An embedded hinge is in the middle of its cell and opens by the mean moment of the cell.  At the
-# ends of the cell the moment differs by |V| h/2.  So a hinge at an end would open at another load.
+# An embedded hinge is in the middle of its cell, and opens when the mean moment of the cell reaches
+# the limit.  At the ends the moment differs by |V| h/2, so a hinge there opens at another load.
 
 WARNED_SHIFT = 0.05
-"""Largest shift, see :meth:`Solution.hinge_place_error`, without a warning."""
+"""Largest :meth:`Solution.hinge_place_error` without a warning."""
 
 INCREMENT = 1e-6
 """Increment of the opening in a difference quotient, as a fraction of fracture energy / limit."""
@@ -285,17 +285,17 @@ class OpenedHinges(NamedTuple):
 
     beam: Member
     number: int  # number of hinges that opened
-    error: float  # largest shift of their limit, see `Solution.hinge_place_error`
-    place: Place  # middle of the cell with the largest shift
+    error: float  # largest error of their limit, see `Solution.hinge_place_error`
+    place: Place  # middle of the cell with the largest error
 
 
 class Opened:
     """Cells that opened in a run.
 
     Attributes:
-        first: Index of the first kept time after the opening; 0 if the cell was open at the
+        first: Index of the first stored time after the opening; 0 if the cell was open at the
             beginning, -1 if it stayed closed; (num_cells,).
-        shear: |V| at the kept time before ``first``, or at ``first`` if the time before is the
+        shear: |V| at the stored time before ``first``, or at ``first`` if that time is the
             beginning of the run; (num_cells,); N.
         dissipated: Energy that hinges and cracks dissipated up to the end; (num_cells,); J.
     """
@@ -336,10 +336,10 @@ class Opened:
     def warn(self, scheme: Scheme) -> None:
         """Issue a :class:`ModelWarning` for each beam whose results depend on the mesh.
 
-        One kind of warning names a hinge whose resistance falls faster with the opening than the
-        stress of its cell, which falls with the stiffness θ EI/h, or θ E/h of a fibre.  The other
-        names hinges of ``Section(hinge=)`` whose place in the cell shifts their limit by more than
-        :data:`WARNED_SHIFT`.
+        A warning is issued for a hinge if its resistance falls with the opening faster than the
+        moment of its cell can follow, with the stiffness θ EI/h (for a fibre θ E/h).  Another one
+        is issued for hinges of ``Section(hinge=)`` whose :meth:`Solution.hinge_place_error`
+        exceeds :data:`WARNED_SHIFT`.
         """
         numbering, times = self._numbering, self._times
         for beam in numbering.scene.beams:
@@ -384,10 +384,10 @@ def _percent(fraction: float) -> str:
 
 
 def _fall(section_points: SectionPoints | None, scheme: Scheme) -> tuple[float, float]:
-    """Return the steepest softening slope, divided by θ times the stiffness (1/m), and an energy.
+    """Return the steepest softening slope, divided by θ times a stiffness (1/m), and an energy (J).
 
-    The stiffness is the least of the points that can break.  The energy is the least that a cell
-    dissipates up to the opening with the steepest slope; J.  Both are zero without softening.
+    The stiffness is the least stiffness of points that can break.  The energy is the least energy
+    that a cell dissipates up to the steepest slope.  Both results are zero without softening.
     """
     law = None if section_points is None else section_points.softening
     if section_points is None or law is None or law.limit == 0:
@@ -408,7 +408,7 @@ def _fall(section_points: SectionPoints | None, scheme: Scheme) -> tuple[float, 
 # -- text in the file ------------------------------------------------------------------------------
 
 FORMAT = "solution of ufl_beam, 4"
-"""Format of the file; the number grows whenever the meaning of files changes."""
+"""Format of the file; its number is increased by each incompatible change of the format."""
 
 NAMED = {
     "seconds": float, "time_error": float, "between": float, "begun": bool, "open_ledger": str,

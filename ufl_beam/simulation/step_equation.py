@@ -48,13 +48,13 @@ MOVING = "inertia", "damping"
 
 
 class StepEquation:
-    """Sum of the virtual works of all terms, minus reactions, at local degrees of freedom.
+    """Equation of a step: forces and tangent of all terms at the local degrees of freedom.
 
-    The terms are made on the subdomain of one process, for a run that begins at ``t0`` (s).  Where
-    supports do not move, the initial local velocities ``v`` are set to zero.
+    The terms are made on the subdomain of one process, for a run that begins at ``t0`` (s).  The
+    initial local velocities ``v`` are set to zero, in place, where supports do not move.
 
     Attributes:
-        A: Matrix of the tangent.
+        A: Tangent matrix.
         fields: Fields on the cells of this process.
         ledger: Energies of this process.
         controllers: Forces of controllers and limits of friction in the step.
@@ -66,7 +66,7 @@ class StepEquation:
         terms: All terms: ``inner``, with the internal forces of ``beams`` and ``connector_terms``,
             and ``others``.
         weights: Weights of residuals: 1 for forces, 1 / (size of the scene) for moments, 0 for
-            ghosts and rows of connectors.
+            ghosts and for equations of connectors.
         force: Internal forces in the latest residual, in statics; else empty.
         c: ``equation`` of loops.h, which a solver completes with its own data.
         callbacks: Python functions that C calls.
@@ -84,8 +84,8 @@ class StepEquation:
         self.A = A = fields.matrix()
         setting = (scheme, A, ledger)
 
-        # Terms create their entries of the ledger in the order of the columns of tables.  All
-        # processes have the same entries, even without cells or connectors of a kind.
+        # Terms create their ledger entries in the order of the columns of tables.  All processes
+        # create the same entries, even without cells or connectors of a kind.
         self.inelastic, elastic = list[InelasticBeams](), np.ones(len(subdomain.cells), dtype=bool)
         for section_points, cells in subdomain.numbering.inelastic:
             expect_entries(section_points, scheme, ledger)
@@ -185,7 +185,7 @@ class StepEquation:
     # -- continued runs ------------------------------------------------------------------------
 
     def internal_variables(self, q: Array, t: float) -> State:
-        """Return the data for a run that starts here: variables, reactions, rates and forces."""
+        """Return the data of this state for ``start=``: variables, reactions, rates and forces."""
         archive = Archive(self.subdomain)
         self.controllers.save_or_restore(archive, t)
         for term in (*self.inelastic, *self.connector_terms):
@@ -205,7 +205,7 @@ class StepEquation:
     def set_internal_variables(self, q: Array, t: float, internal: State, *, same: bool) -> None:
         """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
 
-        With ``same``, time and scene are those at the end of the other run, so that accelerations
+        ``same`` means that the other run ended at this time with this scene, so that accelerations
         are unchanged.
         """
         archive = Archive(self.subdomain, internal)
@@ -253,9 +253,9 @@ class StepEquation:
                 predicted.begins, predicted.stale, predicted.exact = 0, 1, 1
 
     def inner_forces(self, q: Array, t: float | None = None) -> Array:
-        """Return the forces of beams at ``q``, in a step too short for viscous flow.
+        """Return the forces of beams at ``q``, in a step too short for viscous flow; (size,).
 
-        With a time ``t``, forces of connectors at that time, unknowns in ``q``, are added.
+        With a time ``t`` (s), forces of connectors are added, which are unknowns in ``q``.
         """
         short, forces = sys.float_info.min, np.zeros(self.subdomain.size)
         self.begin(Step.of(self.scheme, 0.0, short, short, q), self.beams)
@@ -269,7 +269,7 @@ class StepEquation:
         return forces
 
     def add_state(self, q: Array) -> None:
-        """Enter the energies of the scene at ``q`` into the ledger."""
+        """Add the energies of the scene at ``q`` to the ledger."""
         with self.callbacks.raising():
             for phases in self.phases:
                 for add, data in phases.add_state:
@@ -300,7 +300,7 @@ class StepEquation:
         return self.subdomain.largest(float(self.c.raised)) == 0.0
 
     def forces(self, q1: Array) -> Array:
-        """Return the sum of the forces of all terms at ``q1`` on this process."""
+        """Return the sum of the forces of all terms at ``q1`` on this process; (size,)."""
         r = np.zeros(self.subdomain.size)
         with self.callbacks.raising():
             for term in self.terms:
@@ -310,16 +310,16 @@ class StepEquation:
     def tangent(self, q1: Array) -> None:
         """Fill the matrix with the tangent at ``q1``, in the axes of supports.
 
-        Rows and columns of supports keep only their diagonal entries.  Errors of user functions are
-        stored in :attr:`callbacks`.
+        In rows and columns of supports only the diagonal entry is not zero.  Errors of user
+        functions are stored in :attr:`callbacks`.
         """
         lib.fill_tangent(self.c, doubles(q1))
         lib.hold_tangent(self.c)
 
     def working(self, q: Array, y: Array) -> Array:
-        """Return the motions on which residuals do work in a step ``y`` from ``q``; a new array.
+        """Return the motions on which residuals do work in a step ``y`` from ``q``, as a new array.
 
-        They are ``y``, in the axes of supports, with motions of connectors instead of their forces.
+        It is ``y``, in the axes of supports, with motions of connectors instead of their forces.
         """
         v, works = self.supports.in_plane(y), y.copy()
         for group in self.connector_terms:
@@ -329,9 +329,9 @@ class StepEquation:
     # -- derivatives about a state -------------------------------------------------------------
 
     def linearise(self, q: Array, step: Step) -> tuple[Array, Array]:
-        """Return all forces except inertia in a step to ``q``, and their derivatives.
+        """Return all forces except inertia in a step to ``q``, (size,), and their derivatives.
 
-        Both are in the axes of the plane, without supports; derivatives are entries of the matrix.
+        Derivatives are ``data`` of :attr:`A`.  The axes of the plane are used, without supports.
         """
         r = np.zeros(self.subdomain.size)
         self.begin(step)
@@ -344,14 +344,14 @@ class StepEquation:
         return r, self.A.data.copy()
 
     def tangent_change(self, q: Array, u: Array) -> Array:
-        """Return the derivative of the tangent of :meth:`linearise` along ``u``; entries."""
+        """Return ``data`` of the derivative along ``u`` of the tangent of inner terms and loads."""
         self.A.data.fill(0.0)
         for term in (*self.inner, *self.loads):
             term.add_tangent_change(q, u)
         return self.A.data.copy()
 
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
-        """Return works of the tangent of :meth:`linearise`, xᵀ K y for pairs of columns; J."""
+        """Return xᵀ K y for each pair of columns of X and Y, K as in :meth:`linearise`; (n,); J."""
         self.A.data.fill(0.0)
         for term in (*self.connector_terms, *self.others):
             if term.kind != "inertia":
@@ -363,10 +363,10 @@ class StepEquation:
         return works
 
     def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
-        """Return Xᵀ K Y and Xᵀ K' Y, of which only the upper triangles are computed; J.
+        """Return the symmetric matrices Xᵀ K Y and Xᵀ K' Y; J.
 
-        K is the tangent of beams, connectors and loads, and K' its derivative along ``u``.  Both
-        results must be symmetric.
+        K is the tangent of beams, connectors and loads, and K' is its derivative along ``u``.  Only
+        the upper triangles are computed.
         """
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
@@ -387,9 +387,9 @@ class StepEquation:
 
 
 def forces_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Callable[..., Array]:
-    """Return :meth:`CellForces.forces_from_record` for all cells of a scene on several processes.
+    """Return a function like :meth:`CellForces.forces_from_record`, but for all cells of a scene.
 
-    The first call of the result makes the equation of the whole scene, without communication.
+    The first call of the function makes the equation of the whole scene, without communication.
     """
 
     @cache
@@ -405,7 +405,7 @@ def forces_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Calla
 # -- checks of static steps ------------------------------------------------------------------------
 
 LARGEST_MOTION = 1e3
-"""Largest motion of a node in a step that is no mechanism; in sizes of the scene, or rad."""
+"""Largest motion of a node in a step without a mechanism; in sizes of the scene, or rad."""
 
 KINK_IMBALANCE = 1e-6
 """Imbalance of work that a kink of a law may cause, as a fraction of the energy transferred."""
@@ -414,14 +414,14 @@ KINK_IMBALANCE = 1e-6
 class StaticPath:
     """Checks of each static step before it is accepted.
 
-    No node may move as a mechanism does, and the work of the internal forces must equal the energy
-    that the step stores and dissipates.  Otherwise Newton's method may have found another branch of
-    equilibria: beyond a limit load, or where softening releases more energy than it dissipates.
+    The motion of nodes is limited, and the work of the internal forces must equal the energy that
+    the step stores and dissipates.  Otherwise Newton's method may have found another branch of
+    equilibria, beyond a limit load or where softening releases more energy than it dissipates.
     The ``slack`` of the scheme limits the imbalance of work.
 
-    The first state, ``q`` at ``t0``, is in equilibrium with ``loads``, which are empty if nothing
-    acts yet.  Reactions are set from this equilibrium, unless the run ``goes_on`` from a static run
-    of the same scene, whose reactions include viscous forces.
+    The initial state, ``q`` at ``t0``, is in equilibrium with the vectors ``loads``.  Reactions are
+    set from this equilibrium, unless the run ``goes_on`` from a static run of the same scene,
+    whose reactions include viscous forces.
 
     Attributes:
         force: Internal forces at the end of the last step.
@@ -457,7 +457,7 @@ class StaticPath:
         self.force[:] = archive.added("internal forces", self.force)
 
     def failure(self, mechanism: bool) -> StepFailed:
-        """Return why the latest step is rejected: it is a ``mechanism``, or changes the branch."""
+        """Return the error of a rejected step: a ``mechanism``, or a leap to another branch."""
         c = self.c
         if mechanism:
             return StepFailed(

@@ -18,7 +18,7 @@ GROWTH = 1.5
 """Largest ratio of the length of a step to the length of the previous step."""
 
 MOST = 2**14
-"""Largest number of steps that one call of C gets; it returns earlier if steps take long."""
+"""Largest number of steps of one call of C, which returns earlier if steps take long."""
 
 SAMPLES = (0.01, 0.5, 0.99)
 """Fractions of a step at which functions of time are sampled, to estimate the error of the
@@ -49,7 +49,7 @@ class EqualSteps:
         return self.steps / self._all
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take up to ``most`` steps, in substeps if they fail; with ``keep``, states are kept."""
+        """Take up to ``most`` steps, in substeps if they fail; ``keep`` stores their states."""
         steps = np.arange(self.steps, min(self.steps + min(most, MOST), self._all)) + 1
         ends = self._t0 + (self._t1 - self._t0) * steps / self._all
         ends[steps == self._all] = self._t1  # exactly, for a run that goes on at this time
@@ -84,8 +84,8 @@ class Adaptive:
         longest: Longest step; s.
         shortest: Shortest step; s.  If a shorter step is needed, the run ends with an error.  By
             default 1e-12 of the run; never less than 16 units of the last digit of a time.
-        stops: Further times at which steps end; s.  Times closer than 1e-9 of the run, or than the
-            shortest step, to another time are left out.
+        stops: Further times at which steps end; s.  A time is left out if it differs from
+            another one by less than 1e-9 of the run, or than the shortest step.
 
     Raises:
         ArgumentError: A number is out of range.
@@ -128,7 +128,7 @@ class AdaptiveSteps:
         self._functions = list(dict.fromkeys(functions))
         self._largest = [0.0] * len(self._functions)
         kinks = {float(t) for f in self._functions for t in getattr(f, "kinks", ())}
-        # Of times closer than this only the first is kept: they may differ by round-off alone.
+        # Of times closer than this, only the first is used: they may differ by round-off alone.
         same = max(1e-9 * (t1 - t0), self._shortest)
         inside = sorted(t for t in (*kinks, *control.stops) if t0 + same < t < t1 - same)
         apart = [t for before, t in pairwise([t0, *inside]) if t - before > same]
@@ -152,7 +152,7 @@ class AdaptiveSteps:
         return (self._simulation.t - self._t0) / (self._t1 - self._t0)
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take one step, so short that its error is allowed; with ``keep``, its end is kept."""
+        """Take one step whose error is below the tolerance; ``keep`` stores its end."""
         simulation = self._simulation
         stop = next(t for t in self._stops if t > simulation.t)
         stop = simulation.controllers.next_sample(simulation.t, stop)
@@ -176,7 +176,7 @@ class AdaptiveSteps:
         self.error += error
         self.steps += 1
         self._dt = min(dt * min(change, GROWTH), self._longest)
-        # The acceleration may jump at a stop, so its change since the last step is no measure.
+        # The acceleration may jump at a stop, so the next step does not use its change.
         self._fresh = simulation.t == stop
         if keep:
             simulation.keep()
@@ -186,7 +186,7 @@ class AdaptiveSteps:
         simulation, supports = self._simulation, self._simulation.supports
         inertia = simulation.inertia
         left = stop - simulation.t
-        # Two equal steps to a stop, because a long step could leave a tiny one
+        # Two equal steps to a stop, because a longer step could leave a tiny one
         dt = left if self._dt >= left else min(self._dt, left / 2)
         if self._fresh:
             # Without an earlier step, accelerations in half of the step and in the whole step are
@@ -229,7 +229,7 @@ class AdaptiveSteps:
         return error / 6 * dt / (self._t1 - self._t0)  # Simpson's rule minus midpoint rule
 
     def state(self) -> dict[str, float]:
-        """Return the numbers that determine the next step, the number of steps, and the error."""
+        """Return the data that determine the next step, the number of steps, and the error sum."""
         largest = {f"largest {i}": value for i, value in enumerate(self._largest)}
         return {**{name: float(getattr(self, name)) for name in self._STATE}, **largest}
 

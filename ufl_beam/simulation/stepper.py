@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Steps of a scene in steps.c: they are solved, checked, accepted, and divided if they fail.
+"""Steps of a scene, which steps.c solves, checks and accepts, or divides if they fail.
 
-In statics, a scheme whose forces act at an instant inside the step, not at its end, leaves the end
-of a step with large nodal rotations out of equilibrium.  So with these schemes the first eighth of
-the first step applies the loads that act from the start, in substeps with small rotations.
+Some static schemes satisfy equilibrium inside a step.  After large nodal rotations the end of the
+step is then out of equilibrium.  So these schemes apply loads that act from the start in the first
+eighth of the first step, in substeps with small rotations.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class Prediction:
 
     The guess continues with the velocity of the last step.  In dynamics (``in_motion``), after
     three steps of equal length, a fraction of the last second difference of the configuration is
-    added.  The fraction measures how far the last two second differences agree: it is 1 in smooth
-    motion, and 0 if they have opposite signs, or if steps do not resolve the motion.
+    added.  The fraction measures how well the last two second differences agree: it is nearly 1 in
+    smooth motion, and 0 if their scalar product is negative or steps do not resolve the motion.
 
     Args:
         weights: Weights of residuals, see :class:`StepEquation`.
@@ -63,7 +63,7 @@ class Prediction:
             fill(self.c, second=self._second, weight=weights, **size)
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore the data in the numbering of the scene; see state_io.py."""
+        """Save or restore the data, in the numbering of the scene; see state_io.py."""
         self.c.dt = archive.number("last dt", self.c.dt)
         bytes_now = ffi.buffer(self.c.q_before, 8 * self._subdomain.size)
         q_before = archive.at_dofs("q before", np.frombuffer(bytes_now).copy())
@@ -81,8 +81,8 @@ LARGEST_ROTATION = 0.75 * math.pi
 """Largest rotation of a node in a step; rad.  Algorithmic strains are valid up to π."""
 
 LEAST_AT_REST, LEAST_IN_MOTION = 2, 1
-"""Least numbers of iterations in statics and in dynamics, unless a residual is far below its
-tolerance.
+"""Least numbers of Newton iterations in statics and in dynamics.  A step with a residual far below
+the tolerance needs fewer.
 
 Near buckling, a load hardly larger than the tolerance moves a column far.  In dynamics the inertia
 of the column prevents this.
@@ -95,7 +95,7 @@ The relative error of a moment in a substep is a quarter of the square of this a
 """
 
 FREE_STIFFNESS = 1e-3
-"""Loads hold a motion without strain only if its stiffness exceeds this fraction of (size of the
+"""Loads resist a motion without strain only if its stiffness exceeds this fraction of (size of the
 forces) / (size of the scene).  A weight or a tension gives some tenths of this quotient."""
 
 SHORT_SUBSTEP = 512
@@ -129,7 +129,7 @@ class Stepper(StateView):
         t: Time of the initial state; s.
         q: Local configuration of the initial state.
         path: Checks of static steps; None in dynamics.
-        loose: Description of a motion that only loads may hold; empty if there is none.
+        loose: Description of a motion that only loads may resist; empty if there is none.
 
     Attributes:
         t: Time; s.
@@ -140,8 +140,8 @@ class Stepper(StateView):
         solution: Solution so far.
         time_loop: ``time_loop`` of loops.h.
         copies: Comparison of the processes if each of them computes the scene as a whole.
-        together: Calls a function on all processes that share the scene; if it raises
-            on one of them, all raise.
+        together: Caller of functions on all processes that share the scene; if a function raises
+            on one process, it raises on all.
     """
 
     def __init__(
@@ -217,8 +217,8 @@ class Stepper(StateView):
     def _add_callbacks(self) -> None:
         """Add functions of Python to the phases of the terms in a step.
 
-        They are not added by `fill`, which would store references to them and so keep this object
-        alive.
+        Here `fill` is not used, because it would store references to the functions, and so to this
+        object.
         """
         c, callbacks, controllers = self.time_loop, self.equation.callbacks, self.controllers
         loops = {
@@ -256,9 +256,9 @@ class Stepper(StateView):
         self.together(self.controllers.evaluate, self)
 
     def _prepare(self) -> None:
-        """Take rates other than velocities, reactions and forces of connectors from a short step.
+        """Take further rates, reactions and forces of connectors from a short trial step.
 
-        The first step of the scheme needs them; the state itself does not advance.
+        The first step of schemes with accelerations needs them.  The state does not advance.
         """
         c = self.time_loop
         _, *more = self.inertia.after(self._copy(c.s), c.step.dt)
@@ -269,10 +269,10 @@ class Stepper(StateView):
             group.commit(q1)
 
     def _require_stiffness(self, step: Any, q1: Any, s: Any) -> None:
-        """Raise if a motion that only loads can hold is free in the equilibrium.
+        """Raise if the loads do not resist a motion that only loads can resist.
 
-        If loads hold this motion, the tangent is regular even without stiffness against zero-energy
-        modes.  All processes call it together.
+        If they do, the tangent is regular even without stiffness against zero-energy modes.  All
+        processes call the function together.
         """
         equation, newton, numbering, loose = self.equation, self.solver, self.numbering, self._loose
         if not loose:
@@ -304,11 +304,11 @@ class Stepper(StateView):
         return self._trial(solved)
 
     def attempt_along(self, step: Step, guess: Array, border: Any, *, hold: bool = True) -> Trial:
-        """Solve for a step and its load factor, which is the time at its end.
+        """Solve for a step and its load factor, which is stored as the time at its end.
 
         ``step`` has the times of the initial guess.  The guess is in the axes of supports.  With
         ``hold``, hinges and springs that did not open further in the last step stay closed if an
-        equilibrium exists in which they bear their limits at most, see material_points.py.
+        equilibrium exists in which their forces are within the limits; see material_points.py.
         """
         c = self.time_loop
         self.solver.follow(border)
@@ -348,7 +348,7 @@ class Stepper(StateView):
         try:
             yield
         except SystemError as error:
-            # An exception in a preconditioner of Python is still set when PETSc and C return.
+            # An exception in a preconditioner written in Python is still set when C returns.
             raise error.__cause__ or error from None
         finally:
             self._moved(c.t)
@@ -392,9 +392,9 @@ class Stepper(StateView):
         raise StepFailed("the step cannot be trusted")
 
     def warn(self, warnings: Iterable[str], *, local: bool = False) -> None:
-        """Store warnings that the solution lacks, and issue them on the first process.
+        """Store warnings that the solution does not have yet, and issue them on rank 0.
 
-        With ``local``, this process issues them.
+        With ``local``, each process issues its own warnings.
         """
         for said in warnings:
             if said not in self.solution.warnings:
@@ -407,19 +407,19 @@ class Stepper(StateView):
     def _moved(self, t: float) -> None:
         """Set the time ``t`` of a new state, and drop cached data of the old state."""
         self.t = t
-        self._q: Array | None = None  # copied when Python asks for it
+        self._q: Array | None = None  # copied when it is read
         self._now: States | None = None
 
     @property
     def q(self) -> Array:
-        """Configuration at the local degrees of freedom."""
+        """Configuration at the local degrees of freedom; (size,); m, rad."""
         if self._q is None:
             self._q = self._copy(self.time_loop.q)
         return self._q
 
     @property
     def q_before(self) -> Array:
-        """Configuration at the beginning of the last step."""
+        """Configuration at the beginning of the last step; (size,); m, rad."""
         if self._begun_at is not None and not self.time_loop.parts:  # C may have gone on since
             return self._begun_at
         return self._copy(self.time_loop.prediction.q_before)
