@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""C library of the package: loops over cells and rows, material points, Newton's method.
+"""C library of the package: loops over cells and connectors, material points, Newton's method.
 
-It is compiled once for the machine.  The loops over cells assemble the same vectors and matrices as
-DOLFINx (a test compares both).  In addition they copy the unknowns into the coefficients of a cell,
-and add its entries at stored indices of the matrix.
+It is compiled once on each machine.  The loops over cells assemble the same vectors and matrices as
+DOLFINx, as a test verifies.  They also copy the unknowns into the coefficients of each cell, and
+add the entries of the cell at stored indices of the matrix.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SOURCES = (
 """C files in the folder c; they form one translation unit."""
 
 FLAGS = ["-O3", NATIVE, "-fopenmp-simd", "-ffp-contract=off"]
-"""Compiler flags; the order of sums may change for vectors, but each product is rounded first."""
+"""Compiler flags: SIMD may change the order of sums; products are rounded before they are added."""
 
 _CALLBACKS = """
 extern "Python" void curve_in_python(void *handle, double s, double step, double *out);
@@ -71,12 +71,12 @@ for _name, _field in ffi.typeof("petsc_functions").fields:
 
 
 def opaque(thing: Any) -> Any:
-    """Return the C pointer of a petsc4py object; other arguments are returned unchanged."""
+    """Return the C pointer of a petsc4py object; return other arguments unchanged."""
     return ffi.cast("void *", thing.handle) if isinstance(thing, PETSc.Object) else thing
 
 
 def petsc(name: str, *arguments: Any) -> None:
-    """Call a function of ``petsc_functions`` in loops.h; petsc4py objects become C pointers."""
+    """Call a function of ``petsc_functions`` in loops.h; raise RuntimeError if it fails."""
     if error := getattr(lib.petsc, name)(*map(opaque, arguments)):
         text, specific = ffi.new("const char **"), ffi.new("char **")
         lib.petsc.PetscErrorMessage(error, text, specific)
@@ -149,17 +149,17 @@ def in_order(enum: str, values: Mapping[str, T], prefix: str = "") -> list[T]:
 
 
 LARGE_SCENE = 2**16
-"""Number of unknowns above which memory is returned to the system, in 0.03 ms or more."""
+"""Number of unknowns above which memory is returned to the system, which takes at least 0.03 ms."""
 
 
 def give_back_memory(unknowns: int) -> None:
-    """Return freed memory of large scenes to the system; the GNU C library keeps it otherwise."""
+    """Return freed memory of large scenes to the system; the GNU C library would keep it."""
     if unknowns > LARGE_SCENE:
         lib.give_back_memory()
 
 
 def kernel(pointer: Any, instance: Any) -> Any:
-    """Return the FFCx kernel ``pointer``, which belongs to a cffi ``instance``, for loops.h."""
+    """Cast the FFCx kernel ``pointer`` of a cffi ``instance`` to the type of kernels in loops.h."""
     expected, actual = ffi.typeof("kernel *").cname, instance.typeof(pointer).cname
     if actual != expected:
         raise RuntimeError(

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Directory of compiled code: private to its user, checked before use, complete after a kill.
+"""Directory of compiled code, with entries that are private to a user and checked before use.
 
 An entry is a directory with the files of one build and a list of their checksums.  An entry is
 built in a scratch directory, written to the disk and renamed, so that a killed process leaves no
 incomplete entry.  The lock of an entry belongs to the operating system, which frees it when the
-process ends.  A sweep, at most once a day, removes entries that were not used for a month.
+process ends.  A clean-up, at most once a day, removes entries that were not used for a month.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ CHECKSUMS = "checksums"
 """File with the name of its entry and the checksums of the other files of the entry."""
 
 SWEPT = "swept"
-"""File whose modification time is the time of the last sweep."""
+"""File whose modification time is the time of the last clean-up."""
 
 DAY = 86_400.0
-"""Shortest time between two records of use of an entry, and between two sweeps; s."""
+"""Shortest time between two records of use of an entry, and between two clean-ups; s."""
 
 UNUSED = 30 * DAY
 """Time after which an unused entry is removed; s."""
@@ -49,9 +49,9 @@ TRUSTED = os.geteuid(), 0
 def cached(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tuple[T, Path]:
     """Return a loaded entry of the cache and its directory; build a missing or damaged entry first.
 
-    If several processes need the same entry, one builds it and the others wait.  ``build`` writes
-    the files of the entry into an empty directory and loads them.  ``name`` must change with the
-    sources.  An entry that cannot be imported is built again.
+    If several processes need the same entry, one process builds it and the others wait.  ``build``
+    writes the files of the entry into an empty directory and loads them.  ``name`` must change with
+    the sources.  An entry that cannot be imported is built again.
     """
     place, foreign = _place(), False
     if intact(place / name):
@@ -61,7 +61,7 @@ def cached(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> 
                     os.utime(place / name / CHECKSUMS)
             return load(place / name), place / name
         except FileNotFoundError:
-            pass  # a sweep has just removed the entry
+            pass  # a clean-up has just removed the entry
         except ImportError:
             foreign = True  # it was built for another system
     if not os.access(place, os.W_OK | os.X_OK):
@@ -97,7 +97,7 @@ def _remove_incomplete(entry: Path) -> None:
 
 
 def intact(entry: Path) -> bool:
-    """Return whether an entry is complete, unchanged since its build, and of trusted users."""
+    """Return whether an entry is complete, unchanged since its build, and from trusted users."""
     try:
         return (entry / CHECKSUMS).read_text() == _checksums(entry, entry.name)
     except (OSError, ValueError):
@@ -105,7 +105,7 @@ def intact(entry: Path) -> bool:
 
 
 def _checksums(entry: Path, name: str) -> str:
-    """Return the text of :data:`CHECKSUMS`; ValueError unless trusted users own all files."""
+    """Return the text of :data:`CHECKSUMS`; raise ValueError unless trusted users own all files."""
     lines = [name]
     for path in sorted(entry.iterdir()):
         status = path.lstat()

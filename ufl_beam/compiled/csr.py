@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sparse matrices by rows, which C loops fill and PETSc solves."""
+"""Sparse matrices in compressed rows, which loops in C fill and PETSc factors."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, loop, struc
 
 
 class Csr:
-    """Compressed sparse rows with 32-bit indices, which C needs; SciPy may use 64 bits.
+    """Sparse matrix in compressed rows, with indices of 32 bits for C; SciPy may use 64 bits.
 
     ``again`` recomputes the column indices after :meth:`free` has freed them.
     """
@@ -42,7 +42,7 @@ class Csr:
             vars(self).pop("indices", None)
 
     def zeros_like(self) -> Csr:
-        """Return a matrix that shares the sparsity pattern."""
+        """Return a zero matrix that shares the sparsity pattern."""
         matrix = copy(self)
         matrix.data = np.zeros(len(self.data))  # np.zeros_like would write to the memory at once
         return matrix
@@ -53,7 +53,7 @@ class Csr:
         return len(self.indptr) - 1
 
     def narrow(self) -> bool:
-        """Return whether each row has at most 256 entries, which a byte can number."""
+        """Return whether each row has at most 256 entries, so that a byte can number them."""
         return bool(np.diff(self.indptr).max(initial=0) <= 256)
 
     def rows(self) -> Index:
@@ -78,8 +78,8 @@ class Csr:
     def blocks(self, dofs: Index, lanes: int) -> Index:
         """Find the entries of all pairs of ``dofs`` (int32) of each cell; the entries must exist.
 
-        The result has the shape (num_batches, pairs, lanes), see :func:`in_batches`.  If rows have
-        at most 256 entries, the results are positions in the row (uint8), else positions in
+        The result has the shape (num_batches, pairs, lanes), see :func:`in_batches`.  If the
+        matrix is :meth:`narrow`, the results are positions in the row (uint8), else in
         :attr:`data` (int32).
         """
         cells, cell_size = dofs.shape
@@ -129,7 +129,7 @@ def _pattern(size: int, *coupled: Index) -> tuple[Index, Index]:
 
 
 class Product:
-    """Operator ``x -> A x`` on this process, without the zeros that ``A`` stores.
+    """Operator ``x -> A x`` on this process, which leaves out the stored zeros of ``A``.
 
     Successive rows whose entries have the same distances from the diagonal form a run, which stores
     the distances once.  Most rows along beams are in such runs.
@@ -177,7 +177,7 @@ class StepProduct:
     """Forces ``A (factor s - back v)`` with s = (Δu, 2 tan(Δψ/2)), and their derivative.
 
     ``A`` is constant and has the sparsity pattern of ``tangent``, to which the derivative is added.
-    ``scratch`` is space for a number of each row; it may be used elsewhere between evaluations.
+    ``scratch`` is space for one number per row; other code may use it between evaluations.
 
     Attributes:
         A: The matrix as :class:`Product`.

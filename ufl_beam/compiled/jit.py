@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Compilation of C modules and UFL forms, once for the machine.
+"""Compilation of C modules and UFL forms, once on each machine.
 
-It adds no requirement, because FFCx needs a C compiler at run time, too.
+The C compiler is no additional requirement, because FFCx needs it at run time, too.
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ NATIVE = "-march=native"
 """Flag that lets the compiler use all instructions of the processor."""
 
 PROCESSOR = np.show_config(mode="dicts").get("SIMD Extensions", {})
-"""Features of the processor: the baseline of NumPy, and others that NumPy found.
+"""Features of the processor: the baseline of NumPy, and further features that NumPy found.
 
-Code compiled for this processor may not run on another one that shares the cache.
+Code compiled for this processor may not run on another processor that shares the cache.
 """
 
 
@@ -78,7 +78,7 @@ class CompilerError(RuntimeError):
 
 
 class Refused(Exception):
-    """Code must not be used; the message is the reason, which the cache stores."""
+    """Compiled code must not be used; the message is the reason, which the cache stores."""
 
 
 def compiled(

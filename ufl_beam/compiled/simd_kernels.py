@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""SIMD versions of FFCx's kernels: several cells at once, one in each lane of a vector.
+"""SIMD versions of FFCx's kernels: several cells at once, one cell in each lane of a vector.
 
-A kernel computes with the numbers of one cell, without branches.  Its text is compiled again with
-vector types of GCC and Clang instead of numbers.  The results are compared with FFCx's kernel.
+A kernel of FFCx computes one cell, without branches.  Its C code is compiled again with vector
+types of GCC and Clang instead of numbers.  The results are compared with FFCx's kernel.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ LOGGER = logging.getLogger("ufl_beam")
 _WIDE = {"AVX512F", "X86_V4"} & {*PROCESSOR.get("baseline", ()), *PROCESSOR.get("found", ())}
 
 LANES = 8 if _WIDE else 4
-"""Number of cells that are computed at once: numbers in a vector of AVX-512 or AVX.  On processors
-without these, compilers split the vectors."""
+"""Number of cells that are computed at once, one for each number in a vector of AVX-512 or AVX.
+For other processors, compilers split the vectors."""
 
 FLAGS = ["-O2", NATIVE, "-fno-math-errno", *(["-mprefer-vector-width=512"] if _WIDE else [])]
-"""Compiler flags; without the last one, compilers halve vectors of 512 bits for square roots."""
+"""Compiler flags; without the last flag, compilers halve vectors of 512 bits for square roots."""
 
 FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "pow"}
 """Functions that assembly_simd.h provides for vectors; pow with integer exponents only."""
@@ -58,9 +58,9 @@ _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 def in_vectors(kernel: str) -> str:
     """Rewrite the C code of an FFCx kernel with vectors instead of numbers.
 
-    Divisions by constants become multiplications; divisions by variables that divide more than once
-    become calls of ``quotient`` in assembly_simd.h.  Conditions become masks, whose bits in a lane
-    are all zero or all one, and logical operators become bitwise operators.
+    Divisions by constants become multiplications.  Divisions by a variable that is a divisor more
+    than once become calls of ``quotient`` in assembly_simd.h.  Conditions become masks, whose bits
+    in a lane are all zero or all one, and logical operators become bitwise operators.
 
     Raises:
         Refused: The kernel needs a function or a condition that assembly_simd.h does not provide.
@@ -107,7 +107,7 @@ def written(source: Path) -> str:
 
 
 def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
-    """Arrange one row for each cell in batches (num_batches, numbers, lanes), see loops.h."""
+    """Arrange ``rows``, one per cell, in batches (num_batches, numbers, lanes), see loops.h."""
     rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
     if missing := -len(rows) % lanes:
         rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
@@ -124,7 +124,7 @@ errors than the tolerance.
 
 
 def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, int]) -> None:
-    """Refuse a vector kernel that differs from FFCx's kernel on random cells.
+    """Raise :class:`Refused` if a vector kernel differs from FFCx's kernel on random cells.
 
     ``sizes`` are the numbers of entries, of coefficient values and of constants of the kernel.
     """
@@ -150,7 +150,7 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
 def interleaved(
     source: Path, kernel: int, sizes: tuple[int, int, int], unknowns: tuple[int, int]
 ) -> int | None:
-    """Return the address of the SIMD loop of a compiled form, or None if there is none.
+    """Return the address of the SIMD loop of a compiled form, or None if the form has none.
 
     ``sizes`` are as in :func:`require_agreement`.  ``unknowns`` are the position of the first
     unknown among the coefficients, and the number of unknowns.

@@ -166,8 +166,8 @@ class Simulation(Stepper):
         """Advance to the time ``t1`` in one step or, if it fails, in substeps.
 
         Raises:
-            ConvergenceError: Even the smallest substep failed.  The present state is then the end of
-                the last accepted substep, as is the last state of ``error.solution``.
+            ConvergenceError: Even the smallest substep failed.  The present state is then the end
+                of the last accepted substep, as is the last state of ``error.solution``.
             ArgumentError: Loads of the first static step do not resist a motion without strain.
         """
         self.steps_to(np.array([t1]))

@@ -3,7 +3,7 @@
 
 A beam of many cells is a chain of vertices that couple to their two neighbours only.  Each process
 eliminates such vertices by blocks.  A small matrix remains for joints, ends, vertices at the border
-between processes, and all other unknowns that couple to more than two neighbours.
+between processes, and other unknowns that couple to more than two neighbours.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from ufl_beam.solvers.substructuring import BAD_PIVOT, GOOD, Klu, Summed, succee
 def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any, ...]:
     """Find the vertices of the cells of one process that couple only to their two neighbours.
 
-    They are found from the pattern of the matrix, so any kind of coupling is taken into account.
+    The pattern of the matrix determines them, so any kind of coupling is taken into account.
     ``alone`` marks local degrees of freedom that no other process has.
 
     Returns:
         Degrees of freedom of the vertices, chain after chain; (num_vertices, 3).
-        First vertex of each chain, and the number of vertices.
+        Index of the first vertex of each chain, and last the number of vertices.
         Degrees of freedom of the left and the right end of each chain; (num_chains, 6).
-        Whether each chain has a left end, to which elimination couples all its vertices; other
-        chains begin at a vertex with one neighbour, and have their right end twice.
-        Where, in the rows of each vertex, the columns of the previous vertex, of itself and of the
-        next vertex begin; (num_vertices, 3).
+        True for a chain with a left end, to which elimination couples all its vertices.  Other
+        chains begin at a vertex with one neighbour; both their ends are the right end.
+        Positions in the rows of each vertex at which the columns of the previous vertex, the vertex
+        itself and the next vertex begin; (num_vertices, 3).
     """
     nodes = cell_dofs.shape[1] // 3
     start, end = cell_dofs[:, 0::nodes], cell_dofs[:, 1::nodes]
@@ -48,11 +48,11 @@ def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -
     counts = np.where(alone & (row_counts == column_counts), row_counts, 0)
 
     def has(number: int, dofs: Index) -> npt.NDArray[np.bool_]:
-        """Return which vertices have successive dofs, and ``number`` entries per row and column."""
+        """Find vertices with successive dofs and ``number`` entries per row and column."""
         successive = (np.diff(dofs, axis=1) == 1).all(axis=1)
         return np.asarray((counts[dofs] == number).all(axis=1) & successive)
 
-    inside &= has(9, end[:-1])  # of itself and its two neighbours, three each
+    inside &= has(9, end[:-1])  # three for the vertex and each of its two neighbours
     is_first = np.zeros(len(inside), dtype=bool)
     is_first[np.unique(end[:-1, 0], return_index=True)[1]] = True
     inside &= is_first
@@ -63,7 +63,7 @@ def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -
     ends = np.hstack([start[:-1][first], end[1:][last]])
     inside[inside] = ~middle[ends].any(axis=1)[chain]
 
-    # A chain between two free ends is divided at its middle, to be eliminated from both ends.
+    # A chain between two free ends is divided at its middle, and eliminated from both ends.
     _, first, last = _runs(inside)
     both_free = has(6, start[:-1][first]) & has(6, end[1:][last])
     both_free &= last - first > 1
@@ -98,7 +98,7 @@ def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
-    """Return the run of each true value, and the first and last position of each run."""
+    """Return the number of the run of each true value, and first and last position of each run."""
     edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
     first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
     return np.repeat(np.arange(len(first)), last - first + 1), first, last
@@ -162,7 +162,7 @@ class Elimination:
     :meth:`expand` after it.  On one process, C uses :attr:`c` directly, see newton.c.
 
     Attributes:
-        shared: Which of the remaining unknowns other processes have too.
+        shared: True for remaining unknowns that other processes have, too.
         c: ``chains`` of loops.h.
     """
 
@@ -191,7 +191,7 @@ class Elimination:
         return bool(lib.all_finite(len(self.left.data), doubles(self.left.data)))
 
     def reduce(self, b: Array) -> None:
-        """Eliminate from another right-hand side."""
+        """Reduce another right-hand side by the same factors."""
         lib.reduce(self.c, doubles(b))
 
     def expand(self, small: Array, x: Array) -> None:
@@ -202,15 +202,15 @@ class Elimination:
 class CondensedSolver:
     """Direct solver: condensation along the beams, then factorization of the rest.
 
-    If processes share a scene, each also eliminates the other unknowns that only it has, except in
-    scenes with forces of connectors.  The remaining system is small; each process factors the sum
-    over all processes, so that none waits for another.
+    If processes share a scene, each process also eliminates all other unknowns that no other
+    process has, except in scenes with forces of connectors.  The remaining system is small.  Each
+    process factors its sum over all processes, so that no process sends a solution.
     """
 
     def __init__(self, subdomain: Subdomain, A: Csr) -> None:
         self._elimination, self._is_new, self._good = Elimination(subdomain, A), False, False
-        # If only a connector holds a part, the part's own stiffness may leave zeros or round-off on
-        # the diagonal.  Several fronts then exchange too few rows; KLU exchanges enough.
+        # If only connectors hold a beam, elimination may leave zeros or round-off on the diagonal.
+        # Several fronts then exchange too few rows; KLU exchanges enough.
         few_exchanges = not len(subdomain.numbering.multipliers)
         rest: Any = self._elimination
         if not subdomain.alone:
@@ -244,7 +244,7 @@ class CondensedSolver:
             pc.setFailedReason(BAD_PIVOT)
 
     def solve(self, b: Array, x: Array, *, reduced: bool) -> bool:
-        """Solve for ``x``; return whether that succeeds.
+        """Solve for ``x``; return whether the solution succeeds.
 
         If ``reduced``, :meth:`factor` has already reduced the right-hand side.
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Eigenvalues of pencils: those nearest to a shift by SLEPc; all of a small one by LAPACK."""
+"""Eigenvalues of matrix pencils nearest to a shift, by SLEPc or, for small pencils, by LAPACK."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TOLERANCE = 1e-12
 """Tolerance of the residual of an eigenpair, relative to its eigenvalue."""
 
 SHIFT = 1e-13
-"""Shift relative to the least squared frequency of a dof alone; round-off hides smaller shifts."""
+"""Shift, relative to the least squared frequency of one dof alone; smaller shifts are round-off."""
 
 EXTRA = 8
 """Number of additional eigenvalues, so that none of several close eigenvalues is missed."""
@@ -29,8 +29,8 @@ ROUND_OFF = 64 * float(np.finfo(np.float64).eps)
 """Bound on the round-off of a matrix, relative to its largest entry."""
 
 ZERO = ROUND_OFF / 8
-"""Fraction of the sum of magnitudes in a quadratic form below which its value is round-off; the
-largest round-off that was observed is a sixtieth of it."""
+"""Value of a quadratic form up to which it is round-off, as a fraction of the sum of magnitudes of
+its terms.  The largest observed round-off is a sixtieth of this value."""
 
 
 def _slepc() -> Any:
@@ -55,9 +55,9 @@ def linear(
 ) -> tuple[Array, Array]:
     """Compute the n eigenvalues of ``A x = λ B x`` nearest to ``shift``, with eigenvectors.
 
-    A and B are symmetric, ``A - shift B`` is regular, and B has no negative eigenvalue if
-    ``definite``.  The pencil has ``most`` finite eigenvalues.  The results, (n,) and (size, n), may
-    have a few more than n eigenvalues.
+    A and B are symmetric, and ``A - shift B`` is regular.  With ``definite``, B has no negative
+    eigenvalue.  The pencil has ``most`` finite eigenvalues.  The results, (n,) and (size, n), may
+    contain up to :data:`EXTRA` additional eigenvalues.
     """
     size, n = A.shape[0], min(n + EXTRA, most)
     if size <= DENSE:
@@ -76,9 +76,9 @@ def linear(
 def quadratic(
     K: csr_array, C: csr_array, M: csr_array, n: int, *, most: int, shift: float
 ) -> tuple[Complex, Complex]:
-    """Compute the n exponents s of ``(K + s C + s² M) x = 0`` nearest to ``shift``.
+    """Compute the n exponents s of ``(K + s C + s² M) x = 0`` nearest to ``shift``, and all x.
 
-    Conjugate exponents count as two.  Eigenvectors x are the second result, (size, n).
+    Conjugate exponents count as two.  For the shapes of the results see :func:`linear`.
     """
     size, n = K.shape[0], min(n + EXTRA, most)
     if size <= DENSE:
@@ -119,7 +119,7 @@ def _inverse(A: Array, B: Array) -> tuple[Complex, Complex]:
 
 
 def _inverse_definite(A: Array, B: Array) -> tuple[Array, Array]:
-    """Compute the results of :func:`_inverse` from the symmetric Fᵀ A⁻¹ F with B = F Fᵀ."""
+    """Compute the results of :func:`_inverse` from the symmetric matrix Fᵀ A⁻¹ F with B = F Fᵀ."""
     scale = np.sqrt(B.diagonal())
     nonzero = np.flatnonzero(scale)
     F = np.zeros((len(A), len(nonzero)))

@@ -21,16 +21,16 @@ SYMMETRIC = 64 * float(np.finfo(np.float64).eps)
 class Factorisation:
     """L D Lᵀ factors of a symmetric matrix, or L U factors of an unsymmetric one, by MUMPS.
 
-    Rows and columns are scaled so that the largest entry of each is about one; so the result does
-    not depend on units.  MUMPS exchanges rows and columns, so the diagonal may have zeros.
+    Rows and columns are scaled so that the largest entry of each is about one.  So the result does
+    not depend on units.  MUMPS exchanges rows and columns, so the diagonal may contain zeros.
 
     Attributes:
-        symmetric: Whether the matrix is symmetric up to round-off.
+        symmetric: True if the matrix is symmetric up to round-off.
         negative: Number of negative eigenvalues of a symmetric matrix; else 1 if the determinant
             is negative, and 0 if it is positive.
 
     Raises:
-        LinAlgError: The matrix has no inverse, or entries that are not finite.
+        LinAlgError: The matrix is singular or has entries that are not finite.
     """
 
     def __init__(self, A: csr_array) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Multifrontal elimination of the system that remains after the elimination along chains."""
+"""Multifrontal elimination of the system that remains after the elimination of chains."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ ONE_FRONT = int(lib.ONE_FRONT)
 class Multifrontal:
     """Multifrontal elimination of the unknowns of a system, except those that stay.
 
-    Of :data:`ORDERINGS`, the ordering with the fewest operations is used.  Each front exchanges
-    rows among its pivots only, see fronts.c.  In a system of up to :data:`ONE_FRONT` unknowns, all
+    The ordering of :data:`ORDERINGS` with the fewest operations is used.  Each front exchanges rows
+    among its pivots only, see fronts.c.  In a system of up to :data:`ONE_FRONT` unknowns, all
     eliminated unknowns are pivots of one front.  The fronts of a larger system have few pivots, so
     its matrix must not have structural zeros on the diagonal.
 
     Args:
         inner: The system, see substructuring.py.
-        stays: Which of its unknowns stay.
+        stays: True for unknowns that stay; (size,).
 
     Attributes:
         c: ``fronts`` of loops.h.
@@ -57,14 +57,14 @@ class Multifrontal:
         fill(c, fronts=self.c, found=np.zeros(self.c.size))
 
     def factor(self, b: Array) -> bool:
-        """Eliminate from matrix and right-hand side; return whether all factors are finite."""
+        """Reduce matrix and right-hand side; return whether all factors are finite."""
         good: bool = self._inner.factor(b)
         good &= bool(lib.factor_fronts(self.c, doubles(self._inner.left.data)))
         lib.reduce_fronts(self.c, doubles(self._inner.f))
         return good
 
     def reduce(self, b: Array) -> None:
-        """Eliminate from another right-hand side."""
+        """Reduce another right-hand side by the same factors."""
         self._inner.reduce(b)
         lib.reduce_fronts(self.c, doubles(self._inner.f))
 
@@ -128,7 +128,7 @@ def _structure(
 
 
 def _operations(first: Index, begin: Index) -> float:
-    """Return the number of multiplications in the fronts; for the arguments see loops.h."""
+    """Return the number of multiplications in all fronts; for the arguments see loops.h."""
     pivots, others = (np.diff(x).astype(np.float64) for x in (first, begin))
     return float(np.sum(pivots * (pivots**2 / 3 + pivots * others + others**2)))
 
@@ -137,8 +137,8 @@ def _fronts(A: csr_array, stays: npt.NDArray[np.bool_], kind: str) -> tuple[Inde
     """Find the fronts if the unknowns are eliminated in an order of PETSc.
 
     Returns:
-        All unknowns in this order, those that stay last; ``first``, ``begin`` and ``rest`` of the
-        fronts, see loops.h.
+        All unknowns in this order, with the unknowns that stay at the end; ``first``, ``begin`` and
+        ``rest`` of the fronts, see loops.h.
     """
     size = A.shape[0]
     these: Index = np.arange(size) if kind == "nd" else np.flatnonzero(~stays)

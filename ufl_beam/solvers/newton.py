@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Equilibrium of a step by Newton's method of newton.c, as a solver of PETSc.
+"""Equilibrium of a step by Newton's method in newton.c, as a solver of PETSc.
 
-The convergence test has dimensionless tolerances.
+The tolerances of its convergence test are dimensionless.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
 from ufl_beam.terms.term import from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
-"""Options for full steps: a line search of PETSc would add forces and moments in norms, and compute
-additional residuals."""
+"""Options for full steps.  A line search of PETSc would mix forces and moments in one norm, and
+need additional residuals."""
 
 ZERO_MODE_STIFFNESS = 0.01
 """Stiffness against a zero-energy mode, relative to the largest diagonal entry of the tangent for
@@ -48,22 +48,22 @@ stiffness reduces the motion that round-off causes.
 """
 
 FORCED = 1e-6
-"""Force above which a motion is driven, not a zero-energy mode; relative to forces in the scene."""
+"""Residual up to which a motion is a zero-energy mode; relative to the forces in the scene."""
 
 REASONS = {
     lib.SINGULAR: "found a singular tangent",
     lib.TOO_MANY: "did not converge",
     lib.STALLED: "came no closer to an equilibrium",
     lib.DIVERGED: "met a force that is not a finite number",
-    -4: "met a force that is not a finite number",  # PETSc's name for it changed in 3.24
+    -4: "met a force that is not a finite number",  # its name in PETSc changed in 3.24
 }
-"""Reasons for which Newton's method stops, by values of SNESConvergedReason."""
+"""Text for each reason of a failure, by values of SNESConvergedReason."""
 
 
 def _vector(subdomain: Subdomain) -> tuple[PETSc.Vec, Array]:
     """Create a vector of the unknowns; return it and its local values.
 
-    The vector has ghosts if processes share a scene.  PETSc does not move its values.
+    The vector has ghosts if processes share a scene.  The address of its values does not change.
     """
     if subdomain.alone:
         vector = PETSc.Vec().createSeq(subdomain.size)
@@ -75,18 +75,18 @@ def _vector(subdomain: Subdomain) -> tuple[PETSc.Vec, Array]:
 
 
 class Solver:
-    """Newton's method of newton.c, and the PETSc objects that it uses.
+    """Newton's method in newton.c, and the PETSc objects that it uses.
 
     By default, newton.c is the solver of SNES.  If there are PETSc options or :attr:`snes` has been
     read, PETSc's ``newtonls`` calls the same residuals, tangents and convergence test.
 
     Args:
         equation: The :class:`StepEquation` of the steps.
-        least: Number of iterations; before it, a residual must be far below the tolerance.
+        least: Least number of iterations, unless a residual is far below the tolerance.
 
     Attributes:
         c: ``equation`` of loops.h.
-        change: Change in the latest iteration; between solutions other code may use the array.
+        change: Change in the latest iteration; between solutions, other code may use the array.
         unknowns: Local values of the latest iterate, converged or not; C writes them.
     """
 
@@ -150,11 +150,11 @@ class Solver:
             petsc("SNESShellSetSolve", snes, solve)
 
     def _set_jacobian(self) -> None:
-        """Give SNES a matrix of PETSc if PETSc's own method needs it, else an empty matrix."""
+        """Give SNES a PETSc matrix if PETSc's own Newton method needs it, else an empty matrix."""
         if self._subdomain.alone and self.c.monitored:
             self._matrix = self._equation.A.petsc()
         else:
-            # Only the preconditioner needs the matrix, and the preconditioner has its own.
+            # Only the preconditioner needs a matrix, and it has its own.
             self._equation.A.free()
             give_back_memory(self._subdomain.size)
             sizes = (self._subdomain.num_owned, self._subdomain.numbering.size)
@@ -167,7 +167,7 @@ class Solver:
 
     @property
     def snes(self) -> PETSc.SNES:
-        """SNES of the steps; reading it changes their method to PETSc's ``newtonls``."""
+        """SNES of the steps; reading it switches to PETSc's method ``newtonls``."""
         if not self.c.monitored:
             self.c.monitored = 1
             self._set_jacobian()
@@ -183,24 +183,24 @@ class Solver:
     # -- callbacks of C --------------------------------------------------------------------------
 
     def solve(self, anew: bool) -> bool:
-        """Compute the change, with a new factorization if ``anew``; return whether that fails."""
+        """Compute the change, with a new factorization if ``anew``; return whether this fails."""
         owned = slice(self._subdomain.num_owned)
         if anew and not self._factors.factor(self._r[owned]):
             return True
         return not self._factors.solve(self._r[owned], self.change[owned], reduced=bool(anew))
 
     def find_conjugates(self, q: Array) -> None:
-        """Compute the conjugates of residuals in the change, for works in a line search."""
+        """Compute the motions conjugate to residuals in the change, for works in a line search."""
         conjugate = self._equation.working(q, self.change)
         fill(self.c, conjugate=conjugate, start=np.empty(len(q)))
 
     def find_zero_modes(self) -> bool:
-        """Hold new motions that no force resists or drives; return whether there are any.
+        """Stiffen new motions that no force resists or drives; return whether there are any.
 
-        The node where several members meet has no mass of its own.  When all plastic hinges around
+        An example is a massless node at which several members meet.  When all plastic hinges around
         it have lost their strength, any rotation of the node is an equilibrium, and the tangent is
-        singular.  The rotation is then held by a stiffness on the diagonal of the tangent, which
-        residuals, and so forces, energies and solutions, do not contain.
+        singular.  So a stiffness against the rotation is added to the diagonal of the tangent.
+        Residuals, and so forces, energies and solutions, do not contain this stiffness.
         """
         subdomain, A, numbering = self._subdomain, self._equation.A, self._subdomain.numbering
         K, free = free_matrix(subdomain, A, self._equation.supports.dofs)
@@ -211,7 +211,7 @@ class Solver:
         except (np.linalg.LinAlgError, RuntimeError):
             return False
         motions = numbering.scales[free, None] * vectors
-        # One degree of freedom for each mode, chosen so that the modes are independent there.
+        # One degree of freedom for each mode, chosen so that the modes are independent there
         pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
         dofs = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]
         chosen = np.isin(subdomain.dofs, dofs)
@@ -230,7 +230,7 @@ class Solver:
         return True
 
     def forget_zero_modes(self) -> bool:
-        """Release all zero-energy modes; return whether any were held, on any process."""
+        """Remove all stiffnesses against zero-energy modes; return whether any process had some."""
         if self._subdomain.largest(float(self.c.idle)) == 0.0:
             return False
         self._stiffness[:] = 0.0
@@ -240,8 +240,8 @@ class Solver:
     def _set_stiffness(self) -> None:
         """Let C add the stiffnesses against zero-energy modes to tangents from now on.
 
-        Degrees of freedom that these stiffnesses or supports hold do not count in the round-off of
-        forces.
+        Degrees of freedom with such a stiffness, or with a support, do not count in the round-off
+        of forces.
         """
         dofs = np.flatnonzero(self._stiffness)
         arrays = {"idle_entry": self._diagonal[dofs], "idle_stiffness": self._stiffness[dofs]}
@@ -252,7 +252,7 @@ class Solver:
     # -- paths -----------------------------------------------------------------------------------
 
     def follow(self, border: Any) -> None:
-        """Solve also for the load factor of a :class:`PathCorrector`; None ends this."""
+        """Solve also for the load factor of a :class:`PathCorrector`; None switches this off."""
         self._border, self.c.border = border, ffi.NULL
         if border is not None:
             self._t = np.array([border.t])
@@ -272,10 +272,10 @@ class Solver:
         return bool(self._border.met())
 
     def change_along(self, x: Array) -> bool:
-        """Compute the change of an iteration of the bordered equation; return whether that fails.
+        """Compute the change of an iteration of the bordered equation; return whether this fails.
 
-        The border is eliminated by one factorization and two solutions, because only the tangent
-        without the border is banded.  If the tangent is nearly singular, the next iteration
+        The border is eliminated by one factorization and two solutions, because a border would
+        destroy the sparsity of the tangent.  If the tangent is nearly singular, the next iteration
         recovers the lost digits.
         """
         border, subdomain, owned = self._border, self._subdomain, slice(self._subdomain.num_owned)
@@ -296,7 +296,7 @@ class Solver:
     # -- sizes for dimensionless tolerances --------------------------------------------------------
 
     def size(self, forces: Array) -> float:
-        """Return the Euclidean norm of forces, and of moments divided by the scene's size; N."""
+        """Return the Euclidean norm of forces, with moments divided by the scene's size; N."""
         local = lib.norm(self._subdomain.size, ffi.NULL, doubles(self._weights), doubles(forces))
         return float(lib.over_processes(self.c, lib.HYPOT, local))
 
@@ -305,7 +305,7 @@ class Solver:
         return float(self.c.loads + lib.over_processes(self.c, lib.HYPOT, self.c.inner_size))
 
     def random_work(self, x: Array, s: Array) -> float:
-        """Return the work of independent round-off forces at ``x`` in a step ``s``; J."""
+        """Return the expected work of independent round-off forces at ``x`` in a step ``s``; J."""
         forces = np.empty(self._subdomain.size)
         lib.find_motion(self.c, doubles(x))
         lib.find_round_off(self.c, doubles(x), doubles(forces))
@@ -324,7 +324,7 @@ class Solver:
         return PETSc.Error(self.c.error) if self.c.error else None
 
     def failure(self) -> StepFailed:
-        """Return an error that describes why Newton's method has stopped without a solution."""
+        """Return the error for a Newton's method that has stopped without a solution."""
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
         reason, residuals = self.c.reason, self._residuals()
         worst = self._subdomain.numbering.worst(self._subdomain.gather(residuals))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Options of Newton's method, and a check that PETSc uses the PETSc options among them."""
+"""Options of Newton's method, and a check that PETSc uses all PETSc options among them."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ PREFIX = "ub_"
 
 @dataclass(frozen=True)
 class Newton(Record):
-    """Options of Newton's method: tolerance, number of iterations, PETSc options.
+    """Options of Newton's method: tolerance, number of iterations, PETSc options, solver.
 
     Args:
         rtol: Tolerance of the residual, relative to the forces in the scene.
         max_iterations: Largest number of iterations of a step; a step that needs more is divided.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any option, PETSc's Newton method
-            is used, otherwise an equivalent method in C, which is faster for few cells.
-            ``snes_linesearch_type`` also replaces the line search that follows when full steps
-            stall.  A run raises :class:`ArgumentError` for options that PETSc does not use.
-        reference: Whether the reference solver computes the run: the equations of the paper with
-            DOLFINx forms, a return map in NumPy and PETSc's SNES, for comparison or for reading.
-            It is ten to a thousand times slower; :func:`simulate` accepts it with equal steps on
-            one process.  See docs/theory.md.
+            replaces an equivalent method in C, which is faster for few cells.  With
+            ``snes_linesearch_type``, that line search is also used when full steps stall.
+            A run raises :class:`ArgumentError` for options that PETSc does not use.
+        reference: True if the reference solver computes the run.  It solves the equations of the
+            paper by DOLFINx forms, a return map in NumPy and PETSc's SNES, and is ten to a
+            thousand times slower.  :func:`simulate` accepts it for equal steps on one process.
+            See docs/theory.md.
 
     Example:
         >>> newton = ub.Newton(rtol=1e-12, petsc={"snes_linesearch_type": "bt"})
@@ -103,20 +103,20 @@ def database() -> dict[str, Any]:
 
 
 def apply_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
-    """Apply options to a SNES, its KSP and PC; return the options that none of them has read.
+    """Apply options to a SNES, its KSP and its PC; return the options that none of them has read.
 
-    The database is restored afterwards, as other solvers have the same prefix.
+    PETSc's database is restored afterwards, because other solvers have the same prefix.
     """
     options, before, unused = PETSc.Options(PREFIX), database(), list[str]()
     try:
         for name in before:
-            del options[name]  # it may be marked as used
+            del options[name]  # the option may be marked as used
         for name, value in chosen.items():
             options[name] = value
         snes.setFromOptions()
         # PETSc may have replaced deprecated options by their new names.
         for name in chosen.keys() & database().keys():
-            used = ffi.new("char[8]")  # a bool of any size
+            used = ffi.new("char[8]")  # space for a C bool of any size
             option = ffi.new("char[]", (PREFIX + name).encode())
             petsc("PetscOptionsUsed", ffi.NULL, option, used)
             if not any(bytes(ffi.buffer(used))):
@@ -140,7 +140,7 @@ def checked_newton(newton: Newton | None, comm: MPI.Intracomm) -> Newton:
 
 
 def _require_known(newton: Newton) -> None:
-    """Refuse options that PETSc would not use, or whose values it refuses, before any solution."""
+    """Raise if PETSc would not use an option or refuses its value; called before any solution."""
     chosen = {**database(), **newton.petsc}
     if not chosen:
         return

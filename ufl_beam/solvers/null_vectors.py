@@ -24,7 +24,7 @@ ROUNDS = 40
 def free_matrix(subdomain: Subdomain, A: Csr, constrained: Index) -> tuple[csc_array, Index]:
     """Assemble the tangent of the dofs that no support holds; return it and their scene numbers.
 
-    All processes call it together, each with its part ``A`` and its ``constrained`` local dofs.
+    All processes call it together, with the local matrix ``A`` and local dofs ``constrained``.
     """
     dofs = subdomain.dofs
     local = dofs[A.rows()], dofs[A.indices], A.data, dofs[constrained]
@@ -37,11 +37,11 @@ def free_matrix(subdomain: Subdomain, A: Csr, constrained: Index) -> tuple[csc_a
 
 
 def null_vectors(K: csc_array) -> tuple[Array, Array]:
-    """Compute null vectors of a matrix after its rows and columns are scaled to size 1.
+    """Compute null vectors of a matrix, or the vector of its least singular value if it has none.
 
     Returns:
-        Their dimensionless singular values, the least last; and the vectors in columns, in the
-        units of the unknowns.  There is at least one vector; for large matrices there is only one.
+        Singular values after rows and columns are scaled to size 1, the least last; and the vectors
+        in columns, in the units of the unknowns.  For large matrices there is only one vector.
     """
     n, scaled, factors = K.shape[0], K, np.ones(K.shape[0])
     for _ in range(ROUNDS):

@@ -5,15 +5,15 @@ Substructuring: each process eliminates chains and, in scenes without forces of 
 other unknowns that only this process has.  The Schur complements of the processes are summed; each
 process factors the sum.
 
-Each reduced system (``Multifrontal``, ``Summed``, ``Klu``) is built on another one with more
-unknowns; the first one, ``Elimination``, is built on the full matrix.  It has
+Each reduced system (``Multifrontal``, ``Summed``, ``Klu``) is built on another system with more
+unknowns; the first, ``Elimination``, is built on the full matrix.  A reduced system has
 
 * ``dofs``: degrees of freedom that remain, in numbers of the scene;
-* ``factor(b)``: eliminates from the matrix and a right-hand side at the degrees of freedom owned by
-  this process; returns whether all results are finite;
-* ``reduce(b)``: eliminates from another right-hand side;
+* ``factor(b)``: reduces the matrix and a right-hand side at the degrees of freedom that this
+  process owns; returns whether all results are finite;
+* ``reduce(b)``: reduces another right-hand side by the same factors;
 * ``left``, ``f``: matrix and right-hand side of the reduced system, which the caller solves;
-* ``expand(small, x)``: computes the solution at the degrees of freedom owned by this process from
+* ``expand(small, x)``: computes the solution at the degrees of freedom that this process owns from
   the solution of the reduced system.
 """
 
@@ -33,7 +33,7 @@ from ufl_beam.compiled.csr import Csr
 
 
 class Summed:
-    """Sum of the reduced systems of all processes; each process has the whole sum."""
+    """Sum of the reduced systems of all processes, which each process stores as a whole."""
 
     def __init__(self, inner: Any, comm: MPI.Intracomm) -> None:
         self._inner, self._comm = inner, comm
@@ -51,7 +51,7 @@ class Summed:
         self.left = Csr(data, keys % size if size else keys, indptr)
 
     def factor(self, b: Array) -> bool:
-        """Eliminate on all processes; return whether the matrix is finite on each of them."""
+        """Reduce and sum on all processes; return whether all results are finite."""
         good = self._inner.factor(b)
         self._sums[:] = 0.0
         self.left.data[self._place] = self._inner.left.data
@@ -61,7 +61,7 @@ class Summed:
         return self._failed == 0.0 and bool(lib.all_finite(len(self._sums), doubles(self._sums)))
 
     def reduce(self, b: Array) -> None:
-        """Eliminate from another right-hand side."""
+        """Reduce another right-hand side by the same factors."""
         self._inner.reduce(b)
         self.f.fill(0.0)
         self.f[self._number] = self._inner.f
@@ -79,7 +79,7 @@ BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
 
 def succeeds(function: Callable[..., None], *arguments: Any) -> bool:
-    """Call a function; return False if KLU finds a singular matrix, after which KLU still works."""
+    """Call a function; return False if KLU finds a singular matrix; KLU can be used again then."""
     try:
         function(*arguments)
     except PETSc.Error as error:
@@ -90,7 +90,7 @@ def succeeds(function: Callable[..., None], *arguments: Any) -> bool:
 
 
 class Klu:
-    """Factorization of an entire system, with all row exchanges that it needs."""
+    """Factorization of an entire system by KLU, with all row exchanges that it needs."""
 
     def __init__(self, inner: Any) -> None:
         self._inner, self._matrix = inner, inner.left.petsc()
@@ -110,13 +110,13 @@ class Klu:
         fill(c, found=doubles(self._solution.array_r))
 
     def factor(self, b: Array) -> bool:
-        """Eliminate from the matrix and right-hand side; return whether that succeeds."""
+        """Factor the matrix and solve; return whether both succeed."""
         good: bool = self._inner.factor(b)
         self._matrix.stateIncrease()
         return good and succeeds(self._solve) and int(self._factors.getFailedReason()) == GOOD
 
     def reduce(self, b: Array) -> None:
-        """Eliminate from another right-hand side; PETSc.Error if KLU finds a singular matrix."""
+        """Solve for another right-hand side; raise PETSc.Error if KLU finds a singular matrix."""
         self._inner.reduce(b)
         self._solve()
 
@@ -125,5 +125,5 @@ class Klu:
         self._factors.apply(self._rhs, self._solution)
 
     def expand(self, small: Array, x: Array) -> None:
-        """Compute the solution ``x``; the reduced system has no unknowns."""
+        """Compute the solution ``x``; ``small`` is empty, as the reduced system has no unknowns."""
         self._inner.expand(self._solution.array_r, x)
