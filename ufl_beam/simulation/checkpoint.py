@@ -45,8 +45,8 @@ FORMAT = "checkpoint of ufl_beam, 4"
 class Checkpoint:
     """Checkpoint file of a run, and the interval at which the file is written.
 
-    After a crash, run the same script again.  If the file exists, the run continues from the stored
-    state.  On one process the results then equal an uninterrupted run to the last bit.
+    After a crash, run the same script again.  If the file exists, the run continues from its state.
+    On one process the results then equal the results of an uninterrupted run to the last bit.
 
     Args:
         path: File.

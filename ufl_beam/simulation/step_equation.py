@@ -387,7 +387,7 @@ class StepEquation:
 
 
 def forces_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Callable[..., Array]:
-    """Return a function like :meth:`CellForces.forces_from_record`, but for all cells of a scene.
+    """Return a function like :meth:`CellForces.forces_from_record` for all cells of a scene.
 
     The first call of the function makes the equation of the whole scene, without communication.
     """

@@ -17,7 +17,7 @@ TOLERANCE = 1e-12
 """Tolerance of the residual of an eigenpair, relative to its eigenvalue."""
 
 SHIFT = 1e-13
-"""Shift, relative to the least squared frequency of one dof alone; smaller shifts are round-off."""
+"""Shift relative to the least squared frequency of a dof alone; round-off hides smaller shifts."""
 
 EXTRA = 8
 """Number of additional eigenvalues, so that none of several close eigenvalues is missed."""
@@ -76,7 +76,7 @@ def linear(
 def quadratic(
     K: csr_array, C: csr_array, M: csr_array, n: int, *, most: int, shift: float
 ) -> tuple[Complex, Complex]:
-    """Compute the n exponents s of ``(K + s C + s² M) x = 0`` nearest to ``shift``, and all x.
+    """Compute the n exponents s of ``(K + s C + s² M) x = 0`` nearest to ``shift``, with x.
 
     Conjugate exponents count as two.  For the shapes of the results see :func:`linear`.
     """

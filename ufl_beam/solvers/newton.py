@@ -324,7 +324,7 @@ class Solver:
         return PETSc.Error(self.c.error) if self.c.error else None
 
     def failure(self) -> StepFailed:
-        """Return the error for a Newton's method that has stopped without a solution."""
+        """Return the error of a step for which Newton's method found no solution."""
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
         reason, residuals = self.c.reason, self._residuals()
         worst = self._subdomain.numbering.worst(self._subdomain.gather(residuals))
