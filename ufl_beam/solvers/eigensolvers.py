@@ -76,7 +76,7 @@ def linear(
 def quadratic(
     K: csr_array, C: csr_array, M: csr_array, n: int, *, most: int, shift: float
 ) -> tuple[Complex, Complex]:
-    """Compute the n exponents s of ``(K + s C + s² M) x = 0`` nearest to ``shift``, with x.
+    """Compute the n exponents s of ``(K + s C + s² M) x = 0`` nearest to ``shift``, with vectors x.
 
     Conjugate exponents count as two.  For the shapes of the results see :func:`linear`.
     """
