@@ -184,7 +184,7 @@ class ForceWatch:
         self._alive = connector_terms, controllers
 
     def told(self) -> Iterator[str]:
-        """Yield warnings for all connectors reported so far, if C has reported one recently."""
+        """Yield warnings for all reported connectors, if C has reported one since the last call."""
         if self.c is None or not self.c.tells:
             return
         self.c.tells = 0
