@@ -86,12 +86,12 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
         quantity: Quantity to draw.
         places: Place of "hinge" and "moment-curvature"; one or a sequence of places of "history";
             hot spot of "cycles".
-        options: By name: ``n`` is the index of a recorded time.  ``magnify`` is a factor on
-            displacements.  ``times`` (s) are replaced by the nearest recorded times; ``count`` is a
-            number of shapes.  ``component`` is "u", "v", "psi", "du/dt", "dv/dt" or "dpsi/dt".
-            ``numbers`` are those of the modes, all by default.  ``amplitude`` is the largest
-            displacement of a mode, as a fraction of the size of the scene.  ``ax`` are axes to
-            draw in, instead of a new figure.
+        options: ``n`` is the index of a recorded time, negative from the end.  ``magnify`` is a
+            factor on displacements.  ``times`` (s) are replaced by the nearest recorded times;
+            ``count`` is a number of shapes.  ``component`` is "u", "v", "psi", "du/dt", "dv/dt" or
+            "dpsi/dt".  ``numbers`` are indices of modes, all by default.  ``amplitude`` is their
+            largest displacement, as a fraction of the size of the scene.  ``ax`` are axes to draw
+            in, instead of a new figure.
 
     Raises:
         ArgumentError: There is no such picture, or one of its arguments is wrong; the message says
