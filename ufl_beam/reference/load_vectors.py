@@ -288,7 +288,7 @@ class Supports:
     """Supports of a scene, which may be at an angle to the axes of the plane.
 
     Attributes:
-        axes: Orthogonal matrix that transforms from the axes of the plane to those of supports.
+        axes: Orthogonal matrix from components in the plane to components along support axes.
         constrained: Constrained or prescribed degrees of freedom, in the axes of the supports.
         free: All other degrees of freedom, which are the unknowns of a step.
         reactions: Forces of the supports in the latest residual, in the same axes; (size,).
