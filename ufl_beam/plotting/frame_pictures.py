@@ -272,8 +272,8 @@ def _areas(
     """Divide diagrams into areas of one sign; ``diagram`` has the number of each point's diagram.
 
     Yields:
-        The outline of an area, (n, 2), m; its peak, the value of the largest magnitude; and the
-        index of the point with this value, or of the middle one of several such points.
+        Outline (n, 2), m, of an area; its value of the largest magnitude; index of the point with
+        this value, the middle one of several.
     """
     # Where the sign changes, both areas end at a point on the axis.
     first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (diagram[:-1] == diagram[1:]))
