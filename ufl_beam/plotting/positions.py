@@ -22,8 +22,8 @@ from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.states import States
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3
-"""Half the size of a symbol, in points; median length of beams, in points, below which symbols
-shrink in proportion; smallest fraction to which they shrink."""
+"""Half the size of a symbol; points.  Median length of beams, below which symbols shrink in
+proportion; points.  Smallest fraction to which they shrink."""
 
 FEW = 40  # number of supports and loads up to which their symbols shrink less than others
 
@@ -264,8 +264,8 @@ CLEARANCE = 2.0  # clearance around a label; points
 ROUNDS = 6  # most iterations of the placement
 
 LINE_COST, LABEL_COST, OUTSIDE_COST, DISTANCE_COST, RANK_COST = 8.0, 40.0, 100.0, 0.6, 0.4
-"""Costs of a candidate position: per point of lines under the label, per square point under other
-labels, per point outside the frame, per point of distance from the target, and per index in the
+"""Costs of a candidate position.  A unit is a point of lines under the label, a square point under
+other labels, a point outside the frame, a point of distance from the target, or an index in the
 list of candidates."""
 
 CROSSING_COST = 25.0  # per diagonal of a label that the leader crosses; a line costs a tenth of it
