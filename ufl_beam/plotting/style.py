@@ -117,8 +117,8 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 def _save(figure: Figure, *args: Any, **options: Any) -> None:
     """Label logarithmic axes, and save a figure on the first process only.
 
-    Labels are at powers of ten if at least three are in view, else at 1, 2 and 5 times powers of
-    ten if at least two are in view, else at equal steps.
+    Labels are at powers of ten if at least three are in view.  Otherwise they are at 1, 2 and 5
+    times powers of ten if at least two are in view, or else at equal steps.
     """
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
