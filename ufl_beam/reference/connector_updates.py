@@ -337,9 +337,9 @@ class _Friction(LawInStep):
     equilibrium.
 
     Attributes:
-        excess: For a user's law with ``Search.hold``: ``|force| / limit - 1`` if a sticking force
-            exceeds the limit; infinite if the limit is zero, the connector slides back, or comes to
-            rest with a gain of energy; else 0.
+        excess: ``|force| / limit - 1`` if ``Search.hold`` keeps a user's law sticking above its
+            limit, else 0.  It is infinite if the limit is zero, or if the law is kept sliding back
+            or coming to rest with a gain of energy.
         released: True if the connector may begin to stick or slide from this iterate on.
     """
 
@@ -567,8 +567,8 @@ class _UserLaw(LawInStep):
 
         At an infinite slope, Newton's method would oscillate for ever.  The secant through the two
         latest iterates approximates the response of the rest of the scene.  If the residual does
-        not halve, the law is linearised at its intersection with this secant, provided that it is
-        between ``e1`` and the motion of the previous linearisation.
+        not halve, the law is linearised at its intersection with this secant.  The intersection
+        must be between ``e1`` and the motion of the previous linearisation.
         """
         last, at, residual = self._last, e1, self._evaluate(e1)[0] - λ
         if last is not None and abs(residual) > abs(last[2]) / 2 and e1 != last[0]:
