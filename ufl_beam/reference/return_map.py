@@ -129,8 +129,8 @@ class MaterialPoints:
         self.excess: Array = np.zeros((cells, n))
         self.released: Any = False
         self.softens = section_points.softening is not None
-        # Broken points have no stress where the law holds, but may have a stress at the end of a
-        # step, which is released as a numerical loss.
+        # Broken points have no stress at t_n+θ, where the law holds, but may have a stress at the
+        # end of a step.  Its energy is a numerical loss.
         over_step = scheme.average(0.0, 1.0) != 1.0
         releases = over_step and (self.softens or curved(section_points.kind))
         losses = {"plastic": section_points.yields, "hinges": self.softens}
