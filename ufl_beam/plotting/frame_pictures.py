@@ -46,7 +46,7 @@ ALIKE = 0.999  # values above this fraction of the peak of an area count as equa
 LABELLED = 0.15  # peaks above this fraction of the largest value are labelled
 MOST_BEAMS = 60  # number of diagrams beyond which only extremes are labelled, without directions
 
-CROWDED = 0.08  # if labels would cover more than this fraction of the axes, only extremes have one
+CROWDED = 0.08  # if labels cover more than this fraction of the axes, only extremes are labelled
 MOST_AREAS = 500  # largest number of areas whose ordinates labels should not cover
 MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
 
