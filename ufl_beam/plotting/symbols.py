@@ -162,7 +162,7 @@ def supports(shape: DeformedShape) -> Iterator[Stroke]:
 
 
 def _inward(place: AttachmentPoint) -> float:
-    """Return the angle at which a beam leaves its end; at other places, upwards; rad."""
+    """Return the angle of the inward direction at a beam's end; at other places π/2; rad."""
     if not isinstance(place, Place) or 0.0 < place.s < 1.0:
         return math.pi / 2
     (x, y), (X, Y) = place.point, place.beam.curve(1e-3 if place.s == 0.0 else 1.0 - 1e-3)
