@@ -107,8 +107,8 @@ class YieldingBeams(CellForce):
     """Cells with material points, whose return map computes the resultants r.
 
     In the form of the virtual work, r is a quadrature function.  UFL derives the tangent from a
-    form with b + D e instead, which is r linearised in the strains e at an iterate.  So the tangent
-    has a material and a geometric part.
+    form with b + D e, the linearisation of r in the strains e at an iterate.  So the tangent has a
+    material and a geometric part.
     """
 
     def __init__(self, indices: Index, section_points: SectionPoints, setting: Setting) -> None:
@@ -147,7 +147,7 @@ class YieldingBeams(CellForce):
         self.points.accept()
 
     def start(self, q: Array) -> None:
-        """Begin a run at the strains of a configuration."""
+        """Compute the accepted state of the points at the strains of a configuration."""
         self.points.start(self.cells.strains(q)[:, 0])
 
     @property
