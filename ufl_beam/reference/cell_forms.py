@@ -51,8 +51,8 @@ class Search:
     """Flags of the search for an equilibrium without unnecessary opening and slip.
 
     Attributes:
-        hold: True while points and connectors that did not flow in the last step stay closed, and
-            friction by laws of users sticks or slides as in that step.
+        hold: True while points and connectors that did not flow in the last step stay closed.
+            Friction by laws of users then sticks or slides as in that step.
         over: True if ``hold`` has prevented a point or connector from opening or slipping.
     """
 
@@ -142,7 +142,7 @@ class Force:
         """
 
     def start(self, q: Array) -> None:
-        """Begin a run at the configuration ``q``."""
+        """Compute data of the accepted state at the configuration ``q``."""
 
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore internal variables."""
@@ -169,8 +169,8 @@ class Form:
     def assembled(self) -> Any:
         """Return the value of a form without arguments, or the assembled form.
 
-        A form with one argument is assembled to a vector on the space of the argument, a form with
-        two arguments to a matrix of the scene.
+        A form with one argument becomes a vector on the space of the argument.  A form with two
+        arguments becomes a matrix of the scene.
         """
         if self._form.rank == 0:
             return float(fem.assemble_scalar(self._form))
@@ -264,9 +264,9 @@ class Cells:
 def end_forces(numbering: DofNumbering, kind: str, cells: Index, forces: Array) -> Array:
     """Return forces of the nodes on all cells, and moments of loads on the cells; (9, num_cells).
 
-    The rows are (X, Y, M) at the start and at the end of a cell; the couple of a load along the
-    cell, zero for "stress"; and the first moments of X and Y about the middle of the cell, divided
-    by its length, for "density" only.
+    The first six rows are (X, Y, M) at the start and at the end of a cell.  The next row is the
+    couple of a load along the cell, zero for "stress".  The last two rows, for "density" only, are
+    the first moments of X and Y about the middle of the cell, divided by its length.
 
     Args:
         numbering: Numbering of the scene.
