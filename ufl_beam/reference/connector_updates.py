@@ -65,7 +65,7 @@ Motions = Any
 
 
 class LawInStep:
-    """Law of a connector in a step; its work is added to ``entry`` of the ledger, unless empty.
+    """Law of a connector in a step; its work is added to ``entry`` of the ledger, if not empty.
 
     Attributes:
         saved_as: Name of the internal variables in saved states, as in ``ufl_beam.terms``.
@@ -122,7 +122,7 @@ class LawInStep:
             getattr(self.setting.ledger, self.account)[self.entry] += self.sign * work
 
     def start(self, e: Motions) -> Any:
-        """Begin a run at a motion; return the force of the law there; N or N m."""
+        """Compute the accepted state at a motion; return the force there at the start; N or N m."""
         return 0.0
 
     def state(self, values: Array | None = None) -> Array:
@@ -338,8 +338,8 @@ class _Friction(LawInStep):
 
     Attributes:
         excess: ``|force| / limit - 1`` if ``Search.hold`` keeps a user's law sticking above its
-            limit, else 0.  It is infinite if the limit is zero, or if the law is kept sliding back
-            or coming to rest with a gain of energy.
+            limit, else 0.  It is infinite if the limit is zero, or if the connector slides back or
+            gains energy by coming to rest.
         released: True if the connector may begin to stick or slide from this iterate on.
     """
 
