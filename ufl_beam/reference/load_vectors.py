@@ -33,11 +33,11 @@ from ufl_beam.reference.cell_forms import (
 )
 
 AT_REST = 1e300
-"""Largest step length in forms; it makes all rates zero; s."""
+"""Largest step length in forms, so large that all rates vanish; s."""
 
 
 class LoadForce(Force, ABC):
-    """Base of loads: a factor, which is a function of time, times forces of a configuration.
+    """Base of loads: forces that may depend on the configuration, times a function of time.
 
     Attributes:
         force: Nodal forces in the latest response; (size,).
@@ -91,7 +91,7 @@ class DeadLoad(LoadForce):
         numbering = setting.numbering
         scene, self._vector = numbering.scene, np.zeros(numbering.size)
         per_beam = np.zeros((len(scene.beams), 3))
-        # Point loads beside the centre of a body are connectors in Scene.all_connectors.
+        # Point loads on a body, except at its centre, are connectors in Scene.all_connectors.
         if isinstance(load, PointLoad) and carries(load.place):
             np.add.at(self._vector, numbering.node(load.place), [*load.force, load.moment])
         elif isinstance(load, LineLoad):
@@ -224,7 +224,7 @@ class WorkForce(CellForce):
     def response(self, step: Step, q1: Array) -> Response:
         """Return minus the virtual work, or the gradient of the potential, and the derivative.
 
-        A substep applies the same part of the increment as for loads.
+        A substep applies the same part of the increment as loads do.
         """
         fraction, growth = step.fraction, step.fraction * (1.0 - self._grown)
         self._end = self._t + fraction * (step.motion_time - self._t), self._grown + growth
@@ -235,7 +235,7 @@ class WorkForce(CellForce):
         return r, K
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter the work in the step in the ledger."""
+        """Enter the work of the step in the ledger."""
         name, supplied, at = self._work.name, self.ledger.supplied, np.array(self._at)
         if not self._is_potential:
             supplied[name] += float(acting(self._scheme, self._before, self.force) @ s)
