@@ -3,7 +3,7 @@
 
 The input of a point is the strain at the end of a step.  Laws are called on arrays; derivatives are
 by complex steps.  If the stress exceeds the resistance of the discontinuity, the jump grows until
-they are equal, and its growth is condensed out of the tangent.
+both are equal, and its growth is condensed out of the tangent.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class MaterialPoints:
             energies dissipated by plastic strains and by discontinuities; (cells, 6).
         stored: Energies in the accepted state, by entry of the ledger; J.
         softens: True if points may open.
-        excess: ``|stress| / limit - 1`` of points that stay closed above it, else 0; (cells, n).
+        excess: ``|stress| / limit - 1`` of points that are held closed, else 0; (cells, n).
         released: True for points that may open from this iterate on.
     """
 
@@ -230,7 +230,7 @@ class MaterialPoints:
     # -- discontinuities -------------------------------------------------------------------------
 
     def _growth(self, stress: Array, opens: Array) -> Array:
-        """Return the growth at which bulk stress and resistance are equal, by bounded Newton."""
+        """Return the growth at which bulk stress equals resistance, by Newton steps in bounds."""
         at, length = self.at, self.at["length"]
 
         def excess(a: Array) -> tuple[Array, Array]:
@@ -334,7 +334,7 @@ class MaterialPoints:
         self._update_accepted(self.strains)
 
     def start(self, strains: Array) -> None:
-        """Begin a run at these strains of the cells; (cells, 3)."""
+        """Compute the accepted state at strains of the cells, (cells, 3)."""
         softening, breaking = self._section_points.softening, self._section_points.breaking
         if softening is not None:
             self.at["traction"][:, breaking] = softening.traction(self.at["opening"][:, breaking])
