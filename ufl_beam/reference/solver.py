@@ -186,7 +186,7 @@ class Solver(PresentState):
             self.q = self.q.copy()
             for group in self.connectors:
                 self.q[group.forces_at] = group.before = group.at_rest
-        # Forces of beams at rest are of a step that is too short for viscous flow.
+        # Forces of beams at rest are computed in a step that is too short for viscous flow.
         short = Step.of(scheme, 0.0, sys.float_info.min, sys.float_info.min, self.q)
         for beam in self.beams:
             self._inner_before = self._inner_before + beam.response(short, self.q)[0]
