@@ -210,7 +210,7 @@ class Canvas:
 
     @cached_property
     def offsets(self) -> dict[Connector, float]:
-        """Offsets of connectors from the line of their places, or from the first at a pin; unit."""
+        """Offsets of connectors from the line between places, or from the first at a pin; units."""
         # A rail or rod between the same places stays on the line.
         middles = {frozenset(joint.places) for joint in self.scene.joints if not joint.meets}
         groups: defaultdict[tuple[bool, frozenset[object]], list[Connector]] = defaultdict(list)
@@ -264,9 +264,8 @@ CLEARANCE = 2.0  # clearance around a label; points
 ROUNDS = 6  # most iterations of the placement
 
 LINE_COST, LABEL_COST, OUTSIDE_COST, DISTANCE_COST, RANK_COST = 8.0, 40.0, 100.0, 0.6, 0.4
-"""Costs of a candidate position.  A unit is a point of lines under the label, a square point under
-other labels, a point outside the frame, a point of distance from the target, or an index in the
-list of candidates."""
+"""Costs of a candidate position, per point of lines under the label; square point under other
+labels; point outside the frame; point of distance from the target; index in the candidates."""
 
 CROSSING_COST = 25.0  # per diagonal of a label that the leader crosses; a line costs a tenth of it
 LEADER = 10.0  # least distance of a label from its target at which it has a leader line; points
