@@ -126,7 +126,7 @@ class Connectors(Linked):
         """Return the largest relative residual of a law, without round-off of motions.
 
         A residual in motion is relative to 1 % of ``moved`` (m), a residual in force to ``scale``
-        (N).  The size of the scene relates rotations to motions, and moments to forces.
+        (N).  Rotations are multiplied, and moments divided, by the size of the scene.
         """
         size = self.setting.numbering.scene.size
         k, length = self._k, self._length.reshape(-1, self._k)
@@ -223,7 +223,7 @@ class GuideForce(Linked):
         self._step = parameter_step(self._curve, 0.0, self._size)
 
     def begin(self, step: Step) -> None:
-        """Search for the nearest point from the accepted point of the last step on."""
+        """Set the start of the search for the nearest point to the accepted point."""
         self._s = self._s0
 
     def _nearest(self, x: Array) -> float:
@@ -272,7 +272,7 @@ class GuideForce(Linked):
         self._step, self._s0 = REACH * self._size / math.hypot(*t), self._s
 
     def columns(self, q: Array) -> Array:
-        """Return the columns of ``Connection``, (1, 5); the distance is NaN if none is found."""
+        """Return the columns of ``Connection``; the distance is NaN without a nearest point."""
         self._s = self._s0
         try:
             self._distance = self._equation(self._point + q[self._x])[0]
