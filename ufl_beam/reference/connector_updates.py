@@ -122,7 +122,7 @@ class LawInStep:
             getattr(self.setting.ledger, self.account)[self.entry] += self.sign * work
 
     def start(self, e: Motions) -> Any:
-        """Compute the accepted state at a motion; return the force there at the start; N or N m."""
+        """Compute the accepted state at a motion; return the force of the law there; N or N m."""
         return 0.0
 
     def state(self, values: Array | None = None) -> Array:
@@ -339,7 +339,7 @@ class _Friction(LawInStep):
     Attributes:
         excess: ``|force| / limit - 1`` if ``Search.hold`` keeps a user's law sticking above its
             limit, else 0.  It is infinite if the limit is zero, or if the connector slides back or
-            gains energy by coming to rest.
+            would generate energy by coming to rest.
         released: True if the connector may begin to stick or slide from this iterate on.
     """
 
