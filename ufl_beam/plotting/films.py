@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Films in GIF and MP4 files, which notebooks play, and a screen on which VTK draws them."""
+"""Films in GIF and MP4 files, and a virtual screen on which VTK draws their frames."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ Frames = Iterator[Any]  # images (height, width, 3) of one size; np.uint8
 
 @dataclass(frozen=True)
 class Film(os.PathLike[str]):
-    """Film in a file, as :func:`animate` returns it.
+    """Film in a file, returned by :func:`animate`.
 
-    A notebook plays the film and contains a copy.  Everywhere else the object acts as a path.
+    A notebook embeds and plays the film.  Elsewhere the object acts as the path of the file.
 
     Attributes:
         path: GIF or MP4 file.
@@ -55,23 +55,23 @@ class Film(os.PathLike[str]):
 
 
 def write_gif(path: Path, frames: Frames, fps: float) -> None:
-    """Write a GIF; its durations are in hundredths of a second."""
+    """Write a GIF file, in which durations of frames are whole hundredths of a second."""
     from PIL import Image
 
     images = [Image.fromarray(frame).quantize(256) for frame in frames]
-    # Frames begin at the nearest hundredth, so that errors of rounding do not add up.
+    # Frames begin at the nearest hundredth of a second, so that rounding errors do not add up.
     durations = 10.0 * np.diff(np.rint(100.0 * np.arange(len(images) + 1) / fps))
     first, *others = images
     first.save(path, save_all=True, append_images=others, duration=durations.tolist(), loop=0)
 
 
 def write_mp4(path: Path, frames: Frames, fps: float) -> None:
-    """Write an MP4 file that browsers play (H.264), by ffmpeg of a package or of the system."""
+    """Write an MP4 file (H.264) by the ffmpeg of imageio-ffmpeg or of the system."""
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
 
         program = get_ffmpeg_exe()
-    except (ImportError, RuntimeError) as error:  # no package, or no program in it
+    except (ImportError, RuntimeError) as error:  # the package or its program is missing
         program = shutil.which("ffmpeg")
         if program is None:
             raise ImportError(
@@ -83,11 +83,11 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
     command = [
         program, "-y", "-loglevel", "error",
         "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(fps), "-i", "-",
-        # H.264 needs even sizes.
+        # H.264 needs an even width and height.
         "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p",
         str(path.absolute()),
     ]  # fmt: skip
-    # A file instead of a pipe: PETSc ends the interpreter at the signal of a broken pipe.
+    # Not through a pipe: PETSc ends the interpreter if a broken pipe sends SIGPIPE.
     with tempfile.TemporaryFile() as images:
         for frame in chain([first], frames):
             images.write(np.ascontiguousarray(frame).data)
@@ -103,12 +103,12 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
 
 
 WRITERS = {".gif": write_gif, ".mp4": write_mp4}
-"""Functions that write films, by the endings of their files."""
+"""Functions that write films, by the suffix of the file."""
 
 
 @contextmanager
 def screen(pyvista: Any) -> Iterator[None]:
-    """Start Xvfb if there is no screen: without a screen, VTK before 9.4 ends the interpreter."""
+    """Start Xvfb if DISPLAY is not set and VTK before 9.4 would end the interpreter."""
     needed = sys.platform == "linux" and tuple(pyvista.vtk_version_info) < (9, 4)
     if not needed or os.environ.get("DISPLAY"):
         yield
@@ -120,7 +120,7 @@ def screen(pyvista: Any) -> Iterator[None]:
         )
     server = subprocess.Popen(
         ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"],
-        start_new_session=True,  # Ctrl-C must not end the screen before this process
+        start_new_session=True,  # Ctrl-C must not end Xvfb before this process
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

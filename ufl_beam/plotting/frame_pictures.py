@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of a solution at one of its times, with diagrams of section forces on the frame."""
+"""Pictures of a solution at one time: deformed frame, section force diagrams and damage."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ if TYPE_CHECKING:
     from matplotlib.text import Annotation
     from matplotlib.transforms import Transform
 
-LEAST_STRAIN = 1e-10  # largest strain that may be due to rounding and the tolerance of iterations
+LEAST_STRAIN = 1e-10  # strain up to which section forces count as round-off and are not drawn
 DRAWN_AS_ZERO = 1e-4  # fraction of the largest value below which a value is drawn as zero
-ALIKE = 0.999  # fraction of the peak of an area above which values count as equal to it
-LABELLED = 0.15  # fraction of the largest value above which the peak of an area is labelled
-MOST_BEAMS = 60  # most beams for which all peaks are labelled and directions are drawn
+ALIKE = 0.999  # values above this fraction of the peak of an area count as equal to the peak
+LABELLED = 0.15  # peaks above this fraction of the largest value are labelled
+MOST_BEAMS = 60  # number of diagrams beyond which only extremes are labelled, without directions
 
-CROWDED = 0.08  # fraction of the axes under labels beyond which only extreme values are labelled
-MOST_AREAS = 500  # most areas whose ordinates labels should not cover
+CROWDED = 0.08  # if labels cover more than this fraction of the axes, only extremes are labelled
+MOST_AREAS = 500  # largest number of areas whose ordinates labels should not cover
 MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
@@ -60,7 +60,7 @@ SIGNS = {
 }
 """Meaning of both signs; the arrow on a beam points from its start to its end."""
 
-Values = tuple[Member, Array]  # a beam, and values at the same number of points of each cell
+Values = tuple[Member, Array]  # a beam, and values at points of its cells; (num_cells points,)
 
 
 def plane_canvas(
@@ -73,7 +73,7 @@ def plane_canvas(
     """Make a canvas whose symbols have a size in points; return it and the size of the figure.
 
     ``size`` is the largest width and height of the figure; inch.  By default the width is 9 inches,
-    and the height as all points need at this width.
+    and the height follows from the shape of the frame, between 3.2 and 6.8 inches.
     """
     points = Canvas(solution, magnify, 0.02 * solution.scene.size, shown).points()
     extent = np.ptp(points, axis=0)
@@ -86,7 +86,7 @@ def plane_canvas(
 
 
 def draw_beams(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
-    """Draw the axes of all beams through the drawn nodes ``points``."""
+    """Draw the axes of all beams; ``points`` are the drawn nodes, (num_nodes, 2), m."""
     numbering = solution.numbering
     lines = [points[numbering.nodes_along(beam)] for beam in solution.scene.beams]
     axes.plot(*joined(lines).T, **line)
@@ -104,12 +104,12 @@ def draw_shape(
     solution: Solution, *, quantity: str = "shape", n: int = -1, magnify: float = 1.0,
     ax: Axes | None = None,
 ) -> Figure:  # fmt: skip
-    """Draw the frame at the n-th kept time, optionally with the diagram of a section force.
+    """Draw the frame at the n-th recorded time, optionally with the diagram of a section force.
 
-    M is drawn on the side in tension, positive N and V to the left of a beam that runs from start
-    to end.  Positive values are red, negative values blue.  Values between vertices follow from
-    equilibrium, see :meth:`Solution.diagram`.  Peaks of areas are labelled in the unit of the
-    title; the largest and the least value are bold.  Yielded or cracked cells are orange; open
+    M is drawn on the tension side of a beam.  Positive N and V are drawn on its left, looking from
+    start to end.  Positive values are red, negative values blue.  Values between vertices follow
+    from equilibrium, see :meth:`Solution.diagram`.  Large peaks are labelled in the unit of the
+    title; the largest and the least value are bold.  Yielded or cracked cells are orange.  Open
     hinges are circles as in :func:`draw_damage_state`.
     """
     shape = plane_canvas(solution, [n], magnify, ax, MOST)[0].shape(n)
@@ -134,7 +134,7 @@ def draw_frame(
 ) -> Figure:
     """Draw the deformed frame, with diagrams of a section force, their peaks, and damage.
 
-    The damage is shown at the n-th kept time.  The unit stands between both parts of the title.
+    The damage belongs to the n-th recorded time.  The unit is put between both parts of ``title``.
     """
     sizes = np.array([np.abs(values).max() for _, values in diagrams])
     factor, prefix = style.decimal_prefix(float(sizes.max(initial=0.0)))
@@ -203,7 +203,7 @@ def _draw_diagrams(
             first, *_, last = np.flatnonzero(diagram == k)
             low, high = (first + last) // 2, (first + last + 1) // 2
             (x, y), (across, up) = (axis[low] + axis[high]) / 2, left[high]
-            angle = math.degrees(math.atan2(up, across)) - 180.0  # at 0 it points up
+            angle = math.degrees(math.atan2(up, across)) - 180.0  # at 0 the marker points up
             axes.plot(x, y, marker=(3, 0, angle), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
     for color, group in outlines.items():
         look: dict[str, Any] = {"facecolors": [(color, 0.28)], "edgecolors": color, "gid": color}
@@ -212,19 +212,19 @@ def _draw_diagrams(
 
 
 class Peak(NamedTuple):
-    """Largest value of an area of a diagram."""
+    """Value of the largest magnitude in an area of a diagram."""
 
     text: str
     color: str
     tip: Array  # point of the diagram; (2,); m
     outward: Array  # unit vector away from the axis; (2,)
-    extreme: bool  # True for the largest and the least value of all
+    extreme: bool  # True for the largest and the least value of all diagrams
 
 
 def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
-    """Choose peaks to label, both extreme values first; corners have one label for both beams.
+    """Choose peaks to label: first the largest and the least value, then all large peaks.
 
-    The other chosen peaks exceed the fraction ``least`` of the largest magnitude.
+    Large peaks exceed ``least`` times the largest magnitude.  Equal peaks at a point are one peak.
     """
     values, axis, up = rows[:, 0], rows[:, 1:3], rows[:, 3:]
     ends = (1, int(values.argmax())), (-1, int(values.argmin()))
@@ -249,7 +249,7 @@ def _along(
 ) -> tuple[Array, Array]:
     """Return points of the drawn axes and unit vectors to their left; both (num_cells points, 2).
 
-    ``diagram`` is the number of the diagram of each cell.
+    ``diagram`` has the number of each cell's diagram, ``points`` is the number of points of a cell.
     """
     mesh, fractions = solution.numbering.mesh, np.linspace(0.0, 1.0, points)
     start, end, *between = solution.numbering.nodes_of_cells[cells].T
@@ -269,13 +269,13 @@ def _along(
 def _areas(
     axis: Array, tips: Array, values: Array, diagram: Index
 ) -> Iterator[tuple[Array, float, int]]:
-    """Divide diagrams where signs change; ``diagram`` has the number of each point's diagram.
+    """Divide diagrams into areas of one sign; ``diagram`` has the number of each point's diagram.
 
     Yields:
-        The outline of an area, (n, 2), m; its value of the largest magnitude; and the number of the
-        point with this value, the middle one of equal values.
+        Outline (n, 2), m, of an area; its value of the largest magnitude; index of the point with
+        this value, the middle one of several.
     """
-    # At a change of sign both areas end at the zero on the axis.
+    # Where the sign changes, both areas end at a point on the axis.
     first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (diagram[:-1] == diagram[1:]))
     fraction = values[first] / (values[first] - values[first + 1])
     zeros = axis[first] + fraction[:, None] * (axis[first + 1] - axis[first])
@@ -300,10 +300,10 @@ def _areas(
 def draw_damage_state(
     solution: Solution, *, n: int = -1, magnify: float = 1.0, ax: Axes | None = None
 ) -> Figure:
-    """Draw yielded cells and opened hinges on the frame at the n-th kept time.
+    """Draw yielded cells and opened hinges on the frame at the n-th recorded time.
 
-    Yielded cells are coloured by the energy that plastic strains dissipated per length (J/m), in
-    cells of fibres together with the energy of cracks.  Opened hinges are circles, which grow with
+    Yielded cells are coloured by the energy that plastic strains dissipated per length (J/m).  In
+    cells with fibres, the energy of cracks is added.  Opened hinges are circles, which grow with
     the dissipated fraction of the fracture energy; from 99 % on they are hollow, as joints are.
     """
     from matplotlib.collections import LineCollection
@@ -314,12 +314,12 @@ def draw_damage_state(
     canvas, (width, height) = plane_canvas(solution, [n], magnify, ax)
     shape, density = canvas.shape(n), dissipated_per_length(solution, n)
     length, rise = np.ptp(canvas.points(), axis=0)
-    # Upright frames need less width; the bar and the legend have their own widths.
+    # Tall frames need less width, with space for the colour bar and the legend.
     across = height * length / max(rise, 1e-12)
     with style.panel(ax, (min(width, max(6.0, across + 3.0)), height)) as axes:
         time = solution.parameter.at(solution.times[n])
         style.plane_axes(axes, f"damage at {time}{style.magnified(magnify)}")
-        axes.set_adjustable("datalim")  # space for the broad lines of a slender frame
+        axes.set_adjustable("datalim")  # space for the wide lines of yielded cells
         draw_undeformed(axes, solution, canvas)
         draw_beams(axes, solution, shape.nodes, color=shade(INK), linewidth=2.0, zorder=2)
         draw_strokes(axes, symbols.in_plane(shape))
@@ -351,11 +351,11 @@ def draw_damage_state(
 
 
 def _arrange(axes: Axes, peaks: Sequence[Peak], *, own: bool) -> None:
-    """Fit limits, and the size of a new figure; write labels where they cover the least."""
+    """Fit the limits, and the size of a new figure; put labels where they cover the least."""
     axes.margins(MARGIN)
     without_texts = axes.dataLim.frozen()
     written: list[Annotation] = []
-    # Space for the labels changes the scale, and with it the lines that labels should not cover.
+    # Space for labels changes the scale, which moves the lines that labels should not cover.
     for _ in range(3):
         _fit(axes, own)
         for text in written:
@@ -387,7 +387,7 @@ def _fit(axes: Axes, own: bool) -> None:
 
 
 def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
-    """Write labels of peaks beside areas and lines; omit labels without space, except extremes."""
+    """Write labels of peaks; a label that would cover another is omitted, unless it is extreme."""
     from matplotlib.transforms import Affine2D
 
     figure = style.parent_figure(axes)
@@ -417,7 +417,7 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
         if len(box.leader):
             end = (box.leader[1] - box.center + box.half) / (2 * box.half)
             line = {"arrowstyle": "-", "color": color, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
-            arrow = {**line, "relpos": end, "patchA": None}  # a patch would move this end
+            arrow = {**line, "relpos": end, "patchA": None}  # a patch would shorten the line
         if box.overlap == 0.0 or peaks[k].extreme:
             mark = axes.annotate(
                 text, (x, y), (right, up), textcoords="offset points", color=color,
@@ -428,7 +428,7 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
 
 
 def _lines(axes: Axes, to_points: Transform) -> Array:
-    """Return lines that labels should not cover, and ordinates within areas; (n, 4); points."""
+    """Return segments that labels should not cover, with ordinates of areas; (n, 4); points."""
     lines = [np.asarray(line.get_xydata()) for line in axes.lines if line.get_linestyle() != "None"]
     areas = []
     for collection in axes.collections:
@@ -440,7 +440,7 @@ def _lines(axes: Axes, to_points: Transform) -> Array:
     for line in axes.lines:
         half = line.get_markersize() / 2
         diagonals = np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
-        if line.get_linestyle() == "None":  # symbols
+        if line.get_linestyle() == "None":  # markers
             at = to_points.transform(line.get_xydata())
             groups += [segments(point + diagonals) for point in at]
     for outline in map(to_points.transform, areas[:MOST_AREAS]):

@@ -41,11 +41,11 @@ COMPONENTS = {
     "dpsi/dt": ("angular velocity", "rad/s"),
 }  # fmt: skip
 
-MOST_MODES, NUM_SHAPES = 6, 5  # modes, and shapes of a solution, in a notebook
+MOST_MODES, NUM_SHAPES = 6, 5  # numbers of modes, and of shapes of a solution, in a notebook
 VISIBLE = 0.1  # largest magnified displacement in a notebook, as a fraction of the scene's size
 FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # magnifications; more would show round-off
-LEAST_ERROR = 1e-12  # least drawn ratio of an error; smaller ratios are drawn at this value
-CLASSES = 40  # number of classes of ranges, and of means, of cycles in pictures
+LEAST_ERROR = 1e-12  # ratio of error to tolerance at which all smaller ratios are drawn
+CLASSES = 40  # number of bins of stress ranges, and of mean stresses, in pictures of cycles
 
 
 def draw_shapes(
@@ -58,7 +58,7 @@ def draw_shapes(
 ) -> Figure:
     """Draw successive shapes in one picture, coloured by time or load factor.
 
-    By default they are ``count`` kept states, evenly spaced in time or along the path.
+    By default, ``count`` recorded states are drawn, evenly spaced in time or along the path.
     """
     from matplotlib.colors import to_hex
 
@@ -129,7 +129,7 @@ def draw_history(
 
 
 def draw_energy(solution: Solution) -> Figure:
-    """Draw the energy ledger over time or along a path, and below it its imbalance.
+    """Draw the energy ledger over time or along a path, and its imbalance below.
 
     Above, energies in the scene are solid, supplied energies dashed, and lost energies dotted.
     Below is the imbalance divided by the transferred energy, with the machine precision for
@@ -175,7 +175,7 @@ def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float 
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
     stages = [plane_canvas(swing, [0, 1], 1.0, size=(4.0, np.inf))[0] for swing in swings]
     box = np.concatenate([canvas.points() for canvas in stages])
-    # Space for the symbols of supports.
+    # space for the symbols of supports
     margin = 0.08 * np.hypot(*np.ptp(box, axis=0))
     corners = np.array([box.min(axis=0) - margin, box.max(axis=0) + margin])
     width, height = np.ptp(corners, axis=0)
@@ -207,11 +207,11 @@ def shapes_page(shapes: Shapes) -> str:
 
 
 def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
-    """Draw errors of all runs against their wall times, and a ring around the recommended run.
+    """Draw errors of all runs over their wall times, with a ring around the recommended run.
 
-    Each family of scheme, steps and cells has a colour and a marker.  The line joins runs that no
-    other run beats in both time and error.  Errors are divided by the tolerance, or by the largest
-    magnitude of the quantity if there is a budget.
+    Each family of settings has a colour and a marker.  The line joins the runs that no other run
+    beats in both time and error.  Errors are divided by the tolerance, or by the largest magnitude
+    of the quantity if there is a budget.
     """
     errors = {run: max(tradeoff.ratio(run), LEAST_ERROR) for run in tradeoff.runs}
     with style.panel(ax, (9.0, 6.0)) as axes:
@@ -256,7 +256,7 @@ def tradeoff_page(result: Tradeoff) -> str:
 def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = None) -> Figure:
     """Draw maxima and minima of a section force on the undeformed frame, as two diagrams.
 
-    Positive values are red, negative values blue.  Values may occur at different times.
+    Positive values are red, negative values blue.  The values may occur at different times.
     """
     index, solution = list(style.RESULTANTS).index(quantity), extremes.solution
     reached = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
@@ -272,7 +272,7 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
 def draw_study(study: Study) -> Figure:
     """Draw each result of a study over each number that its cases vary.
 
-    An array result is drawn by its largest magnitude; failed cases are omitted.
+    The largest magnitude of an array result is drawn; failed cases are omitted.
     """
     varied = {
         name: np.array([case[name] for case in study.cases], dtype=float)
@@ -298,8 +298,8 @@ def draw_study(study: Study) -> Figure:
 def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
     """Draw rainflow matrix, spectrum and damage of the stress cycles at a hot spot.
 
-    On the left is the rainflow matrix; in the middle the number of cycles above each range, with
-    the S-N curve; on the right the percentage of the damage by each class of ranges.
+    On the left is the rainflow matrix.  In the middle is the number of cycles above each range,
+    with the S-N curve.  On the right is the percentage of the damage by each bin of ranges.
     """
     from matplotlib.colors import LogNorm
 
@@ -315,7 +315,7 @@ def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
         columns = np.linspace(middle - half, middle + half, CLASSES + 1)
         counts, _, _ = np.histogram2d(means, ranges, (columns, edges), weights=cycles.count)
         colors = matrix.pcolormesh(
-            columns, edges, np.where(counts > 0, counts, np.nan).T,  # empty classes are white
+            columns, edges, np.where(counts > 0, counts, np.nan).T,  # empty bins are white
             norm=LogNorm(0.5, max(10.0, counts.max())), cmap="viridis_r", rasterized=True,
         )  # fmt: skip
         style.draw_bar(matrix, colors, "number")

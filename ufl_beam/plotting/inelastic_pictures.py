@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of yielding and fracture: marks on the frame, paths, and dissipation."""
+"""Pictures of yielding and fracture: marks on the frame, moment curves, and lost energies."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-FULLY_OPEN = 0.99  # dissipated fraction of the fracture energy of hinges that are drawn as joints
+FULLY_OPEN = 0.99  # hinges that dissipated this fraction of their fracture energy look like joints
 
 
 class OpenHinge(NamedTuple):
-    """Hinge that has opened."""
+    """Hinge that has opened, in a cell or at a vertex."""
 
     beam: Member
     at: Array  # drawn position; (2,); m
-    fraction: float  # dissipated fraction of its fracture energy; 0 if it hardens, 1 for a joint
+    fraction: float  # dissipated fraction of its fracture energy; 0 if it hardens, 1 if limit = 0
 
 
 def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
-    """Find open hinges, in cells and at vertices; ``points`` are positions of the drawn nodes."""
+    """Find open hinges in cells and at vertices; ``points`` are drawn positions of nodes, m."""
     numbering = solution.numbering
     hinges: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
     for beam in solution.scene.beams:
@@ -75,7 +75,7 @@ def dissipated_per_length(solution: Solution, n: int) -> Array:
 
 
 def circle(fraction: float) -> dict[str, Any]:
-    """Return the marker of a hinge that has dissipated a fraction of its fracture energy."""
+    """Return the marker style of a hinge from the dissipated fraction of its fracture energy."""
     paper = shade(WHITE)
     inside, edge = (paper, BLUE) if fraction >= FULLY_OPEN else (BLUE, paper)
     size = 4.0 + 6.0 * math.sqrt(fraction)
@@ -84,7 +84,7 @@ def circle(fraction: float) -> dict[str, Any]:
 
 
 def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[str, Artist]:
-    """Mark yielded cells and open hinges on the axes of beams; return marks by name in a legend."""
+    """Mark yielded cells and open hinges on the beams; return marks by their names in a legend."""
     named: dict[str, Artist] = {}
     yielded = np.flatnonzero(dissipated_per_length(solution, n))
     for ends in nodes[solution.numbering.cells[yielded]]:
@@ -102,8 +102,8 @@ def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[st
 def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
-    The curvature includes the jump of a hinge divided by the length of the cell, so the area of
-    loops is the dissipated energy per length.  At a vertex, the cell before the vertex is drawn.
+    The curvature includes the jump of a hinge divided by the length of the cell.  So the area of
+    a loop is the dissipated energy per length.  At a vertex, the cell before the vertex is drawn.
     """
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
     with style.panel(ax, (8.0, 5.4)) as axes:
@@ -116,8 +116,8 @@ def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
 def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a hinge against its jump (rad), coloured by time.
 
-    The area between the path and the axis is the energy that the hinge dissipated.  The title
-    states this energy (J), also as a percentage of the fracture energy.  At a vertex without a
+    The area between the curve and the axis is the energy that the hinge dissipated.  The title
+    states this energy (J), and its percentage of a finite fracture energy.  At a vertex without a
     plastic hinge, the hinge of the cell before the vertex is drawn.
     """
     history, numbering = solution.material_at(place), solution.numbering
@@ -128,7 +128,7 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
         raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
     M, jump, lost = history.forces[:, 2], history.jump, float(history.hinge[-1])
     with style.panel(ax, (8.0, 5.4)) as axes:
-        # Sections in which the jump only grows or only falls; neighbours share a point.
+        # Intervals in which the jump only grows or only falls; adjacent intervals share a point.
         moves = np.flatnonzero(np.diff(jump))
         reversals = moves[1:][np.diff(np.sign(np.diff(jump)[moves])) != 0]
         for first, last in pairwise([0, *reversals, len(jump) - 1]):
@@ -150,8 +150,8 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     """Draw lost energies (J) over time or along a path, as stacked areas.
 
     The line above the areas is the supplied work plus the initial energy of the scene.  The gap
-    between line and areas is the energy in the scene, which also has its own line.  The title
-    states the largest imbalance of the ledger.
+    between this line and the areas is the energy in the scene, which also has its own line.  The
+    title states the largest imbalance of the ledger.
     """
     if not solution.scene.connectors:
         if not solution.scene.beams:
@@ -164,7 +164,7 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     start = inside[0] > 1e-12 * energy.energy_transferred
     with style.panel(ax, (8.0, 5.0)) as axes:
         style.time_axes(axes)
-        # Blue is reserved for the energy in the scene; the colours repeat.
+        # These colours repeat; blue is reserved for the energy in the scene.
         colors = [(color, 0.75) for color in (ORANGE, RED, style.GREEN, style.PINK, style.SKY)]
         labels = [f"lost: {name}" for name in energy.lost]
         axes.stackplot(t, *energy.lost.values(), labels=labels, colors=colors)
@@ -182,7 +182,7 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
 
 
 def _label_axis(axis: Axis, values: Array, quantity: str, unit: str) -> None:
-    """Label an axis in a unit that suits the values; the data stay in SI units."""
+    """Label an axis in a unit with a prefix that suits the values; data stay in SI units."""
     factor, prefix = style.decimal_prefix(float(np.max(np.abs(values))))
     axis.set_major_formatter(lambda x, _: f"{x / factor:.6g}".replace("-", "−"))
     axis.set_label_text(f"{quantity} ({prefix}{unit})")

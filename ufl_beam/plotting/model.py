@@ -34,22 +34,22 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LEAST, MOST = (5.5, 3.0), (9.0, 6.8)  # sizes of the figure; inch
+LEAST, MOST = (5.5, 3.0), (9.0, 6.8)  # least and largest size of a new figure; inch
 LEFT, RIGHT, BELOW, ABOVE, REMARK = 66.0, 14.0, 46.0, 34.0, 16.0  # space around the axes; points
-LABEL_SIZE, TITLE_SIZE, ARROW_SIZE = 11.0, 14.0, 26.0  # of fonts; points
+LABEL_SIZE, TITLE_SIZE, ARROW_SIZE = 11.0, 14.0, 26.0  # font sizes; points
 ARROW_WIDTH = 60.0  # width for the arrow of a load on the whole scene, with spacing; points
 
 Measure = Callable[[str], Array]  # returns half the width and height of a text; (2,); points
-UNBOUNDED = np.array([-np.inf, -np.inf, np.inf, np.inf])  # frame before its position is known
+UNBOUNDED = np.array([-np.inf, -np.inf, np.inf, np.inf])  # frame of unknown position
 
 
 def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     """Draw the undeformed model, before any run.
 
-    It shows beams, their cells and names, bodies, joints, supports, connectors with their sizes,
+    It shows beams, their cells and names, bodies, joints, supports, connectors with parameters,
     hinges, loads (red), prescribed motions (orange), masses and initial velocities (green).  Loads
     that turn with their place have hollow arrow heads.  Drives are orange: filled if they prescribe
-    the motion, hollow if they prescribe the force.  Names and sizes that find no space are omitted.
+    the motion, hollow if they prescribe the force.  Labels for which there is no space are omitted.
     """
     require_independent(scene)
     subject, notes = Subject(scene), model_notes(scene)
@@ -72,7 +72,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
             style.parent_figure(axes).set_layout_engine("none")
             around = LEFT + RIGHT, font_size(BELOW + ABOVE + REMARK * len(notes))
             least, most = (POINTS * np.array(size) - around for size in (LEAST, MOST))
-            # At least as wide as the words above the axes.
+            # at least as wide as the texts above the axes
             texts = [text for text, *_ in map(scene_load, scene.loads) if text]
             widths = [2 * measure(text)[0] + ARROW_WIDTH for text in texts]
             first = 2 * TITLE_SIZE / LABEL_SIZE * measure(title)[0] + sum(widths)
@@ -84,7 +84,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
         _fit(axes, drawing.scale, frame, len(notes) if ax is None else None)
         draw_strokes(axes, drawing.strokes)
         _write(axes, placed, drawing.scale)
-        # Loads on the whole scene, at the right above the axes.
+        # Loads on the whole scene are stated above the axes, at the right.
         x, y = frame[2:] - frame[:2] + (0.0, 17.0)
         for text, arrow, angle in filter(any, map(scene_load, scene.loads)):
             for words, size, rotation in ((text, LABEL_SIZE, 0.0), (arrow, ARROW_SIZE, angle)):
@@ -99,12 +99,12 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
 
 @html_page.register
 def scene_page(scene: Scene) -> str:
-    """Write a scene as HTML: its parts, and its picture."""
+    """Write a scene as HTML: its summary, and its picture."""
     return notebook.lines(str(scene)) + notebook.image("model", partial(draw_model, scene))
 
 
 def model_notes(scene: Scene) -> list[str]:
-    """Return notes on damping, works, and hinges that may form, one for each line."""
+    """Return lines of text on damping, works, and hinges that may form in cells."""
     notes = []
     for damping in scene.damping:
         if isinstance(damping, Rayleigh):
@@ -129,7 +129,7 @@ def model_notes(scene: Scene) -> list[str]:
 
 
 def scene_load(load: Load) -> tuple[str, str, float]:
-    """Return words, an arrow and its angle (degrees), all empty unless all the scene is loaded."""
+    """Return text, arrow and its angle (degrees) of a load on the whole scene; else empty texts."""
     if isinstance(load, Gravity):
         x, y = load.acceleration
         size, angle = math.hypot(x, y), math.degrees(math.atan2(y, x))
@@ -146,7 +146,7 @@ def _planned(
 ) -> tuple[Drawing, list[Placed], Array]:
     """Return the drawing at the largest scale that fits, its labels, and the corners of the axes.
 
-    The least and the largest size of the axes, and the corners, are in points.
+    The least and the largest size of the axes, (2,), and the corners, (4,), are in points.
     """
     scene = subject.scene
     points = [*subject.axes.values(), *(np.array([body.center]) for body in scene.bodies)]
@@ -154,7 +154,7 @@ def _planned(
     points += [np.array([place.point]) for place in attached]
     low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
     scale, frame = max(*(high - low) / (400.0, 250.0), scene.size / 500.0), UNBOUNDED
-    # Symbols around the beams have sizes in points, so a second iteration is needed to fit them.
+    # Symbols have sizes in points, so their extent in m is known only in a second iteration.
     for _ in range(2):
         drawing = draw(subject, scale)
         placed = _arrange(drawing, measure, frame)
@@ -173,7 +173,7 @@ def _planned(
 
 
 def _arrange(drawing: Drawing, measure: Measure, frame: Array) -> list[Placed]:
-    """Place the labels; omit labels that others would cover."""
+    """Place the labels; omit labels that other labels would cover."""
     labels = drawing.labels
     for rank in (NAMES, CAPTIONS):
         if len(labels) > MOST_LABELS:
@@ -186,7 +186,7 @@ def _arrange(drawing: Drawing, measure: Measure, frame: Array) -> list[Placed]:
 
 
 def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
-    """Set limits and ticks; make a new figure as large as the axes and the words around need.
+    """Set limits and ticks; fit the size of a new figure to the axes and the texts around them.
 
     ``notes`` is the number of notes above the axes, or None for axes of the user.
     """
@@ -201,7 +201,7 @@ def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
         below, above = font_size(BELOW), font_size(ABOVE + REMARK * notes)
         figure = style.parent_figure(axes)
         left, width, height = LEFT, across + LEFT + RIGHT, up + below + above
-        for _ in range(2):  # the second time with the width of the numbers at the axis
+        for _ in range(2):  # the second time with the width of the tick labels
             figure.set_size_inches(width / POINTS, height / POINTS)
             axes.set_position((left / width, below / height, across / width, up / height))
             outer: Any = axes.get_tightbbox()

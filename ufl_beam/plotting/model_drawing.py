@@ -31,7 +31,7 @@ HEAD, SHAFT = 0.85, 1.9  # length of the head of an arrow in units, and width of
 
 
 class Subject:
-    """Scene with data common to its pictures at all scales; lengths in m."""
+    """Scene, with data for its pictures at any scale; lengths in m."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, attached = scene, scene.attached
@@ -40,7 +40,7 @@ class Subject:
             for beam in scene.beams
         }
         self.cells = sum(len(axis) - 1 for axis in self.axes.values())
-        self.names: dict[Member | Body, str] = {}  # with a number if several are equal
+        self.names: dict[Member | Body, str] = {}  # equal names are followed by a number
         kinds: tuple[Sequence[Member | Body], ...] = (scene.beams, scene.bodies)
         for objects in kinds:
             known = Counter(member.name for member in objects)
@@ -54,7 +54,7 @@ class Subject:
             for member in velocity.beams
             for at in self.velocity_points(member)
         ]
-        self.force, self.line_load, self.speed = (  # the largest ones; N, N/m, m/s
+        self.force, self.line_load, self.speed = (  # largest magnitudes; N, N/m, m/s
             max((math.hypot(*x) for x in vectors), default=0.0) or 1.0
             for vectors in (forces, lines, speeds)
         )
@@ -73,7 +73,7 @@ class Subject:
         return unit_vectors(end - start)
 
     def velocity_points(self, member: Member | Body) -> Array:
-        """Return the points at which velocities are shown: ends and middle of a beam; (n, 2)."""
+        """Return points for velocities: ends and middle of a beam, or centre of a body; (n, 2)."""
         if isinstance(member, Body):
             return np.array([member.center])
         return points_along(self.axes[member], [0.0, 0.5, 1.0])
@@ -100,7 +100,7 @@ class Drawing:
         self.labels.append(positions.Label(text, color, rank, in_points))
 
     def stack(self, key: object, height: float) -> float:
-        """Stack a symbol onto the others at a place; return the height at which it begins."""
+        """Stack a symbol onto the others at a place; return the height at which it begins; m."""
         self.stacks[key] += height
         return self.stacks[key] - height
 
@@ -113,18 +113,18 @@ def _normals(axis: Array) -> list[tuple[Array, Array]]:
 
 
 def _around(at: Array, radius: float) -> list[Candidate]:
-    """List spots of a label on all sides of a symbol."""
+    """List candidate positions of a label on all sides of a symbol."""
     ways = directions(np.radians([0, 180, 90, 270, 45, 135, 315, 225]))
     return [Candidate(at, x, radius) for x in ways]
 
 
 def _along(axis: Array, gap: float) -> list[Candidate]:
-    """List spots of a label on both sides of a beam."""
+    """List candidate positions of a label on both sides of a beam."""
     return [Candidate(at, s * left, gap) for at, left in _normals(axis) for s in (1.0, -1.0)]
 
 
 def _beside(tail: Array, tip: Array) -> list[Candidate]:
-    """List spots of the label of an arrow: beyond its tail, and on both sides."""
+    """List candidate positions of the label of an arrow: beyond its tail, and on both sides."""
     ahead, middle = unit_vectors(tip - tail), (tail + tip) / 2
     sides = normal(ahead), -normal(ahead)
     aside = [Candidate(at, side) for at in (tail, middle) for side in sides]
@@ -156,7 +156,7 @@ def draw(subject: Subject, scale: float) -> Drawing:
 
 
 def _draw_beams(drawing: Drawing) -> None:
-    """Draw axes, names and hinges of beams; mark few cells and the hinges that may form in them."""
+    """Draw axes, names and hinges of beams; mark cells and their hinges unless there are many."""
     subject, scale, unit = drawing.subject, drawing.scale, drawing.unit
     weight = 2.8 * unit / scale / positions.SYMBOL
     drawing.strokes["beams"] += (Stroke(x, INK, weight, layer=4.0) for x in subject.axes.values())
@@ -187,7 +187,7 @@ def _draw_beams(drawing: Drawing) -> None:
 
 
 def _name_bodies_and_connectors(drawing: Drawing) -> None:
-    """Write names and masses of bodies, kinds and sizes of connectors."""
+    """Write names and masses of bodies, and parameters of connectors."""
     scene, canvas = drawing.subject.scene, drawing.shape.canvas
     unit = drawing.unit
     for body in scene.bodies if len(scene.bodies) <= symbols.MOST_BODIES else ():
@@ -221,7 +221,7 @@ def _name_bodies_and_connectors(drawing: Drawing) -> None:
 def _arrow(
     line: Array, color: str, unit: float, *, hollow: bool = False, size: float = 1.0
 ) -> list[Stroke]:
-    """Draw an arrow along a line; ``size`` is a factor on its head and the width of the line."""
+    """Draw an arrow along a line; ``size`` scales its head and the width of its line."""
     lengths = positions.lengths_along(line)
     head = min(size * HEAD * unit / lengths[-1], 1.0 / 3.0)
     shaft = points_along(line, lengths / lengths[-1] * (1.0 - head))
@@ -271,8 +271,8 @@ def _draw_point_load(drawing: Drawing, load: LoadAtPlace) -> None:
 def _stand(drawing: Drawing, place: AttachmentPoint, direction: Array, fraction: float) -> Array:
     """Return the line of the arrow of a force; (2, 2); m.
 
-    The arrow ends at its place.  If it would lie on a beam, it begins at its place; if it would lie
-    on a beam there, too, it is beside the beam.
+    By default the arrow ends at the loaded place.  If it would then lie on a beam, it begins at the
+    place.  If beams are on both sides, it is drawn beside the beam.
     """
     unit = drawing.outside
     at, length = np.array(place.point), (2.6 + 1.4 * fraction) * unit
@@ -290,7 +290,7 @@ def _stand(drawing: Drawing, place: AttachmentPoint, direction: Array, fraction:
 
 
 def _draw_line_load(drawing: Drawing, load: LineLoad) -> None:
-    """Draw arrows that end on the beam, or are beside it if parallel to it; draw moments."""
+    """Draw arrows of a line load, which end on the beam or are parallel to it, and moments."""
     axis, unit, size = drawing.subject.axes[load.beam], drawing.outside, math.hypot(*load.force)
 
     def spaced(distance: float, *, ends: bool = False) -> Array:
@@ -336,7 +336,7 @@ def _draw_line_load(drawing: Drawing, load: LineLoad) -> None:
 
 
 def _draw_prescribed(drawing: Drawing, support: Support) -> None:
-    """Draw motions that a support prescribes, as hollow arrows."""
+    """Draw motions that a support prescribes, as arrows with hollow heads."""
     at, unit = np.array(support.place.point), drawing.outside
     ways = drawing.subject.directions_at(support.place)
     inward = ways[0] if len(ways) else np.array([0.0, 1.0])

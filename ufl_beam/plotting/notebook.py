@@ -21,7 +21,7 @@ ROWS = 12  # largest number of cases of a study in a table
 
 @html_page.register
 def energy_page(energy: Energy) -> str:
-    """Write an energy ledger as HTML: its final entries and its balance."""
+    """Write an energy ledger as HTML: its final values and its balance."""
     rows = [(kind, name, f"{value:.6g}") for kind, name, value in energy.entries()]
     return table(("energy", "", "at the end (J)"), rows) + lines(energy.balance()) if rows else ""
 
@@ -42,13 +42,13 @@ def study_page(results: Study) -> str:
 
 
 def lines(*texts: str) -> str:
-    """Write texts as lines; leave out empty texts."""
+    """Return texts as lines of HTML, without empty texts."""
     shown = "<br>".join(escape(text).replace("\n", "<br>") for text in texts if text)
     return f"<p>{shown}</p>" if shown else ""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Write rows of texts as a table below its header."""
+    """Return a header and rows of texts as a table in HTML."""
     cells = [
         "".join(f"<{tag}>{escape(text)}</{tag}>" for text in row)
         for tag, row in (("th", head), *(("td", row) for row in rows))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One function for all pictures in the plane: of models, solutions and results of analyses."""
+"""Function for all pictures in the plane: of models, solutions and results of analyses."""
 
 from __future__ import annotations
 
@@ -59,16 +59,16 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
 def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure:
     """Draw a model, a solution, or the result of an analysis.
 
-    The first quantity of a class is drawn by default; a ``Path`` is a ``Solution``.
+    By default, the first quantity of the class is drawn.  A ``Path`` is a ``Solution``.
 
     ===============  ==================  ========================================================
     shown            quantity            picture and further arguments
     ===============  ==================  ========================================================
-    Scene            "model"             all parts, before any run; ``ax``
-    Solution         "shape"             the frame at a time; ``n``, ``magnify``, ``ax``
+    Scene            "model"             the whole model, before any run; ``ax``
+    Solution         "shape"             the frame at one time; ``n``, ``magnify``, ``ax``
     Solution         "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
     Solution         "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
-    Solution         "shapes"            some shapes; ``times`` or ``count``, ``magnify``, ``ax``
+    Solution         "shapes"            several shapes; ``times`` or ``count``, ``magnify``, ``ax``
     Solution         "history"           motion over time; places, ``component``, ``ax``
     Solution         "energy"            the energy ledger over time
     Solution         "dissipation"       energy losses over time; ``ax``
@@ -76,7 +76,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Solution         "moment-curvature"  moment of a cell; a place, ``ax``
     Modes, Buckling  "modes"             shapes side by side; ``numbers``, ``amplitude``
     Extremes         "M", "N", "V"       envelope of a section force; ``ax``
-    Fatigue          "cycles"            rainflow matrix and spectrum; a spot
+    Fatigue          "cycles"            rainflow matrix and spectrum; a hot spot
     Study            "results"           results over the cases
     Tradeoff         "errors"            errors over wall times; ``ax``
     ===============  ==================  ========================================================
@@ -84,17 +84,17 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Args:
         shown: Object to draw.
         quantity: Quantity to draw.
-        places: Places of "history" (one or a sequence), "hinge" and "moment-curvature"; the spot of
-            "cycles".
-        options: By name: ``n``, number of the kept time, negative from the end; ``magnify``, factor
-            on displacements; ``times`` (s) of "shapes", each replaced by the nearest that was kept,
-            or ``count`` of them; ``component`` of "history", "u", "v", "psi", "du/dt", "dv/dt" or
-            "dpsi/dt"; ``numbers`` of the modes, all by default, and ``amplitude``, their largest
-            displacement as a fraction of the size of the scene; ``ax``, axes to draw in, instead
-            of a new figure.
+        places: Place of "hinge" and "moment-curvature"; one or a sequence of places of "history";
+            hot spot of "cycles".
+        options: ``n`` is the index of a recorded time, negative from the end.  ``magnify`` is a
+            factor on displacements.  ``times`` (s) are replaced by the nearest recorded times;
+            ``count`` is a number of shapes.  ``component`` is "u", "v", "psi", "du/dt", "dv/dt" or
+            "dpsi/dt".  ``numbers`` are indices of modes, all by default.  ``amplitude`` is their
+            largest displacement, as a fraction of the size of the scene.  ``ax`` are axes to draw
+            in, instead of a new figure.
 
     Raises:
-        ArgumentError: There is no such picture, or an argument of it is wrong; the message says
+        ArgumentError: There is no such picture, or one of its arguments is wrong; the message says
             which.
 
     Example:

@@ -22,12 +22,12 @@ from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.states import States
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3
-"""Half the size of a symbol, in points; median length of beams, in points, below which symbols
-shrink in proportion; smallest fraction to which they shrink."""
+"""Half the size of a symbol; points.  Median length of beams, below which symbols shrink in
+proportion; points.  Smallest fraction to which they shrink."""
 
-FEW = 40  # largest number of supports and loads whose symbols shrink less than others
+FEW = 40  # number of supports and loads up to which their symbols shrink less than others
 
-Range = tuple[float, float]  # of positions along a rail, m; or of parameters of a guide curve
+Range = tuple[float, float]  # of positions along a rail, m, or of parameters of a guide curve
 
 
 # -- geometry ----------------------------------------------------------------------------------
@@ -49,7 +49,7 @@ def normal(vectors: Array) -> Array:
 
 
 def in_frame(points: Any, at: Any, ahead: Array) -> Array:
-    """Return points with coordinates from ``at``, along and to the left of ``ahead``; (n, 2)."""
+    """Return points from coordinates about ``at``, along ``ahead`` and to its left; (n, 2)."""
     return np.asarray(at + np.array(points) @ np.array([ahead, normal(ahead)]))
 
 
@@ -78,7 +78,7 @@ def joined(lines: Iterable[Array]) -> Array:
 
 
 def evenly(progress: Array, count: int) -> list[int]:
-    """Choose the numbers of ``count`` kept states, evenly spaced in time or along a path."""
+    """Return indices of ``count`` recorded states, evenly spaced in time or along a path."""
     spaced = np.linspace(progress[0], progress[-1], count)
     return [int(np.argmin(np.abs(progress - x))) for x in spaced]
 
@@ -87,10 +87,10 @@ def evenly(progress: Array, count: int) -> list[int]:
 
 
 class Canvas:
-    """Scene before any run or in a solution, as pictures show it, and the size of its symbols.
+    """Scene or solution with the magnification and the size of symbols of a picture.
 
-    Displacements are multiplied by ``magnify``.  The picture shows the kept times ``shown`` of a
-    solution; rails are long enough for these times.
+    Displacements are multiplied by ``magnify``.  ``shown`` are indices of the recorded times of a
+    solution that the picture shows; rails are long enough for these times.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class Canvas:
         magnify: float,
         unit: float,  # half the size of a symbol; m
         shown: Sequence[int] = (),
-        outside: float = 0.0,  # the same of supports, loads and prescribed motions; m
+        outside: float = 0.0,  # half the size of symbols of supports, loads, motions; m
     ) -> None:
         require_number(magnify, "magnify", positive=True)
         self.magnify, self.unit, self.outside = magnify, unit, outside or unit
@@ -112,7 +112,7 @@ class Canvas:
     def at_scale(
         cls, subject: Scene | States, magnify: float, scale: float, shown: Sequence[int] = ()
     ) -> Canvas:
-        """Make a canvas for a picture in the plane, where a point has the length ``scale`` (m)."""
+        """Make a canvas for a plane picture, in which a typographic point is ``scale`` (m) long."""
         scene = subject.scene if isinstance(subject, States) else subject
         lengths = [math.dist(beam.start.point, beam.end.point) for beam in scene.beams]
         typical = float(np.median(lengths)) / scale if lengths else math.inf
@@ -127,7 +127,7 @@ class Canvas:
         return DeformedShape(self, lambda place: np.zeros(3), nodes)
 
     def shape(self, n: int) -> DeformedShape:
-        """Return the shape at the n-th kept time of the solution, or raise ArgumentError."""
+        """Return the shape at the n-th recorded time of the solution, or raise ArgumentError."""
         assert self._solution is not None
         numbering, number = self._solution.numbering, len(self._solution.times)
         if not -number <= n < number:
@@ -141,8 +141,8 @@ class Canvas:
     def points(self, origin: AttachmentPoint | None = None) -> Array:
         """Return points of the undeformed and all shown shapes; (n, 2); m.
 
-        These are nodes of beams, points of the ground, and outlines of bodies, relative to the
-        place ``origin`` at the same time.
+        The points are nodes of beams, attachment points on the ground, and outlines of bodies.  If
+        ``origin`` is given, they are relative to this place at the same time.
         """
         ground = np.reshape([point.point for point in self.spots[GROUND]], (-1, 2))
         found = []
@@ -154,11 +154,11 @@ class Canvas:
 
     @cached_property
     def travels(self) -> dict[Connector, Range]:
-        """Ranges of sliders and guided points at the shown times, with the undeformed state.
+        """Ranges of sliders and guided points at the shown times and in the undeformed state.
 
-        The range on a rail is in positions; its connector constrains the motion across the rail.
-        The range on a guide curve is in parameters, extended by three units at ends where the
-        curve goes on.
+        The keys are the connectors that constrain motions across rails and guide curves.  A range
+        on a rail is in positions, m.  A range on a guide curve is in parameters, extended by three
+        units at ends where the curve goes on.
         """
         ranges: dict[Connector, Range] = {}
         solution, shown = self._solution, list(self._shown)
@@ -177,7 +177,7 @@ class Canvas:
         return ranges
 
     def _along_guide(self, holder: Connector, law: Guide) -> Range:
-        """Return the used parameters of a guide curve, extended by three units where it goes on."""
+        """Return the used parameters of a guide curve, with extensions where the curve goes on."""
         curve, size, parameters = law.curve, self.scene.size, [0.0]
         for point in () if self._solution is None else self._solution.position(holder.b):
             step = parameter_step(curve, parameters[-1], size)
@@ -210,8 +210,8 @@ class Canvas:
 
     @cached_property
     def offsets(self) -> dict[Connector, float]:
-        """Distances of connectors from their common line, or from the first around a pin; units."""
-        # Rails and rods stay in the middle.
+        """Offsets of connectors from the line between places, or from the first at a pin; units."""
+        # A rail or rod between the same places stays on the line.
         middles = {frozenset(joint.places) for joint in self.scene.joints if not joint.meets}
         groups: defaultdict[tuple[bool, frozenset[object]], list[Connector]] = defaultdict(list)
         for c in self.scene.connectors:
@@ -259,23 +259,22 @@ class DeformedShape:
 
 # -- labels beside lines and other labels ------------------------------------------------------
 
-GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)  # candidate distances of a label from its point; points
+GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)  # candidate distances of a label from its target; points
 CLEARANCE = 2.0  # clearance around a label; points
 ROUNDS = 6  # most iterations of the placement
 
 LINE_COST, LABEL_COST, OUTSIDE_COST, DISTANCE_COST, RANK_COST = 8.0, 40.0, 100.0, 0.6, 0.4
-"""Costs of a candidate: per point of the length of lines under the label, per square point under
-other labels, per point beyond the frame, per point between the label and its target, and per number
-in the list of spots."""
+"""Costs of a candidate position, per point of lines under the label; square point under other
+labels; point outside the frame; point of distance from the target; index in the candidates."""
 
 CROSSING_COST = 25.0  # per diagonal of a label that the leader crosses; a line costs a tenth of it
 LEADER = 10.0  # least distance of a label from its target at which it has a leader line; points
 
 
 class Candidate(NamedTuple):
-    """Point that a label belongs to, and the direction from this point to the label.
+    """Candidate position of a label: its target point, and the direction from there to the label.
 
-    Lengths are in points, or in m in a drawing that converts them.
+    Lengths are in points, or in m if a drawing converts them.
     """
 
     at: Array  # (2,)
@@ -284,7 +283,7 @@ class Candidate(NamedTuple):
 
 
 class Label(NamedTuple):
-    """Text, and points where it may be, the best one first."""
+    """Text of a label, and its candidate positions, the best first."""
 
     text: str
     color: str
@@ -298,12 +297,12 @@ class Placed(NamedTuple):
     label: Label
     center: Array  # of its box; (2,)
     half: Array  # half the width and height of its box; (2,)
-    target: Array  # point that it belongs to; (2,)
+    target: Array  # point that the label belongs to; (2,)
     overlap: float  # fraction of its box under other labels
 
     @property
     def leader(self) -> Array:
-        """Line from the target to the box, (2, 2); none if the box is close, (0, 2)."""
+        """Line from the target to the box, (2, 2); no points, (0, 2), if the box is close."""
         edge = np.clip(self.target, self.center - self.half, self.center + self.half)
         ends = np.array([self.target, edge])
         return ends if np.linalg.norm(edge - self.target) >= LEADER else ends[:0]
@@ -314,8 +313,8 @@ def place(
 ) -> list[Placed]:
     """Place labels where they cover the least; iterate until their positions no longer change.
 
-    Candidates, ``halves`` of widths and heights, segments that should stay visible, (n, 4), and the
-    corners of a frame that labels should not leave, (4,), are in points.
+    Lengths are in points.  ``halves`` are half the widths and heights of the labels.  Labels should
+    not cover the segments ``lines``, (n, 4), and not leave the corners of ``frame``, (4,).
     """
     order = sorted(range(len(labels)), key=lambda k: labels[k].rank)
     placed: dict[int, Placed] = {}
@@ -332,14 +331,14 @@ def place(
 def _best(
     label: Label, half: Array, lines: Array, others: list[Placed], frame: Array | None
 ) -> Placed:
-    """Place a label at the least cost, beside one of its spots at one of the distances GAPS."""
+    """Place a label at the candidate position and distance, of GAPS, with the least cost."""
     boxes: Array = np.reshape([(*x.center - x.half, *x.center + x.half) for x in others], (-1, 4))
     lines = np.vstack([lines, *(x.leader.reshape(-1, 4) for x in others)])
     number = np.arange(len(label.spots))
     gaps, choices = np.repeat(GAPS, len(number)), np.tile(number, len(GAPS))
     ways = np.array([place.direction for place in label.spots])[choices]
     spots = np.array([place.at + place.gap * place.direction for place in label.spots])[choices]
-    # All of the box is beyond the line through its spot perpendicular to the direction.
+    # The box is beyond the line that is perpendicular to the direction at the target.
     centers = spots + ways * (gaps + np.abs(ways) @ half)[:, None]
     low, high = centers - half - CLEARANCE, centers + half + CLEARANCE
     # Segments near the candidate boxes.
@@ -352,7 +351,7 @@ def _best(
     if frame is not None:
         beyond = np.maximum(frame[:2] - low, 0.0) + np.maximum(high - frame[2:], 0.0)
         cost += OUTSIDE_COST * beyond.sum(axis=1)
-    # Skip leaders that cost more than the best position without a leader.
+    # Skip candidates with a leader that cost more than the best one without a leader.
     ends = np.hstack([spots, np.clip(spots, centers - half, centers + half)])
     leads = np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1) >= LEADER
     some = np.flatnonzero(leads & (cost < cost[~leads].min(initial=np.inf)))
@@ -365,7 +364,7 @@ def _best(
 
 
 def crossings(first: Array, second: Array) -> Array:
-    """Count segments (n, 4) that each of the first segments (num_first, 4) crosses."""
+    """Count the segments ``second``, (n, 4), that each segment of ``first`` crosses."""
     ends = first[:, None, :2], first[:, None, 2:], second[None, :, :2], second[None, :, 2:]
     a, b, c, d = np.broadcast_arrays(*ends)
     # Signs of the areas of triangles p, q, r.
@@ -377,10 +376,10 @@ def crossings(first: Array, second: Array) -> Array:
 
 
 def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
-    """Add up lengths of segments (n, 4) inside each box; its corners are (num_boxes, 2)."""
+    """Sum the lengths of segments, (n, 4), inside boxes with corners ``low`` and ``high``."""
     first, step = lines[None, :, :2], (lines[:, 2:] - lines[:, :2])[None]
     lengths = np.linalg.norm(step[0], axis=1)
-    # A segment perpendicular to an axis is either entirely inside along this axis, or outside.
+    # In a direction perpendicular to it, a segment is either entirely inside or outside.
     step = np.where(step == 0.0, 1e-99, step)
     ends = (low[:, None] - first) / step, (high[:, None] - first) / step
     enter, end = np.minimum(*ends).max(axis=2), np.maximum(*ends).min(axis=2)

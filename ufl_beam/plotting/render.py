@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Solid pictures and films of a solution, by PyVista."""
+"""Pictures and films of a solution as solids, rendered by PyVista."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Camera(Record):
             in the picture, and (0, 0, -1) is the front view.
         follow: Place that the camera moves with, so that the place is at rest in the picture.
         width: Width of the picture around the followed place, or around the middle of the motion;
-            m.  By default the picture contains the whole motion.
+            m.  By default it contains the whole motion.
 
     Raises:
         ArgumentError: A direction along y, or a wrong argument; the message says which.
@@ -128,16 +128,16 @@ def render(
     camera: Camera = CAMERA,
     size: tuple[int, int] = (1600, 900),
 ) -> None:
-    """Write a rendered picture of the frame at the n-th kept time.
+    """Write a rendered picture of the frame at the n-th recorded time.
 
     In the plane, beams have the depth of their section.  Their width is equal to this depth, or
-    large enough to be visible if they are slender.  Bodies are plates around their places.  Orange
-    pins mark opened hinges.  No screen is needed, see :func:`animate`.
+    larger if beams are too slender to be visible.  Bodies are plates around their attachment
+    points.  Orange pins mark opened hinges.  No screen is needed, see :func:`animate`.
 
     Args:
         solution: Solution to draw.
         path: File, ending in ``.png``.
-        n: Number of the kept time; negative from the end.
+        n: Index of the recorded time; negative from the end.
         quantity: Quantity that colours the beams: "N", "V", "M" or "rotation".
         thickness: Factor on the depth of the sections.
         magnify: Factor on the displacements.
@@ -147,7 +147,7 @@ def render(
     Raises:
         ArgumentError: A wrong argument; the message says which.
         ImportError: PyVista is missing.
-        RuntimeError: There is neither a screen nor Xvfb.
+        RuntimeError: There is neither a screen nor Xvfb for VTK before 9.4.
 
     Example:
         >>> ub.render(solution, "beam.png", quantity="M", size=(640, 360))
@@ -174,14 +174,14 @@ def animate(
     size: tuple[int, int] = (960, 544),
     progress: bool = True,
 ) -> Film:
-    """Write an animation of the whole motion as GIF or MP4, and return it as a film to show.
+    """Write a film of the whole motion to a GIF or MP4 file.
 
     All frames have the same colour scale.  No screen is needed: with VTK before 9.4, Xvfb runs
     during the call.
 
     Args:
         solution: Solution to draw.
-        path: File, ending in ``.gif``, or in ``.mp4`` if there is ffmpeg, as in imageio-ffmpeg.
+        path: File ending in ``.gif``, or in ``.mp4``, which needs ffmpeg (imageio-ffmpeg).
         fps: Frames per second; browsers show at most 50 frames per second of a GIF.
         seconds: Duration of the film, independent of the duration of the motion; s.
         quantity: Quantity that colours the beams: "N", "V", "M" or "rotation".
@@ -192,12 +192,12 @@ def animate(
         progress: Show a progress bar in a terminal or notebook.
 
     Returns:
-        The film, a path that a notebook plays.
+        The film, which is a path and which notebooks play.
 
     Raises:
         ArgumentError: A wrong argument; the message says which.
         ImportError: PyVista is missing, or ffmpeg for MP4; the message says how to install it.
-        RuntimeError: There is neither a screen nor Xvfb, or ffmpeg failed.
+        RuntimeError: There is neither a screen nor Xvfb for VTK before 9.4, or ffmpeg failed.
 
     Example:
         >>> ub.animate(solution, "beam.gif", fps=5, seconds=0.4, size=(320, 192))
@@ -218,7 +218,7 @@ def animate(
 
 
 def _frames(solids: Solids) -> Generator[Any, None, None]:
-    """Yield images (height, width, 3) of the shown times."""
+    """Yield images of the shown times; (height, width, 3), np.uint8."""
     try:
         import pyvista
     except ImportError as error:
@@ -258,7 +258,7 @@ def _frames(solids: Solids) -> Generator[Any, None, None]:
                         cmap="coolwarm", name="beams", scalar_bar_args=bar, reset_camera=False,
                         ambient=0.4, diffuse=0.7,
                     )  # fmt: skip
-                    plotter.scalar_bars["values"].SetTitle("")  # VTK draws it over the numbers
+                    plotter.scalar_bars["values"].SetTitle("")  # VTK would draw it over the numbers
                 for color, meshes in solids.others(n, shape).items():
                     look = {"color": color, "name": color, "ambient": 0.25}
                     plotter.add_mesh(pyvista.merge(meshes), reset_camera=False, **look)
@@ -277,7 +277,7 @@ def _frames(solids: Solids) -> Generator[Any, None, None]:
 
 
 def _require_suffix(path: str | Path, suffixes: Collection[str]) -> Path:
-    """Return the path of a picture, or raise :class:`ArgumentError`."""
+    """Return the checked path of a picture or film, or raise :class:`ArgumentError`."""
     path = Path(path)
     if path.suffix.lower() not in suffixes:
         raise ArgumentError(f"{path}: the name must end in {' or '.join(suffixes)}")
@@ -291,10 +291,10 @@ def _require_suffix(path: str | Path, suffixes: Collection[str]) -> Path:
 
 @dataclass(frozen=True)
 class Solids:
-    """Solid bodies of a solution for :func:`render`, with checked arguments."""
+    """Solids of a solution for :func:`render` and :func:`animate`, with checked arguments."""
 
     solution: Solution
-    shown: list[int]  # numbers of the kept times
+    shown: list[int]  # indices of the recorded times
     quantity: str
     thickness: float
     magnify: float
@@ -313,22 +313,22 @@ class Solids:
 
     @cached_property
     def canvas(self) -> Canvas:
-        """Canvas of bodies, joints, connectors and supports."""
+        """Canvas for bodies, joints, connectors and supports."""
         scene = self.solution.scene
         symbol = max(0.022 * scene.size, 0.7 * self.thickest(scene.beams)[0])
         return Canvas(self.solution, self.magnify, symbol, sorted(set(self.shown)))
 
     def thickest(self, objects: Iterable[Member | AttachmentPoint]) -> tuple[float, float]:
-        """Return the largest depth, in the plane, and width of beams or of beams at places; m.
+        """Return the largest depth (in the plane) and width of beams; m.
 
-        The width has a minimum, so that slender beams and bodies are visible.
+        ``objects`` are beams or places of beams.  The width is at least 4 % of the scene's size.
         """
         beams = [x.beam if isinstance(x, Place) else x for x in objects if not isinstance(x, Spot)]
         depth = self.thickness * max((float(b.section.depth) for b in beams), default=0.0)
         return depth, max(depth, 0.04 * self.solution.scene.size)
 
     def values(self, n: int) -> Array:
-        """Return values of the colours at both ends of all cells; (num_cells, 2)."""
+        """Return the values that colours show at both ends of all cells; (num_cells, 2)."""
         solution, numbering = self.solution, self.solution.numbering
         if self.quantity == "rotation":
             return np.asarray(solution.q[n][numbering.dofs[numbering.cells, 2]])
@@ -337,9 +337,9 @@ class Solids:
         return np.concatenate([np.empty(0), *forces]).reshape(-1, 2)
 
     def beams(self, n: int, shape: DeformedShape, factor: float) -> Any:
-        """Make a hexahedron for each cell of the beams, with values for the colours.
+        """Make a hexahedron for each cell of the beams, with values that colours show.
 
-        Cross-sections rotate with ψ; at corners between cells of a beam they bisect the angle.
+        Cross-sections rotate with ψ.  At corners between cells of a beam they bisect the angle.
         """
         from pyvista import CellType, UnstructuredGrid
 
@@ -361,7 +361,7 @@ class Solids:
             ],
             axis=1,
         )
-        points = corners[numbering.cells].reshape(-1, 3)  # for each cell, as colours may jump
+        points = corners[numbering.cells].reshape(-1, 3)  # for each cell, as values may jump
         hexahedra = {CellType.HEXAHEDRON: np.arange(len(points)).reshape(-1, 8)}
         mesh = UnstructuredGrid(hexahedra, points)
         mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)
@@ -376,7 +376,7 @@ class Solids:
         pins = [(pin, PIN) for pin in symbols.pins(shape)]
         for hinge in open_hinges(self.solution, n, shape.nodes):
             pins.append((Pin(hinge.at, True, (hinge.beam.start,)), style.ORANGE))
-        # Joints are cylinders as thick as the beams that they join; equal cylinders share a mesh.
+        # Joints are cylinders as thick as the joined beams; equal cylinders are in one mesh.
         alike: defaultdict[tuple[float, float, str], list[Array]] = defaultdict(list)
         for pin, color in pins:
             depth, width = self.thickest(pin.places)
@@ -423,7 +423,7 @@ class Solids:
 
 
 def _lines(lines: list[Array]) -> Any:
-    """Join lines in one mesh, for speed; segments are separate, because tubes thin at corners."""
+    """Join lines in one mesh of separate segments, because tubes get thin at corners."""
     from pyvista import line_segments_from_points
 
     ends = np.concatenate([np.repeat(line, 2, axis=0)[1:-1] for line in lines])
@@ -432,7 +432,7 @@ def _lines(lines: list[Array]) -> Any:
 
 
 def _extruded(outline: Array, low: float, high: float) -> Any:
-    """Extrude a closed outline to a block between two planes; m."""
+    """Extrude a closed outline to a block between the planes z = ``low`` and ``high``; m."""
     from pyvista import PolyData
 
     flat = np.insert(outline[:-1], 2, low, axis=1)

@@ -34,7 +34,7 @@ INK, TEXT, GREY, WHITE = "#222222", "#444444", "#B5B5B5", "#FFFFFF"
 RESULTANTS = {"N": ("axial force", "N"), "V": ("shear force", "N"), "M": ("bending moment", "N m")}
 
 POINTS = 72.0  # points per inch
-CSS_DPI = 80.0  # pixels of a page per inch of a figure
+CSS_DPI = 80.0  # pixels on an HTML page per inch of a figure
 
 FONT = 13.0  # default size of texts; points
 FRAME = "#888888"  # colour of axes and their ticks
@@ -43,7 +43,7 @@ SIZES = {
     "axes.titlesize": 14.0, "axes.labelsize": 13.0, "legend.fontsize": 12.0,
     "xtick.labelsize": 12.0, "ytick.labelsize": 12.0,
 }  # fmt: skip
-"""Sizes of other fonts if texts have the size :data:`FONT`; points."""
+"""Sizes of other texts if the default size is :data:`FONT`; points."""
 
 STYLE: dict[str, Any] = {
     "text.color": INK, "figure.dpi": 150.0, "lines.linewidth": 2.0,
@@ -86,9 +86,9 @@ def require_option(option: str, options: Iterable[str], what: str) -> None:
 
 @contextmanager
 def picture(size: tuple[float, float]) -> Iterator[Figure]:
-    """Open a new figure in the style of this module, for the user's own pictures.
+    """Open a new figure in the style of the package, also for pictures of a user.
 
-    Only the first process saves it, as all processes run the same script.  The user's settings and
+    Only the first process saves the figure, as all run the same script.  The user's settings and
     styles of Matplotlib, such as ``plt.style.use("dark_background")``, have priority.  A notebook
     cell that ends with the figure shows it.  Logarithmic axes get labels such as 1, 2, 5, 10, or
     powers of ten, unless ticks are set.
@@ -105,7 +105,7 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
     from matplotlib.figure import Figure
 
     now, default = mpl.rcParams["font.size"], mpl.rcParamsDefault["font.size"]
-    font = FONT if now == default else now  # other sizes are in proportion to it
+    font = FONT if now == default else now  # other sizes are proportional to it
     sizes = {"font.size": font, **{name: size / FONT * font for name, size in SIZES.items()}}
     with mpl.rc_context(_unless_chosen({**STYLE, **sizes})):
         figure = Figure(figsize=size, layout="constrained")
@@ -117,8 +117,8 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 def _save(figure: Figure, *args: Any, **options: Any) -> None:
     """Label logarithmic axes, and save a figure on the first process only.
 
-    Labels are at powers of ten, if three are in view; else at multiples by 1, 2 and 5, if two are
-    in view; else at equal steps.
+    Labels are at powers of ten if at least three are in view.  Otherwise they are at 1, 2 and 5
+    times powers of ten if at least two are in view, or else at equal steps.
     """
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
@@ -145,7 +145,7 @@ def _power_of_ten(value: float, _: float) -> str:
 
 
 def png(figure: Figure) -> tuple[bytes, dict[str, int]]:
-    """Return a figure as PNG, and its width in a page; pixels."""
+    """Return a figure as PNG, and its width on an HTML page; pixels."""
     file = BytesIO()
     figure.savefig(file, format="png")
     return file.getvalue(), {"width": round(CSS_DPI * figure.get_figwidth())}
@@ -176,14 +176,14 @@ def _unless_chosen(ours: dict[str, Any]) -> dict[str, Any]:
 
 
 def font_size(size: float) -> float:
-    """Scale a font size from texts of the size :data:`FONT` to the user's size of texts; points."""
+    """Scale a font size by the ratio of the user's default size to :data:`FONT`; points."""
     import matplotlib as mpl
 
     return float(size / FONT * mpl.rcParams["font.size"])
 
 
 def shade(color: str) -> str:
-    """Replace the ink by the user's text colour and white by the user's background of axes."""
+    """Replace dark colours by the user's text colour, and white by the user's background."""
     import matplotlib as mpl
 
     now = mpl.rcParams
@@ -232,7 +232,7 @@ def draw_legend(
 def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
     """Make a colour scale for values from ``low`` to ``high``.
 
-    The colours are the part from ``first`` to ``last``, of 0 to 1, of the colour map ``name``.
+    The colours are from ``first`` to ``last``, fractions from 0 to 1, in the colour map ``name``.
     """
     import matplotlib as mpl
     from matplotlib.cm import ScalarMappable
@@ -250,7 +250,7 @@ def draw_bar(axes: Axes, colors: Any, label: str) -> None:
 
 
 def fit_texts(axes: Axes) -> None:
-    """Extend the limits so that texts are inside, and data above a legend at the bottom."""
+    """Extend the limits so that texts are inside and data are above a legend at the bottom."""
     figure = parent_figure(axes)
     figure.draw_without_rendering()
     for text in axes.texts:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Symbols of bodies, joints, connector laws and supports for all kinds of pictures.
 
-Supports have their symbols in :data:`SUPPORTS`, joints in :data:`JOINTS` and connector laws in
-:data:`LAWS`; joints and laws without an entry have a plain symbol.  The unit of
-lengths is half a symbol.  Symbols of loads are in `model_drawing.py`.
+Symbols of supports are in :data:`SUPPORTS`, of joints in :data:`JOINTS`, of connector laws in
+:data:`LAWS`.  Joints and laws that are not in these tables have a plain symbol.  The unit of
+lengths is half the size of a symbol.  Symbols of loads are in `model_drawing.py`.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, shade, wit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Layers: below the beams, above the beams, on areas of the layer MIDDLE, pins, above pins.
+# Layers: below the beams, above the beams, on areas in the layer MIDDLE, pins, above pins.
 BEHIND, MIDDLE, UPON, PINS, FRONT = 2.5, 4.2, 4.3, 5.0, 5.5
 
 FILLED, EDGE = "#D6E2ED", "#5F7A94"  # colours of bodies
 STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"  # of rails, rods and fixed supports
 
 LEAST_SLIDE = 4.0  # least length of a sliding connector; units
-MOST_BODIES = 300  # number of bodies beyond which they are drawn as dots
+MOST_BODIES = 300  # number of bodies beyond which bodies are drawn as dots
 
 
 class Stroke(NamedTuple):
@@ -97,8 +97,8 @@ _TRACK = ((-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0))
 _DIAMOND = ((-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0))
 
 SUPPORTS = ((_DIAMOND,), (_TRIANGLE, _TRACK), (_TRIANGLE, _PLATE), (_CLAMP,))
-"""Outlines by the number of constrained displacements; the last ones also constrain the rotation.
-The place is the origin, and the beam comes from above."""
+"""Outlines of supports with 0, 1 and 2 constrained displacements, and of clamped supports.
+The supported place is the origin, and the beam is above."""
 
 
 class SupportSymbol(NamedTuple):
@@ -112,7 +112,7 @@ class SupportSymbol(NamedTuple):
 
 
 def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
-    """Find supports, and points of the ground with joints or connectors."""
+    """Yield symbols of supports, and of points of the ground with joints or connectors."""
     scene = shape.canvas.scene
     # Place, colour, index of SUPPORTS, direction away from the support, angle unless clamped
     found: list[tuple[AttachmentPoint, str, int, float, float]] = []
@@ -128,7 +128,7 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
         (j.places, _rotates(j)) for j in scene.joints if joint_symbol(j).grounded
     ]
     grounded += [((c.a, c.b), False) for c in scene.connectors if not c.is_rotation]
-    grounds: dict[Spot, tuple[float, bool]] = {}  # direction away; whether all joints there turn
+    grounds: dict[Spot, tuple[float, bool]] = {}  # direction away; True if all joints there turn
     for places, rotates in grounded:
         for point in places:
             if isinstance(point, Spot) and point.body is GROUND:
@@ -162,7 +162,7 @@ def supports(shape: DeformedShape) -> Iterator[Stroke]:
 
 
 def _inward(place: AttachmentPoint) -> float:
-    """Return the direction in which a beam leaves its end, or upwards for other places; rad."""
+    """Return the angle of the inward direction at a beam's end; at other places π/2; rad."""
     if not isinstance(place, Place) or 0.0 < place.s < 1.0:
         return math.pi / 2
     (x, y), (X, Y) = place.point, place.beam.curve(1e-3 if place.s == 0.0 else 1.0 - 1e-3)
@@ -192,7 +192,7 @@ def bodies(shape: DeformedShape) -> list[Stroke]:
 
 
 def centres(shape: DeformedShape) -> Iterator[Stroke]:
-    """Draw centres of mass as circles, two quarters dark."""
+    """Draw centres of mass as circles with two dark quarters."""
     arc = 0.45 * shape.canvas.unit * directions(np.linspace(0.0, math.pi / 2, 13))
     quarter = np.vstack([(0.0, 0.0), arc, (0.0, 0.0)])
     for body in shape.canvas.scene.bodies:
@@ -206,9 +206,9 @@ class Look(NamedTuple):
     """Symbol of a joint."""
 
     rod: float = 0.0  # width of a line from place to place; points
-    pins: tuple[int, ...] = ()  # numbers of places with a pin, with a rail only if it turns
+    pins: tuple[int, ...] = ()  # indices of places with a pin; on a rail only if the joint turns
     rail: Callable[[DeformedShape, Joint], Iterator[Stroke]] | None = None
-    grounded: bool = True  # a point of the ground has the symbol of a support
+    grounded: bool = True  # True if a point of the ground gets the symbol of a support
 
 
 def _rail(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
@@ -218,7 +218,7 @@ def _rail(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
     ahead = -normal(shape.turned(across.axis, base))
     s = float((block - start) @ ahead)
     low, high = shape.canvas.travels[across]
-    # With magnified rotations, the block may be outside of this range.
+    # If rotations are magnified, the block may be outside this range.
     low, high = min(low, s) - 1.8 * unit, max(high, s) + 1.8 * unit
     rail = block + np.outer((low - s, high - s), ahead)
     yield Stroke(rail, STEEL, 2.2)
@@ -262,7 +262,7 @@ JOINTS: dict[type[Joint], Look] = {
     Guided: Look(pins=(1,), rail=_guide, grounded=False),
     Release: Look(pins=(0,), rail=_sleeve),
 }
-"""Symbols of joints by their class or a base; other joints have a pin or a thin rod."""
+"""Symbols of joints by class or base class; other joints have a pin or a thin rod."""
 
 
 def joint_symbol(joint: Joint) -> Look:
@@ -293,8 +293,8 @@ class Pin(NamedTuple):
     """Pin of a joint."""
 
     at: Array  # (2,); m
-    rotates: bool  # whether the joint turns freely
-    places: tuple[AttachmentPoint, ...]  # that it joins at this point
+    rotates: bool  # True if the joint turns freely
+    places: tuple[AttachmentPoint, ...]  # places that it joins at this point
 
 
 def pins(shape: DeformedShape) -> Iterator[Pin]:
@@ -313,14 +313,14 @@ def pins(shape: DeformedShape) -> Iterator[Pin]:
 
 
 class LawSymbol(NamedTuple):
-    """Symbol of a connector law, and words on its size."""
+    """Symbol of a connector law, and the text of its parameters."""
 
     straight: list[Stroke]
     words: Callable[[Any, str, str], str] = lambda law, force, unit: type(law).__name__.lower()
-    """Function of the law and the units of force and motion; it returns words on the law's size."""
+    """Function of law, unit of force and unit of motion that returns the parameters as text."""
     turning: list[Stroke] | None = None  # around a pin; by default the straight one with spokes
     sweep: float = math.pi + 1.0  # angle from place a to place b in the undeformed scene; rad
-    spins: bool = False  # rotates rigidly with b; else begins at a and ends at b
+    spins: bool = False  # True if it rotates rigidly with b; else it joins a and b
 
 
 def _drive(straight: list[Stroke], fill: str, tail: float = -2.0, *more: Stroke) -> LawSymbol:
@@ -330,7 +330,7 @@ def _drive(straight: list[Stroke], fill: str, tail: float = -2.0, *more: Stroke)
     return LawSymbol(straight, turning=turning, sweep=1.4 * math.pi, spins=True)
 
 
-CENTRE = -9.0  # the coordinate t of the pin
+CENTRE = -9.0  # coordinate t of the pin
 _SPOKES = [_line((s, CENTRE), (s, 0)) for s in (-2, 2)]
 _TEETH = [(float(s), 0.55 * (-1.0) ** k) for k, s in enumerate(np.linspace(-1.0, 1.0, 13)[1::2])]
 _BOXED = [_line((-2, 0), (-0.8, 0)), _line((0.8, 0), (2, 0)), _box(-0.8, 0.8, 0.6, WHITE)]
@@ -402,12 +402,12 @@ LAWS: dict[type, LawSymbol] = {  # drives are orange, filled if they prescribe t
         [*_BOXED, _line((-0.55, -0.35), (0, -0.35), (0, 0.35), (0.55, 0.35), layer=UPON)],
         lambda law, force, unit: f"rigid up to {with_unit(float(law.law.limit), force)}",
     ),
-    ConnectorLaw: LawSymbol(_CURVE, lambda law, force, unit: type(law).__name__),  # of a user
+    ConnectorLaw: LawSymbol(_CURVE, lambda law, force, unit: type(law).__name__),  # law of a user
 }  # fmt: skip
 
 
 def law_symbol(law: laws.Law) -> LawSymbol:
-    """Return the symbol of a connector law; laws without an entry share one symbol."""
+    """Return the symbol of a connector law; laws that are not in LAWS share one symbol."""
     return LAWS.get(type(law), LAWS[ConnectorLaw])
 
 
@@ -421,7 +421,7 @@ def connector_ends(shape: DeformedShape, connector: Connector) -> tuple[Array, A
     """Return the start and end of the drawing of a straight connector; (2,) each; m.
 
     A sliding connector is drawn along its axis and ends at the projection of its place b onto the
-    axis.  It begins before a if it would be too short in the undeformed scene.
+    axis.  It begins before a if it would otherwise be too short in the undeformed scene.
     """
     a, b = shape.at(connector.a), shape.at(connector.b)
     if not connector.follows_a:
@@ -466,7 +466,7 @@ def _around(shape: DeformedShape, connector: Connector) -> Iterator[Stroke]:
     # Limit the winding of the symbol for many revolutions.
     sweep = symbol.sweep + min(max(sweep, -0.75 * symbol.sweep), 2.0)
     for stroke in symbol.turning or [*symbol.straight, *_SPOKES]:
-        # Steps of 5 degrees bend straight lines between two points.
+        # Steps of 5 degrees turn straight lines into arcs.
         steps = np.abs(np.diff(stroke.points[:, 0])) / 4.0 * sweep / math.radians(5.0)
         counts = np.maximum(1, np.ceil(steps)).astype(int)
         at = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(counts))])
@@ -484,7 +484,7 @@ def _around(shape: DeformedShape, connector: Connector) -> Iterator[Stroke]:
 
 
 def in_plane(shape: DeformedShape) -> dict[str, list[Stroke]]:
-    """Draw the symbols in the plane by groups; many bodies are dots."""
+    """Draw all symbols in the plane, by groups; bodies are dots if there are many."""
     scene, unit = shape.canvas.scene, shape.canvas.unit
     few = len(scene.bodies) <= MOST_BODIES
     square = 0.27 * unit * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reference solver: a plain solution of the equations of the paper.
+"""Reference solver: a plain implementation of the equations of the paper.
 
-A scene becomes a list of forces, each with a residual and a tangent; PETSc's SNES solves a step.
+The forces of a scene have residuals and tangents; PETSc's SNES solves for their sum in each step.
 """

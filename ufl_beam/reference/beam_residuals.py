@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Beams: elastic cells, cells whose material yields or breaks, inertia and damping."""
+"""Forces of elastic cells, of cells that yield or break, of inertia and of damping."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from itertools import zip_longest
 
 import numpy as np
-import scipy  # its parts are loaded when they are used
+import scipy  # its subpackages are loaded when they are used
 import ufl
 from scipy.sparse import csr_array
 
@@ -41,7 +41,7 @@ from ufl_beam.reference.return_map import MaterialPoints
 
 
 class ElasticBeams(CellForce):
-    """Elastic cells; the time scheme states the resultants and the virtual strains."""
+    """Elastic cells, with resultants and virtual strains of the time scheme."""
 
     def __init__(self, indices: Index, setting: Setting) -> None:
         cells, scheme = Cells(setting.numbering, indices), setting.scheme
@@ -59,7 +59,7 @@ class ElasticBeams(CellForce):
             element.at_points(3),
         )
         if scheme.lost_fraction:
-            # c C (Δe - r Δe'), with Δe' of the step before and the ratio r of the step lengths
+            # c C (Δe - r Δe') with Δe' of the last step and r = min(1, dt / length of last step)
             damped = element.constant(scheme.lost_fraction) * resultants(
                 e1 - e0 - self._change_before, C
             )
@@ -76,7 +76,7 @@ class ElasticBeams(CellForce):
         self._last_dt = math.inf
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return the virtual work, and its derivative; both may depend on the step before."""
+        """Return the virtual work, and its derivative; both may depend on the last step."""
         put(self._change_before, min(1.0, step.dt / self._last_dt) * self._last_change)
         return super().response(step, q1)
 
@@ -106,9 +106,9 @@ class ElasticBeams(CellForce):
 class YieldingBeams(CellForce):
     """Cells with material points, whose return map computes the resultants r.
 
-    The virtual work has r as a quadrature function.  The tangent is derived by UFL from a form with
-    b + D e, the resultants linearised around an iterate, in the strains e.  So it has a material
-    and a geometric part.
+    In the form of the virtual work, r is a quadrature function.  UFL derives the tangent from a
+    form with b + D e, the linearisation of r in the strains e at an iterate.  So the tangent has a
+    material and a geometric part.
     """
 
     def __init__(self, indices: Index, section_points: SectionPoints, setting: Setting) -> None:
@@ -147,7 +147,7 @@ class YieldingBeams(CellForce):
         self.points.accept()
 
     def start(self, q: Array) -> None:
-        """Begin at the strains of a configuration."""
+        """Compute the accepted state of the points at the strains of a configuration."""
         self.points.start(self.cells.strains(q)[:, 0])
 
     @property
@@ -160,14 +160,14 @@ class YieldingBeams(CellForce):
         self.points.state(archive.rows("cells", self.cells.cell_indices, self.points.state()))
 
     def material(self) -> Array:
-        """Return the number and the column "material" of each cell; (num_cells, 1 + 6)."""
+        """Return the number of each cell and its six values "material"; (num_cells, 7)."""
         data = self.points.recorded.copy()
-        data[:, 3] *= self._hinges  # the jump of a cracked fibre is no rotation
+        data[:, 3] *= self._hinges  # zero without a hinge: jumps of fibres are no rotations
         return np.column_stack([self.cells.cell_indices, data])
 
 
 def inelastic_cells(numbering: DofNumbering) -> dict[SectionPoints, Index]:
-    """Return layouts of material points that can yield or break, and the cells with them."""
+    """Return the cells that can yield or break, by the layout of their material points."""
     sections, section_indices = numbering.sections
     groups: dict[SectionPoints, list[int]] = {}
     for number, section in enumerate(sections):
@@ -207,13 +207,13 @@ class Mass:
         self._beam_form = cells.form(ufl.action(form, cells.element.q1))
 
     def on_nodes(self, v: Array) -> Array:
-        """Return :func:`end_forces` of the mass matrix of the beams times ``v``."""
+        """Return :func:`end_forces` of the product of the mass matrix of the beams and ``v``."""
         self.cells.set(self.cells.element.q1, v)
         return self.cells.on_nodes("density", self._beam_form.assembled())
 
 
 class MatrixForce(Force):
-    """Force that is a constant matrix times a rate, which :class:`Coefficients` define.
+    """Product of a constant matrix and a rate; :class:`Coefficients` define the rate.
 
     Attributes:
         rate: Rate in the latest response; (size,).
@@ -228,7 +228,7 @@ class MatrixForce(Force):
         self.ledger, self._rotations = setting.ledger, setting.numbering.rotations.astype(np.int32)
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return forces and derivative; the scheme steps rotations by 2 tan(Δψ/2), or by Δψ."""
+        """Return forces and derivative; rotations enter as 2 tan(Δψ/2) or Δψ, see the scheme."""
         scheme, before, rotations = self.scheme, self.inertia, self._rotations
         self.coefficients = scheme.coefficients(step.dt, before.last_dt, len(before.more))
         row = getattr(self.coefficients, self.row)
@@ -243,7 +243,7 @@ class MatrixForce(Force):
 
 
 class Inertia(MatrixForce):
-    """Inertia, and the velocities of the accepted state.
+    """Forces of inertia, and the velocities of the accepted state.
 
     Attributes:
         v: Velocities; (size,).
@@ -266,7 +266,7 @@ class Inertia(MatrixForce):
         return tuple(combined(row, s, self) for row in self.coefficients.rates)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Accept new velocities, and enter numerical losses."""
+        """Accept new velocities, and enter numerical losses in the ledger."""
         self.on_nodes = self.mass.on_nodes(self.rate)
         v, *more = self.after(s)
         if self.coefficients.slip is not None:
@@ -281,7 +281,7 @@ class Inertia(MatrixForce):
         self.stored = {"kinetic": float(self.v @ (self.matrix @ self.v)) / 2}
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore further rates of the scheme, and data of the last step that it uses."""
+        """Save or restore further rates, and data of the last step that the scheme uses."""
         pairs = zip_longest(self.scheme.kept, self.more)
         more = [archive.vector(name, known) for name, known in pairs]
         self.more = tuple(known for known in more if known is not None)
@@ -307,17 +307,17 @@ class RayleighForce(MatrixForce):
         super().__init__(setting, inertia.scheme, csr_array(matrix))
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter the energy lost by damping."""
+        """Enter the energy lost by damping in the ledger."""
         self.ledger.lost["damping"] += float(s @ (self.matrix @ s)) / step.dt
         mass, damping = self.inertia.mass, self._damping
         by_mass = mass.on_nodes(self.rate)
-        # q1 of this form is the rate, which mass.on_nodes has set.
+        # mass.on_nodes has set q1 of this form to the rate.
         by_stiffness = mass.cells.on_nodes("stress", self._stiffness.assembled())
         self.on_nodes = damping.mass * by_mass + damping.stiffness * by_stiffness
 
 
 class KelvinVoigtForce(CellForce):
-    """Kelvin-Voigt damping: resultants C Δe/Δt, multiplied by the retardation time."""
+    """Kelvin-Voigt damping: resultants C Δe/Δt times the retardation time."""
 
     def __init__(self, damping: KelvinVoigt, indices: Index, setting: Setting) -> None:
         cells = Cells(setting.numbering, indices)
@@ -345,7 +345,7 @@ def damping_forces(setting: Setting, inertia: Inertia | None) -> list[Force]:
         setting.loses("damping")
         if isinstance(damping, KelvinVoigt):
             beams = setting.numbering.scene.beams if damping.beams is None else damping.beams
-            # Cells with a hinge are left out, so that an open hinge turns freely.
+            # Beams whose cells may have hinges are left out, so that an open hinge turns freely.
             cells = [
                 setting.numbering.cells_of(beam) for beam in beams if beam.section.hinge is None
             ]

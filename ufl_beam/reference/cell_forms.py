@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Forms on cells, assembled by DOLFINx, and the base of all forces in the equation of a step.
+"""Forms on cells, assembled by DOLFINx, and the base class of all forces in a step.
 
 Each cell has nodes of its own.  Connected cells share degrees of freedom of the scene:
 q = C q_scene with a Boolean matrix C.  Residuals of the scene are Cᵀ r, tangents Cᵀ K C.
@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-import scipy  # its parts are loaded when they are used
+import scipy  # its subpackages are loaded when they are used
 import ufl
 from scipy.sparse import csr_array
 from ufl.algorithms import expand_derivatives
@@ -48,12 +48,12 @@ class Ledger:
 
 @dataclass
 class Search:
-    """Search for the equilibrium of a step without unnecessary openings.
+    """Flags of the search for an equilibrium without unnecessary opening and slip.
 
     Attributes:
-        hold: True if points and connectors that did not flow in the last step stay closed, and
-            friction by laws of users sticks or slides as in that step.
-        over: True if ``hold`` has kept a point or connector from opening or slipping.
+        hold: True while points and connectors that did not flow in the last step stay closed.
+            Friction by laws of users then sticks or slides as in that step.
+        over: True if ``hold`` has prevented a point or connector from opening or slipping.
     """
 
     hold: bool = False
@@ -62,12 +62,12 @@ class Search:
 
 @dataclass
 class Setting:
-    """Objects that all forces and laws of a scene share."""
+    """Objects that all forces and connector laws of a scene use."""
 
     numbering: DofNumbering
     scheme: Scheme
-    requested_forces: Mapping[Connector, float]  # of controllers; limits of friction
-    rates: Mapping[Connector, float]  # of motions with friction, at the beginning of a step
+    requested_forces: Mapping[Connector, float]  # forces of controllers; limits of friction
+    rates: Mapping[Connector, float]  # rates of motions with friction, at the beginning of a step
     friction_repeats: bool  # True if sticking may be a redundant constraint
     ledger: Ledger = field(default_factory=Ledger)
     search: Search = field(default_factory=Search)
@@ -123,7 +123,7 @@ class Force:
     on_nodes: Array | float = 0.0
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return virtual work in a step to ``q1``, and the derivative; (size,), (size, size)."""
+        """Return nodal forces in a step to ``q1``, and their derivative; (size,), (size, size)."""
         return np.zeros(self.size), csr_array((self.size, self.size))
 
     def change(self, step: Step, q1: Array) -> float:
@@ -142,7 +142,7 @@ class Force:
         """
 
     def start(self, q: Array) -> None:
-        """Begin at a configuration without a step."""
+        """Compute data of the accepted state at the configuration ``q``."""
 
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore internal variables."""
@@ -157,7 +157,7 @@ class Form:
     Args:
         form: Form with one quadrature rule; FFCx 0.9 to 0.11 compiles forms with several rules
             wrongly, without an error.
-        at: Number in the scene of each degree of freedom of the mesh.
+        at: Index in the scene of each degree of freedom of the mesh.
         size: Number of degrees of freedom of the scene.
     """
 
@@ -169,8 +169,8 @@ class Form:
     def assembled(self) -> Any:
         """Return the value of a form without arguments, or the assembled form.
 
-        A form with one argument gives a vector on the space of the argument, a form with two
-        arguments a matrix of the scene.
+        A form with one argument becomes a vector on the space of the argument.  A form with two
+        arguments becomes a matrix of the scene.
         """
         if self._form.rank == 0:
             return float(fem.assemble_scalar(self._form))
@@ -181,7 +181,7 @@ class Form:
         return csr_array(self._joins.T @ K @ self._joins)
 
     def joined(self, values: Array) -> Array:
-        """Return the vector of the scene from :meth:`assembled`; shared entries are added."""
+        """Add up ``values`` of :meth:`assembled` at degrees of freedom of the scene; (size,)."""
         return np.asarray(self._joins.T @ values)
 
 
@@ -199,7 +199,7 @@ def put(function: fem.Function, values: Array) -> None:
 
 
 def separate_cells(points: Array) -> tuple[meshes.Mesh, Index]:
-    """Return a mesh of unconnected cells, and their rows in ``points``, (num_cells, 2, 2); m."""
+    """Make a mesh of unconnected cells; return it and the index of each in ``points`` (n, 2, 2)."""
     n = len(points)
     mesh = line_mesh(points.reshape(-1, 2), np.arange(2 * n).reshape(n, 2))
     return mesh, np.asarray(mesh.topology.original_cell_index)
@@ -211,8 +211,8 @@ class Cells:
     Attributes:
         cell_indices: Numbers of the cells in the scene, in the order of the mesh.
         lengths: Lengths of the cells; m.
-        element: Functions in the forms.
-        at: Number in the scene of each degree of freedom of the mesh.
+        element: Finite element, and functions in the forms.
+        at: Index in the scene of each degree of freedom of the mesh.
     """
 
     def __init__(self, numbering: DofNumbering, indices: Index) -> None:
@@ -264,9 +264,9 @@ class Cells:
 def end_forces(numbering: DofNumbering, kind: str, cells: Index, forces: Array) -> Array:
     """Return forces of the nodes on all cells, and moments of loads on the cells; (9, num_cells).
 
-    The rows are (X, Y, M) at the start and at the end of a cell; the couple of a load along the
-    cell, zero for "stress"; and the first moments of X and Y about the middle of the cell, divided
-    by its length, for "density" only.
+    The first six rows are (X, Y, M) at the start and at the end of a cell.  The next row is the
+    couple of a load along the cell, zero for "stress".  The last two rows, for "density" only, are
+    the first moments of X and Y about the middle of the cell, divided by its length.
 
     Args:
         numbering: Numbering of the scene.
@@ -292,7 +292,7 @@ class CellForce(Force):
         cells: Cells on which the work is done.
         work: Form of the virtual work.
         setting: Setting; its ledger has the entries of energies.
-        around: Form with the same derivative, if UFL cannot differentiate ``work``.
+        around: Form from which UFL derives the tangent; by default ``work``.
         stored: Form of the energy stored at the end of the step, and its entry.
         lost: Form of the energy lost in the step, and its entry.
         kind: See :func:`end_forces`.
@@ -317,7 +317,7 @@ class CellForce(Force):
         setting.loses(*self._lost)
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return the virtual work if the step ends at ``q1``, and its derivative."""
+        """Return nodal forces in a step to ``q1``, and their derivative."""
         self.cells.set(self.element.q0, step.q0)
         self.cells.set(self.element.q1, q1)
         forces = self.work.assembled()
@@ -332,7 +332,7 @@ class CellForce(Force):
         return sum(float(form.assembled()) for form in self._stored.values())
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter the losses, and compute the energy at the end."""
+        """Enter the losses in the ledger, and compute the energy at the end."""
         self.cells.set(self.element.q1, q1)
         for name, form in self._lost.items():
             self.ledger.lost[name] += form.assembled()
@@ -358,6 +358,6 @@ def lumps(numbering: DofNumbering) -> list[tuple[Index, float, float]]:
 
 
 def coupled(size: int, rows: Index, columns: Index, values: Array) -> csr_array:
-    """Return the matrix of the scene from entries; duplicates are added."""
+    """Return the matrix of the scene with given entries; duplicates are added."""
     triplets = np.ravel(values), (np.ravel(rows), np.ravel(columns))
     return csr_array(scipy.sparse.coo_array(triplets, (size, size)))

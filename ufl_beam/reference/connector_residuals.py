@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Connectors, whose forces do work on variations of relative motions, and guide curves."""
+"""Forces of connectors, which do work on relative motions, and of guide curves."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ The error of the differences is of second order; round-off of the curve adds les
 
 
 class Linked(Force):
-    """Base of connectors, whose forces are unknowns of the scene.
+    """Base of groups of connectors, whose forces are unknowns of the scene.
 
     Attributes:
         indices: Indices of the connectors in :attr:`Scene.all_connectors`.
-        forces_at: Degrees of freedom of their forces.
+        forces_at: Indices of the unknown forces among the degrees of freedom.
         before: Forces at the end of the last step.
         at_rest: Forces of the laws at the initial configuration.
     """
@@ -60,8 +60,8 @@ class Linked(Force):
 class Connectors(Linked):
     """Connectors with the same kind of relative motion, or bushings with k motions each.
 
-    Each connector or bushing is a cell of unit length between its nodes, with its forces as further
-    unknowns.
+    Each connector or bushing is a cell of unit length between its nodes.  Its forces are further
+    unknowns of the cell.
     """
 
     def __init__(self, motions: Sequence[str], indices: Index, setting: Setting) -> None:
@@ -95,12 +95,12 @@ class Connectors(Linked):
         self._e0: Array = np.zeros(n)
 
     def motion(self, q: Array) -> Array:
-        """Return the relative motions at ``q``; (num_links,); m or rad."""
+        """Return the relative motions at ``q``; (num_connectors,); m or rad."""
         self._forms.q1.x.array[:] = q[self._at]
         return np.asarray(self._motion.assembled()[self._cell_dofs])
 
     def rates(self, q: Array, v: Array) -> Array:
-        """Return the rates of the motions at the velocities ``v``; (num_links,); m/s or rad/s."""
+        """Return the rates of the motions at velocities ``v``; (num_connectors,); m/s, rad/s."""
         self._forms.q1.x.array[:], self._forms.u.x.array[:] = q[self._at], v[self._at]
         return np.asarray(self._rate.assembled()[self._cell_dofs])
 
@@ -114,7 +114,7 @@ class Connectors(Linked):
         return [*map(float, values)] if self._k == 1 else [*values.reshape(-1, self._k)]
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return forces on the nodes and residuals of the laws, and their derivative."""
+        """Return forces on the nodes, with residuals of the laws, and their derivative."""
         arguments = map(self._by_connector, (self.motion(q1), q1[self.forces_at]))
         rows = [law.row(e, λ) for law, e, λ in zip(self.laws, *arguments, strict=True)]
         self._rows = np.vstack([np.reshape(row, (self._k, -1)) for row in rows])
@@ -126,7 +126,7 @@ class Connectors(Linked):
         """Return the largest relative residual of a law, without round-off of motions.
 
         A residual in motion is relative to 1 % of ``moved`` (m), a residual in force to ``scale``
-        (N).  Rotations and moments are compared by the size of the scene as length.
+        (N).  Rotations are multiplied, and moments divided, by the size of the scene.
         """
         size = self.setting.numbering.scene.size
         k, length = self._k, self._length.reshape(-1, self._k)
@@ -144,7 +144,7 @@ class Connectors(Linked):
             return float(np.where(left <= 0, 0.0, left / wanted).max())
 
     def taken(self, q1: Array) -> Array:
-        """Return the works of the forces in the step."""
+        """Return the works of the forces in the step; (num_connectors,); J."""
         force = acting(self.setting.scheme, self.before, q1[self.forces_at])
         return np.asarray(force * (self.motion(q1) - self._e0))
 
@@ -155,7 +155,7 @@ class Connectors(Linked):
         return sum(law.change(e, float(work)) for law, e, work in each)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Accept the end of the step; enter supplied works and losses."""
+        """Accept the end of the step; enter supplied works and losses in the ledger."""
         e, taken = self.motion(q1), self.taken(q1)
         self.work = self.work + taken
         self.rate, self._e0 = np.asarray((e - self._e0) / step.dt), e
@@ -165,21 +165,21 @@ class Connectors(Linked):
             law.accept(motion, float(work))
 
     def start(self, q: Array) -> None:
-        """Begin at the motions of ``q``."""
+        """Begin a run at the motions of ``q``, and compute the forces there."""
         self._e0 = self.motion(q)
         each = zip(self.laws, self._by_connector(self._e0), strict=True)
         self.at_rest = np.concatenate([np.atleast_1d(law.start(e)) for law, e in each])
 
     @property
     def stored(self) -> Mapping[str, float]:  # type: ignore[override]
-        """Stored energies of the laws."""
+        """Stored energies of the laws, by entry of the ledger; J."""
         total: dict[str, float] = defaultdict(float)
         for name, energy in (item for law in self.laws for item in law.stored.items()):
             total[name] += energy
         return total
 
     def columns(self, q: Array) -> Array:
-        """Return the columns of ``Connection``; (num_links, columns)."""
+        """Return the columns of ``Connection``; (num_connectors, 5)."""
         each = zip(self.laws, self._by_connector(self._e0), strict=True)
         e = np.ravel([law.z.get("start", e) for law, e in each])
         dissipated = np.zeros(len(self.connectors))
@@ -200,9 +200,9 @@ class GuideForce(Linked):
     """Guide: a point is constrained to a curve of the plane, and free along the curve.
 
     In schemes whose forces act over the step, the force is normal to the chord of the step, so that
-    it does no work; in other schemes it is normal to the curve.  Round-off of the curve spoils the
-    direction of a short chord, so the tangent in the middle replaces it.  The motion is the
-    distance from the curve; at the end of a step it is zero.
+    it does no work.  In other schemes it is normal to the curve.  Round-off of the curve spoils the
+    direction of a short chord, so the tangent in the middle of the step replaces the chord.  The
+    motion is the distance from the curve, which is zero at the end of a step.
     """
 
     def __init__(self, number: int, setting: Setting) -> None:
@@ -219,15 +219,15 @@ class GuideForce(Linked):
         self._over_step = setting.scheme.average(0.0, 1.0) != 1.0
         last_digit = np.spacing(self._size + np.abs(self._point).max())
         self._shortest = self._size * (24 * last_digit / self._size) ** (1 / 3)
-        self._s = self._s0 = self._distance = 0.0  # parameters: of the iterate, accepted
+        self._s = self._s0 = self._distance = 0.0  # curve parameters: of the iterate, accepted
         self._step = parameter_step(self._curve, 0.0, self._size)
 
     def begin(self, step: Step) -> None:
-        """Begin the search for the nearest point at the end of the last step."""
+        """Set the start of the search for the nearest point to the accepted point."""
         self._s = self._s0
 
     def _nearest(self, x: Array) -> float:
-        """Return the parameter of the nearest point of the curve, starting at the latest point."""
+        """Return the parameter of the nearest point of the curve, searched from the latest one."""
         s = nearest(self._curve, x, self._s, self._step, self._size)
         if not math.isfinite(s):
             raise NoNumber(f"{self._place}: no nearest point was found on its guide curve")

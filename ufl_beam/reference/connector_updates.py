@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors over a step; each is a row ``α e + β λ = γ``, linearised at an iterate.
+"""Laws of connectors over a step: equations ``α e + β λ = γ``, linearised at an iterate.
 
 e is the relative motion at the end of the step and λ the force that resists its growth.  A law is a
-class: ``row`` returns the equation, ``z`` has the internal variables, ``stored`` the energies.
-Variables named by a user are in ``z`` as "state ...".
+class: ``row`` returns (α, β, γ), ``z`` has the internal variables, ``stored`` the energies.  The
+variable ``name`` of a user's law is ``z["state name"]``.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import scipy  # its parts are loaded when they are used
+import scipy  # its subpackages are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, NoNumber
@@ -44,37 +44,37 @@ from ufl_beam.reference.return_map import MaterialPoints, derivative
 CREEP = 1e-12
 """Creep in a step of a sticking connector at its limit; divided by the size of the scene, or rad.
 
-It is used only if several sticking connectors constrain the same motion; then it determines the
-share of the force that each connector bears.
+It is used only if several sticking connectors constrain the same motion.  It then determines the
+force of each of these connectors.
 """
 
 REFERENCE_MOTION = 0.01
-"""Motion, in rad or divided by the size of the scene, that weighs as much as the limit of a force.
+"""Motion with the same weight as a force at its limit; rad, or divided by the size of the scene.
 
-Force and motion together decide whether a rigid-plastic connector slips in an iterate.
+Weighted force and motion decide whether a rigid-plastic connector slips in an iterate.
 """
 
 LEAST_SLOPE = 1e-9
 """Least factor r of :class:`_Slipping`, as a multiple of EI of the beam / size of the scene."""
 
 Row = tuple[float, float, float] | Array
-"""α, β, γ; an array (k, k + 2) for the k components of a bushing."""
+"""(α, β, γ); an array (k, k + 2) for the k components of a bushing."""
 
 Motions = Any
 """A relative motion, or an array of the components of a bushing; m or rad."""
 
 
 class LawInStep:
-    """Law of a connector in a step; its work is in ``entry`` of the ledger, unless that is empty.
+    """Law of a connector in a step; its work is added to ``entry`` of the ledger, if not empty.
 
     Attributes:
         saved_as: Name of the internal variables in saved states, as in ``ufl_beam.terms``.
-        z: Internal variables of the accepted state; "dissipated" is the energy lost since the
-            beginning by yielding, slip and laws of users, J; "start" is the motion of a
-            rigid-plastic connector, without round-off.
+        z: Internal variables of the accepted state.  "dissipated" is the energy lost since the
+            beginning by yielding, slip and laws of users; J.  "start" is the motion of a
+            rigid-plastic connector without round-off.
         stored: Energies in the accepted state, by entry of the ledger; J.
-        opens: Object that opens beyond a limit, or None; see ``Solver._equilibrium``.
-        slope: Number by which rows that state the force are divided.
+        opens: Object that opens or slips beyond a limit, or None; see ``Solver._equilibrium``.
+        slope: Number by which equations that state the force are divided.
     """
 
     account, entry, sign, saved_as = "lost", "", 1.0, ""
@@ -105,7 +105,7 @@ class LawInStep:
         self.e0, self.dt = e0, step.dt
 
     def row(self, e1: Motions, λ: Motions) -> Row:
-        """Return α, β, γ around an iterate; by default the row computed by ``begin``."""
+        """Return (α, β, γ) at an iterate; by default as computed by ``begin``."""
         return self._row
 
     def change(self, e1: Motions, work: float) -> float:
@@ -117,16 +117,16 @@ class LawInStep:
         return work
 
     def accept(self, e1: Motions, work: float) -> None:
-        """Accept the end of the step, in which the connector has received ``work``."""
+        """Accept the end of the step, in which the connector has received ``work``; J."""
         if self.entry:
             getattr(self.setting.ledger, self.account)[self.entry] += self.sign * work
 
     def start(self, e: Motions) -> Any:
-        """Begin at a motion without a step; return the force of the law there."""
+        """Compute the accepted state at a motion; return the force of the law there; N or N m."""
         return 0.0
 
     def state(self, values: Array | None = None) -> Array:
-        """Return the internal variables as a row; ``values`` replace them first, if given."""
+        """Return the internal variables, (n,); if given, ``values`` replace them first."""
         if values is not None:
             self.z = dict(zip(self.z, map(float, values), strict=True))
         return np.array([*self.z.values()])
@@ -134,7 +134,7 @@ class LawInStep:
     def after(self, e1: Motions, fraction: float) -> tuple[Any, Any, State]:
         """Return motions and rates at t_n+θ, and variables after a fraction of the step.
 
-        All have the form of arguments of the law; variables grow in proportion to ``fraction``.
+        They have the form of arguments of the law.  Variables grow in proportion to ``fraction``.
         """
         θ, e0, e1 = self.setting.scheme.theta, np.atleast_1d(self.e0), np.atleast_1d(e1)
         both = (1 - θ) * e0 + θ * e1, (e1 - e0) / self.dt
@@ -147,7 +147,7 @@ class LawInStep:
 
 
 def around(forces: Callable[[Array], Any], e: Motions, increments: Motions) -> Array:
-    """Return rows of a law whose forces are functions of motions, by central differences."""
+    """Linearise forces that are functions of motions by central differences; (k, k + 2)."""
     e, increments = np.atleast_1d(e), np.diag(np.atleast_1d(increments))
     with np.errstate(all="ignore"):
         slopes = [(forces(e + δ) - forces(e - δ)) / (2 * δ.sum()) for δ in increments]
@@ -156,10 +156,10 @@ def around(forces: Callable[[Array], Any], e: Motions, increments: Motions) -> A
 
 
 def small_increment(e0: Motions, e1: Motions, length: Motions) -> Any:
-    """Return steps of central differences: the increments of motions times 6e-6.
+    """Return steps of central differences: the increments of motions in the step, times 6e-6.
 
-    This is the third root of round-off.  An increment counts as at least 1e-3 of the motion, or
-    1e-6 of ``length``.
+    This factor is the third root of the machine precision.  An increment counts as at least 1e-3 of
+    the motion and 1e-6 of ``length``.
     """
     least = 1e-3 * np.maximum(np.abs(e1), 1e-3 * length)
     return 6e-6 * np.maximum(np.abs(e1 - e0), least)
@@ -169,7 +169,7 @@ def small_increment(e0: Motions, e1: Motions, length: Motions) -> Any:
 
 
 class _Known(LawInStep):
-    """Law with a row known at the beginning of a step, such as a joint, motor or damper."""
+    """Law whose equation is known at the beginning of a step, as of a joint, motor or damper."""
 
     KINDS = {  # noqa: RUF012
         PrescribedMotion: ("supplied", "motors", -1.0, "_Driven"),
@@ -195,7 +195,7 @@ class _Known(LawInStep):
         elif isinstance(law, Damper):
             factor = law.viscosity / step.dt
             self._row = -factor, 1.0, -factor * e0
-        else:  # a controller is called at the beginning of the step
+        else:  # a prescribed force, or the requested force of a controller
             controlled, reached = self.setting.requested_forces.get(connector), self.z["reached"]
             wanted = (
                 value_at(law.force, step.load_time, connector) if controlled is None else controlled
@@ -213,7 +213,7 @@ class _Known(LawInStep):
 
 
 class _EnergyLaw(LawInStep):
-    """Law with an energy and a resistance, such as a stop."""
+    """Law with an energy and a resistance, such as the law of a stop."""
 
     def __init__(self, connector: Connector, setting: Setting) -> None:
         super().__init__(connector, setting)
@@ -231,12 +231,12 @@ class _EnergyLaw(LawInStep):
         return np.array([float(np.sum(f)) for f in self.law.elastic_forces([*e[:, None]], z)])
 
     def _forces(self, e1: Array) -> Array:
-        """Return elastic forces at the time of loads plus resistance, in a step to ``e1``; (k,)."""
+        """Return elastic forces at the time of loads plus resistance in a step to ``e1``; (k,)."""
         e0, (*_, z) = np.atleast_1d(self.e0), self.after(e1, self._load_weight)
         resistance = self.law.each(self.law.resistance(*self.after(e1, self._θ), self.dt))
         elastic = end = self._elastic(e1, z)
         if self._load_weight != 1.0:
-            # By Gauss's rule; if forces are not smooth, the work is corrected to the energy change
+            # Gauss's rule; if forces are not smooth, their work is corrected to the energy change
             Δe, mean = e1 - e0, self.setting.scheme.mean(lambda e: self._elastic(e, z), e0, e1)
             first, middle = (self._elastic(e, z) for e in (e0, (e0 + e1) / 2))
             errors = (mean - (first + 4 * middle + end) / 6) * Δe
@@ -263,7 +263,7 @@ class _EnergyLaw(LawInStep):
         """Accept the variables; work that is neither stored nor numerical loss is dissipated."""
         (*_, old), (*_, new) = (self.after(e1, fraction) for fraction in (0.0, 1.0))
         stored, numerical = float(self._energy(e1, new)), 0.0
-        if self._delayed:  # growth: derivative of the energy along the step, by a complex step
+        if self._delayed:  # growth: derivative of the energy along the step, by complex step
             z = {n: x + 1e-30j * (x - getattr(old, n)) for n, x in vars(new).items()}
             along = self._energy(e1 + 1e-30j * (e1 - self.e0), State(z))
             growth = float(np.imag(along)) / 1e-30
@@ -330,17 +330,17 @@ class _SpringLaw(LawInStep):
 
 
 class _Friction(LawInStep):
-    """Dry friction, also by laws of users: it sticks, or slips in the direction -1 or 1.
+    """Dry friction, also by a user's law: the connector sticks, or slips in the direction -1 or 1.
 
     The sliding force of a user's law may be below its limit, so that sticking and sliding can both
-    be solutions.  The connector sticks or slides as in the last step, unless there is no such
+    be solutions.  The connector then sticks or slides as in the last step, unless there is no such
     equilibrium.
 
     Attributes:
-        excess: For a law of a user that is held: infinite if the connector slides back, comes to
-            rest with a gain of energy, or has the limit zero; ``|force| / limit - 1`` if the force
-            exceeds the limit; else 0.
-        released: True if the connector may begin to stick or slide in iterates from now on.
+        excess: ``|force| / limit - 1`` if ``Search.hold`` keeps a user's law sticking above its
+            limit, else 0.  It is infinite if the limit is zero, or if the connector slides back or
+            would generate energy by coming to rest.
+        released: True if the connector may begin to stick or slide from this iterate on.
     """
 
     entry, saved_as = "friction", "_Rubbing"
@@ -360,20 +360,20 @@ class _Friction(LawInStep):
             self._limit = self.setting.requested_forces[self.connector]
         softness = CREEP * self.length * self.setting.friction_repeats
         self._creep = softness / self._limit if self._limit > 0 else 0.0
-        # This motion ends at rest; with no motion the velocity at the end would be reversed.
+        # A step with this motion ends at rest; without motion it would reverse the velocity.
         self._rest_motion = (
             increment_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.connector]
         )
         self._direction, self._motionless, self._guessed = self.z["slip"], False, True
 
     def row(self, e1: float, λ: float) -> Row:
-        """Stick while the force is below the limit; slip until the sliding velocity reverses."""
+        """Return the equation: sticking up to the limit, slip until the velocity reverses."""
         moved, stuck, search = e1 - self.e0, self._direction == 0, self.setting.search
         if not self._motionless and self._direction * self._rest_motion > 0:
-            moved -= self._rest_motion  # rest at the end instead of a reversed velocity
+            moved -= self._rest_motion  # the step ends at rest, not with a reversed velocity
         reverses = not stuck and self._direction * moved < -1e-14 * self.length
-        # Coming to rest must not generate energy; otherwise the step has no motion at all.  The
-        # force of the guess does not decide this, since it belongs to another motion.
+        # Coming to rest must not generate energy; if it would, the step has no motion at all.  The
+        # force of the first guess does not decide this, since it belongs to another motion.
         gives = not self._guessed and not self._motionless and stuck and λ * self._rest_motion < 0
         over = stuck and abs(λ) > self._limit * (1 + 1e-12)
         self._guessed, self.excess = False, 0.0
@@ -409,19 +409,19 @@ class _Friction(LawInStep):
 
 
 class _Slipping(LawInStep):
-    """Rigid-plastic connector, such as a plastic hinge: constrained up to a limit, then a slip law.
+    """Rigid-plastic connector, such as a plastic hinge: rigid up to a limit, then with a slip law.
 
-    With R the resistance after the motion m, any r > 0, and without a back force, the equation for
-    the force λ is
+    R is the resistance after the motion m, and r any positive factor.  Without a back force, the
+    equation for the force λ is
 
-        r m = 0 where |λ + r m| <= R, else λ = R or -R:
+        r m = 0 where |λ + r m| <= R, else λ = R or -R.
 
-    its residual is continuous in λ and m, as Newton's method requires.
+    Its residual is continuous in λ and m, as Newton's method requires.
 
     Attributes:
-        excess: ``|λ + r m| / limit - 1`` if the connector is kept closed and exceeds the limit,
-            else 0.
-        released: True if the connector may open from now on.
+        excess: ``|λ - back force + r m| / limit - 1`` if this is positive and ``Search.hold`` keeps
+            the connector rigid; else 0.
+        released: True if the connector may slip from this iterate on.
     """
 
     saved_as = "CompiledSlips"
@@ -444,7 +444,7 @@ class _Slipping(LawInStep):
 
     def begin(self, e0: float, step: Step) -> None:
         super().begin(e0, step)
-        self._direction = int(self.z["way"])  # of slip in the iterate; now as in the last step
+        self._direction = int(self.z["way"])  # of slip in an iterate; first as in the last step
 
     def _law_step(self, grown: Any, direction: int) -> RigidPlasticStep:
         at = {**self._parameters, **self.z, "θ": self.setting.scheme.theta, "dt": self.dt}
@@ -454,7 +454,7 @@ class _Slipping(LawInStep):
 
     @np.errstate(all="ignore")
     def row(self, e1: float, λ: float) -> Row:
-        """Return α, β, γ around an iterate, after finding the direction of slip."""
+        """Return (α, β, γ) at an iterate, after finding the direction of slip."""
         z, r, search, self.excess = self.z, self.slope, self.setting.search, 0.0
         motion, limit = e1 - z["start"], z["limit"]
         tested = λ - z["back force"] + r * motion
@@ -504,8 +504,8 @@ class _Slipping(LawInStep):
 def _slope(connector: Connector, size: float) -> float:
     """Return the factor r of motions in the equation of a rigid-plastic connector.
 
-    It exceeds the steepest softening, so that an open branch stays open.  It is so large that
-    motions, not the round-off of forces, decide in which direction a weak hinge slips.
+    The factor exceeds the steepest softening, so that an open hinge stays open in iterates.  It is
+    so large that motions, not round-off of forces, decide in which direction a weak hinge slips.
     """
     law = law_of(connector)
     if not 0.0 < law.limit < np.inf:
@@ -565,10 +565,10 @@ class _UserLaw(LawInStep):
     def row(self, e1: float, λ: float) -> Row:
         """Return the law around an iterate.
 
-        At an infinite slope, Newton's method oscillates for ever.  The secant through the two
-        latest iterates approximates the rest of the scene.  If the residual does not halve, the law
-        is linearised at its intersection with this line, if that is between ``e1`` and the motion
-        of the previous linearisation.
+        At an infinite slope, Newton's method would oscillate for ever.  The secant through the two
+        latest iterates approximates the response of the rest of the scene.  If the residual does
+        not halve, the law is linearised at its intersection with this secant.  The intersection
+        must be between ``e1`` and the motion of the previous linearisation.
         """
         last, at, residual = self._last, e1, self._evaluate(e1)[0] - λ
         if last is not None and abs(residual) > abs(last[2]) / 2 and e1 != last[0]:
@@ -588,7 +588,7 @@ class _UserLaw(LawInStep):
         return around(lambda e: self._evaluate(float(e[0]))[0], at, ε)
 
     def accept(self, e1: float, work: float) -> None:
-        """Enter the work that is not stored, and accept the internal variables."""
+        """Enter lost work in the ledger, and accept the internal variables."""
         before, (_, after) = self.stored["stored"], self._evaluate(e1)
         self.state(after)
         self.start(e1)
@@ -607,7 +607,7 @@ LAWS: dict[type, type[LawInStep]] = {
     **dict.fromkeys(_Known.KINDS, _Known), ConnectorLaw: _EnergyLaw, Spring: _SpringLaw,
     Coulomb: _Friction, RigidPlastic: _Slipping, ForceLaw: _UserLaw,
 }  # fmt: skip
-"""Classes of laws in a step, by the class of the law in the scene or a base of it."""
+"""Classes of laws in a step, by the class of the law in the scene or its base class."""
 
 
 def law_in_step(connector: Connector, setting: Setting) -> LawInStep:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Loads, virtual works and potentials of users; supports and prescribed motions."""
+"""Loads, users' virtual works and potentials, supports and prescribed motions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from abc import ABC, abstractmethod
 
 import numpy as np
-import scipy  # its parts are loaded when they are used
+import scipy  # its subpackages are loaded when they are used
 import ufl
 from scipy.sparse import csr_array
 
@@ -33,14 +33,14 @@ from ufl_beam.reference.cell_forms import (
 )
 
 AT_REST = 1e300
-"""Largest step length in forms, at which all rates vanish; s."""
+"""Largest step length in forms, so large that all rates vanish; s."""
 
 
 class LoadForce(Force, ABC):
-    """Base of loads: a function of time, times forces at the configuration where the load acts.
+    """Base of loads: forces that may depend on the configuration, times a function of time.
 
     Attributes:
-        force: Force in the latest response; (size,).
+        force: Nodal forces in the latest response; (size,).
         along: :attr:`on_nodes` of loads along beams, for a factor of one.
     """
 
@@ -63,7 +63,7 @@ class LoadForce(Force, ABC):
         return np.asarray(step.q0 + self.scheme.load_weight * (q1 - step.q0))
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return minus the load and its derivative; a substep takes its part of the increment."""
+        """Return minus the load and its derivative; a substep applies a part of the increment."""
         wanted = value_at(self.time, step.load_time, self.load)
         growth = step.fraction * (wanted - self._reached)
         self.factor, self._end = self._reached + step.at * growth, self._reached + growth
@@ -72,12 +72,12 @@ class LoadForce(Force, ABC):
         return -self.force, csr_array(-self.factor * self.scheme.load_weight * slope)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter the work of the load on the nodal step."""
+        """Enter the work of the load on the nodal step in the ledger."""
         self.supplied["loads"] += float(acting(self.scheme, self._before, self.force) @ s)
         self._before, self._reached = self.force, self._end
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
-        """Return the load at time ``t``, with which the initial state is assumed in equilibrium."""
+        """Return the load at time ``t``, which is assumed in equilibrium with the initial state."""
         self._reached = value_at(self.time, t, self.load)
         self.force = self._before = self._reached * self.forces(q)[0]
         return self.force
@@ -91,7 +91,7 @@ class DeadLoad(LoadForce):
         numbering = setting.numbering
         scene, self._vector = numbering.scene, np.zeros(numbering.size)
         per_beam = np.zeros((len(scene.beams), 3))
-        # Point loads beside the node of a body are connectors in Scene.all_connectors.
+        # Point loads on a body, except at its centre, are connectors in Scene.all_connectors.
         if isinstance(load, PointLoad) and carries(load.place):
             np.add.at(self._vector, numbering.node(load.place), [*load.force, load.moment])
         elif isinstance(load, LineLoad):
@@ -109,7 +109,7 @@ class DeadLoad(LoadForce):
         self.along = end_forces(numbering, "density", cells, -along)
 
     def forces(self, q: Array) -> Response:
-        """Return the consistent nodal forces, and a derivative of zero."""
+        """Return the consistent nodal forces, and their derivative, which is zero."""
         return self._vector, csr_array((self.size, self.size))
 
 
@@ -171,13 +171,13 @@ class FrameForce(LoadForce):
         return np.asarray(self._pull @ (self._places + q)), self._pull
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return minus the forces, and the derivative; Coriolis forces are at mean velocities."""
+        """Return minus the forces, and the derivative; Coriolis forces use mean velocities."""
         r, K = super().response(step, q1)
         coriolis = self._gyro @ (q1 - step.q0) / step.dt
         return np.asarray(r + coriolis), csr_array(K + self._gyro / step.dt)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter the work, and store the forces of beams by the accelerations of the frame."""
+        """Enter the work, and store forces on cells from the accelerations of the frame."""
         super().accept(step, q1, s)
         v = (q1 - step.q0) / step.dt
         a = -self.factor * self._Ω**2 * self._translational * (self._places + self.place(step, q1))
@@ -189,8 +189,8 @@ class FrameForce(LoadForce):
 class WorkForce(CellForce):
     """Virtual work or potential of a user on the cells on which it acts.
 
-    Forces of a potential always act fully; virtual works grow in substeps of the first step, as
-    loads do.
+    Forces of a potential always act fully.  In statics, virtual works grow from zero within the
+    first step, as loads do.
     """
 
     def __init__(self, work: Work, setting: Setting, t0: float) -> None:
@@ -214,7 +214,7 @@ class WorkForce(CellForce):
             supplied[work.in_time] += 0.0
 
     def _put(self, t: float, **clock: float) -> None:
-        """Set time, growth, step length, and the numbers of the work in the forms."""
+        """Set time, growth, step length, and the user's parameters in the forms."""
         parameters = self._work.numbers.items()
         values = {n: value_at(x, t, self._work) if callable(x) else x for n, x in parameters}
         for name, value in {"t": t, **clock, **values}.items():
@@ -224,7 +224,7 @@ class WorkForce(CellForce):
     def response(self, step: Step, q1: Array) -> Response:
         """Return minus the virtual work, or the gradient of the potential, and the derivative.
 
-        A substep takes the same part of the increment as for loads.
+        A substep applies the same part of the increment as loads do.
         """
         fraction, growth = step.fraction, step.fraction * (1.0 - self._grown)
         self._end = self._t + fraction * (step.motion_time - self._t), self._grown + growth
@@ -235,14 +235,14 @@ class WorkForce(CellForce):
         return r, K
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter the work in the step."""
+        """Enter the work of the step in the ledger."""
         name, supplied, at = self._work.name, self.ledger.supplied, np.array(self._at)
         if not self._is_potential:
             supplied[name] += float(acting(self._scheme, self._before, self.force) @ s)
         stored, t = self.stored.get(name, 0.0), float(acting(self._scheme, np.array(self._t), at))
         self._before, (self._t, self._grown) = self.force, self._end
         super().accept(step, q1, s)
-        if self._varies:  # supplied in time: the energy change without its part by the motion
+        if self._varies:  # supplied in time: the energy change minus the change by motion
             self._put(t)
             moved = self.energy(q1) - self.energy(step.q0)
             supplied[self._work.in_time] += self.stored[name] - stored - moved
@@ -288,10 +288,10 @@ class Supports:
     """Supports of a scene, which may be at an angle to the axes of the plane.
 
     Attributes:
-        axes: Orthogonal matrix from the axes of the plane to the axes of the supports.
+        axes: Orthogonal matrix from components in the plane to components along support axes.
         constrained: Constrained or prescribed degrees of freedom, in the axes of the supports.
-        free: All other degrees of freedom: the unknowns of a step.
-        reactions: Forces of the supports in the latest residual, in their axes; (size,).
+        free: All other degrees of freedom, which are the unknowns of a step.
+        reactions: Forces of the supports in the latest residual, in the same axes; (size,).
         before: Reactions of the accepted step.
     """
 
@@ -327,7 +327,7 @@ class Supports:
             x[dof] = x0[dof] + step.fraction * (wanted - x0[dof])
 
     def stop(self, v: Array) -> Array:
-        """Return velocities with zeros at fixed supports, where others would oscillate."""
+        """Return velocities with zeros at fixed supports, where other values would oscillate."""
         x = self.axes @ v
         moving = [dof for dof, *_ in self._motions]
         x[np.setdiff1d(self.constrained, moving)] = 0.0
@@ -339,14 +339,14 @@ class Supports:
         self.reactions[self.constrained] = r[self.constrained]
 
     def accept(self, s: Array) -> None:
-        """Enter the work of moving supports in a nodal step."""
+        """Enter the work of moving supports on the nodal step in the ledger."""
         if self._motions:
             force = acting(self._scheme, self.before, self.reactions)
             self._supplied["supports"] += float(force @ (self.axes @ s))
         self.before = self.reactions
 
     def forces(self) -> Array:
-        """Return the forces of each support on the scene, in its held components; (num, 3)."""
+        """Return force and moment of each support on the scene; (num_supports, 3); N, N, N m."""
         forces = np.zeros((len(self._numbering.scene.supports), 3))
         for force, support in zip(forces, self._numbering.scene.supports, strict=True):
             components = [*support.held]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Return map of material points in NumPy, for all points of a kind at once.
+"""Return map of material points in NumPy, for all points of one kind at once.
 
-A point responds to the strain at the end of a step.  Laws are called on arrays; derivatives are by
-complex steps.  If the stress exceeds the resistance of the discontinuity, the jump grows until both
-are equal, and the tangent is condensed.
+The input of a point is the strain at the end of a step.  Laws are called on arrays; derivatives are
+by complex steps.  If the stress exceeds the resistance of the discontinuity, the jump grows until
+both are equal, and its growth is condensed out of the tangent.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from ufl_beam.model.law_functions import Values
 from ufl_beam.reference.cell_forms import Setting
 
 CLOSED, FLOWING = 0.0, 1.0
-"""Flags of a discontinuity that has not grown in the last step, and of one that has."""
+"""Values of the flag of a discontinuity that did not grow, or did grow, in the last step."""
 
 IMAGINARY = 1e-200
-"""Imaginary step; its square does not change the value."""
+"""Size of a complex step; its square does not change the value."""
 
 EPS = float(np.finfo(float).eps)
 
@@ -40,7 +40,7 @@ CORRECTIONS, HALVINGS = 100, 10
 
 
 def derivative(f: Callable[[Values], Values], x: Array) -> tuple[Array, Array]:
-    """Return value and derivative of a function of arrays, entry by entry."""
+    """Return value and derivative of a function that acts on arrays entry by entry."""
     y = f(x + 1j * IMAGINARY)
     return np.real(y).copy(), np.imag(y) / IMAGINARY
 
@@ -68,24 +68,24 @@ def solved(A: Array, b: Array) -> Array:
 
 
 class MaterialPoints:
-    """Points with the same layout in many cells.
+    """Material points of many cells, with the same layout in each cell.
 
     Args:
         section_points: The points of a cell, with their laws.
-        keys: Keys of the cells, for random numbers.
+        keys: Keys of the cells, for random parameters.
         length: Lengths of the cells; (cells,); m.
         setting: Setting; its scheme decides at which time of a step the laws hold.
 
     Attributes:
-        at: Numbers of the points by name, including internal variables; (cells, n) each.
+        at: Inputs and internal variables of the points, by name; (cells, n) each.
         r: (N, V, M) of the latest response; (cells, 3).
-        D: Derivatives of ``r`` by the strains; (cells, 3, 3).
+        D: Derivatives of ``r`` with respect to the strains; (cells, 3, 3).
         recorded: For each cell: (N, V, M) of the accepted state, the jump of the last point, the
             energies dissipated by plastic strains and by discontinuities; (cells, 6).
         stored: Energies in the accepted state, by entry of the ledger; J.
         softens: True if points may open.
-        excess: ``|stress| / limit - 1`` of the points that are kept closed, else 0; (cells, n).
-        released: True for points that may open from now on.
+        excess: ``|stress| / limit - 1`` of points that are held closed, else 0; (cells, n).
+        released: True for points that may open from this iterate on.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class MaterialPoints:
         ).items():
             at[f"softening {name}"][:] = value
         self._equations = PointEquations(section_points.kind, section_points.softening, scheme)
-        # Strains of the points by component are B times the strains of the cell.
+        # B times the strains of the cell are the strains of the points, by component.
         self._B = np.asarray(section_points.strains).reshape(n, -1, 3)
         self._volume = section_points.weights * at["length"]
         self.r, self.strains, self.strains0 = np.zeros((3, cells, 3))
@@ -129,8 +129,8 @@ class MaterialPoints:
         self.excess: Array = np.zeros((cells, n))
         self.released: Any = False
         self.softens = section_points.softening is not None
-        # Broken points have no stress where the law holds, but may have a stress at the end of a
-        # step, which is released as a numerical loss.
+        # Broken points have no stress at t_n+θ, where the law holds, but may have a stress at the
+        # end of a step.  Its energy is a numerical loss.
         over_step = scheme.average(0.0, 1.0) != 1.0
         releases = over_step and (self.softens or curved(section_points.kind))
         losses = {"plastic": section_points.yields, "hinges": self.softens}
@@ -161,7 +161,7 @@ class MaterialPoints:
             at[name][:] = values
         at["growth"][:] = at["direction"][:] = 0.0
         stress, slope = self._bulk(at)
-        first = stress[0]  # points that can open have only this component
+        first = stress[0]  # points that can open have one component
         over = np.abs(first) > at["traction"]  # P(51)
         closed = over & (at["flows"] == CLOSED) & (at["traction"] > 0) & self._search.hold
         closed &= np.logical_not(self.released)
@@ -230,17 +230,17 @@ class MaterialPoints:
     # -- discontinuities -------------------------------------------------------------------------
 
     def _growth(self, stress: Array, opens: Array) -> Array:
-        """Return the growth for equilibrium of bulk and discontinuity, by Newton within bounds."""
+        """Return the growth at which bulk stress equals resistance, by Newton steps in bounds."""
         at, length = self.at, self.at["length"]
 
         def excess(a: Array) -> tuple[Array, Array]:
-            """Return bulk stress less resistance of the discontinuity, and its derivative."""
+            """Return bulk stress minus resistance of the discontinuity, and its derivative."""
             borne, tangent = self._bulk({**at, "growth": a})
             resists, softens = derivative(partial(self._equations.resistance, at), a)
             over = at["direction"] * borne[0] - resists  # P(32)
             return over, -tangent[0, 0] / length - softens
 
-        # An elastic bulk has lost all its stress after this growth.
+        # After this growth, an elastic bulk has no stress.
         bound = np.abs(stress) / at["stiffness"] * length / self._scheme.theta
         bound += np.finfo(float).tiny
         digits = np.maximum(np.abs(at["before"]), np.abs(at["strain"])) * length
@@ -256,7 +256,7 @@ class MaterialPoints:
             low, high = np.where(over > 0, a, low), np.where(over > 0, high, a)
             better = a - over / slope
             step = np.abs(better - a)
-            # After a relative step of 1e-9 the next would be its square, below round-off.
+            # After a relative step of 1e-9, the next one is about 1e-18, below round-off.
             ends = np.isnan(roots) & ((step <= 1e-9 * a) | (step <= digits))
             roots = np.where(ends, np.where(better > 0, better, a), roots)
             if (none | ~np.isnan(roots)).all():
@@ -292,9 +292,9 @@ class MaterialPoints:
 
     @np.errstate(all="ignore")
     def change(self) -> float:
-        """Return the energy that the latest response stores and dissipates; J.
+        """Return the energy that is stored and dissipated in the step of the latest response; J.
 
-        Relaxing viscous stresses are counted by the trapezoidal rule.
+        Work of relaxing viscous stresses is integrated by the trapezoidal rule.
         """
         end = self._equations.end(self.at)
         bulk = end.worked + end.elastic + end.hardening + end.missed + end.relaxed
@@ -302,12 +302,12 @@ class MaterialPoints:
         return float(change + self._rest_energy(self.strains)) - sum(self.stored.values())
 
     def _rest_energy(self, strains: Array) -> float:
-        """Return the elastic energy of the stiffness without points; J."""
+        """Return the elastic energy of resultants without material points; J."""
         return float(np.sum(strains**2 @ self._section_points.rest / 2 * self.at["length"][:, 0]))
 
     @np.errstate(over="ignore")
     def accept(self) -> None:
-        """Accept the latest response, and enter its dissipation."""
+        """Accept the latest response, and enter its dissipation in the ledger."""
         at, α = self.at, self._scheme.alpha
         end = self._equations.end(at)
         plastic = np.sum(self._volume * end.worked, axis=1)
@@ -334,7 +334,7 @@ class MaterialPoints:
         self._update_accepted(self.strains)
 
     def start(self, strains: Array) -> None:
-        """Begin at these strains of the cells, without a step; (cells, 3)."""
+        """Compute the accepted state at strains of the cells, (cells, 3)."""
         softening, breaking = self._section_points.softening, self._section_points.breaking
         if softening is not None:
             self.at["traction"][:, breaking] = softening.traction(self.at["opening"][:, breaking])

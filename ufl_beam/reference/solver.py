@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Solver of a scene in time: the steps, and the state between steps.
 
-Read a step from :meth:`Solver.step_to` downwards: substeps, the initial guess, the search for
-openings, SNES with the sum of all forces, the check of static branches, acceptance.
+:meth:`Solver.step_to` takes a step: substeps, initial guess, search for points that open, SNES with
+the sum of all forces, check of static branches, acceptance.
 """
 
 from __future__ import annotations
@@ -48,25 +48,25 @@ MOST_SUBSTEPS = 2**12
 """Largest number of substeps of a step."""
 
 FIRST_TOLERANCE = 1e-4
-"""Fraction of the tolerance that first iterates have to meet."""
+"""Factor on the tolerance for the guess, in statics also for the first iterate."""
 
 STALL_LIMIT = 8
-"""Number of iterations without halving the least residual after which Newton's method stops."""
+"""Newton's method stops after this number of iterations that do not halve the least residual."""
 
 TRIAL_STEP = 1 / 16
 """Length of the trial step for initial accelerations, as a fraction of the first step."""
 
 APPLYING = 1 / 8
-"""Fraction of the first step, at its beginning, in which initially acting loads are applied."""
+"""Fraction of the first step, at its beginning, in which loads of the initial time are applied."""
 
 APPLYING_ROTATION = 0.02
 """Largest rotation of a node in a substep while these loads are applied; rad."""
 
 SHORT_SUBSTEP = 512
-"""Ratio of the time in which these loads are applied to the longest substep without this limit."""
+"""Time in which these loads are applied, divided by the longest substep without this limit."""
 
 EXCESS_DECAY = 0.7
-"""Factor of the largest excess above which points open; its exponent is the repetition."""
+"""Fraction of the largest excess above which points open; its power n in the n-th repetition."""
 
 EXCESS_TOLERANCE = 1e-9
 """Largest difference of excesses that count as equal."""
@@ -75,16 +75,16 @@ LARGEST_MOTION = 1e3
 """Largest motion in a static step that is no mechanism; rad, or divided by the scene's size."""
 
 KINK_WORK = 1e-6
-"""Largest difference of work and energy by kinks of laws, relative to the sum of the ledger."""
+"""Largest difference of work and energy due to kinks of laws, relative to the ledger's sum."""
 
 SAMPLE_TOLERANCE = 1e-9
-"""Fraction of a sample time by which the end of a step may miss it."""
+"""Largest distance of the end of a step from a sample time, divided by the sample interval."""
 
 REASONS = PETSc.SNES.ConvergedReason
 
 
 class Solver(PresentState):
-    """State of a scene, and the next step; controllers see it as the running simulation.
+    """State of a scene, and its time steps; controllers get this object as the simulation.
 
     Args:
         numbering: Numbering of the degrees of freedom.
@@ -93,7 +93,7 @@ class Solver(PresentState):
         q: Initial configuration; (size,).
         v: Initial velocities; (size,).
         rtol: Tolerance of the residual, relative to the forces in the scene.
-        max_iterations: Iterations before a step is cut.
+        max_iterations: Largest number of iterations before a step is cut.
         petsc: Options of SNES, without a prefix.
 
     Attributes:
@@ -166,7 +166,7 @@ class Solver(PresentState):
     def start(self, internal: dict[str, Array] | None, *, same: bool) -> None:
         """Begin with the internal variables of another run, if there are any.
 
-        ``same`` means that scene and time are as at the end of that run, so that no force has
+        ``same`` is True if scene and time are as at the end of that run, so that no force has
         jumped.
         """
         scheme, variables = self.scheme, dict(internal or {})
@@ -186,7 +186,7 @@ class Solver(PresentState):
             self.q = self.q.copy()
             for group in self.connectors:
                 self.q[group.forces_at] = group.before = group.at_rest
-        # Forces of beams at rest, in a step too short for viscous flow.
+        # Forces of beams at rest are computed in a step that is too short for viscous flow.
         short = Step.of(scheme, 0.0, sys.float_info.min, sys.float_info.min, self.q)
         for beam in self.beams:
             self._inner_before = self._inner_before + beam.response(short, self.q)[0]
@@ -203,7 +203,7 @@ class Solver(PresentState):
         self._sum_energies()
 
     def internal(self, variables: Mapping[str, Array] | None = None) -> dict[str, Array]:
-        """Return the data that later steps need, by name; entries of ``variables`` replace them."""
+        """Return the data that later steps need, by name; ``variables`` replace them first."""
         archive, supports = Archive(variables or {}), self.supports
         supports.before = supports.reactions = archive.vector("reactions", supports.before)
         for force in self.forces:
@@ -224,15 +224,15 @@ class Solver(PresentState):
         """Go to the time ``t1``, in one step or, if it fails, in substeps.
 
         Raises:
-            StepFailed: Even the smallest substep failed; the state is the end of the substep
-                before.
+            StepFailed: Even the smallest substep failed; the state is the end of the last
+                successful substep.
         """
         scheme, scene = self.scheme, self.scene
         at_end = has_inertia(scheme) or scheme.average(0.0, 1.0) == 1.0
         if self.parts == 0 and not self._continues and not at_end:
             frames = any(isinstance(load, RotatingFrame) for load in scene.loads)
             if frames or scene.works or any(f(self.t) != 0 for _, f in scene.time_functions()):
-                # Loads that act at the beginning are applied first, in a part of the step.
+                # Loads of the initial time are applied first, in a fraction of the step.
                 begin, end = self.t, self.t + APPLYING * (t1 - self.t)
                 self._in_substeps(end, partial(self._attempt, end=end, at_rest=begin))
                 self.last_dt = math.inf  # the next guess does not extrapolate these substeps
@@ -259,7 +259,7 @@ class Solver(PresentState):
     def _attempt(self, t1: float, end: float, at_rest: float | None = None) -> None:
         """Take the substep to ``t1`` of a whole step to ``end``.
 
-        If ``at_rest`` is given, the loads of that time are applied, and nodes must not turn far.
+        If ``at_rest`` is a time, the loads of that time are applied, and nodes must not turn far.
         """
         inertia = self.inertia
         if inertia is not None and inertia.scheme.kept and not inertia.more:
@@ -308,7 +308,7 @@ class Solver(PresentState):
         return float(np.abs(q1 - self.q)[self.numbering.rotations].max(initial=0.0))
 
     def _require_path(self, q1: Array, s: Array, in_beams: float, in_connectors: float) -> None:
-        """Raise :class:`StepFailed` if a static step has moved far or jumped to another branch.
+        """Raise :class:`StepFailed` if a static step leads far away or to another branch.
 
         Along a path of equilibria the work of the internal forces equals the energy that the step
         stores and dissipates.
@@ -333,7 +333,7 @@ class Solver(PresentState):
             )
 
     def _accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Accept the end of a step, and enter works and losses."""
+        """Accept the end of a step, and enter works and losses in the ledger."""
         self._inner_before = self._inner
         for force in self.forces:
             force.accept(step, q1, s)
@@ -353,11 +353,11 @@ class Solver(PresentState):
     # -- openings --------------------------------------------------------------------------------
 
     def _equilibrium(self, guess: Array, step: Step) -> Array:
-        """Find the equilibrium of a step without unnecessary openings.
+        """Find the equilibrium of a step without unnecessary opening and slip.
 
         A point or connector that does not flow at the beginning stays closed if an equilibrium
-        exists in which it bears at most its limit.  Of several above their limits, those with the
-        largest excess open first.
+        exists in which it bears at most its limit.  If several exceed their limits, the largest
+        excesses open first.
         """
         if not self._candidates:
             return self._newton(guess)
@@ -372,7 +372,7 @@ class Solver(PresentState):
             return x
         except StepFailed:
             if not self.search.over:
-                raise  # nothing would open
+                raise  # nothing was kept closed
         finally:
             self.search.hold = False
             for candidate in self._candidates:
@@ -402,7 +402,7 @@ class Solver(PresentState):
     # -- Newton's method -------------------------------------------------------------------------
 
     def _make_snes(self) -> None:
-        """Make the SNES of a step, whose unknowns are the free degrees of freedom."""
+        """Make the SNES of steps, whose unknowns are the free degrees of freedom."""
         petsc, n = self._petsc, len(self.supports.free)
         self._vector, f = (PETSc.Vec().createSeq(n) for _ in range(2))
         matrix = PETSc.Mat().createAIJ((n, n), comm=PETSc.COMM_SELF)
@@ -450,19 +450,19 @@ class Solver(PresentState):
         """Iterate with SNES; return its reason to stop."""
         try:
             self.snes.solve(None, self._vector)
-        except PETSc.Error as error:  # also if a callback is interrupted
+        except PETSc.Error as error:  # also raised if a callback is interrupted
             cause: BaseException = error
             while cause.__cause__ is not None:
                 cause = cause.__cause__
             if not isinstance(cause, PETSc.Error):
                 raise cause from None
-            self._make_snes()  # as MUMPS has found no pivot
+            self._make_snes()  # MUMPS has found no pivot
             return int(REASONS.DIVERGED_LINEAR_SOLVE)
         self.iterations += self.snes.getIterationNumber()
         return int(self.snes.getConvergedReason())
 
     def _all(self, vector: PETSc.Vec) -> Array:
-        """Return all degrees of freedom from the free ones."""
+        """Return all degrees of freedom from a vector of the free ones."""
         x = self._x.copy()
         x[self.supports.free] = vector.array_r
         return x
@@ -500,13 +500,13 @@ class Solver(PresentState):
         residual = max(
             (c.relative_residual(q1, r, scale, moved) for c in self.connectors), default=0.0
         )
-        # A guess that just meets the tolerance would miss a small load beside large ones.
+        # A guess that just meets the tolerance would ignore a small load beside large loads.
         least = 1 if self.inertia is not None else 2
         enough = self._rtol * scale * (FIRST_TOLERANCE if iteration < least else 1.0)
         if size <= enough and residual <= self._rtol:
             return REASONS.CONVERGED_FNORM_ABS
         digits = 8 * self._norm(self._round_off(x)) if iteration > 1 else 0.0
-        # Newton's method no longer halves a residual of round-off.
+        # A residual of round-off is no longer halved by Newton's method.
         stays = size <= digits and size > self._last / 2
         if iteration > 1 and stays and residual <= max(self._rtol, 1e-10):
             return REASONS.CONVERGED_FNORM_ABS
@@ -553,7 +553,7 @@ class Solver(PresentState):
                 self.rates.update(zip(group.connectors, map(float, rates), strict=True))
 
     def _due(self, connector: Connector) -> tuple[float, int]:
-        """Return the first sample time of a controller, s, and the number of the due sample."""
+        """Return the first sample time of a controller, s, and the index of the due sample."""
         sample, (first, _) = self._sampled[connector], self.samples.get(connector, (self.t, -1))
         digits = SAMPLE_TOLERANCE * sample + 4 * math.ulp(max(self.t, first, key=abs))
         return first, math.floor((self.t - first + digits) / sample)
@@ -575,7 +575,7 @@ class Solver(PresentState):
     # -- the state, by objects of the scene ------------------------------------------------------
 
     def connections(self) -> Array:
-        """Return the columns of ``Connection`` for all connectors; (num, columns)."""
+        """Return the columns of ``Connection`` for all connectors; (num_connectors, 5)."""
         table = np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
         for group in self.connectors:
             table[group.indices] = group.columns(self.q)
