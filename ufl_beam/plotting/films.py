@@ -95,6 +95,7 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
         try:
             subprocess.run(command, stdin=images, stderr=subprocess.PIPE, check=True)
         except subprocess.CalledProcessError as error:
+            path.unlink(missing_ok=True)
             words = error.stderr.decode(errors="replace").strip()
             raise RuntimeError(f"{program}: {words}") from None
         except BaseException:

@@ -21,7 +21,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
-from ufl_beam.errors import ArgumentError, StepFailed, warn
+from ufl_beam.errors import ModelError, StepFailed, warn
 from ufl_beam.mechanics.time_scheme import Step, with_half_tangents
 from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.output.recorder import StateView
@@ -284,7 +284,7 @@ class Stepper(StateView):
             motion = np.abs(x * scales).max()
             forces = np.linalg.norm((K @ x)[scales > 0] / scales[scales > 0])
             if forces <= FREE_STIFFNESS * newton.scale() * numbering.scene.size * motion:
-                raise ArgumentError(f"{loose}The loads do not hold it either. {INSTEAD}")
+                raise ModelError(f"{loose}The loads do not hold it either. {INSTEAD}")
         self._loose = ""
 
     # -- steps ---------------------------------------------------------------------------------
