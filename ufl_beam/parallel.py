@@ -299,8 +299,8 @@ class Copies:
     """Redundant computation of a small scene, once on each process.
 
     If a user's function draws random numbers or reads a clock, solutions may differ between
-    processes.  So the processes compare a weighted sum of all states so far: in the background after
-    1, 2, 4, ... and then every :data:`INTERVAL` steps, and before results are written or returned.
+    processes.  So the processes compare a weighted sum of all states so far: in the background
+    after 1, 2, 4, ... and then every :data:`INTERVAL` steps, and before results are written.
 
     Attributes:
         several: True if several processes each compute the scene; else nothing is compared.
