@@ -38,7 +38,7 @@ class Goodman(Record):
     """Goodman's line: equivalent range S / (1 − mean / ultimate) of a range S with a tensile mean.
 
     It is the straight line of the Haigh diagram, and Soderberg's line with the yield stress as
-    ``ultimate``.  A compressive mean has no effect.  From the mean ``ultimate`` on the life is zero.
+    ``ultimate``.  A compressive mean has no effect.  At a mean of ``ultimate`` the life is zero.
 
     Args:
         ultimate: Ultimate stress; Pa.
@@ -260,7 +260,7 @@ class RainflowCounter:
         return Cycles(unit * (high - low)[order], unit / 2 * (low + high)[order], count[order])
 
     def state(self) -> tuple[Array, Array]:
-        """Return (low, high, count) of cycles, (n, 3), and stored points; in units of resolution."""
+        """Return (low, high, count) of cycles, (n, 3), and stored points; unit: resolution."""
         counted = [(*ends, count) for ends, count in self._counts.items()]
         return np.array(counted, dtype=float).reshape(-1, 3), np.array(self._waiting, dtype=float)
 

@@ -41,7 +41,7 @@ CONNECTOR = ("motion", "force", "work")  # columns of a connector
 
 
 class History(Restartable):
-    """Recorder of motions, connectors and energies in a CSV file, which survives a crash.
+    """Recorder of motions, connectors and energies in a CSV file that is valid after a crash.
 
     The columns are the time or load factor; u, v, psi of each place; motion, force, work of each
     connector; and the entries of the energy ledger.  The names of the columns end in their units.
@@ -56,8 +56,7 @@ class History(Restartable):
             other row is deleted and ``every`` is doubled.
 
     Raises:
-        ArgumentError: ``every`` or ``max_rows`` is no positive whole number, or an argument has a
-            wrong type.
+        ArgumentError: An argument has a wrong type, or ``every`` or ``max_rows`` is not positive.
 
     Example:
         >>> table = ub.History("tip.csv", [beam.end])
@@ -130,7 +129,7 @@ class History(Restartable):
         self._length += len(line)
 
     def write(self, simulation: StateView) -> None:
-        """Write the row of the state after each ``every`` steps."""
+        """Write a row after every ``every`` steps."""
         self._steps += 1
         if self._steps == (self._max_rows + 1) * self._every:
             on_first(simulation.comm, self._drop_rows)
