@@ -95,7 +95,7 @@ class States:
         self.numbering, self.scene = numbering, numbering.scene
         self.cells = Cells(numbering)
         self._blocks = [*blocks]
-        self._computed: tuple[tuple[int, bytes], Array] | None = None  # latest result of `cell_forces`, with its key
+        self._computed: tuple[tuple[int, bytes], Array] | None = None  # latest `cell_forces`
         if like is not None:
             self.cells, self.between, self.begun = like.cells, like.between, like.begun
             self.forces_from_record = like.forces_from_record
@@ -103,7 +103,7 @@ class States:
     # -- rows ----------------------------------------------------------------------------------
 
     def free_rows(self, columns: Columns, number: int = 1) -> Array:
-        """Return up to ``number`` free rows after the last state; :meth:`grow` turns them into states.
+        """Return up to ``number`` free rows after the last state; :meth:`grow` makes them states.
 
         Blocks are never copied to a larger block, because freed memory may stay with the process.
         """
@@ -181,7 +181,7 @@ class States:
         return self._row("q", n - 1 if n and self.begun else n)
 
     def cell_resultants(self, n: int) -> Array:
-        """Return the resultants of cells, ``cell_number`` of loops.h, in a state; (9, num_cells)."""
+        """Return resultants of cells, ``cell_number`` of loops.h, in a state; (9, num_cells)."""
         columns, row = self.row(n)
         if FORCES in columns.at:
             return columns.column_of(FORCES, row)
@@ -408,7 +408,7 @@ class States:
         in the axes of the section, which turn with the beam.  Each cell has ``points`` equally
         spaced points, both ends included.  Under a uniform load V is linear between the points.
 
-        A run with ``start=`` begins with the section forces of the last step of the earlier run.
+        With ``start=`` and the same scheme, a run begins with the last forces of the earlier run.
         Other static runs begin without section forces, other dynamic runs with stresses only.
 
         Raises:
@@ -453,7 +453,7 @@ class States:
         return Material(chosen[:3].T, *chosen[3:])
 
     def cells_of(self, n: int, forces: Array | float = 0.0) -> Array:
-        """Return "material" of all cells; elastic cells have ``forces`` and zeros; (num_cells, 6)."""
+        """Return "material" of all cells, in elastic cells ``forces`` and zeros; (num_cells, 6)."""
         everything = np.zeros((len(self.numbering.cells), self.row(n)[0].shapes["material"][1]))
         everything[:, :3] = forces
         everything[self.numbering.inelastic_cells] = self._row("material", n)
