@@ -2,7 +2,7 @@
 """Planar flexible multibody dynamics with geometrically exact beams.  Units are SI.
 
 The examples in docstrings are run as tests.  They use the names of the example below: a cantilever
-with its solution, and a cantilever with a plastic hinge, which yields, at its clamped end.
+with its solution, and a cantilever whose plastic hinge at the clamped end softens.
 
 Example:
     >>> import numpy as np

@@ -94,7 +94,7 @@ def compile_form(form: ufl.Form, directory: Path) -> fem.Form:
     try:
         return fem.form(form, jit_options={"cache_dir": directory})
     finally:
-        logger.handlers = handlers  # FFCx replaces handlers, even for good if interrupted
+        logger.handlers = handlers  # FFCx does not restore them after an interrupt
 
 
 def form_key(form: ufl.Form) -> str:

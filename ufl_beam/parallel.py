@@ -299,8 +299,9 @@ class Copies:
     """Redundant computation of a small scene, once on each process.
 
     If a user's function draws random numbers or reads a clock, solutions may differ between
-    processes.  So the processes compare a weighted sum of all states so far: in the background
-    after 1, 2, 4, ... and then every :data:`INTERVAL` steps, and before results are written.
+    processes.  So the processes compare a weighted sum of all states so far.  They compare in the
+    background after 1, 2, 4, ... and then every :data:`INTERVAL` steps, and before results are
+    written or returned.
 
     Attributes:
         several: True if several processes each compute the scene; else nothing is compared.
@@ -347,7 +348,7 @@ class Copies:
             self._pending = None
 
     def _post(self, failed: float = 0.0) -> None:
-        """Begin a comparison: reduce the largest and the smallest sum over all processes."""
+        """Begin a comparison: find the largest and the smallest sum over all processes."""
         mine = np.array([self._sum, self._times, float(self._steps)])
         ends = np.concatenate([mine, -mine, [self._size, failed]])
         self._pending = self._comm.Iallreduce(MPI.IN_PLACE, ends, op=MPI.MAX), ends
