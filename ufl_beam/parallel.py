@@ -276,8 +276,8 @@ TOLERANCE = 1e-8
 SMALLEST_SUBDOMAIN = 6_000
 """Least number of cells per process for sharing a scene; else each process computes it whole.
 
-Measured with lattices on two cores: two processes are as fast as one process at some 3 000 cells
-each, and 1.2 times as fast at 6 000.
+Measured with lattices on two cores: at some 3 000 cells each, two processes are as fast as one; at
+6 000 cells each they are 1.2 times as fast.
 """
 
 INTERVAL = 256

@@ -4,8 +4,8 @@
 A file of a solution, study or checkpoint has named arrays and JSON, with a checksum.  The file is
 a zip archive in the format of ``numpy.savez``, so ``numpy.load`` reads it.  Its member
 ``text.json`` has all content except arrays.  The comment at the end of the archive has the kind of
-content, the number of the format, the version of ufl_beam, and the SHA-256 of all bytes before this
-checksum.
+content, the number of the format and the version of ufl_beam.  The file ends with the SHA-256 of
+all bytes before this checksum.
 """
 
 from __future__ import annotations

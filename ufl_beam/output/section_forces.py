@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Section forces along cells, from the forces between cells and nodes.
 
-At the ends of a cell, section forces are the forces between the cell and its nodes: by stresses,
-inertia, damping, loads and works (virtual works and potentials of users), see
-:mod:`ufl_beam.terms.cell_forces`.  So they are in equilibrium with supports, joints and other nodal
-forces, up to the residual of the step.  Between the ends they follow from the resultant, the couple
-and, without works, the first moments of the forces along the cell.
+At the ends of a cell, section forces are the forces between the cell and its nodes, see
+:mod:`ufl_beam.terms.cell_forces`.  Stresses, inertia, damping, loads and works (users' virtual works
+and potentials) cause them.  So section forces are in equilibrium with all nodal forces, up to the
+residual of the step.  Between the ends they follow from the resultant, the couple and, without
+works, the first moments of the forces along the cell.
 """
 
 from __future__ import annotations

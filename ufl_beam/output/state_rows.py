@@ -35,9 +35,9 @@ LEDGER = ("state", "supplied", "lost")
 """Parts of the energy ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
 
 FORCES, RECORD, BEFORE = "cell forces", "record", "before"
-"""Names of columns that only some states have: resultants of all cells, ``cell_number`` of loops.h;
-the record from which :meth:`CellForces.forces_from_record` computes them; q at the beginning of the
-step, if resultants depend on it and the previous row may have another q."""
+"""Columns that only some states have.  FORCES: resultants of all cells, ``cell_number`` of loops.h.
+RECORD: data from which :meth:`CellForces.forces_from_record` computes FORCES.  BEFORE: q at the
+beginning of the step, if FORCES depends on it and the previous row may have another q."""
 
 
 @in_one_line

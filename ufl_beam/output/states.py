@@ -341,9 +341,9 @@ class States:
         Reactions in directions that the support leaves free are zero.
 
         Each row belongs to the step that ends at its time.  In dynamics the first row is NaN.  In
-        statics the first row has the reactions of the initial state: zero if the scene is
-        undeformed, because loads act from the first step on; with ``start=``, the last reactions
-        of the earlier run.
+        statics the first row has the reactions of the initial state.  They are zero if the scene
+        is undeformed, because loads act from the first step on.  With ``start=`` they are the last
+        reactions of the earlier run.
 
         Raises:
             ArgumentError: The support is not in the scene.
@@ -463,8 +463,8 @@ class States:
         """Return the material state of the cell at a place at all times; (n+1, ...).
 
         ``forces`` are section forces in the middle of the cell.  If a plastic hinge is at the
-        place, ``forces[:, 2]`` is the moment of the hinge in the step that ends at each time,
-        ``jump`` its rotation, and ``hinge`` its dissipated energy.
+        place, ``forces[:, 2]`` is the moment of the hinge in each step, ``jump`` its rotation, and
+        ``hinge`` its dissipated energy.
 
         Raises:
             ArgumentError: The scene is elastic, or the beam is not in the scene.
