@@ -2,7 +2,7 @@
 """Scenes as JSON data: the class and the exact fields of each object.
 
 Users' functions are code, which is not saved.  Instead, functions of time are saved as values at
-the times of a solution, curves as sampled points, and other functions as names.  Users' laws and other
+the times of a solution, curves as points, and other functions as names.  Users' laws and other
 objects of users' classes are saved as fields and the name of the class.  They can be compared with
 a scene, but not rebuilt.
 """
