@@ -3,8 +3,8 @@
 
 At the ends of a cell, section forces are the forces between the cell and its nodes, see
 :mod:`ufl_beam.terms.cell_forces`.  Stresses, inertia, damping, loads and works (users' virtual
-works and potentials) cause them.  So section forces are in equilibrium with all nodal forces, up to the
-residual of the step.  Between the ends they follow from the resultant, the couple and, without
+works and potentials) cause them.  So section forces are in equilibrium with all nodal forces, up to
+the residual of the step.  Between the ends they follow from the resultant, the couple and, without
 works, the first moments of the forces along the cell.
 """
 
