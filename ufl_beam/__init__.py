@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Planar flexible multibody dynamics with geometrically exact beams.  Units are SI.
 
-The examples in docstrings, which are run as tests, use the names of the example below: a
-cantilever, and a second one with a plastic hinge, at its clamped end, that has opened.
+The examples in docstrings are run as tests.  They use the names of the example below: a cantilever
+with its solution, and a cantilever whose plastic hinge at the clamped end softens.
 
 Example:
     >>> import numpy as np
@@ -21,7 +21,7 @@ Example:
 
 from typing import NoReturn
 
-from ufl_beam import dolfinx_compat  # noqa: F401 - first, to explain missing packages
+from ufl_beam import dolfinx_compat  # noqa: F401 - first: its errors explain missing packages
 
 # isort: split
 
@@ -293,7 +293,7 @@ RESULTS = [
     "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView", "Energy",
     "Envelope", "Event", "Extent", "Film", "Modes", "Path", "Place", "Spot", "Tradeoff",
 ]  # fmt: skip
-"""Classes of results and of places, which functions and other objects return."""
+"""Classes of results and of places; functions and methods return their instances."""
 
 OLD_NAMES = {
     "Actuator": "PrescribedForce",
@@ -325,6 +325,6 @@ OLD_NAMES = {
 
 
 def __getattr__(name: str) -> NoReturn:
-    """Raise :class:`AttributeError`; for an old name, its message has the new name."""
+    """Raise :class:`AttributeError`; for an old name, the message has the new name."""
     new = f"; it is ufl_beam.{OLD_NAMES[name]} now" if name in OLD_NAMES else ""
     raise AttributeError(f"module 'ufl_beam' has no attribute {name!r}{new}")

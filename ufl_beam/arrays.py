@@ -15,7 +15,7 @@ Complex: TypeAlias = npt.NDArray[np.complex128]
 """Complex numbers."""
 
 Index: TypeAlias = npt.NDArray[Any]
-"""Integers, such as numbers of cells or of degrees of freedom."""
+"""Integers, such as indices of cells or of degrees of freedom."""
 
 State: TypeAlias = dict[str, Array]
-"""Arrays of a state, by name."""
+"""State of an object as arrays by name."""

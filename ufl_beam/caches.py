@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Caches of forms and of results that depend only on structure, and garbage collection.
 
-Sparsity patterns, chains and groups of nodes depend only on the structure of a scene.  Scenes that
-differ in numbers only, such as the members of a study, have the same structure.  Results that
-depend only on it are computed for the first of these scenes.  All other results are computed for
-each scene, so that the cache does not change a single bit of a simulation.
+Sparsity patterns and orders of elimination depend only on the connectivity of a scene: the
+structure.  Scenes that differ only in numbers, such as the members of a study, have the same
+structure.  The results for a structure are computed once.  Simulations with and without the cache
+agree in every bit, because all other results are computed for each scene.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ P = ParamSpec("P")
 Cached = TypeVar("Cached")
 
 MOST_CACHED = 64
-"""Largest number of results of each function that are kept."""
+"""Largest number of cached results of each function."""
 
 LARGEST = 2**16
-"""Largest size of the arguments of results that are kept: bytes of arrays plus whole numbers.
+"""Largest size of the arguments of a cached result: bytes of arrays plus values of whole numbers.
 
-Some 500 cells exceed it.  With this number of cells, a hundred steps take longer than building
-the scene.
+Scenes of more than some 500 cells exceed this size.  A hundred steps of such a scene take longer
+than building the scene.
 """
 
 
 def cached_forms(function: Callable[P, Cached]) -> Callable[P, Cached]:
-    """Let a function that states forms run once in a process for the same arguments."""
+    """Cache the results of a function that builds forms, in each process, by its arguments."""
     return cast("Callable[P, Cached]", lru_cache(maxsize=128)(function))
 
 
 def cached_by_structure(function: Callable[..., T]) -> Callable[..., T]:
-    """Let a function of index arrays and whole numbers run once for the same arguments.
+    """Cache the results of a function of index arrays and whole numbers, by its arguments.
 
     The function must depend only on its arguments and return a tuple of arrays.  The arrays become
-    read-only, because several callers share them.
+    read-only, because callers share them.
     """
 
     def locked(result: T) -> T:
@@ -76,8 +76,8 @@ def cached_by_structure(function: Callable[..., T]) -> Callable[..., T]:
 def no_garbage_collection() -> Iterator[None]:
     """Suspend automatic garbage collection, as a context or a decorator.
 
-    The collector looks at all objects again and again while their number grows.  This would take a
-    tenth of the time in which a scene of 100 000 beams is built.
+    The collector examines all objects repeatedly while their number grows.  This would take a tenth
+    of the time in which a scene of 100 000 beams is built.
     """
     was_enabled = gc.isenabled()
     gc.disable()

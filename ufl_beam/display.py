@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Texts for prompts, notebooks and pictures: one-line representations, HTML, names and units.
 
-Models and results do not depend on plotting: the modules that draw them register functions here.
+Models and results do not import plotting: modules that draw them register functions here.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any, NamedTuple, TypeVar
 
 T = TypeVar("T")
 
-FEW = 4  # size of the largest array whose numbers are written
+FEW = 4  # largest size of an array whose numbers are written
 
 
 class _Short(reprlib.Repr):
-    """Short texts: numbers of six digits, names of functions, shapes of arrays, parts of lists."""
+    """Short texts: numbers of six digits, names of functions, shapes of arrays, truncated lists."""
 
     def repr1(self, x: Any, level: int) -> str:
         if isinstance(x, float):
@@ -40,7 +40,7 @@ _SHORT.maxother = _SHORT.maxstring = 120
 
 
 def compact_repr(record: Any) -> str:
-    """Write a record as ``Mesh(refine=2)``, without fields that are empty or have their default."""
+    """Write a record as ``Mesh(refine=2)``, without empty mappings and default values."""
     fields = []
     for name, parameter in signature(type(record)).parameters.items():
         value = _SHORT.repr(getattr(record, name))
@@ -50,7 +50,7 @@ def compact_repr(record: Any) -> str:
 
 
 def in_one_line(kind: type[T]) -> type[T]:
-    """Give instances of a class, such as a named tuple, the text of :func:`compact_repr`."""
+    """Let a class, such as a named tuple, use :func:`compact_repr` as its ``repr``."""
     kind.__repr__ = compact_repr  # type: ignore[method-assign]
     return kind
 
@@ -70,7 +70,7 @@ def counted(*things: tuple[int, str, str]) -> str:
 
 @singledispatch
 def html_page(shown: object) -> str:
-    """Write an object as HTML: its text by default; a class may register another function."""
+    """Write an object as HTML, by default its text; classes may register other functions."""
     return f"<pre>{html.escape(str(shown))}</pre>"
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""DOLFINx 0.9 to 0.11: all code that depends on its version, and checks of the installation."""
+"""DOLFINx 0.9 to 0.11: code that depends on the version, and checks of the installation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WAYS = (
     'Get it by conda install -c conda-forge fenics-dolfinx "petsc=*=real*" slepc4py c-compiler, '
     "by apt-get install python3-dolfinx-real (Debian 13), or in the Docker image dolfinx/dolfinx"
 ) + (f"; or run through {SOURCES}/env, see docs/installation.md" * (SOURCES / "env").is_file())
-"""How to install DOLFINx, for an installed package and for a source tree."""
+"""Instructions to install DOLFINx, for an installed package and for a source tree."""
 
 try:
     from mpi4py import MPI
@@ -68,7 +68,7 @@ TABULATE = (
     "const uint8_t *permutation" + ("" if VERSION < (0, 10) else ", void *data"),
     "" if VERSION < (0, 10) else ", 0",
 )
-"""Parameters of an FFCx kernel in C, and the arguments of a call after the sixth."""
+"""Parameters of an FFCx kernel in C, and the arguments of a call after the first six."""
 
 
 def jit_directory() -> Path:
@@ -94,11 +94,11 @@ def compile_form(form: ufl.Form, directory: Path) -> fem.Form:
     try:
         return fem.form(form, jit_options={"cache_dir": directory})
     finally:
-        logger.handlers = handlers  # FFCx replaces them; an interrupt leaves the replacements
+        logger.handlers = handlers  # FFCx does not restore them after an interrupt
 
 
 def form_key(form: ufl.Form) -> str:
-    """Return a key that differs between forms if FFCx compiles them to different code."""
+    """Return a key of a form; keys differ if FFCx compiles forms to different code."""
     options = {k: v for k, v in _jit_options().items() if k not in ("cache_dir", "timeout")}
     system = [sysconfig.get_config_var(name) for name in ("CFLAGS", "EXT_SUFFIX")]
     ours = (form.signature(), ffcx.__version__, dolfinx.__version__, ffcx.get_options(), options)
@@ -106,7 +106,7 @@ def form_key(form: ufl.Form) -> str:
 
 
 def pack(form: fem.Form) -> tuple[Array, Array]:
-    """Pack the constants of a form and the coefficients of its cells; (n,), (num_cells, m)."""
+    """Return the packed constants (n,) and coefficients (num_cells, m) of a form over cells."""
     coefficients = cpp.fem.pack_coefficients(form._cpp_object)
     (cells,) = coefficients.values()
     topology = form.mesh.topology
@@ -116,14 +116,14 @@ def pack(form: fem.Form) -> tuple[Array, Array]:
 
 
 def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:
-    """Create a mesh of straight cells in the plane, on this process alone; points (n, 2) in m."""
+    """Create a plane mesh of straight cells (num_cells, 2) on this process; points (n, 2) in m."""
     line = ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(2,)))
     more = {} if VERSION < (0, 10) else {"max_facet_to_cell_links": 2}
     return mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=points, e=line, **more)
 
 
 def cell_coordinates(domain: mesh.Mesh) -> Array:
-    """Return the vertices of the cells; shape (num_cells, 2, 3); m."""
+    """Return the coordinates of the vertices of the cells; (num_cells, 2, 3); m."""
     geometry = domain.geometry
     dofmap = geometry.dofmap if VERSION < (0, 11) else geometry.dofmaps[0]
     return np.ascontiguousarray(geometry.x[dofmap])

@@ -22,19 +22,19 @@ LONGEST = 80
 """Largest number of characters of a value in a message."""
 
 BYTES_PER_CELL = 400
-"""Least memory of a cell on each process, for its vertices and the numbers of its unknowns; B."""
+"""Lower bound of the memory per cell on each process, for vertices and dof indices; bytes."""
 
 RAM = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-"""Memory of this machine; B."""
+"""Memory of this machine; bytes."""
 
 PACKAGE = os.path.join(os.path.dirname(__file__), "")
 """The directory of this package."""
 
 
 class ArgumentError(ValueError):
-    """Wrong argument of a call; raised before any computation begins.
+    """Wrong argument of a call, wrong result of a user's function, or unusable file.
 
-    The message names the object and the argument, the error and a remedy.
+    The message names the object and the error, and where possible a remedy.
 
     Example:
         >>> ub.Newton(rtol=-1.0)
@@ -54,7 +54,7 @@ class ArgumentTypeError(ArgumentError, TypeError):
 
 
 class ModelError(ArgumentError):
-    """Error in a model: a record is wrong, or records do not fit together.
+    """Error in a model: an object is wrong, or objects do not fit together.
 
     Example:
         >>> ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Pinned(beam.start)])
@@ -64,7 +64,7 @@ class ModelError(ArgumentError):
 
 
 class ModelWarning(UserWarning):
-    """Warning about a scene or a call that is probably wrong.
+    """Warning about a scene or a call that is probably a mistake.
 
     The message names the object, the problem and a remedy.  To silence these warnings:
     ``warnings.filterwarnings("ignore", category=ub.ModelWarning)``; to make them errors:
@@ -81,7 +81,7 @@ class ModelWarning(UserWarning):
 
 
 class StepFailed(Exception):
-    """A step failed; ``residuals`` and ``reason`` are as in :class:`ConvergenceError`."""
+    """Failure of a step; ``residuals`` and ``reason`` are as in :class:`ConvergenceError`."""
 
     def __init__(self, message: str, residuals: dict[str, float] | None = None) -> None:
         super().__init__(message)
@@ -90,23 +90,23 @@ class StepFailed(Exception):
 
 
 class NoNumber(StepFailed, ModelError):
-    """A user's function returned no finite number; a shorter step may avoid this."""
+    """Error of a function of the scene without a finite value; a shorter step may avoid it."""
 
 
 class ConvergenceError(RuntimeError):
-    """A step found no equilibrium, even after it was divided; ``solution`` has the results so far.
+    """Failure to find equilibrium in a step, even in substeps; ``solution`` has the results so far.
 
     Attributes:
-        time: Time of the last accepted state, on a path its load factor; s.
-        dt: The smallest step that was tried, on a path the change of the load factor; s.
+        time: Time of the last accepted state, s; in path following, its load factor.
+        dt: Smallest substep that was tried, s; in path following, the change of the load factor.
         solution: The :class:`~ufl_beam.simulation.solution.Solution` up to ``time``;
-            ``start=solution`` continues from there with another step or scheme.
-        residuals: Largest residual in each beam, body and connector, in descending order; N, with
-            moments divided by the size of the scene.  Empty if equilibria were found but refused.
+            ``start=solution`` continues from this time with another step or scheme.
+        residuals: Largest residual in each beam, body and connector, in descending order; N.
+            Moments are divided by the size of the scene.  Empty if an equilibrium was rejected.
         forces: Magnitudes of the forces by kind: "beams", "connectors", "loads", "inertia",
             "damping"; N.
-        reason: PETSc's name of the reason, such as "DIVERGED_MAX_IT"; empty if equilibria were
-            found but refused.
+        reason: PETSc's name of the reason, such as "DIVERGED_MAX_IT"; empty if an equilibrium was
+            found but rejected.
 
     Example:
         >>> pull = ub.PointLoad(weak.end, force=(0, -5e4), amplitude=lambda t: t)
@@ -139,7 +139,7 @@ class ConvergenceError(RuntimeError):
 
 
 class CopiesDiffer(RuntimeError):
-    """Processes that each compute the same small scene found different motions, or one failed.
+    """Error of redundant computations of a small scene: motions differ, or one process failed.
 
     Example:
         >>> try:
@@ -150,10 +150,10 @@ class CopiesDiffer(RuntimeError):
 
 
 class TradeoffError(RuntimeError):
-    """No setting can be recommended: the runs do not converge, or would take too long.
+    """Error of :func:`tradeoff`: the runs do not converge, or would take too long.
 
     Attributes:
-        runs: Runs so far, as in :attr:`Tradeoff.runs`.
+        runs: All runs so far, as in :attr:`Tradeoff.runs`.
 
     Example:
         >>> chance = np.random.default_rng(0)
@@ -173,7 +173,7 @@ class TradeoffError(RuntimeError):
 def warn(message: str) -> None:
     """Issue a :class:`ModelWarning` that points to the line of the user's script."""
     level, frame = 1, sys._getframe()
-    # Methods that ``dataclass`` generates are in <string>, wrappers of decorators in contextlib.
+    # Methods generated by ``dataclass`` are in <string>, wrappers of decorators in contextlib.
     library = (PACKAGE, "<string>", contextlib.__file__)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(library):
         level, frame = level + 1, frame.f_back
@@ -182,7 +182,7 @@ def warn(message: str) -> None:
 
 @contextlib.contextmanager
 def calling(what: str, remedy: str = "") -> Iterator[None]:
-    """Raise :class:`ModelError` with ``what`` and the line of the user's code that fails."""
+    """Turn errors in the context into :class:`ModelError` with ``what`` and the user's line."""
     try:
         with np.errstate(all="ignore"):
             yield
@@ -195,16 +195,16 @@ def calling(what: str, remedy: str = "") -> Iterator[None]:
 
 
 def shorten(value: object) -> str:
-    """Format a value for a message: its ``repr`` in one line, of readable length."""
+    """Format a value for a message as its ``repr`` in one line of at most :data:`LONGEST`."""
     try:
         text = " ".join(repr(value).split())
-    except Exception:  # of a user's class, or for an integer with too many digits
+    except Exception:  # by a user's class, or an integer with too many digits
         text = f"<{type(value).__name__}>"
     return clip(text)
 
 
 def clip(text: str) -> str:
-    """Cut a text in the middle to a readable length."""
+    """Shorten a text in the middle to :data:`LONGEST` characters."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 20]} ... {text[-15:]}"
 
 
@@ -231,7 +231,7 @@ def require_number(
 ) -> float:
     """Return ``value`` as a float in range, or raise :class:`ArgumentError` naming ``what``.
 
-    It must be finite; with ``infinite`` it may also be positive infinity.
+    The value must be finite; with ``infinite`` it may also be positive infinity.
     """
     try:
         number = as_float(value)
@@ -251,7 +251,7 @@ def require_number(
 
 
 def require_returned(value: object, function: str, at: str, *, finite: bool = False) -> float:
-    """Return the value of a user's function as a float; NaN and infinity pass unless ``finite``."""
+    """Return the value of a user's function as a float; it must be finite if ``finite``."""
     try:
         number = as_float(value)
     except (TypeError, ValueError, OverflowError):
@@ -264,7 +264,7 @@ def require_returned(value: object, function: str, at: str, *, finite: bool = Fa
 
 
 def require_count(value: Any, what: str, at_least: int = 1) -> int:
-    """Return ``value`` as a whole number in range, or raise :class:`ArgumentError`."""
+    """Return ``value`` as an integer >= ``at_least``, or raise :class:`ArgumentError`."""
     number = require_number(value, what)
     if number != int(number) or number < at_least or isinstance(value, bool):
         raise ArgumentError(
@@ -302,8 +302,8 @@ def require_all(value: Any, what: str, kind: type | tuple[type, ...]) -> tuple[A
 def closed(instead: str) -> Callable[[type[T]], type[T]]:
     """Forbid subclasses of a class of the model; ``instead`` is the advice to users.
 
-    Computations depend only on the class and fields of such an object.  They would ignore methods
-    and fields of a subclass.
+    Computations use only the class itself and its fields, so methods and fields of a subclass would
+    have no effect.
     """
 
     def close(kind: type[T]) -> type[T]:
@@ -320,7 +320,7 @@ def closed(instead: str) -> Callable[[type[T]], type[T]]:
 
 
 def require_text(value: Any, what: str) -> None:
-    """Raise :class:`ArgumentError` naming ``what`` unless ``value`` is text fit for files."""
+    """Raise :class:`ArgumentError` naming ``what`` unless files can hold ``value`` as text."""
     if not isinstance(value, str):
         raise ArgumentTypeError(f"{what} = {shorten(value)} must be text")
     if any(c == "\0" or "\ud800" <= c <= "\udfff" for c in value):
@@ -343,9 +343,9 @@ def require_function(value: Any, what: str, arguments: str) -> None:
 
 
 def require_capacity(cells: int, what: str) -> None:
-    """Raise :class:`ArgumentError` naming ``what`` if cells are too many for memory or indices.
+    """Raise :class:`ArgumentError` naming ``what`` if cells exceed the memory or the indices.
 
-    Each process stores the numbering of the whole scene.
+    Each process stores the numbering of the whole scene, with indices of 32 bits.
     """
     needed = cells * BYTES_PER_CELL
     if needed > RAM:
@@ -390,7 +390,7 @@ def require_array(values: Any, what: str) -> npt.NDArray[np.float64]:
 
 
 def require_row(values: Any, what: str) -> npt.NDArray[np.float64]:
-    """Return ``values`` as one row of finite numbers, or raise :class:`ArgumentError`."""
+    """Return ``values`` as finite numbers of shape (n,), or raise :class:`ArgumentError`."""
     row = require_array(values, what)
     if row.ndim != 1:
         raise ArgumentError(f"{what} has shape {row.shape}; give one row of numbers")

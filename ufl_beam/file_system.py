@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""File system: data brought to the disk, and locks between processes.
+"""File system: data flushed to the disk, and locks of files between processes.
 
-The operating system frees a lock when its process ends.  On a file system without locks, all
-processes get a lock at once.
+The operating system frees a lock when its process ends.  On a file system without locks, several
+processes can acquire the same lock.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import IO
 
 
 def is_at(file: int, path: Path) -> bool:
-    """Return whether ``path`` still leads to the open file ``file``."""
+    """Return whether ``path`` still refers to the open file with the descriptor ``file``."""
     try:
         return os.path.samestat(os.fstat(file), os.stat(path))
     except OSError:
@@ -23,7 +23,7 @@ def is_at(file: int, path: Path) -> bool:
 
 
 def sync(path: Path) -> None:
-    """Wait until a file or a directory is on the disk."""
+    """Flush a file or a directory to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -34,8 +34,8 @@ def sync(path: Path) -> None:
 def locked(path: Path, more: int = 0) -> IO[str]:
     """Open a file with an exclusive lock, which is released when the file is closed.
 
-    The process that has the lock may remove the file: processes that wait for it then create a new
-    one.  ``more`` are flags of ``flock``.
+    The owner of the lock may remove the file; waiting processes then create a new file.  ``more``
+    are additional flags of ``flock``; with ``LOCK_NB``, a taken lock raises BlockingIOError.
     """
     while True:
         file = path.open("a+", encoding="utf-8", errors="replace")
@@ -53,17 +53,17 @@ def locked(path: Path, more: int = 0) -> IO[str]:
 
 
 class Lock:
-    """Exclusive lock of a file, by a second file with ``.lock`` after the name of the first."""
+    """Exclusive lock of a file by means of a lock file, whose name has ``.lock`` appended."""
 
     def __init__(self, path: Path) -> None:
         self.path = path.with_name(path.name + ".lock")
         self._file: IO[str] | None = None
 
     def acquire(self) -> str:
-        """Take the lock and return an empty text, or return which process has it.
+        """Acquire the lock and return an empty text, or return the name of its owner.
 
         Raises:
-            OSError: The file of the lock cannot be written.
+            OSError: The lock file cannot be written.
         """
         try:
             self._file = locked(self.path, fcntl.LOCK_NB)
@@ -75,7 +75,7 @@ class Lock:
         return ""
 
     def release(self) -> None:
-        """Give the lock back, if it was taken, and remove its file."""
+        """Release the lock, if it was acquired, and remove the lock file."""
         if self._file is not None:
             self.path.unlink(missing_ok=True)
             self._file.close()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""MPI processes: computation of a scene by one or all, exceptions on all processes, output.
+"""MPI processes: distribution of scenes, exceptions on all processes, output.
 
-Without agreement, a process that fails alone would leave the other processes waiting forever in a
-collective call.
+If one process alone raised an exception, the other processes would wait forever in a collective
+call.  So all processes raise the exception.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, CopiesDiffer, StepFailed, shorten, warn
 
 with warnings.catch_warnings():
-    warnings.simplefilter("ignore")  # in a notebook without ipywidgets, where bars are text
+    warnings.simplefilter("ignore")  # of tqdm in a notebook without ipywidgets
     from tqdm.auto import tqdm
 
 T = TypeVar("T")
@@ -40,7 +40,7 @@ GRACE = 3.0
 """Time for which a failed process waits for the other processes; s."""
 
 FAILED = 32_749
-"""Tag of the messages of processes that end with an exception; MPI has tags up to 32767."""
+"""Tag of messages of processes that end with an exception; MPI guarantees tags up to 32767."""
 
 DELAY = 0.5
 """Time before a progress bar is shown, and between its updates; s."""
@@ -52,12 +52,12 @@ _ACTIVE: ContextVar[MPI.Intracomm] = ContextVar("processes of a scene", default=
 
 
 def active_comm() -> MPI.Intracomm:
-    """Return the processes that compute a scene if a call has no argument ``comm``."""
+    """Return the communicator of calls without an argument ``comm``."""
     return _ACTIVE.get()
 
 
 def communicator(comm: MPI.Intracomm | None, what: str) -> MPI.Intracomm:
-    """Return the processes of a call: its ``comm``, or by default :func:`active_comm`."""
+    """Return the communicator of a call: its ``comm``, or by default :func:`active_comm`."""
     if comm is None:
         return active_comm()
     if not isinstance(comm, MPI.Intracomm) or comm == MPI.COMM_NULL:
@@ -81,7 +81,7 @@ _DUPLICATE = MPI.Comm.Create_keyval()
 
 
 def duplicate(comm: MPI.Intracomm) -> MPI.Intracomm:
-    """Return a communicator of the same processes for agreements, made once for each ``comm``."""
+    """Return a duplicate of ``comm`` for internal messages; later calls return it again."""
     known: Any = comm.Get_attr(_DUPLICATE)
     if known is None:
         known = comm.Dup()
@@ -94,11 +94,11 @@ def duplicate(comm: MPI.Intracomm) -> MPI.Intracomm:
 
 
 class Agreement:
-    """Calls that raise on all processes if they raise on one.
+    """Collective calls of functions, whose exceptions are raised on all processes.
 
-    On one process they are plain calls.  On several they cost one reduction of an integer.  If the
-    others do not join the reduction of a failed process within :data:`GRACE`, because they may wait
-    for it elsewhere, the failed process prints its exception and aborts all processes.
+    On several processes each call costs one reduction of an integer.  The other processes may wait
+    for a failed process in another collective call.  If they do not join the reduction within
+    :data:`GRACE`, the failed process prints its exception and aborts all processes.
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
@@ -106,7 +106,7 @@ class Agreement:
         self.raised: BaseException | None = None  # latest exception that all processes raised
 
     def __call__(self, function: Callable[..., T], *arguments: Any) -> T:
-        """Call a function on all processes together."""
+        """Call a function on all processes together; all raise if one raises."""
         if self._comm is None:
             return function(*arguments)
         error: BaseException | None = None
@@ -118,7 +118,7 @@ class Agreement:
         return value
 
     def synchronize(self, error: BaseException | None) -> None:
-        """Raise on all processes if one of them has an exception; all call it together.
+        """Raise on all processes if one of them has an exception; all processes call this method.
 
         Any other exception takes precedence over a failed step, after which the run may continue.
         """
@@ -167,7 +167,7 @@ def portable(error: BaseException | None) -> BaseException | None:
 
 
 def _completed(*requests: MPI.Request) -> bool:
-    """Wait for communication up to :data:`GRACE`; return whether it completed."""
+    """Wait at most :data:`GRACE` for communication; return whether it has completed."""
     end = time.monotonic() + GRACE
     while not MPI.Request.Testall(list(requests)):
         if time.monotonic() > end:
@@ -201,8 +201,8 @@ def _end(kind: type[BaseException], error: BaseException, trace: TracebackType |
         _print_exception(kind, error, trace)
     if MPI.Is_finalized() or MPI.COMM_WORLD.size == 1:
         return
-    # MPI ends a process only when all processes end.  A collective call could match a different
-    # call of the other processes, so messages are sent instead.
+    # A process that ends waits in MPI_Finalize for all processes.  A collective call could match
+    # a different collective call of another process, so messages are sent instead.
     world = MPI.COMM_WORLD
     others = [rank for rank in range(world.size) if rank != world.rank]
     told = [world.Isend(bytearray(), rank, FAILED) for rank in others]
@@ -212,7 +212,7 @@ def _end(kind: type[BaseException], error: BaseException, trace: TracebackType |
 
 
 def _write_to_nowhere() -> bool:
-    """Return whether the output has no reader; then redirect the rest to the null device."""
+    """Return whether the output has no reader; if so, redirect it to the null device."""
     try:
         output = sys.stdout.fileno()
         poll = select.poll()
@@ -229,8 +229,8 @@ _print_exception = sys.excepthook
 sys.excepthook = _end
 atexit.register(_write_to_nowhere)
 with suppress(ValueError):  # not in the main thread
-    # `dolfinx_compat` has imported PETSc, whose signal handler prints a page of text.  Restore the
-    # exception of Python.
+    # PETSc has replaced Python's handler by a handler that prints a page of text.  Restore
+    # Python's handler, so that writing raises BrokenPipeError.
     signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
 
 
@@ -249,10 +249,10 @@ def print_once(*words: object, sep: str = " ") -> None:
 
 
 def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
-    """Create a tqdm bar, which the first process shows in a terminal or notebook.
+    """Create a progress bar of tqdm; the first process shows it in a terminal or notebook.
 
-    Members of a study show no bar, and work of less than half a second shows none.  A notebook
-    shows none if its kernel has TQDM_DISABLE=1 in its environment, as for documentation.
+    Members of a study and work of less than half a second have no visible bar.  In a notebook,
+    TQDM_DISABLE=1 in the environment of the kernel hides bars, for example in documentation.
 
     Args:
         shown: Whether the user wants a bar.
@@ -264,7 +264,7 @@ def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
     if not shown or comm.rank > 0 or active_comm() != MPI.COMM_WORLD:
         options["disable"] = True
     elif shell is None or "IPKernelApp" not in shell.config:
-        options["disable"] = None  # unless the output is a terminal
+        options["disable"] = None  # no bar unless the output is a terminal
     return tqdm(delay=DELAY, mininterval=DELAY, **options)
 
 
@@ -274,10 +274,10 @@ TOLERANCE = 1e-8
 """Largest relative difference of motions that count as equal; it is far above round-off."""
 
 SMALLEST_SUBDOMAIN = 6_000
-"""Processes share a scene with at least this number of cells per process; else each computes it.
+"""Least number of cells per process for sharing a scene; else each process computes it whole.
 
-Measured with lattices on two cores: two processes break even at some 3 000 cells each, and are 1.2
-times as fast at 6 000; see docs/ranks.md.
+Measured with lattices on two cores: at some 3 000 cells each, two processes are as fast as one; at
+6 000 cells each they are 1.2 times as fast.
 """
 
 INTERVAL = 256
@@ -287,24 +287,24 @@ LONGEST_WAIT = 20.0
 """Time for which a process waits for the other processes before it warns; s."""
 
 _left: list[tuple[MPI.Request, Array]] = []
-"""Abandoned comparisons, whose buffers MPI needs until they are complete."""
+"""Abandoned comparisons; MPI needs their buffers until the communication is complete."""
 
 
 def sharing(comm: MPI.Intracomm, cells: int) -> MPI.Intracomm:
-    """Return the processes that share a scene of ``cells`` cells: all, or this process alone."""
+    """Return the communicator that shares a scene: ``comm``, or MPI.COMM_SELF for few cells."""
     return comm if cells >= comm.size * SMALLEST_SUBDOMAIN else MPI.COMM_SELF
 
 
 class Copies:
     """Redundant computation of a small scene, once on each process.
 
-    If a user's function draws random numbers or reads a clock, the scene and its solution differ
-    between processes.  So all processes compare a weighted sum of all states so far: in the
+    If a user's function draws random numbers or reads a clock, solutions may differ between
+    processes.  So the processes compare a weighted sum of all states so far.  They compare in the
     background after 1, 2, 4, ... and then every :data:`INTERVAL` steps, and before results are
     written or returned.
 
     Attributes:
-        several: Whether several processes each compute the scene; else there is no comparison.
+        several: True if several processes each compute the scene; else nothing is compared.
     """
 
     def __init__(
@@ -348,14 +348,14 @@ class Copies:
             self._pending = None
 
     def _post(self, failed: float = 0.0) -> None:
-        """Begin a comparison: find the largest and the smallest sum among all processes."""
+        """Begin a comparison: find the largest and the smallest sum over all processes."""
         mine = np.array([self._sum, self._times, float(self._steps)])
         ends = np.concatenate([mine, -mine, [self._size, failed]])
         self._pending = self._comm.Iallreduce(MPI.IN_PLACE, ends, op=MPI.MAX), ends
         self._compared = self._steps
 
     def _complete(self) -> None:
-        """Wait for a pending comparison, and raise if states differ."""
+        """Complete a pending comparison; raise :class:`CopiesDiffer` if states differ."""
         if self._pending is None:
             return
         (request, ends), self._pending = self._pending, None

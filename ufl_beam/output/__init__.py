@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Output files, recorders, and their view of a run."""
+"""Recorders, output files, and the states of a run that they read."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""State of a simulation as functions and forms of DOLFINx, for forms of users and for files."""
+"""State of a simulation as functions and forms of DOLFINx, for users' forms and for files."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class BeamForms(NamedTuple):
 
     Attributes:
         q0, q1: Configurations at the beginning and at the end of a step.
-        work: Virtual work of the resultants in the step from q0 to q1, P(12); linear.
-        tangent: Derivative of ``work`` by q1; bilinear.
-        mass: Mass of the beams without point masses and bodies, P(67); bilinear.
+        work: Linear form: virtual work of the resultants in the step from q0 to q1, P(12).
+        tangent: Bilinear form: derivative of ``work`` with respect to q1.
+        mass: Bilinear form: mass of the beams, without point masses and bodies, P(67).
     """
 
     q0: fem.Function
@@ -43,14 +43,14 @@ class BeamForms(NamedTuple):
 
 
 def put_in_cells(function: fem.Function, values: Array) -> fem.Function:
-    """Set the values of a function at the degrees of freedom of each cell; (num_cells, ...)."""
+    """Set a function to values at the degrees of freedom of each cell, (num_cells, ...)."""
     dofs = dofs_of_cells(function.function_space)
     function.x.array[dofs] = values.reshape(dofs.shape)
     return function
 
 
 class DolfinxView:
-    """Mesh, functions and forms of a simulation, in the types of DOLFINx; ``simulation.dolfinx``.
+    """Mesh, functions and forms of a simulation as objects of DOLFINx: ``simulation.dolfinx``.
 
     A function is created at its first access.  Each access returns the same object, updated to the
     accepted state.  Functions are copies, so a change of their values does not affect the run.  If
@@ -59,7 +59,7 @@ class DolfinxView:
     ``view.mesh.comm`` are incomplete; :meth:`total` integrates over the whole scene.
 
     Each beam has its own vertices, also at joints.  So a function on the mesh may jump at a joint.
-    :attr:`dofs` has the degree of freedom of the scene for each degree of freedom of the mesh.
+    :attr:`dofs` maps degrees of freedom of :attr:`function_space` to entries of ``simulation.q``.
 
     Example:
         >>> from dolfinx import fem
@@ -73,7 +73,7 @@ class DolfinxView:
         True
     """
 
-    def __init__(self, view: Any) -> None:  # a `StateView`, which is above this module
+    def __init__(self, view: Any) -> None:  # a `StateView`, which this module must not import
         self._view = view
         self._fields = DolfinxFields(view.subdomain)
         self._functions: dict[str, fem.Function] = {}
@@ -85,12 +85,12 @@ class DolfinxView:
 
     @property
     def mesh(self) -> meshes.Mesh:
-        """Mesh of the cells of this process, in the plane, undeformed; m."""
+        """Undeformed plane mesh of the cells of this process; m."""
         return self._fields.mesh
 
     @cached_property
     def cells(self) -> Index:
-        """Number in the scene of each cell of the mesh, as an index of rows of section forces.
+        """Index of each mesh cell in the scene and in arrays of section forces; (num_cells,).
 
         Example:
             >>> simulation.section_forces()[view.cells].shape
@@ -100,7 +100,7 @@ class DolfinxView:
 
     @cached_property
     def cell_tags(self) -> meshes.MeshTags:
-        """Number in ``scene.beams`` of the beam of each cell.
+        """Index in ``scene.beams`` of the beam of each cell.
 
         Example:
             >>> import ufl
@@ -114,12 +114,12 @@ class DolfinxView:
 
     @property
     def function_space(self) -> fem.FunctionSpace:
-        """Space of configurations (u_x, u_y, ψ): continuous, P1 with cells of degree 1."""
+        """Space of (u_x, u_y, ψ): continuous Lagrange elements of the degree of the cells."""
         return self._fields.element.space
 
     @cached_property
     def dofs(self) -> Index:
-        """Local scene degree of freedom for each degree of freedom of :attr:`function_space`.
+        """Index in ``simulation.q`` of each degree of freedom of :attr:`function_space`; (size,).
 
         Example:
             >>> import ufl
@@ -139,18 +139,18 @@ class DolfinxView:
 
     @property
     def dx(self) -> ufl.Measure:
-        """Measure of the cells at the quadrature points of the resultants, one at degree 1."""
+        """Measure of the cells with the quadrature of the resultants: one point at degree 1."""
         return self._fields.element.dx(1)
 
     def total(self, integral: ufl.Form | Expr) -> float:
-        """Integrate over the beams of the scene on all processes, which call it together.
+        """Integrate over the beams of the scene; all processes call the method together.
 
         Args:
-            integral: Form over cells without arguments, or a scalar expression, which is integrated
-                with the degree that UFL estimates.
+            integral: Form over cells without test or trial functions, or a scalar expression.  UFL
+                estimates the quadrature degree for an expression.
 
         Raises:
-            ArgumentError: ``integral`` is of another type, on another mesh, or over facets.
+            ArgumentError: ``integral`` has another type or mesh, or integrates over facets.
 
         Example:
             >>> length = view.total(1.0 * view.dx)
@@ -187,7 +187,7 @@ class DolfinxView:
 
     @property
     def velocity(self) -> fem.Function:
-        """Velocity of the configuration in the accepted state; m/s, m/s, rad/s.
+        """Velocity (du_x/dt, du_y/dt, dψ/dt) of the accepted state; m/s, m/s, rad/s.
 
         Raises:
             ArgumentError: The scheme is static.
@@ -198,15 +198,15 @@ class DolfinxView:
 
     @property
     def strains(self) -> fem.Function:
-        """Strains (Σ, Γ, K) of the configuration, means of the cells; 1, 1, 1/m.
+        """Strains (Σ, Γ, K) of the configuration as means over the cells; 1, 1, 1/m.
 
-        They include jumps; strains of the bulk do not, see ``mechanics/functional.py``.
+        K includes the :attr:`jump` of a hinge, divided by the length of its cell.
         """
         return self._function("strains", self._view.now.mean_strains(0)[self.cells])
 
     @property
     def forces(self) -> fem.Function:
-        """Section forces (N, V, M) in the middle of the cells, in the last step; N, N, N m.
+        """Section forces (N, V, M) in the middle of the cells in the last step; N, N, N m.
 
         Example:
             >>> M = view.forces.x.array.reshape(-1, 3)[:, 2]
@@ -217,10 +217,10 @@ class DolfinxView:
 
     @property
     def jump(self) -> fem.Function:
-        """Jump α of the rotation in the hinge of each cell, in DG0; rad.
+        """Jump α of the rotation in the hinge of each cell, constant in the cell; rad.
 
         A plastic hinge of zero length belongs to the cell before it, at the start of a beam to the
-        first cell.  If a cell has several jumps, the value is the largest jump.
+        first cell.  If a cell has several jumps, the value is the jump of the largest magnitude.
 
         Raises:
             ArgumentError: No beam of the scene has a hinge.
@@ -240,7 +240,7 @@ class DolfinxView:
         return self._function("jump", self._view.damage()[0][self.cells])
 
     def _function(self, name: str, values: Array) -> fem.Function:
-        """Return the function of a quantity after setting its values, cell by cell."""
+        """Return the function with this name after setting its ``values`` in each cell."""
         if name not in self._functions:
             element = self._fields.element
             space = element.stiffness.function_space
@@ -255,10 +255,10 @@ class DolfinxView:
 
     @property
     def forms(self) -> BeamForms:
-        """Forms of the beams in the time scheme at the accepted state, which is both q0 and q1.
+        """Forms of the beams in the time scheme; q0 and q1 are both the accepted configuration.
 
-        Cells that may yield or break have the resultants of the state, and the consistent tangent
-        of a step like the last step.
+        Cells that may yield or break have the resultants of the accepted state, and the consistent
+        tangent of a step as long as the last step.
 
         Example:
             >>> forms = view.forms
@@ -282,9 +282,9 @@ class DolfinxView:
 
     @cached_property
     def _forms(self) -> BeamForms:
-        """Forms, which are stated once.
+        """Forms, which are built once.
 
-        The elastic stiffness is zero in cells with material points; b and D are zero in others.
+        The elastic stiffness is zero in cells with material points; b and D are zero in all others.
         """
         element, scheme = self._fields.element, self._view.scheme
         self._around: tuple[fem.Function, ...] = ()

@@ -27,8 +27,8 @@ from ufl_beam.terms.cell_forces import CellForces
 
 
 @in_one_line
-class Extent(NamedTuple):  # with the fields of ``extent`` of loops.h
-    """Smallest and largest values of a run and their times; arrays of one shape.
+class Extent(NamedTuple):  # with the fields of ``extent`` in loops.h
+    """Smallest and largest values in a run and their times, as arrays of the same shape.
 
     Attributes:
         low: The least values.
@@ -50,7 +50,7 @@ class Extent(NamedTuple):  # with the fields of ``extent`` of loops.h
     time_high: Array
 
     def of(self, rows: Index) -> Extent:
-        """Return the extremes of some of the rows."""
+        """Return the extremes at an index of the arrays, such as rows or (row, column)."""
         return Extent(*(values[rows] for values in self))
 
 
@@ -61,18 +61,18 @@ class Extent(NamedTuple):  # with the fields of ``extent`` of loops.h
 def along_cells(
     element: Element, fractions: tuple[float, ...], works: bool
 ) -> tuple[ufl.Form, fem.Function, fem.Function, fem.Function]:
-    """State :func:`section_force` as a form; its entries are (N, V, M).
+    """Build a form of :func:`section_force`; its entries in a cell are (N, V, M) at the fractions.
 
-    If all fractions are ends of cells, displacements and forces between the ends do not matter.
+    If all fractions are 0 or 1, displacements and forces between the ends have no effect.
 
     Returns:
-        The form, and its coefficients: degrees of freedom of a cell, all or for ends only the last,
-        the rotations; the first numbers ``cell_number`` of loops.h; ``ForcesAlongCells.angles``.
+        The form, and its coefficients: degrees of freedom of a cell, or only rotations if all
+        fractions are 0 or 1; resultants (``cell_number`` of loops.h); ``ForcesAlongCells.angles``.
     """
     mesh, h, between = Mesh(degree=element.degree), element.axis.h, set(fractions) > {0.0, 1.0}
     n = len(mesh.nodes)
     first, moves = (lib.CELL_NUMBERS, 3 * n) if between else (lib.COUPLE, n)
-    # Coefficients are constant in cells: interpolation would take longer than the rest of the form.
+    # Coefficients are constant in cells, because interpolation would take most of the time.
     motions, resultants, angles, values = map(
         element.in_cells, (moves, first, 2, 3 * len(fractions))
     )
@@ -106,8 +106,8 @@ class ExtremesInC:
     """Extremes of section forces at points of cells, and of motions, for a scene on one process.
 
     Attributes:
-        c: ``watch`` of loops.h.
-        seen: Number of steps up to the last included state.
+        c: Struct ``watch`` of loops.h.
+        seen: Number of steps up to the state that Python included last.
     """
 
     def __init__(
@@ -139,7 +139,7 @@ class ExtremesInC:
             fill(c, size=len(extent.low), **extent._asdict())
 
     def add(self, steps: int, t: float, q: Array, before: Array) -> None:
-        """Include the state after ``steps`` steps, unless C has already included it."""
+        """Include the state after ``steps`` steps, unless :attr:`seen` is the same number."""
         if steps == self.seen:
             return
         resultants = self._forces(q, before)
@@ -149,7 +149,7 @@ class ExtremesInC:
         self.seen = steps
 
     def begin(self, steps: int, forces: Extent, motion: Extent) -> None:
-        """Begin with the extremes after ``steps`` steps, as :meth:`extents` returns them."""
+        """Set the extremes after ``steps`` steps, in the form that :meth:`extents` returns."""
         for to, values in zip(self._extents[0], forces, strict=True):
             to[:] = in_batches(values, self._batch).ravel()
         for to, values in zip(self._extents[1], motion, strict=True):
@@ -157,7 +157,7 @@ class ExtremesInC:
         self.seen = steps
 
     def extents(self) -> list[Extent]:
-        """Return extremes and times: of forces, (num_cells, points, 3), and motions, (size,)."""
+        """Return the extremes of section forces, (num_cells, points, 3), and motions, (size,)."""
         forces, motion = self._extents
         shape = -1, 3 * self._points, self._batch
         in_cells = (
@@ -173,15 +173,15 @@ class ExtremesInC:
 class Extremes(Restartable):
     """Recorder of the extremes of section forces along all cells and of motions of all nodes.
 
-    All steps are included, even if the solution does not keep them; memory does not grow.  Section
-    forces are taken at equally spaced points of each cell, both ends included; they agree with
-    :meth:`Solution.diagram`.
+    All steps are included, even if the solution does not store them.  Memory does not grow with the
+    number of steps.  Section forces are evaluated at equally spaced points of each cell, both ends
+    included, as in :meth:`Solution.diagram`.
 
     Args:
         points: Number of points of a cell, at least 2.
 
     Raises:
-        ArgumentError: ``points`` is less than 2.
+        ArgumentError: ``points`` is no number of at least 2.
 
     Example:
         >>> extremes = ub.Extremes()
@@ -234,7 +234,7 @@ class Extremes(Restartable):
                     when[beyond] = simulation.t
 
     def close(self) -> None:
-        """End the record; the extremes remain."""
+        """Stop recording; the extremes remain available."""
         self._taken, self._in_c = self._extents, None
 
     @property
@@ -271,7 +271,7 @@ class Extremes(Restartable):
     def section_forces(self, beam: Member) -> Extent:
         """Return extremes of (N, V, M) at points of the cells of a beam; N, N, N m.
 
-        Rows have the order of a :class:`Diagram` with the same points; (num_cells points, 3).
+        Rows have the order of a :class:`Diagram` with the same points; (num_cells · points, 3).
 
         Raises:
             ArgumentError: The beam is not in the scene, or nothing was run.
@@ -282,8 +282,8 @@ class Extremes(Restartable):
     def displacement(self, owner: Member | Body) -> Extent:
         """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
 
-        Rows follow a beam from start to end: its vertices, between them the inner nodes of a mesh
-        of higher degree.  At a hinge ψ agrees with :meth:`Solution.displacement` at the place.
+        Rows follow a beam from start to end: its vertices and, between them, the inner nodes of
+        cells of higher degree.  At a hinge ψ is as in :meth:`Solution.displacement` of the place.
 
         Raises:
             ArgumentError: The object is not in the scene, or nothing was run.

@@ -28,17 +28,17 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.model.records import Instance, Positive, Record
 from ufl_beam.output.recorder import Restartable, StateView
 
-BLOCK = 1000  # number of steps that are collected before cycles are counted
+BLOCK = 1000  # number of steps between counts of cycles
 
 # -- mean stresses and S-N curves -----------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Goodman(Record):
-    """Goodman's line: equivalent range S / (1 − mean / ultimate) of a range S about a tensile mean.
+    """Goodman's line: equivalent range S / (1 − mean / ultimate) of a range S with a tensile mean.
 
     It is the straight line of the Haigh diagram, and Soderberg's line with the yield stress as
-    ``ultimate``.  A compressive mean has no effect.  At the mean ``ultimate`` the life is zero.
+    ``ultimate``.  A compressive mean has no effect.  At a mean of ``ultimate`` the life is zero.
 
     Args:
         ultimate: Ultimate stress; Pa.
@@ -55,7 +55,7 @@ class Goodman(Record):
     _power: ClassVar[int] = 1
 
     def __call__(self, range: Array, mean: Array) -> Array:
-        """Compute equivalent ranges of cycles; infinite if the mean leaves no strength; Pa."""
+        """Compute equivalent ranges; infinite if the mean is at least ``ultimate``; (n,); Pa."""
         left = 1 - (np.maximum(mean, 0.0) / self.ultimate) ** self._power
         infinite = np.full_like(range, np.inf)
         return np.asarray(np.divide(range, left, out=infinite, where=left > 0))
@@ -63,7 +63,7 @@ class Goodman(Record):
 
 @dataclass(frozen=True)
 class Gerber(Goodman):
-    """Gerber's parabola: equivalent range S / (1 − (mean / ultimate)²), as :class:`Goodman`.
+    """Gerber's parabola: equivalent range S / (1 − (mean / ultimate)²); see :class:`Goodman`.
 
     Args:
         ultimate: Ultimate stress; Pa.
@@ -98,15 +98,15 @@ class SNCurve(Record):
     Args:
         range: Stress range that leads to failure after ``cycles``; Pa.
         cycles: Number of cycles to failure at ``range``.
-        slope: m of N = cycles (range / S)^m.
+        slope: Exponent m of N = cycles (range / S)^m, with N cycles to failure at the range S.
         knee: Number of cycles at which the slope changes.
         slope_beyond: Slope above ``knee`` cycles.
-        limit: Number of cycles to failure above which a range does no damage.
-        mean: Function of ranges and mean stresses for equivalent ranges, such as :class:`Goodman`.
+        limit: Number of cycles to failure beyond which a stress range does no damage.
+        mean: Function (range, mean) that returns equivalent ranges, such as :class:`Goodman`.
 
     Raises:
-        ArgumentError: A number is not positive, ``limit`` is less than ``knee``, or ``mean`` is no
-            function.
+        ArgumentError: A number is not positive, ``limit`` is less than a finite ``knee``, or
+            ``mean`` is no function.
 
     Example:
         >>> curve = ub.SNCurve.eurocode(71e6)
@@ -135,16 +135,16 @@ class SNCurve(Record):
 
     @classmethod
     def eurocode(cls, category: float) -> SNCurve:
-        """Make a curve of EN 1993-1-9: slope 3 to 5e6 cycles, 5 to 1e8, no damage beyond.
+        """Make a curve of EN 1993-1-9: slope 3 up to 5e6 cycles, 5 up to 1e8, no damage beyond.
 
         Args:
-            category: Detail category, the range for 2e6 cycles to failure, such as 71e6; Pa.
+            category: Detail category: stress range with 2e6 cycles to failure, such as 71e6; Pa.
         """
         require_number(category, "SNCurve.eurocode: category", positive=True)
         return cls(range=category, cycles=2e6, slope=3.0, knee=5e6, slope_beyond=5.0, limit=1e8)
 
     def endurance(self, range: npt.ArrayLike, mean: npt.ArrayLike = 0.0) -> Array:
-        """Compute cycles to failure of ranges about means, both Pa; infinite beyond the limit."""
+        """Compute cycles to failure from ranges and means (Pa); infinite beyond ``limit``."""
         ranges, means = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (range, mean)))
         with np.errstate(divide="ignore"):
             first = self.cycles * (self.range / self.mean(ranges, means)) ** self.slope
@@ -182,14 +182,14 @@ class Cycles:
     __repr__ = compact_repr
 
     def damage(self, curve: SNCurve) -> float:
-        """Compute Miner's sum: the fraction of the life that is used, 1 at failure."""
+        """Compute Miner's sum: the fraction of the life that the cycles use; 1 at failure."""
         with np.errstate(divide="ignore"):  # zero cycles to failure
             return float(np.sum(self.count / curve.endurance(self.range, self.mean)))
 
     def equivalent(self, curve: SNCurve) -> float:
         """Compute the constant range that does the same damage in the same number of cycles; Pa.
 
-        The first slope alone is used, as is usual for damage equivalent ranges.
+        Only ``slope`` is used, not ``slope_beyond``, as is usual for damage-equivalent ranges.
         """
         m, ranges = curve.slope, curve.mean(self.range, self.mean)
         total = self.count.sum()
@@ -218,9 +218,9 @@ def rainflow(series: npt.ArrayLike) -> Cycles:
 class RainflowCounter:
     """Rainflow counter of a series that comes in pieces.
 
-    With a ``resolution`` (Pa), values are rounded to its multiples.  So cycles fall into classes,
-    whose number limits the memory.  Turning points wait until their cycle is complete.  ``counted``
-    and ``waiting`` are the results of :meth:`state` for a restart.
+    With a ``resolution`` (Pa), values are rounded to multiples of it.  So cycles fall into classes,
+    whose number limits the memory.  Turning points are stored until their cycle is complete.  For a
+    restart, ``counted`` and ``waiting`` are the results of :meth:`state`.
     """
 
     def __init__(
@@ -241,7 +241,7 @@ class RainflowCounter:
             if points and value == points[-1]:
                 continue
             if len(points) > 1 and (value > points[-1]) == (points[-1] > points[-2]):
-                points.pop()  # no turning point: the series goes on beyond it
+                points.pop()  # no turning point: the series continues in its direction
             points.append(value)
             while len(points) > 2 and abs(value - points[-2]) >= abs(points[-2] - points[-3]):
                 half = len(points) == 3  # the range includes the first point
@@ -250,7 +250,7 @@ class RainflowCounter:
                 del points[-3 : -2 if half else -1]
 
     def cycles(self) -> Cycles:
-        """Return all cycles so far; ranges between waiting turning points count as half cycles."""
+        """Return all cycles so far; ranges between stored turning points count as half cycles."""
         counts = self._counts.copy()
         for ends in pairwise(self._waiting):
             counts[min(ends), max(ends)] += 0.5
@@ -260,7 +260,7 @@ class RainflowCounter:
         return Cycles(unit * (high - low)[order], unit / 2 * (low + high)[order], count[order])
 
     def state(self) -> tuple[Array, Array]:
-        """Return (low, high, number) of cycles, (n, 3), and waiting points; stress / resolution."""
+        """Return (low, high, count) of cycles, (n, 3), and stored points; unit: resolution."""
         counted = [(*ends, count) for ends, count in self._counts.items()]
         return np.array(counted, dtype=float).reshape(-1, 3), np.array(self._waiting, dtype=float)
 
@@ -270,11 +270,11 @@ class RainflowCounter:
 
 @dataclass(frozen=True, eq=False)
 class HotSpot(Record):
-    """Place of a beam whose stress cycles :class:`Fatigue` counts.
+    """Place on a beam at which :class:`Fatigue` counts stress cycles.
 
     Args:
         place: Place on a beam.
-        stress: Function of N, V (N) and M (N m) that returns the stress; (n,) each; Pa.
+        stress: Function (N, V, M) of section forces (N, N, N m) that returns stresses; (n,); Pa.
 
     Raises:
         ArgumentError: ``place`` is no place, or ``stress`` is no function.
@@ -295,13 +295,13 @@ class HotSpot(Record):
 
     @classmethod
     def fibre(cls, place: Place, *, y: float, E: float, factor: float = 1.0) -> HotSpot:
-        """Make a spot with the elastic stress E (N/EA − y M/EI) of a fibre.
+        """Make a hot spot with the stress ``factor`` E (N/EA − y M/EI) of an elastic fibre.
 
         Args:
             place: Place on a beam.
             y: Distance from the axis, positive to the left of the direction from start to end; m.
             E: Young's modulus; Pa.
-            factor: Stress concentration factor: hot-spot stress divided by nominal stress.
+            factor: Stress concentration factor: hot-spot stress over nominal stress.
         """
         require_kind(place, Place, "HotSpot: place")
         require_number(y, f"HotSpot {place}: y")
@@ -316,19 +316,19 @@ class HotSpot(Record):
 
 
 class Fatigue(Restartable):
-    """Recorder of the rainflow cycles of the stress at named places.
+    """Recorder of the rainflow cycles of the stress at hot spots.
 
-    The memory does not grow with the number of steps.  Section forces at the places follow from the
-    equation of each step, see :meth:`Solution.diagram`.
+    Memory does not grow with the number of steps.  Section forces are evaluated in each step as in
+    :meth:`Solution.diagram`.
 
     Args:
-        spots: Places and their stresses.
+        spots: Hot spots, or one hot spot.
         curve: S-N curve of all spots.
-        resolution: Unit to whose multiples stresses are rounded; Pa.  By default a hundredth of
-            the ``range`` of the curve.
+        resolution: Stresses are rounded to multiples of this stress; Pa.  The default 0 means a
+            hundredth of the ``range`` of the curve.
 
     Raises:
-        ArgumentError: A spot or the curve has another type, or the resolution is negative.
+        ArgumentError: A spot or the curve has a wrong type, or the resolution is negative.
 
     Example:
         >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
@@ -353,7 +353,7 @@ class Fatigue(Restartable):
         self._block: list[Array] = []
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
-        """Begin to count with the initial state, or continue from a :meth:`state`."""
+        """Begin with the initial state, or continue from a :meth:`state`."""
         at = [simulation.numbering.cell_and_fraction(spot.place) for spot in self.spots]
         self._cells = np.array([cell for cell, _ in at], dtype=np.int64)
         self._fractions, self._column = np.unique([s for _, s in at], return_inverse=True)
@@ -366,7 +366,7 @@ class Fatigue(Restartable):
         else:
             self._begin = simulation.t
             self.write(simulation)
-            self.close()  # A stress that is no number raises an error at once.
+            self.close()  # So a stress that is no number raises an error at once.
 
     def write(self, simulation: StateView) -> None:
         """Store the section forces, and count after each block of steps."""
@@ -391,7 +391,7 @@ class Fatigue(Restartable):
             self._counters[spot].add(stress)
 
     def state(self) -> State:
-        """Return the counted time, and cycles and waiting turning points of each spot."""
+        """Return the first and last time, and cycles and stored turning points of each spot."""
         self.close()
         state: State = {"duration": np.array([self._begin, self._end])}
         for i, counter in enumerate(self._counters.values()):
@@ -400,7 +400,7 @@ class Fatigue(Restartable):
 
     @property
     def duration(self) -> float:
-        """Time in which cycles were counted; s."""
+        """Length of the time in which cycles were counted; s."""
         return self._end - self._begin
 
     def cycles(self, spot: HotSpot) -> Cycles:
@@ -418,7 +418,7 @@ class Fatigue(Restartable):
         return self.cycles(spot).damage(self.curve)
 
     def life(self, spot: HotSpot) -> float:
-        """Extrapolate the time to failure; s; errors as :meth:`cycles`."""
+        """Extrapolate the time to failure, s; infinite without damage; errors as :meth:`cycles`."""
         damage = self.damage(spot)
         return self.duration / damage if damage > 0 else math.inf
 

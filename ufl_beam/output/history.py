@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""History of a run: a CSV file of motions, connectors and the energy ledger; and events."""
+"""History of a run: a CSV file of motions, connectors and the energy ledger, and events."""
 
 from __future__ import annotations
 
@@ -41,22 +41,22 @@ CONNECTOR = ("motion", "force", "work")  # columns of a connector
 
 
 class History(Restartable):
-    """Recorder of a table (CSV) of motions and the energy ledger, complete after a crash.
+    """Recorder of motions, connectors and energies in a CSV file that is valid after a crash.
 
-    The columns are t, or the load factor of a path; u, v, psi of each place; motion, force, work
-    of each connector; and the entries of the ledger.  The names of the columns end in their units.
+    The columns are the time or load factor; u, v, psi of each place; motion, force, work of each
+    connector; and the entries of the energy ledger.  The names of the columns end in their units.
 
     Args:
         path: File, ending in ``.csv``.
         places: Places to follow, on beams and bodies.
         connectors: Connectors to follow, see
-            :class:`~ufl_beam.output.state_rows.Connection`; for a joint, all its connectors.
+            :class:`~ufl_beam.output.state_rows.Connection`; a joint has several connectors.
         every: Number of steps between rows.
-        max_rows: Largest number of rows, besides the initial row.  A row beyond it deletes every
-            other row and doubles ``every``.
+        max_rows: Largest number of rows after the initial row.  If it would be exceeded, every
+            other row is deleted and ``every`` is doubled.
 
     Raises:
-        ArgumentError: ``every`` or ``max_rows`` is not a whole number of at least 1.
+        ArgumentError: An argument has a wrong type, or ``every`` or ``max_rows`` is not positive.
 
     Example:
         >>> table = ub.History("tip.csv", [beam.end])
@@ -88,7 +88,7 @@ class History(Restartable):
         self._open: list[OutputFile] = []
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
-        """Write the header and the initial state, or cut off rows written after a state."""
+        """Write header and initial row, or cut off the rows that follow a :meth:`state`."""
         self._comm = simulation.comm
         self._followed = {
             connector: name
@@ -107,7 +107,7 @@ class History(Restartable):
                 "energy ledger; give the work another name"
             )
         columns = [simulation.parameter.column, *names, *energies]
-        # Spreadsheets read names that begin so as formulas, which may run programs
+        # Spreadsheets read such names as formulas, which may run programs
         self._header = _line([f"'{c}" if c.startswith(FORMULA) else c for c in columns])
         if state is None:
             row = self._row(simulation)
@@ -124,12 +124,12 @@ class History(Restartable):
         self._append(content)
 
     def _append(self, line: bytes) -> None:
-        """Write at the end of the complete lines; an interrupted line is overwritten."""
+        """Write after the last complete line; an interrupted line is overwritten."""
         self._open[0].put(self._length, line)
         self._length += len(line)
 
     def write(self, simulation: StateView) -> None:
-        """Write the row of the state if it is due."""
+        """Write a row after every ``every`` steps."""
         self._steps += 1
         if self._steps == (self._max_rows + 1) * self._every:
             on_first(simulation.comm, self._drop_rows)
@@ -139,7 +139,7 @@ class History(Restartable):
             on_first(simulation.comm, lambda: self._append(row))
 
     def _drop_rows(self) -> None:
-        """Delete every other row; a whole file exists at any time."""
+        """Delete every other row; a complete file exists at any time."""
         rows = self._open[0].read(len(self._header), self._length).splitlines(keepends=True)
         self._write_anew(self._temporary, self._header + b"".join(rows[::2]))
         self._open[0].rename(self._path)
@@ -173,7 +173,7 @@ class History(Restartable):
         return {"counts": counts, **{n: np.frombuffer(x, dtype=np.uint8) for n, x in texts.items()}}
 
     def _go_on(self, content: bytes, digest: bytes, length: int) -> None:
-        """Open the file of a state, or write its content, and cut off later rows."""
+        """Open the file, or write its ``content`` anew, and cut off rows beyond ``length``."""
         if content:
             self._path.write_bytes(content)
         try:
@@ -204,7 +204,7 @@ def _line(cells: Sequence[str]) -> bytes:
 
 
 def _named_components(scene: Scene, followed: Connector | Joint) -> list[tuple[int, str]]:
-    """Return the index and the name of each component; several have different names."""
+    """Return index and name of each component; components have different names."""
     connectors = connector_indices(scene, followed)
     if isinstance(followed, Connector):
         names = COMPONENTS if followed.components else (type(followed.law).__name__,)
@@ -221,21 +221,21 @@ def _named_components(scene: Scene, followed: Connector | Joint) -> list[tuple[i
 
 Flags = npt.NDArray[np.bool_]
 
-IN_CELLS = ("yields", "opens", "is free")  # in a cell or hinge, each once
+IN_CELLS = ("yields", "opens", "is free")  # each at most once in a cell or hinge
 CONNECTOR_EVENTS = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}  # begin, end
 KINDS = (*IN_CELLS, *(kind for pair in CONNECTOR_EVENTS.values() for kind in pair))  # all events
 Row = tuple[float, int, str]  # time, number of the cell or connector, kind of event
-BROKEN_FRACTION = 0.999  # of the fracture energy of a hinge, after which it "is free"
+BROKEN_FRACTION = 0.999  # dissipated fraction of the fracture energy of a hinge that "is free"
 
 
 class Event(NamedTuple):
-    """Event of a step: yielding, opening of a hinge, contact, sliding.
+    """Event in a step: yielding, opening of a hinge, contact or sliding.
 
     Attributes:
-        time: End of the step; s; on a path its load factor.
+        time: End of the step, s; in path following, its load factor.
         where: Middle of a cell, place of a plastic hinge, or connector.
         what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
-        parameter: Name and formats of ``time``.
+        parameter: Name and text formats of ``time``.
 
     Example:
         >>> events = ub.Events()
@@ -260,12 +260,12 @@ class Event(NamedTuple):
 class Events(Restartable):
     """Recorder of events, for scenes with hinges, inelastic material, stops or friction.
 
-    A hinge "is free" when it has dissipated 99.9 % of its fracture energy; a hinge that hardens
+    A hinge "is free" when it has dissipated 99.9 % of its fracture energy; a hardening hinge
     "yields".  Contact and sliding may begin and end repeatedly; all other events occur once in a
     cell or hinge.
 
     Args:
-        tell: Called on the first process with each event as it happens, such as ``print``.
+        tell: Function that the first process calls with each event at once, such as ``print``.
 
     Attributes:
         found: Events in chronological order, the same on all processes.
@@ -287,12 +287,12 @@ class Events(Restartable):
         return f"<Events: {len(self.found)}>"
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
-        """Begin with the initial state, or continue from the events of a state."""
+        """Begin with the initial state, or continue from the events of a :meth:`state`."""
         self.found, self._rows = [], []
         if state is not None:
             rows = [(float(t), int(n), KINDS[int(kind)]) for t, n, kind in state["events"]]
             self._add(simulation, rows)
-        # Energies at which hinges are free, followed connectors, and events before the run
+        # Energies from which on hinges are free; connectors to follow; events before the run
         numbering = simulation.numbering
         in_cells = [law for beam in simulation.scene.beams for law in numbering.hinges(beam)]
         laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
@@ -305,7 +305,7 @@ class Events(Restartable):
         self._in_cells, self._on = self._look(simulation)
 
     def _look(self, simulation: StateView) -> tuple[Flags, Flags]:
-        """Return events in cells and hinges, (n, 3), and which connectors touch or slide."""
+        """Return flags of events in cells and hinges, (n, 3), and of contact or sliding, (m,)."""
         plastic, broken = simulation.now.cells_of(0)[:, [PLASTIC, HINGE]].T
         if hinges := len(simulation.scene.hinges):
             lost, breaks = simulation.connections()[-hinges:, DISSIPATED], self._breaks[-hinges:]
@@ -313,7 +313,7 @@ class Events(Restartable):
             broken = np.append(broken, np.where(breaks, lost, 0.0))
         in_cells = np.column_stack([plastic > 0, broken > 0, broken >= self._enough])
         forces = np.abs(simulation.connections()[self._followed, FORCE])
-        # Forces above which they touch or slide; sliding forces have round-off
+        # Forces above which connectors touch or slide; sliding forces have round-off
         connectors, limits = simulation.scene.all_connectors, simulation.requested_forces
         most = [(1 - 1e-9) * limits.get(connectors[i], 0.0) for i in self._followed]
         return in_cells, np.asarray(forces > most)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Output files: checks of their paths, errors that name them, and the container of saved data.
+"""Output files: checks of paths, errors with names of files, and the format of saved data.
 
-The container of solutions, studies and checkpoints has named arrays and JSON, with a checksum.
-It is a zip archive in the format of ``numpy.savez``, so ``numpy.load`` reads it.  Its member
-``text.json`` has all content except arrays.  The comment at the end of the archive has the name of
-the content, the number of the format, the version of ufl_beam, and the SHA-256 of all bytes before
-this checksum.
+A file of a solution, study or checkpoint has named arrays and JSON, with a checksum.  The file is
+a zip archive in the format of ``numpy.savez``, so ``numpy.load`` reads it.  Its member
+``text.json`` has all content except arrays.  The comment at the end of the archive has the kind of
+content, the number of the format and the version of ufl_beam.  The file ends with the SHA-256 of
+all bytes before this checksum.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.file_system import is_at, sync
 
 Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
-_in_use: list[Output] = []  # outputs of present runs in this process, outer runs first
+_in_use: list[Output] = []  # of the current runs in this process, outer runs first
 
-BLOCK = 1 << 20  # number of bytes that are read at once for a checksum
+BLOCK = 1 << 20  # number of bytes in each read for a checksum
 
 
 def require_path(path: str | Path, what: str) -> Path:
@@ -48,7 +48,7 @@ def require_path(path: str | Path, what: str) -> Path:
 def require_writable(path: Path) -> None:
     """Raise :class:`ArgumentError` if a file cannot be written.
 
-    The content does not change, and no file is made, as a kill would leave an empty file.
+    The check does not change a file, and creates none, because a kill would leave an empty file.
     """
     why = ""
     try:
@@ -59,7 +59,7 @@ def require_writable(path: Path) -> None:
         else:
             why = f" cannot be written: {os.strerror(errno.EACCES)}"
     except FileNotFoundError:
-        pass  # it will be made
+        pass  # the run will create it
     except (OSError, ValueError) as error:  # a ValueError at a null character
         why = f" cannot be written: {getattr(error, 'strerror', error)}"
     if why:
@@ -67,9 +67,9 @@ def require_writable(path: Path) -> None:
 
 
 def require_apart(outputs: Sequence[Output], call: str) -> None:
-    """Raise :class:`ArgumentError` if two outputs share a file; outer runs are included.
+    """Raise :class:`ArgumentError` if two outputs, also of outer runs, share a file.
 
-    Files are compared through symbolic and hard links; devices such as ``/dev/null`` may be shared.
+    Symbolic and hard links are resolved.  Devices such as ``/dev/null`` may be shared.
     """
     owners: dict[object, str] = {}
     for owner, path in ((owner, path) for owner, paths in (*_in_use, *outputs) for path in paths):
@@ -94,7 +94,7 @@ def require_apart(outputs: Sequence[Output], call: str) -> None:
 
 @contextmanager
 def reserved(outputs: Iterable[Output]) -> Iterator[None]:
-    """Reserve the files of a run, so that runs within this run cannot write them."""
+    """Reserve the files of a run within the context, so that inner runs cannot write them."""
     taken = list(outputs)
     _in_use.extend(taken)
     try:
@@ -111,7 +111,7 @@ def beside(path: Path, ending: str = ".part") -> Path:
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Let errors of writing name the file and the reason, and the free space on a full disk."""
+    """Add the file, the reason and, on a full disk, the free space to errors of writing."""
     try:
         yield
     except OSError as error:
@@ -126,7 +126,7 @@ def naming(path: Path) -> Iterator[None]:
 
 
 class OutputFile:
-    """File that is written at given positions; ``new`` creates or empties it; errors name it."""
+    """File that is written at byte positions; ``new`` creates or empties it; errors name it."""
 
     def __init__(self, path: Path, *, new: bool = True) -> None:
         self.path = path
@@ -142,7 +142,7 @@ class OutputFile:
         return os.fstat(self._file).st_size
 
     def put(self, at: int, data: bytes | bytearray) -> None:
-        """Write at a position of the file; pipes and terminals have no positions."""
+        """Write at a position in bytes; append to a pipe or terminal."""
         rest = memoryview(data)
         with naming(self.path):
             while rest:
@@ -155,10 +155,10 @@ class OutputFile:
         return os.pread(self._file, count, at)
 
     def digest(self, length: int) -> bytes:
-        """Return the SHA-256 of the first ``length`` bytes, which must not change any more.
+        """Return the SHA-256 of the first ``length`` bytes; they must not change later.
 
-        Each byte is read once, so ``length`` must not decrease from call to call.  A file that is
-        too short has another digest.
+        Each byte is read once, so ``length`` must not decrease from call to call.  The digest of a
+        file that is too short differs.
         """
         while self._regular and self._hashed < length:
             block = self.read(self._hashed, min(length - self._hashed, BLOCK))
@@ -169,12 +169,12 @@ class OutputFile:
         return self._digest.digest()
 
     def cut(self, length: int) -> None:
-        """Cut the file off at a length."""
+        """Truncate the file to ``length`` bytes."""
         if self._regular:
             os.ftruncate(self._file, length)
 
     def allocate(self, length: int) -> None:
-        """Allocate disk space, so that an error of a full disk is raised here, not in a library."""
+        """Allocate ``length`` bytes, so that a full disk raises OSError here, not in a library."""
         missing = length - self.size
         if missing > 0 and hasattr(os, "posix_fallocate"):
             with naming(self.path):
@@ -190,7 +190,7 @@ class OutputFile:
         self.path = path
 
     def sync(self) -> None:
-        """Write everything to the disk; :class:`FileNotFoundError` if the file was removed."""
+        """Flush to the disk; :class:`FileNotFoundError` if the file was removed or replaced."""
         if not is_at(self._file, self.path):
             raise FileNotFoundError(
                 errno.ENOENT,
@@ -219,17 +219,17 @@ class OutputFile:
 
 
 def changed(what: str) -> ArgumentError:
-    """Return the error of an output that differs from its state in the checkpoint."""
+    """Return the error of an output that differs from its state at the checkpoint."""
     return ArgumentError(
         f"{what}: it differs from the file at the checkpoint: it is missing, or was changed "
         "while the run was down; restore it, or delete the checkpoint to begin anew"
     )
 
 
-# -- the container ---------------------------------------------------------------------------------
+# -- the format of saved data ----------------------------------------------------------------------
 
 Content = dict[str, Any]
-"""Arrays by name; other content is JSON."""
+"""Arrays and JSON data by name."""
 
 ADVICE = {
     "solution": "Take another copy of the file, or save the solution again",
@@ -240,7 +240,7 @@ ADVICE = {
 
 
 class WrongReader(ArgumentError):
-    """Error of a file that is in order, but not for this call; its message says what to do."""
+    """Error of an intact file that this call cannot use; its message has the remedy."""
 
 
 NPY: Any = np.lib.format
@@ -250,12 +250,12 @@ DIGEST = 64
 """Number of bytes of the checksum at the end of a file."""
 
 END = re.compile(rb"(?s).*?(\w+ of ufl_beam, \d+); written by ufl_beam ([!-~]+); sha256 \w{64}")
-"""Pattern of the end of a file, with the format and the version of the package."""
+"""Pattern of the end of a file; its groups are the format and the version of the package."""
 
 
 @cache
 def version() -> str:
-    """Return the version of the imported source tree, else of the installed package."""
+    """Return the version of the source tree if it is imported, else of the installed package."""
     project = Path(__file__).resolve().parents[2] / "pyproject.toml"
     if project.is_file():
         text = project.read_text(encoding="utf-8")
@@ -266,21 +266,21 @@ def version() -> str:
 
 
 def above(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return content with a prefix before its names."""
+    """Return content with a prefix added to its names."""
     return {prefix + name: value for name, value in content.items()}
 
 
 def below(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content whose names begin with a prefix, under names without the prefix."""
+    """Return the content whose names begin with a prefix; remove the prefix from the names."""
     inside = ((n, v) for n, v in content.items() if n.startswith(prefix))
     return {name.removeprefix(prefix): value for name, value in inside}
 
 
 def write(path: Path, format: str, content: Content, at: str = "") -> None:
-    """Write a file; a whole file exists at any time, either the new or the previous file.
+    """Write a file; at any time either the previous or the new file is there as a whole.
 
-    The ``format`` names the content and a number, such as "solution of ufl_beam, 2"; the number
-    grows whenever the meaning of files changes.  ``at`` is a part of messages, such as the time.
+    The ``format`` has a kind of content and a number, such as "solution of ufl_beam, 2"; the number
+    grows whenever the meaning of files changes.  ``at`` is added to messages, such as the time.
     """
     require_writable(path)
     what, file = format.partition(" ")[0], io.BytesIO()
@@ -331,7 +331,7 @@ def plain(value: Any) -> Any:
 
 @contextmanager
 def decoding(path: Path, format: str) -> Iterator[None]:
-    """Turn every error of reading a file into an :class:`ArgumentError` with name and remedy."""
+    """Turn every error of reading a file into :class:`ArgumentError` with its path and a remedy."""
     what = format.partition(" ")[0]
     try:
         yield
@@ -346,7 +346,7 @@ def decoding(path: Path, format: str) -> Iterator[None]:
 
 
 def read(path: Path, format: str) -> Content:
-    """Read a file of :func:`write`; call it within :func:`decoding`, which names the file."""
+    """Read a file of :func:`write`; to be called in :func:`decoding`, which names the file."""
     try:
         data = path.read_bytes()
     except FileNotFoundError:
@@ -379,7 +379,7 @@ def read(path: Path, format: str) -> Content:
 
 
 def require_arrays(content: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> None:
-    """Raise :class:`ArgumentError` unless arrays of numbers have these shapes; -1 is any length."""
+    """Raise :class:`ArgumentError` unless arrays of 64-bit numbers have shapes; -1: any length."""
     for name, shape in shapes.items():
         values = np.asarray(content.get(name))
         same = len(values.shape) == len(shape) and all(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Time series for ParaView and PyVista: scenes as lines, files valid after a kill, recorders."""
+"""Time series for ParaView and PyVista: scenes as lines, writers of files, recorders."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class Lines(NamedTuple):
     """Mesh of straight lines."""
 
     points: Array  # (n, 3); m
-    cells: Index  # points at both ends of each line; (m, 2)
+    cells: Index  # indices of the points at both ends of each line; (m, 2)
     kinds: Array  # kind of each line: 0 for beams, or BODY, or LINK; (m,)
 
 
 BODY, LINK = 1, 2
-"""Kinds of lines: of bodies; of links and connectors.  Lines of beams have the kind 0."""
+"""Kinds of lines: bodies, and links or connectors.  Lines of beams have the kind 0."""
 
 
 class Rod(NamedTuple):
@@ -54,7 +54,7 @@ class Rod(NamedTuple):
 
 
 def scene_rods(scene: Scene) -> list[Rod]:
-    """Return lines from the centre of each body to its points, and along links and springs."""
+    """Return lines from the centre of a body to its points, and along links and connectors."""
     spots, rods = attachment_points(scene), list[Rod]()
     for body in scene.bodies:
         x, y = body.center
@@ -78,8 +78,8 @@ def scene_rods(scene: Scene) -> list[Rod]:
 class LineData:
     """Geometry of beams, bodies and connectors as lines, and the fields of a state on these lines.
 
-    Beams come first, node after node; then each line of a body or connector, with two points of its
-    own.  N is the force of a connector that acts along its line; V and M are zero there.
+    Points and lines of beams come first.  Each line of a body or connector follows, with two points
+    of its own.  There N is the force of a connector along its line, else 0; V and M are zero.
     """
 
     def __init__(self, simulation: StateView) -> None:
@@ -101,7 +101,7 @@ class LineData:
         self._pieces_per_cell, self._num_rods = numbering.mesh.degree, len(rods)
 
     def fields(self, simulation: StateView) -> LineFields:
-        """Compute the fields of the present state, see :class:`XDMF`; all processes call it."""
+        """Compute the fields of the present state, see :class:`XDMF`, on all processes together."""
         q = simulation.subdomain.gather(simulation.q)[self._nodes]
         arms = turned(self._arms, q[self._ends, 2])
         displacement = np.insert(q[:, :2], 2, 0.0, axis=1)
@@ -132,8 +132,8 @@ HEAD = (
     b'<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>'
     b'<Grid Name="scene" GridType="Collection" CollectionType="Temporal">\n'
 )
-TAIL = b"</Grid></Domain></Xdmf>\n<?spare "  # later steps are written into this instruction
-CLOSING = b"<?e?>"  # end of that instruction; after an earlier end, an instruction of its own
+TAIL = b"</Grid></Domain></Xdmf>\n<?spare "  # into its instruction go later steps
+CLOSING = b"<?e?>"  # end of the instruction; after an earlier end, a separate instruction
 PAGE, CAPACITY = mmap.PAGESIZE, 1 << 16
 
 
@@ -147,15 +147,15 @@ class Complete(NamedTuple):
 
 
 class XdmfWriter:
-    """Writer of a time series as XDMF: text with a grid for each step, numbers in a binary file.
+    """Writer of a time series as XDMF: XML with a grid for each step, numbers in a binary file.
 
     A processing instruction of spaces, ``<?spare ... ?>``, follows the text.  A step is written
-    into the instruction, with new closing tags.  Then the old closing tags, within one page of
-    memory, are overwritten with spaces, so that the step belongs to the document.  Thus an
+    into the instruction, with new closing tags.  Then the old closing tags, which lie within one
+    page of memory, are overwritten with spaces, so that the step belongs to the document.  So an
     interrupted write leaves valid XML, and the cost of a step does not grow.  Numbers are written
     before the text that refers to them.
 
-    For a restart ``complete`` are the sizes after the last complete step, and ``digest`` is the
+    For a restart, ``complete`` has the sizes after the last complete step, and ``digest`` is the
     result of :meth:`sync`.  If the files differ, :class:`ValueError` is raised.
     """
 
@@ -168,7 +168,7 @@ class XdmfWriter:
         for values in (lines.cells.astype("<i8"), lines.points, lines.kinds):
             items.append(self._item(values, len(mesh)))
             mesh += values.tobytes()
-        self._mesh = (  # text of each step; its numbers are written once
+        self._mesh = (  # part of the text of each step; its numbers are written once
             f'<Topology TopologyType="Polyline" NodesPerElement="2" '
             f'NumberOfElements="{len(lines.cells)}">{items[0]}</Topology>'
             f'<Geometry GeometryType="XYZ">{items[1]}</Geometry>'
@@ -230,9 +230,9 @@ class XdmfWriter:
         self.complete = Complete(steps + 1, new_tail, capacity, length + len(data))
 
     def _cut(self) -> None:
-        """Cut off data after the last complete step; the document is valid at any time.
+        """Delete data after the last complete step; the document is valid at any time.
 
-        Numbers of a step are written before its text, and cut off after the text.
+        The text of a step is deleted before its numbers.
         """
         _, tail, capacity, length = self.complete
         self._xml.put(tail, TAIL)
@@ -244,13 +244,13 @@ class XdmfWriter:
         self._data.cut(length)
 
     def sync(self) -> bytes:
-        """Write all to the disk; return SHA-256 of the document up to its tail, and of the data."""
+        """Flush to the disk; return SHA-256 of the document up to its tail, and of the numbers."""
         self._data.sync()
         self._xml.sync()
         return self._xml.digest(self.complete.tail) + self._data.digest(self.complete.data)
 
     def close(self) -> None:
-        """Close the text file and the file of numbers."""
+        """Close both files, without an incomplete last step."""
         try:
             if self._data.size > self.complete.data:
                 self._cut()
@@ -262,9 +262,9 @@ class XdmfWriter:
 # -- VTKHDF ---------------------------------------------------------------------------------------
 
 FORMAT_VERSION = (2, 0)  # version of the format; VTK 9.3 warns of later versions
-LINE = 3  # VTK's type of cells that are lines
+LINE = 3  # VTK_LINE, VTK's type of line cells
 KINDS = ("PointData", "CellData")  # groups of fields
-ZERO_OFFSETS = {  # rows that each step adds; all steps have one mesh
+ZERO_OFFSETS = {  # rows of each step; they are equal because all steps have one mesh
     "Steps/PartOffsets": np.array([0]),
     "Steps/CellOffsets": np.array([[0]]),
     "Steps/NumberOfParts": np.array([1]),
@@ -275,7 +275,7 @@ INDEX = 1 << 20  # upper bound of the growth of the indices of all data sets in 
 
 
 class VtkhdfWriter:
-    """Writer of a time series as VTKHDF: mesh written once, fields appended step by step.
+    """Writer of a time series as VTKHDF: the mesh is written once, fields in each step.
 
     The layout is "UnstructuredGrid" of version 2.0 with "Steps", see the documentation of VTK's
     file formats; VTK 9.3, PyVista and ParaView 5.13 read it.  All data sets are created at the
@@ -283,7 +283,7 @@ class VtkhdfWriter:
     during its growth.  HDF5 crashes when a disk is full, so the space for a step is allocated
     first.
 
-    Only names and shapes of ``fields`` are used.  For a restart ``complete`` is the number of
+    Only names and shapes of ``fields`` are used.  For a restart, ``complete`` has the number of
     complete steps, and ``digest`` is the result of :meth:`sync`.  If the file differs,
     :class:`ValueError` is raised.
     """
@@ -298,7 +298,7 @@ class VtkhdfWriter:
         rows = _rows(0.0, 0, fields)
         self._output = OutputFile(path if complete is None else beside(path, ".part"))
         self._output.put(0, _empty_file(lines, rows, fields))
-        # Without a lock other programs may read the file during the run.
+        # Without a lock, other programs can read the file during the run.
         self._file = h5py.File(self._output.path, "r+", locking=False)
         self._root = self._file["VTKHDF"]
         self._growing = {name: (self._root[name], len(values)) for name, values in rows.items()}
@@ -310,9 +310,9 @@ class VtkhdfWriter:
             self._resume(path, digest)
 
     def _resume(self, path: Path, digest: bytes) -> None:
-        """Copy the complete steps of a file, and replace it by the copy if the digest agrees.
+        """Copy the complete steps of a file, and replace the file if the digest agrees.
 
-        So the run does not append to a damaged file, where HDF5 may crash.
+        So the run does not append to a damaged file, in which HDF5 may crash.
         """
         import h5py
 
@@ -351,7 +351,7 @@ class VtkhdfWriter:
         self.complete = (steps + 1,)
 
     def _put(self, name: str, values: Array) -> None:
-        """Write the rows of the next step by HDF5's low-level functions, which are the fastest."""
+        """Write the rows of the next step by HDF5's low-level functions, which are faster."""
         from h5py import h5s
 
         dataset, (rows, *components) = self._growing[name][0].id, values.shape
@@ -362,7 +362,7 @@ class VtkhdfWriter:
         dataset.write(h5s.create_simple(values.shape), space, np.ascontiguousarray(values))
 
     def _cut(self) -> None:
-        """Cut off data after the last step; times first, as VTK 9.3 crashes on extra times."""
+        """Delete data after the last complete step; times first, as extra times crash VTK 9.3."""
         (times, _), *others = self._growing.values()
         times.resize(self.complete[0], axis=0)
         self._file.flush()
@@ -373,7 +373,7 @@ class VtkhdfWriter:
         self._file.flush()
 
     def sync(self) -> bytes:
-        """Write everything to the disk; return the SHA-256 of all numbers; each is read once."""
+        """Flush to the disk; return a SHA-256 of all numbers; each number is read once."""
         self._file.flush()
         self._output.sync()
         whole = hashlib.sha256()
@@ -386,7 +386,7 @@ class VtkhdfWriter:
         return whole.digest()
 
     def close(self) -> None:
-        """Close the file, and cut off an interrupted step after the last complete step."""
+        """Close the file, without an incomplete last step."""
         try:
             self._cut()
         finally:
@@ -406,7 +406,7 @@ def _rows(t: float, n: int, fields: LineFields) -> dict[str, Array]:
 
 
 def _empty_file(lines: Lines, rows: dict[str, Array], fields: LineFields) -> bytes:
-    """Make a file without steps in memory."""
+    """Return the content of a file without steps."""
     import h5py
 
     with h5py.File("vtkhdf", "w", driver="core", backing_store=False) as file:
@@ -422,7 +422,7 @@ def _empty_file(lines: Lines, rows: dict[str, Array], fields: LineFields) -> byt
         root["Types"] = np.full(len(lines.cells), LINE, dtype=np.uint8)
         root["CellData/part"] = lines.kinds
         steps = root.create_group("Steps")
-        # HDF5 writes in the order of addresses: the number of steps comes before their times.
+        # HDF5 writes in the order of addresses: first the number of steps, then their times.
         steps.attrs["NSteps"] = np.int64(0)
         for name, values in rows.items():
             count, *shape = values.shape
@@ -430,7 +430,7 @@ def _empty_file(lines: Lines, rows: dict[str, Array], fields: LineFields) -> byt
             root.create_dataset(
                 name, (0, *shape), values.dtype, maxshape=(None, *shape), chunks=(chunk, *shape)
             )
-        # Data that all steps, or all fields of a kind, share are one data set with several names.
+        # Equal offsets of several fields are one data set with several names.
         steps["PointOffsets"] = steps["CellDataOffsets/part"] = steps["PartOffsets"]
         steps["ConnectivityIdOffsets"] = steps["CellOffsets"]
         for kind, (first, *others) in zip(KINDS, fields, strict=True):
@@ -449,8 +449,8 @@ class TimeSeries(Restartable):
     Attributes:
         ending: Suffix of the file.
         second: Suffix that is added to the name of the file for a second file.
-        writer: Class of the writer.  Its arguments are path, lines and fields of the first state;
-            for a restart also ``complete`` and the result of ``sync()`` of the earlier writer.
+        writer: Class of the writer.  Its arguments are the path, lines, and fields of the first
+            state; for a restart also ``complete`` and the ``sync()`` of the earlier writer.
     """
 
     ending: ClassVar[str]
@@ -468,7 +468,7 @@ class TimeSeries(Restartable):
         self._writers: list[Any] = []  # one writer on the first process while it is open
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
-        """Write the mesh and the initial state, or cut off steps written after a state."""
+        """Write mesh and initial state, or delete the steps that follow a :meth:`state`."""
         self._comm: MPI.Intracomm = simulation.comm
         self._scene, self._count, before = LineData(simulation), 0, tuple[Any, ...]()
         if state is not None:
@@ -490,14 +490,14 @@ class TimeSeries(Restartable):
         on_first(self._comm, make)
 
     def write(self, simulation: StateView) -> None:
-        """Write the state if it is due."""
+        """Write the state after every ``every`` steps."""
         self._count += 1
         if self._count % self._every == 0:
             fields = self._scene.fields(simulation)
             on_first(self._comm, lambda: self._writers[0].write(simulation.t, fields))
 
     def state(self) -> State:
-        """Return the number of steps, and sizes and checksum of the complete steps on the disk."""
+        """Flush to the disk; return numbers of steps, and sizes and a checksum of the files."""
         digests: list[bytes] = []
         on_first(self._comm, lambda: digests.extend(writer.sync() for writer in self._writers))
         sizes = [n for writer in self._writers for n in writer.complete]
@@ -520,10 +520,10 @@ class XDMF(TimeSeries):
     ``velocity`` (m/s) and ``angular velocity`` (rad/s).  Cells have ``N``, ``V`` (N), ``M`` (N m)
     in their middle; if something may yield or break, also the ``jump`` of the hinge (rad) and the
     ``dissipated energy`` (J).  ``part`` is 0 in beams; 1 in lines from the centre of each body to
-    its points; 2 along links and springs, where N is the force along the line.
+    its points; 2 along links and connectors, where N is a force along the line.
 
-    The file is valid and has all complete steps at any moment, also after a kill.  The cost of a
-    step does not grow with the number of steps.  On a path the time is the load factor.
+    At any moment, also after a kill, the file is valid and has all complete steps.  The cost of a
+    step does not grow with the number of steps.  In path following, the time is the load factor.
 
     Args:
         path: File, ending in ``.xdmf``; its numbers are in a second file, with ``.bin`` added to
@@ -531,7 +531,7 @@ class XDMF(TimeSeries):
         every: Number of steps between written states.
 
     Raises:
-        ArgumentError: ``every`` is no whole number of steps, or the path does not end in ``.xdmf``.
+        ArgumentError: ``every`` is no positive whole number, or the path does not end in ``.xdmf``.
 
     Example:
         >>> film = ub.XDMF("beam.xdmf", every=5)
@@ -557,16 +557,16 @@ class XDMF(TimeSeries):
 class VTKHDF(TimeSeries):
     """Time series for ParaView, VTK and PyVista in one HDF5 file, with the fields of :class:`XDMF`.
 
-    Each step is flushed, so the file can be read during the run.  After a kill it has all complete
-    steps, except in the microseconds in which HDF5 rearranges its index.  A restarted run
-    compares the numbers and continues in a copy, as HDF5 may crash in a damaged file.
+    Each step is flushed, so the file can be read during the run.  After a kill the file has all
+    complete steps, except in the microseconds in which HDF5 rearranges its index.  A restarted run
+    checks the numbers and continues in a copy, because HDF5 may crash in a damaged file.
 
     Args:
         path: File, ending in ``.vtkhdf``.
         every: Number of steps between written states.
 
     Raises:
-        ArgumentError: ``every`` is no whole number of steps, or the path does not end in
+        ArgumentError: ``every`` is no positive whole number, or the path does not end in
             ``.vtkhdf``.
 
     Example:

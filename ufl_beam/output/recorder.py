@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recorders of runs: their base class, the state of a run that they read, and their checks."""
+"""Recorders of runs: base classes, the state of a run that recorders read, and checks."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from ufl_beam.terms.inertia_and_damping import Inertia
 
 
 class PresentState(ABC):
-    """Present state of a run, for laws of the scene; all processes call its methods together."""
+    """Present state of a run, for users' laws; all processes call its methods together."""
 
     scene: Scene
     numbering: DofNumbering
@@ -49,17 +49,17 @@ class PresentState(ABC):
         """The present state in the form of a solution; all processes call it together."""
 
     def entries(self) -> tuple[dict[str, float], ...]:
-        """Return the parts of the ledger of all processes: state, supplied, lost; J."""
+        """Return the parts of the energy ledger of the scene: state, supplied, lost; J."""
         columns, row = self.now.row(0)
         values: Any = row.tolist()
         return tuple({name: values[at] for name, at in group.items()} for group in columns.ledger)
 
     def connections(self) -> Array:
-        """Return columns of :class:`Connection` for all connectors of the scene; (num, columns)."""
+        """Return the fields of :class:`Connection` of all connectors; (num_connectors, 5)."""
         return np.asarray(self.now.column("connectors")[0,])
 
     def connector(self, connector: Connector) -> Connection:
-        """Return motion, force, work, rate and dissipation of a connector after the last step.
+        """Return motion, force, work, rate and dissipated energy of a connector.
 
         Raises:
             ArgumentError: The connector is not in the scene.
@@ -74,7 +74,7 @@ class PresentState(ABC):
         """Return the present velocity (du/dt, dv/dt, dψ/dt) of a place; (3,); m/s, m/s, rad/s.
 
         Raises:
-            ArgumentError: The run is static; it has no velocities.
+            ArgumentError: The run is static, so it has no velocities.
         """
         if not has_inertia(self.scheme):
             raise ArgumentError(
@@ -87,7 +87,7 @@ class PresentState(ABC):
         """Return the magnitude of the force of a joint or support in the last step; N.
 
         Raises:
-            ArgumentError: The joint shares its displacement, or is not in the scene.
+            ArgumentError: The joint shares unknowns, or is not in the scene.
         """
         if isinstance(joint, Support):
             number = self.scene.supports.index(joint)
@@ -97,9 +97,9 @@ class PresentState(ABC):
         return float(np.linalg.norm(self.connections()[values, FORCE]))
 
     def section_forces(self) -> Array:
-        """Return (N, V, M) in the middle of all cells; (num_cells, 3); N, N, N m.
+        """Return (N, V, M) in the middle of all cells in the last step; (num_cells, 3); N, N, N m.
 
-        Section forces belong to the equation of the last step, see :meth:`Solution.diagram`.
+        They are computed as in :meth:`Solution.diagram`.
         """
         return np.asarray(self.now.cell_forces(0)[:, 0])
 
@@ -111,7 +111,7 @@ class StateView(PresentState):
     subdomain: Subdomain  # degrees of freedom of this process
     fields: Fields
     parameter: Parameter  # names and formats of `t`: time, or the load factor of a path
-    parts: int  # steps so far; each substep is counted
+    parts: int  # number of steps so far; substeps count as steps
     cell_forces: CellForces
     solution: Any  # `Solution` of the run
     inertia: Inertia
@@ -122,16 +122,16 @@ class StateView(PresentState):
     @property
     @abstractmethod
     def q(self) -> Array:
-        """Configuration at the local degrees of freedom."""
+        """Configuration at the degrees of freedom of this process; m, m, rad."""
 
     @property
     @abstractmethod
     def q_before(self) -> Array:
-        """Configuration at the beginning of the last step."""
+        """Configuration at the beginning of the last step, in the order of :attr:`q`."""
 
     @property
     def requested_forces(self) -> dict[Connector, float]:
-        """Forces of controllers, and limits of friction; N or N m."""
+        """Latest forces of controllers, and limits of friction forces; N or N m."""
         return dict(zip(self.controllers.at, map(float, self.controllers.values), strict=True))
 
     @property
@@ -141,12 +141,12 @@ class StateView(PresentState):
 
     @property
     def snes(self) -> Any:
-        """SNES of petsc4py that solves the steps; it takes monitors, histories and other methods.
+        """SNES of petsc4py that solves the steps; it accepts monitors and other options.
 
-        After the first access PETSc's ``newtonls`` solves the steps, instead of an equivalent
-        method in C that is faster for few cells.  Norms of SNES add forces (N), moments (N m) and
-        residuals of connectors.  Convergence is determined by ``rtol`` of :class:`Newton`.
-        Monitors are also called in line searches and along paths.
+        From the first access on, PETSc's ``newtonls`` solves the steps, instead of an equivalent
+        method in C that is faster for few cells.  Norms of SNES combine forces (N), moments (N m)
+        and residuals of connectors.  ``rtol`` of :class:`Newton` determines convergence.
+        Monitors are also called in line searches and in path following.
 
         Example:
             >>> simulation, norms = ub.Simulation(scene, ub.EnergyMomentum()), []
@@ -158,12 +158,12 @@ class StateView(PresentState):
         return self.solver.snes
 
     def velocities(self) -> list[Array]:
-        """Return the velocities at the local degrees of freedom in a list, empty in statics."""
+        """Return a list with the velocities in the order of :attr:`q`; empty in statics."""
         return [self.inertia.v] if has_inertia(self.scheme) else []
 
     @property
     def may_break(self) -> bool:
-        """True if something in the scene yields, softens or has plastic hinges."""
+        """True if the scene has inelastic material or hinges."""
         return bool(self.now.column("material")[0,].size or self.scene.hinges)
 
     def damage(self) -> tuple[Array, Array]:
@@ -171,16 +171,16 @@ class StateView(PresentState):
         return self.now.damage()
 
     def watch(self, parts: Array) -> Any:
-        """Return extremes that C updates after each step, or None if C cannot."""
+        """Return extremes at fractions of cells that C updates after steps; None if C cannot."""
         return None
 
 
 class Recorder(ABC):
-    """Base class of recorders, which get each accepted step; all processes call them together.
+    """Base class of recorders of accepted steps; all processes call the methods together.
 
     Attributes:
-        files: Paths of output files; two outputs of a run must not share a file.
-        by_itself: True if an open recorder needs no call of :meth:`write` after steps.
+        files: Paths of output files; outputs of a run must not share a file.
+        by_itself: True if an open recorder needs no calls of :meth:`write`.
 
     Example:
         >>> class Speed(ub.Recorder):
@@ -198,20 +198,20 @@ class Recorder(ABC):
         return f"<{' '.join([type(self).__name__, *map(str, self.files)])}>"
 
     def require_writable(self) -> None:
-        """Raise :class:`ArgumentError` if a file cannot be written; the first process calls it."""
+        """Raise :class:`ArgumentError` if a file cannot be written; only process 0 calls it."""
         for path in self.files:
             require_writable(path)
 
     @abstractmethod
     def open(self, simulation: StateView) -> None:
-        """Begin with the initial state."""
+        """Begin to record, with the initial state."""
 
     @abstractmethod
     def write(self, simulation: StateView) -> None:
         """Record the state after a step."""
 
     def close(self) -> None:
-        """End the record; also called when the run fails."""
+        """Stop recording; also called when the run fails."""
 
     def state(self) -> State:
         """Return arrays by name for :meth:`resume`; the arrays of the first process are saved.
@@ -225,7 +225,7 @@ class Recorder(ABC):
         )
 
     def resume(self, simulation: StateView, state: State) -> None:
-        """Continue from a :meth:`state`, instead of :meth:`open`, before anything is recorded.
+        """Continue from a :meth:`state`; a restarted run calls it instead of :meth:`open`.
 
         Raises:
             ArgumentError: Earlier output is missing or changed.
@@ -234,7 +234,7 @@ class Recorder(ABC):
 
 
 class Restartable(Recorder):
-    """Base of the recorders of the package; :meth:`begin` begins both new and restarted runs."""
+    """Base of the recorders of the package; new and restarted runs call :meth:`begin`."""
 
     @abstractmethod
     def begin(self, simulation: StateView, state: State | None = None) -> None:
@@ -252,7 +252,7 @@ class Restartable(Recorder):
 def checked_recorders(
     record: Sequence[Recorder] | Recorder, comm: MPI.Intracomm, call: str, *others: Output
 ) -> tuple[tuple[Recorder, ...], list[Output]]:
-    """Check the recorders of a run; return them and all outputs, including ``others``."""
+    """Check the recorders of a run; return recorders and all outputs, including ``others``."""
     recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
     outputs = []
     for i, recorder in enumerate(recorders):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Section forces along cells, from the forces between cells and nodes.
 
-At both ends of a cell the section forces are the forces between the cell and its nodes, by
-stresses, inertia, damping, loads and works (virtual works and potentials of users), see
-:mod:`ufl_beam.terms.cell_forces`.  So they are in equilibrium with supports, joints and other nodal
-forces, up to the residual of the step.  Between the ends they change by the forces along the cell,
-of which the resultant, the couple and, without works, the first moments are known.
+At the ends of a cell, section forces are the forces between the cell and its nodes, see
+:mod:`ufl_beam.terms.cell_forces`.  Stresses, inertia, damping, loads and works (users' virtual
+works and potentials) cause them.  So section forces are in equilibrium with all nodal forces, up to
+the residual of the step.  Between the ends they follow from the resultant, the couple and, without
+works, the first moments of the forces along the cell.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from ufl_beam.display import in_one_line
 
 @in_one_line
 class Diagram(NamedTuple):
-    """Section forces along a beam, with the values before and after each vertex.
+    """Section forces along a beam, with two values at each inner vertex; (num_cells · points,).
 
     Attributes:
-        s: Parameter of the beam, from 0 at its start to 1; (num_cells points,).
+        s: Parameter of the beam, from 0 at its start to 1 at its end.
         N: Axial force, positive in tension; N.
         V: Shear force, along the normal to the left of the direction of the beam; N.
-        M: Bending moment, positive with tension to the right of this direction; N m.
+        M: Bending moment, positive with tension on the right of this direction; N m.
 
     Example:
         >>> diagram = solution.diagram(beam, points=2)  # at both ends of the four cells
@@ -44,13 +44,13 @@ class Diagram(NamedTuple):
 
 @in_one_line
 class Material(NamedTuple):
-    """State of the material of all cells at one time.
+    """State of the material in n cells at one time, or in one cell at n times.
 
     Attributes:
-        forces: (N, V, M); (num_cells, 3); N, N, N m.
-        jump: Rotation of the hinges; (num_cells,); rad.
-        plastic: Energy dissipated by plastic strains; (num_cells,); J.
-        hinge: Energy dissipated by hinges, or by the cracks of fibres; (num_cells,); J.
+        forces: Section forces (N, V, M); (n, 3); N, N, N m.
+        jump: Jump of the rotation in the hinge of a cell; (n,); rad.
+        plastic: Energy dissipated by plastic strains; (n,); J.
+        hinge: Energy dissipated by hinges, or by cracks of fibres; (n,); J.
     """
 
     forces: Array
@@ -64,21 +64,21 @@ MIDDLE: Array = np.full(1, 0.5)
 
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 GAUSS = [(float(1 + x) / 2, float(w) / 2) for x, w in zip(POINTS, WEIGHTS, strict=True)]
-"""Points and weights of the Gauss rule on a cell, which is exact for all integrals here."""
+"""Points and weights of a Gauss rule from 0 to 1; it is exact for the integrals below."""
 
 
 def section_force(
     resultants: Any, tangent: Callable[[Any], tuple[Any, Any]], *, works: bool
 ) -> Callable[[Any], tuple[Any, Any, Any]]:
-    """Return a function that gives the force in the plane and the moment at a fraction of a cell.
+    """Return a function that computes force (x, y) and moment at a fraction of a cell.
 
     The fraction is 0 at the start of the cell and 1 at its end.
 
     Args:
-        resultants: Numbers ``cell_number`` of loops.h of the cell: arrays, or expressions of UFL.
-        tangent: Derivative of the position by the fraction, at a fraction, in the configuration in
-            which the forces are in equilibrium.
-        works: True if forces across the cell may have any distribution, as the scene has works.
+        resultants: Resultants of the cell, ``cell_number`` of loops.h: arrays or UFL expressions.
+        tangent: Function of the fraction that returns the derivative (x, y) of the position with
+            respect to the fraction, in the configuration of equilibrium.
+        works: True if the scene has works: transverse forces then may have any distribution.
     """
     start, end, skew = (
         (resultants[k], resultants[k + 1]) for k in (lib.START_X, lib.END_X, lib.SKEW_X)
@@ -94,7 +94,7 @@ def section_force(
         pairs = ((weight, tangent(at * s), force(at * s)) for at, weight in GAUSS)
         return sum(weight * (x[0] * f[1] - x[1] * f[0]) for weight, x, f in pairs)
 
-    # The moments at both ends determine a further couple, or with works the forces across.
+    # The end moments determine an additional couple or, with works, the transverse forces.
     imbalance = at_start + at_end - couple + lever(1.0)
     if works:
         arms = [[6 * w * at * (1 - at) * x for x in tangent(at)] for at, w in GAUSS]
@@ -107,7 +107,7 @@ def section_force(
 
 
 def in_section(plane: tuple[Any, Any, Any], c: Any, s: Any) -> tuple[Any, Any, Any]:
-    """Return (N, V, M) from force and moment in the plane; (c, s) is the direction of the axis."""
+    """Return (N, V, M) from (F_x, F_y, M); (c, s) is the direction of the axis."""
     x, y, M = plane
     return c * x + s * y, c * y - s * x, M
 
@@ -116,7 +116,7 @@ class ForcesAlongCells:
     """Section forces (N, V, M) at points of the cells of a scene.
 
     Attributes:
-        angles: Angles of the smooth undeformed axis at both ends of cells; (num_cells, 2); rad.
+        angles: Directions of the smooth undeformed axis at both ends of cells; (num_cells, 2); rad.
         dofs: Degrees of freedom (u, v, ψ) of the nodes of cells; (num_cells, 3, degree + 1).
     """
 
@@ -129,14 +129,14 @@ class ForcesAlongCells:
         self._places: Array = numbering.points[nodes[:, self._along]].transpose(2, 0, 1)
         x, y = self._places[:, :, -1] - self._places[:, :, 0]
         chords = np.asarray(np.arctan2(y, x))
-        # The axis halves the angle between two cells at a vertex, except at corners of the beam.
+        # The axis bisects the angle between two cells at a vertex, except at corners of the beam.
         half = np.angle(np.exp(1j * np.diff(chords))) / 2
         half[np.diff(numbering.beam_of_cell) != 0] = np.nan
         for beam in numbering.scene.beams:
             if beam.corners:
                 at_corners = np.isin(numbering.parameters(beam)[1:-1], beam.corners)
                 half[numbering.cells_of(beam)[:-1][at_corners]] = np.nan
-        # A cell with one smooth neighbour has a circular axis; a cell without one, a straight axis.
+        # With one smooth neighbour the axis of a cell is circular; without a neighbour, straight.
         first, last = np.append(np.nan, -half), np.append(half, np.nan)
         both = np.where(np.isnan(first), -last, first), np.where(np.isnan(last), -first, last)
         self.angles: Array = chords[:, None] + np.nan_to_num(np.column_stack(both))
@@ -147,11 +147,11 @@ class ForcesAlongCells:
         """Compute section forces at fractions of cells; N, N, N m.
 
         Args:
-            cells: Numbers of the cells, or of one cell at many times.
+            cells: Indices of the cells, or one index repeated for each time.
             fractions: Fractions from 0 at the start to 1 at the end; (points,).
-            resultants: Numbers ``cell_number`` of loops.h of the cells; (9, num_cells).
-            q: Configurations (u, v, ψ) of the nodes at the time in the step at which the forces
-                are in equilibrium; (num_cells, 3, degree + 1).
+            resultants: Resultants ``cell_number`` of loops.h of the cells; (9, num_cells).
+            q: Configurations (u, v, ψ) of the nodes in which the forces are in equilibrium;
+                (num_cells, 3, degree + 1).
 
         Returns:
             (N, V, M); (num_cells, points, 3).

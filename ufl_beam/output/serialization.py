@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Scenes as JSON data: each record with its exact arguments.
+"""Scenes as JSON data: the class and the exact fields of each object.
 
-Functions of a user are code, which is not saved.  Functions of time are saved by their values at
-the times of a solution, curves by many points, other functions by their names.  Laws and other
-records of a user are saved by their numbers and the name of the class, so that they can be compared
-with a scene of the user.
+Users' functions are code, which is not saved.  Instead, functions of time are saved as values at
+the times of a solution, curves as points, and other functions as names.  Users' laws and other
+objects of users' classes are saved as fields and the name of the class.  They can be compared with
+a scene, but not rebuilt.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.functions import Point, steady, still
 from ufl_beam.output.output_files import WrongReader
 
-Data = Any  # data of JSON
+Data = Any  # JSON data
 Sampling = Callable[[Any, str, Any], Any]
-"""Function (record, field, function of a user) that returns a substitute, or None."""
+"""Function (object, name of its field, user's function in it) that returns a substitute or None."""
 
-SAMPLES = 1000  # number of intervals in which a curve is sampled
+SAMPLES = 1000  # number of intervals between equally spaced points of a curve
 
 
 @dataclasses.dataclass(frozen=True)
 class SavedFunction:
-    """Function of time that is known at saved times only."""
+    """Function of time with values at saved times only."""
 
     name: str  # name of the function
     times: tuple[float, ...]  # ascending; s
@@ -48,7 +48,7 @@ class SavedFunction:
 
     @classmethod
     def sampled(cls, function: Callable[[float], float], times: Iterable[float]) -> SavedFunction:
-        """Sample a function at times and at 0; times at which it fails are left out."""
+        """Sample a function at 0 and at ``times``; omit times at which it raises an error."""
         known = {}
         for t in sorted({0.0, *times}):
             with suppress(Exception):
@@ -72,14 +72,14 @@ class SavedCurve:
     """Curve through saved points, cubic between them and straight beyond."""
 
     name: str  # name of the function
-    s: tuple[float, ...]  # ascending parameters, at least two
+    s: tuple[float, ...]  # parameters, ascending, at least two
     points: tuple[Point, ...]  # a point for each parameter; m
 
     @classmethod
     def sampled(
         cls, curve: Callable[[float], Any], first: float, last: float, more: Iterable[float] = ()
     ) -> SavedCurve:
-        """Sample a curve between two parameters and at ``more``, except where it fails."""
+        """Sample a curve from ``first`` to ``last`` and at ``more``; omit points with an error."""
         even = (first + (last - first) * k / SAMPLES for k in range(SAMPLES + 1))
         known = {}
         for s in sorted({*even, *more}):
@@ -89,7 +89,7 @@ class SavedCurve:
         return cls(function_name(curve), tuple(known), tuple(known.values()))
 
     def __call__(self, s: float) -> Point:
-        """Return the point at a parameter; exact at sampled parameters."""
+        """Return the point at a parameter, m; exact at sampled parameters."""
         n = bisect_left(self.s, s)
         if n < len(self.s) and self.s[n] == s:
             return self.points[n]
@@ -102,12 +102,12 @@ class SavedCurve:
 
 @dataclasses.dataclass(frozen=True)
 class LostFunction:
-    """Placeholder of a function that cannot be saved, such as a controller."""
+    """Placeholder for a function that cannot be saved, such as a controller."""
 
     name: str  # name of the function
 
     def __call__(self, *arguments: object, **named: object) -> NoReturn:
-        """Raise :class:`ArgumentError`, as the function was not saved."""
+        """Raise :class:`ArgumentError`, because the function was not saved."""
         raise ArgumentError(
             f"the function {self.name} is not in the file of the solution, which has results and "
             "numbers; build the scene with the function to simulate it"
@@ -120,7 +120,7 @@ def function_name(function: Any) -> str:
 
 
 MODEL = import_module("ufl_beam.model").__path__
-# Classes of records, by name
+# Dataclasses of the model, by name
 RECORDS: dict[str, type] = {
     name: kind
     for module in iter_modules(MODEL, "ufl_beam.model.")
@@ -133,12 +133,12 @@ KNOWN: dict[str, Any] = {"GROUND": GROUND, "HELD": RIGID, "steady": steady, "sti
 
 
 def to_data(value: Any, sampling: Sampling | None = None) -> Data:
-    """Describe a scene or another record as data.
+    """Describe a scene or another object of the model as data.
 
-    Functions of a user are replaced by results of ``sampling``, or by their names.
+    Users' functions are replaced by results of ``sampling``, or by their names.
     """
     records: list[Data] = []
-    # By id; a reference to each object prevents that Python uses the id for another object.
+    # By id; the reference to each object prevents Python from reusing the id.
     indices: dict[int, tuple[int, Any]] = {}
 
     def describe(value: Any, owner: Any, field: str) -> Data:
@@ -186,7 +186,7 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
 
 
 def require_no_code(data: Data) -> None:
-    """Raise :class:`ArgumentError` if a scene has records of classes outside the package."""
+    """Raise :class:`ArgumentError` if a scene has objects of classes outside the package."""
     for record in data["records"]:
         if "from" in record:
             kind = f"the class {record['is']} of your own (module {record['from']})"
@@ -197,7 +197,7 @@ def require_no_code(data: Data) -> None:
 
 
 def from_data(data: Data) -> Any:
-    """Rebuild the records that :func:`to_data` described, without repeating warnings."""
+    """Rebuild the scene or object that :func:`to_data` described, without its warnings."""
     require_no_code(data)
     made: list[Any] = []
 
@@ -222,7 +222,7 @@ def from_data(data: Data) -> Any:
             if fields.keys() != known:
                 others = ", ".join(sorted(fields.keys() ^ known))
                 raise TypeError(f"{kind.__name__}: fields {others} are missing or unknown")
-            # Constructors may have other arguments than the fields.
+            # Arguments of constructors may differ from the fields.
             made.append(object.__new__(kind))
             for name, value in fields.items():
                 object.__setattr__(made[-1], name, value)
@@ -233,25 +233,25 @@ def from_data(data: Data) -> Any:
 # -- comparison ------------------------------------------------------------------------------------
 
 CODE = "code"
-"""Last part of the names of data that depend on the version of Python."""
+"""Last component of names of data that depend on the version of Python."""
 
 
 class Description:
-    """All numbers and names that can be reached from some values, by unique names.
+    """Texts of all numbers and names that are reachable from given values, for comparison.
 
-    Functions are compared by their code, defaults and enclosing variables, and by the data and the
+    Functions are compared by their code, defaults and closure variables, and by the data and the
     functions of their own module that they use.  Objects with ``state()`` and ``restore(state)``,
-    and random generators of NumPy, are not compared but collected.
+    and random generators of NumPy, are not compared, but collected in :attr:`stateful`.
 
     Attributes:
-        texts: Text by name, such as ``{"scene.beams[0] 'left'.section.EI": "2000.0"}``.
-        stateful: Objects with a state, by name.
+        texts: Text by unique name, such as ``{"scene.beams[0] 'left'.section.EI": "2000.0"}``.
+        stateful: Objects with a state, by unique name.
     """
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self.texts: dict[str, str] = {}
         self.stateful: dict[str, Any] = {}
-        # By id; a reference to each object prevents that Python uses the id for another object.
+        # By id; the reference to each object prevents Python from reusing the id.
         self._seen: dict[int, tuple[str, Any]] = {}
         for name, value in values.items():
             self._put(name, value)
@@ -273,7 +273,7 @@ class Description:
             self._put(f"{name}{key}", what)
 
     def _members(self, name: str, value: Any) -> Iterator[tuple[str, Any]]:
-        """Store the type of an object, and yield its parts with their names."""
+        """Store a text for an object, and yield names and values of its members."""
         if has_state(value):
             self.stateful[name] = value
             self.texts[name] = type(value).__qualname__
@@ -339,7 +339,7 @@ def has_state(value: Any) -> bool:
 
 
 def _code_text(code: CodeType, names: set[str]) -> str:
-    """Return code as text for comparison, and add the names that it uses to ``names``."""
+    """Return code as text for comparison, and add the names in the code to ``names``."""
     names.update(code.co_names)
     constants = [
         _code_text(c, names)
@@ -351,7 +351,7 @@ def _code_text(code: CodeType, names: set[str]) -> str:
 
 
 def difference(now: Mapping[str, str], then: Mapping[str, str]) -> str:
-    """Describe the first difference of two descriptions; empty if there is none."""
+    """Describe the first difference between two :attr:`Description.texts`; empty if equal."""
     for name, text in now.items():
         if name not in then:
             return f"{name} is {text}, in the file there is none"

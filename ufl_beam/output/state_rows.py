@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """State of a scene as one row of numbers: the table of its columns, and growing arrays of rows.
 
-C writes the rows of running simulations, see :class:`StateWriter`.  Solutions, the present state of
-a run, and files read the rows by the names of the columns.
+C writes the rows of running simulations, see :class:`StateWriter`.  Results and files are made from
+columns, which have names.
 """
 
 from __future__ import annotations
@@ -32,29 +32,29 @@ from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
 
 LEDGER = ("state", "supplied", "lost")
-"""Parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
+"""Parts of the energy ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
 
 FORCES, RECORD, BEFORE = "cell forces", "record", "before"
-"""Columns of some states only: forces of all cells, ``cell_number`` of loops.h; the record from
-which :meth:`CellForces.forces_from_record` computes these forces; q at the beginning of the step,
-if forces depend on it and it differs from q of the previous row (in the first row, from its q)."""
+"""Columns that only some states have.  FORCES: resultants of all cells, ``cell_number`` of loops.h.
+RECORD: data from which :meth:`CellForces.forces_from_record` computes FORCES.  BEFORE: q at the
+beginning of the step, if FORCES depends on it and the previous row may have another q."""
 
 
 @in_one_line
 class Connection(NamedTuple):
-    """History of a connector.
+    """History of a connector, or its present values (without the axis n+1).
 
-    Motion, force and rate of a :class:`Bushing` have all its components; (n+1, 2) or (n+1, 3).
+    Motion, force and rate of a :class:`Bushing` have two or three components; (n+1, 2 or 3).
 
     Attributes:
-        motion: Relative motion since the undeformed scene; (n+1,); m or rad.
+        motion: Relative motion, zero in the undeformed scene; (n+1,); m or rad.
         force: Force that resisted the growth of the motion in the step that ends at each time;
             (n+1,); N or N m.
-        work: Work on the connector since the beginning: energy that springs store and dissipate
-            and that dampers and friction dissipate, minus energy that motors supply; (n+1,); J.
+        work: Work on the connector since the beginning: energy stored or dissipated by springs,
+            dampers and friction, minus energy supplied by motors; (n+1,); J.
         rate: Mean rate of the motion in the step that ends at each time; (n+1,); m/s or rad/s.
-        dissipated: Energy that yielding, softening and plastic hinges have dissipated, or that a
-            :class:`ConnectorLaw` has lost; (n+1,); J.
+        dissipated: Energy dissipated by yielding, softening and plastic hinges, or by a
+            :class:`ConnectorLaw`; (n+1,); J.
     """
 
     motion: Any
@@ -65,7 +65,7 @@ class Connection(NamedTuple):
 
 
 def connection(values: Array) -> Connection:
-    """Make a history from the columns of k components; (..., k, columns).
+    """Make a history from the columns of k components; (..., k, num_columns).
 
     Works and dissipated energies of the components are added.
     """
@@ -77,22 +77,22 @@ def connection(values: Array) -> Connection:
 
 
 FORCE, WORK, DISSIPATED = map(Connection._fields.index, ("force", "work", "dissipated"))
-"""Indices of these fields of :class:`Connection` in the column "connectors"."""
+"""Indices of fields of :class:`Connection`, and so of numbers of the column "connectors"."""
 
 
 PLASTIC, HINGE = 4, 5
-"""Indices in the column "material", which has (N, V, M), jump, plastic, hinge of
+"""Indices of fields in the column "material": (N, V, M), jump, plastic, hinge of
 :class:`Material`."""
 
 
 class Columns:
-    """Table of the columns of a state: their names and shapes, in the order of the row.
+    """Names and shapes of the columns of a state, in the order of a row.
 
     Attributes:
         shapes: Shapes by name; () for a single number.
         at: Slices of a row, by name.
         width: Length of a row.
-        ledger: For each part of the ledger, indices in a row by the names of the entries.
+        ledger: For each part of the energy ledger, index in a row by the name of the entry.
     """
 
     def __init__(self, shapes: Mapping[str, Sequence[int]]) -> None:
@@ -111,10 +111,10 @@ class Columns:
     def of(
         cls, numbering: DofNumbering, *, moving: bool, ledger: Iterable[str], record: int | None
     ) -> Columns:
-        """Make the table of a scene; columns of connectors are the fields of :class:`Connection`.
+        """Make the columns of a scene.
 
-        If the scene is ``moving``, it has velocities.  ``ledger`` has entries like "lost: plastic".
-        ``record`` is the length of this column; if it is None, the forces of cells are kept.
+        If ``moving``, a row has velocities.  ``ledger`` has names of entries, as "lost: plastic".
+        ``record`` is the length of the column "record"; if None, the row has forces of cells.
         """
         size, scene = numbering.size, numbering.scene
         return cls({
@@ -130,11 +130,11 @@ class Columns:
         })  # fmt: skip
 
     def column_of(self, name: str, rows: Array) -> Array:
-        """Return a view of a column of one row or of several rows, in the shape of the column."""
+        """Return a view of a column of one or several rows; (..., *shape of the column)."""
         return rows[..., self.at[name]].reshape(rows.shape[:-1] + self.shapes[name])
 
     def plus(self, name: str, shape: Sequence[int], *, without: str = "") -> Columns:
-        """Return the table with an additional last column, and without the column ``without``."""
+        """Return columns with an additional last column, and without the column ``without``."""
         key = name, without
         if key not in self._others:
             shapes = {n: of for n, of in self.shapes.items() if n != without}
@@ -145,15 +145,15 @@ class Columns:
 def new_rows(number: int, width: int) -> Array:
     """Make rows of zeros.
 
-    A bytearray holds them, because NumPy requests large pages from 4 MiB on, and the first access
-    to a large page takes longer.
+    Their memory is a bytearray: NumPy would request huge pages from 4 MiB on, and the first access
+    to a huge page takes longer.
     """
     return np.frombuffer(bytearray(8 * number * width)).reshape(number, width)
 
 
 @dataclass
 class Block:
-    """Rows with the same columns, and space for more rows; they are never moved in memory."""
+    """Rows with the same columns, and space for more rows; rows are never moved in memory."""
 
     columns: Columns
     space: Array  # the rows, then the free space
@@ -166,7 +166,7 @@ class Block:
 
 
 class Column:
-    """Column of states in several blocks, without states that lack it; (n+1, ...)."""
+    """Column of all states that have it, in one or several blocks; (n+1, ...)."""
 
     def __init__(self, blocks: Sequence[Block], name: str) -> None:
         self._name = name
@@ -176,7 +176,7 @@ class Column:
         return sum(block.number for block in self._blocks)
 
     def __getitem__(self, at: tuple[Any, ...]) -> Array:
-        """Return a new array; the first index is ``:``."""
+        """Return a new array; the first index is ``:``, or a number if there is only one block."""
         pieces = [block.columns.column_of(self._name, block.rows)[at] for block in self._blocks]
         return np.concatenate(pieces) if pieces else np.empty(0)
 
@@ -185,15 +185,15 @@ class Column:
 
 
 class StateWriter:
-    """Writer of the state that C holds, as a row of the whole scene.
+    """Writer of the state in C as a row of the whole scene.
 
-    C adds numbers of each process to entries of the row of this process; then the rows of all
-    processes are added.  Vectors of degrees of freedom, which are last in the row and most of it,
-    are gathered from the processes that own them.
+    On each process C writes a row with the numbers of this process; the sum over the processes is
+    the row of the scene.  Vectors of degrees of freedom, at the end of the row, are not added but
+    gathered from the processes that own the degrees of freedom.
 
     Attributes:
-        records: True if the row has the record of the forces of cells.  Several processes have no
-            common record if forces depend on entries of forms, whose number and order differ.
+        records: True if the row has the column "record".  Several processes have no common record
+            if forces depend on entries of forms, because these differ between processes.
         columns: Columns of a row.
     """
 
@@ -260,7 +260,7 @@ class StateWriter:
         fill(time_loop, kinds=len(kept), kept=kept, width=columns.width, sums=at["q"].start)
 
     def _place(self, values: Any) -> Any:
-        """Return a pointer to the address of numbers of C, of an array, or of a view."""
+        """Return a pointer to the address of the numbers of an array, or ``values`` of C."""
         address = values
         if isinstance(values, np.ndarray):
             address = ffi.cast("double *", values.ctypes.data)
@@ -268,17 +268,17 @@ class StateWriter:
         return place
 
     def _copy(self, place: Any, first: int, number: int) -> None:
-        """Let C write ``number`` contiguous numbers to the row, from entry ``first`` on."""
+        """Let C write ``number`` contiguous numbers to the row, from the index ``first`` on."""
         self._kinds.append((place, number, first, ffi.NULL, ffi.NULL))
 
     def _add(self, place: Any, at: Index, to: Index) -> None:
-        """Let C add the numbers at the indices ``at`` to the entries ``to`` of the row."""
+        """Let C add the numbers at the indices ``at`` to the row at the indices ``to``."""
         both = [np.ascontiguousarray(x.ravel(), dtype=np.int32) for x in (at, to)]
         self._alive.append(both)
         self._kinds.append((place, at.size, 0, *map(integers, both)))
 
     def write(self, row: Array) -> None:
-        """Write the present state of C to ``row``; all processes call it together."""
+        """Write the present state of C to ``row``; all processes call this method together."""
         subdomain = self._subdomain
         lib.keep_state(self._time_loop, doubles(row))
         if not subdomain.alone:
@@ -289,15 +289,15 @@ class StateWriter:
 
 @in_one_line
 class JointHistory(NamedTuple):
-    """History of a joint, whose first place is a and whose second place is b.
+    """History of a joint between its first place a and its second place b.
 
     Attributes:
         motion: Displacement of b relative to a, in axes that turn with a, and rotation of b
             relative to a; zero in the undeformed scene; (n+1, 3); m, m, rad.
         force: Force of the joint on b, in the plane; (n+1, 2); N.
         in_a, in_b: The same force in axes that turn with a and with b; (n+1, 2); N.
-        moment: Moment of the joint on b, about the place b; (n+1,); N m.  It is unknown, NaN, if
-            the places share their rotation.
+        moment: Moment of the joint on b, about the place b; (n+1,); N m.  If the places share
+            their rotation, the moment is unknown: NaN.
     """
 
     motion: Array
@@ -308,7 +308,7 @@ class JointHistory(NamedTuple):
 
 
 def connector_indices(scene: Scene, connector: Connector | Joint) -> list[int]:
-    """Return the indices of the components of a connector, or of a joint."""
+    """Return the indices in ``scene.all_connectors`` of a connector's or joint's components."""
     if isinstance(connector, Connector):
         connectors = connector.components or (connector,)
         if connectors[0] not in scene.all_connectors:

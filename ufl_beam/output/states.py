@@ -44,15 +44,15 @@ from ufl_beam.output.state_rows import (
 from ufl_beam.terms.energy_ledger import Energy
 
 LEAST_ROWS, MOST_VALUES = 8, 2**17
-"""Least number of rows of a new block, and limit of the numbers in them.  Small blocks fit into
-memory that the process has already; the first access to new memory takes a considerable fraction
-of the time of a step."""
+"""Least number of rows of a new block, and largest number of values in a block.  Small blocks fit
+into memory that the process already has.  The first access to new memory takes a considerable
+fraction of the time of a step."""
 
 
 class Cells:
-    """Functions that compute results of all cells of a scene; each is made at its first access.
+    """Objects that compute results of all cells of a scene; each is created at its first access.
 
-    Processes do not communicate.
+    The computations need no communication between processes.
     """
 
     def __init__(self, numbering: DofNumbering) -> None:
@@ -65,12 +65,12 @@ class Cells:
 
     @cached_property
     def strains(self) -> Strains:
-        """Functions for strains of all cells."""
+        """Object that computes the strains of all cells."""
         return Strains(self.fields)
 
     @cached_property
     def along(self) -> ForcesAlongCells:
-        """Functions for section forces of all cells."""
+        """Object that computes the section forces of all cells."""
         return ForcesAlongCells(self.numbering)
 
 
@@ -80,11 +80,11 @@ class States:
     Attributes:
         scene: Model.
         numbering: Vertices, cells and degrees of freedom of the scene.
-        between: Fraction of a step at which its forces are in equilibrium on the deformed scene.
-        begun: Whether forces depend on the configuration at the beginning of the step.
-        cells: Functions for section forces and strains of all cells.
-        forces_from_record: Function that computes the forces of cells, ``cell_number`` of loops.h,
-            from a record, q, and q at the beginning of the step; (9, num_cells).
+        between: Instant of equilibrium in a step, as a fraction of the step.
+        begun: True if forces depend on the configuration at the beginning of the step.
+        cells: Objects that compute section forces and strains of all cells.
+        forces_from_record: Function that computes :meth:`cell_resultants` from a record, q, and q
+            at the beginning of the step.
     """
 
     between = 1.0
@@ -95,7 +95,7 @@ class States:
         self.numbering, self.scene = numbering, numbering.scene
         self.cells = Cells(numbering)
         self._blocks = [*blocks]
-        self._computed: tuple[tuple[int, bytes], Array] | None = None  # latest forces
+        self._computed: tuple[tuple[int, bytes], Array] | None = None  # latest `cell_forces`
         if like is not None:
             self.cells, self.between, self.begun = like.cells, like.between, like.begun
             self.forces_from_record = like.forces_from_record
@@ -105,7 +105,7 @@ class States:
     def free_rows(self, columns: Columns, number: int = 1) -> Array:
         """Return up to ``number`` free rows after the last state; :meth:`grow` makes them states.
 
-        Rows are never copied to make room, because the process may keep the freed memory.
+        Blocks are never copied to a larger block, because freed memory may stay with the process.
         """
         block = self._blocks[-1] if self._blocks else None
         if (
@@ -129,7 +129,7 @@ class States:
         self.grow()
 
     def subset(self, first: int, last: int) -> States:
-        """Return views of the states from ``first`` to ``last``, excluding ``last``."""
+        """Return the states from ``first`` to ``last - 1`` as views."""
         blocks, end = [], 0
         for block in self._blocks:
             begin, end = end, end + block.number
@@ -138,7 +138,7 @@ class States:
         return States(self.numbering, self, *blocks)
 
     def downsample(self) -> None:
-        """Delete every other state; the first state stays."""
+        """Delete every second state; the first state remains."""
         states, self._blocks, self._computed = self.subset(0, len(self)), [], None
         for n in range(0, len(states), 2):
             columns, *pieces = states.row(n)
@@ -170,9 +170,9 @@ class States:
         return columns.column_of(name, row)
 
     def before(self, n: int) -> Array:
-        """Return q at the beginning of the step to the n-th state.
+        """Return q at the beginning of the step that ends at the n-th state; (size,).
 
-        It is q of this state if forces do not depend on it, or if no step led to the state.
+        If forces do not depend on this q, or if no step led to the state, return q of the state.
         """
         n = range(len(self))[n]
         columns, row = self.row(n)
@@ -181,7 +181,7 @@ class States:
         return self._row("q", n - 1 if n and self.begun else n)
 
     def cell_resultants(self, n: int) -> Array:
-        """Return the forces of cells, ``cell_number`` of loops.h, in a state; (9, num_cells)."""
+        """Return resultants of cells, ``cell_number`` of loops.h, in a state; (9, num_cells)."""
         columns, row = self.row(n)
         if FORCES in columns.at:
             return columns.column_of(FORCES, row)
@@ -191,7 +191,7 @@ class States:
         return self.forces_from_record(record, q, self.before(n))
 
     def history(self) -> State:
-        """Return all states as arrays by name, with the forces of cells; (n+1, ...)."""
+        """Return all states as arrays by name, with the resultants of cells; (n+1, ...)."""
         number = range(len(self))
         names = dict.fromkeys(name for block in self._blocks for name in block.columns.at)
         arrays = {name: self.column(name)[:,] for name in names if ": " not in name}
@@ -200,16 +200,16 @@ class States:
         if arrays.pop(BEFORE, None) is not None:
             before = np.array([self.before(n) for n in number])
             if not np.array_equal(before, arrays["q"][[0, *number[:-1]]]):
-                arrays[BEFORE] = before  # a step does not begin at the end of the previous step
+                arrays[BEFORE] = before  # a step does not begin at the previous state
         for part, entries in zip(LEDGER, self.ledger(), strict=True):
             arrays |= {f"{part}: {name}": values for name, values in entries.items()}
         return arrays
 
     def resume(self, history: State) -> None:
-        """Restore the states of a :meth:`history`; missing arrays are zero.
+        """Restore the states of a :meth:`history`; missing arrays become zero.
 
         Raises:
-            ArgumentError: Times, q or forces are missing, or shapes do not agree with the scene.
+            ArgumentError: Times, q or forces are missing, or shapes do not match the scene.
         """
         require_arrays(history, {"t": (-1,)})
         n, begins = len(history["t"]), BEFORE in history
@@ -229,24 +229,24 @@ class States:
 
     @property
     def times(self) -> Array:
-        """Initial time and n kept times; (n+1,); s."""
+        """Times of the initial and the n recorded states, s; or load factors; (n+1,)."""
         return self.column("t")[:,]
 
     @property
     def q(self) -> Array:
-        """Configurations: all degrees of freedom in the order of the numbering; (n+1, size)."""
+        """Configurations, in the order of the degrees of freedom; (n+1, size); m, m, rad."""
         return self.column("q")[:,]
 
     @property
     def v(self) -> Array:
-        """Velocities in the order of :attr:`q`; empty in statics."""
+        """Velocities, in the order of :attr:`q`; empty in statics; m/s, m/s, rad/s."""
         return self.column("v")[:,]
 
     def displacement(self, place: AttachmentPoint) -> Array:
         """Return displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
 
-        Between nodes of a beam they are interpolated with the degree of the mesh.  In bodies they
-        are exact.
+        Between the nodes of a beam, values are interpolated with the degree of the cells.  In
+        bodies, values are exact.
 
         Raises:
             ArgumentError: The beam or body of the place is not in the scene.
@@ -267,14 +267,14 @@ class States:
         return velocity_at(self.numbering, place, self.column("q"), v)
 
     def position(self, place: AttachmentPoint) -> Array:
-        """Return the coordinates of a place; (n+1, 2); m."""
+        """Return the coordinates of a place in the deformed scene; (n+1, 2); m."""
         if isinstance(place, Spot):
             return np.asarray(place.point + self.displacement(place)[:, :2])
         nodes, weights = self.numbering.weights(place)
         return np.asarray(weights @ self.numbering.points[nodes] + self.displacement(place)[:, :2])
 
     def shape(self, beam: Member, n: int = -1) -> Array:
-        """Return coordinates of the vertices of a beam at the n-th time; (num_vertices, 2); m."""
+        """Return the deformed vertices of a beam at the n-th time; (num_vertices, 2); m."""
         vertices, numbering = self.numbering.vertices_of(beam), self.numbering
         moved = self._row("q", n)[numbering.dofs[vertices, :2]]
         return np.asarray(numbering.points[vertices] + moved)
@@ -282,7 +282,7 @@ class States:
     # -- joints --------------------------------------------------------------------------------
 
     def connector(self, connector: Connector) -> Connection:
-        """Return relative motion, force and work of a connector.
+        """Return motion, force, work, rate and dissipated energy of a connector.
 
         Raises:
             ArgumentError: The connector is not in the scene.
@@ -321,7 +321,7 @@ class States:
         return JointHistory(motion, force, in_a, in_b, moment)
 
     def _direction(self, holder: Connector, angle: Array) -> Array:
-        """Return unit vectors along which b moves if the motion of ``holder`` grows; (n+1, 2)."""
+        """Return directions in which b moves if the motion of ``holder`` grows; (n+1, 2)."""
         if holder.stretches:
             between = self.position(holder.b) - self.position(holder.a)
             return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
@@ -336,14 +336,14 @@ class States:
         return turned(holder.axis, angle if holder.follows_a else np.zeros_like(angle))
 
     def reaction(self, support: Support) -> Array:
-        """Return force and moment of a support on the scene; (n+1, 3); N, N, N m.
+        """Return force (x, y) and moment of a support on the scene; (n+1, 3); N, N, N m.
 
-        Only components of motion that the support holds have reactions.
+        Reactions in directions that the support leaves free are zero.
 
-        In statics the first row belongs to the initial state: it is zero in the undeformed scene,
-        since loads act from the first step on, and with ``start=`` it has the reactions at the end
-        of that run.  In dynamics reactions act during the step that ends at each time; the first
-        row is NaN.
+        Each row belongs to the step that ends at its time.  In dynamics the first row is NaN.  In
+        statics the first row has the reactions of the initial state.  They are zero if the scene
+        is undeformed, because loads act from the first step on.  With ``start=`` they are the last
+        reactions of the earlier run.
 
         Raises:
             ArgumentError: The support is not in the scene.
@@ -361,8 +361,8 @@ class States:
         """Compute (N, V, M) of :meth:`diagram` in all cells in the n-th state.
 
         Args:
-            n: Number of the state.
-            pieces: Fractions of the length of a cell, from 0 to 1.
+            n: Index of the state.
+            pieces: Fractions of the length of a cell, from 0 to 1, by default the middle.
 
         Returns:
             Section forces; (num_cells, len(pieces), 3); N, N, N m.
@@ -385,7 +385,7 @@ class States:
     def section_forces_at(self, place: Place) -> Array:
         """Return (N, V, M) of :meth:`diagram` at a place; (n+1, 3); N, N, N m.
 
-        At a vertex the values belong to the end of the cell before it.
+        At an inner vertex the values belong to the end of the cell before the vertex.
 
         Raises:
             ArgumentError: The beam of the place is not in the scene.
@@ -401,15 +401,15 @@ class States:
         return np.asarray(forces[:, 0])
 
     def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
-        """Return section forces along a beam, by equilibrium of cells, at the n-th kept time.
+        """Return section forces along a beam, by equilibrium of cells, at the n-th time.
 
-        Section forces belong to the equation of the step that ends at this time, with inertia,
-        damping, loads and works.  At a support they agree with its :meth:`reaction`, in the axes of
-        the section, which turn with the beam.  Each cell has ``points`` equally spaced points, both
-        ends included; under a uniform load V is linear between them.
+        Section forces satisfy the equation of the step that ends at this time, with inertia,
+        damping, loads and users' virtual works.  At a support they agree with its :meth:`reaction`
+        in the axes of the section, which turn with the beam.  Each cell has ``points`` equally
+        spaced points, both ends included.  Under a uniform load V is linear between the points.
 
-        The initial state of a static run has no forces without ``start=``.  The initial state of a
-        dynamic run has the forces of the last step of ``start=``, or the forces by its own strains.
+        With ``start=`` and the same scheme, a run begins with the last forces of the earlier run.
+        Other static runs begin without section forces, other dynamic runs with stresses only.
 
         Raises:
             ArgumentError: The beam is not in the scene, or ``points`` is less than 2.
@@ -423,7 +423,7 @@ class States:
     def strains(self, beam: Member, n: int = -1) -> Array:
         """Return (Σ, Γ, K) in the cells of a beam at the n-th time; (num_cells, 3); 1, 1, 1/m.
 
-        The curvature includes the jump of a hinge divided by the length of its cell.
+        K includes the jump of a hinge, divided by the length of its cell.
         """
         return self.mean_strains(n)[self.numbering.cells_of(beam)]
 
@@ -442,7 +442,7 @@ class States:
         """Return forces, jumps and dissipated energies in the cells of a beam at the n-th time.
 
         Raises:
-            ArgumentError: The scene is elastic, or the beam is not in it.
+            ArgumentError: The scene is elastic, or the beam is not in the scene.
         """
         return self._material(n, self.numbering.cells_of(beam))
 
@@ -460,14 +460,14 @@ class States:
         return everything
 
     def material_at(self, place: Place) -> Material:
-        """Return material states in the cell at a place at all kept times; (n+1, ...).
+        """Return the material state of the cell at a place at all times; (n+1, ...).
 
-        If a plastic hinge is at the place, ``forces[:, 2]`` is its moment during the step that ends
-        at each time, ``jump`` its rotation, and ``hinge`` the energy that it has dissipated.  The
-        other forces belong to the middle of the cell.
+        ``forces`` are section forces in the middle of the cell.  If a plastic hinge is at the
+        place, ``forces[:, 2]`` is the moment of the hinge in each step, ``jump`` its rotation, and
+        ``hinge`` its dissipated energy.
 
         Raises:
-            ArgumentError: The scene is elastic, or the beam of the place is not in it.
+            ArgumentError: The scene is elastic, or the beam is not in the scene.
         """
         cell, hinge = self.numbering.cell(place), self.numbering.hinge_at(place)
         states = zip(*(self._material(n, cell) for n in range(len(self))), strict=True)
@@ -478,10 +478,10 @@ class States:
         return Material(forces, jump, plastic, energy)
 
     def damage(self, n: int = -1) -> tuple[Array, Array]:
-        """Return jump of rotation (rad) and dissipated energy (J) of each cell; (num_cells,).
+        """Return jump of rotation (rad) and dissipated energy (J) of each cell; (num_cells,) each.
 
-        Plastic hinges at the ends of cells are included.  The jump of a cell with several jumps is
-        the largest of them.
+        Plastic hinges at the ends of cells are included.  If a cell has several jumps, the jump of
+        the largest magnitude is returned.
         """
         states = self.cells_of(n)
         jump, dissipated = states[:, 3].copy(), states[:, PLASTIC] + states[:, HINGE]
@@ -495,7 +495,7 @@ class States:
     # -- balances ------------------------------------------------------------------------------
 
     def ledger(self) -> list[dict[str, Array]]:
-        """Return the three parts of the ledger, each with arrays by name; (n+1,); J."""
+        """Return the three parts of the energy ledger, each as arrays by name; (n+1,); J."""
         pieces = []
         for k in range(len(LEDGER)):
             columns = [(block.rows, block.columns.ledger[k]) for block in self._blocks]
@@ -510,11 +510,11 @@ class States:
 
     @property
     def energy(self) -> Energy:
-        """Energy ledger of the run."""
+        """Energy ledger of all states."""
         return Energy(*self.ledger())
 
     def momentum(self) -> Array:
-        """Return (p_x, p_y, L), with L about the origin; (n+1, 3); N s, N s, N m s.
+        """Return momenta (p_x, p_y, L), with L about the origin; (n+1, 3); N s, N s, N m s.
 
         Raises:
             ArgumentError: The run was static.
