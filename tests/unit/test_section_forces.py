@@ -367,6 +367,8 @@ def test_supports_at_one_node_have_what_they_hold(scheme, along, turns_first):
     assert abs(of_turning[2]) > 1e-3
     assert simulation.press(turning) == 0.0
     assert simulation.press(roller) == pytest.approx(np.hypot(*of_roller[:2]), rel=1e-15)
+    with pytest.raises(ub.ArgumentError, match="is not in the scene"):
+        simulation.press(ub.Roller(beam.start, along=along))
     d = run.diagram(beam, points=2)
     end = np.array([d.N[-1], d.V[-1], d.M[-1]])  # the end does not turn
     # Across the roller, and along it nothing but the residual

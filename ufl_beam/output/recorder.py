@@ -87,11 +87,10 @@ class PresentState(ABC):
         """Return the magnitude of the force of a joint or support in the last step; N.
 
         Raises:
-            ArgumentError: The joint shares unknowns, or is not in the scene.
+            ArgumentError: The joint shares unknowns, or joint or support is not in the scene.
         """
         if isinstance(joint, Support):
-            number = self.scene.supports.index(joint)
-            return float(np.linalg.norm(self.now.column("reactions")[0, number, :2]))
+            return float(np.linalg.norm(self.now.reaction(joint)[0, :2]))
         connectors = self.scene.all_connectors
         values = [n for n in connector_indices(self.scene, joint) if not connectors[n].is_rotation]
         return float(np.linalg.norm(self.connections()[values, FORCE]))
