@@ -290,7 +290,7 @@ def _distributed(
     ended: SimpleQueue[Any] = SimpleQueue()  # includes futures that this process cancels
     for future in futures:
         future.add_done_callback(ended.put)
-    # While this process runs members, a thread of the pool calls MPI, if MPI supports threads.
+    # This process runs members only if MPI allows a thread of the pool to communicate meanwhile.
     left = [*futures] if MPI.Query_thread() == MPI.THREAD_MULTIPLE else []
     finished = 0
     try:

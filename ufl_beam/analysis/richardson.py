@@ -60,7 +60,7 @@ class Convergence:
                 size(changes[1] * 2**k - changes[0]) <= (TRUSTED - 1) * first
                 for k in range(1, round(method) + 1)
             )
-            # A change that is smaller than the order in theory predicts may be close to a zero.
+            # A change that fell faster than the order in theory may be near a change of sign.
             most = max(last, first / 2**method)
         used = method if math.isnan(order) else min(max(order, LEAST_ORDER), method)
         rest, bound = changes[-1] * 0.0, DOUBTED * max(sizes)  # if changes are irregular
