@@ -134,7 +134,7 @@ def damping(
     """Estimate the damping of a free vibration; the arguments are as in :func:`peaks`.
 
     Raises:
-        ArgumentError: An error of :func:`peaks` or :func:`fit_decay`; there are fewer than 3 peaks;
+        ArgumentError: As in :func:`peaks` and :func:`fit_decay`; or there are fewer than 3 peaks,
             or a peak is not above ``about``.
 
     Example:
@@ -172,7 +172,7 @@ def peaks(
             last peaks.
 
     Raises:
-        ArgumentError: t and x differ in length, t does not increase, or a number is wrong.
+        ArgumentError: t and x differ in length, t does not increase, or a number is out of range.
 
     Example:
         >>> t = np.arange(0, 3, 0.01)

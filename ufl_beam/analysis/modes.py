@@ -278,8 +278,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
 
     Without damping the modes solve K x = ω² M x.  With damping, Coriolis or follower forces they
     solve (K + s C + s² M) x = 0, without the assumption of modal damping.  Motions that decay
-    without oscillation are modes, too.  A damping ratio of -1 means buckling, another negative
-    ratio flutter.
+    without oscillation are modes, too.  A negative damping ratio means flutter, or buckling if the
+    ratio is -1.
 
     Args:
         scene: Model.

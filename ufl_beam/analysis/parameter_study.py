@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Parameter studies: one scene with many parameters or seeds, computed in parallel.
 
-:mod:`mpi4py.futures` distributes the members.  Only cases are sent, because all processes run the
-same script and have the member function: it may be a closure and need not be picklable.
+:mod:`mpi4py.futures` distributes the members.  All processes run the same script, so only cases are
+sent.  The member function may be a closure and need not be picklable.
 """
 
 from __future__ import annotations

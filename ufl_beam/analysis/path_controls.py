@@ -52,8 +52,8 @@ class PathCorrector:
 
     Attributes:
         weights: Weights of the squares in the norm of a direction.  Displacements are divided by
-            the size of the scene, the load factor by ``factor``.  Of displacements and rotations
-            the mean square counts.  Degrees of freedom owned by another process have the weight
+            the size of the scene, the load factor by ``factor``.  The squares of displacements and
+            rotations are averaged.  Degrees of freedom owned by another process have the weight
             zero, because norms are summed over the processes.
         factor_gradient: Gradient of the load factor.
         direction: Direction of the path at the beginning of the step.
@@ -242,8 +242,8 @@ class PathCorrector:
             predicted: Predicted step.
             normal: Gradient of the controlled quantity, normal to the plane.
             reach: Change of this quantity in the step, by which its error is divided.
-            hold: Whether hinges, cracks and springs stay closed if an equilibrium allows it, see
-                material_points.py; false along a direction in which they open.
+            hold: Whether hinges, cracks and springs that did not open in the last step stay closed
+                if possible, see material_points.py; false along a direction in which they open.
         """
         simulation = self.simulation
         self._end, self._normal, self._reach = self.start + predicted, normal, reach

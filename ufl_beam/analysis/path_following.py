@@ -64,7 +64,7 @@ SAME_POINT_FRACTION = 1e-3  # closer critical points, as a fraction of a step, a
 # Largest distance between the states before and at a critical point, as a fraction of the step to
 # the critical point.  A longer distance is a leap to another branch.
 LARGEST_GAP = 0.1
-SINGULAR_RATIO = 1e-3  # a number below this fraction of its size at the ends of a step is zero
+SINGULAR_RATIO = 1e-3  # below this fraction of its size at the ends of a step, a number is zero
 
 
 class Path(Solution):
@@ -309,7 +309,7 @@ class PathStepper:
             return
         self._at_point = candidate.passed(before)
         # At a limit point the load factor has turned, as at a kink, or the slope vanishes.  Both
-        # are needed, because round-off may separate the sign changes of slope and eigenvalue.
+        # are tested, because round-off may separate the sign changes of slope and eigenvalue.
         soft = _vanishes("softness", candidate, before, after)
         limit = self._turned(candidate) or _vanishes("slope", candidate, before, after)
         limit = limit and not (soft and _no_work(candidate, before, after))

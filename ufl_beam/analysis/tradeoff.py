@@ -392,7 +392,7 @@ class _Candidate(NamedTuple):
     level: float  # the number of steps is multiplied by about 2**level
     seconds: float  # wall time; s
     likely: float  # largest error, divided by units; errors of cells and steps may cancel
-    bound: float  # likewise, if errors of cells and steps do not cancel
+    bound: float  # largest error, divided by units, if errors of cells and steps add up
 
 
 class _Search:
@@ -475,7 +475,7 @@ class _Search:
         return notes
 
     def ratio(self, run: Run, other: Run | None = None) -> float:
-        """Return the largest distance of a run from the limits or another run, over ``units``."""
+        """Return the largest distance from the limits, or another run, divided by ``units``."""
         limits = {name: convergence.limit for name, convergence in self.crosses.items()}
         goal = other.values if other else limits
         return max(size(run.values[name] - goal[name]) / unit for name, unit in self.units.items())

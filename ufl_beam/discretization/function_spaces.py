@@ -169,7 +169,7 @@ class Fields:
         return kernel
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
-        """Compile a virtual work and its derivative with shared values; the latter adds to ``A``."""
+        """Compile a virtual work and, to add to ``A``, its derivative; both share their values."""
         form, lanes = derivative(work, q1), self._coordinates_in_lanes
         force = self.kernel(work, q1)
         tangent = Kernel(form, q1, self.cell_dofs, self._coordinates(), lanes)

@@ -27,7 +27,7 @@ TOUCHING = 1e-3
 """Largest gap between vertices that touch, as a fraction of the length of the shorter beam."""
 
 JUMP = 1e-6
-"""Largest initial jump without a warning; rotations: rad, else a fraction of the scene's size."""
+"""Largest initial jump without a warning: an angle in rad, or a fraction of the scene's size."""
 
 FAR_OUT = 10.0
 """Largest distance from the centre of a body without a warning, in radii of gyration."""

@@ -41,9 +41,9 @@ def bisected(points: Array, number: int) -> Index:
 class Subdomain:
     """Subdomain of a scene that one process computes: its cells, and their degrees of freedom.
 
-    The local numbers of degrees of freedom that this process owns are first; then follow ghosts,
-    which other processes own.  Both groups are in the order of the numbering.  Global numbers, used
-    by PETSc, are contiguous on each process.
+    Degrees of freedom that this process owns have the first local numbers.  Ghosts, which other
+    processes own, follow.  Both groups are in the order of the numbering.  Global numbers, used by
+    PETSc, are contiguous on each process.
 
     Attributes:
         numbering: The :class:`DofNumbering`.
@@ -107,7 +107,7 @@ class Subdomain:
             self._local = self._all_owned = self.dofs
         self.rotations = np.sort(self.local(numbering.rotations)).astype(np.int32)
         self.multipliers = self.local(numbering.multipliers).astype(np.int32)
-        self._gathered: Array = np.empty(0 if self.alone else numbering.size)  # used by each call
+        self._gathered: Array = np.empty(0 if self.alone else numbering.size)  # buffer of :meth:`gather`
         self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
 
     @cached_property

@@ -21,7 +21,7 @@ from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.works import VirtualWork, Work
 
 GROWTH = "growth of works"
-"""Name of the load factor of virtual works; the spaces exclude it as a name of a parameter."""
+"""Name of the load factor of virtual works; its spaces distinguish it from parameters."""
 
 
 class Statement(NamedTuple):
