@@ -107,7 +107,7 @@ class Subdomain:
             self._local = self._all_owned = self.dofs
         self.rotations = np.sort(self.local(numbering.rotations)).astype(np.int32)
         self.multipliers = self.local(numbering.multipliers).astype(np.int32)
-        self._gathered: Array = np.empty(0 if self.alone else numbering.size)  # buffer of :meth:`gather`
+        self._gathered: Array = np.empty(0 if self.alone else numbering.size)  # for gather()
         self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
 
     @cached_property
