@@ -37,7 +37,7 @@ class Branch:
     Attributes:
         state: Solution whose last state is the start of the path.
         mode: Direction of the path at its start, at all degrees of freedom in the order of the
-            numbering.
+            numbering; (numbering.size,).
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), amplitude=lambda t: t)
@@ -60,13 +60,13 @@ class CriticalPoint:
     """Limit or bifurcation point: a state of a path with singular tangent stiffness.
 
     Attributes:
-        kind: "limit" if the load factor turns, "bifurcation" if another branch begins.
+        kind: "limit" if the load factor has an extremum, "bifurcation" if another branch begins.
         factor: The load factor.
-        n: Number of the state in the path.
+        n: Index of the state in the path.
         state: Solution with this state only.
         mode: Critical mode at all degrees of freedom, in the order of the numbering.  The root mean
-            square of its rotations (rad), and of its displacements divided by the size of the
-            scene, is 1.
+            square of all rotations (rad) and all displacements is 1, where displacements are
+            divided by the size of the scene.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), amplitude=lambda t: t)
@@ -105,23 +105,23 @@ class Stiffness:
     """Tangent stiffness of the whole scene, factored by every process; StepFailed if singular.
 
     Each process contributes its subdomain's tangent A, the local degrees of freedom ``constrained``
-    by supports, and its part ``rate`` of the derivative of the residual with respect to the load
+    by supports, and its addend ``rate`` to the derivative of the residual with respect to the load
     factor.  ``weights`` are the weights of the norm of a direction, at all degrees of freedom of
     the scene.
 
-    The tangent is factored in a symmetric form.  The column of a connector's force holds the
-    gradient g of the motion; its row holds α g, and β on the diagonal.  The row is divided by α.
-    If β is not zero, the unit of the force is chosen so that the diagonal entry becomes ±1.  A law
-    whose force does not depend on the motion has α = 0.  Each force adds one negative eigenvalue if
-    it constrains a motion or grows with it, and otherwise none.
+    A force of a connector has a column and a row of the tangent.  The column has the gradient g of
+    the connector's motion; the row has α g, and β on the diagonal.  Division of the row by α makes
+    the tangent symmetric.  If β is not zero, the unit of the force makes the diagonal entry ±1.  A
+    force that does not depend on the motion has α = 0.  Each force that constrains the motion or
+    grows with it adds one negative eigenvalue.
 
     Attributes:
-        negative: Number of negative eigenvalues after elimination of the connectors' forces.  If
-            the tangent is not symmetric, as with follower loads: 1 if its determinant is negative,
-            else 0.
+        negative: Number of negative eigenvalues after elimination of the connectors' forces.  For
+            an unsymmetric tangent, as with follower loads: 1 if the determinant is negative, else
+            0.
         symmetric: True if the tangent is symmetric.
-        flow: Change of the configuration per unit of the load factor, zero at supported degrees
-            of freedom; (numbering.size,).
+        flow: Derivative of the configuration with respect to the load factor, zero at degrees of
+            freedom that supports constrain; (numbering.size,).
     """
 
     def __init__(
@@ -175,7 +175,7 @@ class Stiffness:
 
     @property
     def most_work(self) -> float:
-        """Work of the load if each component did the largest motion of the softest mode; N m."""
+        """Work of the load if each dof had the largest component of the softest mode; N m."""
         units = np.sqrt(self._weights)
         moving = units > 0.0
         forces = np.abs(self._forces[moving]) / units[moving]
@@ -188,7 +188,7 @@ class Stiffness:
 
     @cached_property
     def softest(self) -> tuple[float, Array]:
-        """Eigenvalue nearest to zero (N m), and its mode, whose norm with ``weights`` is 1."""
+        """Eigenvalue nearest to zero (N m), and its mode with the norm 1; (numbering.size,)."""
         w = self._weights
         mode = np.random.default_rng(0).normal(size=len(w)) / np.sqrt(np.maximum(w, w.max()))
         for _ in range(INVERSE_ITERATIONS):
@@ -196,14 +196,14 @@ class Stiffness:
             mode /= np.sqrt(w @ mode**2) * np.sign(w @ (mode * before) or 1.0)
             if w @ (mode - before) ** 2 <= MODE_TOLERANCE**2:
                 break
-        # Extended precision: the works of stiff cells nearly cancel.
+        # The sum needs extended precision, because the works of stiff cells nearly cancel.
         K, x = self._K.tocoo(), mode.astype(np.longdouble)
         λ = float(np.sum(K.data * x[K.row] * x[K.col]))
         return λ, self._spread(mode * np.sign(mode[np.abs(w * mode).argmax()]))
 
 
 class Candidate(NamedTuple):
-    """End of a step that may be accepted, with the stiffness and the direction of the path.
+    """Solved step that may be accepted, with stiffness and direction of the path at its end.
 
     ``mode`` is the critical mode if the end is a bifurcation point, else None.
     """
@@ -211,9 +211,9 @@ class Candidate(NamedTuple):
     trial: Trial
     stiffness: Stiffness
     direction: Array
-    #: Change of the load factor t along the path, divided by the size of the change of the
-    #: configuration q.  As K q' = f t', a slope of zero means that the direction of the path is a
-    #: critical mode.  The load f does work on this mode, but none on a bifurcation point's mode.
+    #: Slope |t'|/|q'| of the path, with the load factor t and the configuration q.  As K q' = f t',
+    #: a slope of zero means that q' is a critical mode.  The load f does work on this mode; it does
+    #: none on the mode of a bifurcation point.
     slope: float
     mode: Array | None = None
 
@@ -226,9 +226,9 @@ class Candidate(NamedTuple):
     def work(self) -> float:
         """Work of the load on the critical mode, near a critical point; N m.
 
-        This work f·x is softness divided by slope, as t'/|q'| = λ/(f·x) for a motion along a mode x
-        of norm 1 with the eigenvalue λ.  If the load does no work on x, the quotient tends to zero
-        despite round-off in q'.
+        The work f·x is softness divided by slope, because t'/|q'| = λ/(f·x) for a motion along a
+        mode x of norm 1 with the eigenvalue λ.  If the load does no work on x, this quotient tends
+        to zero at the critical point, despite round-off in q'.
         """
         return self.softness / self.slope if self.slope else math.inf
 
@@ -238,7 +238,7 @@ class Candidate(NamedTuple):
         return np.append(self.trial.q1, self.trial.step.t1)
 
     def passed(self, before: Candidate) -> bool:
-        """Return whether an eigenvalue passed zero, or the load factor turned, since ``before``."""
+        """Return whether an eigenvalue or the load factor's rate changed sign since ``before``."""
         turned = (self.direction[-1] < 0) != (before.direction[-1] < 0)
         now, then = self.stiffness, before.stiffness
         change = now.negative - then.negative

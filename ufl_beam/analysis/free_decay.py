@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import scipy  # its parts are loaded when they are used
+import scipy  # imports its modules when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import compact_repr
@@ -16,13 +16,13 @@ from ufl_beam.errors import ArgumentError, require_array, require_number, requir
 
 @dataclass(frozen=True)
 class Envelope:
-    """Decay law fitted to peaks, with half-widths of 95 % intervals (Student's t).
+    """Decay law fitted to peaks, with 95 % confidence intervals of Student's t distribution.
 
     Attributes:
-        initial: A_0, the amplitude at the first peak; unit of x.
-        rate: r of A_0 − r t, unit of x per s, or λ of A_0 exp(−λ t), 1/s; t is 0 at the first peak.
-        initial_95: Half-width of the interval of ``initial``; unit of x.
-        rate_95: Half-width of the interval of ``rate``, in the same unit.
+        initial: A_0, the fitted amplitude at the first peak, where t = 0; unit of x.
+        rate: r of the law A_0 − r t, in the unit of x per s; or λ of the law A_0 exp(−λ t), 1/s.
+        initial_95: Half-width of the confidence interval of ``initial``; unit of x.
+        rate_95: Half-width of the confidence interval of ``rate``; unit of ``rate``.
         rms: Root mean square of the residuals; unit of x.
 
     Example:
@@ -54,10 +54,10 @@ class Decay:
     Attributes:
         times: Times of the n peaks; (n,); s.
         amplitudes: Amplitudes of the peaks; (n,); unit of x.
-        decrement: Logarithmic decrement δ, mean of all periods.
+        decrement: Mean logarithmic decrement δ of all periods.
         decrements: Logarithmic decrement of each period; (n-1,).
-        linear: Fit of A_0 − r t, as under dry friction: equal losses in all periods.
-        exponential: Fit of A_0 exp(−λ t), as under viscous damping: equal ratios.
+        linear: Fit of A_0 − r t, the law of dry friction.
+        exponential: Fit of A_0 exp(−λ t), the law of viscous damping.
 
     Example:
         >>> t = np.arange(0, 5, 0.01)
@@ -90,7 +90,7 @@ class Decay:
 
     @property
     def fitted_ratio_95(self) -> float:
-        """Half-width of the 95 % interval of ``fitted_ratio``, from the interval of λ."""
+        """Half-width of the 95 % confidence interval of ``fitted_ratio``."""
         slope = (1 - self.fitted_ratio**2) ** 1.5 / (2 * np.pi)  # dζ/dδ
         return float(slope * self.exponential.rate_95 * self.period)
 
@@ -101,10 +101,10 @@ class Decay:
 
     @property
     def evidence(self) -> float:
-        """Evidence ratio of the better law, exp(ΔAIC/2); both have two parameters.
+        """Evidence ratio of the better law, exp(ΔAIC/2) with Akaike's information criterion AIC.
 
-        Residuals are assumed independent and normal.  An ``rms`` below round-off is replaced by
-        round-off.
+        Residuals are assumed independent and normal.  Round-off of the amplitudes replaces a
+        smaller ``rms``.
         """
         least = np.finfo(float).eps * np.max(self.amplitudes)
         linear, exponential = (max(law.rms, least) for law in (self.linear, self.exponential))
@@ -157,22 +157,22 @@ def peaks(
 ) -> tuple[Array, Array]:
     """Find times (s) and amplitudes (unit of x) of the maxima of a vibration; (m,) each.
 
-    Minima of x do not count, so the peaks are one period apart for any equilibrium.  Each maximum
-    is interpolated by a parabola through three samples.  The ends of the history do not count.
+    Minima are left out, so that successive peaks are one period apart even if ``about`` is wrong.
+    A parabola through three samples gives each maximum.  The ends of the history are no maxima.
 
-    Noise raises small peaks by a larger fraction than large peaks.  First filter noise that exceeds
-    0.3 % of the amplitudes.
+    Noise raises small peaks by a larger fraction than large peaks.  If noise exceeds 0.3 % of the
+    amplitudes, filter it first.
 
     Args:
         t: Increasing times, not necessarily equidistant; (n,); s.
-        x: Values of the free vibration alone; (n,).
-        about: Equilibrium, from which amplitudes are measured; unit of x.
-        prominence: Fraction of the range of x by which x must fall on both sides of a maximum.
+        x: Values of the free vibration, without the forced vibration before; (n,).
+        about: Value of x at equilibrium, from which amplitudes are measured.
+        prominence: Least fall of x on both sides of a maximum, as a fraction of the range of x.
             Choose it larger than superposed vibrations of high frequency, and smaller than the
             last peaks.
 
     Raises:
-        ArgumentError: t and x differ in length, are not finite, or t does not increase.
+        ArgumentError: t and x differ in length, t does not increase, or a number is out of range.
 
     Example:
         >>> t = np.arange(0, 3, 0.01)
@@ -195,16 +195,16 @@ def _maxima(
     rise, fall = (x[i] - x[i - 1]) / before, (x[i + 1] - x[i]) / after
     curvature = 2 * (fall - rise) / (before + after)
     slope = (rise * after + fall * before) / (before + after)
-    # Three equal samples have no slope and no curvature; their peak is not shifted.
+    # Three equal samples have slope and curvature zero; the middle sample is the peak.
     shift = np.divide(-slope, curvature, out=np.zeros(len(i)), where=curvature < 0)
     return t[i] + shift, x[i] + slope * shift / 2 - about
 
 
 def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
-    """Compute the mean logarithmic decrement δ of n + 1 amplitudes, and δ of each period; (n,).
+    """Compute the mean logarithmic decrement δ of n + 1 amplitudes, and each period's δ; (n,).
 
     Raises:
-        ArgumentError: There are fewer than two amplitudes, or one is not positive.
+        ArgumentError: There are fewer than two amplitudes, or an amplitude is not positive.
 
     Example:
         >>> mean, each = ub.logarithmic_decrement([1.0, 0.9, 0.81])
@@ -225,7 +225,7 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
 
 
 def damping_ratio(decrement: npt.ArrayLike) -> Array:
-    """Compute damping ratios ζ of decrements δ of any shape; negative where vibrations grow.
+    """Compute damping ratios ζ = δ/√(δ² + 4π²) of decrements δ; an array of the same shape.
 
     Example:
         >>> print(f"{ub.damping_ratio(0.1):.4f}")
@@ -239,16 +239,15 @@ def damping_ratio(decrement: npt.ArrayLike) -> Array:
 def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     """Fit a linear and an exponential law to peaks that are one period apart, by least squares.
 
-    Both laws are fitted to the amplitudes, not to their logarithms, so that their residuals can be
-    compared.
+    Both laws are fitted to the amplitudes, not to logarithms, so that residuals can be compared.
 
     Args:
         t: Increasing times of the peaks; (n,); s.
         amplitudes: Amplitudes of the peaks; (n,).
 
     Raises:
-        ArgumentError: t and amplitudes differ in length, or are fewer than 3 or not finite; t does
-            not increase; an amplitude is not positive; or no exponential fits the amplitudes.
+        ArgumentError: There are fewer than 3 peaks; t and amplitudes differ in length or are not
+            finite; t does not increase; an amplitude is not positive; or no exponential law fits.
 
     Example:
         >>> t = np.arange(6.0)
@@ -264,7 +263,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     line = scipy.stats.linregress(s, A)
     errors = line.intercept_stderr, line.stderr
     linear = _envelope((line.intercept, -line.slope), errors, A - line.intercept - line.slope * s)
-    # The dimensionless fit begins at the line through the logarithms, weighted by the amplitudes.
+    # A line through the logarithms, weighted by the amplitudes, is the initial guess of the fit.
     τ, a, units = s / s[-1], A / np.max(A), np.array([np.max(A), 1 / s[-1]])
     slope, logarithm = np.polyfit(τ, np.log(a), 1, w=a)
     guess = np.exp(logarithm), -slope

@@ -30,13 +30,13 @@ from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
 
 V = TypeVar("V", Array, Complex)
 
-MODAL_TOLERANCE = 1e-9  # couplings below this fraction of the largest damping do not count
+MODAL_TOLERANCE = 1e-9  # coupling below this fraction of the largest damping is neglected
 BALANCED = 1e-13  # forces below this fraction of the stiffness times the scene's size are round-off
-AT_REST = 1e150  # time step so long that rates vanish; its square is finite; s
+AT_REST = 1e150  # time step after which rates vanish; its square does not overflow; s
 
 
 class _Standstill(Newmark):
-    """Scheme of small motions: all terms are evaluated at the present state, without a step."""
+    """Scheme of small motions, whose terms are evaluated at the present state."""
 
     has_mean_velocity = True
     rings = False
@@ -48,17 +48,17 @@ class _Standstill(Newmark):
 
 
 class SmallMotions:
-    """Matrices of small motions about a state, without the degrees of freedom that supports hold.
+    """Matrices of small motions about a state, without degrees of freedom constrained by supports.
 
     The state is the last state of ``at``, by default the undeformed scene.  Loads are evaluated at
-    the time t (s), by default the time of the state.
+    the time ``t`` (s), by default the time of the state.
     """
 
     def __init__(
         self, scene: Scene, at: Solution | None, t: float | None = None, mesh: Mesh | None = None
     ) -> None:
         time = 0.0 if at is None else float(at.times[-1])
-        # All processes compute the same, so that no result depends on their number.
+        # All processes compute all matrices, so that no result depends on their number.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)  # these warnings concern runs
             simulation = Simulation(
@@ -69,7 +69,7 @@ class SmallMotions:
         self.scene, self._simulation = scene, simulation
         self.numbering, self.q = simulation.numbering, simulation.q
         simulation.close()
-        # Yielding and opening stay frozen from now on.
+        # Plastic strains and openings of hinges are constant from now on.
         simulation.controllers.evaluate(simulation)
         for cells in simulation.inelastic:
             cells.points.freeze()
@@ -80,7 +80,7 @@ class SmallMotions:
             i, j = self.numbering.node(support.place)[:2]
             c, s = math.cos(support.angle), math.sin(support.angle)
             Q[i, i], Q[i, j], Q[j, i], Q[j, j] = c, -s, s, c
-        self._axes = csr_array(Q)  # columns: the unit motions along the axes of supports
+        self._axes = csr_array(Q)  # columns: unit motions along the axes of supports
         _, T = self._linearised(self.q)
         multipliers = self.numbering.multipliers
         about_forces = T.diagonal()[multipliers] != 0.0
@@ -88,15 +88,15 @@ class SmallMotions:
         left = np.ones(self.numbering.size, dtype=bool)
         left[simulation.supports.dofs] = left[self._laws] = False
         scale = np.ones(self.numbering.size)
-        scale[constraints] = abs(T.data).max()  # its entries become as large as stiffnesses
-        # Columns: the free motions, in the axes of supports, and the forces of constraints.
+        scale[constraints] = abs(T.data).max()  # rows of constraints become as large as stiffnesses
+        # Columns: unit motions that supports allow, and unit forces of constraints.
         self._Z = (self._axes @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
         self.K, self.M = self._reduced(T), self._reduced(self._matrix(simulation.inertia.M.data))
-        # Number of modes: a constraint removes its force and a motion; massless motions add none.
+        # Number of modes: a constraint removes its force and one motion; a mode needs mass.
         self.most = self.K.shape[0] - len(constraints) - int(np.sum(self.M.diagonal() == 0.0))
 
     def _matrix(self, data: Array) -> csr_array:
-        A: Csr = self._simulation.inertia.M  # all matrices have one structure
+        A: Csr = self._simulation.inertia.M  # all matrices have this sparsity pattern
         return csr_array((data.copy(), A.indices.copy(), A.indptr.copy()), shape=(A.size, A.size))
 
     def _linearised(self, q: Array, dt: float = AT_REST) -> tuple[Array, csr_array]:
@@ -107,7 +107,7 @@ class SmallMotions:
         return r, self._matrix(data)
 
     def _reduced(self, T: csr_array) -> csr_array:
-        """Reduce a matrix to free motions and forces of constraints; eliminate forces of laws."""
+        """Reduce a matrix to columns of ``_Z``; eliminate forces that follow from force laws."""
         laws = self._laws
         if len(laws):
             flexibility = diags_array(1 / (T.diagonal()[laws] + (T.diagonal()[laws] == 0.0)))
@@ -115,7 +115,7 @@ class SmallMotions:
         return csr_array(self._Z.T @ T @ self._Z)
 
     def unbalanced(self) -> str:
-        """Name works, connectors and motions of supports that disturb the equilibrium, if any."""
+        """Return a warning of works, connectors, supports that disturb the equilibrium, or ""."""
         t = self._simulation.t
         r, T = self._linearised(self.q)
         sizes = abs(T).max(axis=1).toarray().ravel()
@@ -152,7 +152,7 @@ class SmallMotions:
         works, zero = self._works(x)
         first = np.abs(values[~zero]).min(initial=highest)
         if zero.any():
-            # Huge inverses of the zero eigenvalues leave few digits for the other eigenvalues.
+            # A second shift is far from zero eigenvalues, whose huge inverses cost digits.
             values, x = solve(shift=-first / 2)
             works, zero = self._works(x)
         if abs(C).max() <= round_off * τ and symmetric:
@@ -165,7 +165,7 @@ class SmallMotions:
         return self._nearest(n, s[finite], motions[:, finite])
 
     def _works(self, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-        """Return works (J) of the stiffness on the columns of x, and which may be round-off."""
+        """Return works xᵀ K x (J) of the columns of x, and whether each may be round-off."""
         right, left = self._with_laws()
         works = self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
         sizes = np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
@@ -174,12 +174,12 @@ class SmallMotions:
     def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
         """Compute at least n exponents and motions with velocity-dependent forces C.
 
-        The motions ``free``, in columns, have no stiffness; ``lowest`` is the lowest frequency of
-        the other motions without damping; rad/s.
+        Columns of ``free`` are the motions without stiffness; ``lowest`` is the lowest undamped
+        frequency of the other motions; rad/s.
         """
         # Motions without stiffness may have the double exponent zero, which no solver finds
-        # accurately.  A set N of these motions with C N = M N Λ has the exponents 0 and -Λ:
-        # constraints exclude N from the eigenvalue problem.
+        # accurately.  Motions N among them with C N = M N Λ have the exponent 0 and the eigenvalues
+        # of -Λ as exponents.  Constraints exclude N from the eigenvalue problem.
         N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
         Λ = N.T @ (C @ N)
         _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
@@ -208,7 +208,7 @@ class SmallMotions:
     # -- buckling ------------------------------------------------------------------------------
 
     def buckling(self, n: int) -> tuple[Array, Array | Complex]:
-        """Compute up to n buckling factors nearest to zero, and their shapes."""
+        """Compute up to n buckling factors nearest to zero, and their shapes; (n,), (size, n)."""
         u = self._path()
         right, left = self._with_laws()
         change = csr_array(
@@ -216,16 +216,16 @@ class SmallMotions:
         )
         factors, x = eigensolvers.linear(self.K, -change, n, most=self.K.shape[0], definite=False)
         x = x[:, np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)]
-        # Solve again in the space of these shapes: works are more accurate than the matrices.
+        # Solve again in the space of these shapes, because works are more accurate than matrices.
         works = self._simulation.equation.tangent_works(self.q, u, right @ x, left.T @ x)
         factors, mix = eigensolvers.small(works[0], -works[1])
         return self._nearest(n, factors, (x @ mix).astype(complex))
 
     def _with_laws(self) -> tuple[csr_array, csr_array]:
-        """Return motions, in columns, and virtual motions, in rows, with the forces of laws.
+        """Return the matrices R and L that reduce the tangent T of all unknowns to K = L T R.
 
-        The product of virtual motions, tangent and motions is K; with the derivative of the
-        tangent it is the derivative of K.
+        Columns of R and rows of L are motions with the forces that follow from force laws.  The
+        derivative of K is L T' R.
         """
         (_, T), laws, Z = self._linearised(self.q), self._laws, self._Z
         flexibility = diags_array(1 / T.diagonal()[laws])
@@ -257,7 +257,7 @@ class SmallMotions:
     # -- shapes --------------------------------------------------------------------------------
 
     def _nearest(self, n: int, values: V, x: Complex) -> tuple[V, Array | Complex]:
-        """Return the n eigenvalues nearest to zero, and shapes with the largest displacement 1."""
+        """Return the n eigenvalues nearest to zero, and shapes with a largest displacement of 1."""
         order = np.argsort(np.abs(values), kind="stable")[:n]
         shapes = self._Z @ x[:, order]
         rotations = self._simulation.subdomain.rotations

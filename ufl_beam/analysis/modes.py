@@ -41,20 +41,20 @@ from ufl_beam.terms.beam_forces import elastic_forms
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.term import InCells
 
-MOST_TITLES = 4  # most modes that a text of one line names
+MOST_TITLES = 4  # largest number of modes in a one-line text
 AMPLITUDE = 0.1  # largest displacement of a mode in pictures, as a fraction of the scene's size
 
 
 @dataclass(frozen=True, eq=False)
 class Shapes(Rich, ABC):
-    """Modes about a state; the same on every process.
+    """Vibration or buckling modes about a state; the same on every process.
 
     Attributes:
         scene: Model.
         numbering: Vertices, cells and degrees of freedom of the scene.
-        q: Configuration in the state, at all degrees of freedom in the order of the numbering.
-        shapes: Motions of all degrees of freedom, in columns, with the largest displacement 1 (or
-            rotation, if only rotations move); (size, n); complex if phases differ.
+        q: Configuration in the state, in the order of the numbering; (size,).
+        shapes: Modes, in columns; (size, n); complex if phases differ.  The largest displacement is
+            1; in a mode without displacements, the largest rotation is 1.
     """
 
     scene: Scene
@@ -67,7 +67,7 @@ class Shapes(Rich, ABC):
     @property
     @abstractmethod
     def titles(self) -> list[str]:
-        """Captions of the modes in pictures."""
+        """Captions of the modes in plots."""
 
     def __str__(self) -> str:
         return "\n".join(f"{self.word} {k}: {title}" for k, title in enumerate(self.titles))
@@ -83,7 +83,7 @@ class Shapes(Rich, ABC):
         """Return the motion (u, v, ψ) of a place in the k-th mode; (3,).
 
         Raises:
-            ArgumentError: There is no such shape, or the place is not in the scene.
+            ArgumentError: There is no such mode, or the place is not in the scene.
         """
         self._require(k)
         shape: Any = self.shapes[:, k]
@@ -93,12 +93,12 @@ class Shapes(Rich, ABC):
         """Return one period of the k-th mode as a solution, for :func:`animate` or :func:`plot`.
 
         Args:
-            k: Number of the mode.
+            k: Index of the mode.
             amplitude: Largest displacement, as a fraction of the size of the scene.
-            count: Number of intervals of the period, between states at times from 0 to 1.
+            count: Number of equal intervals of the period; times go from 0 to 1.
 
         Raises:
-            ArgumentError: There is no such shape, or a number is not positive.
+            ArgumentError: There is no such mode, or a number is not positive.
         """
         self._require(k)
         require_number(amplitude, "motion: amplitude", positive=True)
@@ -123,14 +123,14 @@ class Shapes(Rich, ABC):
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
         """Write a time series for ParaView, which shows the k-th mode at the time k.
 
-        Displacements are the sum of state and shape; N, V, M belong to the shape alone.
+        Displacements are the sum of state and mode; N, V and M are the forces of the mode alone.
 
         Args:
             path: File, ending in ``.xdmf`` or ``.vtkhdf``, see :class:`XDMF`, :class:`VTKHDF`.
             amplitude: Largest displacement, as a fraction of the size of the scene.
 
         Raises:
-            ArgumentError: The file cannot be written, or there is no shape.
+            ArgumentError: The file cannot be written, or there is no mode.
         """
         require_number(amplitude, "write: amplitude", positive=True)
         self._require(0)
@@ -153,9 +153,9 @@ class Shapes(Rich, ABC):
             recorder.close()
 
     def _scaled(self, k: int, amplitude: float) -> Array | Complex:
-        """Scale a shape so that its largest displacement is ``amplitude`` times the scene's size.
+        """Scale a mode so that its largest displacement is ``amplitude`` times the scene's size.
 
-        If it only rotates, its largest rotation is ``amplitude`` in rad.
+        If the mode has rotations only, the largest rotation is ``amplitude`` in rad.
         """
         shape = self.shapes[:, k]
         lengths = np.r_[self.numbering.dofs, self.numbering.dofs_of_bodies][:, :2]
@@ -169,7 +169,7 @@ class Shapes(Rich, ABC):
 
 
 class _Frame:
-    """State plus one shape, which recorders read like a simulation; connectors have no history."""
+    """State plus one mode, with the interface of a simulation that recorders need."""
 
     may_break = False
 
@@ -188,7 +188,7 @@ class _Frame:
         return np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
 
     def section_forces(self) -> Array:
-        """Return section forces of the shape alone, by a central difference."""
+        """Return section forces of the mode alone, by a central difference; (num_cells, 3)."""
         ends, ε = np.zeros((2, len(self.numbering.cells), 3)), 1e-5
         for sign, end in zip((1.0, -1.0), ends, strict=True):
             self._forces.add(self._state + sign * ε * self._change, end)
@@ -200,8 +200,8 @@ class Modes(Shapes):
     """Vibration modes ``x exp(s t)`` about a state; made by :func:`modes`.
 
     Attributes:
-        exponents: s = -ζω + iω√(1-ζ²) of each mode, ``|s|`` ascending; of a conjugate pair
-            only the exponent with positive imaginary part; (n,); 1/s.
+        exponents: s = -ζω + iω√(1-ζ²) of each mode, ``|s|`` ascending; (n,); 1/s.  A conjugate
+            pair counts once, with positive imaginary part.
 
     Example:
         >>> shapes = ub.modes(scene, 3)
@@ -227,8 +227,8 @@ class Modes(Shapes):
     def damping(self) -> Array:
         """Damping ratios ζ = ``-Re s/|s|``; (n,).
 
-        A negative ratio means that the motion grows, ±1 that it does not oscillate, NaN that no
-        force opposes it.
+        A motion with a negative ratio grows, a motion with ±1 does not oscillate, and no force
+        opposes a motion with NaN.
         """
         ω = self.omega
         ratios: Array = np.full(len(ω), np.nan)
@@ -262,29 +262,29 @@ class Buckling(Shapes):
 
     @property
     def titles(self) -> list[str]:
-        """Load factor of each mode, by which the loads are multiplied."""
+        """Factor of each mode by which the loads are multiplied."""
         return [f"loads × {factor:.4g}" for factor in self.factors]
 
 
 def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None = None) -> Modes:
     """Compute natural frequencies, damping ratios and shapes of small vibrations.
 
-    The vibrations are about the undeformed, unloaded scene, or about the last state of a solution.
-    In this state section forces, loads and a :class:`RotatingFrame` have a stiffness, and yielded
-    material is elastic.  If only loads hold the scene, as its weight holds a pendulum, the state is
-    the equilibrium with these loads.  Yielding and opening are frozen; hinges that no longer carry
-    a moment act as joints.  Sticking friction is a constraint; sliding friction and controllers are
-    ignored.
+    The vibrations are about the undeformed, unloaded scene, or about the last state of the solution
+    ``at``.  Section forces, loads and a :class:`RotatingFrame` contribute to the stiffness of this
+    state.  Without ``at``, a scene that can move without strain, such as a pendulum, vibrates about
+    its equilibrium with its loads.  Yielded material is elastic, and openings of hinges are
+    constant; hinges that no longer carry a moment act as joints.  Sticking friction is a
+    constraint; sliding friction and controllers are ignored.
 
     Without damping the modes solve K x = ω² M x.  With damping, Coriolis or follower forces they
     solve (K + s C + s² M) x = 0, without the assumption of modal damping.  Motions that decay
-    without oscillation count as modes.  A negative damping ratio means flutter, or buckling if it
-    is -1.
+    without oscillation are modes, too.  A negative damping ratio means flutter, or buckling if the
+    ratio is -1.
 
     Args:
         scene: Model.
         n: Number of modes, from the lowest frequency; fewer if the scene has fewer.
-        at: Solution of the same beams, joined alike; vibrations are about its last state.
+        at: Solution of the same beams with equal joints; vibrations are about its last state.
         mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
 
     Raises:
@@ -292,7 +292,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
             has a :class:`RotatingFrame` and ``at`` is not given.
 
     Warns:
-        ModelWarning: Works, connectors, or motions of supports make the undeformed scene move.
+        ModelWarning: The undeformed scene is no equilibrium, or some beams have no mass.
 
     Example:
         >>> shapes = ub.modes(scene, 3, mesh=ub.Mesh(refine=4))
@@ -308,12 +308,12 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
             )
         if scene.loads and require_no_mechanism(scene):
             simulation = Simulation(replace(scene, damping=()), Static(), mesh=mesh)
-            # There may be no equilibrium, as for a falling body.
+            # Some scenes have no equilibrium, such as a falling body.
             with suppress(ArgumentError), closing(simulation):
                 simulation.step_to(1.0)
                 at = simulation.snapshot()
         if at is None:
-            scene = replace(scene, loads=())  # the undeformed scene is in no equilibrium with them
+            scene = replace(scene, loads=())  # with loads, this state would be no equilibrium
     small = SmallMotions(scene, at, mesh=mesh)
     if at is None and (said := small.unbalanced()):
         warn(said)
@@ -331,20 +331,20 @@ def buckling(
 
     Loads and prescribed motions grow in proportion, from their values in the state ``at`` (λ = 0;
     zero without ``at``) to their values at the time ``t`` (λ = 1).  K' is the derivative of the
-    stiffness along the initial tangent of this path, on which forces and displacements change.  So
-    factors are exact in the limit of a state that buckles; their error grows with the distance
-    from it and with the curvature of the path.
+    stiffness along the initial tangent of this path; it includes changes of forces and of
+    displacements.  A factor is exact if the state itself buckles.  The error grows with the
+    distance of the state from buckling, and with the curvature of the path.
 
     Args:
         scene: Model.
         n: Number of factors, from the smallest ``|λ|``.
         t: Time at which loads are evaluated; s.
-        at: Solution of the same beams, joined alike; the loads grow from its last state.
+        at: Solution of the same beams with equal joints; the loads grow from its last state.
         mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
 
     Raises:
-        ArgumentError: The call is wrong, the scene is free to move, nothing acts on it, or a load
-            has a stiffness of its own.
+        ArgumentError: The call is wrong; the scene is free to move; nothing acts on it; or it has a
+            :class:`FollowerLoad`, :class:`RotatingFrame` or :class:`VirtualWork`.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-1.0, 0))
@@ -370,7 +370,7 @@ def buckling(
 
 
 def _checked_count(what: str, scene: Scene, n: int, at: Solution | None, mesh: Mesh | None) -> int:
-    """Check the arguments of a call ``what``, and return ``n`` as a number of modes."""
+    """Check the arguments of the function ``what``, and return the number ``n`` of modes."""
     require_kind(scene, Scene, f"{what}: scene")
     n = require_count(n, f"{what}: n")
     if at is None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Parameter studies: one scene with many parameters or seeds, computed in parallel.
 
-:mod:`mpi4py.futures` distributes the members.  All processes run the same script and have the
-member function, so only cases are sent: the function may be a closure and need not be picklable.
+:mod:`mpi4py.futures` distributes the members.  All processes run the same script, so only cases are
+sent.  The member function may be a closure and need not be picklable.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Study(Rich):
         member: Name of the function.
         cases: Arguments of each member; tuples and arrays become lists.
         results: Returned values by name; (len(cases), ...) each.
-        failed: Numbers of failed cases, with their errors.
+        failed: Error message of each failed case, by the index of the case.
         seconds: Wall time of each member; (len(cases),); s.
 
     Example:
@@ -83,7 +83,7 @@ class Study(Rich):
 
     @classmethod
     def from_records(cls, member: str, records: dict[str, Record]) -> Study:
-        """Make a study from outcome and seconds of each case; keys are from :func:`_case_text`."""
+        """Make a study from the record of each case, by the text of :func:`_case_text`."""
         outcomes = [outcome for outcome, _ in records.values()]
         failed = {i: outcome for i, outcome in enumerate(outcomes) if isinstance(outcome, str)}
         first: dict[str, Array] = next((row for row in outcomes if not isinstance(row, str)), {})
@@ -111,7 +111,7 @@ class Study(Rich):
         return "\n".join(lines)
 
     def save(self, path: str | Path) -> None:
-        """Write a file with a checksum; only the complete file replaces an existing file.
+        """Write a file with a checksum; an existing file is replaced by a complete file only.
 
         Raises:
             ArgumentError: The file cannot be written.
@@ -129,7 +129,7 @@ class Study(Rich):
         """Read a file that :meth:`save` or :func:`study` wrote.
 
         Raises:
-            ArgumentError: The file does not exist, holds no study, or is damaged.
+            ArgumentError: The file does not exist, is no study, or is damaged.
         """
         file = require_path(path, "study")
         with decoding(file, FORMAT):
@@ -157,33 +157,33 @@ def study(
     """Run a parameter study: call ``member(**case)`` for each case, in parallel under ``mpirun``.
 
     Each member is computed by one process; results agree to the last bit for any number of
-    processes.  The first process distributes cases and writes the file; it also computes members if
-    MPI allows threads, or if it is alone.
+    processes.  The first process distributes cases and writes the file.  It also computes members
+    if there is no other process, or if MPI supports several threads (``MPI_THREAD_MULTIPLE``).
 
-    A member fails if it raises an exception.  The failure is reported, and the study continues.
+    A member fails if it raises an exception.  The study continues and reports the failure.
 
     Args:
         member: Function that makes and simulates a scene and returns numbers and arrays by name,
             with the same names and shapes for each case.  It must write to different files for
             different cases.
         cases: Arguments: ``[{"seed": seed, "mass": m} for m in (1, 2) for seed in range(50)]``.
-            Values are numbers, texts, or lists of these; no two cases are alike.
-        path: File of the results.  It is saved repeatedly, in at most a twentieth of the time.
-            Cases in the file are not computed again, unless they failed.  Results of other cases
-            stay in the file.
+            Values are numbers, texts, or lists of these; no two cases are equal.
+        path: File of the results.  It is saved repeatedly, which takes at most a twentieth of the
+            wall time.  Cases in the file are not computed again, unless they failed.  Results of
+            other cases stay in the file.
         anew: Compute all cases again and discard the results in the file, as is necessary after a
             change of the member.
         progress: Show a progress bar in a terminal or notebook.
-        comm: Processes; by default all, or this process alone inside a member of another study.
-            In a member, leave out ``comm`` of :func:`simulate`.
+        comm: Processes; by default all, but this process alone inside a member of another study.
+            In a member, call :func:`simulate` without ``comm``.
 
     Returns:
         Results in the order of the cases.
 
     Raises:
-        ArgumentError: The call or the file is wrong, or a member returned anything but
-            numbers and arrays, or other names or shapes than the other members.  The file then has
-            the results of the earlier members.
+        ArgumentError: The call or the file is wrong; or a member returned anything but numbers and
+            arrays, or names or shapes that differ between members.  The results of earlier members
+            are in the file.
         RuntimeError: All members failed.
 
     Example:
@@ -254,7 +254,7 @@ def study(
     with reserved(outputs):
         if comm.rank > 0:
             for _ in _outcomes(comm, member, {}):
-                pass  # this process serves until the first process has all results
+                pass  # serve until the first process has all results
         on_first(comm, gather)
     result = Study.from_records(name, comm.bcast({key: records[key] for key in todo}))
     if len(result.failed) == len(result):
@@ -285,12 +285,12 @@ def _outcomes(
 def _distributed(
     pool: Any, cases: dict[str, Case]
 ) -> Generator[tuple[str, Outcome, float], None, None]:
-    """Yield key, outcome and seconds of cases; this process runs the last, others the first."""
+    """Yield key, outcome and seconds of cases; this process begins with the last case."""
     futures = {pool.submit(_run, case): key for key, case in cases.items()}
-    ended: SimpleQueue[Any] = SimpleQueue()  # also has the futures that this process cancels
+    ended: SimpleQueue[Any] = SimpleQueue()  # includes futures that this process cancels
     for future in futures:
         future.add_done_callback(ended.put)
-    # While this process runs members, a thread of the pool communicates: not every MPI allows it.
+    # This process runs members only if MPI allows a thread of the pool to communicate meanwhile.
     left = [*futures] if MPI.Query_thread() == MPI.THREAD_MULTIPLE else []
     finished = 0
     try:
@@ -313,7 +313,7 @@ def _distributed(
 
 
 def _run(case: Case) -> Record:
-    """Run one member on this process; its exception is an outcome, a wrong result an error."""
+    """Run one member on this process; its exception is an outcome, a wrong result is raised."""
     begin = time.perf_counter()
     try:
         with alone():
@@ -329,7 +329,7 @@ def _run(case: Case) -> Record:
     for name, value in returned.items():
         if not isinstance(name, str) or name in {"", "."} or "/" in name or not name.isprintable():
             raise ArgumentError(f"study: {case} returned {name!r}, which names no result")
-        array = np.asarray(None)  # kept, and refused below, if rows have different lengths
+        array = np.asarray(None)  # refused below, if lists have different lengths
         with suppress(ValueError):
             array = np.asarray(value)
         if array.dtype.kind not in "biuf":
@@ -341,7 +341,7 @@ def _run(case: Case) -> Record:
 
 
 def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> None:
-    """Raise unless names and shapes agree with the first member that did not fail."""
+    """Raise unless an outcome has the names and shapes of the first outcome in ``records``."""
     if isinstance(outcome, str):
         return
     known = ((key, row) for key, (row, _) in records.items() if not isinstance(row, str))
@@ -355,7 +355,7 @@ def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> 
 
 
 def _case_text(case: dict[str, Any], what: str = "case") -> str:
-    """Write a case as JSON with all digits and sorted names, for comparison of cases."""
+    """Return a case as JSON with all digits and sorted names, for comparison of cases."""
     require_kind(case, dict, what)
     for name in case:
         require_kind(name, str, f"{what}: name")

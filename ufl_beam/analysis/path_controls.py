@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Controls of static paths, and the corrector that solves their steps.
+"""Controls of static paths, and the corrector that solves for steps.
 
 A step ends in an equilibrium that fulfils the equation of a control.  The load factor is one of the
 unknowns.
@@ -25,18 +25,18 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
 from ufl_beam.terms.term import Term
 
-MOST_DOUBLINGS = 30  # most doublings of a step until something dissipates in it
-ONSET_FRACTION = 1e-6  # part of the energy dissipated in a step up to the onset of dissipation
+MOST_DOUBLINGS = 30  # largest number of doublings of a step until something dissipates in it
+ONSET_FRACTION = 1e-6  # dissipated energy at the onset, as a fraction of the energy in the step
 CONTROL_TOLERANCE = 1e-9  # largest error of the equation of the control, as a fraction of a step
 
 
 class Crossing(NamedTuple):
     """Step to a bifurcation point, with the critical mode there.
 
-    Along the mode the tangent is singular and the load does no work, so a correction along it would
-    be round-off divided by zero.  Hence corrections move along the mode only in proportion to the
-    load factor: ``speed`` is the path's motion along the mode per unit of the load factor.  The
-    mode is in the axes of supports.
+    Along the mode the tangent is singular and the load does no work, so a correction along the mode
+    would be round-off divided by zero.  Hence the component of a correction along the mode is
+    ``speed`` times the change of the load factor, as on the path.  The mode is in the axes of the
+    supports.
     """
 
     predicted: Array
@@ -52,9 +52,9 @@ class PathCorrector:
 
     Attributes:
         weights: Weights of the squares in the norm of a direction.  Displacements are divided by
-            the size of the scene, the load factor by ``factor``; displacements and rotations enter
-            with their mean square.  Degrees of freedom owned by another process have the weight
-            zero, so that sums of the processes add up.
+            the size of the scene, the load factor by ``factor``.  The squares of displacements and
+            rotations are averaged.  Degrees of freedom owned by another process have the weight
+            zero, because norms are summed over the processes.
         factor_gradient: Gradient of the load factor.
         direction: Direction of the path at the beginning of the step.
         sought: The predicted step.
@@ -79,17 +79,17 @@ class PathCorrector:
 
     @property
     def start(self) -> Array:
-        """State and load factor at the beginning of the step."""
+        """Configuration and load factor at the beginning of the step."""
         return np.append(self.simulation.q, self.simulation.t)
 
     # -- measures ------------------------------------------------------------------------------
 
     def along(self, normal: Array, direction: Array) -> float:
-        """Return the derivative along a direction of a quantity with the gradient ``normal``."""
+        """Return the derivative of a quantity with the gradient ``normal`` along a direction."""
         return self.subdomain.total(float(normal @ direction))
 
     def length(self, direction: Array) -> float:
-        """Return the length of a direction, however small; dimensionless."""
+        """Return the length of a direction, without underflow; dimensionless."""
         largest = self.subdomain.largest(float(np.abs(direction[:-1]).max(initial=0.0)))
         largest = max(largest, abs(direction[-1]) / self.factor)
         if largest == 0.0 or not math.isfinite(largest):
@@ -109,7 +109,7 @@ class PathCorrector:
         return self.subdomain.total(local)
 
     def dissipation_side(self, q: Array, direction: Array) -> float:
-        """Return a number with the sign of the change of dissipation along ``direction``, or 0."""
+        """Return the change of dissipation in a small motion along ``direction``, or 0; J."""
         motion = direction[:-1]
         now, size = self.dissipation(q), self.size(motion)
         active = any(group.response.way.any() for group in self.simulation.connector_terms)
@@ -122,7 +122,7 @@ class PathCorrector:
         return 0.0
 
     def kink(self, step: Array) -> tuple[Array, Array] | None:
-        """Find the part of ``step`` up to an onset of dissipation, and the direction there."""
+        """Return the increment to an onset of dissipation in ``step``, and the direction there."""
         q, motion = self.simulation.q, step[:-1]
         self.begin()
         if self.dissipates or not (whole := self.dissipation(q + motion)) > 0:
@@ -133,7 +133,7 @@ class PathCorrector:
         return increment, -direction if self.dissipation_side(q, direction) < 0 else direction
 
     def until(self, energy: float, increment: Array, direction: Array) -> Array:
-        """Extend the step ``increment`` along a direction until it dissipates ``energy`` (J)."""
+        """Extend a step from ``increment`` along a direction until it dissipates ``energy`` (J)."""
         q, motion = self.simulation.q + increment[:-1], direction[:-1]
         low, high = 0.0, 1e-6 / self.length(direction)
         for _ in range(MOST_DOUBLINGS):
@@ -145,7 +145,7 @@ class PathCorrector:
     def _length_to(
         self, energy: float, q: Array, motion: Array, between: tuple[float, float], halvings: int
     ) -> float:
-        """Find by bisection the factor of a motion from ``q`` that dissipates ``energy`` (J)."""
+        """Find by bisection how far to go along a motion from ``q`` to dissipate ``energy`` (J)."""
         low, high = between
         for _ in range(halvings):
             middle = (low + high) / 2
@@ -156,7 +156,7 @@ class PathCorrector:
     # -- the border ----------------------------------------------------------------------------
 
     def step_at(self, t: float) -> Step:
-        """Return an infinitely slow step to a load factor, without rates and viscous forces."""
+        """Return a step to a load factor in infinite time, in which viscous forces vanish."""
         return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, fraction=1.0)
 
     def _moved(self, t: float) -> Array:
@@ -166,7 +166,7 @@ class PathCorrector:
         return x
 
     def arrive(self, x: Array) -> None:
-        """Store an iterate, and set the loads to its load factor."""
+        """Store the iterate ``x``, and set the loads to the load factor :attr:`t`."""
         self._x = x.copy()
         self.simulation.equation.begin(self.step_at(self.t), self._loading)
 
@@ -190,8 +190,8 @@ class PathCorrector:
     def correct(self, y: Array, z: Array) -> None:
         """Add to ``y`` the correction by the linearised equation of the control.
 
-        Corrections are subtracted from an iterate: ``y`` is the correction at a constant load
-        factor, ``z`` is added to it for each unit by which the load factor grows.
+        Corrections are subtracted from an iterate.  ``y`` is the correction at a constant load
+        factor; ``z`` is the derivative of the correction with respect to the load factor.
         """
         supports, moving = self.simulation.supports, self.simulation.supports.moving
         if len(moving):
@@ -219,7 +219,7 @@ class PathCorrector:
         return self.along(self._normal, np.append(q, self.t) - self._end) / self._reach
 
     def _error_derivative(self, direction: Array) -> float:
-        """Return the derivative of this error along a direction; for energies, by differences."""
+        """Return the derivative of :meth:`_error` along a direction; of energies by differences."""
         if self._normal is not None:
             return self.along(self._normal, direction) / self._reach
         q, size = self.simulation.supports.in_plane(self._x), self.size(direction[:-1])
@@ -242,8 +242,8 @@ class PathCorrector:
             predicted: Predicted step.
             normal: Gradient of the controlled quantity, normal to the plane.
             reach: Change of this quantity in the step, by which its error is divided.
-            hold: Whether hinges, cracks and springs that do not flow stay closed if possible, see
-                material_points.py; false along a direction in which they open.
+            hold: Whether hinges, cracks and springs that did not open in the last step stay closed
+                if possible, see material_points.py; false along a direction in which they open.
         """
         simulation = self.simulation
         self._end, self._normal, self._reach = self.start + predicted, normal, reach
@@ -261,9 +261,9 @@ class PathCorrector:
         simulation.together(simulation.equation.begin, self.step_at(simulation.t))
 
     def direction_at(self, q: Array, t: float) -> tuple[Stiffness, Array]:
-        """Return the stiffness of a state, and the direction of the path with a growing factor."""
+        """Return the stiffness of a state, and the direction of the path that raises the factor."""
         self.t, supports = t, self.simulation.supports
-        for _ in range(2):  # the first tangent of a step belongs to the forces before
+        for _ in range(2):  # the first tangent of a step is for the forces before it
             rate = np.zeros(self.subdomain.size)
             self.simulation.together(self.tangent, supports.in_axes(q), rate)
         stiffness = Stiffness(self.subdomain, self._A, supports.dofs, rate, self._all_weights)
@@ -280,15 +280,15 @@ class PathCorrector:
 
 
 class Control:
-    """Base class of path controls, which set the lengths of steps.
+    """Base class of path controls, which determine the lengths of steps.
 
     A step changes the controlled quantity by ``step``, or by a fraction of ``step``.
     """
 
     step: float
     factor = 1.0  # change of the load factor that counts as much as a length of 1
-    quantity = ""  # name of the controlled quantity if it may turn back along a path
-    least_rest = 0.0  # least fraction of a step that remains beyond a kink
+    quantity = ""  # name of the controlled quantity if it may have an extremum on a path
+    least_rest = 0.0  # least length of a step after a kink, as a fraction of the step
 
     def __post_init__(self) -> None:
         require_number(self.step, f"{type(self).__name__}: step")
@@ -299,24 +299,24 @@ class Control:
         """Raise :class:`ArgumentError` if the control does not fit the scene."""
 
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
-        """Return the gradient of the quantity or of its negative, whichever grows in a step.
+        """Return the gradient of the controlled quantity, with the sign for growth in a step.
 
-        By default the quantity is the arc length in a step along ``direction``.
+        By default the quantity is the arc length along ``direction``.
         """
         return np.asarray(corrector.weights * direction / corrector.length(direction))
 
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return a positive number if the path continues along ``direction``.
 
-        ``increment`` is the step by which the path came, or None at the beginning of the path.
+        ``increment`` is the last step of the path, or None at the beginning of the path.
         """
         return corrector.along(self.normal(corrector, direction), direction)
 
     def solve_step(self, corrector: PathCorrector, fraction: float) -> Trial:
-        """Solve for the end of a fraction of a step; :class:`StepFailed` if there is none.
+        """Solve for the end of a fraction of a step; raise :class:`StepFailed` if none is found.
 
-        If no end is found and dissipation begins in the step, another attempt changes the direction
-        at the onset of dissipation.
+        If the first attempt fails and dissipation begins in the step, a second attempt changes the
+        direction at the onset of dissipation.
         """
         reach, direction = abs(self.step) * fraction, corrector.direction
         increment = 0.0 * direction
@@ -348,14 +348,14 @@ class Control:
 
 @dataclass(frozen=True)
 class ArcLength(Control):
-    """Arc-length control: passes limit points of loads and of displacements.
+    """Arc-length control, which passes limit points of loads and of displacements.
 
     Displacements are divided by the size of the scene, the change of the load factor by ``factor``.
     The square of the length is the mean square of all displacements and rotations (rad), plus the
     square of the load factor's change.
 
     Args:
-        step: Longest step; a path with a negative step begins with a falling load factor.
+        step: Longest step; with a negative step, the load factor falls initially.
         factor: Change of the load factor that counts as much as a length of 1.
 
     Raises:
@@ -382,9 +382,9 @@ class ArcLength(Control):
         require_number(self.factor, "ArcLength: factor", positive=True)
 
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
-        """Return the sense: initially by the sign of ``step``, later such that dissipation grows.
+        """Return a positive number if the path continues along ``direction``.
 
-        Without dissipation, the sense is such that the path turns by less than π/2.
+        ``step`` sets the initial sense; later dissipation grows, or the path turns less than π/2.
         """
         if increment is None:
             return self.step * float(direction[-1])
@@ -394,7 +394,7 @@ class ArcLength(Control):
 
 @dataclass(frozen=True)
 class LoadControl(Control):
-    """Load control: equal steps of the load factor, up to the limit load.
+    """Load control by equal steps of the load factor, up to the limit load.
 
     Args:
         step: Change of the load factor; negative if the factor is to fall.
@@ -418,7 +418,7 @@ class LoadControl(Control):
 
 @dataclass(frozen=True)
 class DisplacementControl(Control):
-    """Displacement control of one component at a place: passes limit points of loads.
+    """Displacement control of one component at a place, which passes limit points of loads.
 
     Args:
         place: Place of a beam.
@@ -426,8 +426,8 @@ class DisplacementControl(Control):
         step: Change of the component; m or rad.
 
     Raises:
-        ArgumentError: ``place`` is not a place of a beam, ``component`` is another text, or
-            ``step`` is zero.
+        ArgumentError: ``place`` is not a place of a beam, ``component`` is unknown, or ``step`` is
+            zero.
 
     Example:
         >>> control = ub.DisplacementControl(beam.end, "v", -0.05)
@@ -476,14 +476,14 @@ class DisplacementControl(Control):
 class DissipationControl(Control):
     """Control by the energy that hinges, beams and springs dissipate, for sharp snap-backs.
 
-    Softening and unloading may begin in nearly the same direction; only softening dissipates.
+    Softening and unloading may begin in nearly the same direction, but only softening dissipates.
 
     Args:
         step: Dissipated energy of a step; J.
         otherwise: Arc-length control of steps in which nothing dissipates.
 
     Raises:
-        ArgumentError: ``step`` is not positive.
+        ArgumentError: ``step`` is not positive, or ``otherwise`` is no :class:`ArcLength`.
 
     Example:
         >>> pull = ub.PointLoad(weak.end, force=(0, -1e5), amplitude=lambda t: t)
@@ -502,18 +502,18 @@ class DissipationControl(Control):
 
     @property
     def factor(self) -> float:  # type: ignore[override]
-        """Factor of the arc length."""
+        """Change of the load factor that has the arc length 1."""
         return self.otherwise.factor
 
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
-        """Return the sense of the arc length; used where nothing dissipates."""
+        """Return :meth:`ArcLength.sense` of ``otherwise``."""
         return self.otherwise.sense(corrector, direction, increment)
 
     def solve_step(self, corrector: PathCorrector, fraction: float) -> Trial:
-        """Solve for a step that dissipates an energy, or by arc length.
+        """Solve for a step that dissipates the energy ``step``, or for an arc-length step.
 
-        Arc-length steps are taken while they dissipate nothing.  If the latest step dissipated and
-        this step fails, an arc-length step replaces it.
+        The step is by arc length while nothing dissipates, and if the step by energy fails after a
+        step with dissipation.
         """
         if not corrector.dissipates:
             with suppress(StepFailed):

@@ -47,24 +47,24 @@ ADVICE = (
     "displacements, DissipationControl through softening that snaps back"
 )
 
-SMALLEST_FRACTION = 2.0**-12  # smallest fraction to which a step is cut
+SMALLEST_FRACTION = 2.0**-12  # smallest fraction of a step
 TARGET_ITERATIONS = 12  # more iterations in a step shorten the next step, fewer lengthen it
-MOST_FAILURES = 4  # failed steps after which the search for a critical point ends
+MOST_FAILURES = 4  # number of failed steps that ends the search for a critical point
 LOCATION_TOLERANCE = 1e-7  # accuracy of the location of critical points, as a fraction of a step
-BRACKET = 1e-2  # fraction of a step within which motions along a critical mode are interpolated
+BRACKET = 1e-2  # largest fraction of a step in which motions along a mode are interpolated
 SEPARABLE = 1.5e-5  # critical points closer than this fraction of a step may count as one point
-MOST_CROSSING_STEPS = 8  # most steps from a bracket to its bifurcation point
-SOFT = 0.1  # fraction of its size at the ends of a step below which an eigenvalue is small
+MOST_CROSSING_STEPS = 8  # most steps that refine the location of a bifurcation point
+SOFT = 0.1  # an eigenvalue below this fraction of its size at the ends of a step is small
 NO_WORK = 1e-6  # fraction of Stiffness.most_work below which the work of a load counts as zero
 MOST_LOCATION_STEPS = 60  # most steps to locate a critical point
 LEAST_COSINE = 0.5  # least cosine of the angle between a step and its predictor
 LARGEST_LENGTH_RATIO = 10.0  # largest ratio of the lengths of a step and its predictor
-UNCHECKED_FRACTION = 2.0**-6  # largest fraction of a step that may turn sharply, as at a kink
-SAME_POINT_FRACTION = 1e-3  # fraction of a step within which a critical point is the last one again
-# Largest distance between states before and at a critical point, as a fraction of the step to it; a
-# longer distance is a leap to another branch.
+UNCHECKED_FRACTION = 2.0**-6  # steps of at most this fraction may turn sharply, as at a kink
+SAME_POINT_FRACTION = 1e-3  # closer critical points, as a fraction of a step, are one point
+# Largest distance between the states before and at a critical point, as a fraction of the step to
+# the critical point.  A longer distance is a leap to another branch.
 LARGEST_GAP = 0.1
-SINGULAR_RATIO = 1e-3  # ratio to its size at the ends of a step below which a measure vanishes
+SINGULAR_RATIO = 1e-3  # below this fraction of its size at the ends of a step, a number is zero
 
 
 class Path(Solution):
@@ -84,7 +84,7 @@ class Path(Solution):
 
     @property
     def factor(self) -> Array:
-        """Load factors, the argument of the time functions; (n+1,)."""
+        """Load factors, which are the arguments of time functions; (n+1,)."""
         return self.times
 
     def summary(self) -> list[str]:
@@ -118,7 +118,7 @@ class Path(Solution):
 
     @property
     def progress(self) -> Array:
-        """Arc length of the path: sum of root mean square displacements in steps; (n+1,); m."""
+        """Arc length: sum of the steps, each a root mean square of displacements; (n+1,); m."""
         nodes = np.unique(np.vstack([self.numbering.dofs, self.numbering.dofs_of_bodies])[:, :2])
         steps = np.sqrt(2 * np.mean(np.diff(self.q[:, nodes], axis=0) ** 2, axis=1))
         return np.concatenate([[0.0], np.cumsum(steps)])
@@ -140,16 +140,16 @@ def follow(
     """Follow a path of static equilibria through limit points and snap-backs.
 
     The load factor replaces the time of loads and motions; it is an unknown like the displacements.
-    Without ``start``, a path begins at the equilibrium with the factor 0, in the direction of the
-    control; then it follows its own direction.  Viscosity and masses have no effect.
+    Without ``start``, a path begins at the equilibrium with the load factor 0.  The control sets
+    the sense of the path.  Viscosity and masses have no effect.
 
     Limit points of the load factor and bifurcation points become states of the path.
 
     Args:
-        scene: Model; some load or motion must vary in time, ``amplitude=lambda t: t``.
+        scene: Model; a load or motion must depend on time, as with ``amplitude=lambda t: t``.
         control: :class:`ArcLength`, :class:`LoadControl`, :class:`DisplacementControl` or
             :class:`DissipationControl`.
-        until: The path ends after the first step for which this is true, as in
+        until: Function that ends the path after the first step for which it is true, as in
             ``until=lambda now: now.displacement(tip)[1] < -0.5``; ``now.t`` is the load factor.
         steps: Largest number of steps.
         start: Branch of a :class:`CriticalPoint`, or a solution that the path continues.
@@ -161,7 +161,7 @@ def follow(
 
     Raises:
         ArgumentError: The call or the scene is wrong; nothing was computed.
-        ConvergenceError: A step failed; ``solution`` of the error is the path so far.
+        ConvergenceError: The shortest step failed; ``solution`` of the error has the path so far.
 
     Example:
         >>> path = ub.follow(scene, ub.LoadControl(0.5), until=lambda now: now.t >= 2)
@@ -205,7 +205,7 @@ def follow(
 
 
 def _require_load_factor(scene: Scene, t0: float) -> None:
-    """Raise unless a load or motion depends on the load factor, and no law on physical time."""
+    """Raise if no load or motion depends on the load factor, or a law needs physical time."""
     for connector in scene.all_connectors:
         if isinstance(connector.law, Controller):
             raise ArgumentError(f"{connector}: a controller acts in time, and a path has none")
@@ -232,7 +232,7 @@ def _require_load_factor(scene: Scene, t0: float) -> None:
 
 
 class PathStepper:
-    """Stepper of a path, which sets lengths of steps and locates critical points."""
+    """Stepper of a path, which adapts lengths of steps and locates critical points."""
 
     def __init__(self, simulation: Simulation, control: Control, most: int) -> None:
         self._simulation, self._control = simulation, control
@@ -246,7 +246,7 @@ class PathStepper:
         self._at_point = False
 
     def begin(self, branch: Branch | None, *, fresh: bool) -> None:
-        """Find the initial direction of the path; if ``fresh``, also its first equilibrium."""
+        """Find the initial direction of the path; if ``fresh``, first find an equilibrium."""
         corrector, simulation = self.corrector, self._simulation
         if branch is not None:
             corrector.direction = np.append(branch.mode[corrector.subdomain.dofs], 0.0)
@@ -297,19 +297,19 @@ class PathStepper:
         after = candidate
         candidate, reached = self._locate(before, after, fraction)
         if self._at_point and reached < SAME_POINT_FRACTION * fraction:
-            # Signs of eigenvalue and load factor at one point may change in different last digits.
+            # Round-off may separate the sign changes of eigenvalue and load factor at one point.
             self._at_point = False
             self._go_to(self._seek(fraction))
             return
         if candidate.mode is not None:
-            # The candidate has the signs beyond the point, so the point is not found again.
+            # The candidate has the signs after the point, so that the point is not found again.
             direction, self._at_point = corrector.direction, False
             self._go_to(candidate)
             self._store(candidate, direction, len(self._simulation.solution), limit=False)
             return
         self._at_point = candidate.passed(before)
-        # At a limit point the load factor has turned in the located state, as at a kink, or its
-        # slope vanishes: slope and eigenvalue may change signs in different last digits.
+        # At a limit point the load factor has turned, as at a kink, or the slope vanishes.  Both
+        # are tested, because round-off may separate the sign changes of slope and eigenvalue.
         soft = _vanishes("softness", candidate, before, after)
         limit = self._turned(candidate) or _vanishes("slope", candidate, before, after)
         limit = limit and not (soft and _no_work(candidate, before, after))
@@ -327,7 +327,7 @@ class PathStepper:
             self._store(candidate, direction, len(self._simulation.solution), limit)
 
     def _pass_kink(self, after: Candidate, last: float, fraction: float, limit: bool) -> None:
-        """Go to the onset of dissipation if the load factor turns there (``limit``), else past it.
+        """Go to the onset of dissipation if the load factor turns there (``limit``), else beyond.
 
         The onset is at the fraction ``last`` of the step, or at the present state if ``last`` is
         not positive.
@@ -355,7 +355,7 @@ class PathStepper:
         return Candidate(trial, stiffness, direction, slope, mode)
 
     def _seek(self, fraction: float) -> Candidate:
-        """Solve for the end of a fraction of a step; StepFailed if it is far from its predictor."""
+        """Solve for a fraction of a step; StepFailed if the end is far from the prediction."""
         corrector = self.corrector
         trial = self._control.solve_step(corrector, fraction)
         stiffness, direction = corrector.direction_at(trial.q1, trial.step.t1)
@@ -372,12 +372,12 @@ class PathStepper:
     def _locate(
         self, before: Candidate, after: Candidate, fraction: float
     ) -> tuple[Candidate, float]:
-        """Return the first state with changed signs, and the fraction of the step that leads to it.
+        """Return the first state with changed signs, and its fraction of the step.
 
-        It is located by false position with halved weights (Illinois).  A bifurcation is located
-        from states on both sides, far enough from it that round-off along the mode is small, see
-        :meth:`_bifurcation_point`.  If intermediate steps fail, or the signs change by a leap to
-        another branch, return the last state before, from which shorter steps follow.
+        False position with halved weights (Illinois) locates this state.  A bifurcation point is
+        located between two states, see :meth:`_bifurcation_point`, which are far enough from the
+        point that round-off along the mode is small.  If intermediate steps fail, or the signs
+        change by a leap to another branch, return the last state before; shorter steps follow.
         """
         low, high, first, last = 0.0, fraction, before, after
         weight_low, weight_high, bracket = 1.0, 1.0, BRACKET
@@ -398,7 +398,7 @@ class PathStepper:
             value_low, value_high = weight_low * sizes[0], -weight_high * sizes[1]
             middle = (low * value_high - high * value_low) / (value_high - value_low)
             if not turned and high - low > bracket * fraction:
-                # Go beyond the estimate, so that two states bracket the critical point.
+                # Go beyond the estimate, so that the critical point is between two close states.
                 middle += 0.4 * bracket * fraction * (1 if value_low < -value_high else -1)
             margin = min(0.01 * (high - low), LOCATION_TOLERANCE * fraction)
             middle = min(max(middle, low + margin), high - margin)
@@ -437,8 +437,8 @@ class PathStepper:
         """Return the bifurcation point between two nearby states, and its fraction of the step.
 
         Close to the point, round-off and residuals of the solver would move the state along the
-        mode, perhaps to the other branch.  So a cubic between the two states sets the motion along
-        the mode and the direction of the path.  The second state gives the stiffness.
+        mode, perhaps to the other branch.  So a cubic between the two states gives the motion along
+        the mode and the direction of the path.  The stiffness is from the second state.
 
         Raises:
             StepFailed: The point is no bifurcation point, or was not found.
@@ -455,7 +455,7 @@ class PathStepper:
             x0, x = x, (x0 * λ - x * λ0) / (λ - λ0) if λ != λ0 else math.nan
             if not 0.0 <= x <= 1.0:
                 break
-            end, direction = path(x), path(x, 1)  # its load factor is linear
+            end, direction = path(x), path(x, 1)  # the load factor is linear in x
             mode = np.array(stiffness.softest[1][corrector.subdomain.dofs])
             to_plane(seen := mode.copy())
             speed = corrector.along(corrector.weights[:-1] * seen, direction[:-1]) / direction[-1]
@@ -494,7 +494,7 @@ class PathStepper:
         else:
             mode = np.array(candidate.stiffness.softest[1][corrector.subdomain.dofs])
             simulation.supports.into_plane(mode)
-            # The component along the mode stays: a singular stiffness does not give it accurately.
+            # A singular stiffness gives no accurate component along the mode; it stays as before.
             along = corrector.along(corrector.weights[:-1] * mode, (direction - before)[:-1])
             corrector.direction = direction - along * np.append(mode, 0.0)
         kind = "limit" if limit else "bifurcation"
@@ -504,7 +504,7 @@ class PathStepper:
 
 
 def _vanishes(what: str, candidate: Candidate, before: Candidate, after: Candidate) -> bool:
-    """Return whether the attribute ``what`` is nearly zero, compared with states on both sides."""
+    """Return whether the attribute ``what`` is nearly zero, relative to states on both sides."""
     size, *ends = (getattr(x, what) for x in (candidate, before, after))
     return bool(size < SINGULAR_RATIO * max(ends))
 
@@ -516,5 +516,5 @@ def _no_work(candidate: Candidate, before: Candidate, after: Candidate) -> bool:
 
 
 def _soft(candidate: Candidate, before: Candidate, after: Candidate) -> bool:
-    """Return whether an eigenvalue is small, compared with its values at the ends of a step."""
+    """Return whether an eigenvalue is small, relative to its values at the ends of a step."""
     return candidate.softness < SOFT * max(before.softness, after.softness)

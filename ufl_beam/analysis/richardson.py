@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Richardson extrapolation of runs on two or three levels: order, limit and uncertainty.
 
-Cells or steps of level k are 2**k times as fine as on level 0.  The uncertainty is Roache's grid
-convergence index (J. Fluids Eng. 116 (1994) 405).
+On level k the number of cells or steps is 2**k times the number on level 0.  The uncertainty is
+Roache's grid convergence index (J. Fluids Eng. 116 (1994) 405).
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-import scipy  # its parts are loaded when they are used
+import scipy  # imports its modules when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import compact_repr
 
-# Roache's safety factors on the error of the finest level: TRUSTED if the observed order agrees
-# with theory, DOUBTED if it does not, or is unknown because there are only two levels.
+# Roache's safety factors on the error of the finest level: TRUSTED if the changes fit an integer
+# order up to the order in theory; DOUBTED otherwise, or if there are only two levels.
 TRUSTED, DOUBTED = 1.25, 3.0
-# Half of the lowest order of a scheme.  At this order the sum of the changes to come is 2.4 times
-# the last change, so that no limit can be extrapolated.
+# Half of the lowest order of a scheme.  At this order the sum of the changes on all finer levels is
+# 2.4 times the last change, which is too large for an extrapolation.
 LEAST_ORDER = 0.5
 
 
@@ -33,22 +33,22 @@ def size(values: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Convergence:
-    """Convergence of a quantity with cells or steps, from two or three successive levels."""
+    """Convergence of a quantity with refined cells or steps, from two or three levels."""
 
-    coarsest: int  # the coarsest level
+    coarsest: int  # number of the coarsest level
     changes: tuple[float, ...]  # sizes of the changes from level to level; unit of the quantity
     method: float  # order in theory
-    order: float  # observed order; NaN from two levels, where predictions use the order in theory
-    used: float  # order for predictions, at most the order in theory
+    order: float  # observed order; NaN if there are only two levels
+    used: float  # order for predictions: ``order`` limited to [LEAST_ORDER, method], or ``method``
     trusted: bool  # whether the changes fit an integer order, at most the order in theory
-    lacks: Array  # limit minus value of each level, and of the limit: zero; (levels + 1, ...)
+    lacks: Array  # limit minus value on each level, then zero for the limit; (levels + 1, ...)
     error_bound: float  # bound of the error of the limit; unit of the quantity
 
     __repr__ = compact_repr
 
     @classmethod
     def estimate(cls, values: Sequence[Array], coarsest: int, method: float) -> Convergence:
-        """Evaluate the convergence of values on two or three levels."""
+        """Estimate the convergence of values on two or three levels, the coarsest first."""
         changes = np.diff(np.stack(values), axis=0)
         sizes = tuple(map(size, changes))
         first, last = sizes[0], sizes[-1]
@@ -60,7 +60,7 @@ class Convergence:
                 size(changes[1] * 2**k - changes[0]) <= (TRUSTED - 1) * first
                 for k in range(1, round(method) + 1)
             )
-            # A change that fell faster than the order of the method may have passed through zero.
+            # A change that fell faster than the order in theory may be near a change of sign.
             most = max(last, first / 2**method)
         used = method if math.isnan(order) else min(max(order, LEAST_ORDER), method)
         rest, bound = changes[-1] * 0.0, DOUBTED * max(sizes)  # if changes are irregular
@@ -72,18 +72,18 @@ class Convergence:
 
     @property
     def seen(self) -> bool:
-        """True if the observed order is at least LEAST_ORDER, or unknown from two levels."""
+        """True if the observed order is at least LEAST_ORDER, or unknown."""
         return not self.order < LEAST_ORDER
 
     @property
     def finest(self) -> int:
-        """Finest level of the runs."""
+        """Number of the finest level of the runs."""
         return self.coarsest + len(self.changes)
 
     def lack(self, level: npt.ArrayLike) -> Array:
-        """Predict the limit minus the value on levels, also fractional ones; (*level.shape, ...).
+        """Predict the limit minus the value on whole or fractional levels; (*level.shape, ...).
 
-        The result is interpolated linearly in the size of cells or steps raised to the order.
+        The result is linear, between levels, in the size of cells or steps to the power ``used``.
         """
         levels = np.append(np.arange(len(self.changes), -1.0, -1.0), 0.0)
         s = np.append(0.0, 2.0 ** (-self.used * levels[:-1]))
@@ -93,8 +93,8 @@ class Convergence:
     def bound_at(self, level: float) -> float:
         """Bound the error of the limit extrapolated from a run on a level; unit of the quantity.
 
-        The bound falls beyond the finest level, unless changes are irregular: these are assumed
-        equally large on all levels.
+        Beyond the finest level the bound falls, except for irregular changes, which are assumed
+        equal on all levels.
         """
         finer = max(0.0, level - self.finest) if self.seen else 0.0
         return float(self.error_bound * 2 ** (-self.used * finer))
@@ -108,7 +108,7 @@ class Convergence:
 
 @dataclass(frozen=True, eq=False)
 class SelfConvergence:
-    """Self-convergence of a quantity with cells and with steps."""
+    """Self-convergence of a quantity with refined cells and with refined steps."""
 
     cells: Convergence  # with refined cells
     steps: Convergence  # with refined steps
@@ -119,17 +119,17 @@ class SelfConvergence:
 
     @classmethod
     def extrapolate(cls, value: Array, cells: Convergence, steps: Convergence) -> SelfConvergence:
-        """Extrapolate from the coarsest run: both errors add up."""
+        """Extrapolate from the coarsest run, with the sum of the errors of cells and steps."""
         limit = np.asarray(value + cells.lacks[0] + steps.lacks[0])
         return cls(cells, steps, limit, cells.error_bound + steps.error_bound)
 
     def confirmed(self, value: Array, i: float, j: float) -> SelfConvergence:
         """Return a copy with the limit extrapolated from a run with finer cells and finer steps.
 
-        The limit moves because errors of cells and steps depend on each other.  Take an error term
-        proportional to the product of both, and let fractions c and s of the errors of cells and of
-        steps remain in the run.  The fraction (1 - c) (1 - s) of this term moves the limit; the
-        rest of the term is uncertain.
+        The limit changes because the error has a term proportional to the product of the errors of
+        cells and steps.  Let the finer run have the fractions c and s of these errors.  Then the
+        limit changes by the fraction (1 - c) (1 - s) of the term, and the rest of the term is
+        uncertain.
         """
         limit = np.asarray(value + self.cells.lack(i) + self.steps.lack(j))
         c, s = (
@@ -146,13 +146,13 @@ class SelfConvergence:
 
 
 def fit_cost(steps: Array, cells: Array, seconds: Array) -> Array:
-    """Fit wall times (s) by ``a + b cells + steps (c + d cells)``; no coefficient is negative."""
+    """Fit ``a + b cells + steps (c + d cells)`` to wall times (s); coefficients are ≥ 0; (4,)."""
     columns = np.stack([np.ones_like(steps), cells, steps, steps * cells], axis=1)
     return np.asarray(scipy.optimize.nnls(columns / seconds[:, None], np.ones_like(seconds))[0])
 
 
 def pareto(seconds: Array, errors: Array) -> list[int]:
-    """Find the runs that no other run beats in both time and error, the fastest first."""
+    """Find indices of runs that no other run beats in time and error, the fastest run first."""
     front: list[int] = []
     for k in np.lexsort((errors, seconds)):
         if not front or errors[k] < errors[front[-1]]:

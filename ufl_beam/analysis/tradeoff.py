@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Trade-off of speed for accuracy on a user's own scene: runs, search, recommendation."""
+"""Trade-off of speed for accuracy on a user's scene: runs, search and recommendation."""
 
 from __future__ import annotations
 
@@ -40,27 +40,27 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_lengths import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
-MESHES = Mesh(degree=2), Mesh()  # meshes that compete by default
+MESHES = Mesh(degree=2), Mesh()  # meshes that are compared by default
 NEWTONS = (Newton(),)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
-WRONG = "ArgumentError: "  # start of texts of failures that no refinement can avoid
+WRONG = "ArgumentError: "  # beginning of messages of failures that no refinement avoids
 
 LEAST_USED = 0.3  # least error of the recommended run, as a fraction of a tolerance
-# Largest uncertainty of a limit, as a fraction of a tolerance: an error of LEAST_USED and this
-# uncertainty add up to the tolerance.
+# Largest uncertainty of a limit, as a fraction of a tolerance.  The sum of an error of LEAST_USED
+# and this uncertainty is the tolerance.
 MOST_UNCERTAINTY = 1 - LEAST_USED
 # Largest negligible error, as a fraction of a tolerance.  The search aims at the geometric mean of
 # the least and the largest error, 0.55 for an accurate limit.  Four negligible errors share the
-# rest: by cells and by steps that are not refined, by options of Newton's method, and of the limit.
+# rest: of unrefined cells, of unrefined steps, of options of Newton's method, and of the limit.
 NEGLIGIBLE = (1 - math.sqrt(LEAST_USED)) / 4
 NOISE = 1e-9  # noise as a fraction of a quantity: Newton's method leaves residuals of 1e-10
 STEP_ORDER = 2.0  # largest order of the schemes; the order of cells is twice their degree
-FURTHER = 2  # most levels from a base to the next, which may begin at the finest run of the last
-REACH = 8  # most levels of a choice beyond the runs; an error of second order falls to 2**-16 there
-SETTINGS_PER_LEVEL = 8  # between two settings an error of second order changes by a fifth, 2**(2/8)
-MOST_DOUBTS = 4  # most bases without visible convergence, each finer than the last
-MOST_TRIALS = 3  # most settings tried, each at about a quarter of the cost of the run for the limit
-SCATTER = 0.1  # relative scatter of times of one run on a quiet machine, see bench_budget.py
+FURTHER = 2  # most levels from a base to the next; the finest run of a base is 2 levels finer
+REACH = 8  # most levels from the finest run to a setting; second-order errors fall by 2**16
+SETTINGS_PER_LEVEL = 8  # between two settings a second-order error changes by a factor of 2**(2/8)
+MOST_DOUBTS = 4  # number of bases without convergence after which the search ends
+MOST_TRIALS = 3  # most settings tried; each costs about a quarter of the run for the limit
+SCATTER = 0.1  # relative scatter of times of equal runs on an idle machine, see bench_budget.py
 
 Quantity = Callable[[Solution], npt.ArrayLike]
 
@@ -86,9 +86,9 @@ def tradeoff(
 
     The scene is run on three levels of cells and of steps.  Richardson extrapolation estimates the
     errors of the runs, the limits and the required setting.  A run finer than this setting confirms
-    the limits.  The setting is then run, and others are tried until errors are 0.3 to 1 times the
-    tolerance, or the time is 0.8 to 1 times the budget.  All settings are arguments of
-    :func:`simulate`.  Several schemes, steps and meshes compete by their coarse runs.
+    the limits.  Up to three settings are then run, until errors are 0.3 to 1 times the tolerance,
+    or the time is 0.8 to 1 times the budget.  A setting consists of arguments of :func:`simulate`.
+    Coarse runs decide between several schemes, steps and meshes.
 
     Args:
         scene: Model; the ``cells`` of its beams are the coarsest cells.
@@ -97,15 +97,15 @@ def tradeoff(
             s.position(beam.end)[-1]}``.  The error of an array is its largest error.
         scheme: Time scheme, or several.
         t: Beginning and end; s.
-        dt: Longest step, s; or :class:`Adaptive` steps with the largest tolerance; or several.
-        tolerance: Largest error of each quantity, by name, in its own unit; or for all quantities,
-            as a fraction of their largest magnitudes.
-        budget: Wall time of one run, instead of a tolerance; s.
+        dt: Longest step, s; or :class:`Adaptive` with the largest tolerance; or several of these.
+        tolerance: Largest error of each quantity, by name, in its unit; or one number for all
+            quantities, as a fraction of their largest magnitudes.
+        budget: Largest wall time of one run, instead of a tolerance; s.
         mesh: Mesh with the coarsest cells, or several meshes; by default cells of degree 1, and
             cells of degree 2 if the scene allows them.
-        newton: Options of Newton's method, or several.  Runs use the first options; the others are
-            compared with these on a coarse run.  The recommendation uses the fastest options that
-            change the quantities little.
+        newton: Options of Newton's method, or several.  Runs use the first options; a coarse run
+            compares the others.  The recommendation uses the fastest options that change the
+            quantities little.
         max_seconds: Largest total wall time of the runs; s.
         progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run uses one process, and several run at a time.  Simultaneous runs
@@ -115,9 +115,9 @@ def tradeoff(
         The runs with their times and errors, and the recommended arguments.
 
     Raises:
-        ArgumentError: The call is wrong, or no family of settings can be used for the scene.
-        TradeoffError: The runs show no self-convergence, or would take too long; the error
-            describes their results and has the runs.
+        ArgumentError: The call is wrong, or the scene allows none of the schemes, steps and meshes.
+        TradeoffError: The runs show no self-convergence, or would take too long.  The message
+            describes the results; ``runs`` of the error has the runs.
 
     Example:
         >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
@@ -169,9 +169,9 @@ def tradeoff(
 
 
 def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str]]:
-    """Search with the family that coarse runs predict to be the best; if this fails, the next.
+    """Search with the family that coarse runs predict to be the best; after a failure, the next.
 
-    Return the successful search, the other searches, and notes on these.
+    Return the successful search, the other searches, and notes on failed and other searches.
     """
     searches: list[_Search] = []
     notes: list[str] = []
@@ -207,7 +207,7 @@ def _checked_target(
     tolerance: float | Mapping[str, float] | None,
     budget: float | None,
 ) -> Target:
-    """Check the tolerance or budget of a call, and return its target."""
+    """Return the target of a call, or raise :class:`ArgumentError`."""
     if (tolerance is None) == (budget is None):
         raise ArgumentError("tradeoff: give either a tolerance or a budget")
     if budget is not None:
@@ -226,7 +226,7 @@ def _checked_target(
 
 
 def _several(values: Value | Sequence[Value], kind: type, what: str) -> tuple[Value, ...]:
-    """Return one value, or a sequence of them, as a tuple of values of a kind."""
+    """Return a value, or a sequence of values, of type ``kind`` as a tuple."""
     if not isinstance(values, Sequence) or isinstance(values, str | bytes):
         require_kind(values, kind, f"tradeoff: {what}")
         return (values,)  # type: ignore[return-value]
@@ -237,7 +237,7 @@ def _several(values: Value | Sequence[Value], kind: type, what: str) -> tuple[Va
 
 @dataclass(eq=False)
 class _Runs:
-    """Runs of a trade-off, each done once and timed, see :func:`tradeoff`."""
+    """Runs of a trade-off, each with its wall time, see :func:`tradeoff`."""
 
     scene: Scene
     quantities: Mapping[str, Quantity]
@@ -252,7 +252,7 @@ class _Runs:
     spent: float = field(default=0.0, init=False)  # wall time of all runs; s
 
     def begin(self, family: int) -> None:
-        """Compile in a first run, of one step if steps are equal; then time the coarsest run."""
+        """Compile in a first run, of one step if steps are equal; then do the coarsest run."""
         first = Refinement(family, Fraction(1), 0.0)
         dt = self.families[family].dt
         until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
@@ -268,8 +268,8 @@ class _Runs:
     def run(self, refinements: Sequence[Refinement], *, optional: bool = False) -> None:
         """Do the runs that are missing, several at a time if there are several processes.
 
-        If ``max_seconds`` leave no time for them, omit ``optional`` runs, but raise
-        :class:`TradeoffError` for other runs.
+        If the runs would exceed ``max_seconds``, omit them if they are ``optional``, else raise
+        :class:`TradeoffError`.
         """
         missing = [r for r in refinements if r not in self.runs and r not in self.failed]
         if not missing:
@@ -304,13 +304,13 @@ class _Runs:
     def setting(self, refinement: Refinement) -> Setting:
         """Return the setting of a refinement.
 
-        The error of an adaptive step is of third order, so the number of steps is proportional to
-        the cube root of 1/tolerance.
+        The error of an adaptive step is proportional to its length cubed.  So the number of steps
+        is proportional to the cube root of 1/tolerance.
         """
         family, refine, level, newton = refinement
         coarsest = replace(self.families[family], newton=self.newtons[newton])
         if refine == 1 and level == 0:
-            return coarsest  # unchanged, so that checks see the user's arguments
+            return coarsest  # unchanged, so that simulate checks the user's arguments
         dt, mesh, duration = coarsest.dt, coarsest.mesh, self.t[1] - self.t[0]
         if isinstance(dt, Adaptive):
             dt = replace(dt, tolerance=dt.tolerance / 8**level)
@@ -324,7 +324,7 @@ class _Runs:
         return [run for refinement, run in self.runs.items() if refinement.family == family]
 
     def divisor(self, family: int) -> int:
-        """Return the largest q up to SETTINGS_PER_LEVEL so that (q+1)/q can divide cells, or 1."""
+        """Return the largest q ≤ SETTINGS_PER_LEVEL for which ``refine`` may be (q+1)/q, or 1."""
         mesh, scene = self.families[family].mesh, self.scene
         for q in range(SETTINGS_PER_LEVEL, 1, -1):
             finer = replace(mesh, refine=mesh.refine * Fraction(q + 1, q))
@@ -337,7 +337,7 @@ class _Runs:
         return 1
 
     def _longest(self, refinement: Refinement) -> float:
-        """Bound the wall time (s) of a run by the other runs of its family; 0 without any."""
+        """Estimate the wall time (s) of a run from other runs of its family; 0 without these."""
         times = (
             run.seconds
             * 2 ** max(0.0, refinement.level - run.refinement.level)
@@ -375,7 +375,7 @@ class _Runs:
         return content
 
     def _store(self, refinement: Refinement, content: dict[str, Any]) -> None:
-        """Store a run with the data of the first process."""
+        """Store a run, with the content on the first process."""
         content = self.comm.bcast(content)
         values = {
             name: np.asarray(content.pop(f"quantity {n}")) for n, name in enumerate(self.quantities)
@@ -386,23 +386,23 @@ class _Runs:
 
 
 class _Candidate(NamedTuple):
-    """Setting of a run with its predicted time and error."""
+    """Refinement of a possible run, with predicted time and errors, see :class:`_Search`."""
 
-    refine: Fraction  # divisor of each cell
+    refine: Fraction  # factor on the number of cells
     level: float  # the number of steps is multiplied by about 2**level
     seconds: float  # wall time; s
-    likely: float  # largest error, see _Search; errors of cells and steps may cancel
-    bound: float  # largest error if errors of cells and steps do not cancel
+    likely: float  # largest error, divided by units; errors of cells and steps may cancel
+    bound: float  # largest error, divided by units, if errors of cells and steps add up
 
 
 class _Search:
     """Search with one family: three levels of cells and of steps from a base, and a finer run.
 
-    The base moves until the chosen setting is about a level finer than the base.  Then the finest
-    levels are about a level finer than the setting.
+    The base is refined until the chosen setting is about a level finer than the base.  Then the
+    finest levels are about a level finer than the setting.
 
-    Errors and uncertainties are divided by ``units``, the tolerances, or the sizes of the
-    quantities if there is a budget.
+    Errors and uncertainties are divided by ``units``.  These are the tolerances or, with a budget,
+    the sizes of the quantities.
     """
 
     def __init__(self, runs: _Runs, family: int, target: Target) -> None:
@@ -422,9 +422,9 @@ class _Search:
         self.objective = candidate.seconds if math.isinf(target.budget) else candidate.bound
 
     def find(self) -> None:
-        """Do the runs that determine the setting and its error; TradeoffError if none serves."""
+        """Find the setting and its error by runs; raise TradeoffError if no setting is found."""
         while True:
-            expected = min(self.uncertainty, NEGLIGIBLE)  # uncertainty after refinement
+            expected = min(self.uncertainty, NEGLIGIBLE)  # uncertainty after refinement of the base
             candidate = self._choose(expected)
             levels = math.log2(candidate.refine), candidate.level
             some, base = next(iter(self.crosses.values())), self._base
@@ -445,7 +445,7 @@ class _Search:
             except TradeoffError:
                 if self.uncertainty > MOST_UNCERTAINTY:
                     raise
-                self._base = before  # no time for more runs, but the limits are accurate enough
+                self._base = before  # no time is left, but the limits are accurate enough
                 break
         self._choose_newton()
         self._try_settings()
@@ -460,7 +460,7 @@ class _Search:
         return min(self._runs.in_family(self.family), key=self._rank)
 
     def remarks(self, run: Run) -> list[str]:
-        """Return notes on convergence that is not seen, and on a run that misses the target."""
+        """Return notes on missing convergence, and on a run that misses the target."""
         notes = [
             f"the order of convergence is not seen: {name}{convergence}"
             for name, convergence in self.crosses.items()
@@ -475,7 +475,7 @@ class _Search:
         return notes
 
     def ratio(self, run: Run, other: Run | None = None) -> float:
-        """Return the largest distance of a run from a limit, or another run, divided by units."""
+        """Return the largest distance from the limits, or another run, divided by ``units``."""
         limits = {name: convergence.limit for name, convergence in self.crosses.items()}
         goal = other.values if other else limits
         return max(size(run.values[name] - goal[name]) / unit for name, unit in self.units.items())
@@ -486,13 +486,13 @@ class _Search:
         return Refinement(self.family, Fraction(refine), float(level), newton)
 
     def _refine_base(self) -> None:
-        """Run three levels from the base; refine the base while changes do not fall."""
+        """Run three levels from the base; refine the base if changes between levels do not fall."""
         while True:
             i, j = self._base
             first, *others = wanted = [
                 self._at(2**i, j), self._at(2 ** (i + 1), j), self._at(2**i, j + 1)
             ]  # fmt: skip
-            self._runs.run(wanted[:1])  # its time predicts the times of the others
+            self._runs.run(wanted[:1])  # its time predicts the times of the other runs
             self._runs.run(wanted)
             failed = [self._runs.failed[run] for run in wanted if run in self._runs.failed]
             if failed:
@@ -530,7 +530,7 @@ class _Search:
             )
 
     def _matters(self, values: Mapping[str, Array], finer: Mapping[str, Array]) -> bool:
-        """Return whether a change between levels matters for the target."""
+        """Return whether a change between levels is too large to be neglected."""
         least = NEGLIGIBLE if math.isinf(self._target.budget) else 0.0
         return any(
             size(finer[name] - values[name]) > max(least * unit, NOISE * size(finer[name]))
@@ -538,7 +538,7 @@ class _Search:
         )
 
     def _worst(self) -> tuple[int, bool]:
-        """Return the main source of uncertainty, cells (0) or steps (1); and if changes fall."""
+        """Return the larger source of uncertainty, cells (0) or steps (1), and if changes fall."""
         sources = [
             (convergence.error_bound / self.units[name], axis, convergence.seen)
             for name, x in self.crosses.items()
@@ -547,9 +547,9 @@ class _Search:
         return max(sources)[1:]
 
     def _move_base(self, said: str, axis: int | None = None) -> None:
-        """Refine cells (``axis=0``) or steps (1) of the base, by default the more uncertain.
+        """Refine cells (``axis`` 0) or steps (1) of the base; by default the larger error source.
 
-        Raise :class:`TradeoffError` if ``MOST_DOUBTS`` bases have not shown convergence.
+        Raise :class:`TradeoffError` after ``MOST_DOUBTS`` bases without convergence.
         """
         where = self._runs.setting(self._at(2 ** self._base[0], self._base[1]))
         self._doubts.append(f"\n  from {where} on: {said}")
@@ -558,7 +558,7 @@ class _Search:
         self._base[self._worst()[0] if axis is None else axis] += 1
 
     def _confirm(self, candidate: _Candidate) -> None:
-        """Run, if time allows, with cells and steps a level finer than a choice, for the limit."""
+        """Confirm the limit, if time allows, by a run one level finer than a candidate."""
         i, j = self._base
         intervals = 2 * max(round(2**candidate.level), 2**j)
         finer = self._at(2 * max(candidate.refine, Fraction(2**i)), math.log2(intervals))
@@ -597,26 +597,26 @@ class _Search:
                 return
             self._time_ratios[self._newton] *= run.seconds / candidate.seconds
             if candidate.likely > 0:
-                # Errors are not known more accurately than the limit.
+                # The uncertainty of the limit is also the uncertainty of the errors.
                 self._error_ratio *= max(self.ratio(run), self.uncertainty) / candidate.likely
 
     # -- decisions -----------------------------------------------------------------------------
 
     def _negligible(self, candidate: _Candidate) -> float:
-        """Return the largest negligible error: with a budget, NEGLIGIBLE times a choice's error."""
+        """Return the largest negligible error, for a budget relative to a candidate's error."""
         return NEGLIGIBLE * (1.0 if math.isinf(self._target.budget) else candidate.bound)
 
     def _choose(self, uncertainty: float) -> _Candidate:
         """Choose the cheapest setting that is accurate enough, or the most accurate in the budget.
 
-        ``uncertainty`` is the uncertainty of the limit, see :class:`_Search`.
+        ``uncertainty`` of the limit is divided by units, see :class:`_Search`.
         """
         some, setting = next(iter(self.crosses.values())), self._runs.families[self.family]
         top = 2 ** (some.cells.finest + REACH), 2 ** (some.steps.finest + REACH)
-        # The coarsest mesh has about the number of nodes of the given cells at degree 1.
+        # The coarsest mesh has about the same number of nodes as the user's cells at degree 1.
         first = math.ceil(self._divisor / setting.mesh.degree)
         refine = [Fraction(k, self._divisor) for k in _geometric(first, self._divisor * top[0])]
-        # Whole multiples of the number of the user's steps, so that all runs end at the same time.
+        # The number of steps is a multiple of the user's, so that all runs end at the same time.
         multiples = np.array(_geometric(1, top[1]), dtype=float)
         cell_levels, step_levels = np.log2(np.array(refine, dtype=float)), np.log2(multiples)
         likely = bound = np.zeros((len(cell_levels), len(step_levels)))
@@ -630,12 +630,12 @@ class _Search:
             2.0 ** cell_levels[:, None], multiples
         )
         if math.isinf(self._target.budget):
-            # The aim is the middle half, on a logarithmic scale, of the allowed errors.
+            # The target is the middle half of the allowed errors, on a logarithmic scale.
             largest = 1 - uncertainty
             least, most = ((LEAST_USED ** (1 - p)) * largest**p for p in (1 / 4, 3 / 4))
             allowed = (likely <= most) & (bound <= largest)
             costs = np.where(allowed, seconds, np.inf)
-            # A setting whose errors cancel below ``least`` is avoided, even at twice the cost.
+            # Avoid errors below ``least``, which are due to cancellation, even at twice the cost.
             used = allowed & (likely >= least) & (seconds <= 2 * costs.min())
             costs = np.where(used, seconds, np.inf) if used.any() else costs
             k = costs.argmin() if allowed.any() else bound.argmin()
@@ -662,7 +662,7 @@ class _Search:
         return np.asarray(a + b * cells + steps * (c + d * cells))
 
     def _accepts(self, run: Run) -> bool:
-        """Return whether a run is accurate or fast enough, but not much more than required."""
+        """Return whether a run is accurate or fast enough, but not much better than required."""
         budget, ratio = self._target.budget, self.ratio(run)
         if math.isinf(budget):
             return LEAST_USED <= ratio <= 1 - self.uncertainty
@@ -671,9 +671,9 @@ class _Search:
     def _rank(self, run: Run) -> tuple[bool, bool, float]:
         """Return a key that is smaller for better runs.
 
-        Accurate runs are sorted by time, others by error; with a budget, fast runs are sorted by
-        error, others by time.  A run that is accurate only because errors of cells and steps cancel
-        does not count as accurate.
+        Accurate runs are sorted by time, and come before other runs, sorted by error.  With a
+        budget, fast runs are sorted by error, and come before other runs, sorted by time.  A run
+        does not count as accurate if only errors that cancel make it so.
         """
         _, refine, level, newton = run.refinement
         bound = self._error_ratio * max(

@@ -21,11 +21,11 @@ from ufl_beam.solvers.newton_options import Newton
 
 @dataclass(frozen=True)
 class Setting:
-    """Setting of a run, the arguments of :func:`simulate`."""
+    """Setting of a run: arguments of :func:`simulate`."""
 
     scheme: Scheme  # the time scheme
-    dt: Any  # step (s), or adaptive steps
-    mesh: Mesh  # the cells
+    dt: Any  # length of steps (s), or :class:`Adaptive`
+    mesh: Mesh  # the discretization
     newton: Newton  # options of Newton's method
 
     def __str__(self) -> str:
@@ -37,26 +37,26 @@ class Setting:
 
 
 class Refinement(NamedTuple):
-    """Family of the setting of a run, and refinement from the coarsest setting of the family."""
+    """Family of a setting (scheme, coarsest steps and mesh), and refinement of steps and cells."""
 
-    family: int  # number of the family, given by its coarsest setting
-    refine: Fraction  # divisor of each cell
+    family: int  # index of the family
+    refine: Fraction  # factor on the number of cells
     level: float  # the number of steps is multiplied by about 2**level
-    newton: int = 0  # number of the options of Newton's method
+    newton: int = 0  # index of the options of Newton's method
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
     """Result of a run, and its cost."""
 
-    refinement: Refinement  # its family and refinement
-    dials: Setting  # its setting
+    refinement: Refinement  # family and refinement
+    dials: Setting  # setting
     values: dict[str, Array]  # the quantities
     seconds: float  # wall time without compiling; s
-    building: float  # part of the wall time before the first step; s
-    steps: float  # number of steps
+    building: float  # wall time before the first step; s
+    steps: float  # number of substeps
     cells: float  # number of cells
-    iterations: float  # Newton iterations per step
+    iterations: float  # Newton iterations per substep
 
     @property
     def stepping(self) -> float:
@@ -74,12 +74,12 @@ class Target:
     """Target of a trade-off: absolute or relative tolerances, or the wall time of a run."""
 
     absolute: Mapping[str, float]  # tolerance of each quantity, in its unit; or empty
-    relative: float  # tolerance as a fraction of largest magnitudes; 1 with a budget
+    relative: float  # tolerance as a fraction of the largest magnitude; 1 with a budget
     budget: float  # wall time (s); infinite if tolerances are given
 
     @property
     def measure(self) -> str:
-        """Name of the measure by which errors are divided."""
+        """Name of the values by which errors are divided."""
         return "tolerances" if math.isinf(self.budget) else "largest values"
 
     def __str__(self) -> str:
@@ -98,11 +98,11 @@ class Tradeoff(Rich):
         runs: All runs.
         best: The run with the recommended setting.
         t: Beginning and end; s.
-        crosses: Convergence of each quantity in the recommended family of settings.
+        crosses: Convergence of each quantity in the family of the recommended setting.
         units: The tolerances, in the unit of each quantity; with a budget, the largest magnitudes
             of the quantities.
         target: The tolerances or the budget.
-        families: The families of settings, in words.
+        families: Coarsest settings, as texts; each run refines one of these settings.
         notes: Further remarks on the result.
         spent: Wall time of all runs; s.
 
@@ -130,16 +130,16 @@ class Tradeoff(Rich):
 
     @property
     def limit(self) -> dict[str, Array]:
-        """Extrapolated limits of the quantities."""
+        """Extrapolated limits of the quantities, by name."""
         return {name: convergence.limit for name, convergence in self.crosses.items()}
 
     @property
     def uncertainty(self) -> dict[str, float]:
-        """Uncertainty of the limits; unit of each quantity."""
+        """Uncertainty of the limits, by quantity; unit of each quantity."""
         return {name: convergence.uncertainty for name, convergence in self.crosses.items()}
 
     def errors(self, run: Run) -> dict[str, float]:
-        """Return the distance of a run from the limit of each quantity, in the unit of each."""
+        """Return the distance of a run from the limit of each quantity, in its unit."""
         return {name: size(run.values[name] - limit) for name, limit in self.limit.items()}
 
     def ratio(self, run: Run) -> float:
@@ -148,7 +148,7 @@ class Tradeoff(Rich):
 
     @property
     def effort(self) -> float:
-        """Wall time of the steps of all runs, divided by this time of the recommended run."""
+        """Wall time of the steps of all runs, divided by the same time of the recommended run."""
         return sum(run.stepping for run in self.runs) / self.best.stepping
 
     @property
@@ -163,7 +163,7 @@ class Tradeoff(Rich):
         return f"trade-off for {self.target}; errors are distances from the extrapolated limit"
 
     def table(self) -> list[list[str]]:
-        """Return a header, and cost, errors and setting of the best and of all unbeaten runs."""
+        """Return a header, and cost, errors and setting of each run of ``front`` and ``best``."""
         rows = [["", "seconds", "steps", "cells", "iterations", *self.limit, "dials"]]
         for run in sorted({*self.front, self.best}, key=lambda run: run.seconds):
             rows.append([

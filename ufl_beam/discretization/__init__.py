@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Numbering of unknowns, function spaces, compiled forms, transfer of states."""
+"""Numbering of unknowns, function spaces, compiled forms, and transfer of states."""

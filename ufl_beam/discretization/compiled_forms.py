@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """UFL forms, and functions of values at a point, compiled to C.
 
-Coefficients of forms are packed once; later only changed values are packed again.
+Coefficients of forms are packed once; later only changed values are packed.
 
 A form is compiled with one quadrature rule only, because FFCx 0.9 to 0.11 gives wrong results for
 forms that mix a one-point rule with another rule.
@@ -32,7 +32,7 @@ from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
 
 def tabulator(compiled: fem.Form) -> Any:
-    """Return the C function of a compiled cell form; it is valid as long as the form exists."""
+    """Return the C function of a compiled cell form, valid as long as the form exists."""
     integral = compiled.ufcx_form.form_integrals[0]
     return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
 
@@ -41,12 +41,12 @@ class Prepared(NamedTuple):
     """Form compiled for all scenes.
 
     Attributes:
-        source: C file that FFCx wrote for the form.
+        form, source: Form of DOLFINx, and the C file that FFCx wrote for it.
         tabulate: C function of the form.
         coefficients: Coefficients that the C function uses.
-        columns: Columns of each coefficient in ``packed``, by the identity of the coefficient.
-        constants, packed: Values of the constants, and of the coefficients in each cell of the mesh
-            of the form.
+        columns: Columns of each coefficient in ``packed``, by ``id`` of the coefficient.
+        constants: Values of the constants.
+        packed: Values of the coefficients in each cell of the mesh of the form.
         entries: Number of entries of the vector or matrix of a cell; 1 for a functional.
     """
 
@@ -62,7 +62,7 @@ class Prepared(NamedTuple):
 
 @lru_cache(maxsize=512)
 def prepared(form: ufl.Form) -> Prepared:
-    """Compile a form once per process."""
+    """Compile a form; a second call returns the first result."""
     compiled, source = compiled_form(form)
     ufcx, (constants, packed) = compiled.ufcx_form, pack(compiled)
     positions = ufcx.original_coefficient_positions[0 : ufcx.num_coefficients]
@@ -70,7 +70,7 @@ def prepared(form: ufl.Form) -> Prepared:
     ends = [0, *accumulate(f.function_space.element.space_dimension for f in used)]
     if packed.shape[1] != ends[-1]:
         raise ValueError(f"{VERSIONS} pack {packed.shape[1]} values of a cell, not {ends[-1]}")
-    # Keys are identities, because hashes of UFL functions are computed in Python, which is slow.
+    # Keys are identities, because Python computes hashes of UFL functions slowly.
     columns = {id(f): slice(*ends[i : i + 2]) for i, f in enumerate(used)}
     sizes = [x.ufl_function_space().element.space_dimension for x in form.arguments()]
     entries = math.prod(sizes)
@@ -84,10 +84,10 @@ def prepared(form: ufl.Form) -> Prepared:
 
 
 def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
-    """Return fields of ``cells`` of loops.h with the positions ``places`` of :meth:`Csr.blocks`.
+    """Return fields of the struct ``cells`` of loops.h for positions of :meth:`Csr.blocks`.
 
-    Batches of cells with equal positions share a pattern.  Patterns of cells of degree 1 whose
-    entries are adjacent in each row come first.
+    Batches of cells with equal positions share a pattern.  With cells of degree 1, patterns whose
+    entries are adjacent in each row of the matrix come first.
     """
     batches, entries, lanes = places.shape
     rows = places.reshape(batches, entries * lanes).view(f"V{entries * lanes}")[:, 0]
@@ -107,22 +107,21 @@ def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
 class Kernel:
     """Compiled cell form with the packed values of its coefficients.
 
-    A form stated on one cell is evaluated on all cells.  Its coefficients keep their values on that
-    cell until :meth:`put` or :meth:`set` changes them.  Entries of a linear form whose test
-    function is in the space of the unknown are added at the degrees of freedom of the cells;
-    entries of a bilinear form are added to a matrix after :meth:`place`.  Otherwise, each cell has
-    its own entries.
+    A form on one cell is evaluated on all cells.  Coefficients have the values in this one cell
+    until :meth:`put` or :meth:`set` changes them.  A linear form whose test function is in the
+    space of the unknown adds to the degrees of freedom of the cells.  Any other linear form returns
+    separate entries for each cell.  After :meth:`place`, a bilinear form adds to a matrix.
 
     Args:
         form: Cell integrals with one quadrature rule.
-        unknown: The configuration that most calls change; it need not appear in the form.
+        unknown: The configuration that is an argument of :meth:`add` and :meth:`value`; the form
+            need not depend on it.
         cell_dofs: Degrees of freedom of the unknown; shape (num_cells, dofs per cell).
         coordinates: Vertices of the cells; shape (num_cells, 2, 2); m.
-        several: ``coordinates`` in batches of :data:`LANES`, see :func:`in_batches`, to compute
-            several cells at once if the form has a SIMD version.
+        several: ``coordinates`` in batches of :data:`LANES`, see :func:`in_batches`; None: no SIMD.
 
     Attributes:
-        lanes: Number of cells that are computed at once.
+        lanes: Number of cells that are computed at once with SIMD; else 1.
     """
 
     def __init__(
@@ -170,13 +169,13 @@ class Kernel:
 
     @cached_property
     def _packed(self) -> Array:
-        """Values of all coefficients but the unknown in the cells, in batches."""
+        """Values of all coefficients except the unknown in the cells, in batches."""
         values = self._values
         return in_batches(np.tile(values, (len(self._dofs) // len(values), 1)), self.lanes)
 
     @cached_property
     def _places(self) -> dict[str, Any]:
-        """Fields of ``cells`` of loops.h with the positions to which entries are added."""
+        """Fields of the struct ``cells`` with the positions to which entries are added."""
         shape = len(self._dofs), self._entries
         if self._to_dofs or self._is_functional:
             return {}
@@ -192,7 +191,7 @@ class Kernel:
 
     @cached_property
     def cells(self) -> Any:
-        """Argument of ``add_cells`` of loops.h, created when all of its arrays are known."""
+        """Argument of ``add_cells`` of loops.h, created at the first use."""
         number, cell_size = self._dofs.shape
         packed, coefficients = self._packed, self._form.packed.shape[1]
         return fill(
@@ -210,25 +209,25 @@ class Kernel:
         return id(function) in self._form.columns
 
     def position(self, function: fem.Function) -> int:
-        """Return the first column of ``function``, not the unknown, in the packed values."""
+        """Return the first column of ``function`` in the packed values without the unknown."""
         return int(self._columns[id(function)].start)
 
     def set(self, function: fem.Function, q: Array) -> None:
-        """Set ``function`` to the degrees of freedom ``q``, if it appears in the form."""
+        """Set ``function`` to the configuration ``q``, if the form depends on it."""
         if (columns := self._columns.get(id(function))) is not None:
             lib.set_cells(self.cells, doubles(q), columns.start)
 
     def put(self, function: fem.Function, values: Array) -> None:
-        """Set the values of ``function`` in the cells; shape (num_cells, dofs per cell)."""
+        """Set the values of ``function`` in the cells; (num_cells, dofs per cell)."""
         columns = self._columns[id(function)]
         rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
         self._packed[:, columns] = in_batches(rows, self.lanes)
 
     def subdomain(self, source: Kernel) -> bool:
-        """Share the packed values of ``source`` if they have this form's values in one block.
+        """Use the packed values of ``source``, if these contain this form's values as one block.
 
         Returns:
-            Whether both forms share their values now.
+            Whether both forms use the same values now.
         """
         mine, others = self._columns, source._columns
         shifts = {others[f].start - mine[f].start for f in mine.keys() & others.keys()}
@@ -239,7 +238,7 @@ class Kernel:
         return True
 
     def place(self, A: Csr) -> None:
-        """Let :meth:`add` of a bilinear form add to ``A`` at the degrees of freedom of cells."""
+        """Let :meth:`add` of a bilinear form add to entries of ``A`` from now on."""
         per_cell = self._dofs.shape[1]
         if self._entries != per_cell**2:
             raise ValueError(f"{self._entries} entries of a cell are no matrix of {per_cell} rows")
@@ -248,11 +247,11 @@ class Kernel:
     def keep_entries(self) -> tuple[Any, int, Array]:
         """Store the entries of all cells in each evaluation from now on.
 
-        Call it after :meth:`place` and :meth:`subdomain`, because later changes have no effect.
+        Call this method after :meth:`place` and :meth:`subdomain`, which have no effect later.
 
         Returns:
-            A pointer to the address of the array of entries, which C may exchange for another
-            array; the number of cells in a batch, see :func:`in_batches`; and such an array.
+            A pointer to the address of the array of entries; the number of cells in a batch, see
+            :func:`in_batches`; and a second array, by which C may replace the first.
         """
         batches = -(-len(self._dofs) // self.lanes)
         each, second = np.zeros((2, batches, self._entries, self.lanes))
@@ -272,7 +271,7 @@ class Kernel:
 class Pointwise:
     """Compiler of functions of values at a point; ``inputs`` are the names of these values.
 
-    Such a function is compiled as a form on a cell of unit length with one quadrature point.
+    A function is compiled as a form on a cell of unit length with one quadrature point.
 
     Attributes:
         at: The values in UFL, by name.
@@ -285,7 +284,7 @@ class Pointwise:
         self.at: dict[str, Expr] = {name: x[i] for i, name in enumerate(inputs)}
 
     def compile(self, *outputs: Expr) -> Any:
-        """Compile a function with these ``outputs``; it is valid as long as this object exists."""
+        """Compile a C function of the outputs, valid as long as this object exists."""
         z = ufl.TestFunction(self._values(len(outputs)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
         form, _ = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)

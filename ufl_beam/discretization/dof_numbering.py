@@ -44,25 +44,25 @@ from ufl_beam.model.supports import COMPONENTS
 class DofNumbering:
     """Vertices, cells and degrees of freedom of a scene.
 
-    Cells of a higher degree also have nodes between their vertices.  A node has three degrees of
-    freedom (u, v, ψ); nodes of a joint share degrees of freedom.  Degrees of freedom are numbered
-    along the beams, then at bodies and joints; the forces of connectors are last.
-    Elimination in this order causes fill-in only where joints and connectors couple beams.
+    Cells of a degree above 1 also have nodes between their vertices.  A node has three degrees of
+    freedom (u, v, ψ); nodes of a joint share degrees of freedom.  The numbers of degrees of freedom
+    follow the beams, then bodies and joints, and last the forces of connectors.  Elimination in
+    this order causes fill-in only where joints and connectors couple beams.
 
     Attributes:
-        points: Nodes of all beams: vertices, beam after beam, then nodes inside cells, then the
+        points: Coordinates of nodes: vertices, beam after beam; then nodes inside cells; then the
             second vertex of each plastic hinge; shape (num_nodes, 2); m.
         cells: Vertices of the cells; shape (num_cells, 2).
         nodes_of_cells: Both vertices of each cell, then the nodes between them; shape
             (num_cells, degree + 1).
-        beam_of_cell: Number of the beam of each cell; shape (num_cells,).
-        first_vertices: First vertex of each beam, then the number of vertices; (num_beams + 1,).
+        beam_of_cell: Index of the beam of each cell; shape (num_cells,).
+        first_vertices: First vertex of each beam; last, the number of vertices; (num_beams + 1,).
         dofs: Degrees of freedom of each node; shape (num_nodes, 3).
         dofs_of_bodies: Degrees of freedom of ``scene.rigid_bodies``; shape (num_bodies, 3).
-        multipliers: Lagrange multipliers, the forces of connectors; shape (num_connectors,).
+        multipliers: Numbers of the forces of connectors (Lagrange multipliers); (num_connectors,).
         size: Number of degrees of freedom, including the forces of connectors.
-        cells_at_hinges, vertices_at_hinges: Cell, and first vertex, at each plastic hinge of zero
-            length; shape (num_hinges,).
+        cells_at_hinges: Cell at each plastic hinge of zero length; shape (num_hinges,).
+        vertices_at_hinges: First vertex at each of these hinges; shape (num_hinges,).
     """
 
     def __init__(self, scene: Scene, mesh: Mesh | None = None) -> None:
@@ -71,7 +71,7 @@ class DofNumbering:
         self.scene, self.mesh, beams = scene, mesh, scene.beams
         self._beam_indices: dict[Member, int] = {beam: i for i, beam in enumerate(beams)}
         self._parameters: list[Array] = []
-        by_kind: dict[object, Array] = {}  # equal beams share parameters
+        by_kind: dict[object, Array] = {}  # beams with equal cells share parameters
         for beam, attached in scene.attached.items():
             kind = beam.cells, beam.corners, frozenset(attached) - {0.0, 1.0}
             if kind not in by_kind:
@@ -114,7 +114,7 @@ class DofNumbering:
         return f"<DofNumbering: {self}>"
 
     def _add_hinges(self, places: Sequence[Place]) -> None:
-        """Give each plastic hinge a second vertex, which is an end of the cell beyond the hinge."""
+        """Create the second vertex of each plastic hinge, an end of the cell beyond the hinge."""
         at = np.array([self.vertex(place) for place in places], dtype=np.int64)
         vertices = range(len(self.points), len(self.points) + len(at))
         beyond = [Place(place.beam, place.s, beyond=True) for place in places]
@@ -154,8 +154,8 @@ class DofNumbering:
         number[order] = np.arange(len(order))
         dofs = number[slots].reshape(-1, 3)
         self.dofs, self.dofs_of_bodies = dofs[:nodes], dofs[nodes:]
-        # Forces of connectors come last, because their diagonal may be zero until the motions that
-        # they act on are eliminated.
+        # Forces of connectors are last: their diagonal entries may be zero before the motions of
+        # the connected nodes are eliminated.
         self.multipliers: Index = len(order) + np.arange(len(self.scene.all_connectors))
         self.size = len(order) + len(self.multipliers)
 
@@ -177,7 +177,7 @@ class DofNumbering:
     # -- beams, vertices, cells ------------------------------------------------------------------
 
     def _index(self, beam: Member) -> int:
-        """Return the number of a beam of the scene."""
+        """Return the index of a beam of the scene."""
         number = self._beam_indices.get(beam)
         if number is not None:
             return number
@@ -186,7 +186,7 @@ class DofNumbering:
         raise ModelError(f"{beam.name} is not in the scene")
 
     def parameters(self, beam: Member) -> Array:
-        """Return the parameters s of the vertices of a beam, from start to end."""
+        """Return the parameters s of the vertices of a beam, from 0 (start) to 1 (end)."""
         return self._parameters[self._index(beam)]
 
     def vertices_of(self, beam: Member) -> Index:
@@ -206,7 +206,7 @@ class DofNumbering:
 
     @property
     def pieces(self) -> Index:
-        """Pairs of neighbouring nodes along each cell; (num_cells degree, 2)."""
+        """Pairs of neighbouring nodes along each cell; (num_cells * degree, 2)."""
         start, end, *between = self.nodes_of_cells.T
         along = np.column_stack([start, *between, end])
         return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2)
@@ -224,10 +224,10 @@ class DofNumbering:
 
     @cached_property
     def inelastic(self) -> list[tuple[SectionPoints, Index]]:
-        """Layouts of material points that can yield or break, each with the cells that have it.
+        """Material points of cells that can yield or break, with the cells that have these points.
 
         Raises:
-            ModelError: There are such cells, and the degree of the mesh is above one.
+            ModelError: There are such cells, and the degree of the mesh is above 1.
         """
         groups = dict[SectionPoints, list[int]]()
         sections, beam_sections = self.sections
@@ -260,7 +260,7 @@ class DofNumbering:
         return np.asarray(np.sqrt(x * x + y * y))
 
     def hinges(self, beam: Member) -> list[SofteningLaw | None]:
-        """Return the law of the hinge that may open in the middle of each cell of a beam."""
+        """Return the law of the hinge in the middle of each cell of a beam, or None."""
         return [beam.section.hinge] * len(self.cells_of(beam))
 
     def keys(self, cells: Index) -> list[tuple[int, int]]:
@@ -275,7 +275,7 @@ class DofNumbering:
     # -- places ----------------------------------------------------------------------------------
 
     def cell_and_fraction(self, place: Place) -> tuple[int, float]:
-        """Return the cell at a place, and the fraction of the cell before the place."""
+        """Return the cell at a place, and the position of the place in the cell, from 0 to 1."""
         require_kind(place, Place, "place")
         if place.beam not in self._beam_indices:
             raise ModelError(f"{place}: {place.beam.name} is not in the scene")
@@ -286,7 +286,7 @@ class DofNumbering:
         return int(self._first_cells[i]) + left, float(fraction)
 
     def cell(self, place: Place) -> int:
-        """Return the cell at a place; at a vertex, the cell before it; at the start, the first."""
+        """Return the cell at a place; at a vertex, the cell before it; at s = 0, the first cell."""
         return self.cell_and_fraction(place)[0]
 
     def vertex(self, place: Place) -> int:
@@ -302,11 +302,11 @@ class DofNumbering:
         return cell + i + round(fraction)
 
     def weights(self, place: Place) -> tuple[Index, Array]:
-        """Return the nodes of the cell at a place and their shape functions; (degree + 1,)."""
+        """Return the nodes of the cell at a place, and shape functions there; (degree + 1,)."""
         cell, fraction = self.cell_and_fraction(place)
         first, *between, last = self.mesh.weights(fraction)
         nodes = self.nodes_of_cells[cell].copy()
-        if fraction in (0.0, 1.0):  # at a hinge, the cell may have the other vertex
+        if fraction in (0.0, 1.0):  # a hinge has another vertex, which the cell may have
             nodes[int(fraction)] = self.vertex(place)
         return nodes, np.array([first, last, *between])
 
@@ -324,7 +324,7 @@ class DofNumbering:
         return beam.at((s[i] + s[i + 1]) / 2)
 
     def place_of(self, number: int) -> Place:
-        """Return the middle of a cell, or the place of a hinge; hinges follow after the cells."""
+        """Return the middle of a cell, or the place of a hinge, whose numbers follow the cells."""
         if number < len(self.cells):
             return self.middle(number)
         return place_of(self.scene.hinges[number - len(self.cells)])
@@ -357,14 +357,14 @@ class DofNumbering:
 
     @cached_property
     def rotations(self) -> Index:
-        """Rotational degrees of freedom; a shared one occurs once."""
+        """Rotational degrees of freedom, each once, ascending."""
         return np.unique(np.r_[self.dofs[:, 2], self.dofs_of_bodies[:, 2]])
 
     @property
     def scales(self) -> Array:
         """Factors that make motions dimensionless; (size,).
 
-        1/size of the scene for displacements, 1 for rotations, 0 for forces of connectors.
+        The factor is 1/(size of the scene) for displacements, 1 for rotations, 0 for forces.
         """
         scales = np.full(self.size, 1 / self.scene.size)
         scales[self.rotations] = 1.0
@@ -375,7 +375,7 @@ class DofNumbering:
     def dofs_of_connectors(self) -> Index:
         """Degrees of freedom of each connector; (num_connectors, 7).
 
-        First u of both nodes, then v of both, then ψ of both, and last the force.
+        The order is u of both nodes, v of both nodes, ψ of both nodes, and the force.
         """
         connectors = self.scene.all_connectors
         nodes = np.array([(self.node(c.a), self.node(c.b)) for c in connectors]).reshape(-1, 2, 3)
@@ -402,7 +402,7 @@ class DofNumbering:
     def worst(self, sizes: Array) -> dict[str, float]:
         """Return the largest of ``sizes`` in each beam, body and connector, in descending order.
 
-        The keys describe the degrees of freedom; zeros are left out.
+        Keys describe the degrees of freedom.  Zeros are left out.
         """
         beam_dofs = [self.nodes_of(beam)[1] for beam in self.scene.beams]
         groups = [*beam_dofs, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
@@ -413,18 +413,18 @@ class DofNumbering:
 # -- motions of places -----------------------------------------------------------------------------
 
 Vectors: TypeAlias = Any
-"""Configurations or velocities at some times, an array or a ``Column``; (n, size)."""
+"""Configurations or velocities at n times: an array, or ``Column`` of state_rows.py; (n, size)."""
 
 
 def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
-    """Rotate one vector, or a vector for each angle, by angles; (n, 2)."""
+    """Rotate one vector, or one vector for each angle, by angles (rad); (n, 2)."""
     a, b = np.asarray(x, dtype=np.float64).T
     cos, sin = np.cos(angle), np.sin(angle)
     return np.column_stack([cos * a - sin * b, sin * a + cos * b])
 
 
 def values_at(numbering: DofNumbering, place: AttachmentPoint, states: Vectors) -> Array:
-    """Return values of the node of a body, or interpolated at a place of a beam; (n, 3)."""
+    """Return values at the centre of a body, or interpolated at a place of a beam; (n, 3)."""
     if isinstance(place, Spot):
         if node(place) is GROUND:
             return np.zeros((len(states), 3))
@@ -438,7 +438,7 @@ def values_at(numbering: DofNumbering, place: AttachmentPoint, states: Vectors) 
 def velocity_at(
     numbering: DofNumbering, place: AttachmentPoint, states: Vectors, velocities: Vectors
 ) -> Array:
-    """Return the velocity of a place; (n, 3); m/s, m/s, rad/s."""
+    """Return the velocities of a place in ``states``; (n, 3); m/s, m/s, rad/s."""
     motion = values_at(numbering, place, velocities)
     if isinstance(place, Spot):
         x, y = turned(arm(place), values_at(numbering, place, states)[:, 2]).T

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Finite element of the beams, on which forms are stated, and the cells of a subdomain.
+"""Finite element of the beams, with which forms are written, and the cells of a subdomain.
 
-Forms do not depend on a scene: they are stated on one cell and compiled once per process.  Only
-integrals of a user are stated on the cells of a scene, as a mesh of DOLFINx.
+Forms do not depend on a scene: they are defined on one cell and compiled once per process.  Only
+integrals of a user are defined on the cells of a scene, as a mesh of DOLFINx.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ from ufl_beam.model.scene import Scene
 class Element:
     """Finite element of the beams, and the functions in which forms are written.
 
-    By default, forms are stated on one cell and compiled once for all scenes.  With ``cells``, the
-    mesh of a scene, DOLFINx can assemble them.
+    By default, forms are defined on one cell and compiled once for all scenes.  With ``cells``, the
+    mesh of a scene, forms are defined on this mesh, and DOLFINx can assemble them.
 
     Attributes:
         degree: Polynomial degree of configurations.
-        axis: Undeformed axis at the points of ``dx(1)``, in UFL.
+        axis: Undeformed axis at the points of ``dx(1)``.
         anywhere: Undeformed axis at the points of any quadrature rule.
         space: Configurations (u_x, u_y, ψ).
         q0, q1: Configurations at the beginning and at the end of a step.
-        w: Virtual motions.
+        w: Test function, the virtual motion.
         stiffness: (EA, GA, EI); N, N, N m².
         inertia: (rhoA, rhoI); kg/m, kg m.
     """
@@ -68,34 +68,34 @@ class Element:
         return fem.Function(self.space)
 
     def in_cells(self, *shape: int) -> fem.Function:
-        """Create a function that is constant in each cell, with values of ``shape``."""
+        """Create a function that is constant in each cell; its values have the shape ``shape``."""
         return fem.Function(fem.functionspace(self._cell, ("DG", 0, shape)))
 
     def at_points(self, *shape: int) -> fem.Function:
-        """Create a function with values of ``shape`` at the points of ``dx(1)``."""
+        """Create a function at the points of ``dx(1)``; its values have the shape ``shape``."""
         rule = self._rule(1)
         element = basix.ufl.quadrature_element("interval", value_shape=shape, degree=rule)
         return fem.Function(fem.functionspace(self._cell, element))
 
     def sampled(self, values: Expr) -> ufl.Form:
-        """Return ``values``, of shape (3,), at the points of ``dx(1)``, times weights of sum 1."""
+        """Return a form for ``values`` (3,) at the points of ``dx(1)``, times weights of sum 1."""
         z = ufl.TestFunction(self.at_points(3).function_space)
         return ufl.dot(values, z) / self.axis.h * self.dx(1)
 
     def constant(self, value: float) -> fem.Constant:
-        """Create a number that can change without new compilation of forms."""
+        """Create a number that can change without a new compilation of forms."""
         return fem.Constant(self._cell, value)
 
     def dx(self, degree: int) -> ufl.Measure:
-        """Return the measure of the cells; a form has only one, see compiled_forms.py.
+        """Return the measure of the cells; a form has only one measure, see compiled_forms.py.
 
-        ``degree`` of quadrature is for cells of degree 1; each further degree of the cells adds 2.
+        The quadrature has the degree ``degree + 2 (p - 1)`` for cells of degree p.
         """
         rule = {"quadrature_degree": self._rule(degree)}
         return ufl.Measure("dx", domain=self._cell, metadata=rule)
 
     def dx_of_mass(self) -> ufl.Measure:
-        """Return the measure of inertia: exact, or with the nodes as points for lumped mass."""
+        """Return the measure of inertia: exact, or for lumped mass with points at the nodes."""
         if not self._lumped:
             return self.dx(2)
         rule = {"quadrature_rule": "GLL", "quadrature_degree": self._rule(1)}
@@ -106,7 +106,7 @@ class Element:
 
 
 def element_of(mesh: Mesh) -> Element:
-    """Return the element of a mesh, stated on one cell; it does not depend on ``refine``."""
+    """Return the element of a mesh, defined on one cell; it does not depend on ``refine``."""
     return _element(mesh.degree, mesh.lumped)
 
 
@@ -130,13 +130,13 @@ def applied(form: ufl.Form, q1: fem.Function) -> ufl.Form:
 class Fields:
     """Cells of one process, or some of them, on which forms of the element are evaluated.
 
-    Loops in C evaluate the forms, which are compiled once for all scenes.  ``positions`` are those
-    of the cells in ``subdomain.cells``; by default, all cells are selected.
+    Loops in C evaluate the forms, which are compiled once for all scenes.  ``positions`` selects
+    cells by their indices in ``subdomain.cells``; the default is all cells.
 
     Attributes:
         cell_dofs: Local degrees of freedom of the cells; (num_cells, 3 (degree + 1)).
-        order: Position in ``subdomain.cells`` of each cell.
-        element: Element on which the forms are stated.
+        order: Index in ``subdomain.cells`` of each cell.
+        element: Element with which the forms are written.
     """
 
     def __init__(self, subdomain: Subdomain, positions: Index | None = None) -> None:
@@ -156,7 +156,7 @@ class Fields:
 
         Args:
             form: Cell integrals with one quadrature rule.
-            unknown: The configuration that changes.
+            unknown: The configuration that is an argument of :meth:`Kernel.add`.
             cell_dofs: Degrees of freedom of the unknown, by default :attr:`cell_dofs`.
             several: Whether to compute several cells at once, if possible.
         """
@@ -169,11 +169,11 @@ class Fields:
         return kernel
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
-        """Compile a virtual work and its derivative, which adds to ``A``, with shared values."""
+        """Compile a virtual work and, to add to ``A``, its derivative; both share their values."""
         form, lanes = derivative(work, q1), self._coordinates_in_lanes
         force = self.kernel(work, q1)
         tangent = Kernel(form, q1, self.cell_dofs, self._coordinates(), lanes)
-        if force.lanes != tangent.lanes:  # they could not share packed coefficients
+        if force.lanes != tangent.lanes:  # otherwise they could not share packed coefficients
             force = self.kernel(work, q1, several=False)
             tangent = Kernel(form, q1, self.cell_dofs, self._coordinates())
         if not tangent.subdomain(force):
@@ -192,7 +192,7 @@ class Fields:
         return in_batches(self._coordinates(), LANES)
 
     def matrix(self) -> Csr:
-        """Create a zero matrix on the degrees of freedom of this process."""
+        """Create a zero matrix for the degrees of freedom of this process."""
         if self._matrix is None:
             subdomain = self.subdomain
             connectors = subdomain.numbering.scene.all_connectors
@@ -208,7 +208,7 @@ class Fields:
         return self._matrix.zeros_like()
 
     def assembled(self, form: ufl.Form) -> Csr:
-        """Assemble a bilinear form at the undeformed configuration in a new matrix."""
+        """Assemble a bilinear form at the undeformed configuration into a new matrix."""
         matrix = self.matrix()
         kernel = self.kernel(form, self.element.q1, several=False)
         kernel.place(matrix)
@@ -216,7 +216,7 @@ class Fields:
         return matrix
 
     def section_values(self, function: fem.Function) -> Array:
-        """Return the values of ``element.stiffness`` or ``element.inertia`` in the cells."""
+        """Return values of ``element.stiffness`` or ``element.inertia``; (num_cells, 3 or 2)."""
         numbering = self.subdomain.numbering
         names = ("rhoA", "rhoI") if function is self.element.inertia else ("EA", "GA", "EI")
         sections, beam_sections = numbering.sections
@@ -267,7 +267,7 @@ class Strains:
     """Strains (Σ, Γ, K) at the quadrature points of the cells.
 
     Attributes:
-        weights: Weights of the points; the kernel multiplies the strains of a cell by them.
+        weights: Quadrature weight of each strain of a cell; the kernel includes these factors.
     """
 
     def __init__(self, fields: Fields) -> None:
@@ -276,7 +276,7 @@ class Strains:
         self.shape = (len(fields.order), len(self.weights))
 
     def __call__(self, q: Array) -> Array:
-        """Compute strains at ``q``, point after point; (num_cells, 3 degree); 1, 1, 1/m."""
+        """Compute strains at ``q``, point after point; (num_cells, 3 * degree); 1, 1, 1/m."""
         return np.asarray(self._weighted(q) / self.weights)
 
     def mean(self, q: Array) -> Array:
@@ -301,7 +301,7 @@ def _section_forces(element: Element) -> ufl.Form:
 
 
 def section_forces(fields: Fields) -> Kernel:
-    """Compile (N, V, M) of elastic cells from the strains of a configuration, P(7)."""
+    """Compile the mean (N, V, M) of elastic cells in a configuration; N, N, N m; P(7)."""
     return fields.kernel(_section_forces(fields.element), fields.element.q1, several=False)
 
 
@@ -318,7 +318,7 @@ def integrated(integral: ufl.Form | Expr, mesh: meshes.Mesh) -> float:
     """Integrate a form without arguments, or a scalar expression, over the cells of a mesh.
 
     Raises:
-        ModelError: ``integral`` is neither, is over facets, or is on another mesh.
+        ModelError: ``integral`` is something else, is over facets, or is on another mesh.
     """
     if isinstance(integral, Expr) and not integral.ufl_shape:
         integral = integral * ufl.dx(domain=mesh)
@@ -340,7 +340,7 @@ def integrated(integral: ufl.Form | Expr, mesh: meshes.Mesh) -> float:
 
 
 class DolfinxFields(Fields):
-    """Cells as a mesh of DOLFINx; their element is stated on it, so that DOLFINx can assemble.
+    """Cells as a mesh of DOLFINx, with an element on this mesh, so that DOLFINx can assemble.
 
     Attributes:
         mesh: Mesh of the cells; DOLFINx chooses their order.
@@ -354,7 +354,7 @@ class DolfinxFields(Fields):
         vertices, local_vertices = np.unique(numbering.cells[cells], return_inverse=True)
         self.mesh = line_mesh(numbering.points[vertices], local_vertices.reshape(-1, 2))
         order: Index = np.asarray(self.mesh.topology.original_cell_index)
-        # The order of the vertices of a cell orients the beam.
+        # The direction of a beam is the order of the vertices in its cells.
         expected = numbering.points[numbering.cells[cells[order]]]
         if not np.array_equal(cell_coordinates(self.mesh)[:, :, :2], expected):
             raise RuntimeError("this version of DOLFINx reverses cells; please report it")

@@ -24,17 +24,17 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 
 TOUCHING = 1e-3
-"""Largest distance of vertices that touch, as a fraction of the length of the shorter beam."""
+"""Largest gap between vertices that touch, as a fraction of the length of the shorter beam."""
 
 JUMP = 1e-6
-"""Largest jump of a prescribed motion without a warning: fraction of the scene's size, or rad."""
+"""Largest initial jump without a warning: an angle in rad, or a fraction of the scene's size."""
 
 FAR_OUT = 10.0
-"""Largest likely distance of a point from the centre of its body, in radii of gyration."""
+"""Largest distance from the centre of a body without a warning, in radii of gyration."""
 
 
 def warn_of_masses(scene: Scene) -> None:
-    """Warn of sections without rho and rhoA if other beams have mass, or if nothing has mass."""
+    """Warn of sections without rho and rhoA if other beams have mass or nothing has mass."""
     light = [beam.name for beam in scene.beams if beam.section.massless_by_default]
     if not light:
         return
@@ -53,7 +53,7 @@ def warn_of_masses(scene: Scene) -> None:
 
 
 def warn_of_rates(scene: Scene) -> None:
-    """Warn of a user's virtual works that depend on velocities, such as drag, in a static run."""
+    """Warn of virtual works that depend on velocities, such as drag, in a static run."""
     for work in scene.works:
         if "v" in work.used_arguments:
             warn(
@@ -79,7 +79,7 @@ def warn_of_free_hinges(scene: Scene) -> None:
 
 
 def warn_of_touching(numbering: DofNumbering) -> None:
-    """Warn of ends of beams that touch another beam and are not connected with it."""
+    """Warn of ends of beams that touch another beam without a connection."""
     if not numbering.scene.beams or not len(pairs := _touching(numbering)):
         return
     end, touched = (numbering.place(int(vertex)) for vertex in pairs[0])
@@ -109,7 +109,7 @@ def _touching(numbering: DofNumbering) -> Index:
     counts = np.array([len(indices) for indices in neighbours])
     end = np.repeat(ends, counts)
     touched = np.fromiter(chain.from_iterable(neighbours), dtype=np.int64, count=len(end))
-    # A beam touches itself only if both of its ends meet.
+    # Within one beam, only contact of both ends counts.
     apart = (beams[end] != beams[touched]) | (np.isin(touched, ends) & (end < touched))
     gap = np.linalg.norm(points[end] - points[touched], axis=1)
     touching = apart & (gap <= np.minimum(reach[end], reach[touched]))
@@ -132,8 +132,8 @@ def _touching(numbering: DofNumbering) -> Index:
 def _groups(numbering: DofNumbering) -> Index:
     """Return the group number of each node of the beams; connected nodes are in one group.
 
-    Joints that share u and connectors connect nodes.  Supports that hold u and v connect nodes to
-    the ground.
+    Nodes are connected if they share the degree of freedom u or have a connector between them.
+    Supports of u and v connect nodes to the ground.
     """
     connectors = numbering.dofs_of_connectors[:, :2]
     fixed = [s.place for s in numbering.scene.supports if {0, 1} <= s.held.keys()]
@@ -154,13 +154,13 @@ def _connected(size: int, pairs: Index) -> tuple[Index]:
 
 
 def warn_of_far_points(scene: Scene) -> None:
-    """Warn of points of bodies that are far from the centre of their body and from other parts.
+    """Warn of points of bodies that are far from the centre of their body and from other points.
 
-    No other part has a point there, and the distance from the centre is more than :data:`FAR_OUT`
-    radii of gyration.  For a body without mass or inertia, the distance from the box around the
-    other parts and the centre is more than the diagonal of this box.  ``body.at(x, y)`` takes
-    coordinates of the undeformed scene; coordinates relative to the centre, given by mistake, may
-    be far away.
+    A point is far if it is not a point of another beam or body, and its distance from the centre is
+    more than :data:`FAR_OUT` radii of gyration.  For a body without mass or inertia, the distance
+    from the box around the centre, beams and other bodies is more than the diagonal of this box.
+    Coordinates relative to the centre, given to ``body.at`` by mistake, may be such points;
+    ``body.at(x, y)`` takes coordinates of the undeformed scene.
     """
     attached = (place for _, place in scene.attachments() if isinstance(place, Spot))
     spots = dict.fromkeys(s for s in attached if s.body is not GROUND and not carries(s))
@@ -199,10 +199,10 @@ def _points(scene: Scene) -> Iterator[tuple[tuple[float, float], object]]:
 
 
 def warn_of_origin(scene: Scene) -> None:
-    """Warn of angular velocities about the origin if ``about`` is not given and the scene is far.
+    """Warn of an angular velocity without ``about`` if the scene is far from the origin.
 
-    The distance of the origin from the box around the scene is then larger than the diagonal of the
-    box around the parts that turn.
+    The scene is far if the distance of the origin from the box around the scene is larger than the
+    diagonal of the box around the rotating beams and bodies.
     """
     points = np.array([point for point, _ in _points(scene)])
     away = _outside(np.zeros(2), points)

@@ -17,10 +17,10 @@ from ufl_beam.model.bodies import AttachmentPoint, Spot
 
 
 def bisected(points: Array, number: int) -> Index:
-    """Divide points into ``number`` equal subdomains; return the number of each point's subdomain.
+    """Divide points into ``number`` subdomains of equal size; return the subdomain of each point.
 
-    Recursive coordinate bisection cuts the longer side of the bounding box, which keeps the number
-    of neighbours small.
+    Recursive coordinate bisection cuts the longer side of the bounding box, so that a subdomain has
+    few neighbours.
     """
     subdomains = np.zeros(len(points), dtype=np.int32)
     to_divide = [(np.arange(len(points)), 0, number)]
@@ -41,26 +41,26 @@ def bisected(points: Array, number: int) -> Index:
 class Subdomain:
     """Subdomain of a scene that one process computes: its cells, and their degrees of freedom.
 
-    Local numbers begin with the degrees of freedom that this process owns.  The ghosts, which other
-    processes own, follow; both are in the order of the numbering.  Global numbers, used by PETSc,
-    are contiguous on each process.
+    Degrees of freedom that this process owns have the first local numbers.  Ghosts, which other
+    processes own, follow.  Both groups are in the order of the numbering.  Global numbers, used by
+    PETSc, are contiguous on each process.
 
     Attributes:
         numbering: The :class:`DofNumbering`.
         alone: True if there is only one process, which needs no MPI calls.
         cells: Numbers of the cells of this process, ascending.
-        dofs: Number in the scene of each local degree of freedom.
+        dofs: Number in the :class:`DofNumbering` of each local degree of freedom.
         size: Number of local degrees of freedom, including ghosts.
         num_owned: Number of degrees of freedom that this process owns.
         ghosts: Global numbers of the ghosts.
         cell_dofs: Local degrees of freedom of each cell: u of all its nodes, then all v, then all
             ψ; shape (len(cells), 3 (degree + 1)).
         connectors: Numbers of the connectors of this process.
-        body_dofs: Local degrees of freedom of the bodies on this process; shape (num, 3).
+        body_dofs: Local degrees of freedom of the bodies on this process; shape (num_bodies, 3).
         connector_dofs: Local degrees of freedom of ``connectors``: u of both nodes, then v, then ψ,
             then the force; shape (len(connectors), 7).
-        rotations, multipliers: Local numbers of all rotations, and of the forces of connectors, on
-            this process; int32.
+        rotations: Local numbers of the rotations on this process, ascending; int32.
+        multipliers: Local numbers of the forces of connectors on this process; int32.
     """
 
     def __init__(self, numbering: Any, comm: MPI.Intracomm) -> None:
@@ -81,7 +81,7 @@ class Subdomain:
         connector_dofs = numbering.dofs_of_connectors
         connector_ranks = owner[connector_dofs].min(axis=1, initial=comm.size) % comm.size
         np.minimum.at(owner, connector_dofs, connector_ranks[:, None])
-        owner[owner == comm.size] = 0  # bodies to which nothing is attached
+        owner[owner == comm.size] = 0  # for bodies to which nothing is attached
         self.connectors = np.flatnonzero(connector_ranks == comm.rank)
         order = np.argsort(owner, kind="stable")
         number = np.empty(numbering.size, dtype=np.int32)  # global numbers
@@ -103,22 +103,22 @@ class Subdomain:
         body_dofs = self._local[numbering.dofs_of_bodies]
         self.body_dofs = body_dofs[(body_dofs >= 0).all(axis=1)]
         self._all_owned: Index = order
-        if self.alone:  # local numbers are those of the scene
+        if self.alone:  # local numbers and numbers of the scene are equal
             self._local = self._all_owned = self.dofs
         self.rotations = np.sort(self.local(numbering.rotations)).astype(np.int32)
         self.multipliers = self.local(numbering.multipliers).astype(np.int32)
-        self._gathered: Array = np.empty(0 if self.alone else numbering.size)  # new memory is slow
+        self._gathered: Array = np.empty(0 if self.alone else numbering.size)  # for gather()
         self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
 
     @cached_property
     def scratch(self) -> Array:
-        """Scratch space for each degree of freedom; loops in C keep nothing in it between calls."""
+        """Scratch space of C for each degree of freedom, with no meaning between calls."""
         return np.empty(self.size)
 
     def computes(self, point: AttachmentPoint) -> bool:
         """Return whether this process has the cell at a place, or owns the body of a point.
 
-        It then has all degrees of freedom of the place, even if other processes own some of them.
+        This process then has all degrees of freedom of the place, but may not own all of them.
         """
         if isinstance(point, Spot):
             return bool(self.owns(self.numbering.node(point)).all())
@@ -134,9 +134,9 @@ class Subdomain:
         return x, y
 
     def lengths(self) -> Array:
-        """Return the change of each local dof by a strain of 1: the length of a cell, or 1 rad.
+        """Return the change of each local degree of freedom by a strain of 1; m, rad; 0 for forces.
 
-        It is the size of the scene for displacements of bodies, and 0 for forces of connectors.
+        Displacements change by the length of a cell, or at bodies by the size of the scene.
         """
         lengths = np.full(self.size, self.numbering.scene.size)
         displacements = self.cell_dofs[:, : 2 * (self.numbering.mesh.degree + 1)]
@@ -154,20 +154,20 @@ class Subdomain:
         return weights
 
     def local(self, dofs: Index) -> Index:
-        """Return local numbers of the ``dofs`` (numbers of the scene) that this process has."""
+        """Return the local numbers of the ``dofs`` of the scene that this process has."""
         indices = self._local[dofs]
         return np.asarray(indices[indices >= 0])
 
     def owns(self, dofs: Index) -> npt.NDArray[np.bool_]:
-        """Return which of ``dofs`` (numbers of the scene) this process owns."""
+        """Return whether this process owns each of the ``dofs`` of the scene."""
         indices = self._local[dofs]
         return np.asarray((indices >= 0) & (indices < self.num_owned))
 
     def gather(self, values: Array, out: Array | None = None) -> Array:
         """Gather values of all degrees of freedom, in the order of the numbering, on every process.
 
-        A single process returns ``values`` themselves, not a copy, because states are new arrays in
-        each step.
+        A single process returns ``values`` themselves, not a copy, because states of later steps
+        are new arrays.
         """
         if self.alone:
             return values
@@ -188,14 +188,14 @@ class Subdomain:
         return np.asarray(sums[self.dofs])
 
     def total(self, value: float) -> float:
-        """Return the sum over the processes."""
+        """Return the sum of ``value`` over the processes."""
         return value if self.alone else float(self.comm.allreduce(value))
 
     def largest(self, value: float) -> float:
         """Return the largest value over the processes; infinite if any value is NaN.
 
-        MPI does not define the maximum with NaN, and processes with different results would
-        diverge.
+        MPI does not define the maximum with NaN, and different results on different processes
+        would lead to different decisions.
         """
         if self.alone:
             return value

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""State of a simulation in numbers of the scene, the same on any number of processes.
+"""Saved state of a simulation, which does not depend on the number of processes.
 
-An object that keeps data between steps lists these in one method, ``save_or_restore``, whose calls
-of an :class:`Archive` both save and restore.
+An object with data that later steps need has a method ``save_or_restore``.  The same calls of an
+:class:`Archive` in this method save the data, or restore them.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ModelError
 
 NOWHERE: Array = np.empty(0)
-"""Argument of ``save_or_restore`` instead of a configuration while a state is restored, because
-restored strains and stored energies do not belong to the configuration of the scene."""
+"""Argument of ``save_or_restore`` instead of a configuration while a state is restored: restored
+strains and energies do not belong to the present configuration of the scene."""
 
 
 class Archive:
     """Storage of the state of a process, for restart and ``start=``.
 
-    Without a ``state``, methods save their values and return them.  With a ``state``, methods
-    return the saved values instead.
+    Without ``state``, methods save their arguments and return them.  With ``state``, methods return
+    the saved values instead.
     """
 
     def __init__(self, subdomain: Subdomain, state: State | None = None) -> None:
@@ -54,9 +54,9 @@ class Archive:
     def _values(
         self, name: str, values: Array, size: int, where: Index, owned: int, *, summed: bool = False
     ) -> Array:
-        """Save or restore values at ``where`` in an array; the first ``owned`` are this process's.
+        """Save or restore values at ``where`` in an array; this process owns the first ``owned``.
 
-        Processes that have the same position have equal values, or addends if ``summed``.
+        Processes with the same position have equal values there, or addends if ``summed``.
         """
         if self._restored is None:
             mine = len(values) if summed else owned
@@ -68,10 +68,10 @@ class Archive:
         return np.asarray(result)
 
     def rows(self, name: str, indices: Index, rows: Array, *, known: bool = False) -> Array:
-        """Save or restore numbered rows; each is on one process, or all on all if ``known``.
+        """Save or restore rows by index; each is on one process, or if ``known`` on all processes.
 
-        Calls with one name may have rows of different lengths.  If the state has no row of a
-        number, the present row stays.
+        Calls with the same name may have rows of different lengths.  If the state has no row with
+        an index, the present row is returned.
         """
         columns = rows.shape[1]
         key = f"{name}, {columns}"
@@ -87,11 +87,11 @@ class Archive:
         return np.where(present[:, None], table[positions, 1:], rows)
 
     def has(self, name: str) -> bool:
-        """Return whether a state is restored and has values of this name."""
+        """Return whether a state is being restored and has values of this name."""
         return self._restored is not None and name in self._restored
 
     def _array(self, name: str, shape: tuple[int, ...]) -> Array:
-        """Return an array of the state; require its number of dimensions and of columns."""
+        """Return an array of the state; raise unless dimensions and columns fit ``shape``."""
         values = (self._restored or {}).get(name)
         if values is None or len(values.shape) != len(shape) or shape[-1] != values.shape[-1]:
             problem = "missing" if values is None else f"of shape {values.shape}"
@@ -99,14 +99,14 @@ class Archive:
         return values
 
     def state(self) -> State:
-        """Return the saved state of all processes on each process; all call it together."""
+        """Return the saved state of all processes on each process; a collective call."""
         own = self._sums, self._rows
         everyone = [own] if self._subdomain.comm.size == 1 else self._subdomain.comm.allgather(own)
         state: State = {}
         tables: defaultdict[str, list[Array]] = defaultdict(list)
         for sums, rows in everyone:
             for name, (size, where, values) in sums.items():
-                # Start from -0, which keeps the sign of a zero that is added.
+                # Start from -0.0, because 0.0 + (-0.0) would lose the sign of a zero.
                 np.add.at(state.setdefault(name, np.full(size, -0.0)), where, values)
             for name, arrays in rows.items():
                 tables[name] += arrays

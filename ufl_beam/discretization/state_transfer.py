@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Transfer of the last state of a run to a scene of the same beams with other connections."""
+"""Transfer of the last state of a run to a scene with the same beams and other connections."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connectors import Connector
 
 APART = 1e-6
-"""Largest difference between two places that a new joint may connect.  Positions: as a fraction of
-the size of the scene; rotations: in rad.  Velocities: as a fraction of the largest velocity in the
-scene times the larger of its size and 1 m."""
+"""Largest difference between two places that a new joint may connect: in positions, relative to the
+size of the scene; in rotations, in rad; in velocities, relative to the largest velocity in the
+scene times max(size of the scene in m, 1)."""
 
 CELL_TABLES = ("cells", "changes of strains")
-"""Tables of internal variables whose rows begin with the number of a cell, not of a connector."""
+"""Tables of internal variables of cells; the other tables are of connectors."""
 
 
 class Transfer:
     """Map between the degrees of freedom of two scenes.
 
-    Beams and bodies are the same if they are the same objects.  Connectors are the same if they
-    have the same relative motion of the same points, and laws of one type.  If a joint was removed,
-    both places start at the joint's position.  If a joint was added, its places must coincide.
+    Beams and bodies of both scenes are the same if they are the same objects.  Connectors are the
+    same if motion, places and type of law are equal.  If a joint was removed, both places start at
+    the position of the joint.  If a joint was added, its places must coincide.
     """
 
     def __init__(self, old: DofNumbering, new: DofNumbering) -> None:
@@ -39,7 +39,7 @@ class Transfer:
             np.vstack([numbering.dofs, *(numbering.node(body.middle) for body in bodies)]).ravel()
             for numbering in (new, old)
         )
-        # Numbers of connectors in both scenes: new -> old
+        # ``connectors`` maps indices of connectors from the new scene to the old scene.
         known: dict[object, list[int]] = {}
         for i, connector in enumerate(old.scene.all_connectors):
             known.setdefault(_geometry(connector), []).append(i)
@@ -52,7 +52,7 @@ class Transfer:
         self._from = np.concatenate([olds, old.multipliers[list(connectors.values())]])
 
     def _require_alike(self) -> None:
-        """Raise unless beams, meshes and points are equal and the old scene has all bodies."""
+        """Raise unless beams, meshes and points are equal and all bodies are in the old scene."""
         old, new = self._old, self._new
         if old.scene.beams != new.scene.beams or old.mesh != new.mesh:
             raise ModelError(
@@ -75,12 +75,12 @@ class Transfer:
                 )
 
     def state(self, q: Array) -> Array:
-        """Map a configuration to the new numbering; places of a new joint must coincide."""
+        """Map a configuration to the new numbering; raise if places of a new joint are apart."""
         size = self._new.scene.size
         return self._map(q, lambda c: APART * (size if c < 2 else 1.0), ("m", "rad"), "positions")
 
     def velocity(self, v: Array) -> Array:
-        """Map velocities to the new numbering; places of a new joint must have equal velocities."""
+        """Map velocities to the new numbering; raise if places of a new joint differ in them."""
         fastest = float(np.abs(v).max(initial=0.0)) * max(self._new.scene.size, 1.0)
         return self._map(v, lambda c: APART * fastest, ("m/s", "rad/s"), "velocities")
 
@@ -123,7 +123,7 @@ class Transfer:
 
 
 def same_unknowns(old: DofNumbering, new: DofNumbering) -> bool:
-    """Return whether degrees of freedom and connectors have the same numbers in two scenes."""
+    """Return whether degrees of freedom and connectors have equal numbers in two scenes."""
     connectors = (
         [_geometry(connector) for connector in numbering.scene.all_connectors]
         for numbering in (old, new)

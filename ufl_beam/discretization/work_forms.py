@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Forms of a user's virtual works and potentials, and checks of their functions."""
+"""Forms of a user's virtual works and potentials, and checks of the user's functions."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.works import VirtualWork, Work
 
 GROWTH = "growth of works"
-"""Name of the load factor of virtual works; a user's parameter cannot have a name with spaces."""
+"""Name of the load factor of virtual works; its spaces distinguish it from parameters."""
 
 
 class Statement(NamedTuple):
-    """Forms of a work."""
+    """Forms of a virtual work or potential."""
 
     residual: ufl.Form  # minus the virtual work
     tangent: ufl.Form  # derivative of the residual; empty if it is zero
-    parameters: Mapping[str, fem.Function]  # functions that hold the parameters, by name
-    energy: ufl.Form | None = None  # energy of a potential at the end of the step
-    lost: ufl.Form | None = None  # energy that the scheme dissipates in the step
+    parameters: Mapping[str, fem.Function]  # coefficients for numbers in the forms, by name
+    energy: ufl.Form | None = None  # energy of a potential at the end of a step
+    lost: ufl.Form | None = None  # energy that the scheme dissipates in a step
 
     def varies(self, work: Work) -> bool:
-        """Return whether the energy of a work may change in time without motion."""
+        """Return whether the energy of a potential may change in time without motion."""
         known = () if self.energy is None else self.energy.coefficients()
         varying = ["t", *(name for name, number in work.numbers.items() if callable(number))]
         return any(self.parameters[name] in known for name in varying)
@@ -54,10 +54,10 @@ class _Same:
 
 
 def statement(work: Work, element: Element, scheme: Scheme) -> Statement:
-    """Return the forms of a work in a time scheme, once for all beams and values of parameters.
+    """Return the forms of a work in a time scheme; they serve all beams and parameter values.
 
     Raises:
-        ModelError: The function of the work is wrong.
+        ModelError: The function of the work fails, or returns no suitable expression.
     """
     names = tuple(work.numbers)
     return _statement(
@@ -89,7 +89,7 @@ def _virtual_work_forms(
     density, dx = _returned(work, known, element), element.dx(work.degree)
     try:
         check_form_arity(expand_derivatives(density * dx), (w,))
-    except (ArityMismatch, ValueError):  # UFL may fail while it writes the message
+    except (ArityMismatch, ValueError):  # ValueError: UFL fails to write its message
         raise ModelError(
             f"{work}: the function must return an expression that is linear in w, such as f * w[1]"
         ) from None
@@ -99,7 +99,7 @@ def _virtual_work_forms(
 def _potential_forms(
     work: Work, element: Element, scheme: Scheme, functions: Mapping[str, fem.Function]
 ) -> tuple[ufl.Form, ufl.Form, ufl.Form | None]:
-    """Return forms of minus the virtual work, the energy at the end of a step, and its loss."""
+    """Return the forms of minus virtual work, energy at the end of a step, and dissipation."""
     q0, q1, w, q, dx = (
         element.q0,
         element.q1,
@@ -115,7 +115,7 @@ def _potential_forms(
     def along(direction: Expr, at: Expr) -> Expr:
         return ufl.replace(gradient, {q: at, w: direction})
 
-    # If w is the increment of the nodes, this variation is the increment of q everywhere.
+    # For w equal to the increment of the nodes, s is the increment of q along the whole cell.
     axis = element.anywhere
     (_, ψ0), (_, ψ1), (w_u, w_ψ) = map(split, (q0, q1, w))
     pairs = zip(axis.at_nodes(ψ1 - ψ0), axis.at_nodes(w_ψ), strict=True)
@@ -132,7 +132,7 @@ def _potential_forms(
 
 
 def _returned(work: Work, known: Mapping[str, Any], element: Element) -> Expr:
-    """Return the expression of the function of a work; :class:`ModelError` names the work."""
+    """Return the expression of the function of a work, or raise :class:`ModelError`."""
     try:
         value = work.density(**{name: known[name] for name in work.used_arguments})
     except ModelError:
