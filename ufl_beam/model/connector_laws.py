@@ -117,7 +117,7 @@ class Controller(Record):
     sample: Annotated[float | None, partial(require_number, positive=True)] = None
 
     def evaluate(self, simulation: Running, connector: object) -> float:
-        """Return the force until the next evaluation; all processes call this together; N or N m."""
+        """Return the force until the next evaluation, N or N m; all processes call this"""
         at = f"t = {simulation.t:.9g} s"
         return require_returned(
             self.force(simulation), f"{connector}: the controller", at, finite=True
