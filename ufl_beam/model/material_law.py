@@ -40,7 +40,7 @@ class MaterialLaw(ABC):
     read the elastic stiffness at the point from ``self.C``: EA, GA or EI of a resultant in a
     :class:`Section`, Young's modulus of a fibre, or the stiffness of a :class:`Spring`.  A law with
     internal variables defines either :meth:`increments` or :meth:`residuals`.  Energies are per
-    volume for fibres, per length for resultants, and total for springs.
+    volume for fibres, per length for resultants, total for springs.  See docs/extending_laws.md.
 
     Attributes:
         variables: Initial values of the internal variables, by name.
@@ -72,7 +72,7 @@ class MaterialLaw(ABC):
 
     @abstractmethod
     def stress(self, strain: Values, state: State) -> Values:
-        """Return the stress, whose derivative by the strain is ``C`` unless elasticity is nonlinear."""
+        """Return the stress; its derivative by the strain is ``C`` if elasticity is linear."""
 
     @abstractmethod
     def elastic_energy(self, strain: Values, state: State) -> Values:
@@ -161,7 +161,7 @@ class MaterialLaw(ABC):
         return tuple(values) if self.resultants else (values,)
 
     def as_argument(self, values: tuple[Values, ...]) -> Values:
-        """Return strains or stiffnesses as an argument of the methods: a tuple, or a single value."""
+        """Return strains or stiffnesses as an argument of methods: a tuple, or a single value."""
         return values if self.resultants else values[0]
 
 
