@@ -139,7 +139,7 @@ class Beam(Record, Member):
 
     @property
     def hinge_laws(self) -> dict[Place, HingeLaw]:
-        """Laws of possible hinges of zero length, by place; :func:`plastic_hinges` selects."""
+        """Laws of possible plastic hinges of zero length by place, see :func:`plastic_hinges`."""
         laws: dict[float, HingeLaw | None] = dict.fromkeys((0.0, 1.0), self.section.hinge)
         laws |= {float(s): law for s, law in self.hinges.items()}
         return {self.at(s): law for s, law in laws.items() if law is not None}
@@ -247,7 +247,7 @@ class Mesh:
 
     @cached_property
     def fractions(self) -> Array:
-        """Fraction of the mass, or of a uniform load, of a cell at each node; (p+1,)."""
+        """Fractions of a cell's mass or uniform load at the nodes of the cell; (p+1,)."""
         p = self.degree
         at = np.polynomial.legendre.Legendre.basis(p)(2 * self.nodes - 1)
         return np.asarray(1 / (p * (p + 1) * at**2))
@@ -271,7 +271,7 @@ class Mesh:
         """Return the parameters of the vertices of a beam with ``attached`` places, ascending.
 
         Raises:
-            ModelError: ``refine`` gives a fraction of a cell between places, or too many cells.
+            ModelError: The number of cells between two places is not whole, or is too large.
         """
         vertices = beam.vertices(attached)
         if self.refine == 1:

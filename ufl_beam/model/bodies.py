@@ -229,14 +229,14 @@ NodeDof = tuple[Node, int]
 
 
 class Representatives(dict[NodeDof, NodeDof]):
-    """Map from degrees of freedom to representatives of equal ones; by default to themselves."""
+    """Representatives of groups of equal degrees of freedom; others represent themselves."""
 
     def __missing__(self, dof: NodeDof) -> NodeDof:
         return dof
 
 
 def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
-    """Return representatives; groups with a common degree of freedom have the same one."""
+    """Return one representative for all degrees of freedom that ``groups`` make equal."""
     # Each node is hashed once and gets a number, because hashing takes most of the time.
     number: dict[Node, int] = {}
     dofs: dict[int, NodeDof] = {}

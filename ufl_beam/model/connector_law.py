@@ -27,7 +27,7 @@ from ufl_beam.model.material_law import (
 from ufl_beam.model.records import Record, parameters_by_name
 
 LOSSES = ("damping", "friction", "functions", "connectors", "contact")
-"""Entries of the energy ledger, used by the package, to which a user's law may add losses."""
+"""Entries of the package in the energy ledger to which a user's law may add its losses."""
 
 CONTRIBUTIONS = (
     *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
@@ -105,7 +105,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
         return 0.0 if self.components == 1 else self.components * (0.0,)
 
     def limit(self, state: State) -> Values:
-        """Return the largest force of the constraint that holds the motion; N or N m.
+        """Return the largest constraint force that holds the motion, zero by default; N or N m.
 
         Args:
             state: Internal variables at the beginning of the step.
@@ -147,7 +147,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
         return type(self).energy is not ConnectorLaw.energy
 
     def parameters(self) -> dict[str, Any]:
-        """Return the fields of the law by name, which are its parameters."""
+        """Return the parameters of the law, its fields, by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
     def with_parameters(self, parameters: Mapping[str, Values]) -> ConnectorLaw:

@@ -117,7 +117,7 @@ class Controller(Record):
     sample: Annotated[float | None, partial(require_number, positive=True)] = None
 
     def evaluate(self, simulation: Running, connector: object) -> float:
-        """Return the force until the next evaluation, N or N m; all processes call this"""
+        """Return the force until the next evaluation; N or N m; all processes must call this."""
         at = f"t = {simulation.t:.9g} s"
         return require_returned(
             self.force(simulation), f"{connector}: the controller", at, finite=True
@@ -427,7 +427,7 @@ def require_hinge_law(law: object, what: str) -> None:
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class RigidPlastic(Record):
-    """Rigid-plastic law: no motion below a limit of the force, plastic flow or softening at it.
+    """Rigid-plastic law: no motion below a limit force, plastic flow or softening at the limit.
 
     Below the limit a constraint holds the motion, without elasticity.  No other constraint may hold
     the same motion, see docs/warnings.md.  Plastic hinges of beams, ``Beam(hinges={s: law})``,

@@ -54,7 +54,7 @@ class Connector(Record, ABC):
         a, b: The places.
         law: Law of the force.
         axis: Unit vector, for motions along an axis.
-        corner: Point, fixed to the node of ``a``, from which ``b`` moves; by default place ``a``.
+        corner: Point, fixed to the node of ``a``, to which the motion of ``b`` refers, or None.
         component: Index of the motion in the law of a :class:`Bushing`, otherwise 0.
         components: Connectors of the components of a :class:`Bushing`, otherwise empty.
 
@@ -126,7 +126,7 @@ class Connector(Record, ABC):
         return self.motion == "sliding"
 
     def rigidly(self) -> tuple[Factors, Factors]:
-        """Return the factors of the nodes of a and b for the motion, in the undeformed scene."""
+        """Return the factors for the nodes of a and b, in the undeformed scene."""
         if self.is_rotation:
             return (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)
         (dx, dy), length = self.apart, math.hypot(*self.apart)
@@ -285,7 +285,7 @@ UNIT_TOLERANCE = 4 * sys.float_info.epsilon
 
 
 def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: str) -> Point:
-    """Return the unit vector along ``axis``, by default from ``a`` to ``b``; raise if zero."""
+    """Return the unit vector along ``axis``, by default along the line from ``a`` to ``b``."""
     (ax, ay), (bx, by) = a.point, b.point
     x, y = (bx - ax, by - ay) if axis is None else require_vector(axis, f"{kind}: axis")
     length = math.hypot(x, y)
@@ -321,9 +321,9 @@ def plastic_hinges(
 
     Possible hinges are ``Beam(hinges=)``, and ``Section(hinge=)`` at both ends of a beam.  A hinge
     at an end is left out if the end bears no moment, or only the moment of a load: that load acts
-    on the beam, because nothing beyond the hinge could bear it.  If two beams meet in a joint that
-    nothing else loads or supports by a moment, both bear the same moment.  Then only the weaker
-    beam has a hinge, because a hinge of the stronger beam would never open.
+    on the beam, because nothing beyond the hinge could bear it.  If a joint only transmits
+    a moment between two beams, both bear the same moment.  Then only the weaker beam has a hinge,
+    because a hinge of the stronger beam would never open.
     """
     laws = {place: law for place, law in may_have.items() if law.opens}
     if not laws:

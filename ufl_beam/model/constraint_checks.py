@@ -158,7 +158,7 @@ def _supports_and_joints_at(scene: Scene, rows: Iterable[Row]) -> Iterator[objec
 
 
 def friction_repeats(scene: Scene) -> bool:
-    """Return whether constraints are linearly dependent while friction sticks."""
+    """Return whether sticking friction makes constraints linearly dependent."""
     friction = any(rubs(connector.law) for connector in scene.all_connectors)
     return friction and _dependences(scene, friction=True)[1].shape[1] > 0
 
@@ -369,7 +369,7 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
 
 
 class Rated(Protocol):
-    """Properties of a time scheme on which the admitted scenes depend."""
+    """Properties of a time scheme that :func:`require_rates` reads."""
 
     has_mean_velocity: bool
     rings: bool

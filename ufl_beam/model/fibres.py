@@ -44,7 +44,7 @@ class SectionPoints:
     strains: Values  # derivatives of strains of points with respect to (Σ, Γ, K); (n, 3)
     weights: Values  # areas of fibres, or 1 for resultants; (n,), (1,) with interaction
     stiffness: Values  # elastic stiffness, also of each interacting resultant; (n,)
-    laws: tuple[tuple[MaterialLaw, int], ...]  # laws with numbers of successive points
+    laws: tuple[tuple[MaterialLaw, int], ...]  # (law, number of successive points)
     rest: Values  # EA, GA, EI of resultants that have no points, otherwise 0; (3,)
     softening: SofteningLaw | None  # law of hinge or cracks, if points can break
     breaking: slice  # points that can break

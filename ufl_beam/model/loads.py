@@ -198,7 +198,7 @@ class Rayleigh(Record):
     """Rayleigh damping (a0 M + a1 K) v with the stiffness K of the undeformed scene, P(92).
 
     The damping ratio of a mode of circular frequency ω is a0/(2ω) + a1 ω/2.  This damping is not
-    objective: it acts on rigid rotations and open hinges.  For large motions: :class:`KelvinVoigt`.
+    objective: it acts on rigid rotations and open hinges.  In large motion use KelvinVoigt.
 
     Args:
         mass: Factor a0 on the mass matrix; 1/s.
@@ -228,7 +228,7 @@ class Rayleigh(Record):
 @closed("state other damping as a VirtualWork of v")
 @dataclass(frozen=True, eq=False)
 class KelvinVoigt(Record):
-    """Kelvin-Voigt damping: resultants retardation_time C times the strain rates, C elastic.
+    """Kelvin-Voigt damping: retardation time times elastic stiffness times strain rates.
 
     The damping is objective: rigid motions are not damped.  In small vibration, the damping ratio
     of a mode of circular frequency ω is retardation_time ω/2, as with

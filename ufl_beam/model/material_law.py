@@ -195,7 +195,7 @@ def initial_state(law: Any) -> State:
 
 
 def require_law(law: object, what: str, interaction: bool = False) -> None:
-    """Raise :class:`ModelError` unless a law is complete; calls the methods at zero strain.
+    """Raise :class:`ModelError` unless a law is complete, by calls at zero strain.
 
     With ``interaction`` the law must couple resultants, otherwise it must have one stress.
     """
@@ -277,7 +277,7 @@ EVOLUTION_METHODS = ("increments", "residuals")
 
 
 def traced(law: object) -> AbstractContextManager[None]:
-    """Return a context in which errors of a law, called with UFL symbols, are ModelErrors."""
+    """Return a context that turns errors of a law, called with UFL symbols, into ModelErrors."""
     return calling(f"{type(law).__name__}: it cannot be called with symbols of UFL", WRITTEN)
 
 

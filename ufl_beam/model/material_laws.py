@@ -44,7 +44,7 @@ class Perzyna(Record):
 
     Args:
         eta: Overstress per plastic strain rate; Pa s for fibres, N s and N m² s for resultants.
-            A zero makes the law rate-independent, infinity makes the law elastic.
+            Zero makes the law rate-independent, infinity makes the law elastic.
 
     Example:
         >>> law = ub.ElastoPlastic(250e6, isotropic=2e9, viscosity=ub.Perzyna(eta=1e6))  # Pa, Pa s
@@ -66,7 +66,7 @@ class DuvautLions(Record):
     It equals :class:`Perzyna` with ``eta = tau (C + isotropic + kinematic)``.
 
     Args:
-        tau: Relaxation time; s.  A zero makes the law rate-independent, infinity elastic.
+        tau: Relaxation time; s.  Zero makes the law rate-independent, infinity elastic.
 
     Example:
         >>> law = ub.ElastoPlastic(  # Pa, s
@@ -138,7 +138,7 @@ class ElastoPlastic(_Plastic):
     viscosity: Annotated[Any, partial(require_kind, kind=(Perzyna, DuvautLions))] = Perzyna(0.0)
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "accumulated": 0.0}
     fracture_energy: ClassVar[float] = math.inf  # as in a SofteningLaw that never breaks
-    steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # as in a SofteningLaw, but no fall
+    steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # as in a SofteningLaw; no decrease
 
     def parameters(self, C: Values) -> dict[str, Any]:
         """Return the fields, with the viscosity as overstress per rate of plastic strain."""
@@ -393,7 +393,7 @@ class AxialBending(Record, MaterialLaw):
         """Return the residuals of both plastic strains, and of the yield condition.
 
         A negative flow could lead to a second solution, on the opposite side of the surface.
-        Therefore it changes no plastic strain but increases the residual of the yield condition.
+        A negative flow therefore changes no plastic strain but increases the last residual.
         """
         (N, M), (EA, EI) = self.stress(strain, new), self.C
         w, m, flow = self.rounding, M / self.bending, new.flow - old.flow

@@ -59,7 +59,7 @@ class Record:
     """
 
     _refused: ClassVar[type[ArgumentError]] = ModelError
-    """Class of errors of fields; ArgumentError in records that are not part of a model."""
+    """Class of the error for a wrong field; ArgumentError in records outside a model."""
 
     def __repr__(self) -> str:
         return compact_repr(self)  # for dataclasses with ``repr=False``
@@ -103,7 +103,7 @@ def _checks(record: type[Any]) -> list[tuple[str, str, object, Callable[..., obj
 NO_MEMBERS = {object, ABC, Protocol, Generic}
 
 _satisfied: WeakKeyDictionary[type, set[type]] = WeakKeyDictionary()
-"""Protocols that each class satisfies; a cache, as a check of signatures takes a millisecond."""
+"""Protocols that each class satisfies; cached, because a check takes a millisecond."""
 
 
 def parameters_by_name(

@@ -280,7 +280,7 @@ def _below_in_circle(y: Array, d: float) -> Array:
     """Return the area up to y and its first moment, each up to a constant; (2, n); m², m³."""
     r = d / 2
     y = np.clip(y, -r, r)
-    half_chord = np.sqrt((r - y) * (r + y))  # no negative round-off
+    half_chord = np.sqrt((r - y) * (r + y))  # this product is never negative
     area = y * half_chord + (r**2 * np.arcsin(y / r) if r else 0.0)
     return np.array([area, -2 / 3 * half_chord**3])
 

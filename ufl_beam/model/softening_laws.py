@@ -30,7 +30,7 @@ For an exponential traction the relative error of the mean is below 1e-12 in a s
 """
 
 SMALL_GROWTH = 1e-4
-"""Growth of an opening above which mean tractions are differences of energies; energy/limit.
+"""Growth above which mean tractions are differences of energies, as a multiple of energy/limit.
 
 At this growth the difference loses four digits.  For a smaller growth quadrature is exact to
 round-off, or to 1e-10 of the energy if the step contains a kink.
@@ -156,7 +156,7 @@ class _LimitAndEnergy(Record, SofteningLaw):
 
     @property
     def steepest(self) -> tuple[float, float]:
-        """Upper bound of the steepest decrease, limit²/energy, and the opening zero."""
+        """Upper bound of the decrease per opening, and zero as an opening with this decrease."""
         return self.limit * (self.limit / self.fracture_energy), 0.0
 
 

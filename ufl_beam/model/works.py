@@ -132,7 +132,7 @@ class VirtualWork(Work):
             ``Mesh(degree=1)``.  Each further degree of the mesh adds two.
 
     Raises:
-        ModelError: The name is taken, or, in a run, the function is not a UFL scalar linear in w.
+        ModelError: The name is taken.  In a run, the function returns no UFL scalar linear in w.
 
     Example:
         >>> def drag(v, w, c):
@@ -165,7 +165,7 @@ class Potential(Work):
     It has the arguments of :class:`VirtualWork`.
 
     Raises:
-        ModelError: The name is taken, or, in a run, the function is not a UFL scalar that uses q.
+        ModelError: The name is taken.  In a run, the function returns no UFL scalar with q.
 
     Example:
         >>> soil = ub.Potential("soil", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": 1e6})  # N/m²
