@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Records of a model: beams, bodies, sections, laws, joints, supports, loads, scenes."""
+"""Dataclasses of a model: beams, bodies, sections, laws, joints, supports, loads, scenes."""

@@ -41,20 +41,20 @@ class Beam(Record, Member):
         start: First end; m.
         end: Last end; m.
         section: Cross-section of the beam.
-        cells: Number of cells, equal intervals of the parameter ``s``.  Attachment points, corners
-            and hinges become vertices too, and divide the cells in which they lie.
+        cells: Number of cells, which are equal intervals of the parameter ``s``.  Attachment
+            points, corners and hinges are further vertices, which divide cells.
         name: Name in messages and pictures.
         curve: Axis ``s -> (x, y)`` from ``s = 0`` at the start to ``s = 1`` at the end; m.
         corners: Parameters ``s`` of the corners of the curve.
-        hinges: Plastic hinges of zero length, by their parameter ``s``, which becomes a vertex:
-            ``{0.0: Softening(limit, fracture_energy)}``.  The law is a :class:`SofteningLaw` or
+        hinges: Laws of plastic hinges of zero length, by the parameter ``s`` of each hinge, such as
+            ``{0.0: Softening(limit, fracture_energy)}``.  A law is a :class:`SofteningLaw` or
             :class:`ElastoPlastic` (limit in N m, moduli in N m/rad, ``eta`` in N m s).  A hinge is
-            rigid until the moment at ``s`` reaches its limit.  A hinge at an end replaces the hinge
-            of the section there; ``None`` instead of a law removes the hinge of the section.
+            rigid until its moment reaches the limit of the law.  At an end of the beam, the law
+            replaces ``Section(hinge=)``, and ``None`` removes the hinge of the section.
 
     Raises:
         ModelError: Zero length, ``cells < 1``, coordinates that are not finite, corners or hinges
-            outside the beam, hinges in a section of fibres, or a curve that misses an end.
+            outside the beam, hinges with a section of fibres, or a curve that misses an end.
 
     Example:
         >>> column = ub.Beam((0, 0), (0, 3), section, cells=6, name="column")
@@ -113,7 +113,7 @@ class Beam(Record, Member):
             )
 
     def _require_hinges(self) -> None:
-        """Raise :class:`ModelError` if hinges lack a law, coincide, or lie in a beam of fibres."""
+        """Raise :class:`ModelError` unless places and laws of the hinges suit the beam."""
         for s, law in self.hinges.items():
             require_number(s, f"{self.name}: hinge at")
             if not 0.0 <= s <= 1.0:
@@ -139,7 +139,7 @@ class Beam(Record, Member):
 
     @property
     def hinge_laws(self) -> dict[Place, HingeLaw]:
-        """Laws of all plastic hinges of zero length that the beam may have, by place."""
+        """Laws of possible plastic hinges of zero length by place, see :func:`plastic_hinges`."""
         laws: dict[float, HingeLaw | None] = dict.fromkeys((0.0, 1.0), self.section.hinge)
         laws |= {float(s): law for s, law in self.hinges.items()}
         return {self.at(s): law for s, law in laws.items() if law is not None}
@@ -149,7 +149,7 @@ class Beam(Record, Member):
         cls, center: Point, radius: float, angles: tuple[float, float], section: Section, *,
         cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
     ) -> Beam:  # fmt: skip
-        """Create a circular arc between two ``angles`` (rad, counter-clockwise from x)."""
+        """Create a circular arc (m) between two ``angles`` (rad, counter-clockwise from x)."""
         middle = require_vector(center, f"{name}: center")
         require_number(radius, f"{name}: radius", positive=True)
         first, last = require_vector(angles, f"{name}: angles")
@@ -164,7 +164,7 @@ class Beam(Record, Member):
         cls, points: Sequence[Point], section: Section, *,
         cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
     ) -> Beam:  # fmt: skip
-        """Create a beam of straight pieces; ``s`` is the fraction of the length from the start."""
+        """Create a beam of straight pieces through points (m); ``s`` is the fraction of length."""
         points = require_sequence(points, f"{name}: points")
         xy = [require_vector(p, f"{name}: point {i}") for i, p in enumerate(points)]
         if len(xy) < 2:
@@ -185,7 +185,7 @@ class Beam(Record, Member):
         cls, curve: Curve, section: Section, *,
         cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
     ) -> Beam:  # fmt: skip
-        """Create a beam along any curve ``s -> (x, y)``, with ``s`` from 0 to 1; m."""
+        """Create a beam along any curve ``s -> (x, y)`` (m), with ``s`` from 0 to 1."""
         a, b = (curve_point(curve, s, f"{name}: curve") for s in (0.0, 1.0))
         return cls(a, b, section, cells=cells, name=name, curve=curve, hinges=hinges)
 
@@ -198,15 +198,15 @@ class Mesh:
     """Discretization of a scene: number of cells, polynomial degree, lumped mass.
 
     Args:
-        refine: Factor on the number of cells between any two places of a beam: 3 divides each cell
-            into three, ``Fraction(1, 2)`` merges two cells into one.
+        refine: Factor on the number of cells: 3 divides each cell into three, ``Fraction(1, 2)``
+            merges two cells into one.  Corners, attachment points and hinges stay vertices.
         degree: Polynomial degree p of displacements and rotations in a cell: 1, 2 or 3.  A cell
             has p integration points.  Degrees 2 and 3 are for elastic beams only.
-        lumped: Use a lumped mass matrix of the beams: diagonal, with the row sums of the
-            consistent matrix.
+        lumped: True for a lumped mass matrix of the beams: a diagonal matrix with the row sums of
+            the consistent matrix.
 
     Raises:
-        ModelError: A number is out of range.
+        ModelError: An argument has a wrong type or is out of range.
 
     Example:
         >>> fine = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=4))
@@ -236,18 +236,18 @@ class Mesh:
 
     @cached_property
     def nodes(self) -> Array:
-        """Coordinates of the nodes in a cell, from 0 to 1, ascending: Gauss-Lobatto points."""
+        """Gauss-Lobatto points, the nodes of a cell, ascending from 0 to 1; (p+1,)."""
         inner = np.polynomial.legendre.Legendre.basis(self.degree).deriv().roots()
         return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
 
     @property
     def point_weights(self) -> Array:
-        """Weights of the Gauss points of a cell; their sum is 1."""
+        """Weights of the Gauss points of a cell, with the sum 1; (p,)."""
         return np.asarray(np.polynomial.legendre.leggauss(self.degree)[1] / 2)
 
     @cached_property
     def fractions(self) -> Array:
-        """Fractions of the mass of a cell, or of a uniform load on it, at its nodes."""
+        """Fractions of a cell's mass or uniform load at the nodes of the cell; (p+1,)."""
         p = self.degree
         at = np.polynomial.legendre.Legendre.basis(p)(2 * self.nodes - 1)
         return np.asarray(1 / (p * (p + 1) * at**2))
@@ -268,10 +268,10 @@ class Mesh:
         return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)))
 
     def vertices(self, beam: Member, attached: Sequence[float]) -> list[float]:
-        """Return the parameters of the vertices of a beam, also of corners and ``attached`` places.
+        """Return the parameters of the vertices of a beam with ``attached`` places, ascending.
 
         Raises:
-            ModelError: ``refine`` gives no whole number of cells between two of these places.
+            ModelError: The number of cells between two places is not whole, or is too large.
         """
         vertices = beam.vertices(attached)
         if self.refine == 1:

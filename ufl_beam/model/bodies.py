@@ -26,11 +26,11 @@ from ufl_beam.model.functions import Curve, Point, tangent_within
 from ufl_beam.model.records import NotNegative, Number, Record, Text, Vector
 
 TOGETHER = 1e-9
-"""Largest distance of two places of a beam that coincide, as a fraction of a cell."""
+"""Largest distance at which two places of a beam coincide, as a fraction of a cell."""
 
 
 class Member(ABC):
-    """Base of :class:`Beam`: an axis with places on it, and the attributes of a beam."""
+    """Base of :class:`Beam`: the attributes of a beam, and the places on its axis."""
 
     called: ClassVar[str] = "Beam"  # name of the class in messages
     name: str
@@ -58,7 +58,7 @@ class Member(ABC):
         return Place(self, 1.0)
 
     def vertices(self, attached: Sequence[float]) -> list[float]:
-        """Return the parameters of all vertices: of equal cells, corners and ``attached`` places.
+        """Return the parameters of all vertices: ends of equal cells, corners, ``attached`` places.
 
         A place within :data:`TOGETHER` of another vertex adds no vertex.
         """
@@ -74,7 +74,7 @@ class Member(ABC):
 
 
 Beams = Annotated[Sequence[Member] | None, partial(require_all, kind=Member)]
-"""Field of a record with some beams; the default is all beams of the scene."""
+"""Type of a field with beams; None stands for all beams of the scene."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,22 +222,22 @@ AttachmentPoint = Place | Spot
 """Attachment point of a joint, support, load, mass or connector."""
 
 Node = Place | Body
-"""Place of a beam, or a body: it has a displacement and a rotation."""
+"""Place of a beam, or a body; each has a displacement and a rotation."""
 
 NodeDof = tuple[Node, int]
 """Degree of freedom of a node: components 0 and 1 are the displacement, 2 is the rotation."""
 
 
 class Representatives(dict[NodeDof, NodeDof]):
-    """Representative of each degree of freedom that equals another; others represent themselves."""
+    """Representatives of groups of equal degrees of freedom; others represent themselves."""
 
     def __missing__(self, dof: NodeDof) -> NodeDof:
         return dof
 
 
 def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
-    """Return the representatives of degrees of freedom, given groups of equal ones."""
-    # Nodes are numbered, because to hash them again would take longer than all the rest.
+    """Return one representative for all degrees of freedom that ``groups`` make equal."""
+    # Each node is hashed once and gets a number, because hashing takes most of the time.
     number: dict[Node, int] = {}
     dofs: dict[int, NodeDof] = {}
     parent: dict[int, int] = {}
@@ -260,14 +260,14 @@ def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
 
 
 def node(place: AttachmentPoint) -> Node:
-    """Return the cross-section of a beam, or the body, to which a place is fixed."""
+    """Return the node of an attachment point: the place itself on a beam, otherwise the body."""
     return place.body if isinstance(place, Spot) else place
 
 
 def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
     """Return the vector from the node of a place to a point, by default the place itself; m.
 
-    It is zero for points of the ground, which do not move.
+    The vector is zero for points of the ground, which do not move.
     """
     if node(place) is GROUND:
         return 0.0, 0.0
@@ -277,12 +277,12 @@ def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
 
 
 def carries(place: AttachmentPoint) -> bool:
-    """Return whether a place and its node have the same displacement."""
+    """Return whether a place always has the displacement of its node."""
     return isinstance(place, Place) or math.hypot(*arm(place)) == 0.0
 
 
 def require_place(place: Any, what: str) -> None:
-    """Raise :class:`ModelError` naming ``what`` unless ``place`` is an attachment point."""
+    """Raise :class:`ModelError` unless ``place`` is an attachment point."""
     if not isinstance(place, Place | Spot):
         raise ModelError(
             f"{what} = {shorten(place)} is not a place; use beam.start, .end or .at(s), "
@@ -303,10 +303,10 @@ def require_node(place: Any, what: str) -> None:
 
 
 PlaceField = Annotated[AttachmentPoint, require_place]
-"""Field of a record for a place."""
+"""Type of a field with an attachment point."""
 
 NodeField = Annotated[AttachmentPoint, require_node]
-"""Field of a record for a place that has a node: on a beam, or the centre of a moving body."""
+"""Type of a field with a place on a beam, or with the centre of a moving body."""
 
 
 # -- point masses, initial velocities -----------------------------------------------------------
@@ -317,7 +317,7 @@ class PointMass(Record):
     """Point mass, with rotary inertia, fixed to a place.
 
     Args:
-        place: Place to which the mass is fixed.
+        place: Place to which the mass is fixed: on a beam, or the centre of a body.
         mass: Mass; kg.
         inertia: Rotary inertia about the place; kg m².
 

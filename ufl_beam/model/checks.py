@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checks of arguments that raise :class:`ModelError`."""
+"""Checks of arguments; each check raises :class:`ModelError` for a wrong argument."""
 
 from __future__ import annotations
 

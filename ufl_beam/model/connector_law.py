@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Connector laws of users: energy, resistance and internal variables, or functions."""
+"""Connector laws of users: classes with energy and resistance, or Python functions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from ufl_beam.model.material_law import (
 from ufl_beam.model.records import Record, parameters_by_name
 
 LOSSES = ("damping", "friction", "functions", "connectors", "contact")
-"""Entries of the energy ledger to which a connector law may add its losses."""
+"""Entries of the package in the energy ledger to which a user's law may add its losses."""
 
 CONTRIBUTIONS = (
     *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
@@ -36,24 +36,24 @@ CONTRIBUTIONS = (
 """Names of all entries of the energy ledger that the package uses."""
 
 IMAGINARY = 1e-30
-"""Size of a complex step; the derivative that it gives has no cancellation."""
+"""Imaginary increment of complex-step derivatives, which do not suffer from cancellation."""
 
 
 class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be defined
     """Base of connector laws; a user's law is a frozen dataclass derived from it.
 
-    The fields of the dataclass are the parameters of the law.  Its methods use the functions of
-    ``ub.law_functions``.  A law states an energy, a resistance, or both: the force that resists
-    growth of the motion is the derivative of the energy with respect to the motion, plus the
-    resistance.  Work that is not stored is lost.  A friction law states a limit instead, and
-    perhaps a sliding force: a constraint holds the motion until the constraint force exceeds the
-    limit, and again when the motion comes to rest.  See docs/extending_laws.md.
+    The fields of the dataclass are the parameters of the law.  The methods use the functions of
+    ``ub.law_functions``.  A law defines an energy, a resistance, or both.  The force is the
+    derivative of the energy with respect to the motion, plus the resistance.  A positive force
+    resists growth of the motion.  Work that is not stored is lost.  A friction law defines a limit
+    instead, and optionally a sliding force: a constraint holds the motion until the constraint
+    force exceeds the limit.  Then the motion slides until it stops.  See docs/extending_laws.md.
 
     Attributes:
-        variables: Internal variables, and their initial values.
-        components: Number of motions on which the law acts.  A law for :class:`Bushing` has 2 or 3;
-            its methods get tuples of motions and rates, and its resistance is a tuple.
-        entry: Entry of the ledger, in ``lost``, for work that is not stored.
+        variables: Initial values of the internal variables, by name.
+        components: Number of relative motions, by default 1.  A law for :class:`Bushing` has 2 or
+            3; motions and rates are then tuples, and the resistance must be a tuple.
+        entry: Name of the entry in ``energy.lost`` for work that is not stored.
         active: True if the law may supply energy, as a drive does.  Otherwise runs warn if the
             lost energy decreases.
 
@@ -86,26 +86,26 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
         """Return the recoverable energy, zero by default; J.
 
         Args:
-            motion: Motion; a tuple for several components; m or rad.
+            motion: Relative motion, or a tuple of several components; m or rad.
             state: Internal variables, as attributes.
         """
         return 0.0
 
     def resistance(self, motion: Any, rate: Any, state: State, dt: Values) -> Any:
-        """Return the force in addition to the derivative of the energy; N or N m.
+        """Return the force besides the derivative of the energy, zero by default; N or N m.
 
-        It is zero by default, and a tuple for several components.
+        A law with several components returns a tuple.
 
         Args:
-            motion: Motion at the time of the step at which the law holds; m or rad.
+            motion: Motion at the instant of the step at which the law is evaluated; m or rad.
             rate: Mean rate of the step; m/s or rad/s.
-            state: Internal variables at the time of the motion.
-            dt: Length of the step, infinite on a path; s.
+            state: Internal variables at this instant, as attributes.
+            dt: Length of the step, infinite in ``follow``; s.
         """
         return 0.0 if self.components == 1 else self.components * (0.0,)
 
     def limit(self, state: State) -> Values:
-        """Return the force up to which a constraint holds the motion, zero by default; N or N m.
+        """Return the largest constraint force that holds the motion, zero by default; N or N m.
 
         Args:
             state: Internal variables at the beginning of the step.
@@ -113,9 +113,9 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
         return 0.0
 
     def sliding(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
-        """Return the size of the force against sliding, the limit by default; N or N m.
+        """Return the magnitude of the force against sliding, the limit by default; N or N m.
 
-        It has the arguments of :meth:`resistance`.
+        The arguments are the same as for :meth:`resistance`.
         """
         return self.limit(state)
 
@@ -125,14 +125,14 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
         Args:
             motion: Motion at the end of the step; m or rad.
             rate: Mean rate of the step; m/s or rad/s.
-            state: Variables at the beginning of the step.
-            dt: Length of the step, infinite on a path; s.
+            state: Variables at the beginning of the step, as attributes.
+            dt: Length of the step, infinite in ``follow``; s.
         """
         return {}
 
     @property
     def holds(self) -> bool:
-        """True if a constraint holds the motion below a limit."""
+        """True if the law has a limit, below which a constraint holds the motion."""
         return type(self).limit is not ConnectorLaw.limit
 
     @property
@@ -143,11 +143,11 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
 
     @property
     def resists(self) -> bool:
-        """True if the law resists every motion, as a spring does."""
+        """True if the law has an energy, so that it resists every motion as a spring does."""
         return type(self).energy is not ConnectorLaw.energy
 
     def parameters(self) -> dict[str, Any]:
-        """Return the parameters of the law, which are its fields, by name."""
+        """Return the parameters of the law, its fields, by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
     def with_parameters(self, parameters: Mapping[str, Values]) -> ConnectorLaw:
@@ -157,11 +157,11 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
         return law
 
     def as_argument(self, motions: Sequence[Values]) -> Any:
-        """Return motions as the methods expect them: one motion, or a tuple of several."""
+        """Return motions as the argument of the methods: the only motion, or a tuple of several."""
         return motions[0] if self.components == 1 else tuple(motions)
 
     def each(self, forces: Any) -> tuple[Values, ...]:
-        """Return the forces of the law as a tuple, also for one component."""
+        """Return the result of :meth:`resistance` as a tuple, also for one component."""
         return (forces,) if self.components == 1 else tuple(forces)
 
     def elastic_forces(self, motions: Sequence[Values], state: State) -> list[Values]:
@@ -181,7 +181,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
 def require_connector_law(law: ConnectorLaw, what: str) -> None:
     """Raise :class:`ModelError` unless a connector law is complete.
 
-    Its methods are called at zero motion here, and compiled when a run begins.
+    This function calls the methods of the law at zero motion.  A run compiles them.
     """
     what = f"{what}: {type(law).__name__}"
     require_fields(law, ConnectorLaw, what)
@@ -247,7 +247,7 @@ CALLED = ("energy", "limit", "resistance", "sliding", "increments")
 
 
 def require_limit(law: ConnectorLaw, what: str) -> None:
-    """Raise :class:`ModelError` unless the increments of a law are finite for an infinite step."""
+    """Raise :class:`ModelError` unless the increments of a law are finite for ``dt = inf``."""
     motion, rest = (law.as_argument([np.full(1, x)] * law.components) for x in (0.5, 0.0))
     with np.errstate(all="ignore"):
         changes = law.increments(motion, rest, initial_state(law), np.inf) if law.variables else {}
@@ -262,7 +262,7 @@ def require_limit(law: ConnectorLaw, what: str) -> None:
 
 
 def source_location(law: object) -> str:
-    """Return " (file, line n)" of the class of a law; empty if they are unknown."""
+    """Return " (file, line n)" of the class of a law, or an empty text if it is unknown."""
     try:
         file, (_, line) = inspect.getsourcefile(type(law)), inspect.getsourcelines(type(law))
     except (OSError, TypeError):
@@ -271,9 +271,9 @@ def source_location(law: object) -> str:
 
 
 def judges_loss(law: ConnectorLaw) -> bool:
-    """Return whether a loss that decreases is a fault of the law, for steps of any length.
+    """Return whether the loss of a law must not decrease in a run, for steps of any length.
 
-    The loss of a law with variables has an integration error, unless its energy is quadratic.  An
+    With internal variables the loss has an integration error, unless the energy is quadratic.  An
     active law may supply energy.
     """
     return not law.active and (not law.variables or quadratic(law, law.components, law.energy))
@@ -288,16 +288,16 @@ class ForceLaw(Record):
     """Force of a connector as a function of motion, rate, time and internal variables.
 
     Args:
-        force: ``force(motion, rate)``; N or N m; a positive force resists growth of the motion.  It
-            is evaluated when loads act: in dynamics with energy-momentum schemes in the middle of a
-            step, with :class:`EnergyMomentumStatic` at its fraction ``theta``, otherwise at its
-            end.  It may have the parameters ``t``, this time (s), ``dt``, the length of the step
-            (s), and ``state``, the internal variables before the step.  With ``state`` it returns
-            the force and the new variables.
-        state: Internal variables before the run.
-        stored: ``stored(motion)``, or ``stored(motion, state)``, the recoverable energy; J.  This
-            energy is in the entry "stored" of the ledger, and the rest of the work on the law in
-            the entry "functions".  By default all work is in "functions".
+        force: ``force(motion, rate)``; N or N m; a positive force resists growth of the motion.
+            Dynamic energy-momentum schemes evaluate the function in the middle of a step,
+            :class:`EnergyMomentumStatic` at the fraction ``theta`` of a step, other schemes at the
+            end.  Optional parameters are ``t``, the time of evaluation (s), ``dt``, the length of
+            the step (s), and ``state``, the internal variables before the step.  A function with
+            ``state`` returns the force and the variables after the step.
+        state: Initial values of the internal variables.
+        stored: ``stored(motion)`` or ``stored(motion, state)``, the recoverable energy; J.  The
+            entry "stored" of the ledger includes this energy.  All other work on the law is in the
+            entry "functions".
 
     Raises:
         ModelError: A function has an unknown parameter, or only one of ``state`` and the parameter

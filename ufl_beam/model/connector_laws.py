@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors: force as a function of a relative motion, prescribed motions or forces."""
+"""Laws of connectors: forces as functions of a relative motion, prescribed motions or forces."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from ufl_beam.model.softening_laws import (
 )
 
 OWN_LAW = "state a ConnectorLaw of your own"
-"""Advice in the error that refuses a subclass of a law."""
+"""Advice in the error that a subclass of a law of the package raises."""
 
 
 @closed(OWN_LAW)
 @dataclass(frozen=True, repr=False)
 class PrescribedMotion(Record):
-    """Prescribed relative motion of a connector; its force is unknown.
+    """Prescribed relative motion of a connector, whose force is an unknown of the run.
 
     Args:
         motion: Motion as a function of time; m or rad.  Joints prescribe zero.
@@ -77,13 +77,13 @@ class Bearing:
 
 
 class Running(Protocol):
-    """Simulation between two steps, as connector laws see it."""
+    """Attributes of a simulation between two steps that laws of connectors need."""
 
     t: float
     """Time; s."""
 
     def press(self, joint: Any) -> float:
-        """Return the magnitude of the force of a joint or support; N."""
+        """Return the magnitude of the force of a joint or support in the last step; N."""
 
 
 @closed(OWN_LAW)
@@ -92,15 +92,15 @@ class Controller(Record):
     """Force computed from the state of a run, constant until the next evaluation.
 
     The force acts during the step, or the sample time, after the state from which it is computed.
-    A force of ``-kd`` times a rate changes its sign at each evaluation and grows, unless
-    ``kd sample < 2 J``; J is the inertia that the force accelerates within a sample time.  At the
-    end of a beam without a body J is nearly zero.  :class:`ForceLaw` has no such delay.
+    Because of this delay, a force of ``-kd`` times a rate changes its sign at each evaluation and
+    grows unless ``kd sample < 2 J``.  J is the inertia that the force accelerates within a sample
+    time, nearly zero at the end of a beam without a body.  A :class:`ForceLaw` has no delay.
 
     Args:
         force: ``force(simulation)``; N or N m; a positive force makes the motion grow.  The
-            function may read the time, motions, velocities and forces of joints of the simulation.
-        sample: Time between evaluations, from the beginning of the run on; s.  Steps end at these
-            times.  By default the force is computed for every step.
+            function may read time, motions, velocities and joint forces of the simulation.
+        sample: Time between evaluations, counted from the beginning of the run; s.  Steps end at
+            each evaluation.  By default the force is computed for every step.
 
     Example:
         >>> brake = ub.Controller(lambda now: -1e4 * now.velocity(beam.end)[1])
@@ -117,7 +117,7 @@ class Controller(Record):
     sample: Annotated[float | None, partial(require_number, positive=True)] = None
 
     def evaluate(self, simulation: Running, connector: object) -> float:
-        """Return the force of a connector in the next steps; all processes call this together."""
+        """Return the force until the next evaluation; N or N m; all processes must call this."""
         at = f"t = {simulation.t:.9g} s"
         return require_returned(
             self.force(simulation), f"{connector}: the controller", at, finite=True
@@ -132,7 +132,7 @@ class Spring(Record):
     Args:
         stiffness: Elastic stiffness; N/m or N m/rad.
         law: Law of yielding; limit in N or N m, moduli in the unit of the stiffness.
-        softening: Law of fracture; energy in J.
+        softening: Law of fracture; limit in N or N m, energy in J.
 
     Raises:
         ModelError: The stiffness is not positive.
@@ -176,9 +176,9 @@ class Damper(Record):
 class Stop(Record, ConnectorLaw):
     """Stop: an elastic or damped contact force while the motion is outside an interval.
 
-    At a depth δ the force is stiffness δ (1 + damping dδ/dt), but never pulls (Hunt and Crossley
-    1975).  A contact begins and ends with zero force.  The lost energy is the entry "contact" of
-    the ledger.
+    At a depth δ the force is stiffness δ (1 + damping dδ/dt), or zero where this is negative (Hunt
+    and Crossley 1975).  A contact begins and ends with zero force.  The lost energy is in the entry
+    "contact" of the ledger.
 
     Args:
         low, high: Ends of the interval; m or rad.
@@ -187,8 +187,8 @@ class Stop(Record, ConnectorLaw):
             with the velocity (1 - 2/3 damping v) v.
 
     Raises:
-        ModelError: The interval does not contain 0 or has no end, the stiffness is not positive, or
-            the damping is negative.
+        ModelError: The interval does not contain 0 or is unbounded, the stiffness is not positive,
+            or the damping is negative.
 
     Example:
         >>> buffer = ub.Slide(ub.ground(2, 0), beam.end, ub.Stop(1e9, low=-0.01), axis=(0, 1))
@@ -215,7 +215,7 @@ class Stop(Record, ConnectorLaw):
         return self.stiffness * (below**2 + above**2) / 2
 
     def resistance(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
-        """Return the damping force; if it pulls, it is at most as large as the elastic force."""
+        """Return the damping force, limited so that the total force does not pull; N or N m."""
         below, above = positive(self.low - motion), positive(motion - self.high)
         above = above * larger(self.damping * rate, -1.0)
         below = below * larger(-self.damping * rate, -1.0)
@@ -241,13 +241,13 @@ class Stop(Record, ConnectorLaw):
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Clearance(Record, ConnectorLaw):
-    """Law of a :class:`Bushing` for a pin in a larger round hole, free up to contact at the edge.
+    """Law of a :class:`Bushing` for a pin in a larger round hole: no force without contact.
 
-    At a depth δ beyond the gap the hole presses on the pin with stiffness δ (1 + damping dδ/dt), as
-    a :class:`Stop`.  Friction acts along the edge, against the motion of the surface of the pin,
-    and turns the pin.  A sticking contact deflects elastically, with the contact stiffness, until
-    the friction force is ``friction`` times the normal force.  The lost energy is the entry
-    "contact" of the ledger.
+    At a depth δ beyond the gap the normal force is stiffness δ (1 + damping dδ/dt), as in a
+    :class:`Stop`.  Friction acts along the edge, against the motion of the surface of the pin, and
+    exerts a moment on the pin.  A sticking contact deflects elastically, with the contact
+    stiffness, until the friction force is ``friction`` times the normal force.  The lost energy is
+    in the entry "contact" of the ledger.
 
     Args:
         stiffness: Contact stiffness; N/m.
@@ -287,21 +287,21 @@ class Clearance(Record, ConnectorLaw):
 
     @property
     def rubs(self) -> bool:
-        """True if there is friction."""
+        """True if the coefficient of friction is positive, or an array or symbol."""
         return not isinstance(self.friction, Real) or self.friction > 0.0
 
     @property
     def components(self) -> int:  # type: ignore[override]
-        """Number of components: displacements along and across the axis, rotation if ``rubs``."""
+        """Number of components: 3 with friction (two displacements, rotation), otherwise 2."""
         return 3 if self.rubs else 2
 
     @property
     def variables(self) -> dict[str, float]:  # type: ignore[override]
-        """Elastic deflection of the sticking contact along the edge; m."""
+        """Initial elastic deflection of the contact along the edge, with friction; m."""
         return {"deflection": 0.0} if self.rubs else {}
 
     def parameters(self) -> dict[str, Any]:
-        """Return the parameters of the law by name."""
+        """Return the parameters by name, without friction and radius if they are zero."""
         unused = () if self.rubs else ("friction", "radius")
         return {name: x for name, x in super().parameters().items() if name not in unused}
 
@@ -311,14 +311,14 @@ class Clearance(Record, ConnectorLaw):
         return self.damping == 0.0 and not self.rubs
 
     def _contact(self, motion: Any, rate: Any = (0.0, 0.0)) -> tuple[Values, ...]:
-        """Return elastic and damping force, N, and the direction from hole centre to pin centre."""
+        """Return elastic and damping force (N), and the unit vector from hole to pin centre."""
         x, y = motion[:2]
-        r = sqrt(larger(x**2 + y**2, (self.gap / 2) ** 2))  # at zero there is no direction
+        r = sqrt(larger(x**2 + y**2, (self.gap / 2) ** 2))  # avoids 0/0 at the centre
         x, y, elastic = x / r, y / r, self.stiffness * positive(r - self.gap)
         return elastic, elastic * larger(self.damping * (x * rate[0] + y * rate[1]), -1.0), x, y
 
     def energy(self, motion: Any, state: State) -> Values:
-        """Return the energy of contact and of the deflection by friction; J."""
+        """Return the energy of the normal and of the tangential deflection; J."""
         pressure, *_ = self._contact(motion)
         stored = pressure**2 / (2 * self.stiffness)
         return stored + self.stiffness * state.deflection**2 / 2 if self.rubs else stored
@@ -332,7 +332,7 @@ class Clearance(Record, ConnectorLaw):
         return damped * x - friction * y, damped * y + friction * x, friction * self.radius
 
     def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
-        """Return the growth of the deflection with the surface of the pin, up to sliding."""
+        """Return the increment of the deflection along the edge, which sliding limits; m."""
         if not self.rubs:
             return {}
         elastic, damped, x, y = self._contact(motion, rate)
@@ -347,15 +347,15 @@ class Clearance(Record, ConnectorLaw):
 class Coulomb(Record):
     """Coulomb friction: a connector sticks below a limit of its force, and slides at the limit.
 
-    The limit is ``force``, plus ``coefficient`` times the force of a joint or support at the end of
-    the previous step.  A sticking connector has no elasticity: a constraint holds the motion.
+    The limit is ``force``, plus ``coefficient`` times the force of ``joint`` at the end of the
+    previous step.  A sticking connector has no elasticity: a constraint holds the motion.
 
     Args:
         force: Constant term of the limit; N or N m.
-        coefficient: Coefficient of friction; 1.  For rotations it is multiplied by the radius of
+        coefficient: Coefficient of friction; 1.  For rotations give its product with the radius of
             the pin; m.
-        joint: Joint or support whose force is the normal force.  A joint needs ``multipliers``,
-            unless it always has constraint forces, as :class:`Prismatic` and :class:`Link` do.
+        joint: Joint or support whose force is the normal force.  A joint needs ``multipliers=True``
+            unless it always has constraint forces, such as :class:`Prismatic` and :class:`Link`.
 
     Raises:
         ModelError: Force and coefficient are zero, or only one of coefficient and joint is given.
@@ -384,7 +384,7 @@ class Coulomb(Record):
             raise ModelError("Coulomb: give coefficient and joint together")
 
     def evaluate(self, simulation: Running, connector: object) -> float:
-        """Return the limit of the force in the next step; all processes call this together."""
+        """Return the limit in the next step; all processes call this together; N or N m."""
         if self.joint is None:
             return self.force
         return self.force + self.coefficient * simulation.press(self.joint)
@@ -399,7 +399,7 @@ HingeLaw = SofteningLaw | ElastoPlastic
 
 
 def require_hinge_law(law: object, what: str) -> None:
-    """Raise :class:`ModelError` naming ``what`` unless ``law`` can be the law of a rigid hinge."""
+    """Raise :class:`ModelError` unless ``law`` can be the law of a hinge of zero length."""
     if isinstance(law, MaterialLaw) and not isinstance(law, ElastoPlastic):
         raise ModelError(
             f"{what}: {type(law).__name__} is the law of an elastic stiffness, and a hinge of zero "
@@ -427,18 +427,18 @@ def require_hinge_law(law: object, what: str) -> None:
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class RigidPlastic(Record):
-    """Rigid-plastic law: no motion below a limit of the force, flow or softening at the limit.
+    """Rigid-plastic law: no motion below a limit force, plastic flow or softening at the limit.
 
-    There is no elastic stiffness: below the limit a constraint holds the motion.  No other
-    constraint may hold the same motion, see docs/warnings.md.  Plastic hinges of beams,
-    ``Beam(hinges={s: law})``, are rotations with this law.
+    Below the limit a constraint holds the motion, without elasticity.  No other constraint may hold
+    the same motion, see docs/warnings.md.  Plastic hinges of beams, ``Beam(hinges={s: law})``,
+    follow this law.
 
     Args:
         law: A :class:`SofteningLaw` or :class:`ElastoPlastic`; limit in N m or N, moduli in N m/rad
             or N/m, fracture energy in J.
 
     Raises:
-        ModelError: A law of another kind, or with :class:`DuvautLions` viscosity.
+        ModelError: ``law`` is of another kind, or has :class:`DuvautLions` viscosity.
 
     Example:
         >>> fuse = ub.RigidPlastic(ub.ElastoPlastic(yield_limit=5e4))  # N m
@@ -452,9 +452,9 @@ class RigidPlastic(Record):
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Guide(Record):
-    """Law that keeps a point on a curve of the plane, free to move along; see :class:`Guided`."""
+    """Law that constrains a point to a curve of the plane; see :class:`Guided`."""
 
-    # ``s -> (x, y)``, smooth, for all s that the motion may reach; m
+    # ``s -> (x, y)``, smooth, for all s that the point may reach; m
     curve: Annotated[Curve, partial(require_function, arguments="s that returns (x, y)")]
 
 
@@ -464,21 +464,21 @@ Law = (
 )  # fmt: skip
 
 HOLDING = (PrescribedMotion, Guide)
-"""Laws that are constraints on the motion."""
+"""Laws that always constrain the motion."""
 
 RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
-"""Laws that resist every motion; see :func:`resists`."""
+"""Laws besides :class:`ConnectorLaw` that resist every motion; see :func:`resists`."""
 
 
 def resists(law: Law) -> bool:
-    """Return whether every motion changes the force of a law, or a constraint holds the motion."""
+    """Return whether a law resists every motion, by a force or by a constraint."""
     return law.resists if isinstance(law, ConnectorLaw) else isinstance(law, RESISTING)
 
 
 def rubs(law: object) -> bool:
-    """Return whether a law of friction holds the motion below a limit, and slides at the limit."""
+    """Return whether a law is dry friction: it sticks below a limit, and slides at the limit."""
     return isinstance(law, Coulomb) or (isinstance(law, ConnectorLaw) and law.holds)
 
 
 RIGID = PrescribedMotion(Constant(0.0))
-"""Law of the connectors that represent a joint."""
+"""Law of the connectors of joints: a prescribed motion of zero."""

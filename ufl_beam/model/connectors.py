@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Connectors: a relative motion of two places, and the law of its force; plastic hinges."""
+"""Connectors: relative motions of two places, with laws of force; plastic hinges."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _require_law(law: Any, what: str) -> None:
 
 
 LawField = Annotated[Law, _require_law]
-"""Field of a connector for its law."""
+"""Type of a field with the law of a connector."""
 
 Factors = tuple[float, float, float]
 """Derivatives of a relative motion with respect to (u, v, ψ) of a node."""
@@ -54,9 +54,9 @@ class Connector(Record, ABC):
         a, b: The places.
         law: Law of the force.
         axis: Unit vector, for motions along an axis.
-        corner: Point that is fixed to the node of ``a`` and compared with ``b``; None: place ``a``.
-        component: Index of the motion in the law of a :class:`Bushing`.
-        components: Connectors of the components of a :class:`Bushing`.
+        corner: Point, fixed to the node of ``a``, to which the motion of ``b`` refers, or None.
+        component: Index of the motion in the law of a :class:`Bushing`, otherwise 0.
+        components: Connectors of the components of a :class:`Bushing`, otherwise empty.
 
     Example:
         >>> spring = ub.Slide(ub.ground(2, 0), beam.end, ub.Spring(1e6), axis=(0, 1))
@@ -96,7 +96,7 @@ class Connector(Record, ABC):
 
     @property
     def kind(self) -> str:
-        """Name of the class in messages."""
+        """Name of the kind of connector in messages."""
         return type(self).__name__
 
     @property
@@ -106,7 +106,7 @@ class Connector(Record, ABC):
 
     @property
     def apart(self) -> Point:
-        """Vector from the point of a to the point of b in the undeformed scene; m."""
+        """Vector from ``corner`` or place a to place b in the undeformed scene; m."""
         (ax, ay), (bx, by) = self.corner or self.a.point, self.b.point
         return bx - ax, by - ay
 
@@ -117,7 +117,7 @@ class Connector(Record, ABC):
 
     @property
     def stretches(self) -> bool:
-        """True if the motion is a change of the distance of the points."""
+        """True if the motion is a change of the distance between the points."""
         return self.motion == "stretching"
 
     @property
@@ -126,14 +126,14 @@ class Connector(Record, ABC):
         return self.motion == "sliding"
 
     def rigidly(self) -> tuple[Factors, Factors]:
-        """Return the derivatives of the motion for nodes a and b, in the undeformed scene."""
+        """Return the factors for the nodes of a and b, in the undeformed scene."""
         if self.is_rotation:
             return (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)
         (dx, dy), length = self.apart, math.hypot(*self.apart)
         x, y = (dx / length, dy / length) if self.stretches else self.axis
         (ax, ay), (bx, by) = self.arms
         turned_with_a = x * dy - y * dx if self.follows_a else 0.0
-        # d/dψ of axis(ψ)·d is (W axis)·d = -y dx + x dy
+        # If the axis turns with a, d(axis·d)/dψ = (W axis)·d = -y dx + x dy
         return (-x, -y, x * ay - y * ax + turned_with_a), (x, y, y * bx - x * by)
 
 
@@ -208,12 +208,12 @@ class Slide(Connector):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bushing(Connector):
-    """Connector of two or three components of the motion of ``b`` relative to ``a``; N, N m.
+    """Connector of two or three components of the motion of ``b`` relative to ``a``.
 
     The first component is the displacement along an axis that turns with ``a``, the second the
-    displacement along the normal, 90 degrees counter-clockwise from the axis, and the third, if the
-    law has it, the rotation.  All are zero in the undeformed scene.  The histories of a solution
-    are in this order.
+    displacement along the normal, 90 degrees counter-clockwise from the axis.  The third, if any,
+    is the rotation.  Units are m, m and rad, of forces N, N and N m.  All components are zero in
+    the undeformed scene.  Motions and forces in a solution have one column for each component.
 
     Args:
         a: Place with which the axis turns; it may be on the ground.
@@ -276,12 +276,12 @@ class Component(Connector):
 
     @property
     def kind(self) -> str:
-        """Name of the owner in messages, such as "Revolute"."""
+        """Class of the joint, bushing or load in messages, such as "Revolute", or "Hinge"."""
         return self.owner
 
 
 UNIT_TOLERANCE = 4 * sys.float_info.epsilon
-"""Largest difference of the length of a unit vector from 1 by round-off."""
+"""Largest round-off error of the length of a unit vector."""
 
 
 def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: str) -> Point:
@@ -294,7 +294,7 @@ def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: 
             f"{kind}({a}, {b}): the axis has zero length; give axis = (x, y), a direction in the "
             "undeformed scene"
         )
-    if abs(length - 1.0) <= UNIT_TOLERANCE:  # axes that are read from files must not change
+    if abs(length - 1.0) <= UNIT_TOLERANCE:  # axes from files must not change
         return x, y
     return x / length, y / length
 
@@ -312,18 +312,18 @@ def require_apart(connector: Connector) -> None:
 
 
 def plastic_hinges(
-    may_have: Mapping[Place, HingeLaw],  # laws of the hinges that the beams may have
+    may_have: Mapping[Place, HingeLaw],  # laws of all possible hinges of beams
     rigid: Iterable[Sequence[NodeDof]],  # groups of rotations that joints make equal
-    bearing: Iterable[AttachmentPoint],  # where supports, connectors or masses bear a moment
-    loaded: Iterable[AttachmentPoint],  # where loads are moments
+    bearing: Iterable[AttachmentPoint],  # places where supports, connectors or masses bear a moment
+    loaded: Iterable[AttachmentPoint],  # places of loads with a moment
 ) -> tuple[Connector, ...]:
-    """Return plastic hinges of zero length as connectors; their motions are jumps of rotation.
+    """Return plastic hinges of zero length as connectors, whose motions are jumps of rotation.
 
-    A beam has its ``hinges``, and a hinge at each end if its section has one.  An end has no hinge
-    if it bears no moment, or if its only moment is a load: the load acts on the member, because
-    nothing beyond the hinge could bear it.  Where two members meet and nothing else bears or loads
-    the joint by a moment, both have the same moment.  Then only the weaker member has a hinge,
-    because the hinge of the stronger member would never open.
+    Possible hinges are ``Beam(hinges=)``, and ``Section(hinge=)`` at both ends of a beam.  A hinge
+    at an end is left out if the end bears no moment, or only the moment of a load: that load acts
+    on the beam, because nothing beyond the hinge could bear it.  If a joint only transmits
+    a moment between two beams, both bear the same moment.  Then only the weaker beam has a hinge,
+    because a hinge of the stronger beam would never open.
     """
     laws = {place: law for place, law in may_have.items() if law.opens}
     if not laws:
@@ -359,15 +359,15 @@ def law_of(connector: Connector) -> HingeLaw:
 
 
 def place_of(hinge: Connector) -> Place:
-    """Return the place of a plastic hinge, on the side of joints and loads."""
+    """Return the place of a plastic hinge, on the side to which joints and loads are attached."""
     assert isinstance(hinge.a, Place)
     return hinge.a.beam.at(hinge.a.s)
 
 
 def _never_opens(place: Place, others: Sequence[Node], laws: Mapping[Place, HingeLaw]) -> bool:
-    """Return whether a hinge never opens, because the only other member at the joint yields first.
+    """Return whether a hinge never opens, because the only other beam at the joint yields first.
 
-    If both members have the same limit, the first one in ``laws`` yields.
+    If both hinges have the same limit, the first hinge in ``laws`` yields first.
     """
     if len(others) > 1 or not isinstance(others[0], Place) or others[0] not in laws:
         return False

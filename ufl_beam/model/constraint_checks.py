@@ -38,16 +38,16 @@ INSTEAD = "Add supports or joints, or run dynamics (EnergyMomentum)"
 """Advice if statics has no unique answer."""
 
 LAST_DIGITS = 1e-12
-"""Strain, or motion divided by the size of the scene, whose stress counts as round-off."""
+"""Strain, rotation, or displacement by size of the scene, whose stress counts as round-off."""
 
 DENSE = 90
-"""Largest number of unknowns whose null space is found by a dense decomposition."""
+"""Largest number of unknowns for which the null space comes from a dense decomposition."""
 
 
 def require_masses(scene: Scene) -> None:
-    """Raise :class:`ModelError` if a body moves freely without mass, or turns without inertia.
+    """Raise :class:`ModelError` if a body without mass or inertia moves or turns freely.
 
-    A displacement or rotation that a body shares with a beam needs no mass of the body.
+    Displacements and rotations that a body shares with a beam need no mass or inertia of the body.
     """
     if not scene.bodies:
         return
@@ -102,21 +102,21 @@ def require_inertia(scene: Scene) -> None:
 
 
 def _fixed(scene: Scene) -> set[NodeDof]:
-    """Return the degrees of freedom of the ground, and those held by supports in unrotated axes."""
+    """Return the degrees of freedom of the ground and of supports with unrotated axes."""
     same = scene.representatives
     by_supports = {same[node(s.place), c] for s in scene.supports if not s.angle for c in s.held}
     return {same[GROUND, component] for component in range(3)} | by_supports
 
 
 Row = list[tuple[Node, Array]]
-"""Linear constraint: nodes, and the factors of (u, v, size ψ) of each."""
+"""Linear constraint: nodes with their factors of (u, v, size ψ); size of the scene in m."""
 
 
 def require_independent(scene: Scene) -> None:
     """Raise :class:`ModelError` if constraints repeat or contradict each other.
 
-    They do if their gradients with respect to the free degrees of freedom are linearly dependent in
-    the undeformed scene.  A rigid-plastic connector is a constraint below its limit.
+    Such constraints have linearly dependent gradients in the undeformed scene, with respect to the
+    free degrees of freedom.  Rigid-plastic connectors count as constraints.
     """
     rows, combinations = _dependences(scene)
     if combinations.shape[1] == 0:
@@ -145,7 +145,7 @@ def require_independent(scene: Scene) -> None:
 
 
 def _supports_and_joints_at(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
-    """Iterate over supports that hold, and joints that equate, degrees of freedom of ``rows``."""
+    """Iterate over supports and joints that act on degrees of freedom of constraints ``rows``."""
     same = scene.representatives
     supports = {same[node(s.place), c]: s for s in scene.supports for c in s.held if not s.angle}
     for row in rows:
@@ -158,7 +158,7 @@ def _supports_and_joints_at(scene: Scene, rows: Iterable[Row]) -> Iterator[objec
 
 
 def friction_repeats(scene: Scene) -> bool:
-    """Return whether constraints of sticking friction repeat each other or other constraints."""
+    """Return whether sticking friction makes constraints linearly dependent."""
     friction = any(rubs(connector.law) for connector in scene.all_connectors)
     return friction and _dependences(scene, friction=True)[1].shape[1] > 0
 
@@ -166,10 +166,10 @@ def friction_repeats(scene: Scene) -> bool:
 def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[object, Row]], Array]:
     """Find linearly dependent constraints of connectors and of supports in rotated axes.
 
-    With ``friction``, sticking friction is a constraint, too.  Returns candidate constraints with
-    their owners, and a matrix: each column has the factors of a combination of candidates that
-    vanishes for all free degrees of freedom.  A constraint that alone acts on a degree of freedom
-    is independent; such constraints are removed from the candidates, one after the other.
+    With ``friction``, sticking friction is a constraint, too.  The function returns candidates,
+    which are constraints with their owners, and a matrix.  Each column has the factors of a linear
+    combination of candidates that vanishes at all free degrees of freedom.  A constraint that alone
+    acts on a degree of freedom is independent.  Such constraints are removed one by one.
     """
 
     def holds(connector: Connector) -> bool:
@@ -189,7 +189,7 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
         for carrier, factors in row:
             for component, factor in enumerate(factors):
                 sums[same[carrier, component]] += factor
-        # Factors of one degree of freedom at both ends cancel, which leaves round-off.
+        # Factors at both ends that act on the same degree of freedom cancel to round-off.
         entries.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
         for dof in entries[-1]:
             rows_at[dof].add(number)
@@ -218,11 +218,10 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
 def require_no_mechanism(scene: Scene) -> str:
     """Raise :class:`ModelError` if the scene is a mechanism without loads.
 
-    Loads may stabilize a mechanism, as weight stabilizes a pendulum, which only the tangent in
-    equilibrium shows.  So for a mechanism with loads this function returns a description of its
-    motions, otherwise an empty text.  An elastic beam resists every motion except the three rigid
-    ones, so a motion without strain moves each beam as a rigid body.  Such a motion exists if the
-    constraints on rigid motions have a null space.
+    Loads may stabilize a mechanism, as weight stabilizes a pendulum.  Only the tangent stiffness in
+    equilibrium shows this.  So for a mechanism with loads the function returns a description of the
+    free motions, otherwise an empty text.  A motion without strain moves each beam as a rigid body.
+    Such a motion exists if the constraints on rigid motions have a null space.
     """
     free = _null_space(_constraints(scene))
     if free.shape[1] == 0:
@@ -240,7 +239,7 @@ def require_no_mechanism(scene: Scene) -> str:
 
 
 def _center(member: Member | Body) -> Point:
-    """Return the reference point of a rigid motion: a body's centre, or the middle of both ends."""
+    """Return the reference point: centre of a body, or midpoint between the ends of a beam."""
     if isinstance(member, Body):
         return member.center
     (xa, ya), (xb, yb) = member.start.point, member.end.point
@@ -250,7 +249,7 @@ def _center(member: Member | Body) -> Point:
 def _rows(
     scene: Scene, acts: Callable[[Connector], bool], supports: Iterable[Support]
 ) -> Iterator[tuple[object, Row]]:
-    """Iterate over constraints and their owners: connectors that ``acts`` selects, and supports."""
+    """Iterate over (owner, constraint) for connectors that ``acts`` selects, and ``supports``."""
     for connector in filter(acts, scene.all_connectors):
         unit = np.array([1.0, 1.0, 1.0 if connector.is_rotation else 1 / scene.size])
         ends = zip((connector.a, connector.b), connector.rigidly(), strict=True)
@@ -266,11 +265,11 @@ def _constraints(
     acts: Callable[[Connector], bool] = lambda connector: resists(connector.law),
     also: Iterable[tuple[AttachmentPoint, int]] = (),
 ) -> csr_array:
-    """Assemble constraints on the rigid motions (u, v, size ψ) of all parts; (n, 3 parts).
+    """Assemble the matrix of constraints on rigid motions (u, v, size ψ) of beams and bodies.
 
-    Parts are beams and bodies.  Joints, supports, connectors that ``acts`` selects and degrees of
-    freedom in ``also`` have rows.  Beams with works of the user have rows too, because a work may
-    hold a beam.
+    The n rows are for joints, supports, connectors that ``acts`` selects and degrees of freedom in
+    ``also``, and for beams with works, because a work may hold a beam.  The shape is (n, 3 times
+    the number of beams and bodies).
     """
     unit = np.eye(3)
     rows: list[Row] = [
@@ -300,13 +299,13 @@ def _constraints(
 
 
 def _sparse(terms: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
-    """Build a sparse matrix of entries (row, column, value); duplicates are added."""
+    """Build a sparse matrix from (row, column, value) of its entries; duplicates are added."""
     rows, columns, values = np.array(terms).reshape(-1, 3).T
     return csr_array((values, (rows.astype(int), columns.astype(int))), shape=shape)
 
 
 def _null_space(constraints: csr_array) -> Array:
-    """Return an orthonormal basis of the null space, in columns; at most 6 beyond :data:`DENSE`."""
+    """Return a basis of the null space, in columns; above :data:`DENSE` unknowns at most 6."""
     unknowns = constraints.shape[1]
     if unknowns <= DENSE:
         _, sizes, rows = np.linalg.svd(constraints.toarray(), full_matrices=True)
@@ -318,7 +317,7 @@ def _null_space(constraints: csr_array) -> Array:
 
 
 def _moving(scene: Scene, mode: Array) -> list[str]:
-    """Describe the motions of beams and bodies in a mode."""
+    """Describe the rigid motion of each beam and body that moves in a mode."""
     moving: list[tuple[str, Member | Body]] = [(f"beam {i}", b) for i, b in enumerate(scene.beams)]
     moving += [(f"body {i}", body) for i, body in enumerate(scene.bodies)]
     texts = []
@@ -335,9 +334,9 @@ def _moving(scene: Scene, mode: Array) -> list[str]:
 
 
 def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
-    """Raise :class:`ModelError` if a law has a stress at zero strain, as with an eigenstrain.
+    """Raise :class:`ModelError` if a law has a stress at zero strain, such as by an eigenstrain.
 
-    Then the undeformed scene, from which the analysis ``what`` starts, is not in equilibrium.
+    The undeformed scene, from which the analysis starts, is then not in equilibrium.
     """
     wrong: list[tuple[object, object, str]] = []
     for connector in scene.all_connectors:
@@ -370,7 +369,7 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
 
 
 class Rated(Protocol):
-    """Properties of a time scheme that not all scenes admit."""
+    """Properties of a time scheme that :func:`require_rates` reads."""
 
     has_mean_velocity: bool
     rings: bool

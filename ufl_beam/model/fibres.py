@@ -23,7 +23,7 @@ from ufl_beam.model.records import Positive, Record
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
 Below = Callable[[Array], Array]
-"""Function of y: area up to y and its first moment, each less a constant; (2, n); m², m³."""
+"""Function of y: area up to y and its first moment, each up to a constant; (2, n); m², m³."""
 
 
 class Kind(NamedTuple):
@@ -37,18 +37,18 @@ class Kind(NamedTuple):
 class SectionPoints:
     """Material points of a cross-section, with their strains, weights and laws.
 
-    The resultants of the section are the sums of weight times stress times ``strains`` over all
-    points, and ``rest`` times the strains of the section.
+    The resultants of the section are sums over all points of weight times stress times ``strains``,
+    plus ``rest`` times the strains of the section.
     """
 
     strains: Values  # derivatives of strains of points with respect to (Σ, Γ, K); (n, 3)
-    weights: Values  # areas of fibres, 1 for resultants; (n,), (1,) for interacting resultants
+    weights: Values  # areas of fibres, or 1 for resultants; (n,), (1,) with interaction
     stiffness: Values  # elastic stiffness, also of each interacting resultant; (n,)
-    laws: tuple[tuple[MaterialLaw, int], ...]  # each law with its number of successive points
-    rest: Values  # stiffness (axial, shear, bending) of resultants without points; (3,)
-    softening: SofteningLaw | None  # law of the discontinuities, if points can break
+    laws: tuple[tuple[MaterialLaw, int], ...]  # (law, number of successive points)
+    rest: Values  # EA, GA, EI of resultants that have no points, otherwise 0; (3,)
+    softening: SofteningLaw | None  # law of hinge or cracks, if points can break
     breaking: slice  # points that can break
-    hinges: bool = False  # True if the points that break are one hinge, a jump of rotation
+    hinges: bool = False  # True if the breaking point is a hinge, with a jump of rotation
 
     def __post_init__(self) -> None:
         _ = self.kind  # raises if the laws are of several classes
@@ -65,7 +65,7 @@ class SectionPoints:
 
     @cached_property
     def kind(self) -> Kind:
-        """The kind of law that all points follow, each with its own parameters."""
+        """Law of all points, without the parameters, which differ between points."""
         laws = [law for law, _ in self.laws if not law.elastic] or [self.laws[0][0]]
         kinds: dict[Kind, MaterialLaw] = {}
         for law in laws:
@@ -85,9 +85,9 @@ class SectionPoints:
         return kind
 
     def parameters(self, keys: list[tuple[int, int]]) -> dict[str, Values]:
-        """Return the parameters of the laws at the points of many cells, each (cells, n).
+        """Return the parameters of the laws at the points of cells by name, each (cells, n).
 
-        Random values depend on the keys of the cells and the seed of a distribution.
+        Random values depend on the ``keys`` of the cells and the seed of a distribution.
         """
         shape, first = (len(keys), len(self.weights)), 0
         columns = {name: np.zeros(shape) for name in self.kind.parameters}
@@ -104,14 +104,14 @@ class SectionPoints:
 
 @dataclass(frozen=True, repr=False)
 class Fibres(Record):
-    """Number and material law of the fibres of a section, P(93).
+    """Material law and number of the fibres of a section, P(93).
 
     Args:
         law: Law of each fibre; stresses in Pa.  A random limit is drawn for each fibre of each
             cell.
-        number: Number of layers of equal thickness, if the shape of the section gives their areas.
+        number: Number of layers of equal thickness, at least 2; not for :meth:`Section.of_fibres`.
         softening: Law of the crack that opens in a fibre if the stress reaches the limit of this
-            law; Pa, J/m².
+            law; limit in Pa, energy in J/m².
 
     Raises:
         ModelError: A law has the wrong type, or ``number`` is not a whole number from 1.
@@ -144,7 +144,7 @@ class PlacedFibres:
     def layers(
         cls, fibres: Fibres | None, E: float, h: float, below: Below, edges: Sequence[float] = ()
     ) -> PlacedFibres | None:
-        """Create layers of equal thickness over the depth ``h`` (m), also cut at ``edges`` (m)."""
+        """Create layers of equal thickness over the depth ``h`` (m), with cuts at ``edges`` (m)."""
         if fibres is None:
             return None
         require_kind(fibres, Fibres, "Section: fibres")
@@ -157,7 +157,7 @@ class PlacedFibres:
 
     @property
     def EA(self) -> float:
-        """Axial stiffness, the sum over all fibres; N."""
+        """Axial stiffness; N."""
         return float(self.E * self.A.sum())
 
     @property
@@ -184,23 +184,23 @@ class PlacedFibres:
 
 @dataclass(frozen=True)
 class Distribution(Record, ABC):
-    """Base of the distributions: a random positive quantity, the same on every process.
+    """Base of the distributions of a random quantity that is not negative.
 
-    Each cell of each beam draws from its own random stream.  Its key is a checksum of the ends of
-    the beam and the number of the cell in the beam.  So values depend on neither the order of beams
-    nor the number of processes.
+    Each cell draws from a random stream of its own.  The key of the stream is a checksum of the
+    ends of the beam, and the number of the cell in the beam.  So values in beams depend on neither
+    the order of beams nor the number of processes.
     """
 
     _: KW_ONLY
-    # The same seed gives the same scene again.
+    # The same seed gives the same values again.
     seed: Annotated[int, partial(require_count, at_least=0)]
 
     @abstractmethod
     def _law(self) -> Any:
-        """Return this distribution as an object of SciPy."""
+        """Return the distribution of SciPy."""
 
     def draw(self, n: int, key: tuple[int, int]) -> npt.NDArray[np.float64]:
-        """Draw ``n`` independent values from the stream ``key``, at least zero; shape (n,)."""
+        """Draw ``n`` independent values from the stream ``key``; negative values become 0; (n,)."""
         stream = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
         return np.asarray(np.maximum(self._law().rvs(n, random_state=stream), 0.0))
 
@@ -219,7 +219,7 @@ class Normal(_ByMoments):
     Args:
         mean: Mean; Pa for fibres, N or N m for resultants.
         deviation: Standard deviation; same unit.
-        seed: The same seed gives the same scene again.
+        seed: Seed of the random streams; the same seed gives the same values again.
 
     Raises:
         ModelError: Mean or deviation is not positive, or the seed is not a whole number from 0.
@@ -236,7 +236,7 @@ class Normal(_ByMoments):
 class TruncatedNormal(_ByMoments):
     """Normal distribution with the arguments of :class:`Normal`, truncated to positive values.
 
-    So its mean is larger than ``mean``, and its deviation smaller than ``deviation``.
+    By truncation the mean exceeds ``mean``, and the deviation is less than ``deviation``.
 
     Example:
         >>> limit = ub.TruncatedNormal(mean=30e6, deviation=20e6, seed=1)
@@ -249,7 +249,7 @@ class TruncatedNormal(_ByMoments):
 
 
 class Lognormal(_ByMoments):
-    """Lognormal distribution of given mean and standard deviation, see :class:`Normal`.
+    """Lognormal distribution with the arguments of :class:`Normal`.
 
     Example:
         >>> limit = ub.Lognormal(mean=355e6, deviation=25e6, seed=1)
@@ -266,10 +266,10 @@ class Weibull(Distribution):
     """Weibull distribution of positive values, for strengths.
 
     Args:
-        scale: Value that is exceeded with probability exp(-1); Pa for fibres, N or N m for
+        scale: Value that is exceeded with the probability exp(-1); Pa for fibres, N or N m for
             resultants.
         shape: Weibull modulus; a larger modulus means less scatter.
-        seed: The same seed gives the same scene again.
+        seed: Seed of the random streams; the same seed gives the same values again.
 
     Raises:
         ModelError: Scale or shape is not positive, or the seed is not a whole number from 0.

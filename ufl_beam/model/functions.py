@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Curves of the plane, among them axes of beams, and functions of time."""
+"""Curves in the plane, such as axes of beams, and functions of time."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ Point = tuple[float, float]
 Curve = Callable[[float], Sequence[float]]
 
 REACH = 1e-3
-"""Step of finite differences for tangents, as a fraction of a length.  A tangent has an error of
-some 1e-12 if this length is the radius of the curve; round-off costs three digits."""
+"""Step of finite differences for tangents: fraction of the scene's size, or of a beam's length.
+Tangents have a relative error of some 1e-12, mostly round-off, if radii are not much smaller."""
 
 MOST_ITERATIONS = 50
-"""Largest number of iterations in the search for the point of a curve nearest to another."""
+"""Largest number of iterations in :func:`nearest`."""
 
 WEIGHTS = np.array(
     [[-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1],
      [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25]]
 ) / 12  # fmt: skip
-"""Row k: weights of five equidistant values in the derivative at the k-th of their points."""
+"""Row k: weights of the values at five equidistant points in the derivative at point k."""
 
 
-# -- beam axes: records, so that scenes are compared and saved by their numbers ------------------
+# -- beam axes: dataclasses, so that scenes can be compared and saved --------------------------
 
 
 @closed("any function of s will do")
@@ -75,7 +75,7 @@ class Arc:
 
 @dataclass(frozen=True)
 class Polyline:
-    """Straight pieces through points; m."""
+    """Straight lines from point to point; m."""
 
     points: tuple[Point, ...]
     at: tuple[float, ...]  # fraction of the length at each point, from 0 to 1
@@ -88,12 +88,12 @@ class Polyline:
 
 
 def between(p: Point, q: Point, s: float) -> Point:
-    """Return the point at the fraction ``s`` of the line from ``p`` to ``q``; exact at its ends."""
+    """Return the point at the fraction ``s`` of the line from ``p`` to ``q``; exact at the ends."""
     return p[0] * (1 - s) + q[0] * s, p[1] * (1 - s) + q[1] * s
 
 
 def curve_point(curve: Curve, s: float, what: str) -> Point:
-    """Evaluate a user's curve, or raise :class:`ModelError` naming ``what``."""
+    """Evaluate a user's curve at ``s``, or raise :class:`ModelError`; m."""
     require_function(curve, what, "s that returns (x, y)")
     try:
         point = curve(s)
@@ -103,7 +103,7 @@ def curve_point(curve: Curve, s: float, what: str) -> Point:
 
 
 def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] | Array]) -> Array:
-    """Return points of curves, each at its own parameters, curve by curve; (n, 2); m."""
+    """Return the points of each curve at its own parameters, curve by curve; (n, 2); m."""
     ends = [(*c.a, *c.b) if isinstance(c, Straight) else (0.0,) * 4 for c in curves]
     counts = [len(s) for s in parameters]
     s = np.concatenate([np.empty(0), *parameters])
@@ -127,7 +127,7 @@ def tangent(curve: Curve, s: float, step: float) -> Array:
 
 
 def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
-    """Return the derivative at ``s`` from points between ``low`` and ``high`` only; (2,); m."""
+    """Return the derivative at ``s``, from points between ``low`` and ``high``; (2,); m."""
     step = min(REACH, (high - low) / 8)
     left, right = int((s - low) / step), int((high - s) / step)
     before = left if left < 2 else max(2, 4 - right)
@@ -138,7 +138,7 @@ def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
 def parameter_step(curve: Curve, s: float, length: float) -> float:
     """Find the parameter step from ``s`` that moves a point by about ``REACH * length``.
 
-    The parameter may have any unit, so the search begins at an arbitrary step.
+    The unit of the parameter is unknown, so the search begins at an arbitrary step.
     """
     step = 1e-6
     for _ in range(60):
@@ -171,8 +171,8 @@ def nearest(curve: Curve, point: Array, s: float, step: float, length: float) ->
 def enclosing_diameter(points: Array) -> float:
     """Return the diameter of the smallest circle around points, (n, 2); m.
 
-    It does not depend on the coordinate axes.  The circle goes through two or three points; the
-    point that is farthest outside is included, until no point is outside.
+    The diameter does not depend on the coordinate axes.  The circle goes through two or three
+    points.  The farthest point outside is included next, until no point is outside.
     """
     points = points - points.mean(axis=0)
     distances = np.hypot(*points.T)
@@ -205,7 +205,7 @@ TimeFunction = Callable[[float], float]
 
 @dataclass(frozen=True)
 class Constant:
-    """Time function with a constant value."""
+    """Constant function of time."""
 
     value: float
 
@@ -218,11 +218,11 @@ steady = Constant(1.0)
 """Time function of a steady load."""
 
 still = Constant(0.0)
-"""Time function of a component of motion that is fixed."""
+"""Time function of a fixed component of motion."""
 
 
 def ramp(duration: float) -> TimeFunction:
-    """Return the time function that grows from 0 to 1 within ``duration`` (s) and stays at 1.
+    """Return a time function that grows from 0 at t = 0 to 1 at ``duration`` (s) and stays at 1.
 
     Example:
         >>> growth = ub.ramp(2.0)
@@ -276,7 +276,7 @@ class Table:
 
     @property
     def kinks(self) -> Sequence[float]:
-        """Times at which adaptive steps end, as the function is smooth only between them; s."""
+        """Times at which the slope may jump; adaptive steps end there; s."""
         return self.times
 
     def __call__(self, t: float) -> float:
@@ -285,7 +285,7 @@ class Table:
 
 
 def require_time_function(function: TimeFunction, what: str) -> None:
-    """Raise :class:`ModelError` naming ``what`` unless ``function`` gives a number at t = 0."""
+    """Raise :class:`ModelError` unless ``function`` returns a number at t = 0."""
     if not callable(function):
         raise ModelError(f"{what} = {shorten(function)} must be a function of t, such as ub.Table")
     try:
@@ -297,7 +297,7 @@ def require_time_function(function: TimeFunction, what: str) -> None:
 
 
 Timed = Annotated[TimeFunction, require_time_function]
-"""Field of a record with a time function."""
+"""Type of a field with a time function."""
 
 
 def value_at(function: TimeFunction, t: float, owner: object) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joints: places share degrees of freedom, or connectors hold relative motions of places."""
+"""Joints, by shared degrees of freedom or by connectors that hold relative motions."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class Joint(Bearing, Record, ABC):
 
     Attributes:
         places: The joined places.
-        shared: Components that are equal at all places: 0, 1 displacement, 2 rotation.  Equal
-            rotations are one unknown.  So are equal displacements, except at points of a body
-            other than its centre, where the node has another displacement.
+        shared: Components that all places share as one unknown: 0, 1 displacement, 2 rotation.
+            Points of a body other than its centre do not share displacements, because the node of
+            the body has another displacement.
         holders: Connectors that hold the other motions that the joint prevents.
-        meets: Whether the places must coincide in the undeformed scene.
+        meets: True if the places must coincide in the undeformed scene.
         advice: Text appended to the error if the places do not coincide.
 
     Example:
@@ -68,7 +68,7 @@ class Joint(Bearing, Record, ABC):
     _label = __str__
 
     def equal(self, component: int) -> list[NodeDof]:
-        """Return equal degrees of freedom of nodes; displacements only of places at their nodes."""
+        """Return equal degrees of freedom of nodes; displacements only of places that are nodes."""
         places = [place for place in self.places if component == 2 or carries(place)]
         return [(node(place), component) for place in places]
 
@@ -81,12 +81,12 @@ class Joint(Bearing, Record, ABC):
 class _AtPoint(Joint):
     """Joint at one point by shared unknowns or, with ``multipliers``, by connectors.
 
-    Connectors also hold displacements at points of bodies other than the centre.
+    Points of bodies other than the centre are always joined by connectors.
     """
 
     meets = True
     joined: tuple[int, ...] = (0, 1)
-    """Components that are equal at all places."""
+    """Components of motion that are equal at all places."""
 
     multipliers: bool
 
@@ -122,8 +122,8 @@ class Rigid(_AtPoint):
 
     Args:
         places: Two or more places at one point.
-        multipliers: Keep separate unknowns, and make them equal by constraint forces, which
-            solutions and controllers can read.  By default the places share unknowns.
+        multipliers: True for separate unknowns that constraint forces make equal.  Solutions and
+            controllers can read these forces.  By default the places share unknowns.
 
     Example:
         >>> column = ub.Beam((2, 0), (2, -3), section, name="column")
@@ -141,8 +141,8 @@ class Rigid(_AtPoint):
 class Revolute(_AtPoint):
     """Revolute joint: all ``places`` share the displacement, and each turns freely.
 
-    It has the arguments of :class:`Rigid`.  Friction by the force of the joint needs
-    ``multipliers``, see :class:`Coulomb`.
+    The arguments are the same as for :class:`Rigid`.  Friction by the force of the joint needs
+    ``multipliers=True``, see :class:`Coulomb`.
 
     Example:
         >>> rod = ub.Beam((2, 0), (4, 0), section, name="rod")
@@ -157,13 +157,13 @@ class Revolute(_AtPoint):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Prismatic(Joint):
-    """Prismatic joint: ``slider`` moves along an axis that turns with ``rail``.
+    """Prismatic joint: ``slider`` moves along an axis that turns with the place ``rail``.
 
     Args:
         rail: Place with which the axis turns; it may be on the ground.
         slider: Place that slides.
         axis: Direction in the undeformed scene; from rail to slider by default.
-        turning: Whether the slider may turn on the rail, like a pin in a slot.
+        turning: True if the slider may turn on the rail, like a pin in a slot.
 
     Raises:
         ModelError: An axis of zero length.
@@ -190,7 +190,7 @@ class Prismatic(Joint):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigidLink(Joint):
-    """Massless rigid link: ``b`` moves as a point of the cross-section or body of ``a`` would.
+    """Massless rigid link: ``b`` moves as if fixed to the cross-section or body of ``a``.
 
     Raises:
         ModelError: Both places are at the same point.
@@ -217,10 +217,10 @@ class RigidLink(Joint):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Link(Joint):
-    """Massless rigid rod with a revolute joint at both ends, which keep their distance.
+    """Massless rigid rod with a revolute joint at each end.
 
     Raises:
-        ModelError: Zero length.
+        ModelError: Both places are at the same point.
 
     Example:
         >>> hanger = ub.Link(ub.ground(2, 3), beam.end)
@@ -244,12 +244,12 @@ class Link(Joint):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Guided(Joint):
-    """Joint that keeps a point on a guide curve of the ground, free along it and free to turn.
+    """Joint that keeps a place on a fixed curve, along which it moves and turns freely.
 
     Args:
         place: Guided place: on a beam, or the centre of a body.  Another point of a body can be
             joined to a guided beam by a :class:`Revolute`.
-        curve: ``s -> (x, y)`` for all s that the motion may reach; ``curve(0)`` is at the place; m.
+        curve: ``s -> (x, y)`` for all s that the place may reach; ``curve(0)`` is at the place; m.
 
     Raises:
         ModelError: The curve has no direction at s = 0, or the place is another point of a body.
@@ -288,12 +288,12 @@ START_INTERVAL = (-1e-6, 1e-6)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Release(_AtPoint):
-    """Joint at one point that releases some of the resultants of the beam of ``a``.
+    """Joint at one point that does not transmit some of the resultants of the beam of ``a``.
 
     Args:
         a: Place on a beam, whose axis defines the axial direction.
         b: Place to which ``a`` is joined.
-        free: Resultants that are not transmitted: one to three letters of "NVM".
+        free: Resultants that are not transmitted: one or more of the letters "N", "V", "M".
         multipliers: As in :class:`Rigid`.
 
     Raises:
@@ -329,6 +329,6 @@ class Release(_AtPoint):
 
     @property
     def joined(self) -> tuple[int, ...]:  # type: ignore[override]
-        """Components that are not released."""
+        """Components of motion that are equal at both places."""
         displacement = () if set(self.free) & set("NV") else (0, 1)
         return displacement if "M" in self.free else (*displacement, 2)

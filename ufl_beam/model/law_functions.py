@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Functions for laws of materials, softening and connectors; of arrays and UFL expressions.
+"""Functions of arrays and UFL expressions, for laws of materials, softening and connectors.
 
 Arrays may be complex, because the reference solver differentiates by complex steps: use
 :func:`absolute` instead of ``abs``.  The operators + - * / and ** are the Python operators.
@@ -29,7 +29,7 @@ def where(condition: Values, yes: Values, no: Values) -> Values:
 
 @singledispatch
 def below(x: Values, limit: float) -> Values:
-    """Return whether x is less than the limit."""
+    """Return the condition x < limit."""
     return x < limit
 
 

@@ -16,10 +16,10 @@ from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Reco
 
 
 class Load(Record, ABC):
-    """Base of the loads; their forces are in terms/load_forces.py."""
+    """Base of the loads; terms/load_forces.py computes their forces."""
 
     amplitude: TimeFunction
-    """Factor at time t."""
+    """Factor on the load, a function of time t (s)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,7 +38,7 @@ class LoadAtPlace(Load):
 
 
 OWN_LOAD = "state other loads as a VirtualWork, a Potential or a connector with a ForceLaw"
-"""Advice in the error that refuses a subclass of a load."""
+"""Advice in the error that a subclass of a load raises."""
 
 
 @closed(OWN_LOAD)
@@ -64,7 +64,7 @@ class PointLoad(LoadAtPlace):
 
     @property
     def pushes(self) -> tuple[Connector, ...]:
-        """Connectors that apply the load at a point off the centre of a body; else none."""
+        """Connectors that apply a load away from the centre of a body; otherwise empty."""
         if carries(self.place):
             return ()
         (x, y), fixed = self.force, ground(*self.place.point)
@@ -84,9 +84,10 @@ class PointLoad(LoadAtPlace):
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
 class FollowerLoad(LoadAtPlace):
-    """Follower force: it turns with the cross-section or body, and is not conservative.
+    """Follower force, which turns with the cross-section or body, and is not conservative.
 
     It has the arguments of :class:`PointLoad`; ``force`` is the force in the undeformed scene.
+    A place on a body must be the centre of the body.
 
     Example:
         >>> thrust = ub.FollowerLoad(beam.end, force=(0, -1e5), amplitude=lambda t: t)
@@ -180,12 +181,12 @@ class RotatingFrame(Load):
     rate: Number
     about: Vector = (0.0, 0.0)
 
-    # A rate that changes would cause a further force, the Euler force.
+    # A rate that varies in time would cause a further force, the Euler force.
     amplitude: ClassVar[TimeFunction] = steady  # type: ignore[misc]
 
 
 LOADS = PointLoad, FollowerLoad, LineLoad, Gravity, RotatingFrame
-"""All kinds of loads; messages name them."""
+"""All classes of loads."""
 
 
 # -- viscous damping of the elastic motion ------------------------------------------------------
@@ -196,16 +197,15 @@ LOADS = PointLoad, FollowerLoad, LineLoad, Gravity, RotatingFrame
 class Rayleigh(Record):
     """Rayleigh damping (a0 M + a1 K) v with the stiffness K of the undeformed scene, P(92).
 
-    The damping ratio of a mode of circular frequency ω is a0/(2ω) + a1 ω/2.  This damping is a
-    property of the structure, not of the material, and is not objective: it damps rigid rotation,
-    too, and resists a hinge that has opened.  For large motion see :class:`KelvinVoigt`.
+    The damping ratio of a mode of circular frequency ω is a0/(2ω) + a1 ω/2.  This damping is not
+    objective: it acts on rigid rotations and open hinges.  In large motion use KelvinVoigt.
 
     Args:
         mass: Factor a0 on the mass matrix; 1/s.
         stiffness: Factor a1 on the stiffness matrix; s.
 
     Raises:
-        ModelError: A negative number, or both zero.
+        ModelError: A factor is negative, or both are zero.
 
     Example:
         >>> damping = ub.Rayleigh(mass=1.0, stiffness=1e-5)  # 1/s, s
@@ -228,11 +228,11 @@ class Rayleigh(Record):
 @closed("state other damping as a VirtualWork of v")
 @dataclass(frozen=True, eq=False)
 class KelvinVoigt(Record):
-    """Kelvin-Voigt damping: viscous resultants, retardation_time C times strain rates; objective.
+    """Kelvin-Voigt damping: retardation time times elastic stiffness times strain rates.
 
-    Rigid motion is not damped.  The damping ratio of a mode of circular frequency ω in small
-    vibration is retardation_time ω/2, as with ``Rayleigh(stiffness=retardation_time)``.  Cells of a
-    section with a ``hinge`` are not damped, so that an open hinge turns freely.
+    The damping is objective: rigid motions are not damped.  In small vibration, the damping ratio
+    of a mode of circular frequency ω is retardation_time ω/2, as with
+    ``Rayleigh(stiffness=retardation_time)``.  Beams with ``Section(hinge=)`` are not damped.
 
     Args:
         retardation_time: Viscosity divided by stiffness; s.

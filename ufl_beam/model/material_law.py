@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Base of the laws of material points: stress, evolution of internal variables, energies."""
+"""Base class of material laws: stress, evolution of internal variables, energies."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Values = Any
 
 
 class State:
-    """Internal variables of a law, as attributes."""
+    """Internal variables of a law as attributes."""
 
     def __init__(self, variables: Mapping[str, Values]) -> None:
         vars(self).update(variables)
@@ -35,15 +35,15 @@ class State:
 class MaterialLaw(ABC):
     """Base of the laws of material points; a user's law is a frozen dataclass derived from it.
 
-    The fields of the dataclass are the parameters of the law.  Its methods are called with arrays
+    The fields of the dataclass are the parameters of the law.  The methods are called with arrays
     and with UFL expressions; therefore they use the functions of ``ub.law_functions``.  Methods
     read the elastic stiffness at the point from ``self.C``: EA, GA or EI of a resultant in a
     :class:`Section`, Young's modulus of a fibre, or the stiffness of a :class:`Spring`.  A law with
     internal variables defines either :meth:`increments` or :meth:`residuals`.  Energies are per
-    volume of a fibre, or per length for resultants.  See docs/extending_laws.md.
+    volume for fibres, per length for resultants, total for springs.  See docs/extending_laws.md.
 
     Attributes:
-        variables: Internal variables, and their initial values.
+        variables: Initial values of the internal variables, by name.
         resultants: ``"NM"`` or ``"NVM"`` if the law couples these resultants; strain, stress and
             ``C`` are then tuples.  By default a law has one strain and one stress.
         C: Elastic stiffness.
@@ -72,11 +72,11 @@ class MaterialLaw(ABC):
 
     @abstractmethod
     def stress(self, strain: Values, state: State) -> Values:
-        """Return the stress; its slope at fixed variables is ``C`` unless the law is nonlinear."""
+        """Return the stress; its derivative by the strain is ``C`` if elasticity is linear."""
 
     @abstractmethod
     def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Return the density of stored energy, without the energy of hardening."""
+        """Return the density of the stored energy without the energy of hardening."""
 
     def hardening_energy(self, state: State) -> Values:
         """Return the density of the energy that hardening stores; zero by default."""
@@ -108,7 +108,7 @@ class MaterialLaw(ABC):
     ) -> Values | None:
         """Return the density of the energy that a step dissipates.
 
-        None, the default, means the work that is neither stored nor lost by the time scheme.
+        None, the default, stands for the work that is neither stored nor lost by the time scheme.
 
         Args:
             strain: Strain at the instant of the step at which the law holds.
@@ -120,11 +120,11 @@ class MaterialLaw(ABC):
 
     @property
     def elastic(self) -> bool:
-        """True if the variables never change."""
+        """True if the internal variables never change; False by default."""
         return False
 
     def parameters(self, C: Values) -> dict[str, Any]:
-        """Return the parameters at points of stiffness ``C`` by name; by default the fields."""
+        """Return the parameters by name, at points of stiffness ``C``; by default the fields."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
     def with_parameters(self, C: Values, parameters: Mapping[str, Values]) -> MaterialLaw:
@@ -140,8 +140,8 @@ class MaterialLaw(ABC):
 
     @property
     def prestressed(self) -> bool:
-        """True if laws of this class may bear stress at zero strain, for some parameters."""
-        law = copy.copy(self)  # gets irrational parameters, whose terms do not cancel
+        """True if laws of this class have a stress at zero strain for some parameters."""
+        law = copy.copy(self)  # with irrational parameters, so that terms do not cancel
         vars(law).update({name: math.sqrt(k + 2) for k, name in enumerate(vars(self))})
         unit = uniform(self, 1.0)
         return any(np.any(σ != 0) for σ in _at_no_strain(law.with_parameters(unit, {})))
@@ -157,11 +157,11 @@ class MaterialLaw(ABC):
         return self.solves and not self.active
 
     def as_tuple(self, values: Values) -> tuple[Values, ...]:
-        """Return strains or stresses of a point as a tuple, also for a single resultant."""
+        """Return strains or stresses of a point as a tuple, also if the law has only one."""
         return tuple(values) if self.resultants else (values,)
 
     def as_argument(self, values: tuple[Values, ...]) -> Values:
-        """Return strains or stiffnesses as the methods take them: a tuple, or a single value."""
+        """Return strains or stiffnesses as an argument of methods: a tuple, or a single value."""
         return values if self.resultants else values[0]
 
 
@@ -171,7 +171,7 @@ def uniform(law: MaterialLaw, value: Values) -> Values:
 
 
 def _sample(law: MaterialLaw, C: tuple[Values, ...] = ()) -> MaterialLaw:
-    """Return a law with stiffness ``C``, 1 by default, and with 1 for each random parameter."""
+    """Return a law with the stiffness ``C`` (by default 1), and 1 for each random parameter."""
     at = law.as_argument(C) if C else uniform(law, np.ones(1))
     parameters = law.parameters(at).items()
     return law.with_parameters(
@@ -195,9 +195,9 @@ def initial_state(law: Any) -> State:
 
 
 def require_law(law: object, what: str, interaction: bool = False) -> None:
-    """Raise :class:`ModelError` unless a law is complete; it is called at zero strain.
+    """Raise :class:`ModelError` unless a law is complete, by calls at zero strain.
 
-    With ``interaction`` it must couple resultants of a section, else it must have one stress.
+    With ``interaction`` the law must couple resultants, otherwise it must have one stress.
     """
     if not isinstance(law, MaterialLaw):
         raise ModelError(f"{what} = {shorten(law)} is not an ElastoPlastic or another MaterialLaw")
@@ -247,9 +247,9 @@ def require_law(law: object, what: str, interaction: bool = False) -> None:
 
 
 def require_fields(law: Any, base: type, what: str, but: Collection[str] = ()) -> None:
-    """Raise :class:`ModelError` unless a law is a frozen dataclass whose fields have free names.
+    """Raise :class:`ModelError` unless a law is a frozen dataclass with admissible field names.
 
-    A field cannot have the name of a member of ``base``, except for the names in ``but``.
+    Names of members of ``base`` are not admissible, except for the names in ``but``.
     """
     parameters = getattr(type(law), "__dataclass_params__", None)
     if parameters is None or not parameters.frozen or not parameters.eq:
@@ -264,7 +264,7 @@ def require_fields(law: Any, base: type, what: str, but: Collection[str] = ()) -
 
 
 def require_field(value: object, what: str, kinds: Any = Real) -> None:
-    """Raise :class:`ModelError` unless the value of a field of a law is of one of ``kinds``."""
+    """Raise :class:`ModelError` unless the value of a field has one of the types ``kinds``."""
     if not isinstance(value, kinds) or isinstance(value, bool):
         raise ModelError(
             f"{what} = {shorten(value)} is no number; fields of a law are numbers, its other "
@@ -273,20 +273,20 @@ def require_field(value: object, what: str, kinds: Any = Real) -> None:
 
 
 EVOLUTION_METHODS = ("increments", "residuals")
-"""Methods for the evolution of variables; a law with variables defines one of the two."""
+"""Methods for the evolution of variables; a law with variables defines exactly one of them."""
 
 
 def traced(law: object) -> AbstractContextManager[None]:
-    """Raise :class:`ModelError` naming a law that cannot be called with symbols of UFL."""
+    """Return a context that turns errors of a law, called with UFL symbols, into ModelErrors."""
     return calling(f"{type(law).__name__}: it cannot be called with symbols of UFL", WRITTEN)
 
 
 WRITTEN = ". Laws are written with + - * / ** and the functions of ub.law_functions"
-"""Remedy in the errors of laws that cannot be called."""
+"""Advice in the errors of laws that cannot be called."""
 
 
 def require_names(result: object, law: Any, what: str) -> None:
-    """Raise :class:`ModelError` unless a method returned a dict with each variable of a law."""
+    """Raise :class:`ModelError` unless ``result`` is a dict with exactly the variables of a law."""
     if not isinstance(result, Mapping):
         raise ModelError(
             f"{what} returns {shorten(result)}; it must return a dict with the names "
@@ -303,10 +303,10 @@ def require_names(result: object, law: Any, what: str) -> None:
 
 
 def judges_dissipation(law: MaterialLaw) -> bool:
-    """Return whether the dissipation of a law cannot fall in a run, for steps of any length.
+    """Return whether the dissipation of a law must not decrease in a run, for any step length.
 
-    The entry "plastic" of the ledger is exact if the law states its dissipation, or if its energies
-    are quadratic.  Otherwise the entry has an integration error of either sign.  An active law may
+    The entry "plastic" of the ledger is exact if the law defines ``dissipation``, or has quadratic
+    energies.  Otherwise the entry has an integration error of either sign.  An active law may
     supply energy.
     """
     defined = type(law).dissipation is not MaterialLaw.dissipation
@@ -330,5 +330,5 @@ def quadratic(law: Any, number: int, energy: Callable[[Any, State], Values]) -> 
         with np.errstate(all="ignore"):
             return float(np.sum(energy(law.as_argument(strains), state)))
 
-    # A factor of two keeps all digits of the arguments.
+    # Doubling of the arguments is exact in floating-point arithmetic.
     return bool(np.isclose(value(2.0), 4.0 * value(1.0), rtol=1e-12, atol=0.0))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Laws of material points: yielding, hardening, viscous flow, hysteresis, interaction of N and M.
+"""Material laws: yielding, hardening, viscous flow, hysteresis, interaction of N and M.
 
-A point is a resultant of a cross-section (N of a strain, N m of a curvature in 1/m), N and M
-together, a fibre (Pa of a strain) or a spring (N of m, N m of rad).  The laws are functions of
-arrays and of UFL expressions: UFL derives the tangents, and FFCx compiles the laws for the time
-loop, see :mod:`ufl_beam.terms.material_points`.
+A law acts on a resultant of a cross-section (N or N m; strain 1 or 1/m), on N and M together, on a
+fibre (Pa; strain 1) or on a spring (N or N m; m or rad).  The laws are functions of arrays and of
+UFL expressions.  UFL derives the tangents, and FFCx compiles the laws for the time loop, see
+:mod:`ufl_beam.terms.material_points`.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.records import FromZero, NotNegative, Positive, Record
 
 OWN_LAW = "state a MaterialLaw of your own"
-"""Remedy in the error if a user derives a subclass from a closed class."""
+"""Advice in the error that a subclass of a closed class raises."""
 
 
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Perzyna(Record):
-    """Perzyna viscoplasticity: overstress in proportion to the plastic strain rate, P(39).
+    """Perzyna viscoplasticity: overstress proportional to the plastic strain rate, P(39).
 
     Args:
         eta: Overstress per plastic strain rate; Pa s for fibres, N s and N m² s for resultants.
-            With zero the law is rate-independent, with infinity it is elastic.
+            Zero makes the law rate-independent, infinity makes the law elastic.
 
     Example:
         >>> law = ub.ElastoPlastic(250e6, isotropic=2e9, viscosity=ub.Perzyna(eta=1e6))  # Pa, Pa s
@@ -54,7 +54,7 @@ class Perzyna(Record):
     eta: FromZero
 
     def coefficient(self, stiffness: Values) -> Values:
-        """Return the overstress per rate of plastic strain, the same for any stiffness."""
+        """Return the overstress per rate of plastic strain, in the shape of ``stiffness``."""
         return np.full_like(stiffness, self.eta)
 
 
@@ -63,10 +63,10 @@ class Perzyna(Record):
 class DuvautLions(Record):
     """Duvaut-Lions viscoplasticity: relaxation towards the rate-independent stress, P(45).
 
-    It is the law of :class:`Perzyna` with ``eta = tau (C + isotropic + kinematic)``.
+    It equals :class:`Perzyna` with ``eta = tau (C + isotropic + kinematic)``.
 
     Args:
-        tau: Relaxation time; s.  With zero the law is rate-independent, with infinity elastic.
+        tau: Relaxation time; s.  Zero makes the law rate-independent, infinity elastic.
 
     Example:
         >>> law = ub.ElastoPlastic(  # Pa, s
@@ -78,12 +78,12 @@ class DuvautLions(Record):
     tau: FromZero
 
     def coefficient(self, stiffness: Values) -> Values:
-        """Return the overstress per rate of plastic strain; hardening adds to ``stiffness``."""
+        """Return the overstress per rate of plastic strain; ``stiffness`` includes hardening."""
         return np.asarray(self.tau * stiffness)  # P(46)
 
 
 def _require_limit(value: Any, what: str, **limits: Any) -> None:
-    """Raise :class:`ModelError` unless a limit is a number in range or a distribution."""
+    """Raise :class:`ModelError` unless a limit is a distribution, or a number in range."""
     if not hasattr(value, "draw"):
         require_number(value, what, **limits)
 
@@ -102,14 +102,14 @@ Exponent = Annotated[float, partial(require_number, at_least=1.0)]
 
 
 class _Plastic(Record, MaterialLaw):
-    """Base of laws with the stress C (strain - plastic strain)."""
+    """Base of laws with the stress ``C (strain - plastic strain)``."""
 
     def stress(self, strain: Values, state: State) -> Values:
-        """Return the stress of the elastic strain."""
+        """Return the stress."""
         return self.C * (strain - state.plastic)
 
     def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Return the energy density of the elastic strain."""
+        """Return the density of the elastic energy."""
         return self.C * (strain - state.plastic) ** 2 / 2
 
 
@@ -137,16 +137,16 @@ class ElastoPlastic(_Plastic):
     kinematic: Modulus = 0.0
     viscosity: Annotated[Any, partial(require_kind, kind=(Perzyna, DuvautLions))] = Perzyna(0.0)
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "accumulated": 0.0}
-    fracture_energy: ClassVar[float] = math.inf  # it never breaks
-    steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # of a SofteningLaw; here nothing falls
+    fracture_energy: ClassVar[float] = math.inf  # as in a SofteningLaw that never breaks
+    steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # as in a SofteningLaw; no decrease
 
     def parameters(self, C: Values) -> dict[str, Any]:
-        """Return limit and moduli, and the viscosity as overstress per plastic strain rate."""
+        """Return the fields, with the viscosity as overstress per rate of plastic strain."""
         eta = self.viscosity.coefficient(C + self.isotropic + self.kinematic)
         return super().parameters(C) | {"viscosity": eta}
 
     def increments(self, strain: Values, state: State, dt: Values) -> dict[str, Values]:
-        """Return the increment of plastic strain and its size, in closed form, P(38)-P(44)."""
+        """Return the increments of plastic strain and accumulated plastic strain, P(38)-P(44)."""
         trial = self.stress(strain, state) - self.kinematic * state.plastic
         direction = sign(trial)
         overstress = direction * trial - (
@@ -163,16 +163,16 @@ class ElastoPlastic(_Plastic):
         ) / 2  # P(35)
 
     def dissipation(self, strain: Values, state: State, changes: State, dt: Values) -> Values:
-        """Return the density of the energy that yield stress and viscosity dissipate in a step."""
+        """Return the density of the energy dissipated by yield stress and viscosity in a step."""
         γ = changes.accumulated
-        flows = below(-γ, 0.0)  # without flow, infinite numbers times zero would be NaN
+        flows = below(-γ, 0.0)  # avoids infinity times zero
         return (
             where(flows, self.yield_limit, 0.0) + where(flows, self.viscosity, 0.0) * γ / dt
         ) * γ  # P(37)
 
     @property
     def limit(self) -> Any:
-        """The yield limit, under the name that all laws of hinges use."""
+        """Yield limit, by the name that all laws of hinges have."""
         return self.yield_limit
 
     @property
@@ -199,15 +199,15 @@ class ElastoPlastic(_Plastic):
 class RambergOsgood(_Plastic):
     """Power law of Ramberg and Osgood: strain = stress/C + offset (stress/yield_limit)^exponent.
 
-    The power law holds while the size of the stress exceeds all its previous values; below them
-    the point is elastic, in both directions (isotropic hardening).  There is no elastic range at
-    first.  After Ramberg and Osgood, NACA TN 902 (1943).
+    The power law holds while the absolute stress exceeds all its previous values.  Otherwise the
+    point is elastic, in tension and compression (isotropic hardening).  Initially there is no
+    elastic range.  After Ramberg and Osgood, NACA TN 902 (1943).
 
     Args:
         yield_limit: Stress at which the plastic strain is ``offset``, or a distribution such as
             :class:`Normal`; Pa, N or N m.
         offset: Plastic strain or curvature at the stress ``yield_limit``, such as 0.002; 1 or 1/m.
-        exponent: At least 1.
+        exponent: Exponent of the power law, at least 1.
 
     Raises:
         ModelError: A number is not positive, or the exponent is less than 1.
@@ -223,7 +223,7 @@ class RambergOsgood(_Plastic):
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "largest": 0.0}
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Return the residuals of the largest and of the present plastic strain."""
+        """Return the residuals of the plastic strain and of the largest value of the power law."""
         stress = self.stress(strain, new)
         largest = larger(
             old.largest, self.offset * (absolute(stress) / self.yield_limit) ** self.exponent
@@ -236,14 +236,14 @@ class RambergOsgood(_Plastic):
 class ArmstrongFrederick(_Plastic):
     """Plasticity with nonlinear kinematic hardening: loops that close, ratchet and saturate.
 
-    The stress lies within ``yield_limit`` of a back stress X.  With the plastic strain p,
+    The stress differs by at most ``yield_limit`` from a back stress X.  With the plastic strain p,
     dX = kinematic dp - recovery X abs(dp), so that X saturates at kinematic/recovery.  After
     Armstrong and Frederick, CEGB report RD/B/N731 (1966).
 
     Args:
         yield_limit: Yield stress, or a distribution such as :class:`Normal`; Pa, N or N m.
-        kinematic: Initial hardening; stress per plastic strain.
-        recovery: Rate of dynamic recovery; per plastic strain.  Without recovery use
+        kinematic: Initial hardening modulus; stress per plastic strain.
+        recovery: Rate of dynamic recovery; 1 per plastic strain.  Without recovery use
             :class:`ElastoPlastic` with ``kinematic``.
 
     Raises:
@@ -262,21 +262,21 @@ class ArmstrongFrederick(_Plastic):
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "back": 0.0}
 
     def increments(self, strain: Values, state: State, dt: Values) -> Mapping[str, Values]:
-        """Solve a quadratic equation for the increments of plastic strain and back stress."""
+        """Return the increments of plastic strain and back stress from a quadratic equation."""
         C, B, r = self.C, self.kinematic, self.recovery
         trial = self.stress(strain, state)
         direction = sign(trial - state.back)
         overstress = positive(direction * (trial - state.back) - self.yield_limit)
         b = C + B - r * (direction * trial - self.yield_limit)  # C r γ² + b γ = overstress
         root = sqrt(b**2 + 4 * C * r * overstress)
-        divisor = where(below(b, 0.0), 1.0, b + root)  # root - b would cancel digits if b > 0
+        divisor = where(below(b, 0.0), 1.0, b + root)  # if b > 0, root - b has cancellation
         γ = where(below(b, 0.0), (root - b) / (2 * C * r), 2 * overstress / divisor)
         γ = where(below(-overstress, 0.0), γ, 0.0)
         change = (direction * B - r * state.back) * γ / (1 + r * γ)
         return {"plastic": direction * γ, "back": change}
 
     def hardening_energy(self, state: State) -> Values:
-        """Return the density of the energy that the back stress stores."""
+        """Return the density of the energy stored by the back stress."""
         return state.back**2 / (2 * self.kinematic)
 
 
@@ -288,16 +288,16 @@ class BoucWen(Record, MaterialLaw):
     z follows dz = dx (1 - ν abs(z/z0)^n (1 - β + β sign(z dx))) with z0 = yield_limit/C.  Strength
     degrades by ν = 1 + strength e, where e is the dissipated energy in units of
     (1 - a) yield_limit²/C.  After Wen, J. Eng. Mech. Div. ASCE 102 (1976), and Baber and Wen, ibid.
-    107 (1981).  Their degradation of stiffness is left out: in unloading it would return dissipated
+    107 (1981).  Their degradation of stiffness is omitted: in unloading it would return dissipated
     energy.
 
     Args:
         yield_limit: Stress at which the elastic tangent meets the plastic branch, or a distribution
             such as :class:`Normal`; Pa, N or N m.
-        hardening: Ratio of the slope of the plastic branch to C, from 0 to 0.999.
+        hardening: Slope of the plastic branch divided by C, from 0 to 0.999.
         exponent: Sharpness n of the transition, at least 1.
         shape: β from 1/2 (unloading along C) to 1.
-        strength: Growth of ν per dissipated energy e; zero by default.
+        strength: Increase of ν per unit of e; zero, the default, means no degradation.
 
     Raises:
         ModelError: A parameter is out of range.
@@ -319,9 +319,9 @@ class BoucWen(Record, MaterialLaw):
         return self.C * (strain - (1 - self.hardening) * state.slip)
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Return the residuals of the slip, the stored strain and the dissipated energy.
+        """Return the residuals of the slip, of the last strain and of the dissipated energy e.
 
-        For abs(z) far beyond the solution the flow does not grow with z, so that there is no second
+        The flow does not grow further where abs(z) is far too large.  This excludes a second
         solution.
         """
         z, z0, dx = strain - new.slip, self.yield_limit / self.C, strain - old.strain
@@ -339,12 +339,12 @@ class BoucWen(Record, MaterialLaw):
         }
 
     def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Return the energy density of the strain and of z, two springs in parallel."""
+        """Return the energy density of two springs in parallel, with the strains x and z."""
         a = self.hardening
         return self.C * (a * strain**2 + (1 - a) * (strain - state.slip) ** 2) / 2
 
 
-# -- resultants that yield together -------------------------------------------------------------
+# -- interaction of resultants ------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -358,7 +358,7 @@ class AxialBending(Record, MaterialLaw):
     Args:
         axial: Np, the yield force; N.
         bending: Mp, the plastic moment; N m.
-        rounding: Width w of the rounded corners, in terms of m.
+        rounding: Width w of the rounded corners; 1.
 
     Raises:
         ModelError: A number is not positive.
@@ -375,25 +375,25 @@ class AxialBending(Record, MaterialLaw):
     variables: ClassVar[Mapping[str, float]] = {"stretch": 0.0, "curvature": 0.0, "flow": 0.0}
 
     def stress(self, strain: Values, state: State) -> Values:
-        """Return (N, M) of the elastic strains."""
+        """Return (N, M)."""
         (Σ, K), (EA, EI) = strain, self.C
         return EA * (Σ - state.stretch), EI * (K - state.curvature)
 
     def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Return the energy per length of the elastic strains."""
+        """Return the elastic energy per length."""
         (Σ, K), (EA, EI) = strain, self.C
         return (EA * (Σ - state.stretch) ** 2 + EI * (K - state.curvature) ** 2) / 2
 
     def excess(self, N: Values, M: Values) -> Values:
-        """Return the yield function; it is positive outside the surface."""
+        """Return the yield function, which is positive outside the surface."""
         w, m = self.rounding, M / self.bending
         return (N / self.axial) ** 2 + (sqrt(m**2 + w**2) - w) / (sqrt(1 + w**2) - w) - 1
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Return the residuals of both plastic strains, and of the return to the yield surface.
+        """Return the residuals of both plastic strains, and of the yield condition.
 
-        A flow against the normal could return to the far side of the surface.  Therefore a negative
-        flow changes no strain but increases the residual: the equations have one solution.
+        A negative flow could lead to a second solution, on the opposite side of the surface.
+        A negative flow therefore changes no plastic strain but increases the last residual.
         """
         (N, M), (EA, EI) = self.stress(strain, new), self.C
         w, m, flow = self.rounding, M / self.bending, new.flow - old.flow

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Records that check their fields; signatures of users' functions and objects."""
+"""Base of dataclasses that check their fields; signatures of users' functions and objects."""
 
 from __future__ import annotations
 
@@ -38,28 +38,28 @@ Number = Annotated[float, require_number]
 Positive = Annotated[float, partial(require_number, positive=True)]
 NotNegative = Annotated[float, partial(require_number, at_least=0.0)]
 FromZero = Annotated[float, partial(require_number, at_least=0.0, infinite=True)]
-"""A number that is not negative, or infinity."""
+"""Type of a field with a number that is not negative, or infinity."""
 
 Vector = Annotated[tuple[float, float], require_vector]
 Text = Annotated[str, require_text]
 Switch = Annotated[bool, require_switch]
 Instance = Annotated[T, require_kind]
-"""An object of the annotated class, or of one of several classes."""
+"""Type of a field with an object of the annotated class, or of one of several classes."""
 
 NAMING = ("name", "place", "beam", "a", "b", "rail", "slider")
-"""Fields that name a record in messages, so that messages about them name its class only."""
+"""Fields used in the name of a record; errors in these fields name only the class."""
 
 
 class Record:
     """Base of frozen dataclasses that check their fields by annotations ``Annotated[T, check]``.
 
-    A value other than the default is checked by ``check(value, what="Record: name")``, where
-    ``name`` is the name of the field, or the text that follows the check in the annotation.  The
-    value that the check returns replaces the field, unless it is None.
+    ``check(value, what="Record: name")`` checks values other than the default.  ``name`` is the
+    name of the field, or the text that follows the check in the annotation.  The result of the
+    check replaces the value, unless the result is None.
     """
 
     _refused: ClassVar[type[ArgumentError]] = ModelError
-    """Error that a wrong field raises; ArgumentError in records that are not part of a model."""
+    """Class of the error for a wrong field; ArgumentError in records outside a model."""
 
     def __repr__(self) -> str:
         return compact_repr(self)  # for dataclasses with ``repr=False``
@@ -84,7 +84,7 @@ class Record:
 
 @cache
 def _checks(record: type[Any]) -> list[tuple[str, str, object, Callable[..., object]]]:
-    """Return (name, name in messages, default, check) of each field that has a check."""
+    """Return (name, name in messages, default, check) for each field with a check."""
     checks = []
     hints = get_type_hints(record, include_extras=True)
     for field in fields(record):
@@ -103,19 +103,19 @@ def _checks(record: type[Any]) -> list[tuple[str, str, object, Callable[..., obj
 NO_MEMBERS = {object, ABC, Protocol, Generic}
 
 _satisfied: WeakKeyDictionary[type, set[type]] = WeakKeyDictionary()
-"""Protocols that each class satisfies, kept because a check of signatures takes a millisecond."""
+"""Protocols that each class satisfies; cached, because a check takes a millisecond."""
 
 
 def parameters_by_name(
     function: Callable[..., Any], known: Sequence[str], what: str, after: int = 0, more: str = ""
 ) -> tuple[str, ...] | None:
-    """Return the ``known`` names among the parameters that follow the first ``after`` ones.
+    """Return the ``known`` names among the parameters after the first ``after`` parameters.
 
-    A function with parameters ``**kwargs`` takes all known names.  The result is None if a function
-    has no signature.  ``more`` is appended to the message.
+    The result is all known names for a function with ``**kwargs``, and None for a function without
+    a signature.  ``more`` is appended to the message of the error.
 
     Raises:
-        ModelError: ``what`` has an unknown parameter without a default.
+        ModelError: The function has an unknown parameter without a default.
     """
     try:
         parameters = [*inspect.signature(function).parameters.values()]
@@ -135,7 +135,7 @@ def parameters_by_name(
 
 @lru_cache(maxsize=32)
 def members(protocol: type) -> dict[str, Callable[..., Any] | None]:
-    """Return methods by name of a protocol or abstract class, and None for each attribute."""
+    """Return the members of a protocol or abstract class by name; None for attributes."""
     methods: dict[str, Callable[..., Any] | None] = {}
     for base in reversed([base for base in protocol.__mro__ if base not in NO_MEMBERS]):
         for name, thing in (dict.fromkeys(inspect.get_annotations(base)) | vars(base)).items():
@@ -145,7 +145,7 @@ def members(protocol: type) -> dict[str, Callable[..., Any] | None]:
 
 
 def unlike(value: object, protocol: type) -> str:
-    """Return why an object does not satisfy a protocol, or an empty text if it does.
+    """Return the reason why an object does not satisfy a protocol; empty if it does.
 
     Methods of the object must accept the arguments of the methods of the protocol.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scenes: all records of a model, and checks of the whole model before any mesh exists."""
+"""Scenes: models of beams, bodies, joints, supports and loads, and checks of whole models."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ from ufl_beam.model.works import Potential, VirtualWork, Work
 
 
 def _all(*kinds: type) -> Callable[..., tuple[Any, ...]]:
-    """Return a check that a field is a list of records of these kinds."""
+    """Return a check that a field is a list of objects of these classes."""
     return partial(require_all, kind=kinds)
 
 
@@ -72,15 +72,15 @@ class Scene(Record, Rich):
         loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`,
             :class:`RotatingFrame`.
         masses: :class:`PointMass`.
-        initial: :class:`Velocity`; all is at rest by default.
+        initial: :class:`Velocity`; by default the scene is at rest.
         damping: :class:`Rayleigh`, :class:`KelvinVoigt`, in addition to dissipation of materials.
         bodies: :class:`Body`.
         connectors: :class:`Turn`, :class:`Stretch`, :class:`Slide`, :class:`Bushing`: springs,
             dampers, stops, friction, motors.
-        works: :class:`VirtualWork`, :class:`Potential`: effects along beams that you state in UFL.
+        works: :class:`VirtualWork`, :class:`Potential`: effects along beams, written in UFL.
 
     Raises:
-        ModelError: Records do not fit together; the message names them.
+        ModelError: The objects do not fit together; the message names them.
 
     Example:
         >>> frame = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
@@ -136,7 +136,7 @@ class Scene(Record, Rich):
         """Return the beam or body called ``name``, as in ``scene["left"].end``.
 
         Raises:
-            ModelError: No beam or body has this name, or more than one has it.
+            ModelError: No beam or body, or more than one, has this name.
         """
         everything: tuple[Beam | Body, ...] = (*self.beams, *self.bodies)
         matches = [x for x in everything if x.name == name]
@@ -164,8 +164,8 @@ class Scene(Record, Rich):
     def size(self) -> float:
         """Diameter of the smallest circle around the undeformed scene; m.
 
-        It does not depend on the directions of x and y.  If all points coincide, it is the largest
-        radius of gyration of a body, or 1.
+        The size does not depend on the directions of x and y.  If all points coincide, the size is
+        the largest radius of gyration of a body, or 1.
         """
         beams = {(b.cells, b.corners): b for b in self.beams}  # equal beams share an array
         vertices = {kind: np.array(b.vertices(())) for kind, b in beams.items()}
@@ -179,7 +179,7 @@ class Scene(Record, Rich):
 
     @cached_property
     def all_connectors(self) -> tuple[Connector, ...]:
-        """Connectors of joints, of the scene and of off-centre loads, and plastic hinges."""
+        """Connectors of joints, of ``connectors`` and of off-centre loads, and plastic hinges."""
         connectors = [holder for joint in self.joints for holder in joint.holders]
         connectors += [one for x in self.connectors for one in x.components or (x,)]
         connectors += [push for x in self.loads if isinstance(x, PointLoad) for push in x.pushes]
@@ -196,7 +196,7 @@ class Scene(Record, Rich):
 
     @cached_property
     def hinges(self) -> tuple[Connector, ...]:
-        """Plastic hinges of zero length: ``hinges`` of beams, and of sections at ends of beams."""
+        """Plastic hinges of zero length, by ``Beam(hinges=)`` and ``Section(hinge=)``."""
         return tuple(
             connector
             for connector in self.all_connectors
@@ -205,18 +205,18 @@ class Scene(Record, Rich):
 
     @property
     def moments(self) -> list[LoadAtPlace]:
-        """Loads at places with a moment."""
+        """Loads with a moment at a place."""
         return [load for load in self.loads if isinstance(load, LoadAtPlace) and load.moment]
 
     @cached_property
     def rigid_bodies(self) -> tuple[Body, ...]:
-        """The bodies, and the ground if something is attached to it."""
+        """Bodies, and the ground if anything is attached to the ground."""
         attached = [place for _, place in self.attachments()]
         attached += [connector.a for connector in self.all_connectors]
         return (*self.bodies, *((GROUND,) if any(node(p) is GROUND for p in attached) else ()))
 
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
-        """Iterate over (owner, function of time): loads, supports, connectors, and works."""
+        """Iterate over (owner, function of time) for loads, supports, connectors and works."""
         yield from ((load, load.amplitude) for load in self.loads)
         yield from ((x, motion) for x in self.supports for motion in x.held.values())
         for connector in self.all_connectors:
@@ -228,7 +228,7 @@ class Scene(Record, Rich):
             yield from ((work, number) for number in work.numbers.values() if callable(number))
 
     def attachments(self) -> Iterator[tuple[object, AttachmentPoint]]:
-        """Iterate over (record or its class name, place): each place that a record refers to."""
+        """Iterate over (object or its class name, place) for all places of objects in the scene."""
         yield from ((joint, place) for joint in self.joints for place in joint.places)
         yield from (
             (connector, place)
@@ -254,7 +254,7 @@ class Scene(Record, Rich):
 
     @cached_property
     def attached(self) -> dict[Member, list[float]]:
-        """For each beam, the parameters s of the places that must be vertices."""
+        """Parameters s of places that must be vertices, by beam."""
         places: dict[Member, list[float]] = {beam: list(beam.hinges) for beam in self.beams}
         for _, place in self.attachments():
             if isinstance(place, Place):
@@ -262,7 +262,7 @@ class Scene(Record, Rich):
         return places
 
     def _require_once(self) -> None:
-        """Raise if a record is repeated, works share a name, or there are two rotating frames."""
+        """Raise if an object is repeated, works share a name, or there are two rotating frames."""
         for member, twice in (*_again("beams", self.beams), *_again("bodies", self.bodies)):
             raise ModelError(f"Scene: {member.name} is in the scene {twice}")
         for field in ("joints", "connectors", "loads", "masses", "initial", "damping", "works"):
@@ -299,7 +299,7 @@ class Scene(Record, Rich):
             )
 
     def _require_normal_force(self, connector: Connector, bearing: Bearing) -> None:
-        """Raise unless the normal force of friction is a known force of a support or joint."""
+        """Raise unless the force of the bearing is computed, so that it can cause friction."""
         if bearing not in (*self.joints, *self.supports):
             why = "is not in the scene; add it to joints or supports"
         elif isinstance(bearing, Support) and not bearing.held.keys() & {0, 1}:
@@ -316,13 +316,13 @@ class Scene(Record, Rich):
         return [joint.equal(component) for joint in self.joints for component in joint.shared]
 
     def free_caches(self) -> None:
-        """Free the memory of properties that only numbering uses; further uses compute them."""
+        """Free the memory of cached properties that only the numbering of unknowns uses."""
         for name in ("attached", "representatives"):
             vars(self).pop(name, None)
 
     @cached_property
     def representatives(self) -> Representatives:
-        """Representative of each degree of freedom that joints and hinges share."""
+        """Representatives of the degrees of freedom that joints and hinges make equal."""
         hinges = (
             [(node(connector.a), c), (node(connector.b), c)]
             for connector in self.hinges
@@ -334,7 +334,7 @@ class Scene(Record, Rich):
         same = self.representatives
         holders = {same[GROUND, component]: "the ground" for component in range(3)}
         for support in self.supports:
-            # A support in rotated axes involves both displacements of its place.
+            # A support with rotated axes involves both displacements of its place.
             components = {*support.held, *((0, 1) if support.angle else ())}
             for component in sorted(components):
                 dof = same[node(support.place), component]
@@ -347,7 +347,7 @@ class Scene(Record, Rich):
 
 
 def attachment_points(scene: Scene) -> dict[Body, list[Spot]]:
-    """Find the attachment points of each body and of the ground, without repetition."""
+    """Return the different attachment points of each body and of the ground."""
     anchors = [place for joint in scene.joints for place in joint.places]
     anchors += [place for connector in scene.connectors for place in (connector.a, connector.b)]
     anchors += [x.place for x in scene.loads if isinstance(x, LoadAtPlace)]
@@ -361,7 +361,7 @@ def attachment_points(scene: Scene) -> dict[Body, list[Spot]]:
 def _again(
     field: str, records: Sequence[Any], key: Callable[[Any], object] = id
 ) -> Iterator[tuple[Any, str]]:
-    """Iterate over (repeated record of a list, text for a message)."""
+    """Iterate over (repeated object, text for a message) of a list."""
     first: dict[object, int] = {}
     for i, record in enumerate(records):
         if (j := first.setdefault(key(record), i)) != i:

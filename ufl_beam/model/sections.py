@@ -34,24 +34,24 @@ class Section(Record):
         EA: Axial stiffness; N.
         GA: Shear stiffness, shear factor included; N.
         EI: Bending stiffness; N m².
-        rhoA: Mass per length; kg/m.  Zero, the default, is a beam without mass.  Give zero
-            explicitly to avoid the warning if other beams of a dynamic scene have mass.
-        rhoI: Rotary inertia per length; kg m.  Zero leaves rotary inertia out.
+        rhoA: Mass per length; kg/m.  Zero, the default, means a beam without mass.  Dynamics may
+            warn of the default, but never warns of an explicit zero.
+        rhoI: Rotary inertia per length; kg m.
         depth: Depth in the plane of motion, for pictures; m.  The default is the depth of the
             rectangle with the same EI/EA.  A beam shorter than depth/√12 causes a warning.
-        axial: Law of the axial force N, if it can yield; N.
-        shear: Law of the shear force V, if it can yield; N.
-        bending: Law of the bending moment M, if it can yield; N m.
+        axial: Inelastic law of the axial force N; N.
+        shear: Inelastic law of the shear force V; N.
+        bending: Inelastic law of the bending moment M; N m.
         hinge: Law of the hinge that opens in each cell where the moment reaches the limit of the
             law; N m, J.  For hinges at chosen places see :class:`Beam`.
-        fibres: Fibres, instead of all laws of resultants and of the hinge; shapes such as
-            :meth:`rectangle`, and :meth:`of_fibres`, place them.
+        fibres: Fibres with their positions, instead of laws of resultants and of the hinge.  They
+            come from :meth:`of_fibres`, or from shapes such as :meth:`rectangle`.
         interaction: Law of N and M together, such as :class:`AxialBending`, instead of laws of
             single resultants, the hinge and fibres.
 
     Raises:
         ModelError: A stiffness is not positive, a number is not finite, a law has the wrong type,
-            or laws, fibres and ``interaction`` exclude each other.
+            or laws, fibres and ``interaction`` cannot be combined.
 
     Example:
         >>> plate = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
@@ -97,7 +97,7 @@ class Section(Record):
         self.section_points(self.hinge)  # raises an error if the laws cannot be combined
 
     def section_points(self, hinge: SofteningLaw | None) -> SectionPoints | None:
-        """Return the material points of a cell with this hinge law; None if the cell is elastic."""
+        """Return the material points of a cell with a hinge law; None if the cell is elastic."""
         if self.fibres is not None:
             return self.fibres.section_points(self.GA)
         if hinge is not None and not hinge.opens:
@@ -141,7 +141,7 @@ class Section(Record):
             rho: Density; kg/m³.
             shear_factor: Shear area divided by A.
             depth: Depth in the plane of motion; m.
-            fibres: Fibres; EA and EI are then sums over the fibres.
+            fibres: Fibres with positions; EA and EI are then sums over the fibres.
             laws: ``axial``, ``shear``, ``bending``, ``hinge``, ``interaction`` of :class:`Section`.
         """
         _require_positive("Section", A=A, I=I, E=E, shear_factor=shear_factor)
@@ -165,12 +165,12 @@ class Section(Record):
     ) -> Section:  # fmt: skip
         """Create a section of fibres with areas ``A`` (m²) at coordinates ``y`` (m).
 
-        The direction of y is to the left of the beam, its origin is arbitrary.  The axis of the
-        beam runs through the centroid of the fibres.
+        The coordinate y points to the left of the direction of the beam; its origin is arbitrary.
+        The axis of the beam runs through the centroid of the fibres.
 
         Raises:
-            ModelError: The lengths of the lists differ, an area is not positive, or all fibres lie
-                at one y.
+            ModelError: The lengths of ``y`` and ``A`` differ, an area is not positive, or all
+                fibres lie at one y.
         """
         require_kind(fibres, Fibres, "Section.of_fibres: fibres")
         require_number(E, "Section: E", positive=True)
@@ -200,7 +200,7 @@ class Section(Record):
         cls, b: float, h: float, *, E: float, nu: float, rho: float | None = None,
         shear_factor: float = 5 / 6, fibres: Fibres | None = None, **laws: Any,
     ) -> Section:  # fmt: skip
-        """Create a rectangle of width ``b`` and depth ``h`` (in the plane of motion); m."""
+        """Create a rectangle of width ``b`` and depth ``h``, the size in the plane of motion; m."""
         _require_positive("Section.rectangle", b=b, h=h)
         placed = PlacedFibres.layers(fibres, E, h, lambda y: _below_in_rectangle(y, b, h))
         return cls.of_shape(
@@ -247,9 +247,9 @@ class Section(Record):
         cls, h: float, b: float, tw: float, tf: float, *, E: float, nu: float,
         rho: float | None = None, fibres: Fibres | None = None, **laws: Any,
     ) -> Section:  # fmt: skip
-        """Create a symmetric I, ``h`` deep and ``b`` wide, web ``tw`` and flanges ``tf`` thick; m.
+        """Create a symmetric I: depth h, width b, thickness tw of the web and tf of the flanges; m.
 
-        It bends about its strong axis; the web between the mid-planes of the flanges carries shear.
+        The section bends about the strong axis.  The shear area is ``tw (h - tf)``.
         """
         _require_positive("Section.i_shape", h=h, b=b, tw=tw, tf=tf)
         if 2 * tf >= h or tw > b:
@@ -271,16 +271,16 @@ class Section(Record):
 
 
 def _below_in_rectangle(y: Array, b: float, h: float) -> Array:
-    """Return the area up to y, less a constant, and its first moment; (2, n)."""
+    """Return the area up to y and its first moment, each up to a constant; (2, n); m², m³."""
     y = np.clip(y, -h / 2, h / 2)
     return np.array([b * y, b * y**2 / 2])
 
 
 def _below_in_circle(y: Array, d: float) -> Array:
-    """Return the area up to y, less a constant, and its first moment; (2, n)."""
+    """Return the area up to y and its first moment, each up to a constant; (2, n); m², m³."""
     r = d / 2
     y = np.clip(y, -r, r)
-    half_chord = np.sqrt((r - y) * (r + y))  # as a product, it is never negative by round-off
+    half_chord = np.sqrt((r - y) * (r + y))  # this product is never negative
     area = y * half_chord + (r**2 * np.arcsin(y / r) if r else 0.0)
     return np.array([area, -2 / 3 * half_chord**3])
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Softening laws of hinges and cracks: traction as a function of the opening."""
+"""Softening laws of hinges, cracks and springs: traction as a function of the opening."""
 
 from __future__ import annotations
 
@@ -20,41 +20,41 @@ from ufl_beam.model.material_law import WRITTEN, require_field, require_fields
 from ufl_beam.model.records import FromZero, Positive, Record
 
 OWN_LAW = "state a SofteningLaw of your own"
-"""Remedy in the error if a user derives a subclass from a closed class."""
+"""Advice in the error that a subclass of a closed class raises."""
 
 QUADRATURE_POINTS = 6
 """Number of points of Gauss-Legendre quadrature of a traction over a step.
 
-For an exponential traction the error is 1e-12 of the mean in a step that opens by 2 energy/limit
-and dissipates 86 % of the energy, and 5e-20 in a step that opens by 0.5 energy/limit.
+For an exponential traction the relative error of the mean is below 1e-12 in a step that opens by
+2 energy/limit, which dissipates 86 % of the energy.  For 0.5 energy/limit the error is 5e-20.
 """
 
 SMALL_GROWTH = 1e-4
-"""Growth, as a multiple of energy/limit, above which mean tractions are differences of energies.
+"""Growth above which mean tractions are differences of energies, as a multiple of energy/limit.
 
 At this growth the difference loses four digits.  For a smaller growth quadrature is exact to
 round-off, or to 1e-10 of the energy if the step contains a kink.
 """
 
 MOST_INTERVALS = 10_000
-"""Number of intervals above which adaptive quadrature stops; for a noisy law it never converges."""
+"""Number of intervals above which adaptive quadrature stops, as for a law with noise."""
 
 DECADES = 20
-"""A law is sampled at openings from 10**-DECADES to 10**DECADES; m or rad."""
+"""Laws are sampled at openings from 10**-DECADES to 10**DECADES; m or rad."""
 
 
 class SofteningLaw(ABC):
-    """Base of the laws of hinges and cracks that lose their resistance.
+    """Base of the softening laws of hinges, cracks and springs.
 
     A user's law is a frozen dataclass, whose fields are its parameters.  Its methods are called
     with arrays and with UFL expressions; therefore they use the functions of ``ub.law_functions``.
-    The traction must be positive at zero opening and vanish at large openings; it may rise before
-    it falls.  See docs/extending_laws.md.
+    The traction must be positive at zero opening and vanish at large openings.  It may rise before
+    it falls.  Tractions are in N m, N or Pa, openings in rad or m.  See docs/extending_laws.md.
 
     Attributes:
         limit: Traction at zero opening; a field of the law, or computed from :meth:`traction`.
-        fracture_energy: Integral of the traction over all openings; a field of the law, or
-            computed by quadrature.
+        fracture_energy: Integral of the traction over all openings, J or J/m²; a field of the law,
+            or computed by quadrature.
 
     Example:
         >>> from dataclasses import dataclass
@@ -79,14 +79,14 @@ class SofteningLaw(ABC):
         """Return the traction at an accumulated opening; N m, N or Pa."""
 
     def energy_to(self, opening: Values) -> Values | None:
-        """Return the integral of the traction up to an opening; None leaves it to quadrature."""
+        """Return the integral of the traction from zero to an opening; None means quadrature."""
         return None
 
     def mean_traction(self, opening: Values, growth: Values) -> Values:
-        """Return the mean traction over a growth of the opening; dissipation is their product.
+        """Return the mean traction over a growth of the opening; mean times growth is dissipated.
 
-        It is the difference of :meth:`energy_to` divided by the growth.  Gauss-Legendre quadrature
-        replaces this if a law has no ``energy_to``, or if the growth is too small for a difference.
+        The mean is a difference of :meth:`energy_to` divided by the growth.  If a law has no
+        ``energy_to``, or if the growth is small, the mean is computed by Gauss-Legendre quadrature.
         """
         points, weights = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
         terms = zip(points.tolist(), weights.tolist(), strict=True)
@@ -114,11 +114,11 @@ class SofteningLaw(ABC):
 
     @property
     def steepest(self) -> tuple[float, float]:
-        """Largest fall of the traction per opening, and an opening with this fall."""
+        """Steepest decrease of the traction per opening, and an opening with this decrease."""
         return traction_properties(self).steepest
 
     def parameters(self) -> dict[str, Any]:
-        """Return the parameters of the law by name: its fields, limit and energy."""
+        """Return the parameters of the law by name: fields, limit and fracture energy."""
         own = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
         return {"limit": self.limit, "fracture_energy": self.fracture_energy} | own
 
@@ -136,18 +136,18 @@ class SofteningLaw(ABC):
 # -- laws of the package -------------------------------------------------------------------------
 
 LARGEST_DECAY = 70.0
-"""Exponent of the decay above which a traction is set to zero; it is then below 1e-30 of the limit.
+"""Exponent of the decay above which a traction is set to zero.
 
-Such tractions are far below round-off, and smaller ones would underflow to noise in forces and
-stiffnesses.
+The traction is then below 1e-30 of the limit, far below round-off.  Still smaller tractions would
+cause underflow.
 """
 
 
 @dataclass(frozen=True)
 class _LimitAndEnergy(Record, SofteningLaw):
-    """Base of laws with a limit and an energy, whose tractions never exceed the limit.
+    """Base of laws with the parameters limit and energy, whose tractions never exceed the limit.
 
-    The tractions fall by at most limit²/energy per opening; a steeper law must define ``steepest``.
+    Tractions decrease by at most limit²/energy per opening; a steeper law must define ``steepest``.
     """
 
     limit: FromZero
@@ -156,17 +156,17 @@ class _LimitAndEnergy(Record, SofteningLaw):
 
     @property
     def steepest(self) -> tuple[float, float]:
-        """Bound on the fall per opening, at zero opening; linear softening has half this fall."""
+        """Upper bound of the decrease per opening, and zero as an opening with this decrease."""
         return self.limit * (self.limit / self.fracture_energy), 0.0
 
 
 @closed(OWN_LAW)
 class Softening(_LimitAndEnergy):
-    """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
+    """Exponential softening of a hinge, crack or spring to zero traction, P(51)-P(53).
 
     Args:
-        limit: Traction at which opening begins: moment of a hinge, N m; stress of a fibre, Pa;
-            force or moment of a spring.  Zero is a perfect joint; with infinity nothing opens.
+        limit: Traction at which opening begins: moment of a hinge (N m), stress of a fibre (Pa),
+            force or moment of a spring.  Zero is a frictionless joint; infinity prevents opening.
         fracture_energy: Energy that a complete opening dissipates: J; for fibres J/m².
 
     Raises:
@@ -179,12 +179,12 @@ class Softening(_LimitAndEnergy):
     """
 
     def traction(self, ξ: Values) -> Values:
-        """Return the resistance after the accumulated opening ξ."""
+        """Return the traction at the accumulated opening ξ."""
         decay = self.limit / self.fracture_energy * ξ
         return where(below(decay, LARGEST_DECAY), self.limit * exp(-decay), 0.0)  # P(52)!
 
     def mean_traction(self, ξ: Values, a: Values) -> Values:
-        """Return the mean resistance from ξ to ξ + a; its product with a is dissipated."""
+        """Return the mean traction from ξ to ξ + a; mean times a is dissipated."""
         x = self.limit / self.fracture_energy * a
         small = below(x, 0.1)  # where the series of (1 - exp(-x))/x is exact
         series = 1.0
@@ -196,7 +196,7 @@ class Softening(_LimitAndEnergy):
 
 @closed(OWN_LAW)
 class LinearSoftening(_LimitAndEnergy):
-    """Linear softening of a hinge or crack, to zero at the opening 2 fracture_energy / limit.
+    """Linear softening to zero traction at the opening 2 fracture_energy / limit.
 
     It has the arguments and errors of :class:`Softening`.
 
@@ -207,11 +207,11 @@ class LinearSoftening(_LimitAndEnergy):
     """
 
     def traction(self, ξ: Values) -> Values:
-        """Return the resistance after the accumulated opening ξ."""
+        """Return the traction at the accumulated opening ξ."""
         return positive(self.limit - self.limit**2 / (2 * self.fracture_energy) * ξ)
 
     def mean_traction(self, ξ: Values, a: Values) -> Values:
-        """Return the mean resistance from ξ to ξ + a; its product with a is dissipated."""
+        """Return the mean traction from ξ to ξ + a; mean times a is dissipated."""
         now, slope = self.traction(ξ), self.limit**2 / (2 * self.fracture_energy)
         ends = below(now - slope * a, 0.0)
         safe = where(ends, slope * a, 1.0)
@@ -219,7 +219,7 @@ class LinearSoftening(_LimitAndEnergy):
 
 
 def require_softening(law: object, what: str) -> None:
-    """Raise :class:`ModelError` naming ``what`` unless a law is a valid softening law."""
+    """Raise :class:`ModelError` unless ``law`` is a valid softening law."""
     require_kind(law, (Softening, LinearSoftening, SofteningLaw), what)
     if isinstance(law, _LimitAndEnergy):
         return
@@ -239,16 +239,16 @@ def require_softening(law: object, what: str) -> None:
         raise ModelError(f"{what}: {error}") from error.__cause__
 
 
-# -- parameters that follow from the traction ----------------------------------------------------
+# -- properties computed from the traction -------------------------------------------------------
 
 
 class TractionProperties(NamedTuple):
-    """Properties of a traction over all openings."""
+    """Properties of the traction of a law as a function of the opening."""
 
     limit: float
     fracture_energy: float
-    largest: float  # traction
-    steepest: tuple[float, float]  # largest fall per opening, and an opening with this fall
+    largest: float  # largest traction
+    steepest: tuple[float, float]  # steepest decrease per opening, and an opening where it occurs
 
 
 @lru_cache(maxsize=256)
@@ -265,7 +265,7 @@ def traction_properties(law: SofteningLaw) -> TractionProperties:
         )
     _require_not_negative(kind, edges, t)
     energy = _integral(law, edges)
-    if t[-1] > 0:  # add the energy of larger openings, by the power law of the last decade
+    if t[-1] > 0:  # add the energy of larger openings by the power law of the last decade
         power = np.log(t[-17] / t[-1]) / np.log(edges[-1] / edges[-17])
         if power <= 1.01:
             raise ModelError(
@@ -304,7 +304,7 @@ def _require_not_negative(kind: str, jumps: Array, t: Array) -> None:
 
 
 def _called(law: SofteningLaw, method: str, jumps: Array) -> Array:
-    """Call a method of a law with openings; raise :class:`ModelError` unless it returns numbers."""
+    """Evaluate a method of a law at openings; raise :class:`ModelError` if results are invalid."""
     what = f"{type(law).__name__}.{method}"
     remedy = ". It is called with arrays of openings, real or complex"
     with calling(f"{what} fails", remedy + WRITTEN):
@@ -323,9 +323,9 @@ def _called(law: SofteningLaw, method: str, jumps: Array) -> Array:
 
 
 def _integral(law: SofteningLaw, edges: Array) -> float:
-    """Integrate a traction; intervals are halved until quadrature is exact to round-off.
+    """Integrate a traction by adaptive Lobatto quadrature, if possible to round-off.
 
-    Lobatto's rule has points at both ends of an interval, so that it detects kinks near the ends.
+    Lobatto's rule detects kinks near the ends of an interval, because it has points at both ends.
     """
     polynomial = np.polynomial.Legendre.basis(QUADRATURE_POINTS)
     x = np.array([-1.0, *polynomial.deriv().roots(), 1.0])
@@ -373,7 +373,7 @@ def _require_integral(law: SofteningLaw, unit: float, energy: float) -> None:
 
 
 def _slope(law: SofteningLaw, a: float, b: float, limit: float, unit: float) -> tuple[float, float]:
-    """Find the steepest fall in an interval by bisection, and the opening where it begins."""
+    """Find the steepest decrease in an interval by bisection, and the opening where it begins."""
 
     def traction(opening: float) -> float:
         return float(_called(law, "traction", np.array([opening]))[0])

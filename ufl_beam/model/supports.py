@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Supports: components of motion of a place that are held or prescribed."""
+"""Supports: fixed or prescribed components of the motion of a place."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ Motion = float | TimeFunction
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Support(Bearing, Record, ABC):
-    """Held or prescribed motion of a place; base of :class:`Clamped` and other supports.
+    """Fixed or prescribed motion of a place; base of :class:`Clamped` and other supports.
 
     Attributes:
-        place: Supported place.
-        held: Function of time of each held component: 0 and 1, displacements in axes turned by
-            ``angle``, m; 2, rotation, rad.
-        angle: Direction of the first axis; rad.
+        place: Supported place: on a beam, or the centre of a body.
+        held: Functions of time of the prescribed components: 0 and 1 are displacements in axes
+            turned by ``angle`` (m), 2 is the rotation (rad).
+        angle: Angle from the x axis to the axis of component 0; rad.
 
     Example:
         >>> foot = ub.Clamped(beam.start)
@@ -48,7 +48,7 @@ class Support(Bearing, Record, ABC):
     @property
     @abstractmethod
     def held(self) -> dict[int, TimeFunction]:
-        """Function of time of each held component."""
+        """Functions of time of the prescribed components."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -59,7 +59,7 @@ class Support(Bearing, Record, ABC):
 
     @property
     def moving(self) -> dict[int, TimeFunction]:
-        """The held components without those that are fixed at zero."""
+        """Functions in ``held`` except the components that are fixed at zero."""
         return {c: f for c, f in self.held.items() if f != still}
 
     def __str__(self) -> str:
@@ -117,7 +117,7 @@ class Roller(Support):
 
     @property
     def held(self) -> dict[int, TimeFunction]:
-        """The displacement across ``along``."""
+        """Displacement across ``along``, fixed at zero."""
         return {0 if self.along[0] == 0.0 else 1: still}
 
     @property
@@ -130,8 +130,8 @@ class Roller(Support):
 class PrescribedDisplacement(Support):
     """Prescribed motion of a place by numbers or functions of time; m, m, rad.
 
-    A number is reached at once, also in statics.  For a motion in proportion to the time give a
-    function such as ``lambda t: 0.1 * t``.
+    A number is the value from the first step on, also in statics.  For a motion that grows in time
+    give a function such as ``lambda t: 0.1 * t``.  Components without a value are free.
 
     Example:
         >>> turned = ub.PrescribedDisplacement(
@@ -149,7 +149,7 @@ class PrescribedDisplacement(Support):
 
     @cached_property
     def held(self) -> dict[int, TimeFunction]:
-        """Function of time of each held component."""
+        """Functions of time of the prescribed components."""
         components: dict[int, TimeFunction] = {}
         for component, value in enumerate((self.u, self.v, self.psi)):
             if callable(value):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Virtual works and potentials along beams, stated by users in UFL."""
+"""Virtual works and potentials along beams, which users write in UFL."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def _require_name(name: Any, what: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Work(Record):
-    """Base of effects along beams, stated by a function that returns a density of work or energy.
+    """Base of effects along beams, defined by a function that returns a work or energy per length.
 
     Attributes:
-        arguments: Names that the parameters of the function may have, besides ``numbers``.
+        arguments: Possible names of the parameters of the function, besides names in ``numbers``.
     """
 
     arguments: ClassVar[tuple[str, ...]]
@@ -72,7 +72,7 @@ class Work(Record):
 
     @property
     def used_arguments(self) -> tuple[str, ...]:
-        """Names of the parameters of the function, each known; others raise an error."""
+        """Names of the parameters of the function; an unknown name raises :class:`ModelError`."""
         known = (*self.arguments, *self.numbers)
         asked = parameters_by_name(
             self.density, known, f"{self}: the function", more=", and the names in `numbers`"
@@ -86,12 +86,12 @@ class Work(Record):
 
     @property
     def takes_rates(self) -> bool:
-        """True if the function takes ``v`` or ``dt``, which only a time step defines."""
+        """True if the function has a parameter ``v`` or ``dt``, which only a time step defines."""
         return not {"v", "dt"}.isdisjoint(self.used_arguments)
 
     @property
     def in_time(self) -> str:
-        """Name of the entry with the energy that a potential gains by a change in time."""
+        """Ledger entry of the energy that a potential gains by explicit dependence on time."""
         return f"{self.name} in time"
 
     def on(self, beams: Sequence[Member]) -> Sequence[Member]:
@@ -102,37 +102,37 @@ class Work(Record):
 @closed("give it a function of your own")
 @dataclass(frozen=True, eq=False)
 class VirtualWork(Work):
-    """Virtual work of a distributed effect, which a user states in UFL.
+    """Virtual work of a distributed effect, written in UFL.
 
-    The function returns the work of the effect on a virtual motion, per undeformed length and with
-    the sign of loads: a force f along y is ``f * w[1]``.  UFL derives the tangent.  The function
-    may have parameters of these names:
+    The function returns the work of the effect in a virtual motion, per undeformed length and with
+    the sign of loads: for a force f along y it is ``f * w[1]``.  UFL derives the tangent.  The
+    function may have parameters of these names:
 
     * ``q0``, ``q1``: configurations (u_x, u_y, ψ) at both ends of the step; m, m, rad,
-    * ``q``: configuration at the instant of the step at which loads act, in
-      :class:`EnergyMomentum` the mean of ``q0`` and ``q1``,
+    * ``q``: configuration at the time of the loads, in :class:`EnergyMomentum` the mean of ``q0``
+      and ``q1``,
     * ``v``: mean velocity of the step, (q1 - q0)/dt, also in static runs; m/s, m/s, rad/s,
     * ``w``: virtual motion (w_x, w_y, w_ψ), in which the work is linear; m, m, rad,
-    * ``axis``: undeformed axis: point ``axis.x`` (2,), tangent ``axis.t0``, normal ``axis.n0``,
-      derivative along the axis ``axis.d(f)``, length of the cell ``axis.h``,
+    * ``axis``: undeformed axis with point ``axis.x`` (m), unit tangent ``axis.t0`` and normal
+      ``axis.n0``, all (2,), derivative ``axis.d(f)`` by arc length, cell length ``axis.h`` (m),
     * ``t``, ``dt``: time at which the effect acts, and length of the step; s,
     * the names in ``numbers``.
 
-    The work of the effect since the beginning of a run is the entry ``name`` of the supplied energy
-    in the ledger.  State effects that store energy as a :class:`Potential`.  A static run has real
-    time: there works with ``v`` act like dampers, with a warning.
+    The entry ``name`` in ``energy.supplied`` is the work of the effect since the beginning of the
+    run.  For effects that store energy use a :class:`Potential`.  In a static run, too, ``v`` is
+    not zero: works with ``v`` act as dampers there, with a warning.
 
     Args:
-        name: Entry in the ledger.
+        name: Name of the entry in the ledger.
         density: The function; J/m.
-        beams: Beams on which it acts; all by default.
+        beams: Beams on which the effect acts; all by default.
         numbers: Parameters of the function: numbers or functions of time.  New values need no
             compilation.
-        degree: Degree of polynomials that are integrated exactly in cells of degree 1.  Each
-            further degree of the cells adds two.
+        degree: Degree of polynomials along a cell that quadrature integrates exactly, for
+            ``Mesh(degree=1)``.  Each further degree of the mesh adds two.
 
     Raises:
-        ModelError: The function is not linear in w, or not a scalar of UFL; the name is taken.
+        ModelError: The name is taken.  In a run, the function returns no UFL scalar linear in w.
 
     Example:
         >>> def drag(v, w, c):
@@ -153,19 +153,19 @@ class VirtualWork(Work):
 @closed("give it a function of your own")
 @dataclass(frozen=True, eq=False)
 class Potential(Work):
-    """Potential energy of a distributed effect, which a user states in UFL.
+    """Potential energy of a distributed effect, written in UFL.
 
     The function returns the energy per undeformed length.  Its parameters may be ``q``, ``axis``,
     ``t`` and the names in ``numbers``, see :class:`VirtualWork`.  UFL derives the forces.
-    :class:`EnergyMomentum` and related schemes use the mean of the forces over the step.  Then the
-    work of the forces is the increment of the energy: to round-off for polynomials up to degree 8,
-    otherwise with an error of the ninth power of a step.  The energy is the entry ``name`` of the
-    state in the ledger; energy gained by changes in time is the supplied entry "name in time".
+    :class:`EnergyMomentum` and related schemes use the mean of the forces over the step.  The work
+    of the forces is then the increment of the energy: to round-off for polynomials up to degree 8,
+    otherwise with an error of order nine in the step.  The energy is the entry ``name`` in
+    ``energy.state``; ``energy.supplied["name in time"]`` is energy gained by changes in time.
 
     It has the arguments of :class:`VirtualWork`.
 
     Raises:
-        ModelError: The function does not depend on q, or is not a scalar of UFL; the name is taken.
+        ModelError: The name is taken.  In a run, the function returns no UFL scalar with q.
 
     Example:
         >>> soil = ub.Potential("soil", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": 1e6})  # N/m²
