@@ -141,6 +141,45 @@ def test_a_scene_has_the_same_limits_again():
     assert all((one[cell] == other[cell]).all() for cell in range(7))
 
 
+def test_beams_between_the_same_points_differ():
+    """Two columns side by side, drawn on one axis, do not break at the same load."""
+    a, same = frame()[0], frame()[0]
+    values = limits([a, same])
+    assert len(np.unique(np.concatenate(list(values.values())))) == 6 * 6
+    alone = limits([a])
+    assert all((alone[cell] == values[cell]).all() for cell in range(3))
+
+
+def springs(order):
+    """Moments at the feet of three columns, whose springs yield at random limits."""
+    section = ub.Section.rectangle(0.1, 0.2, E=210e9, nu=0.3)
+    feet, tops, scenes = [], [], []
+    for k in range(3):
+        column = ub.Beam((k, 0), (k, 1), section, cells=2)
+        law = ub.ElastoPlastic(ub.Normal(10e3, 2e3, seed=SEED), kinematic=1e5)
+        feet.append(ub.Turn(ub.ground(k, 0), column.start, ub.Spring(1e6, law=law)))
+        tops.append(ub.PointLoad(column.end, force=(12e3, 0.0), amplitude=lambda t: t))
+        scenes.append(column)
+    return ub.Scene(
+        [scenes[k] for k in order], connectors=[feet[k] for k in order], loads=tops,
+        supports=[ub.PrescribedDisplacement(x.start, u=0.0, v=0.0) for x in scenes],
+    ), feet  # fmt: skip
+
+
+def test_springs_draw_by_their_places():
+    """Neither the order, the processes nor the solver change the draws; each spring has its own."""
+    found = []
+    for order, options in (
+        ((0, 1, 2), {}), ((2, 0, 1), {}), ((0, 1, 2), {"comm": MPI.COMM_SELF}),
+        ((0, 1, 2), {"comm": MPI.COMM_SELF, "newton": ub.Newton(reference=True)}),
+    ):  # fmt: skip
+        scene, feet = springs(order)
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, **options)
+        found.append([run.connector(foot).motion[-1] for foot in feet])
+    assert np.ptp(found, axis=0).max() < 1e-9 * np.abs(found).max()
+    assert np.diff(np.sort(found[0])).min() > 1e-3 * np.abs(found).max()
+
+
 def test_other_beams_change_nothing():
     """A beam draws for itself: what comes after it, and how it is meshed, does not matter."""
     a, b = frame()

@@ -518,9 +518,11 @@ def test_what_needs_steps_in_time_is_refused():
     parts = {"beams": scene.beams, "joints": scene.joints, "supports": scene.supports}
     rubs = ub.Slide(ub.ground(0, 0), left, ub.Coulomb(5.0), axis=(0, 1))
     drag = ub.VirtualWork("drag", lambda v, w, axis: -ufl.dot(v, w))
+    creep = ub.VirtualWork("creep", lambda q, w, dt, axis: -ufl.dot(q, w) * dt)
     for more, said in (
         ({"connectors": [rubs]}, r"Slide.*dry friction sticks or slides .* a path has none"),
-        ({"works": [drag]}, r"'drag'.*depends on the velocity v, and a path has no time"),
+        ({"works": [drag]}, r"'drag'.*depends on the velocity v, and a path has no time; leave v"),
+        ({"works": [creep]}, r"'creep'.*depends on the step length dt, and .*; leave dt out"),
     ):
         with pytest.raises(ub.ArgumentError, match=said):
             ub.follow(ub.Scene(**parts, loads=scene.loads, **more), ub.LoadControl(0.1))

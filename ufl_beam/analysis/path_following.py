@@ -217,10 +217,11 @@ def _require_load_factor(scene: Scene, t0: float) -> None:
         if isinstance(connector.law, ConnectorLaw):
             require_limit(connector.law, str(connector))
     for work in scene.works:
-        if "v" in work.used_arguments:
+        if work.takes_rates:
+            rate = "velocity v" if "v" in work.used_arguments else "step length dt"
             raise ArgumentError(
-                f"{work}: it depends on the velocity v, and a path has no time; leave v out, or "
-                "use simulate(scene, Static(), ...)"
+                f"{work}: it depends on the {rate}, and a path has no time; leave "
+                f"{rate.split()[-1]} out, or use simulate(scene, Static(), ...)"
             )
     times = (t0 + 1e-3, t0 + 1.0, t0 - 1e-3, t0 - 1.0)
     changes = any("t" in work.used_arguments for work in scene.works)

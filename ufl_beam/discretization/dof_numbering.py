@@ -8,12 +8,10 @@ number of processes.
 
 from __future__ import annotations
 
-import struct
 from bisect import bisect_left
 from collections.abc import Sequence
 from functools import cache, cached_property
 from typing import Any, TypeAlias
-from zlib import crc32
 
 import numpy as np
 
@@ -34,7 +32,7 @@ from ufl_beam.model.bodies import (
 )
 from ufl_beam.model.checks import require_kind
 from ufl_beam.model.connectors import Connector, place_of
-from ufl_beam.model.fibres import SectionPoints
+from ufl_beam.model.fibres import SectionPoints, stream_keys
 from ufl_beam.model.functions import points_along
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.softening_laws import SofteningLaw
@@ -263,14 +261,19 @@ class DofNumbering:
         """Return the law of the hinge in the middle of each cell of a beam, or None."""
         return [beam.section.hinge] * len(self.cells_of(beam))
 
-    def keys(self, cells: Index) -> list[tuple[int, int]]:
-        """Return for each cell a checksum of the ends of its beam, and its number in the beam."""
+    def keys(self, cells: Index) -> list[tuple[int, ...]]:
+        """Return for each cell the key of its stream of random values, see :func:`stream_keys`.
+
+        It consists of a checksum of the ends of the beam, the number of the cell in the beam, and,
+        for the further beams between the same ends, their number.
+        """
         beams = self.beam_of_cell[cells]
-        checksums = [
-            crc32(struct.pack("4d", *beam.ends[0], *beam.ends[1])) for beam in self.scene.beams
-        ]
+        keys = stream_keys(beam.ends for beam in self.scene.beams)
         in_beam = cells - self._first_cells[beams]
-        return [(checksums[b], int(c)) for b, c in zip(beams, in_beam, strict=True)]
+        return [
+            (keys[b][0], int(c), *keys[b][1:] * bool(keys[b][1]))
+            for b, c in zip(beams, in_beam, strict=True)
+        ]
 
     # -- places ----------------------------------------------------------------------------------
 

@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+import struct
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property, partial
 from typing import Annotated, Any, NamedTuple
+from zlib import crc32
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +20,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.display import compact_repr
 from ufl_beam.errors import ModelError
 from ufl_beam.model.checks import require_count, require_kind
+from ufl_beam.model.functions import Point
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import MaterialLaw, require_law, uniform
 from ufl_beam.model.records import Positive, Record
@@ -84,7 +88,7 @@ class SectionPoints:
                 )
         return kind
 
-    def parameters(self, keys: list[tuple[int, int]]) -> dict[str, Values]:
+    def parameters(self, keys: Sequence[tuple[int, ...]]) -> dict[str, Values]:
         """Return the parameters of the laws at the points of cells by name, each (cells, n).
 
         Random values depend on the ``keys`` of the cells and the seed of a distribution.
@@ -186,9 +190,10 @@ class PlacedFibres:
 class Distribution(Record, ABC):
     """Base of the distributions of a random quantity that is not negative.
 
-    Each cell draws from a random stream of its own.  The key of the stream is a checksum of the
-    ends of the beam, and the number of the cell in the beam.  So values in beams depend on neither
-    the order of beams nor the number of processes.
+    Each cell and each spring draws from a random stream of its own.  The key of the stream is a
+    checksum of the ends of the beam and the number of the cell in the beam, or a checksum of the
+    places of the spring.  So values depend on neither the number of processes nor the order of
+    beams and springs, except of those between the same two points.
     """
 
     _: KW_ONLY
@@ -199,10 +204,21 @@ class Distribution(Record, ABC):
     def _law(self) -> Any:
         """Return the distribution of SciPy."""
 
-    def draw(self, n: int, key: tuple[int, int]) -> npt.NDArray[np.float64]:
+    def draw(self, n: int, key: tuple[int, ...]) -> npt.NDArray[np.float64]:
         """Draw ``n`` independent values from the stream ``key``; negative values become 0; (n,)."""
         stream = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
         return np.asarray(np.maximum(self._law().rvs(n, random_state=stream), 0.0))
+
+
+def stream_keys(segments: Iterable[tuple[Point, Point]]) -> list[tuple[int, int]]:
+    """Return a key for each pair of points: a checksum, and the number of earlier equal pairs."""
+    seen: Counter[int] = Counter()
+    keys = []
+    for a, b in segments:
+        checksum = crc32(struct.pack("4d", *a, *b))
+        keys.append((checksum, seen[checksum]))
+        seen[checksum] += 1
+    return keys
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,7 @@ from ufl_beam.model.connector_laws import (
     RigidPlastic,
 )
 from ufl_beam.model.connectors import Component, Connector, plastic_hinges
+from ufl_beam.model.fibres import stream_keys
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import (
@@ -214,6 +215,13 @@ class Scene(Record, Rich):
         attached = [place for _, place in self.attachments()]
         attached += [connector.a for connector in self.all_connectors]
         return (*self.bodies, *((GROUND,) if any(node(p) is GROUND for p in attached) else ()))
+
+    @cached_property
+    def stream_keys(self) -> dict[Connector, tuple[int, int]]:
+        """Keys of random values of connectors, by the points that the connectors join."""
+        connectors = self.all_connectors
+        keys = stream_keys((c.corner or c.a.point, c.b.point) for c in connectors)
+        return dict(zip(connectors, keys, strict=True))
 
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
         """Iterate over (owner, function of time) for loads, supports, connectors and works."""

@@ -294,12 +294,13 @@ class _SpringLaw(LawInStep):
     def __init__(self, connector: Connector, setting: Setting) -> None:
         super().__init__(connector, setting)
         law, softening = self.law.law or ElastoPlastic(yield_limit=np.inf), self.law.softening
+        key = [setting.numbering.scene.stream_keys[connector]]
         section_points = SectionPoints(
             strains=np.eye(1, 3), weights=np.ones(1), stiffness=np.array([self.law.stiffness]),
             laws=((law, 1),), rest=np.zeros(3), breaking=slice(None),
             softening=softening if softening is not None and softening.opens else None,
         )  # fmt: skip
-        self._points = MaterialPoints(section_points, [(0, 0)], np.ones(1), setting)
+        self._points = MaterialPoints(section_points, key, np.ones(1), setting)
         self.stored = self._points.stored
         self.opens = self._points if self._points.softens else None
 

@@ -110,7 +110,7 @@ class StepEquation:
         inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
         self.inertia = inertia
         connectors = Setting(
-            self.controllers.place, None if inertia is None else inertia.c, scene.size, scheme,
+            self.controllers.place, None if inertia is None else inertia.c, scene, scheme,
             ledger, friction_repeats(scene), search, switched,
         )  # fmt: skip
         self.connector_terms = together(connector_terms, subdomain, connectors, A)

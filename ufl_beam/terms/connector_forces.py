@@ -175,8 +175,8 @@ class ConnectorForces(ConnectorTerm):
             kernel.put(forms.row, self.latest_rows.reshape(self._cells, -1))
         self._in_c = struct(
             "connectors", number=self._cells, components=k, dofs=self._dofs, rows=self.latest_rows,
-            force=self.forces_at.copy(), size=setting.size,
-            length=np.where([c.is_rotation for c in connectors], 1.0, setting.size),
+            force=self.forces_at.copy(), size=setting.scene.size,
+            length=np.where([c.is_rotation for c in connectors], 1.0, setting.scene.size),
             work=work.cells, tangent=tangent.cells, motion=value.cells,
             row=work.position(forms.row), row_of_tangent=tangent.position(forms.row),
             e0=self._e, e1=self._now, before=self._before,
@@ -304,7 +304,7 @@ class Guides(ConnectorTerm):
 
     def __init__(self, subdomain: Subdomain, positions: Index, setting: Setting, A: Csr) -> None:
         super().__init__(subdomain, positions, setting, A)
-        n, size = len(self.connectors), setting.size
+        n, size = len(self.connectors), setting.scene.size
         self._curves = [
             connector.law.curve for connector in self.connectors if isinstance(connector.law, Guide)
         ]

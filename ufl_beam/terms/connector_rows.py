@@ -42,6 +42,7 @@ from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import TimeFunction
 from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import ElastoPlastic
+from ufl_beam.model.scene import Scene
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.energy_ledger import LEDGER_ENTRIES, Account, Ledger
 from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS, Points, expect_entries
@@ -62,7 +63,7 @@ class Setting(NamedTuple):
         [Connector], Any
     ]  # pointer to the force of a controller, or to the limit of friction
     rates: Any  # ``rates`` of loops.h, with the velocities; None in statics
-    size: float  # of the scene; m
+    scene: Scene
     scheme: Scheme
     ledger: Ledger
     friction_repeats: bool  # True if constraints of sticking connectors may be redundant
@@ -104,7 +105,7 @@ class Response:
         self._laws: list[Any] = [connector.law for connector in connectors]
         # Scale of motions: the size of the scene, or a radian
         self._lengths = np.where(
-            [connector.is_rotation for connector in connectors], 1.0, setting.size
+            [connector.is_rotation for connector in connectors], 1.0, setting.scene.size
         )
         self.way: Index = np.zeros(len(connectors), dtype=np.int32)
         self.in_c: dict[str, Any] = {}
@@ -267,7 +268,7 @@ class Springs(Response):
             softening=softening if softening is not None and softening.opens else None,
             breaking=slice(0, None),
         )
-        keys = [(0, i) for i in range(number)]
+        keys = [setting.scene.stream_keys[connector] for connector in connectors]
         self.points = Points(section_points, keys, np.ones(number), setting.scheme, setting.search)
         expect_entries(section_points, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
@@ -423,7 +424,7 @@ class RigidPlasticLaws(Response):
             "rigid_plastic", number=n, width=len(inputs), w=self._storage,
             force=self._forms.force, end=self._forms.end, search=setting.search,
             limit=self._limit, back_force=back_force, dissipated=dissipated,
-            slope=np.array([_slope(connector, setting.size) for connector in connectors]),
+            slope=np.array([_slope(connector, setting.scene.size) for connector in connectors]),
             excess=excess, free=free, way=self.way, way_before=direction_before,
         )  # fmt: skip
         self.in_c = {"rigid_plastic": self._c}
