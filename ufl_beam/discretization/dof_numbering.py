@@ -12,6 +12,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from functools import cache, cached_property
 from typing import Any, TypeAlias
+from zlib import crc32
 
 import numpy as np
 

@@ -91,7 +91,7 @@ class MaterialPoints:
     def __init__(
         self,
         section_points: SectionPoints,
-        keys: list[tuple[int, ...]],
+        keys: Sequence[tuple[int, ...]],
         length: Array,
         setting: Setting,
     ) -> None:

@@ -194,7 +194,7 @@ class Points:
     def __init__(
         self,
         section_points: SectionPoints,
-        keys: list[tuple[int, ...]],
+        keys: Sequence[tuple[int, ...]],
         length: Array,
         scheme: Scheme,
         search: Index | None = None,
