@@ -18,7 +18,7 @@ sliding force may be below the limit: sticking or sliding continues if such an e
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
