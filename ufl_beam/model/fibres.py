@@ -161,7 +161,7 @@ class PlacedFibres:
 
     @property
     def EA(self) -> float:
-        """Axial stiffness; N."""
+        """Axial stiffness EA; N."""
         return float(self.E * self.A.sum())
 
     @property

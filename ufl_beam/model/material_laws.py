@@ -375,7 +375,7 @@ class AxialBending(Record, MaterialLaw):
     variables: ClassVar[Mapping[str, float]] = {"stretch": 0.0, "curvature": 0.0, "flow": 0.0}
 
     def stress(self, strain: Values, state: State) -> Values:
-        """Return (N, M)."""
+        """Return the resultants (N, M)."""
         (Σ, K), (EA, EI) = strain, self.C
         return EA * (Σ - state.stretch), EI * (K - state.curvature)
 
