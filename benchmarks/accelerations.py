@@ -33,7 +33,7 @@ class Acceleration(NamedTuple):
 
 ACCELERATIONS = {
     "Newton's method in C": Acceleration(
-        "Newton's method with full steps, in C, as a SNES of the type \"shell\". Without it, "
+        "Newton's method with full steps is in C, as a SNES of the type \"shell\". Without it, "
         "PETSc's `newtonls` calls the same residual and tangent in C, and Python calls the "
         "factorization.",
         by.SHIPPED, by.PETSC,
@@ -46,8 +46,8 @@ ACCELERATIONS = {
         ),
     ),
     "SIMD kernels": Acceleration(
-        "FFCx's kernels are compiled a second time, for vectors of the processor: they compute "
-        "four or eight cells at once. Without it, FFCx's own kernels compute one cell at a time.",
+        "FFCx's kernels are compiled a second time with SIMD vectors and compute four or eight "
+        "cells at once. Without it, FFCx's own kernels compute one cell at a time.",
         by.SHIPPED, by.SCALAR,
         (
             "compiled/simd_kernels.py", "compiled/c/assembly_simd.c", "compiled/c/assembly_simd.h",
@@ -56,12 +56,12 @@ ACCELERATIONS = {
         ),
     ),
     "elimination along beams": Acceleration(
-        "The unknowns of the vertices between the ends of beams are eliminated in blocks of three; "
-        "dense fronts factor the remaining matrix, or KLU if more than 24 unknowns remain and "
+        "The interior vertices of beams are eliminated first, in blocks of three unknowns. Dense "
+        "fronts factor the remaining matrix; KLU factors it if more than 24 unknowns remain and "
         "forces of connectors are among them. Without it, the same solver factors the whole "
-        "tangent. On several processes, each eliminates the unknowns that no other process has, in "
-        "scenes with forces of connectors only those along beams; every process then factors the "
-        "rest.",
+        "tangent. On several processes, each process eliminates its own unknowns, or in scenes "
+        "with forces of connectors only the unknowns along its beams. Each process then factors "
+        "the remaining matrix.",
         by.SHIPPED, by.WHOLE,
         (
             "compiled/c/beam_elimination.c", "solvers/beam_elimination.py:_interior_vertices",
@@ -71,17 +71,17 @@ ACCELERATIONS = {
     ),
     "dense fronts": Acceleration(
         "The unknowns that remain after the elimination along beams, mostly of joints, are "
-        "eliminated in small dense matrices (fronts); partial sums of their products are kept in "
-        "registers. Without it, KLU, called by PETSc, factors this matrix, as it does with both "
-        "variants if more than 24 unknowns remain and forces of connectors are among them. The "
-        "gain grows with the number of joints: see docs/ranks.md.",
+        "eliminated in small dense matrices (fronts), with partial sums in registers. Without it, "
+        "KLU, called by PETSc, factors the remaining matrix. Both variants use KLU if more than 24 "
+        "unknowns remain and forces of connectors are among them. The gain grows with the number "
+        "of joints: see docs/ranks.md.",
         by.SHIPPED, by.LEFT,
         ("compiled/c/fronts.c", "solvers/multifrontal.py"),
     ),
     "guess with the acceleration": Acceleration(
-        "The initial guess extrapolates with the velocity of the last step and adds the fraction "
-        "of the last second difference of the configuration that is expected to repeat. Without "
-        "it, the guess extrapolates with the velocity of the last step.",
+        "The initial guess extrapolates with the velocity of the last step and adds a fraction of "
+        "the last second difference of the configuration. Without it, the guess only extrapolates "
+        "with the velocity of the last step.",
         by.SHIPPED, by.VELOCITY,
         (
             "compiled/c/steps.c:enter_step", "compiled/c/steps.c:compare_differences",
@@ -90,9 +90,9 @@ ACCELERATIONS = {
         (ELASTIC, LARGE, SWING, HINGED, JOINTED),
     ),
     "tangent kept in the last iteration": Acceleration(
-        "An iteration reuses the tangent of the previous one if the residual is expected to fall "
-        "far below the tolerance with it; the next iteration then has a new tangent. Without it, "
-        "every iteration assembles and factors a tangent.",
+        "An iteration reuses the previous tangent if the residual is expected to fall far below "
+        "the tolerance; the next iteration then has a new tangent. Without it, every iteration "
+        "assembles and factors a tangent.",
         by.SHIPPED, by.TANGENTS,
         ("compiled/c/newton.c~e->near|\\bkept\\b|\\bclose\\b|CLOSE",),
         (ELASTIC, LARGE, HINGED, JOINTED),

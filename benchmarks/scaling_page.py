@@ -54,17 +54,18 @@ def modelled(cases, half, lattice):
 
 def write_page(rows, lattice):
     """Write the tables into the page."""
-    first = ("bays", "processes", "ms per iteration", "gain", "ms per kept state",
-             "built in s", "MB", "cells", "unknowns of joints", "Mflop for them", "border",
+    first = ("bays", "processes", "ms per iteration", "gain", "ms per recorded state",
+             "s to build", "MB", "cells", "unknowns of joints", "Mflop for joints", "border",
              "messages", "kB")  # fmt: skip
-    then = ("lattice", "processes", "border", "s: cells", "joints", "borders", "messages", "total",
+    then = ("lattice", "processes", "border", "cells", "joints", "borders", "messages", "total",
             "GB a process")  # fmt: skip
     of = machine()
     lines = [
         f"Measured at {of['commit']} on {of['processor']}, DOLFINx {of['dolfinx']}.", "",
         row(*first), row(*["---"] * len(first)),
         *(x for cases, _ in rows for x in measured(cases)), "",
-        f"Extrapolated to {CELLS:.0e} cells:", "", row(*then), row(*["---"] * len(then)),
+        f"Extrapolated to {CELLS:.0e} cells, with times in s of one iteration:", "",
+        row(*then), row(*["---"] * len(then)),
         *(x for cases, half in rows for x in modelled(cases, half, lattice)),
     ]  # fmt: skip
     text = PAGE.read_text()

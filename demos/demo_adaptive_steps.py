@@ -1,13 +1,14 @@
 # %% [markdown]
 # # Adaptive steps
 #
-# The four-beam swing moves slowly for 0.64 s, then it snaps taut within microseconds.  Equal steps
-# that resolve the snap are far too short for the rest of the motion.  `dt=ub.Adaptive(tolerance)`
-# chooses the steps by the error of each step, estimated from the change of the acceleration.
+# The four-beam swing moves slowly for 0.64 s, then its links snap taut within microseconds.  Equal
+# steps that resolve the snap are far too short for the rest of the motion.
+# `dt=ub.Adaptive(tolerance)` chooses the length of each step by its error, which is estimated from
+# the change of the acceleration.
 #
 # This demo shows
 #
-# * adaptive and equal steps: the numbers of steps for the same error,
+# * the number of adaptive and of equal steps for the same error,
 # * steps that end at the kinks of the load table,
 # * the list of events, here impacts of the beam on a stop,
 # * the meaning of the tolerance.
@@ -57,19 +58,19 @@ def swing(connectors=()):
 # %% [markdown]
 # ## Errors and steps
 #
-# The error is the distance of the places of the beam at 0.64 s from a run with a smaller tolerance.
+# The error is the largest distance of three points at 0.64 s from a run with a smaller tolerance.
 
 # %%
 END = 0.64  # s
 
 
 def places(solution):
-    """Both ends and the middle of the beam at the end of a run; m."""
+    """Return displacements of both ends and the middle of the beam at the end of a run; m."""
     return np.array([solution.displacement(p)[-1, :2] for p in (beam.start, middle, beam.end)])
 
 
 def run(dt):
-    """The swing until it is taut."""
+    """Simulate the swing until it is taut."""
     return ub.simulate(swing(), ub.EnergyMomentum(), t=(0.0, END), dt=dt)
 
 
@@ -80,7 +81,7 @@ exact = places(run(ub.Adaptive(1e-8)))
 
 
 def error(solution):
-    """Largest distance from the exact places; m."""
+    """Return the largest distance from the reference; m."""
     return float(np.linalg.norm(places(solution) - exact, axis=1).max())
 
 
@@ -101,13 +102,13 @@ for kink in push.times[1:]:
     assert kink in chosen.times
 
 # %% [markdown]
-# For the same error, adaptive steps are fewer than equal steps by an order of magnitude.  The sum
-# of the estimated errors is larger than the error at the end, since errors decay in this motion.
+# For the same error, a tenth of the number of equal steps suffices.  The sum of the estimated
+# errors is larger than the error at the end, because errors decay in this motion.
 #
 # ## Impact on a stop
 #
-# A stop stands 0.12 m to the right of the middle.  `Events` lists the impacts; the steps adapt to
-# them.
+# A stop is 0.12 m to the right of the middle.  `Events` lists the impacts; there the steps are
+# short.
 
 # %%
 stop = ub.Slide(ub.ground(0.36, -0.36), middle, ub.Stop(1e5, high=0.12), axis=(1, 0))
@@ -149,5 +150,5 @@ errors.savefig(output / "adaptive_steps_errors.png")
 # ## Try this
 #
 # * `EnergyMomentum(0.05, 0.05)`: numerical dissipation counts as an error, so steps are shorter.
-# * A pulse without a table, `amplitude=lambda t: 2.0 * (0.1 < t < 0.2)`: the steps find the jumps
-#   at some cost; `ub.Adaptive(1e-6, stops=[0.1, 0.2])` avoids this cost.
+# * A pulse without a table, `amplitude=lambda t: 2.0 * (0.1 < t < 0.2)`: steps are repeated at the
+#   jumps; `ub.Adaptive(1e-6, stops=[0.1, 0.2])` avoids this.

@@ -3,14 +3,14 @@
 #
 # A slender arm of a pick-and-place machine turns with its payload at 4 rad/s when the brake of its
 # hub closes within 20 ms.  The moment at the hub would bend the arm permanently.  A predetermined
-# breaking joint at the hub prevents this: it opens, dissipates exactly its fracture energy, and is
-# a revolute joint from then on, about which the arm swings on.
+# breaking joint at the hub prevents this: it opens and dissipates exactly its fracture energy.
+# From then on it is a revolute joint, about which the arm swings.
 #
 # This demo shows
 #
 # * a hinge that softens, P(49)-P(53), at a chosen place of a moving beam,
 # * the transition from a rigid joint to a revolute joint without a change of the model,
-# * the ledger: the energy that the drive supplied, and its distribution.
+# * the ledger: the energy that the drive supplies, and its distribution.
 #
 # The data of the machine are realistic assumptions: an aluminium tube 50 x 2 mm of 1.5 m and a
 # payload of 2 kg, in the horizontal plane, so that gravity does no work.
@@ -65,9 +65,9 @@ def run(hinges, record=()):
 # %% [markdown]
 # ## Two runs
 #
-# The arm moves with the breaking joint, and without it.  `alpha` damps vibrations that the brake
-# excites, at frequencies far above the natural frequencies of the arm; the ledger lists this loss
-# as "numerical".
+# The arm is simulated with and without the breaking joint.  The brake excites vibrations far above
+# the lowest natural frequencies of the arm.  `alpha` damps them; the ledger lists this loss as
+# "numerical".
 
 # %%
 breaking = {0.0: ub.Softening(M_u, G_f)}
@@ -98,8 +98,8 @@ ub.print_once(
 # %% [markdown]
 # ## Pictures
 #
-# The pictures show the arm every 50 ms, the moments at the hub, the jump of the joint, and the
-# distribution of the energy.
+# The pictures show the arm every 50 ms, the moment at the hub, the jump of rotation in the joint,
+# and the distribution of the energy.
 
 # %%
 from matplotlib import colormaps
@@ -126,7 +126,7 @@ def strobe(axes, solution, beam):
 
 
 def balance(axes, energy):
-    """Draw stacked energies; their sum is the energy that the drive supplied."""
+    """Draw stacked energies, whose sum is the energy supplied by the drive."""
     shares = {
         "kinetic": (blue, "kinetic"), "stored": (sky, "stored"), "hinges": (orange, "lost: joint"),
         "numerical": (grey, "lost: scheme"),
@@ -189,9 +189,9 @@ ub.print_once(
 # %% [markdown]
 # ## Verification
 #
-# The hinge dissipates exactly its fracture energy, and the ledger closes.  Afterwards it is a
-# revolute joint: it has no moment and no dissipation, and the arm swings freely with constant
-# angular momentum about the hub.
+# The hinge dissipates exactly its fracture energy, and the ledger closes.  Afterwards the hinge is
+# a revolute joint without moment and dissipation, and the arm swings freely with constant angular
+# momentum about the hub.
 
 # %%
 for solution in (saved, bent):
@@ -214,7 +214,7 @@ assert np.ptp(momentum) < 1e-2 * momentum.mean()
 # %% [markdown]
 # ## Try this
 #
-# * `LinearSoftening(M_u, G_f)`: the joint is completely open after 2 G_f/M_u = 0.13 rad,
+# * `LinearSoftening(M_u, G_f)`: the joint is completely open at 2 G_f/M_u = 0.13 rad,
 # * `G_f = 60.0`: more than the energy of the arm; where does it stop?
 # * `tube` with `bending=ub.ElastoPlastic(M_yield, isotropic=...)`: how far does the arm bend
 #   without the joint?

@@ -11,8 +11,8 @@
 # * an energy ledger that closes to round-off although energy is dissipated,
 # * a plastic hinge that opens and softens, independently of the mesh.
 #
-# The paper does not print L and the durations, but they follow from its numbers: L = 1 m, and π,
-# 10π and 100π per second are rates of the curvature, so the end turns by π in 1, 0.1 and 0.01 s.
+# The paper does not print L and the durations, but they follow from its numbers.  L = 1 m, and π,
+# 10π and 100π per second are rates of the curvature.  So the end rotates by π in 1, 0.1 and 0.01 s.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -34,17 +34,17 @@ kNcm = 10.0  # N m
 
 
 def section(law=None):
-    """The section of the paper; without a law it is elastic."""
+    """Return the section of the paper, elastic without a law."""
     return ub.Section(EA=E * A, GA=5 / 6 * E * A / 2.6, EI=EI, bending=law)
 
 
 def hardening(viscosity):
-    """Yield at M_y, then linear hardening: K I per plastic curvature."""
+    """Return the law: yield moment M_y, then linear hardening with the modulus K I."""
     return ub.ElastoPlastic(M_y, isotropic=K * I, viscosity=viscosity)
 
 
 def turn(beam, angle, rate, steps, record=()):
-    """Turn the end of a clamped beam by an angle (rad) at a rate (rad/s)."""
+    """Rotate the end of a clamped beam by an angle (rad) at a rate (rad/s); return the solution."""
     scene = ub.Scene(
         [beam],
         supports=[
@@ -71,15 +71,15 @@ def check(solution):
 # %% [markdown]
 # ## Table 1
 #
-# `EnergyMomentumStatic` finds equilibrium over each step, in the middle of its rotation.  Therefore
-# the moment at the end of a step varies along the beam, with the square of the rotation in a step;
-# its mean is exact, since the mean curvature is exact.  (`Static` has no such variation, but its
+# `EnergyMomentumStatic` finds equilibrium over each step.  Therefore the moment at the end of a
+# step varies along the beam, by the order of the squared rotation of the step.  The mean of this
+# moment is exact, because the mean curvature is exact.  (`Static` has no such variation, but its
 # ledger closes only to second order.)
 #
 # The overstress of Perzyna's law, P(39), is η I times the rate of the plastic curvature.  In steady
 # flow this rate is E/(E + K) times the rate of the curvature.  Only the fraction E/(E + K) of the
-# overstress adds to the moment, because it also slows down hardening.  The law of Duvaut and Lions,
-# P(45), with τ = η/(E + K), P(46), is the same law; we use it for the larger η as the paper does.
+# overstress adds to the moment, because the overstress also reduces hardening.  The law of Duvaut
+# and Lions, P(45), with τ = η/(E + K), P(46), is the same law, used for the larger η.
 
 # %%
 M_e = np.pi * EI / L
@@ -87,19 +87,19 @@ M_ep = M_y + E * K / (E + K) * I * (np.pi / L - M_y / EI)
 
 
 def steady(eta):
-    """Closed form at the three rates; N m."""
+    """Return the moments in closed form at the three rates; N m."""
     return M_ep + (E / (E + K)) ** 2 * eta * rates / L * I
 
 
 def moment(solution, beam, n=-1):
-    """Return the mean moment of the law at the n-th kept time, not over the step before it; N m."""
+    """Return the mean moment of the law at the n-th recorded time; N m."""
     if beam.section.bending is None:
         return EI * solution.strains(beam, n)[:, 2].mean()
     return solution.material(beam, n).forces[:, 2].mean()
 
 
 def columns():
-    """Law and rate of each column of the table."""
+    """Generate the law and the rate of each column of the table."""
     yield None, rates[0]
     yield hardening(ub.Perzyna(0.0)), rates[0]
     for rate in rates:
@@ -123,17 +123,17 @@ closed = np.array([M_e, M_ep, *steady(1e6), *steady(2e7)]) / kNcm
 # %% [markdown]
 # ## What the paper prints for η = 2e7 Pa s
 #
-# The paper's computed values result from another update.  It starts the trial stress of a step from
-# the preceding *rate-independent* stress, whereas P(47) starts from the viscous stress.  It uses
-# τ = η/E instead of P(46), and a step of 1 ms at all rates.  Each step then loses the overstress of
-# the preceding steps, so the result depends on the step.  The "exact" values are one step of the
-# same rule from yield to the end.  The package has neither of these rules; they are implemented
-# here.
+# The paper's computed values result from another update of the stress.  This update starts the
+# trial stress of a step from the preceding *rate-independent* stress, whereas P(47) starts from the
+# viscous stress.  It uses τ = η/E instead of P(46), and a step of 1 ms at all rates.  Each step
+# then loses the overstress of the preceding steps, so the result depends on the step.  The paper's
+# "exact" values are one step of this update from first yield to the end.  The demo implements the
+# update, because the package does not contain it.
 
 
 # %%
 def printed_update(rate, eta=2e7, dt=1e-3):
-    """Curvatures and moments of the paper's update; 1/m, N m."""
+    """Return curvatures and moments of the paper's update; 1/m, N m."""
     tau = eta / E
     kappa = np.linspace(0.0, np.pi / L, round(np.pi / rate / dt) + 1)
     plastic = np.maximum(kappa - M_y / EI, 0.0) * E / (E + K)  # rate-independent
@@ -144,7 +144,7 @@ def printed_update(rate, eta=2e7, dt=1e-3):
 
 
 def printed_exact(eta=2e7):
-    """One step from yield to the end; N m."""
+    """Return the moments after one step from first yield to the end; N m."""
     T_p = (np.pi - M_y * L / EI) / rates
     return M_ep + E / (E + K) * eta * rates / L * I / (1 + eta / E / T_p)
 
@@ -160,7 +160,7 @@ update = np.array([printed_update(rate)[1][-1] for rate in rates]) / kNcm
 
 
 def line(name, values):
-    """A row of the table; kN cm."""
+    """Print a row of the table; kN cm."""
     ub.print_once(f"{name:20s}" + "".join(f"{v:10.5f}" if v == v else 10 * " " for v in values))
 
 
@@ -207,14 +207,14 @@ assert 3.8 < spread[100] / spread[200] < 4.2
 # %% [markdown]
 # ## Softening
 #
-# The middle is weaker: at M_u = 8 kN cm a hinge opens there, with the traction M_u exp(-M_u a/G_f)
-# at the jump a, P(52).  While the hinge opens, the beam around it unloads.  As the rotation of the
-# end is prescribed, this is stable if the hinge softens more slowly than the beam unloads:
-# M_u²/G_f < EI/L.  The paper prints the fracture energy as 10·10³ kJ, which would lift a lorry of
-# 40 t by 25 m; we read it as 10·10³ N cm = 100 J, so that 64 < 122 N m/rad.
+# The middle of the beam is weaker: at M_u = 8 kN cm a hinge opens there, with the moment M_u
+# exp(-M_u a/G_f) at the jump a, P(52).  While the hinge opens, the beam around it unloads.  The
+# rotation of the end is prescribed, so this is stable if the hinge softens more slowly than the
+# beam unloads: M_u²/G_f < EI/L.  The paper prints a fracture energy of 10·10³ kJ, which would lift
+# a lorry of 40 t by 25 m.  The demo takes 10·10³ N cm = 100 J, so that 64 < 122 N m/rad.
 #
-# M_u is reached only at 9.7 rad, so we continue to 4π.  At any place the jump adds to the curvature
-# of the bulk: ψ = M L/EI + κ_p L + a, with the plastic curvature κ_p = (M_u - M_y)/(K I).
+# M_u is reached only at 9.7 rad, so the end is rotated to 4π.  The rotation is ψ = M L/EI + κ_p L +
+# a with the plastic curvature κ_p = (M_u - M_y)/(K I).
 
 # %%
 M_u, G_f = 80.0, 100.0  # N m, J
@@ -224,7 +224,7 @@ kappa_p = (M_u - M_y) / (K * I)
 
 
 def soften(others, rate, eta, steps, record=()):
-    """The beam with a hinge in the middle of 20 cm in two cells, and ``others`` cells beside."""
+    """Simulate a beam with a hinge between two cells of 10 cm and ``others`` other cells."""
     sides = np.linspace(0.0, 0.4, others // 2 + 1)[1:]
     beam = ub.Beam(
         (0, 0), (L, 0), section(hardening(ub.DuvautLions(eta / (E + K)))), name="cantilever",
@@ -258,8 +258,8 @@ for name, (psi, at_hinge, solution) in named.items():
 
 # %% [markdown]
 # The bulk dissipates M_y κ_p L until M_u is reached.  The dissipation of the hinge equals the
-# closed form for its jump to round-off.  The moment of the hinge is the mean traction over a step.
-# It is compared with the closed form in the middle of the step: the first step has the largest
+# closed form for its jump to round-off.  The computed moment of the hinge is the mean over a step,
+# so it is compared with the closed form in the middle of the step.  The first step has the largest
 # error, 2 % of M_u.
 
 # %%
@@ -280,8 +280,8 @@ assert opening_at[0] > opening_at[1] > opening_at[2]  # the faster, the earlier
 # %% [markdown]
 # ## Pictures
 #
-# Figure 4 of the paper: moment against curvature.  Meshes of 2, 4 and 8 cells give one curve, and
-# so do the three rates, unless the viscosity is large.
+# The first picture is Figure 4 of the paper: moment against curvature.  Meshes of 2, 4 and 8 cells
+# have the same curve, and so have the three rates, unless the viscosity is large.
 
 # %%
 ink, grey = "#222222", "0.75"
@@ -290,7 +290,7 @@ names = ("π/s", "10π/s", "100π/s")
 
 
 def curve(axes, column, cells, *args, **options):
-    """Mean moment of a run against the mean curvature."""
+    """Draw the mean moment of a run over the mean curvature."""
     solution = runs[cells, column]
     beam = solution.scene.beams[0]
     M = [moment(solution, beam, n) for n in range(len(solution.times))]
@@ -390,11 +390,12 @@ ub.print_once(
 # ## Verification
 #
 # The laws agree with the paper's numbers, and with closed forms to round-off.  The laws of Perzyna
-# and of Duvaut and Lions are identical.  The ledger is exact with all of them, and the moment of a
-# hinge depends on its jump alone, not on the mesh or the rate.
+# and of Duvaut and Lions are identical.  The ledger is exact with all laws.  The moment of a hinge
+# depends only on its jump, not on the mesh or the rate.
 #
 # ## Try this
 #
-# * `G_f = 50.0`: the hinge snaps back, and no rotation of the end can hold it,
-# * `kinematic` instead of `isotropic`, and turn the end back: which law shifts, which law grows?
-# * `DuvautLions(2e7 / E)`, the relaxation time that the paper uses: 5.8963, 5.9881, 6.9056.
+# * `G_f = 50.0`: the hinge snaps back, so static steps find no equilibrium,
+# * `kinematic` instead of `isotropic`, and rotate the end back: which elastic range shifts or
+#   grows?
+# * `DuvautLions(2e7 / E)`, the relaxation time of the paper: 5.8963, 5.9881, 6.9056 kN cm.
