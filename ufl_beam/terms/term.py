@@ -214,7 +214,7 @@ def from_c(
 
 @from_c()
 def curve_in_python(handle: Any, s: float, step: float, out: Any) -> None:
-    """Write CURVE_POINTS points of a curve, at equal steps around the parameter ``s``."""
+    """Write CURVE_POINTS points of a curve to ``out``, at equal parameter steps around ``s``."""
     curve, far = ffi.from_handle(handle)[1], 2 * step
     out[0 : 2 * lib.CURVE_POINTS] = (
         *curve(s - far), *curve(s - step), *curve(s), *curve(s + step), *curve(s + far),
