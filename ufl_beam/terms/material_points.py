@@ -57,7 +57,7 @@ DIGITS = 16 * float(np.finfo(float).eps)
 """Round-off of plastic dissipation, as a fraction of the sum of C e² over points and step ends."""
 
 EXHAUSTED = 1e-6
-"""Fraction of its limit up to which an open hinge counts as a frictionless joint in modes.
+"""Resistance, as a fraction of the limit, up to which modes treat an open hinge as a joint.
 
 At this resistance an exponential law has the same fraction of its fracture energy left.
 """

@@ -130,7 +130,7 @@ def _position(form: Kernel, function: fem.Function) -> int:
 
 
 class Works(LoadTerm):
-    """Works of a user on the cells of a process, which may be none.
+    """Works of a user on the cells of a process; every process has this term.
 
     The ledger has virtual works in ``supplied``, and energies of potentials in ``state``.  Virtual
     works grow in the substeps of the first step, as loads do; potentials act fully from the start.
