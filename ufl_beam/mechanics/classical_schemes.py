@@ -181,9 +181,9 @@ class Newmark(_Accelerated):
         beta: β; from γ/2, below which the scheme is unstable at large steps.
 
     Raises:
-        ArgumentError: A number is out of range.  A run raises it if the scene has dry friction or a
-            rotating frame; unless 2 beta > gamma > 1/2, also if the scene has joints held by
-            multipliers, guides, motors or moving supports.
+        ArgumentError: ``gamma`` or ``beta`` is out of range.
+        ModelError: A run with dry friction or a rotating frame; unless 2 beta > gamma > 1/2, also
+            with joints held by multipliers, guides, motors or moving supports.
 
     Example:
         >>> run = ub.simulate(scene, ub.Newmark(), t=(0, 1), dt=0.05)
@@ -233,7 +233,7 @@ class GeneralizedAlpha(_Accelerated):
 
     Raises:
         ArgumentError: ``rho_inf`` is outside [0, 1].
-        ModelError: In a run, for the scenes that :class:`Newmark` lists; joints only if rho_inf=1.
+        ModelError: As in :class:`Newmark`; for joints and motions only if ``rho_inf=1``.
 
     Example:
         >>> run = ub.simulate(scene, ub.GeneralizedAlpha(rho_inf=0.8), t=(0, 1), dt=0.05)
