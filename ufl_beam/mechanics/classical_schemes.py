@@ -168,13 +168,13 @@ class Newmark(_Accelerated):
     """Newmark's scheme, by default with average acceleration; for comparison with other programs.
 
     With ``gamma = 1/2`` the scheme is of second order without damping.  In large motion its energy
-    is not bounded, and it may diverge where :class:`EnergyMomentum` does not.  ``gamma > 1/2``
-    damps, but is of first order; :class:`GeneralizedAlpha` damps and is of second order.
+    is not bounded, and the scheme may diverge where :class:`EnergyMomentum` does not.  With
+    ``gamma > 1/2`` it damps, but is of first order; :class:`GeneralizedAlpha` is of second order.
 
     The ledger computes works by the trapezoidal rule.  Its imbalance is of second order in the step
     and measures the error.  Initial accelerations come from a trial step of a sixteenth of the
     first step.  Laws that depend on rates, except :class:`Rayleigh`, use the mean rate of the step,
-    and material yields by the state at its end; both approximations are of first order.
+    and yield conditions hold at its end; both approximations are of first order.
 
     Args:
         gamma: γ; from 1/2.

@@ -123,10 +123,10 @@ class Coefficients(NamedTuple):
     Attributes:
         inertia: Row of the acceleration in the equation of the step.
         velocity: Row of the velocity in the equation of the step.
-        rates: Row of the velocities after the step, then rows of the rates of ``kept`` after it.
+        rates: Row of the velocities after the step, then a row of each rate of ``kept`` after it.
         slip: Row of Δu/Δt minus the mean of the velocities at both ends, P(88), whose work on the
-            change of momentum is lost.  Its first number multiplies the change of velocities.  It
-            is None without a loss.
+            change of momentum is lost.  Its first number multiplies the change of velocities.  None
+            means no loss.
 
     Example:
         >>> print(ub.EnergyMomentum().coefficients(dt=0.1, last_dt=0.1, known=0).rates)
@@ -197,9 +197,9 @@ def nodal_step(scheme: Scheme, q0: Array, q1: Array, rotations: Index) -> Array:
 
 
 def increment_to_rest(scheme: Scheme, dt: float) -> float:
-    """Return the displacement in a step that ends at rest, divided by its initial velocity; s.
+    """Return the displacement in a step that ends at rest, divided by the initial velocity; s.
 
-    The result is for a first step.  It is zero in statics and for schemes without a mean velocity.
+    The step has no previous step.  The result is zero in statics and without a mean velocity.
     """
     if not has_inertia(scheme) or not scheme.has_mean_velocity:
         return 0.0

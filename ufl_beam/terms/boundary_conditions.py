@@ -107,7 +107,7 @@ class Supports:
         )  # fmt: skip
 
     def hold(self, r: Array) -> None:
-        """Store the reactions, entries of the summed residual ``r``, and set these to zero."""
+        """Store the reactions in the summed residual ``r``, and set its entries to zero."""
         if len(self.dofs):
             self.reactions[:] = r[self.dofs]
             r[self.dofs] = 0.0

@@ -85,7 +85,7 @@ class CellForces:
         lib.accept_cell_forces(self.c)
 
     def begin(self, values: Array | None) -> None:
-        """Begin with resultants ``values``, (9, num_cells), or with stresses of the residual."""
+        """Set the initial forces to ``values``, (9, num_cells), or to stresses of the residual."""
         if values is not None:
             fill(self.c, given=values)
             return
@@ -122,7 +122,7 @@ class CellForces:
         return all(not c.cell and c.lanes == lanes for c in self._forces)
 
     def keep_latest(self) -> None:
-        """Store all entries of forms in each residual from now on; they are used after a step."""
+        """Store all entries of forms in each residual from now on, for use after a step."""
         self._make()
         structs = (c for c in self._forces if not c.latest and not c.vector)
         for c, (*_, each, values) in zip(structs, self._step_forms, strict=True):
@@ -134,7 +134,7 @@ class CellForces:
     # -- data of solutions ----------------------------------------------------------------------
 
     def forces_from_record(self, record: Array, q: Array, before: Array) -> Array:
-        """Compute the forces from saved :attr:`vectors`, :attr:`entries` and :attr:`factors`."""
+        """Compute the forces from a ``record`` of vectors, entries and factors, in this order."""
         arrays = [*((x, self._subdomain.size) for x in self.vectors), *self.entries, *self.factors]
         values, addresses, at = self.c.given, [place[0] for place, _ in arrays], 0
         record = np.array(record)

@@ -36,7 +36,7 @@ from ufl_beam.terms.term import Callbacks
 
 
 def inputs(law: ConnectorLaw) -> tuple[str, ...]:
-    """Return the names of the inputs of a compiled law; loops.h defines their order."""
+    """Return the names of the inputs of a compiled law in the order of loops.h."""
     motions = (f"{when} {i}" for when in ("motion", "before") for i in range(law.components))
     data = (
         *(f"state {name}" for name in law.variables),
@@ -134,7 +134,7 @@ class CompiledLaws(Response):
         """Return minus the second derivatives of the forces at constant variables.
 
         The result is zero for laws with a limit.  This is exact for sticking connectors, whose rows
-        are constant, and neglects the slope of sliding forces.
+        are constant, and neglects the second derivatives of sliding forces.
         """
         if self._law.holds:
             return super().bends(e1)
@@ -382,7 +382,7 @@ class UserLaws(Response):
         return np.array([law.bend(e1[i]) for i, law in enumerate(self._each)])
 
     def accept_end(self, e1: Array) -> None:
-        """Accept the variables after a step to ``e1``; growth of stored energy is not lost."""
+        """Accept the variables after a step to ``e1``; the growth of stored energy is no loss."""
         states = [law.end(float(x))[1] for law, x in zip(self._each, e1, strict=True)]
         before = float(self._stored[0])
         for law, state in zip(self._each, states, strict=True):
@@ -396,6 +396,6 @@ class UserLaws(Response):
         self._stored[0] = sum([law.stored(float(x)) for law, x in zip(self._each, e, strict=True)])
 
     def restore(self, rows: Array) -> None:
-        """Restore the variables of :meth:`state`; restore the accepted motions before."""
+        """Restore the variables of :meth:`state`, after the accepted motions."""
         super().restore(rows)
         self.start(self._e0)

@@ -292,11 +292,12 @@ class ConnectorForces(ConnectorTerm):
 
 
 class Guides(ConnectorTerm):
-    """Forces that hold points on curves; forces over a step are normal to its chord.
+    """Forces that hold points on curves.
 
-    Such forces do no work.  The round-off of points spoils the direction of a short chord.  If this
-    error exceeds the error by curvature, the tangent in the middle replaces the chord.  The error
-    of either direction is at most the round-off to the power of two thirds.
+    In schemes whose forces act over the step, they are normal to the chord of the step and do no
+    work.  The round-off of points spoils the direction of a short chord.  If this error exceeds the
+    error by curvature, the tangent in the middle replaces the chord.  The error of either direction
+    is at most the round-off to the power of two thirds.
 
     The motion of a guide is the distance of the point from its curve, which is zero when a step is
     accepted.  guide_curves.c computes guides, and calls Python for points of the curves.
@@ -355,7 +356,7 @@ class Guides(ConnectorTerm):
         """Add the derivative of the tangent at ``q1`` along ``u``.
 
         Curves are Python functions, so the derivative is a fourth-order difference whose increment
-        is a hundredth of the scene.  The errors are 1e-8 of curvatures and 1e-6 of the derivative.
+        is a hundredth of the scene.  The error of curvatures is 1e-8, of the derivative 1e-6.
         """
         increment = np.abs(u[np.r_[self._x, self._y]]).max(initial=0.0)
         ε = 1e-2 * self._size / increment if increment > 0 else 1.0
@@ -379,8 +380,7 @@ class Guides(ConnectorTerm):
 def connector_terms(subdomain: Subdomain, setting: Setting, A: Csr) -> list[ConnectorTerm]:
     """Create the terms of the connectors of a process, one for each kind, guides last.
 
-    Each process creates the entries of the ledger in the order of the scene, including the entries
-    that only other processes write.
+    Every process creates all entries of the ledger, in the order of the scene.
     """
     connectors = subdomain.numbering.scene.all_connectors
     groups: dict[tuple[tuple[str, ...], object], list[int]] = {}

@@ -24,10 +24,10 @@ from ufl_beam.model.connector_laws import (
 )
 
 EXPLAINED = 0.1
-"""Fraction of an imbalance from which on estimated round-off explains the imbalance."""
+"""Least ratio of estimated round-off to imbalance at which round-off explains the imbalance."""
 
 ROUND_OFF_ENERGY = 1e-3
-"""Ratio of stored and lost energy to transferred energy up to which works are round-off."""
+"""Largest ratio of stored and lost energy to transferred energy at which works are round-off."""
 
 LEDGER_ENTRIES = {
     PrescribedMotion: ("_Driven", "supplied", "motors", -1.0),
