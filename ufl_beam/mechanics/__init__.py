@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Mechanics of the paper in UFL: strains, relative motions, time schemes."""
+"""Mechanics in UFL: strains, relative motions, equations of laws, time schemes."""

@@ -26,7 +26,7 @@ class PlainStep:
     half_tangents = False
 
     def virtual_rotation(self, rotation_a: Expr, rotation_b: Expr, w: Expr) -> Expr:
-        """Return the virtual rotation itself."""
+        """Return ``w``, the virtual relative rotation."""
         return w
 
 
@@ -73,13 +73,13 @@ class _AtEnd(PlainStep):
 class Static(_AtEnd):
     """Static equilibrium at the end of each step; time is the load parameter.
 
-    Dampers, :class:`KelvinVoigt`, viscosity of materials, and works with ``v`` take the mean rates
-    of the step, in real time.  There is no inertia.
+    Dampers, :class:`KelvinVoigt`, viscosity of materials, and works with ``v`` use the mean rates
+    of the step in real time.  There is no inertia.
 
     The ledger computes works by the trapezoidal rule.  Its imbalance is of second order in the step
-    and measures the error.  A step is cut if the work of the forces differs from the stored and
-    dissipated energy by more than 5 % of both together, because the step may have jumped to another
-    branch of equilibria.
+    and measures the error.  A step is divided if the work of the forces differs from the stored and
+    dissipated energy by more than 5 % of the sum of both, because the step may have jumped to
+    another branch of equilibria.
 
     Example:
         >>> run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
@@ -108,7 +108,7 @@ class Weights(NamedTuple):
 
 
 CONSTANT = Weights(0.0, 0.0, 1.0, 1 / 2)
-"""Weights with the acceleration at the end of the step alone: none is known at its beginning."""
+"""Weights without the acceleration at the beginning of the step, for use while it is unknown."""
 
 AVERAGE = Weights(0.0, 0.0, 1 / 2, 1 / 4)
 """Weights with the mean of the accelerations at both ends of the step."""
@@ -134,7 +134,7 @@ class _Accelerated(_AtEnd):
         return not 2 * β > γ > 0.5
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
-        """Return the numbers of Newmark's formulas, and of the accelerations ü by the forces.
+        """Return the coefficients of Newmark's formulas, and of the accelerations ü by the forces.
 
         The acceleration a is ü at a time that is later by (α_m - α_f) dt; the lead is (a - ü)/dt.
         A step uses ü and the lead at its beginning only if they are known.
@@ -157,7 +157,7 @@ class _Accelerated(_AtEnd):
         return Coefficients(inertia=forced1, velocity=v1, rates=(v1, *further))
 
     def error_weights(self) -> tuple[float, float]:
-        """Return the errors against Taylor's series; a leads the forces by α_m - α_f steps."""
+        """Return error weights by Taylor's series; a leads the forces by α_m - α_f steps."""
         α_m, α_f, γ, β = self.weights
         ahead = α_m - α_f
         return 0.0, abs(β + ahead / 2 - 1 / 6) + abs(γ + ahead - 1 / 2)
@@ -167,23 +167,23 @@ class _Accelerated(_AtEnd):
 class Newmark(_Accelerated):
     """Newmark's scheme, by default with average acceleration; for comparison with other programs.
 
-    ``gamma = 1/2`` is of second order and damps nothing.  In large motion its energy is not
-    bounded, and it may diverge where :class:`EnergyMomentum` does not.  ``gamma > 1/2`` damps, but
-    is of first order; :class:`GeneralizedAlpha` damps and is of second order.
+    With ``gamma = 1/2`` the scheme is of second order without damping.  In large motion its energy
+    is not bounded, and the scheme may diverge where :class:`EnergyMomentum` does not.  With
+    ``gamma > 1/2`` it damps, but is of first order; :class:`GeneralizedAlpha` is of second order.
 
-    The ledger computes works by the trapezoidal rule.  It does not close; its imbalance is of
-    second order in the step and measures the error.  Initial accelerations come from a trial step
-    of a sixteenth of the first step.  Laws that depend on rates, except :class:`Rayleigh`, take the
-    mean rate of the step, and yielding is stated at its end.  Both are of first order.
+    The ledger computes works by the trapezoidal rule.  Its imbalance is of second order in the step
+    and measures the error.  Initial accelerations come from a trial step of a sixteenth of the
+    first step.  Laws that depend on rates, except :class:`Rayleigh`, use the mean rate of the step,
+    and yield conditions hold at its end; both approximations are of first order.
 
     Args:
         gamma: γ; from 1/2.
         beta: β; from γ/2, below which the scheme is unstable at large steps.
 
     Raises:
-        ArgumentError: A number is out of range.  A run raises it if the scene has dry friction or a
-            rotating frame; unless 2 beta > gamma > 1/2, also if the scene has joints held by
-            multipliers, guides, motors or moving supports.
+        ArgumentError: ``gamma`` or ``beta`` is out of range.
+        ModelError: A run with dry friction or a rotating frame; unless 2 beta > gamma > 1/2, also
+            with joints held by multipliers, guides, motors or moving supports.
 
     Example:
         >>> run = ub.simulate(scene, ub.Newmark(), t=(0, 1), dt=0.05)
@@ -219,10 +219,10 @@ class GeneralizedAlpha(_Accelerated):
     """Generalised-α scheme of second order with damping of high frequencies.
 
     The weights are by Chung and Hulbert (1993), the form is by Arnold and Brüls (2007): equilibrium
-    and constraints are satisfied at the ends of the steps, and an auxiliary acceleration carries
-    the weights.  For linear scenes both forms agree; this form is stable with joints held by
-    multipliers if ``rho_inf < 1``.  If the step length changes, the auxiliary acceleration is
-    adjusted to keep the order.
+    and constraints are satisfied at the ends of the steps, and the weights average an auxiliary
+    acceleration.  For linear scenes this form agrees with the original form.  With joints held by
+    multipliers it is stable if ``rho_inf < 1``.  If the step length changes, the auxiliary
+    acceleration is adjusted to keep the order.
 
     The ledger, initial accelerations and rate-dependent laws are as in :class:`Newmark`.  In large
     motion the energy may grow; with :class:`EnergyMomentumDecaying` it cannot.
@@ -232,8 +232,8 @@ class GeneralizedAlpha(_Accelerated):
             (undamped).
 
     Raises:
-        ArgumentError: A number outside [0, 1].  A run raises it for the scenes that
-            :class:`Newmark` lists, for the joints and motions only if ``rho_inf=1``.
+        ArgumentError: ``rho_inf`` is outside [0, 1].
+        ModelError: As in :class:`Newmark`; for joints and motions only if ``rho_inf=1``.
 
     Example:
         >>> run = ub.simulate(scene, ub.GeneralizedAlpha(rho_inf=0.8), t=(0, 1), dt=0.05)

@@ -4,7 +4,7 @@
 A law of energy and resistance holds at t_n+θ.  A backward-Euler step of length θ dt gives the
 changes of its variables up to t_n+θ; divided by θ, they are the changes in the whole step.  The
 elastic force acts at the time of the loads.  The force of a rigid-plastic law is a function of the
-slip in the step; it is stated once for UFL and for numbers.
+slip in the step; the same Python function serves UFL expressions and numbers.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from ufl_beam.model.softening_laws import SofteningLaw
 # -- energy and resistance -------------------------------------------------------------------------
 
 SMOOTH = 1e-7
-"""Relative difference of works by Gauss's and Simpson's rules up to which Gauss's rule is exact.
+"""Relative difference of works by Gauss and Simpson up to which Gauss's rule counts as exact.
 
 Gauss's rule has four points.  The errors are of the eighth and the fourth order in the step, with
-the factors 1 / 1778112000 and 1 / 2880.  If Simpson's error is 1e-7, Gauss's is (3e-4)² / 2e9,
-below round-off.
+the factors 1 / 1778112000 and 1 / 2880.  If Simpson's rule has the error 1e-7, the error of
+Gauss's rule is about (3e-4)² / 2e9, below round-off.
 """
 
 
@@ -47,7 +47,7 @@ class LawStep(NamedTuple):
 def law_step(
     law: ConnectorLaw, at: Mapping[str, Expr], scheme: Scheme, *, frozen: bool = False
 ) -> LawStep:
-    """State the equations of a step; if ``frozen``, the variables stay constant.
+    """Return the equations of a law in a step; if ``frozen``, its variables are constant.
 
     The names in ``at`` are "motion 0" and so on for the motions at the end of the step, "before 0"
     for the motions before it, "dt" and "theta", "state ..." for the variables before the step, and
@@ -69,7 +69,7 @@ def law_step(
 
     end = {n: ufl.variable(ufl.as_ufl(z)) for n, z in vars(after(1.0)).items()}
     zero = ufl.as_ufl(0.0)
-    if law.holds:  # a law with a limit has only a sliding force, whose size is returned
+    if law.holds:  # a law with a limit has only a sliding force; return its magnitude
         sliding = ufl.as_ufl(law.sliding(e, rate, after(θ), dt))
         return LawStep((sliding,), zero, zero, tuple(end.values()))
     resistances = law.each(law.resistance(e, rate, after(θ), dt))
@@ -79,8 +79,8 @@ def law_step(
     stored = ufl.as_ufl(law.energy(law.as_argument(moved), State(end)))
     numerical = zero
     if load_weight > 0.5 and scheme.average(0.0, 1.0) != 1.0:
-        # The scheme counts works exactly.  Forces that act after the middle of the step lose energy
-        # as in backward Euler: of second order, and positive for convex energies.
+        # The scheme computes works exactly.  Forces that act after the middle of the step lose
+        # energy as in backward Euler; the loss is of second order, positive for convex energies.
         each = zip(moved, pairs, strict=True)
         growth = sum(ufl.diff(stored, m) * (x1 - x0) for m, (x0, x1) in each)
         growth += sum(ufl.diff(stored, z) * (z - getattr(old, n)) for n, z in end.items())
@@ -97,7 +97,7 @@ def _elastic_forces(
     over the step, means by Gauss's rule satisfy this to round-off.  At kinks and in large steps a
     force along the increment does the missing work.  Forces and moment share this work in
     proportion to the squares of the errors of their works.  A single force is then the growth of
-    the energy divided by the increment of the motion, which has few digits in small steps.
+    the energy divided by the increment of the motion; this quotient has few digits in small steps.
     """
 
     def energy(e: Sequence[Expr]) -> Expr:
@@ -153,7 +153,7 @@ class RigidPlasticStep(NamedTuple):
 
 
 def parameters(law: SofteningLaw | ElastoPlastic) -> dict[str, Any]:
-    """Return the parameters of a law by the names that :func:`rigid_plastic_step` takes."""
+    """Return the parameters of a law by their names in :func:`rigid_plastic_step`."""
     values = law.parameters() if isinstance(law, SofteningLaw) else law.parameters(np.ones(()))
     return {f"number {name}": value for name, value in values.items()}
 
@@ -163,7 +163,7 @@ def rigid_plastic_step(
 ) -> RigidPlasticStep:
     """Return the response of a law, whose parameters come from ``at``, not from ``law``.
 
-    ``at`` maps names to numbers: "slip" in the step and its "direction" (1 or -1); at the beginning
+    ``at`` maps names to values: "slip" in the step and its "direction" (1 or -1); at the beginning
     of the step, accumulated slip "slipped" and motion "start"; "θ" and "dt"; parameters of the law,
     see :func:`parameters`.
     """

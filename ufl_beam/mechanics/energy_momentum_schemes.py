@@ -23,7 +23,7 @@ from ufl_beam.model.softening_laws import SofteningLaw
 GAUSS_POINTS = 4
 """Number of points of Gauss's rule on the line from the beginning to the end of a step.
 
-The rule is exact up to degree 7, and four forces cost hardly more than one strain.
+The rule is exact up to degree 7.  Four forces cost hardly more than one strain.
 """
 
 
@@ -52,11 +52,11 @@ class _OverStep:
         return mean + constant(self.alpha) * functional.resultants(e1 - e0, C)  # P(89)
 
     def average(self, before: Expr, now: Expr) -> Expr:
-        """Return the mean of both ends; with means, the product rule holds for increments."""
+        """Return the mean of both ends, for which the product rule holds in increments."""
         return (before + now) / 2
 
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
-        """Return the mean on the straight line from q0 to q1; the work of a gradient is exact."""
+        """Return the mean of ``f`` on the straight line from q0 to q1, exact up to degree 7."""
         points, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
         values = (f(q0 + float(1 + x) / 2 * (q1 - q0)) for x in points)
         return sum((float(w) / 2 * f for w, f in zip(weights, values, strict=True)), 0)
@@ -90,14 +90,14 @@ class EnergyMomentumBase(_OverStep):
 class EnergyMomentumStatic(EnergyMomentumBase):
     """Static equilibrium with an exact ledger: works are exact increments of energy.
 
-    :class:`Static` is in equilibrium at the ends of steps and counts works by the trapezoidal rule.
-    This scheme uses the step equation of :class:`EnergyMomentum`.  Inelastic material follows its
-    laws over the step, not only at its end.  The ledger is exact; the solution is of first order in
-    the step with ``theta=1`` and of second order with ``theta=1/2``, see docs/schemes.md for
-    measured errors.  Loads that act from the start are applied in the first step, in substeps with
-    small rotations of nodes.  At a jump to another branch of equilibria the run goes on, and the
-    released energy is in the entry "numerical"; :class:`Static` stops there.  Viscous forces act in
-    real time, as in :class:`Static`.
+    :class:`Static` has equilibrium at the ends of steps and computes works by the trapezoidal rule.
+    This scheme uses the step equation of :class:`EnergyMomentum`.  Inelastic material satisfies its
+    laws at the fraction ``theta`` of the step.  The solution is of first order in the step with
+    ``theta=1`` and of second order with ``theta=1/2``, see docs/schemes.md for measured errors.
+    Loads that act from the start are applied in the first step, in substeps with small rotations of
+    nodes.  At a jump to another branch of equilibria the run continues, and the released energy is
+    in the entry "numerical"; :class:`Static` stops there.  Viscous forces act in real time, as in
+    :class:`Static`.
 
     Args:
         theta: Fraction of the step at which resultants and loads are in equilibrium.  With 1/2 no
@@ -106,7 +106,7 @@ class EnergyMomentumStatic(EnergyMomentumBase):
             are uniform in equilibrium vary along a beam by the fraction (Δψ/2)² in a step.
 
     Raises:
-        ArgumentError: A number outside [1/2, 1].
+        ArgumentError: ``theta`` is outside [1/2, 1].
 
     Example:
         >>> run = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.1)
@@ -165,7 +165,7 @@ class _Velocities(MidpointLoads):
     beta: float
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
-        """Return the numbers of v1 = a s - b v0 for the nodal step s, and of (v1 - v0)/dt."""
+        """Return the coefficients of v1 = a s - b v0 for the nodal step s, and of (v1 - v0)/dt."""
         keep = 0.5 + self.beta
         a, b = 1 / (dt * keep), (0.5 - self.beta) / keep  # P(87)
         return Coefficients(
@@ -189,19 +189,19 @@ class EnergyMomentum(EnergyMomentumBase, _Velocities):
     with exact momenta; ``beta`` by the velocities, without conservation of angular momentum.  The
     loss is the entry "numerical" of the ledger.
 
-    Laws of inelastic material hold in the middle of the step, which is of second order.  With
-    ``alpha = 1/2`` they hold at its end, which is backward Euler, of first order.  In the middle of
-    the step stresses lie on the yield surface, and a fully open hinge bears no moment.  At the ends
-    stress and moment alternate about these values, with deviations of the order of a step; a small
-    ``alpha`` damps this.  The elastic energy of material that breaks completely is lost at once, as
-    "numerical".
+    Inelastic material satisfies its laws in the middle of the step, which is of second order.  With
+    ``alpha = 1/2`` it satisfies them at the end, as in backward Euler, which is of first order.  In
+    the middle stresses lie on the yield surface, and a fully open hinge bears no moment.  At the
+    ends stress and moment alternate about these values, with deviations proportional to the step; a
+    small ``alpha`` damps these.  The elastic energy of material that breaks completely is lost at
+    once, as "numerical".
 
     Args:
         alpha: Dissipation by the resultants, from 0 to 1/2.
         beta: Dissipation by the velocities, from 0 to 1/2.
 
     Raises:
-        ArgumentError: A number outside [0, 1/2].
+        ArgumentError: ``alpha`` or ``beta`` is outside [0, 1/2].
 
     Equations:
         P(77)-P(91); P(82) corrected, see docs/errata.md.
@@ -248,7 +248,7 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
         rho_inf: Spectral radius at infinite frequency, from 1/3 to 1; 1 loses nothing.
 
     Raises:
-        ArgumentError: A number outside [1/3, 1].
+        ArgumentError: ``rho_inf`` is outside [1/3, 1].
 
     Example:
         >>> run = ub.simulate(scene, ub.EnergyMomentumDecaying(rho_inf=0.5), t=(0, 1), dt=0.05)
@@ -272,7 +272,7 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
         return self.rho_inf * (1 - self.rho_inf) / (2 * (1 + self.rho_inf) ** 2)
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
-        """Return the numbers of the step, with c times second differences of velocities."""
+        """Return the coefficients of a step, with c times second differences of velocities."""
         c, keep = self.lost_fraction, 0.5 + self.lost_fraction
         cr = c * min(1.0, dt / last_dt)
         return Coefficients(
@@ -292,7 +292,7 @@ class EnergyMomentumPrinted(_OverStep, _Velocities, PlainStep):
     """The midpoint rule as the paper prints it, for comparison; :class:`EnergyMomentum` is better.
 
     The variation of the strains is taken in the middle of the step and differs from their
-    increment, so energy drifts by the square of the rotation of a step.  Linear and angular
+    increment, so energy drifts with the square of the rotation in a step.  Linear and angular
     momentum are conserved.  The ledger contains the works of the step, and its imbalance is this
     drift.  Joints with multipliers do work of the size of the drift.
 

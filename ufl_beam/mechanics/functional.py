@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The Hu-Washizu functional of beams with plastic hinges, and their kinetic energy, in UFL.
 
-The fields on a mesh of straight cells are
+The fields on a mesh of straight two-node cells, as in the paper, are
 
 * q = (u, ψ), the configuration, continuous and linear in a cell (P1);
 * α, the jump of the rotation in a hinge in the middle of each cell, constant in a cell (DG0);
@@ -10,7 +10,7 @@ The fields on a mesh of straight cells are
 
 Energies are densities along the undeformed axis, J/m; a function W maps the strains (Σ, Γ, K) of
 the bulk to its free energy at given internal variables, P(35).  Weak forms are derivatives of these
-functionals.  A time scheme replaces strains and variations by its own, one line each, see
+functionals.  A time scheme replaces strains and variations by its own, see
 :mod:`ufl_beam.mechanics.time_scheme`.
 """
 
@@ -24,19 +24,19 @@ from ufl.core.expr import Expr
 from ufl_beam.mechanics.kinematics import Axis, split, strain
 
 Energy = Callable[[Expr], Expr]
-"""Free energy of the bulk per length, from its strains (3,); J/m."""
+"""Free energy of the bulk per length, J/m, as a function of its strains, (3,)."""
 
 
 def hu_washizu(W: Energy, q: Expr, D: Expr, r: Expr, axis: Axis) -> Expr:
-    """Return the functional of three fields; the resultants r tie the free strains D to q."""
+    """Return the three-field functional, J/m; r enforces that the strains D equal strain(q)."""
     return W(D) + ufl.dot(r, strain(q, axis) - D)  # P(26)
 
 
 def incompatible(α: Expr, axis: Axis) -> Expr:
     """Return the strain that a jump α of the rotation causes in the bulk; it unloads the cell.
 
-    The jump adds to the rotation α times the difference of Heaviside's function and a linear
-    function, P(69).  The slope of the linear function is this strain; the Dirac delta is the hinge.
+    The jump adds α (H - N) to the rotation, with Heaviside's function H and a linear function N,
+    P(69).  This strain is the derivative of -α N; the derivative of α H acts in the hinge only.
     """
     return ufl.as_vector([0, 0, -α / axis.h])  # P(71)!
 
@@ -47,7 +47,7 @@ def enhanced_strain(q: Expr, α: Expr, axis: Axis) -> Expr:
 
 
 def modified_functional(W: Energy, q: Expr, D: Expr, r: Expr, axis: Axis) -> Expr:
-    """Return the functional with the strains D added to the strains of the configuration."""
+    """Return the functional, J/m, with strains D in addition to the strains of q."""
     return W(strain(q, axis) + D) - ufl.dot(r, D)  # P(31)
 
 
@@ -62,7 +62,7 @@ def potential(W: Energy, q: Expr, α: Expr, hinge: Expr, axis: Axis) -> Expr:
 
 
 def elastic_energy(e: Expr, C: Expr) -> Expr:
-    """Return the energy of elastic strains e with the stiffness C = (EA, GA, EI); N, N, N m²."""
+    """Return the energy, J/m, of elastic strains e; stiffness C = (EA, GA, EI) in N, N, N m²."""
     return sum(C[i] * e[i] ** 2 for i in range(3)) / 2  # P(9)
 
 
@@ -78,6 +78,6 @@ def virtual_work(r: Expr, w_e: Expr) -> Expr:
 
 
 def kinetic_energy(v: Expr, ρ: Expr) -> Expr:
-    """Return the kinetic energy of v = (du/dt, dψ/dt), with ρ = (A_ρ, J_ρ); kg/m, kg m."""
+    """Return the kinetic energy, J/m, of v = (du/dt, dψ/dt); ρ = (A_ρ, J_ρ) in kg/m, kg m."""
     v_u, ω = split(v)
     return (ρ[0] * ufl.dot(v_u, v_u) + ρ[1] * ω**2) / 2  # P(18)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Strains of the Reissner beam and their algorithmic variation over a time step, in UFL.
 
-Pure functions map configurations ``(u_x, u_y, ψ)`` to strains ``(Σ, Γ, K)``, without state, on the
-mesh of their arguments.  The letters are the paper's; P(n) is its equation n.
+Functions without state map configurations ``(u_x, u_y, ψ)`` to strains ``(Σ, Γ, K)`` on the mesh of
+their arguments.  Symbols are as in the paper, see docs/notation.md; P(n) is its equation n.
 """
 
 import math
@@ -18,11 +18,11 @@ class Axis:
 
     Attributes:
         nodes: Positions of the nodes of configurations in a cell, from 0 to 1; ascending.
-        X: Position along each cell of the point of evaluation, from 0 to 1; by default the middle.
+        X: Point of evaluation as a fraction of the length of the cell, 0 to 1; default: the middle.
         t0: Unit tangent of the cell, from its first to its last vertex; shape (2,).
         n0: Unit normal, ``t0`` turned by +90°; shape (2,).
         h: Length of the cell; m.
-        x: Position of the point of evaluation in the plane; m.
+        x: Position of the point of evaluation in the plane; shape (2,); m.
     """
 
     def __init__(self, mesh: ufl.Mesh, nodes: Iterable[float] = (0.0, 1.0), X: Expr = 0.5) -> None:
@@ -37,7 +37,7 @@ class Axis:
         return ufl.dot(ufl.grad(f), self.t0)
 
     def at_nodes(self, f: Expr) -> list[Expr]:
-        """Return nodal values of a scalar polynomial by Taylor's series from the point."""
+        """Return nodal values of a scalar polynomial, by Taylor's series about the point ``X``."""
         terms = [f]
         for _ in self.nodes[1:]:
             terms.append(self.h * self.d(terms[-1]))
@@ -47,7 +47,7 @@ class Axis:
         ]
 
     def interpolate(self, values: Sequence[Expr]) -> tuple[Expr, Expr]:
-        """Interpolate nodal values at the point by Lagrange; return value and derivative."""
+        """Return value and axial derivative of the Lagrange interpolation at ``X``."""
         X = ufl.variable(self.X)
         f = 0
         for a, value in zip(self.nodes, values, strict=True):
@@ -59,7 +59,7 @@ class Axis:
 def frame(ψ: Expr) -> tuple[Expr, Expr]:
     """Return (cos ψ - 1, sin ψ), both to the relative precision of ``ψ``, however small.
 
-    The difference cos ψ - 1 would keep no digits of a small rotation.
+    The difference cos ψ - 1 itself would lose all digits of a small rotation.
     """
     half_sin, half_cos = ufl.sin(ψ / 2), ufl.cos(ψ / 2)
     return -2 * half_sin**2, 2 * half_sin * half_cos
@@ -90,12 +90,12 @@ def strain(q: Expr, axis: Axis) -> Expr:
     u, ψ = split(q)
     Σ, Γ = _pull_back(axis.d(u), ψ, axis)
     cos_1, sin = frame(ψ)
-    # Λᵀ t0 - e1 = (cos ψ - 1, -sin ψ), without a difference that loses digits of small strains.
+    # Λᵀ t0 - e1 = (cos ψ - 1, -sin ψ), without differences that lose digits of small strains.
     return ufl.as_vector([Σ + cos_1, Γ - sin, axis.d(ψ)])  # P(6)
 
 
 def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
-    """Return the variation of :func:`strain` at ``q`` along (w_u, w_ψ); P(21) pulled back."""
+    """Return the variation of :func:`strain` at ``q`` along (w_u, w_ψ): P(21) times Λᵀ."""
     (u, ψ), (w_u, w_ψ) = split(q), split(w)
     w_Σ, w_Γ = _pull_back(axis.d(w_u) - perpendicular(axis.t0 + axis.d(u)) * w_ψ, ψ, axis)  # P(21)
     return ufl.as_vector([w_Σ, w_Γ, axis.d(w_ψ)])
@@ -119,8 +119,8 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
 
     With ``w = (Δu, 2 tan(Δψ/2))`` at the nodes it is ``strain(q1) - strain(q0)`` to round-off, so
     the work of the algorithmic resultants is the increment of stored energy.  It vanishes if ``w``
-    is a rigid rotation about any point, so angular momentum is exact.  P(82) as printed has only
-    the second property, and misses the increment by O(Δψ²); docs/errata.md derives this form.
+    is a rigid rotation about any point, so angular momentum is conserved.  P(82) as printed has
+    only the second property; its error is O(Δψ²), see docs/errata.md for the corrected form.
 
     Valid for ``|Δψ| < π``, on two-node cells with a one-point rule, on other cells with any rule.
     """
@@ -153,9 +153,9 @@ def _two_node_rotation(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr,
 
 
 def _nodal_rotation(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
-    """Return virtual rotation and curvature at a point: 2 tan δ, 2 δ' if w is 2 tan δ at nodes.
+    """Return virtual rotation and curvature at a point, see docs/errata.md.
 
-    Both results are linear in w; for a uniform w they are w and zero, see docs/errata.md.
+    If w is 2 tan δ at the nodes, they are 2 tan δ and 2 δ'; if w is uniform, they are w and zero.
     """
     δ = (ψ1 - ψ0) / 2  # half of the increment of rotation
     nodes, virtual = axis.at_nodes(δ), axis.at_nodes(w)

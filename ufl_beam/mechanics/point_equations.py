@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Equations of a material point over a step, stated once for UFL and for arrays.
+"""Equations of a material point over a step, for UFL expressions and for arrays.
 
 The law holds at t_n+θ.  A backward-Euler step of length θ dt gives the changes of its variables up
 to t_n+θ; divided by θ, they are the changes in the whole step.
@@ -56,14 +56,14 @@ class End(NamedTuple):
     """Changes and energies of a point at the end of a step; J/m³ or J/m."""
 
     worked: Values  # dissipated by the bulk
-    broken: Values  # dissipated by the discontinuity, per area
+    broken: Values  # dissipated by the discontinuity, per area instead of volume
     lost: Values  # numerical loss of backward Euler, divided by ``2 alpha`` of the scheme
     elastic: Values  # stored elastically
     hardening: Values  # stored by hardening
     relaxed: Values  # work on plastic strain by the mean stress, minus work by the end stress
     resistance: Values  # of the discontinuity
-    left: Values  # stored elastically after the point has dropped its stress
-    missed: Values  # numerical loss of schemes over the step in nonlinear elasticity
+    left: Values  # stored elastically after a break has removed the stress
+    missed: Values  # numerical loss in nonlinear elasticity, with forces over the step
     stress: tuple[Values, ...]
     changes: tuple[Values, ...]  # of the variables
 
@@ -118,7 +118,7 @@ class PointEquations:
         return 0 * growth if law is None else self._scheme.resistance(law, at["opening"], growth)
 
     def state(self, at: At, prefix: str = "state") -> State:
-        """Return the variables at the beginning of the step, or the unknown variables ("new")."""
+        """Return the variables at the beginning of the step; with "new", the unknown variables."""
         return State({name: at[f"{prefix} {name}"] for name in self._names})
 
     def strain(self, at: At) -> Values:
@@ -152,8 +152,8 @@ class PointEquations:
     def own_dissipation(self, at: At, slopes: tuple[Values, ...]) -> tuple[Values, Values]:
         """Return (dissipation, size of its terms) of a law that solves for its variables.
 
-        The dissipation is as the law states it, or -∂ψ/∂z Δz, without errors of the time scheme.
-        ``slopes`` are the derivatives ∂ψ/∂z of :meth:`stored` by the variables z.
+        The dissipation is -∂ψ/∂z Δz, without errors of the time scheme, unless the law states it.
+        ``slopes`` are the derivatives ∂ψ/∂z of the energy :meth:`stored` by the variables z.
         """
         law, old, new = self.law(at), self.state(at), self.state(at, "new")
         changes = State({n: (getattr(new, n) - getattr(old, n)) / at["theta"] for n in self._names})
@@ -179,7 +179,7 @@ class PointEquations:
         return law.as_tuple(law.stress(self.strain(at), self.state(at)))
 
     def _elastic_growth(self, law: MaterialLaw, de: tuple[Values, ...], dz: State) -> Values:
-        """Return the growth of the elastic energy without the part that is linear in the step."""
+        """Return the elastic energy of the changes, without its terms that are linear in them."""
         growth = law.elastic_energy(law.as_argument(de), dz)
         if not law.prestressed:
             return growth
@@ -204,13 +204,13 @@ class PointEquations:
         new = _plus(old, changes)
         before, now = (law.as_tuple(law.stress(argument(e), z)) for e, z in ((e0, old), (e1, new)))
         elastic, hardening = law.elastic_energy(argument(e1), new), law.hardening_energy(new)
-        # ``lost`` is exact if energies are quadratic.  Laws that are not quadratic and state no
-        # dissipation have its error in ``worked``.
+        # ``lost`` is exact for quadratic energies.  For other laws that state no dissipation, its
+        # error is in ``worked``.
         hardened = law.hardening_energy(changes)
         lost = self._elastic_growth(law, de, changes) + hardened
         elastically, missed, C = de, zero, tuple(at[n] for n in rows(law, "stiffness"))
         if self._curved:
-            # The value of ``worked`` below at constant variables is not dissipation.
+            # ``missed`` is the value of ``worked`` below at constant variables: not dissipation.
             ends = tuple(law.as_tuple(law.stress(argument(e1), old)))
             elastically = tuple((y - x) / c for x, y, c in zip(before, ends, C, strict=True))
             work = sum(σ * e for σ, e in zip(self.elastic_stress(at), de, strict=True))

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Relative motions of two frames, their variation over a step, and forms of connectors, in UFL.
 
-A frame is a configuration (u_x, u_y, ψ).  Each motion is stated by a function of the frames at both
-ends of a step and of virtual motions of the frames.  The function returns the motion at the end,
-which is zero in the undeformed scene, and the variation of the motion.  In schemes of
+A frame is a configuration (u_x, u_y, ψ).  Each motion has a function of the frames at both ends of
+a step and of virtual motions of the frames.  The function returns the motion at the end, which is
+zero in the undeformed scene, and the variation of the motion.  In schemes derived from
 :class:`EnergyMomentumBase` the variation for the nodal step (Δu, 2 tan(Δψ/2)) is the increment of
-the motion: constraint forces do no work, and springs store the work that is done on them.
-Variations vanish for rigid virtual motions of both frames, the variation of :func:`parting` only if
+the motion.  So constraint forces do no work, and springs store the work done on them.  Variations
+vanish for rigid virtual motions of both frames; the variation of :func:`parting` vanishes only if
 the points coincide.
 """
 
@@ -30,10 +30,10 @@ from ufl_beam.mechanics.time_scheme import Scheme
 class Geometry(NamedTuple):
     """Vectors (2,) that a relative motion depends on besides the frames; m."""
 
-    arm_a: Expr  # from the node to the point a
-    arm_b: Expr  # from the node to the point b
+    arm_a: Expr  # from the node of frame a to point a, undeformed
+    arm_b: Expr  # from the node of frame b to point b, undeformed
     apart: Expr  # from point a to point b in the undeformed scene
-    axis: Expr  # unit vector
+    axis: Expr  # dimensionless unit vector
 
 
 class Pair(NamedTuple):
@@ -120,7 +120,7 @@ MOTIONS = {motion.__name__: motion for motion in (turning, stretching, parting, 
 class ConnectorForms(NamedTuple):
     """Forms of connectors, and their coefficients."""
 
-    work: ufl.Form  # virtual work, and a row ``row[:n]·e + row[n] λ - row[n + 1]`` of each motion
+    work: ufl.Form  # virtual work, and ``row[:n]·e + row[n] λ - row[n + 1]`` of each motion
     tangent: ufl.Form  # derivative of ``work`` by ``q1``
     motion: ufl.Form  # the n relative motions e of each cell
     rate: ufl.Form  # derivatives of the motions along ``u``
@@ -135,7 +135,7 @@ class ConnectorForms(NamedTuple):
 
 @cached_forms
 def connector_forms(motions: Sequence[str], scheme: Scheme, cell: meshes.Mesh) -> ConnectorForms:
-    """Return forms on cells of unit length between both nodes of a connector."""
+    """Return forms on cells of unit length between the two nodes of a connector."""
     n = len(motions)
     line = basix.ufl.element("Lagrange", "interval", 1)
     point = basix.ufl.element("DG", "interval", 0)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Time schemes: the equation of a step between two states of the scene.
 
-A scheme states, in UFL, how strains vary and which resultants act in a step, how velocities follow
-from displacements, and at which time loads act.  Neither material laws nor the solver know
-which scheme runs.  This module has the protocols.  Schemes whose forces act over the step are in
-energy_momentum_schemes.py, schemes whose forces act at its end in classical_schemes.py.
+A scheme states in UFL how strains vary and which resultants act in a step.  It also states how
+velocities follow from displacements, and when loads act.  Material laws and the solver use schemes
+only through the protocols in this module.  Schemes whose forces act over the step are in
+energy_momentum_schemes.py; schemes whose forces act at its end are in classical_schemes.py.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ class Step(NamedTuple):
     q0: Array  # configuration at the beginning, local degrees of freedom
     load_time: float  # time at which loads are taken; s
     motion_time: float  # time at which prescribed motions are taken; s
-    fraction: float  # of the remaining increment of loads and motions that is applied; 1: all
+    fraction: float  # applied fraction of the remaining increment of loads and motions; 1: all
     at: float = 1.0  # fraction of the increment of loads in the step equation; 1: at the end
     q_before: Array | None = None  # configuration at the beginning of the last step, if ratio > 0
     ratio: float = 0.0  # length divided by the length of the last step; 0 if there is none
 
     @classmethod
     def of(cls, scheme: Scheme, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Return the step of a scheme from ``t0`` to ``t1``, a part of a step that ends at ``end``.
+        """Return the step of a scheme from ``t0`` to ``t1``: a substep of a step to ``end``.
 
-        In statics a part of a step applies its fraction of the increment of loads and motions up to
-        ``end``.  So sudden loads, too, can be applied in parts.
+        In statics a substep applies its fraction of the increment of loads and motions up to
+        ``end``.  Sudden loads, too, can thus be applied in substeps.
         """
         w = scheme.load_weight
         if scheme.dynamic:
@@ -84,26 +84,26 @@ class Scheme(Protocol):
     load_weight: float  # fraction of the step at which loads act; in statics, of their increment
     weight_of_before: float  # weight of the last step's forces in the mean that does the work
     half_tangents: bool  # True if forces work on 2 tan(Δψ/2) of a rotation, else on Δψ
-    limits_rotation: bool  # True if a step that turns a node by more than 0.75 π is cut
-    theta: float  # fraction of the step at which laws of inelastic material hold
-    slack: float  # relative error of the work of the forces above which a static step is cut
+    limits_rotation: bool  # True if a step that turns a node by more than 0.75 π is subdivided
+    theta: float  # fraction of the step at which inelastic material satisfies its laws
+    slack: float  # relative error of the work of forces above which a static step is subdivided
     alpha: float  # numerical loss divided by twice the energy of the change of strain
     lost_fraction: float  # numerical loss divided by the energy of a second difference of strain
 
     def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
-        """Return the traction of a discontinuity whose opening grows in the step."""
+        """Return the traction of a discontinuity with an ``opening`` and its growth in the step."""
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """Return the variation of the strains that the resultants work on; shape (3,)."""
 
     def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
-        """Return (N, V, M) during the step, from stiffness and strains at both ends."""
+        """Return (N, V, M) in the step equation, from stiffness and strains at both ends."""
 
     def average(self, before: Expr, now: Expr) -> Expr:
         """Return the average of a vector or length at both ends of the step, for variations."""
 
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
-        """Return the value that a function of the configuration has in the step."""
+        """Return the value of a function of the configuration in the step equation."""
 
     def virtual_rotation(self, rotation_a: Expr, rotation_b: Expr, w: Expr) -> Expr:
         """Return the variation of a relative rotation whose virtual motion is ``w``."""
@@ -114,16 +114,16 @@ CHANGE, V, V_BEFORE, FURTHER = range(4)
 
 
 class Coefficients(NamedTuple):
-    """Numbers of a step of a scheme with inertia.
+    """Coefficients of a scheme with inertia in a step.
 
-    In a row the first number multiplies the step of the nodes, see :func:`nodal_step`.  The next
-    numbers multiply the velocities at the beginning of the step, the velocities before the last
-    step, and the rates of :attr:`DynamicScheme.kept`.
+    The numbers of a row multiply the step of the nodes, see :func:`nodal_step`, the velocities at
+    the beginning of the step, the velocities before the last step, and the known rates of
+    :attr:`DynamicScheme.kept`, in this order.
 
     Attributes:
         inertia: Row of the acceleration in the equation of the step.
         velocity: Row of the velocity in the equation of the step.
-        rates: Row of the velocities after the step, and a row of each other rate that is kept.
+        rates: Row of the velocities after the step, then a row of each rate of ``kept`` after it.
         slip: Row of Δu/Δt minus the mean of the velocities at both ends, P(88), whose work on the
             change of momentum is lost.  Its first number multiplies the change of velocities.  None
             means no loss.
@@ -160,13 +160,13 @@ class DynamicScheme(Scheme, Protocol):
     rings: bool  # True if accelerations of prescribed motions oscillate for ever
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
-        """Return the numbers of a step of length ``dt``.
+        """Return the coefficients of a step of length ``dt``.
 
         Args:
             dt: Length of the step; s.
             last_dt: Length of the step before; infinite if there was none; s.
             known: Number of rates of :attr:`kept` that are known at the beginning.  After the step,
-                each row of ``rates`` after the first makes one of them known.
+                ``len(rates) - 1`` of these rates are known.
         """
 
     def error_weights(self) -> tuple[float, float]:
@@ -197,10 +197,9 @@ def nodal_step(scheme: Scheme, q0: Array, q1: Array, rotations: Index) -> Array:
 
 
 def increment_to_rest(scheme: Scheme, dt: float) -> float:
-    """Return the increment of a step that ends at rest, divided by its initial velocity; s.
+    """Return the displacement in a step that ends at rest, divided by the initial velocity; s.
 
-    The result holds for a step without a previous one.  It is zero in statics and for schemes
-    without a mean velocity.
+    The step has no previous step.  The result is zero in statics and without a mean velocity.
     """
     if not has_inertia(scheme) or not scheme.has_mean_velocity:
         return 0.0

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Virtual works in the equation of a step, one class for each physical effect."""
+"""Terms of the step equation: virtual works, one class for each physical effect."""

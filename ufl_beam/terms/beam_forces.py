@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Forces inside beams: elastic cells, and cells whose material yields, flows or breaks.
 
-Inelastic cells compute resultants by the return map of their material points.  Cells of both kinds
-predict strains in the iterations of static steps, and compute works of the tangent and of its
-derivative, which buckling needs.
+Inelastic cells compute resultants by the return map of their material points.  Both kinds of cells
+predict strains in the iterations of static steps.  For the analysis of buckling they also compute
+works of the tangent and of its derivative.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, beginning, ent
 class FormForces(Term):
     """Forces of a virtual work on cells, with forms of the energy lost in a step."""
 
-    _entry: str  # entry of the losses in the ledger
+    _entry: str  # name of the ledger entry of the losses
 
     def __init__(
         self, work: ufl.Form, losses: Sequence[ufl.Form], fields: Fields, A: Csr, ledger: Ledger,
@@ -66,7 +66,7 @@ class FormForces(Term):
 
 @cached_forms
 def _linear_strains(element: Element) -> tuple[ufl.Form, fem.Function]:
-    """Return strains at the points, linearised about a configuration, and this configuration."""
+    """Return weighted strains, linearised about a configuration, and this configuration."""
     about = element.configuration()
     e_about = strain(about, element.axis)
     return element.sampled(e_about + ufl.derivative(e_about, about, element.q1)), about
@@ -76,12 +76,12 @@ def predicted_strains(fields: Fields) -> Any:
     """Return ``predicted_strains`` of loops.h, the strains predicted by a static iteration.
 
     In an iteration nodes move along straight lines, so rotating beams become longer than linearised
-    strains predict.  In slender beams the axial forces of this error spoil the next iteration.  So
-    the tangent uses the forces of the linearised strains, and the residual uses the forces of the
-    displacements.  This is Newton's method for displacements and forces as independent unknowns of
-    the functional, with the forces eliminated; it converges in few iterations at any slenderness.
+    strains predict.  In slender beams the axial forces of this error spoil the next iteration.  The
+    tangent therefore uses the forces of the linearised strains, the residual the forces of the
+    actual strains.  This is Newton's method for displacements and forces as independent unknowns of
+    the functional, with the forces eliminated.  It converges in few iterations at any slenderness.
     The initial guess of a step has the same error, so cells that yield extrapolate the strains of
-    the last states instead.
+    the last two states instead.
 
     Magisano, Leonetti and Garcea, Computer Methods in Applied Mechanics and Engineering 313 (2017).
     """
@@ -101,9 +101,9 @@ def predicted_strains(fields: Fields) -> Any:
 
 @cached_forms
 def _works(work: ufl.Form, q1: fem.Function) -> dict[str, Any]:
-    """Return forms, and their functions x, y and u, by name.
+    """Return forms of the tangent K by name, with the functions x, y and u in them.
 
-    The forms are the work y·(K x) of the tangent K, and the derivatives along u of this work and K.
+    The forms are the work y·(K x), its derivative along u, and the derivative of K along u.
     """
     x, y, u = (fem.Function(q1.function_space) for _ in range(3))
     tangent = ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
@@ -114,11 +114,11 @@ def _works(work: ufl.Form, q1: fem.Function) -> dict[str, Any]:
 
 
 class Cells(Term):
-    """Forces in cells, with the work of their tangent for two motions.
+    """Forces in cells, with the work y·(K x) of their tangent K for two displacement vectors.
 
-    The work is a sum over cells, computed from the strains of the motions.  A product with the
-    matrix would have the round-off of axial and shear stiffness, which may exceed the bending
-    stiffness of slender cells.
+    The work is a sum over cells, computed from the strains of x and y.  A product with the matrix
+    would have the round-off of axial and shear stiffness.  In slender cells this round-off may
+    exceed the bending stiffness.
     """
 
     _work_form: ufl.Form
@@ -128,7 +128,7 @@ class Cells(Term):
     """In statics, the :func:`predicted_strains` whose forces are in the tangent; else None."""
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
-        """Return further functions in the virtual work, with their values in cells at ``q1``."""
+        """Return the values in cells, at ``q1``, of further functions in the virtual work."""
         return {}
 
     @cached_property
@@ -136,7 +136,7 @@ class Cells(Term):
         return _works(self._work_form, self._q1), {}
 
     def _at(self, q1: Array, name: str, **motions: Array) -> Kernel:
-        """Return the kernel of a form of :func:`_works`, compiled at the first request."""
+        """Return the kernel of a form of :func:`_works` at ``q1``; compile it at the first use."""
         forms, kernels = self._derivatives
         if name not in kernels:
             kernels[name] = self._fields.kernel(forms[name], self._q1, several=False)
@@ -155,7 +155,7 @@ class Cells(Term):
         self._at(q1, "matrix", u=u).add(q1, self._A.data)
 
     def tangent_work(self, q1: Array, x: Array, y: Array, u: Array | None = None) -> float:
-        """Return the work y·(K x) of the tangent K, or of its derivative along u; J."""
+        """Return y·(K x), J; K is the tangent or, with ``u``, its derivative along ``u``."""
         if u is None:
             return self._at(q1, "tangent", x=x, y=y).value(q1)
         return self._at(q1, "change", u=u, x=x, y=y).value(q1)
@@ -186,7 +186,7 @@ def elastic_forms(element: Element, scheme: Scheme) -> ElasticForms:
 
 @cached_forms
 def _static_tangent(element: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function]:
-    """Return the tangent of elastic cells with the forces of given strains, and these strains."""
+    """Return the tangent of elastic cells for forces of given strains, and these strains."""
     q0, q1, C = element.q0, element.q1, element.stiffness
     e0, e1, e = strain(q0, element.axis), strain(q1, element.axis), element.at_points(3)
     w_e = scheme.virtual_strain(q0, q1, element.w, element.axis)
@@ -221,7 +221,7 @@ class ElasticBeams(FormForces, Cells):
         if tangent is not None:
             self._step_kernels.append(tangent)
             self.loops = self.loops[0], loop("add_static_tangent", self._static)
-        # Both configurations of a step determine the forces.
+        # The configurations at both ends of a step determine the forces.
         self.in_cells = [forces._replace(q0=self._q0) for forces in self.in_cells]
 
     def phases(self, callbacks: Callbacks) -> Phases:
@@ -236,14 +236,14 @@ class ElasticBeams(FormForces, Cells):
 # -- beams with material points --------------------------------------------------------------------
 
 WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
-"""Factors of :attr:`Points.recorded` that remove the jump: without a hinge, it is of a fibre."""
+"""Factors of :attr:`Points.recorded` that remove the jump of a fibre in cells without a hinge."""
 
 
 class InelasticForms(NamedTuple):
-    """Forms with resultants r, or b + D e, which are linear in the strains e."""
+    """Forms with resultants r, or with b + D e, which is affine in the strains e."""
 
     work: ufl.Form  # virtual work of r
-    around: ufl.Form  # virtual work of b + D e, around an iterate
+    around: ufl.Form  # virtual work of b + D e, linearised at an iterate
     tangent: ufl.Form  # derivative of ``around``
     r: fem.Function
     b: fem.Function
@@ -333,7 +333,7 @@ class InelasticBeams(Cells):
     # -- the step ------------------------------------------------------------------------------
 
     def start(self, q: Array) -> None:
-        """Set the accepted strains of the points to those at ``q``, without a step."""
+        """Set the accepted strains of the points to the strains at ``q``, without a step."""
         strains = self._strains(q)
         self.points.start(strains)
         self.points.refresh(strains)
@@ -350,17 +350,17 @@ class InelasticBeams(Cells):
         return self.points.dissipation()
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
-        """Return b and D about ``q1``, whose response becomes the latest one of the points."""
+        """Return b and D about ``q1``; this replaces the latest response of the points."""
         strains = self._strains(q1)
         r, D = self.points.return_map(strains)
-        self._latest.fill(np.nan)  # the latest response no longer belongs to these unknowns
+        self._latest.fill(np.nan)  # the latest response belongs to other unknowns
         around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
         return {self._b: around, self._D: D}
 
     def about_state(self) -> tuple[Index, Array, Array]:
-        """Return cells (numbers of the scene), and b, D of b + D e about the accepted state.
+        """Return cells (numbers of the scene), and b and D of b + D e about the accepted state.
 
-        Shapes (num_cells, 3) and (num_cells, 9).  D holds for a step as long as the last one.
+        b is (num_cells, 3), D (num_cells, 9).  D is for a step with the length of the last step.
         """
         strains, D = self.points.tangent()
         elastic = np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
@@ -373,5 +373,5 @@ class InelasticBeams(Cells):
         self.points.restore(archive.rows("cells", self._cells, self.points.state()))
 
     def recorded(self) -> tuple[Index, Array]:
-        """Return cells (numbers of the scene), and their recorded values; (num_cells, 6)."""
+        """Return cells (scene numbers), and their :attr:`Points.recorded`; (num_cells, 6)."""
         return self._cells, self.points.recorded * self.recorded_factors

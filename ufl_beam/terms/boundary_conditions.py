@@ -24,8 +24,8 @@ from ufl_beam.terms.term import Callbacks
 class Supports:
     """Supports of a scene: constrained and prescribed degrees of freedom, reactions.
 
-    Unknowns and residuals of the solver are in the axes of the supports, which an angle may turn.
-    Unknowns and residuals of the terms are in the axes of the plane.  :meth:`into_axes` and
+    The solver uses unknowns and residuals in the axes of the supports, which may be rotated.  The
+    terms use unknowns and residuals in the global axes of the plane.  :meth:`into_axes` and
     :meth:`into_plane` transform vectors.
 
     Attributes:
@@ -33,8 +33,8 @@ class Supports:
         reactions: Forces of the supports on the scene in the latest residual, at ``dofs``, in the
             axes of the supports.
         entries: Matrix entries in the rows and columns of ``dofs``; diagonal entries of ``dofs``.
-        pivots: Values of these diagonal entries in the constrained matrix.
-        turned, axes: Number of supports at an angle; ``turned_axes`` of loops.h.
+        pivots: Values of the diagonal entries of ``dofs`` in the constrained matrix.
+        turned, axes: Number of supports with rotated axes; their ``turned_axes`` of loops.h.
         moving: Local degrees of freedom whose values depend on time.
         work: True if any support of the scene, on any process, moves.
     """
@@ -90,13 +90,13 @@ class Supports:
         return x
 
     def move(self, x: Array, x0: Array, step: Step) -> None:
-        """Set the prescribed values in ``x`` for the step that begins at ``x0``."""
+        """Set prescribed values in ``x``, the end of a step that begins with unknowns ``x0``."""
         for dof, motion, support in self._motions:
             target = value_at(motion, step.motion_time, support)
             x[dof] = x0[dof] + step.fraction * (target - x0[dof])
 
     def in_c(self, callbacks: Callbacks) -> Any:
-        """Return ``moving_supports`` of loops.h: prescribed motions for steps without Python."""
+        """Return ``moving_supports`` of loops.h: prescribed motions, and the work of reactions."""
         moves = [(motion, support) for _, motion, support in self._motions]
         entry = self._ledger.supplied.pointer("supports") if self.work else ffi.NULL
         return struct(
@@ -107,7 +107,7 @@ class Supports:
         )  # fmt: skip
 
     def hold(self, r: Array) -> None:
-        """Take the reactions out of ``r``, the residual of all processes, and store them."""
+        """Store the reactions in the summed residual ``r``, and set its entries to zero."""
         if len(self.dofs):
             self.reactions[:] = r[self.dofs]
             r[self.dofs] = 0.0
@@ -144,7 +144,7 @@ class Supports:
 
 
 def _turned_axes(dofs: Index, angle: float, A: Csr) -> tuple[Any, ...]:
-    """Return fields of ``turned_axes`` of loops.h for the displacement of a place."""
+    """Return fields of ``turned_axes`` of loops.h for a support at an ``angle``; rad."""
     rows = [np.arange(A.indptr[d], A.indptr[d + 1], dtype=np.int32) for d in dofs]
     # Both dofs belong to the same cells, so their rows and columns have the same pattern.
     columns = [np.flatnonzero(A.indices == d).astype(np.int32) for d in dofs]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Forces on the nodes of cells in the equation of a step, and in the accepted state.
 
-At a node, the forces of all cells and all other forces add up to the residual.  So the forces at
-both ends of a cell are section forces that are in equilibrium with supports and joints.
+At a node, the forces of all cells and all other forces add up to the residual.  The forces at the
+ends of a cell are therefore section forces in equilibrium with supports and joints.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ class CellForces:
         asks_for_before: True if the forces depend on the configuration at the beginning of the
             step.
         vectors: Pointers to vectors of degrees of freedom that determine forces.
-        entries: Pointers to entries of forms that determine forces, with their numbers.
-        factors: Pointers to load factors, which are equal on all processes, with their numbers.
+        entries: Pairs of a pointer to entries of a form that determine forces, and their number.
+        factors: Pairs of a pointer to load factors, equal on all processes, and their number.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class CellForces:
         self.vectors, self.entries = list[Any](), list[tuple[Any, int]]()
         self.factors = list[tuple[Any, int]]()
         self._forces = ffi.new("force_in_cells[]", len(forces))
-        vectors: dict[Any, Any] = {}  # pointer to each latest vector: to the accepted one
+        vectors: dict[Any, Any] = {}  # by latest vector: pointer to the accepted one
         for c, force in zip(self._forces, forces, strict=True):
             c.kind, c.factor, c.number = force.kind, force.factor, len(force.order)
             if not np.array_equal(force.order, np.arange(len(subdomain.cells))):
@@ -81,11 +81,11 @@ class CellForces:
         )  # fmt: skip
 
     def accept(self) -> None:
-        """Accept the forces of the latest residual as forces of the accepted step."""
+        """Accept the forces of the latest residual as the forces of the accepted step."""
         lib.accept_cell_forces(self.c)
 
     def begin(self, values: Array | None) -> None:
-        """Begin with known resultants ``values``, or with only the stresses of the residual."""
+        """Set the initial forces to ``values``, (9, num_cells), or to stresses of the residual."""
         if values is not None:
             fill(self.c, given=values)
             return
@@ -94,7 +94,7 @@ class CellForces:
                 c.accepted, c.latest[0] = c.latest[0], c.accepted
 
     def __call__(self, q: Array, before: Array) -> Array:
-        """Compute ``cell_number`` of loops.h for the cells of this process; (9, num_cells).
+        """Compute resultants of cells in the order of ``cell_number`` in loops.h; (9, num_cells).
 
         ``q`` and ``before`` are the configurations at the end and at the beginning of the step.
         """
@@ -122,7 +122,7 @@ class CellForces:
         return all(not c.cell and c.lanes == lanes for c in self._forces)
 
     def keep_latest(self) -> None:
-        """Store all entries of each residual from now on, so that they are known after a step."""
+        """Store all entries of forms in each residual from now on, for use after a step."""
         self._make()
         structs = (c for c in self._forces if not c.latest and not c.vector)
         for c, (*_, each, values) in zip(structs, self._step_forms, strict=True):
@@ -134,7 +134,7 @@ class CellForces:
     # -- data of solutions ----------------------------------------------------------------------
 
     def forces_from_record(self, record: Array, q: Array, before: Array) -> Array:
-        """Return the result of a call for saved vectors, entries and factors, in this order."""
+        """Compute the forces from a ``record`` of vectors, entries and factors, in this order."""
         arrays = [*((x, self._subdomain.size) for x in self.vectors), *self.entries, *self.factors]
         values, addresses, at = self.c.given, [place[0] for place, _ in arrays], 0
         record = np.array(record)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Compiled connector laws, which state energy, resistance or a limit; and functions of a user.
+"""Connector laws: compiled laws of energy, resistance or a limit, and Python functions of a user.
 
-A function of a user returns a force, which may depend on a history and have any slope.  C calls it
-in Python.
+A function of a user returns a force, which may depend on the history and may have any slope.  C
+calls the function.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy  # its parts are loaded when they are used
+import scipy  # loads its submodules at their first use
 import ufl
 from ufl.algorithms import expand_derivatives
 from ufl.constantvalue import Zero
@@ -36,7 +36,7 @@ from ufl_beam.terms.term import Callbacks
 
 
 def inputs(law: ConnectorLaw) -> tuple[str, ...]:
-    """Return the names of the inputs of a compiled law, in the order that loops.h explains."""
+    """Return the names of the inputs of a compiled law in the order of loops.h."""
     motions = (f"{when} {i}" for when in ("motion", "before") for i in range(law.components))
     data = (
         *(f"state {name}" for name in law.variables),
@@ -46,12 +46,12 @@ def inputs(law: ConnectorLaw) -> tuple[str, ...]:
 
 
 class LawForms:
-    """C functions of a connector law, with the parameters of the law among their inputs.
+    """C functions of a connector law; the parameters of the law are inputs of the functions.
 
     Attributes:
         force: Forces and their derivatives with respect to the motions at the end of the step.
         end: ``law_output`` of loops.h, then the variables at the end.
-        limit: Force up to which a constraint holds the motion.
+        limit: Force up to which a constraint holds the motion; N or N m.
     """
 
     def __init__(self, law: ConnectorLaw, scheme: Scheme) -> None:
@@ -71,7 +71,7 @@ class LawForms:
 
     @cached_property
     def frozen(self) -> tuple[Any, Any]:
-        """C functions at constant variables: forces with derivatives; second derivatives."""
+        """Two C functions at constant variables: forces and derivatives; second derivatives."""
         forces = law_step(self._law, self._at, self._scheme, frozen=True).forces
         slopes = self._slopes(forces)
         return self._compile(*forces, *slopes), self._compile(*self._slopes(slopes))
@@ -113,7 +113,7 @@ class CompiledLaws(Response):
             at[f"state {name}"][:] = value
         for name in law.parameters():
             at[f"number {name}"][:] = [getattr(x, name) for x in self._laws[::k]]
-        self._stored, lost = np.zeros(n), np.zeros(n * k)  # losses are at the first components
+        self._stored, lost = np.zeros(n), np.zeros(n * k)  # the first component has the loss
         self.dissipated = (lost,)
         variables = [at[f"state {name}"] for name in law.variables]
         self._variables = [*variables, self._stored, lost[::k]]
@@ -133,8 +133,8 @@ class CompiledLaws(Response):
     def bends(self, e1: Array) -> Array:
         """Return minus the second derivatives of the forces at constant variables.
 
-        They are zero for laws with a limit: sticking connectors have constant rows, and no analysis
-        follows sliding connectors.
+        The result is zero for laws with a limit.  This is exact for sticking connectors, whose rows
+        are constant, and neglects the second derivatives of sliding forces.
         """
         if self._law.holds:
             return super().bends(e1)
@@ -146,7 +146,7 @@ class CompiledLaws(Response):
         return -bends
 
     def _accepted_state(self) -> tuple[ConnectorLaw, list[Array], State]:
-        """Return the law with the parameters of all connectors, their motions and variables."""
+        """Return the law with all parameters, and the accepted motions and variables."""
         law, at = self._law, self._at
         laws = law.with_parameters({name: at[f"number {name}"] for name in law.parameters()})
         motions = [at[f"before {i}"] for i in range(law.components)]
@@ -168,7 +168,7 @@ class CompiledLaws(Response):
         return np.column_stack(law.elastic_forces(motions, variables)).ravel()
 
     def freeze(self) -> None:
-        """Keep variables constant from now on; nothing changes for laws with a limit."""
+        """Keep internal variables constant from now on, except in laws with a limit."""
         if not self._law.holds:
             fill(self._c, force=self._forms.frozen[0])
 
@@ -182,7 +182,7 @@ At a root of order n, Newton's method multiplies a residual by (1 - 1/n)ⁿ, whi
 """
 
 DIGITS = 1e-8
-"""Difference of forces, as a fraction of the force, above which a slope has enough digits."""
+"""Fraction of the force above which a difference of forces has enough digits for a slope."""
 
 DIFFERENCE = 6e-6
 """Relative increment at which central differences have the least error: ∛(round-off)."""
@@ -198,12 +198,12 @@ class Iterate(NamedTuple):
 
 
 class UserLaw:
-    """Law of a connector in a step, by functions of a user.
+    """Law of a connector in a step, stated by functions of a user.
 
     Attributes:
         state: Internal variables of the accepted state; :meth:`UserLaws.accept_end` writes them.
         last: Previous iterate of this step; None in the first iterate.
-        energy: Function of the recoverable energy; None if the law states none.
+        energy: Function that returns the recoverable energy; None if the law has no such function.
     """
 
     def __init__(
@@ -218,7 +218,7 @@ class UserLaw:
         state[:] = law.state
 
     def begin(self, e0: float, t: float, dt: float) -> None:
-        """Begin a step of length ``dt`` at the motion ``e0``; the law acts at the time ``t``; s."""
+        """Begin a step of ``dt`` (s) at the motion ``e0``; the law acts at the time ``t`` (s)."""
         self._e0, self._dt = e0, dt
         state = self.state.copy()
         state.flags.writeable = False  # all iterates begin with the same state
@@ -228,7 +228,7 @@ class UserLaw:
     # -- the functions -------------------------------------------------------------------------
 
     def force(self, e1: float) -> float:
-        """Return the force if the step ends at the motion ``e1``."""
+        """Return the force, N or N m, if the step ends at the motion ``e1``."""
         return self.end(e1)[0]
 
     def end(self, e1: float) -> tuple[float, Array]:
@@ -262,7 +262,7 @@ class UserLaw:
         return force, state
 
     def stored(self, motion: float) -> float:
-        """Return the recoverable energy; J."""
+        """Return the recoverable energy at a motion; J."""
         if self.energy is None:
             return 0.0
         value = self.energy(motion, **dict.fromkeys(self._stored_arguments, self.state.copy()))
@@ -273,7 +273,7 @@ class UserLaw:
     # -- the law around an iterate -------------------------------------------------------------
 
     def line(self, e: float, λ: float) -> tuple[float, float]:
-        """Return slope and intercept of the linearised law for the iteration from ``e``, ``λ``."""
+        """Return slope and intercept of the linearised law at an iterate (``e``, ``λ``)."""
         force, last = self.force(e), self.last
         residual, at = force - λ, e
         if last is not None and abs(residual) > OVERSHOOT * abs(last.residual) and e != last.e:
@@ -288,8 +288,8 @@ class UserLaw:
 
         Where the slope of a law is infinite, Newton's method oscillates for ever.  The line through
         motions and forces of the two latest iterates approximates the rest of the scene.  The law
-        is linearised where it intersects this line, if the intersection is between ``e`` and the
-        previous motion ``last.at``.
+        is linearised at its intersection with this line, if the intersection is between ``e`` and
+        the previous motion ``last.at``.
         """
         stiffness = max(0.0, (last.λ - λ) / (e - last.e))
 
@@ -304,10 +304,10 @@ class UserLaw:
     def _slope(self, e: float, force: float) -> float:
         """Return the derivative of the force at ``e`` by central differences.
 
-        The increment is in proportion to the change of the motion in the step, at least to a
-        thousandth of the motion and a millionth of the scene.  Near zero the slope may be infinite.
-        There a smaller increment, in proportion to the motion in this or the previous iterate, is
-        taken if the difference of forces has enough digits.
+        The increment is proportional to the change of the motion in the step, but at least to a
+        thousandth of the motion and a millionth of the scene.  At zero motion the slope may be
+        infinite.  Near zero a smaller increment, proportional to the motion in this or the previous
+        iterate, is therefore used if the difference of forces has enough digits.
         """
         ε = DIFFERENCE * max(abs(e - self._e0), 1e-3 * max(abs(e), self._small))
         ε_motion = DIFFERENCE * max(abs(e), 0.0 if self.last is None else abs(self.last.at))
@@ -320,9 +320,9 @@ class UserLaw:
     def bend(self, e: float) -> float:
         """Return minus the second derivative of the force by a fourth-order difference.
 
-        The increment is a thousandth of the scene, or of a radian.  The relative error by round-off
-        is 1e-10.  The error by the sixth derivative is smaller if the slope of the law changes over
-        a length of a thirtieth of the scene or more.
+        The increment is a thousandth of the size of the scene, or of a radian.  The relative error
+        is below 1e-8 if the slope changes over a thirtieth of that size or more.  Round-off adds
+        about 1e-10 of the force divided by the square of that size.
         """
         ε, weights = self._small, (-1.0, 16.0, -30.0, 16.0, -1.0)
         forces = [w * self.force(e + k * ε) for k, w in zip(range(-2, 3), weights, strict=True)]
@@ -330,7 +330,7 @@ class UserLaw:
 
 
 class UserLaws(Response):
-    """Connectors with forces by functions; all have the same number of internal variables."""
+    """Connectors with forces by user functions, with equal numbers of internal variables."""
 
     def __init__(self, law: ForceLaw, connectors: Sequence[Connector], setting: Setting) -> None:
         super().__init__(connectors, setting, "AskedLaws")
@@ -358,7 +358,7 @@ class UserLaws(Response):
         return super().in_steps(callbacks)
 
     def know(self, term: Any) -> None:
-        """Take the arrays of motions and rows in the accepted state and in the iterate."""
+        """Store references to the motions, accepted and latest, and to the latest rows of laws."""
         (self._e0, self._e1), self._rows = term.motions, term.latest_rows
 
     def _begin(self, t: float, dt: float) -> None:
@@ -371,7 +371,7 @@ class UserLaws(Response):
 
     def _find_rows(self) -> None:
         """Write the laws, linearised about the iterate, into the rows of C."""
-        self._rows[:, 2] = math.nan  # stays where a function raises an exception
+        self._rows[:, 2] = math.nan  # remains if a function raises an exception
         motions = zip(self._each, self._e1.tolist(), self._force.tolist(), strict=True)
         for row, (law, e1, λ) in zip(self._rows, motions, strict=True):
             slope, intercept = law.line(e1, λ)
@@ -382,7 +382,7 @@ class UserLaws(Response):
         return np.array([law.bend(e1[i]) for i, law in enumerate(self._each)])
 
     def accept_end(self, e1: Array) -> None:
-        """Accept the variables after a step to ``e1``; stored energy does not count as lost."""
+        """Accept the variables after a step to ``e1``; the growth of stored energy is no loss."""
         states = [law.end(float(x))[1] for law, x in zip(self._each, e1, strict=True)]
         before = float(self._stored[0])
         for law, state in zip(self._each, states, strict=True):
@@ -396,6 +396,6 @@ class UserLaws(Response):
         self._stored[0] = sum([law.stored(float(x)) for law, x in zip(self._each, e, strict=True)])
 
     def restore(self, rows: Array) -> None:
-        """Restore the variables of :meth:`state`; the accepted motions are restored before."""
+        """Restore the variables of :meth:`state`, after the accepted motions."""
         super().restore(rows)
         self.start(self._e0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The virtual work of connectors: the force of a law on the variation of a relative motion.
+"""Virtual work of connectors: force of a law times the variation of a relative motion.
 
 Guides hold a point on a curve in the plane; the point moves freely along the curve.
 """
@@ -53,12 +53,12 @@ class ConnectorTerm(Term):
 
     Attributes:
         indices: Indices of the connectors in :attr:`Scene.all_connectors`.
-        connectors: The connectors; each component of a :class:`Bushing` is one.
+        connectors: The connectors; each component of a :class:`Bushing` counts as a connector.
         forces_at: Local degrees of freedom of the forces; (num_connectors,).
         response: Response of the laws to motions and forces.
         rate: Mean rate of the motions in the last step; (num_connectors,); m/s or rad/s.
-        recorded: Pairs of a field of :class:`Connection`, except the force, and a summand of its
-            values in the accepted state, (num_connectors,).  Later steps change the arrays.
+        recorded: Pairs of a field of :class:`Connection` and an array of the accepted state, which
+            later steps change, (num_connectors,).  Arrays of the same field are added.
     """
 
     kind = "connectors"
@@ -74,7 +74,7 @@ class ConnectorTerm(Term):
         self._callbacks: Callbacks  # set when the phases are created
         self.response = response = response_of(self.connectors[0].law, self.connectors, setting)
         self.must_dissipate = response.must_dissipate
-        # Motions and forces of the accepted state, and its `connector_number` of loops.h
+        # In the accepted state: motions, forces, and `connector_number` of loops.h
         self._e, self._before = np.zeros((2, len(self.connectors)))
         self._recorded: Array = np.zeros((lib.CONNECTOR_NUMBERS, len(self.connectors)))
         self.rate: Array = self._recorded[lib.CONNECTOR_RATE]
@@ -88,24 +88,24 @@ class ConnectorTerm(Term):
         """Return the relative motions at ``q``; (num_connectors,); m or rad."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Add forces and rows of laws, and raise exceptions of functions of a user."""
+        """Add forces and residuals of laws; raise exceptions of functions of a user."""
         with self._callbacks.raising():
             super().add_residual(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
-        """Add derivatives of forces and rows, and raise exceptions of functions of a user."""
+        """Add derivatives of forces and residuals; raise exceptions of functions of a user."""
         with self._callbacks.raising():
             super().add_tangent(q1)
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
-        """Set ``works`` at forces that laws determine to conjugate motions in a step ``v``."""
+        """Replace forces that laws determine, in ``works``, by their motions in a step ``v``."""
 
     def commit(self, q: Array) -> None:
         """Set the forces before the next step to the forces in ``q``."""
         self._before[:] = q[self.forces_at]
 
     def put_forces(self, q: Array) -> None:
-        """Put the elastic forces of the undeformed scene into its configuration ``q``."""
+        """Write the elastic forces of the initial configuration into its unknowns ``q``."""
         if (borne := self.response.borne()) is not None:
             q[self.forces_at] = self._before[:] = borne
 
@@ -119,7 +119,7 @@ class ConnectorTerm(Term):
 
 
 def _motions_with(connector: Connector) -> tuple[str, ...]:
-    """Return the motions on which the law of a connector acts: its own, or all of a bushing."""
+    """Return the names of motions in the law of a connector: one, or all motions of a bushing."""
     if isinstance(connector.law, ConnectorLaw) and connector.law.components > 1:
         return ("sliding", "sliding", "turning")[: connector.law.components]
     return (connector.motion,)
@@ -142,16 +142,16 @@ def _unit_cell() -> meshes.Mesh:
 
 
 class ConnectorForces(ConnectorTerm):
-    """Connectors of the same relative motions with laws of one kind.
+    """Connectors with the same relative motions and laws of one kind.
 
     Forms are stated on a cell of unit length between the two nodes of a connector.  The unknowns of
     the cell are six nodal unknowns, then the forces.  A :class:`Bushing` is one cell; its
-    components are consecutive connectors.  C evaluates the forms, and most laws.
+    components are consecutive connectors.  C evaluates the forms and most laws.
 
     Attributes:
         forms: Forms of a connector, and the functions in them.
-        motions: Motions in the accepted state and in the latest iterate, which C writes.
-        latest_rows: Rows of the laws about the latest iterate; (num_connectors, k + 2).
+        motions: Motions in the accepted state and in the latest iterate, (num_connectors,) each.
+        latest_rows: α, β, γ of connector_rows.py in the latest iterate; (num_connectors, k + 2).
     """
 
     def __init__(self, subdomain: Subdomain, positions: Index, setting: Setting, A: Csr) -> None:
@@ -170,7 +170,7 @@ class ConnectorForces(ConnectorTerm):
         self._step_kernels = work, tangent
         self._now, self.latest_rows = np.zeros(n), np.zeros((n, k + 2))
         self.motions = self._e, self._now
-        self.latest_rows[:, 0] = 1.0  # a constraint, unless a law changes the row
+        self.latest_rows[:, 0] = 1.0  # constraints, unless laws change them
         for kernel in self._step_kernels:
             kernel.put(forms.row, self.latest_rows.reshape(self._cells, -1))
         self._in_c = struct(
@@ -215,7 +215,7 @@ class ConnectorForces(ConnectorTerm):
         if response.asks_at_ends:
 
             def accept_user_laws(step: Any, q1: Any, s: Any) -> None:
-                """Let laws of a user accept the end of a step, before all other terms."""
+                """Let laws of a user accept the end of a step before any other term accepts it."""
                 lib.find_motions(self._in_c, q1)
                 response.accept_end(self._now)
 
@@ -237,7 +237,7 @@ class ConnectorForces(ConnectorTerm):
         return self._form(self.forms.rate)
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
-        """Set ``works`` at forces that laws determine to -1/β times the motion in a step ``v``."""
+        """Replace forces that laws determine by -1/β times their motions in a step ``v``."""
         β = self.rows(q)[:, -2]
         about_force = β != 0.0
         factors = np.divide(-1.0, β, out=np.zeros(len(β)), where=about_force)
@@ -252,7 +252,7 @@ class ConnectorForces(ConnectorTerm):
             works[at] = np.where(about_force, factors * rates, works[at])
 
     def rows(self, q: Array) -> Array:
-        """Return rows of the laws, linearised at ``q``; (num_connectors, k + 2), k components."""
+        """Return the rows of the laws, linearised at ``q``; :attr:`latest_rows`."""
         lib.find_rows(self._in_c, doubles(q))
         return self.latest_rows
 
@@ -276,7 +276,7 @@ class ConnectorForces(ConnectorTerm):
     # -- the state -----------------------------------------------------------------------------
 
     def start(self, q: Array) -> None:
-        """Set the accepted motions to those of ``q``, without a step."""
+        """Set the accepted motions to the motions at ``q``, without a step."""
         self._e[:] = self.motion(q)
         self.response.start(self._e)
 
@@ -292,11 +292,12 @@ class ConnectorForces(ConnectorTerm):
 
 
 class Guides(ConnectorTerm):
-    """Forces across curves; over a step they are normal to its chord, so they do no work.
+    """Forces that hold points on curves.
 
-    The round-off of points spoils the direction of a short chord.  A chord is replaced by the
-    tangent in its middle where round-off causes a larger error than curvature.  The error of either
-    direction is at most the round-off to the power of two thirds.
+    In schemes whose forces act over the step, they are normal to the chord of the step and do no
+    work.  The round-off of points spoils the direction of a short chord.  If this error exceeds the
+    error by curvature, the tangent in the middle replaces the chord.  The error of either direction
+    is at most the round-off to the power of two thirds.
 
     The motion of a guide is the distance of the point from its curve, which is zero when a step is
     accepted.  guide_curves.c computes guides, and calls Python for points of the curves.
@@ -328,7 +329,7 @@ class Guides(ConnectorTerm):
         self.law_residual = loop("missed_by_guides", self._c)
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops that begin at the accepted points of the curves, and accept new ones."""
+        """Return loops that begin at the accepted points of the curves, and accept new points."""
         self._callbacks = callbacks
         curves = [callbacks.handle(curve, 2 * lib.CURVE_POINTS) for curve in self._curves]
         fill(self._c, ask=lib.curve_in_python, curve=ffi.new("void *[]", curves))
@@ -337,7 +338,7 @@ class Guides(ConnectorTerm):
         return Phases([begin], [accept], again=begin)
 
     def _begin_again(self) -> None:
-        """Begin at the points of the last step."""
+        """Discard iterates, and begin at the accepted points of the curves."""
         lib.begin_guides(self._c, ffi.NULL, ffi.NULL, ffi.NULL)
 
     def _report(self) -> None:
@@ -345,7 +346,7 @@ class Guides(ConnectorTerm):
         raise NoNumber(f"{place}: no nearest point was found on its guide curve")
 
     def motion(self, q: Array) -> Array:
-        """Return the distances from the curves; m."""
+        """Return the distances from the curves; (num_connectors,); m."""
         self._begin_again()
         with self._callbacks.raising():
             lib.find_frames(self._c, doubles(q))
@@ -355,7 +356,7 @@ class Guides(ConnectorTerm):
         """Add the derivative of the tangent at ``q1`` along ``u``.
 
         Curves are Python functions, so the derivative is a fourth-order difference whose increment
-        is a hundredth of the scene.  Curvatures have an error of 1e-8, the derivative one of 1e-6.
+        is a hundredth of the scene.  The error of curvatures is 1e-8, of the derivative 1e-6.
         """
         increment = np.abs(u[np.r_[self._x, self._y]]).max(initial=0.0)
         ε = 1e-2 * self._size / increment if increment > 0 else 1.0
@@ -379,8 +380,7 @@ class Guides(ConnectorTerm):
 def connector_terms(subdomain: Subdomain, setting: Setting, A: Csr) -> list[ConnectorTerm]:
     """Create the terms of the connectors of a process, one for each kind, guides last.
 
-    Each process creates the entries of the ledger in the order of the scene, including the entries
-    that only other processes write.
+    Every process creates all entries of the ledger, in the order of the scene.
     """
     connectors = subdomain.numbering.scene.all_connectors
     groups: dict[tuple[tuple[str, ...], object], list[int]] = {}

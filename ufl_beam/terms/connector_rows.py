@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors over a step: a row ``α e + β λ = γ`` for each component of each law.
+"""Laws of connectors over a step: a linear equation ``α e + β λ = γ``, or row, for each component.
 
-e is the relative motion at the end of the step, of all components of a connector; λ is the force
-that resists the growth of the motion.  The row of a constraint determines e.  The row of any other
-law determines λ as a function of e, which is linearised about the latest iterate.
+e are the relative motions of all components of a connector at the end of the step.  λ is the force
+of the component, which resists the growth of its motion.  The row of a constraint determines e.
+Any other law determines λ as a function of e; its row is linearised about the latest iterate.
 
 This module has laws that prescribe a motion or a force, dampers, dry friction, springs, and
 rigid-plastic laws, such as plastic hinges of zero length.  Compiled laws and functions of a user
@@ -49,15 +49,15 @@ from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS, Points, e
 from ufl_beam.terms.term import Callbacks
 
 CREEP = 1e-12
-"""Motion in a step of a sticking connector at its limit; rad, or a fraction of the scene's size.
+"""Motion in a step of a sticking connector at its limit force; rad, or fraction of scene size.
 
-Sticking connectors move only if several of them may constrain the same motion.  Then their motions
-decide how they share the force.
+Sticking connectors creep only if several of them may constrain the same motion.  The creep then
+determines how they share the force.
 """
 
 
 class Setting(NamedTuple):
-    """Data of a scene that all responses refer to."""
+    """Data of a scene that all responses use."""
 
     requested_forces: Callable[
         [Connector], Any
@@ -68,14 +68,14 @@ class Setting(NamedTuple):
     ledger: Ledger
     friction_repeats: bool  # True if constraints of sticking connectors may be redundant
     search: Index  # flags shared by all points and connectors, see loops.h
-    switched: Index  # whether a row began or ceased to be a constraint since the tangent; (1,)
+    switched: Index  # whether a row began or ceased to be a constraint since the last tangent; (1,)
 
 
 class Response:
-    """Connectors with laws of one kind; motions and forces are arrays.
+    """Response of connectors with laws of one kind; motions and forces are (num_connectors,).
 
-    Each component of a :class:`Bushing` counts as a connector.  The attributes are views, which
-    later steps change.
+    Each component of a :class:`Bushing` counts as a connector.  Later steps change the arrays of
+    the attributes.
 
     Attributes:
         name: Name of the internal variables in files.
@@ -85,13 +85,13 @@ class Response:
         opens: Fields of ``openable`` of loops.h if connectors may open or slip by the rule in
             material_points.py; else None.
         asks_at_ends: True if :meth:`accept_end` must be called when a step is accepted.
-        motion: Motions of the accepted state in solutions, (num_connectors,); None if they are the
-            motions of the nodes.
+        motion: Accepted motions that solutions record, (num_connectors,); None if solutions record
+            the motions of the nodes.
         way: Direction of plastic slip in the latest iterate, 1 or -1; 0 without slip.
         sticks: True for each connector that friction holds in the latest iterate; None without
             friction.
-        dissipated: Energies since the beginning whose sum is ``dissipated`` of
-            :class:`Connection`; (num_connectors,) each; J.
+        dissipated: Arrays (num_connectors,) of energies lost since the beginning, whose sum is
+            ``dissipated`` of :class:`Connection`; J.
     """
 
     must_dissipate = asks_at_ends = False
@@ -112,7 +112,7 @@ class Response:
         self._in_steps: dict[str, Any] = {}
         self._time_functions: dict[str, list[tuple[TimeFunction, object]]] = {}
         self._accounts: dict[str, tuple[Account, str]] = {}
-        # Arrays of internal variables; all components of a bushing share a number
+        # Arrays of internal variables; all components of a bushing share one value
         self._variables: list[npt.NDArray[Any]] = []
         self._components = 1
 
@@ -123,9 +123,9 @@ class Response:
             account[name] += 0.0
 
     def _rub(self, limits: list[Any], **law_fields: Any) -> None:
-        """Let connectors stick or slip; ``limits`` are the addresses of their limit forces."""
+        """Set the data of friction in C; ``limits`` are the addresses of the limit forces."""
         n, setting = len(self._connectors), self._setting
-        # Direction of slip, or 0, in the step and in the accepted state; ``friction`` of loops.h
+        # Direction of slip, or 0, in the iterate and in the accepted state; see ``friction``
         self._direction, self._accepted, distance, creep = np.zeros((4, n))
         self.sticks, against = np.zeros((2, n), dtype=np.int32)
         softness = CREEP if setting.friction_repeats else 0.0
@@ -151,13 +151,13 @@ class Response:
         return {**self._in_steps, **functions, **places}
 
     def know(self, term: Any) -> None:
-        """Take the arrays and forms of the :class:`ConnectorForces` ``term`` that the laws need."""
+        """Store arrays and forms of the :class:`ConnectorForces` ``term`` that the laws need."""
         if self.sticks is not None:
             rate, v = term.motion_rate, term.forms.u
             fill(self.in_c["friction"], rate=rate.cells, at_v=rate.position(v))
 
     def accept_end(self, e1: Array) -> None:
-        """Accept the end of a step at ``e1`` before C does; functions of a user may raise."""
+        """Accept motions ``e1`` before C accepts the step; user functions may raise exceptions."""
 
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Return the energy dissipated plastically in a step to the motions ``e1``; J."""
@@ -167,7 +167,7 @@ class Response:
         """Raise :class:`StepFailed` if a law generates energy in a step to motions ``e1``."""
 
     def remaining(self) -> Array:
-        """Return the fraction of elastic stiffness left in the iterate; (num_connectors,)."""
+        """Return the remaining fraction of elastic stiffness in the iterate; (num_connectors,)."""
         return np.where(self.way == 0, 1.0, 0.0)
 
     def bends(self, e1: Array) -> Array:
@@ -195,20 +195,20 @@ class Response:
         """Set the accepted motions to ``e``, without a step."""
 
     def borne(self) -> Array | None:
-        """Return the elastic forces after :meth:`start`, (num_connectors,), or None."""
+        """Return the elastic forces after :meth:`start`, (num_connectors,); None without any."""
         return None
 
     def freeze(self) -> None:
         """Make all responses elastic from now on, without further yielding or breaking."""
 
 
-# -- laws that give a motion or a force ------------------------------------------------------------
+# -- laws that prescribe a motion or a force -------------------------------------------------------
 
 
 class PrescribedLaws(Response):
     """Laws that prescribe the motion, the force or its limit: motors, dampers, dry friction, ...
 
-    Joints and guides constrain a motion by forces that do no work.
+    Joints and guides also prescribe a motion; their forces do no work, and have no ledger entry.
     """
 
     def __init__(self, law: Any, connectors: Sequence[Connector], setting: Setting) -> None:
@@ -296,7 +296,7 @@ class Springs(Response):
         self.points.require_dissipation(lambda number: str(self._connectors[number]))
 
     def remaining(self) -> Array:
-        """Return the fraction of elastic stiffness left in the iterate; (num_connectors,)."""
+        """Return the remaining fraction of elastic stiffness in the iterate; (num_connectors,)."""
         return self.points.remaining(np.eye(1, 3).repeat(len(self._strains), axis=0))
 
     def state(self) -> Array:
@@ -324,15 +324,15 @@ class Springs(Response):
 # -- rigid-plastic laws ---------------------------------------------------------------------------
 
 INPUTS = (*names("slip_input", "slip_"), "θ", "dt")
-"""First inputs of the compiled laws: slip of the step and its direction (1 or -1), accumulated slip
-and motion at t_n; θ and length of the step.
+"""First inputs of the compiled laws: slip in the step, its direction (1 or -1), accumulated slip at
+t_n, motion at t_n, θ, and length of the step (s).
 
-loops.h has the order of the first four in ``slip_input``.  The parameters of the law follow.
+The first four are in the order of ``slip_input`` in loops.h.  The parameters of the law follow.
 """
 
 
 class RigidPlasticForms:
-    """C functions of a law of slip: force and its derivative; ``slip_output`` of loops.h."""
+    """C functions of a rigid-plastic law: force and derivative; ``slip_output`` of loops.h."""
 
     def __init__(self, law: SofteningLaw | ElastoPlastic, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise((*INPUTS, *parameters(law)))
@@ -355,7 +355,7 @@ _rigid_plastic_forms = cached_forms(RigidPlasticForms)
 
 
 REFERENCE_MOTION = 0.01
-"""Motion m at which r m, see rigid_plastic.c, is the limit force; rad, or part of the scene's size.
+"""Motion m at which r m, see rigid_plastic.c, is the limit force; rad, or fraction of scene size.
 
 r decides whether a connector slips in an iterate; solutions do not depend on r.
 """
@@ -367,8 +367,8 @@ LEAST_SLOPE = 1e-9
 def _slope(connector: Connector, size: float) -> float:
     """Return r, the factor of the motion in the equation of a connector, see rigid_plastic.c.
 
-    r exceeds the steepest slope of softening, so that an open branch stays open.  It is so large
-    that the motion, not the round-off of the force, decides in which direction a weak hinge slips.
+    r exceeds the steepest slope of softening, so that an open hinge stays open.  For weak hinges r
+    is large enough that the motion, not the round-off of the force, decides the direction of slip.
     """
     law = law_of(connector)
     if not 0.0 < law.limit < np.inf:
@@ -437,14 +437,14 @@ class RigidPlasticLaws(Response):
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Return the energy dissipated in a step to the motions ``e1``; J.
 
-        A held connector beyond its limit counts with its excess times a unit of motion.
+        A held connector whose force exceeds the limit counts with the excess times 1 m or 1 rad.
         """
         arrays = doubles(e1), doubles(np.ascontiguousarray(λ))
         return float(lib.dissipation_of_rigid_plastic(self._c, *arrays))
 
     def state(self) -> Array:
         """Return the internal variables; (num_connectors, 7)."""
-        stored = np.zeros(len(self._connectors))  # any one row may have the sum
+        stored = np.zeros(len(self._connectors))  # any row may store the sum
         stored[:1] = self._stored
         return np.column_stack([super().state(), stored])
 
@@ -458,7 +458,7 @@ class RigidPlasticLaws(Response):
         self._at["start"][:] = e
 
     def freeze(self) -> None:
-        """Hold connectors from now on, except those with exhausted limits, which are free."""
+        """Hold connectors from now on; connectors with exhausted limits move freely."""
         spent = self._limit <= EXHAUSTED * self._initial_limit
         self._limit[:] = np.where(spent, 0.0, np.inf)
         if not self._hardens:

@@ -24,10 +24,10 @@ from ufl_beam.model.connector_laws import (
 )
 
 EXPLAINED = 0.1
-"""Estimate of round-off, as a fraction of an imbalance, from which on it explains the imbalance."""
+"""Least ratio of estimated round-off to imbalance at which round-off explains the imbalance."""
 
 ROUND_OFF_ENERGY = 1e-3
-"""Stored and lost energy, as a fraction of transferred energy, up to which works are round-off."""
+"""Largest ratio of stored and lost energy to transferred energy at which works are round-off."""
 
 LEDGER_ENTRIES = {
     PrescribedMotion: ("_Driven", "supplied", "motors", -1.0),
@@ -53,7 +53,7 @@ class Account(Mapping[str, float]):
     def __init__(self) -> None:
         self._at: dict[str, int] = {}
         self.amounts: Array = np.zeros(16)
-        self._fixed = False  # C has addresses
+        self._fixed = False  # True once C has addresses
 
     def __getitem__(self, name: str) -> float:
         return float(self.amounts[self._at[name]]) if name in self._at else 0.0
@@ -181,8 +181,8 @@ class Energy(Mapping[str, Array], Rich):
     def imbalance(self) -> Array:
         """Energy that the ledger does not account for since the first state; (n+1,); J.
 
-        The difference from the first state is taken because a path begins under its constant loads,
-        and the entries have their work.
+        The value of the first state is subtracted, because an equilibrium path begins under its
+        constant loads, whose work is in the entries.
         """
         since = self.total - _sum(self.supplied) + _sum(self.lost)
         return np.asarray(since - since[0])
@@ -195,7 +195,7 @@ class Energy(Mapping[str, Array], Rich):
 
     @property
     def _in_scene(self) -> Array:
-        """Energy in the scene; a user's potentials count as changes, as their zero is arbitrary."""
+        """Energy in the scene, J; user potentials count by changes, as their zero is arbitrary."""
         sizes = {n: e if n in CONTRIBUTIONS else np.abs(e - e[0]) for n, e in self.state.items()}
         return _sum(sizes)
 
@@ -206,14 +206,14 @@ class Energy(Mapping[str, Array], Rich):
         return largest / transferred if transferred > 0 else largest
 
     def opened(self, claimed: float, round_off: float) -> str:
-        """Describe the imbalance of the ledger; empty if it is as small as claimed, or round-off.
+        """Return a message about the imbalance; empty if it is as small as claimed, or round-off.
 
         Args:
             claimed: Largest imbalance that the scheme claims, as a fraction of the transferred
                 energy.
             round_off: Estimate of the error of the energy by round-off of the unknowns; J.
         """
-        # Squares of the smallest numbers have lost their digits.
+        # Energies near the smallest floating-point number have too few digits.
         if not self.energy_transferred > sys.float_info.min / sys.float_info.epsilon:
             return ""
         if self.worst <= claimed:

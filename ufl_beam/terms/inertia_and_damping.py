@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Inertia, damping, and the rates of a time scheme in C.
 
-Coefficients of a scheme are stored, because most steps have one of few lengths.
+Coefficients of a scheme are cached, because steps have only a few different lengths.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ BEFORE = "velocity before"
 
 @lru_cache(maxsize=1024)  # constant steps between rounded times have about ten lengths
 def _coefficients(scheme: Any, dt: float, last_dt: float, known: int) -> Coefficients:
-    """Return the coefficients of a step as lists of numbers."""
+    """Return the coefficients of a scheme for a step as lists of numbers."""
     c = scheme.coefficients(dt, last_dt, known)
     inertia, velocity, *rates = (list(map(float, row)) for row in (*c[:2], *c.rates))
     slip = None if c.slip is None else list(map(float, c.slip))
@@ -84,7 +84,7 @@ def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
 
 @ffi.def_extern(error=0)  # type: ignore[misc, untyped-decorator, unused-ignore]
 def numbers_in_python(handle: Any, c: Any) -> int:
-    """Callback of C: write ``scheme_numbers`` of loops.h for a step."""
+    """Write ``scheme_numbers`` of loops.h for a step; C calls this function."""
     scheme, number = ffi.from_handle(handle)
     inertia, velocity, rates, slip = _coefficients(scheme, c.dt, c.last_dt, c.more)
     rows = inertia, velocity, slip or [0.0] * FURTHER, *rates
@@ -96,10 +96,10 @@ def numbers_in_python(handle: Any, c: Any) -> int:
 
 
 class Inertia(Term):
-    """Inertia of beams, point masses and bodies: constant matrix, P(18); rates of a scheme in C.
+    """Inertia of beams, point masses and bodies: constant mass matrix, P(18), and rates in C.
 
     Rates are velocities, velocities before the last step, and further rates of the scheme, such as
-    accelerations.  Properties return copies of them.
+    accelerations.  Properties return copies.
 
     Attributes:
         scheme: The time scheme.
@@ -123,7 +123,7 @@ class Inertia(Term):
         size, number = len(v), FURTHER + len(scheme.kept)
         self.loses_energy = checked_coefficients(scheme).slip is not None
         # Rate 0, the nodal step, is stored elsewhere.  Velocities before the last step are not
-        # computed: they are the old velocities.  If nothing needs them, new ones take their memory.
+        # computed: they are the old velocities.  If unused, new velocities take their memory.
         asks = self.loses_energy or scheme.uses_last_step
         self._now = np.zeros((number - V, size))
         self._next = np.zeros((number - V_BEFORE - (not asks), size))
@@ -175,7 +175,7 @@ class Inertia(Term):
         return tuple(self._rate(FURTHER + k).copy() for k in range(self.c.more))
 
     def keep(self, *more: Array) -> None:
-        """Set the further rates; a step can begin if some are set, or if the scheme has none."""
+        """Set the further rates; a step can begin if some are set or the scheme has none."""
         for k, rate in enumerate(more):
             self._rate(FURTHER + k)[:] = rate
         self.c.more, self.c.ready = len(more), bool(more) or not self.scheme.kept
@@ -305,7 +305,7 @@ def damping_forces(
     damping: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
     rates: Inertia | None,
 ) -> list[Term]:  # fmt: skip
-    """Return the terms of a damping on the cells of a process; none if it has no such cells."""
+    """Return the terms of a damping on the cells of a process; empty without such cells."""
     ledger.lost["damping"] += 0.0
     if isinstance(damping, Rayleigh):
         if rates is None:
@@ -359,12 +359,12 @@ class SecondDifferences(FormForces):
         return Phases([*begin, before], [*accept, after])
 
     def start(self, q: Array) -> None:
-        """Set the strains to those at ``q``."""
+        """Set the strains at the beginning of the step to the strains at ``q``."""
         self._e[:] = self._strains(q)
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore changes of the strains in the last step, and its length."""
-        # The rows have the length, as process 0, which saves numbers, may have no such cells.
+        # The length is in the rows, because process 0, which saves numbers, may have no such cells.
         rows = np.column_stack([self._change, np.full(len(self._change), self._last_dt)])
         rows = archive.rows("changes of strains", self._cells, rows)
         self._change[:], self._last_dt[0] = rows[:, :-1], rows[0, -1]

@@ -66,8 +66,8 @@ class LoadTerm(Term):
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them.
 
-        The state ``q`` is assumed in equilibrium with them.  ``v`` are the velocities, None in
-        statics; ``past`` is the end of a run of the same scene.
+        The state ``q`` is assumed to be in equilibrium with these loads.  ``v`` are the velocities,
+        None in statics.  ``past`` is the end of an earlier run of the same scene, if there is one.
         """
 
     def pass_on(self, archive: Archive) -> None:
@@ -78,10 +78,10 @@ class _AtDofs(LoadTerm):
     """Loads that act at some degrees of freedom, with sizes that are functions of time.
 
     Attributes:
-        dofs: Local degrees of freedom that any process loads; rows of forces have no others.
+        dofs: Local degrees of freedom that any process loads: the columns of the forces.
     """
 
-    _forces: Array  # rows of forces; the first row is in the equation
+    _forces: Array  # (rows, dofs); the first row is in the step equation
 
     def _set_dofs(
         self, subdomain: Subdomain, loaded: Array, owners: Sequence[Load], rows: int
@@ -110,8 +110,8 @@ class DeadLoads(_AtDofs):
         self, loads: Sequence[Load], subdomain: Subdomain, scheme: Scheme, ledger: Ledger
     ) -> None:
         self._scheme, self._ledger = scheme, ledger
-        # Loads with the same time function share a vector; messages name the first of them.  Keys
-        # are identities, because functions need not be hashable.
+        # Loads with the same time function share a vector; messages name the first load.  Keys are
+        # identities, because functions need not be hashable.
         vectors: dict[int, tuple[Load, Array]] = {}
         in_cells: dict[int, Array] = {}
         for load in loads:
@@ -132,7 +132,7 @@ class DeadLoads(_AtDofs):
         self.loops = loop("subtract_vector", self.vector), None
 
     def loads_in_cells(self) -> Any:
-        """Return ``loads_in_cells`` of loops.h; null if nothing acts along beams."""
+        """Return ``loads_in_cells`` of loops.h; null if no load acts along beams."""
         if not any(along is not None for along in self._along):
             return ffi.NULL
         along = [ffi.NULL if forces is None else doubles(forces) for forces in self._along]
@@ -143,7 +143,7 @@ class DeadLoads(_AtDofs):
         return ffi.gc(c, lambda _, alive=(c, along): None)  # solutions outlive the term
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the vectors of forces."""
+        """Return loops over the load vectors that begin and accept a step."""
         number = len(self._vectors)
         c = self._c = struct(
             "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=number,
@@ -244,7 +244,7 @@ class FollowerLoads(_AtDofs):
         self.loops = loop("subtract_follower_loads", self._c), tangent
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the loads."""
+        """Return loops over the loads that begin and accept a step."""
         c = fill(self._c, factor=callbacks.time_functions(self._in_time))
         c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_follower_loads", c)], [loop("accept_follower_loads", c)])
@@ -272,7 +272,7 @@ def _turned_mass(element: Element) -> ufl.Form:
 class FrameForces(LoadTerm):
     """Centrifugal forces, which have a potential, and Coriolis forces, which do no work.
 
-    Rotary inertia keeps its spin in steady rotation, so it causes no moments.
+    Rotary inertia causes no moments, because its spin is constant in steady rotation.
     """
 
     def __init__(
@@ -316,7 +316,7 @@ class FrameForces(LoadTerm):
         self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at_cells)]
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the degrees of freedom."""
+        """Return loops over the degrees of freedom that begin and accept a step."""
         self._c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_frame", self._c)], [loop("accept_frame", self._c)])
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Material points: return map, internal variables, stored and dissipated energies.
 
-The laws are traced with UFL symbols, UFL derives their derivatives, and FFCx compiles both.  The
-return map is in material_points.c, a loop over the points that calls the compiled laws.  There the
+The laws are evaluated with UFL symbols, UFL computes their derivatives, and FFCx compiles both.
+The return map in material_points.c is a loop over the points that calls the compiled laws.  The
 tangents of opening discontinuities, and of laws that solve for their variables, follow from the
 implicit function theorem.
 
@@ -12,8 +12,8 @@ last step stays closed if an equilibrium exists in which it bears at most its li
 points above their limits, the point with the largest excess opens first; the others open only if
 they still exceed their limits.
 
-Rigid-plastic connectors follow the same rule, and so do connector laws with a limit, because their
-sliding force may be below the limit: sticking or sliding continues if such an equilibrium exists.
+Rigid-plastic connectors follow the same rule.  So do connector laws with a limit, whose sliding
+force may be below the limit: sticking or sliding continues if such an equilibrium exists.
 """
 
 from __future__ import annotations
@@ -54,23 +54,23 @@ law_functions.log.register(Expr, ufl.ln)
 law_functions.tanh.register(Expr, ufl.tanh)
 
 DIGITS = 16 * float(np.finfo(float).eps)
-"""Round-off of a plastic dissipation, as a fraction of C e² summed over points and both ends."""
+"""Round-off of plastic dissipation, as a fraction of the sum of C e² over points and step ends."""
 
 EXHAUSTED = 1e-6
-"""Resistance of an open hinge, as a fraction of its limit, up to which modes treat it as a joint.
+"""Resistance, as a fraction of the limit, up to which modes treat an open hinge as a joint.
 
-An exponential law then has the same fraction of its fracture energy left.
+At this resistance an exponential law has the same fraction of its fracture energy left.
 """
 
 FREED_STIFFNESS = 1e-30
-"""Factor of the stiffness of such a hinge; its square root makes frequencies zero to round-off."""
+"""Factor of the stiffness of such a hinge; its frequencies then are zero to round-off."""
 
 
 def expect_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger) -> None:
     """Create the entries of the ledger that points of a layout write.
 
-    Every process calls it, even without such points, so that all ledgers have the same entries in
-    the same order.
+    Every process calls this function, even without such points, so that all ledgers have the same
+    entries in the same order.
     """
     if section_points.yields:
         ledger.state["hardening"] += 0.0
@@ -82,7 +82,7 @@ def expect_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger
 
 
 def releases(section_points: SectionPoints, scheme: Scheme) -> bool:
-    """Return whether points have numerical losses besides those by ``alpha`` of a scheme.
+    """Return whether points have numerical losses besides the loss by ``alpha`` of a scheme.
 
     Schemes with forces over the step have two such losses.  A point that breaks loses the energy of
     its stress at the end of the step.  In nonlinear elasticity the work of the stress at t_n+θ
@@ -169,8 +169,8 @@ class Points:
         scheme: The time scheme.
         search: Flags of the present search for an equilibrium, which all points and connectors of
             a scene share, see loops.h; (SEARCH_FLAGS,).
-        predicts: True if tangents predict the stresses of yielding points with one strain, see
-            follow_prediction in material_points.c.
+        predicts: True if tangents predict stresses of yielding points with one strain component,
+            see follow_prediction in material_points.c.
 
     Attributes:
         c: ``points`` of loops.h.
@@ -186,9 +186,9 @@ class Points:
             beginning; (cells, 6); N, N, N m, rad or m, J, J.
         sums: Seven sums over all cells; J.  Energies in the accepted state: (3) elastic, (4) stored
             by hardening.  Energies lost in the last step: (0) by plastic strains, (1) by
-            discontinuities, (2) numerically, with θ = 1, (5) numerically, see :func:`releases`.
-            (6) is the work of the mean of both end stresses on plastic strains less the work of the
-            stress at the end, of points whose stress relaxes.
+            discontinuities, (2) numerically if θ were 1, (5) numerically, see :func:`releases`.
+            (6) For points whose stress relaxes in the last step: work of the mean stress on plastic
+            strains minus the work of the end stress.
     """
 
     def __init__(
@@ -296,7 +296,7 @@ class Points:
     def return_map(self, strains: Array) -> tuple[Array, Array]:
         """Return (N, V, M) in a step to ``strains``, and derivatives; (cells, 3), (cells, 9).
 
-        Both are NaN in a cell where an opening, or the variables for which a law solves, are not
+        Both are NaN in a cell where no solution for an opening or for the variables of a law is
         found.  Later calls overwrite the arrays.  Predictions of the last tangent are ignored.
         """
         self.c.predicts, self.c.linear = 0, ffi.NULL
@@ -305,9 +305,9 @@ class Points:
         return self.r, self.D
 
     def tangent(self) -> tuple[Array, Array]:
-        """Return the accepted strains, and derivatives of (N, V, M) in a step that stays there.
+        """Return the accepted strains, and derivatives of (N, V, M) in a step without motion.
 
-        Shapes (cells, 3) and (cells, 9).  The latest response is restored.
+        The shapes are (cells, 3) and (cells, 9).  The latest response is restored.
         """
         arrays = self._storage, self.strains, self.r, self.D, self._search
         before = [array.copy() for array in arrays]
@@ -318,9 +318,9 @@ class Points:
                 array[:] = values
 
     def remaining(self, change: Array) -> Array:
-        """Return the fraction of elastic stiffness that remains against ``change``; (cells,).
+        """Return the remaining fraction of elastic stiffness for strains ``change``; (cells,).
 
-        The stiffness is the tangent of the latest response.  ``change`` are strains; (cells, 3).
+        The stiffness is the tangent of the latest response.  ``change`` has the shape (cells, 3).
         """
         section_points, theta = self._section_points, self["theta"][0, 0]
         elastic = theta * change**2 @ section_points.rest
@@ -332,8 +332,8 @@ class Points:
     def require_dissipation(self, describe: Callable[[int], str]) -> None:
         """Raise :class:`StepFailed` if a point generates energy; ``describe`` names its cell.
 
-        The law then has a negative dissipation.  Either its equations have several solutions, and
-        the solver found one that no material reaches; or it stores energy that it does not state.
+        The law then has a negative dissipation.  Either its equations have several solutions, of
+        which the solver found an unphysical one; or it stores energy that it does not state.
         """
         if (worst := lib.gives_energy(self.c)) >= 0:
             law = type(self._section_points.kind.law).__name__
@@ -363,7 +363,7 @@ class Points:
         return float(broken + (plastic if abs(plastic) > DIGITS * size else 0.0))
 
     def _copy(self) -> Any:
-        """Return ``points`` of loops.h with this response, and a copy of the state to change."""
+        """Return ``points`` of loops.h with the latest response and its own copy of the state."""
         copy = ffi.new("points *", self.c[0])
         return fill(
             copy, e0=self._e0.copy(), w=self._storage.copy(), kept=self.recorded.copy(),
@@ -388,8 +388,8 @@ class Points:
     def in_steps(self, ledger: Ledger) -> dict[str, Any]:
         """Return fields of ``inelastic_term`` of loops.h, with entries of the ledger.
 
-        In statics a copy of the points is a field, for the energy change of a step before it is
-        accepted.
+        In statics the fields include a copy of the points, with which C computes the change of
+        energy in a step before the step is accepted.
         """
         state, lost = ledger.state, ledger.lost
         kinds = {
@@ -407,7 +407,7 @@ class Points:
     def state(self) -> Array:
         """Return a copy of variables, strains and energies of the accepted state; (cells, k)."""
         stored = np.zeros((len(self.recorded), 2))
-        stored[:1] = self.sums[3:5]  # sums over all cells; any one row may have them
+        stored[:1] = self.sums[3:5]  # sums over all cells; any row may store them
         return np.hstack(
             [*(self[name] for name in self._state_names), self.recorded, self._e0, stored]
         )

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Terms: virtual works in the equation of a step, and their phases.
 
-A term adds its contributions to the residual and to the tangent at the end of the step, and enters
-the energies of the step in the ledger.  Vectors hold the local degrees of freedom of a process,
-ghosts included.  The solver sums the contributions of several processes to a degree of freedom.
+A term adds its forces to the residual and their derivatives to the tangent.  When a step is
+accepted, the term adds its energies to the ledger.  Vectors hold the local degrees of freedom of a
+process, ghosts included.  For each degree of freedom the solver sums the forces of all processes.
 
-Phases are loops in C that begin and accept a step; they call functions of a user in Python.
+Phases are C functions that begin or accept a step; they call Python functions of a user.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ class InCells(NamedTuple):
     """Forces of a term on the nodes of cells; see cell_forces.py.
 
     Attributes:
-        form: Function that creates the form whose entries are the forces.  Without a
-            ``vector``, the forces are the entries of its latest evaluation.
-        kind: ``force_kind`` of loops.h.
+        form: Function that returns the compiled form whose values are the nodal forces.  Without
+            a ``vector``, the forces are the values of the form in the latest residual.
+        kind: Value of ``force_kind`` in loops.h.
         order: Positions of the cells of the form in ``subdomain.cells``.
         vector: Pointer to the address of the vector at which the form is evaluated, if the form is
-            linear and the residual does not evaluate it; else None.
+            linear and the residual does not evaluate the form; else None.
         factor: Factor of the forces.
         q0: Function of the configuration at the beginning of the step, if the form depends only on
             the configurations at the beginning and at the end; else None.
@@ -55,12 +55,12 @@ class InCells(NamedTuple):
 
 
 class Phases(NamedTuple):
-    """Loops of the type ``phase`` of loops.h, each with its data.
+    """C functions of a term in a step, each with its data; loops.h declares their types.
 
-    ``change``, of the type ``change_of_energy``, computes the energy that a step stores and
-    dissipates.  ``opens`` has fields of ``openable``, if points or connectors may open.
-    ``admits``, of the type ``admission``, checks a step before it is accepted.  ``again`` discards
-    the results of earlier iterates before stiffer tangents are tried in the same step.
+    ``begin`` and ``accept`` begin and accept a step; ``add_state`` adds the energies of a state to
+    the ledger.  ``change`` computes the energy that a step stores and dissipates.  ``opens`` has
+    the fields of ``openable``, if points or connectors may open.  ``admits`` checks a step before
+    its end is accepted.  ``again`` discards earlier iterates when a step is restarted.
     """
 
     begin: Sequence[Loop] = ()
@@ -77,11 +77,11 @@ class Term(ABC):
 
     Attributes:
         kind: One of :data:`KINDS`.
-        loops: C functions that add to the residual and to the tangent, with their data; the second
-            is None if the tangent is zero.
-        in_cells: Forces on the nodes of cells, except dead loads, which have
+        loops: Two C functions with their data: the first adds to the residual, the second to the
+            tangent.  The second is None if the tangent is zero.
+        in_cells: Forces on the nodes of cells, except dead loads; see
             :meth:`DeadLoads.loads_in_cells`.
-        law_residual: C function of the residual of a law, with its data; None if it is always zero.
+        law_residual: C function, with its data, of the relative residual of laws; None if zero.
         must_dissipate: True if :meth:`require_dissipation` has to be called before a step is
             accepted.
     """
@@ -97,7 +97,7 @@ class Term(ABC):
 
     @abstractmethod
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return the C functions that begin and accept a step; it is called once."""
+        """Return the C functions of the term in a step; the solver calls this method once."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the virtual work at ``q1`` to ``r``."""
@@ -111,7 +111,7 @@ class Term(ABC):
             tangent[0](tangent[1], doubles(q1), doubles(self._A.data))
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
-        """Add the derivative of the tangent along ``u``, at constant variables, to the matrix."""
+        """Add the derivative of the tangent along ``u`` at constant internal variables."""
 
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if a law generates energy in the step to ``q1``."""
@@ -142,9 +142,9 @@ class Callbacks:
     # -- functions, with their data ---------------------------------------------------------------
 
     def time_functions(self, functions: Sequence[tuple[TimeFunction, object]]) -> Any:
-        """Return ``time_function`` of loops.h for pairs of a function and its owner.
+        """Return an array of ``time_function`` of loops.h for pairs of a function and its owner.
 
-        Errors of functions name the owners, see :func:`value_at`.
+        Error messages about a function name its owner, see :func:`value_at`.
         """
         functions_in_c = ffi.new("time_function[]", len(functions))
         for place, (function, owner) in zip(functions_in_c, functions, strict=True):
@@ -166,7 +166,7 @@ class Callbacks:
     # -- exceptions -------------------------------------------------------------------------------
 
     def synchronize(self) -> None:
-        """Raise the exception of a function that C has called, if there is one."""
+        """Raise the stored exception of a callback, if there is one."""
         error, self.error = self.error, None
         if error is not None:
             raise error
@@ -190,8 +190,8 @@ class Callbacks:
 def _record_error(kind: type, error: BaseException, traceback: Any) -> None:
     """Store an exception of a callback, and let C end the step on all processes.
 
-    The handle is read from the arguments of the callback, because an interrupt may come before its
-    first line has run.
+    The handle is read from the arguments of the callback, because an interrupt may come before the
+    first line of the callback.
     """
     arguments = traceback.tb_frame.f_locals
     callbacks, _, size = ffi.from_handle(arguments["handle"])
@@ -206,7 +206,7 @@ def _record_error(kind: type, error: BaseException, traceback: Any) -> None:
 def from_c(
     error: float | None = None, name: str | None = None
 ) -> Callable[[Callable[..., Any]], Any]:
-    """Decorate a callback that c_library.py declares; it returns ``error`` if it raises."""
+    """Decorate a callback that c_library.py declares; it returns ``error`` after an exception."""
     more = {} if error is None else {"error": error}
     declared: Any = ffi.def_extern(name=name, onerror=_record_error, **more)
     return declared  # type: ignore[no-any-return]
@@ -214,7 +214,7 @@ def from_c(
 
 @from_c()
 def curve_in_python(handle: Any, s: float, step: float, out: Any) -> None:
-    """Write CURVE_POINTS points of a curve at steps of its parameter around ``s`` to ``out``."""
+    """Write CURVE_POINTS points of a curve to ``out``, at equal parameter steps around ``s``."""
     curve, far = ffi.from_handle(handle)[1], 2 * step
     out[0 : 2 * lib.CURVE_POINTS] = (
         *curve(s - far), *curve(s - step), *curve(s), *curve(s + step), *curve(s + far),
@@ -228,7 +228,7 @@ def time_in_python(handle: Any, t: float) -> float:
 
 
 def call_in_python(handle: Any, *arguments: Any) -> None:
-    """Call a Python function for C; the callbacks of three signatures share this function."""
+    """Call a Python function for C; callbacks of three signatures use this function."""
     ffi.from_handle(handle)[1](*arguments)
 
 
@@ -251,5 +251,5 @@ def knowing(kernels: Sequence[Any], function: fem.Function) -> dict[str, Any]:
 
 
 def entering(kernel: Any, entry: Any) -> Loop:
-    """Return a loop that adds the value of a kernel to an entry of the ledger."""
+    """Return a loop that adds the value of a compiled functional to an entry of the ledger."""
     return loop("add_values", struct("form_value", form=kernel.cells, entry=entry))

@@ -29,14 +29,14 @@ from ufl_beam.terms.term import Callbacks, InCells, Phases, entering
 
 
 class Acting:
-    """Work of a user on the cells of a process on which it acts.
+    """Work of a user on those cells of a process on which the work acts.
 
     Attributes:
         order: Positions of the cells in ``subdomain.cells``.
-        residual: Form of minus the forces.
-        tangent: Form of the derivative of ``residual``; None if it is zero.
-        passes_on: True if a continued run needs the forces of the last step, because they depend
-            on its motion and do a part of the work of the next step.
+        residual: Compiled form of the forces with negative sign.
+        tangent: Compiled form of the derivative of ``residual``; None if it is zero.
+        passes_on: True if a continued run needs the forces of the last step, because these depend
+            on rates and do a fraction of the work of the next step.
     """
 
     def __init__(
@@ -122,7 +122,7 @@ class Acting:
 
 
 def _position(form: Kernel, function: fem.Function) -> int:
-    """Return the position of the values of ``function`` in ``form``; -1 without ``function``."""
+    """Return the position of the values of ``function`` in ``form``; -1 if it is not used."""
     return form.position(function) if form.uses(function) else -1
 
 
@@ -130,7 +130,7 @@ def _position(form: Kernel, function: fem.Function) -> int:
 
 
 class Works(LoadTerm):
-    """Works of a scene on the cells of a process; all processes have the term.
+    """Works of a user on the cells of a process; every process has this term.
 
     The ledger has virtual works in ``supplied``, and energies of potentials in ``state``.  Virtual
     works grow in the substeps of the first step, as loads do; potentials act fully from the start.
@@ -143,7 +143,7 @@ class Works(LoadTerm):
         self._works: list[Acting] = []
         for work in numbering.scene.works:
             work_forms = statement(work, element_of(numbering.mesh), scheme)
-            # All processes create the entries, even those without such cells
+            # All processes create the entries, even processes without such cells
             potential = isinstance(work, Potential)
             (ledger.state if potential else ledger.supplied)[work.name] += 0.0
             if work_forms.varies(work):
@@ -187,7 +187,7 @@ class Works(LoadTerm):
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the forces before the next step to the forces at ``q``, and return them."""
         self._c.t, self._c.grown = t, 1.0
-        # The last step is taken as 1 s at constant velocities; in statics, as infinitely long
+        # The last step is assumed to take 1 s at constant velocities, in statics infinitely long
         before, dt = (q, math.inf) if v is None else (q - v, 1.0)
         times = {"load_time": t, "motion_time": t, "fraction": 1.0, "at": 1.0}
         step = struct("time_step", q0=before, dt=dt, **times)
