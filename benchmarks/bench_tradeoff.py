@@ -96,7 +96,7 @@ QUESTIONS = (
 
 def work(run):
     """Iterations of all steps, times cells, those of a higher degree as many as their nodes."""
-    return run.steps * run.iterations * (STEP_CELLS + run.cells * run.dials.mesh.degree)
+    return run.steps * run.iterations * (STEP_CELLS + run.cells * run.setting.mesh.degree)
 
 
 def answer(question, reference, tolerance):
@@ -113,7 +113,7 @@ def answer(question, reference, tolerance):
         "estimated": found.ratio(best), "runs": len(found.runs), "spent_s": found.spent,
         "best_s": best.seconds, "effort": found.effort, "wall_s": wall,
         "work": sum(map(work, found.runs)) / work(best), "uncertain": uncertain,
-        "steps": best.steps, "cells": best.cells, "dials": str(best.dials),
+        "steps": best.steps, "cells": best.cells, "setting": str(best.setting),
         "notes": list(found.notes),
     }  # fmt: skip
 

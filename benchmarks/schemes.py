@@ -86,7 +86,7 @@ def rows(make):
         drifts = [energy[-1] / energy[0] - 1, momentum[-1] / momentum[0] - 1]
         numbers = [f"{error:.1e}" for error in errors]
         numbers += [f"{drift:+.0e}" if abs(drift) > 1e-9 else "0" for drift in drifts]
-        numbers += [f"{runs[0].energy.worst:.0e}", f"{runs[0].iterations / runs[0].parts:.1f}"]
+        numbers += [f"{runs[0].energy.worst:.0e}", f"{runs[0].iterations / runs[0].substeps:.1f}"]
         yield f"| {' | '.join([name(scheme), *numbers])} |"
 
 

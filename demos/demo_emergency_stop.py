@@ -196,7 +196,7 @@ ub.print_once(
 # %%
 for solution in (saved, bent):
     assert solution.energy.worst < 1e-9
-    assert solution.iterations <= 5 * solution.parts
+    assert solution.iterations <= 5 * solution.substeps
     for values in solution.energy.lost.values():
         assert np.diff(values).min() >= 0.0
 assert np.abs(M[t < t_brake]).max() < M_u / 2

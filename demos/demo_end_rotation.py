@@ -63,7 +63,7 @@ def turn(beam, angle, rate, steps, record=()):
 def check(solution):
     """Check conditions that must hold in every run with any law."""
     assert solution.energy.worst < 1e-9
-    assert solution.iterations <= 5 * solution.parts
+    assert solution.iterations <= 5 * solution.substeps
     for values in solution.energy.lost.values():
         assert np.diff(values).min() >= 0.0
 
@@ -253,7 +253,7 @@ for name, (psi, at_hinge, solution) in named.items():
     ub.print_once(
         f"{name:12s}{M.max() / kNcm:8.4f}{psi[M.argmax()]:10.3f}{at_hinge.jump[-1]:9.3f}"
         f"{lost['plastic'][-1]:8.1f}{lost['hinges'][-1]:9.3f}"
-        f"{solution.iterations / solution.parts:9.2f}{solution.energy.worst:15.1e}"
+        f"{solution.iterations / solution.substeps:9.2f}{solution.energy.worst:15.1e}"
     )
 
 # %% [markdown]

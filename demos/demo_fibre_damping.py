@@ -236,7 +236,7 @@ preference = [d.linear.rms / d.exponential.rms for d in decays.values()]
 assert preference == sorted(preference)  # a transition, without a detour
 for solution in (*runs.values(), viscous):
     assert solution.energy.worst < 1e-9
-    assert solution.parts == len(solution.times) - 1
+    assert solution.substeps == len(solution.times) - 1
 assert abs(of_damper.fitted_ratio / ζ - 1) < 0.01
 ub.print_once("linear and exponential decay told apart")
 

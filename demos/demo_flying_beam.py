@@ -67,7 +67,7 @@ def drifts(solution):
 ub.print_once("dt (s)  steps  drift of energy  drift of angular momentum")
 for dt, (_, solution) in flights.items():
     energy, momentum = drifts(solution)
-    ub.print_once(f"{dt:6g}  {solution.parts:5d}  {energy:15.1e}  {momentum:25.1e}")
+    ub.print_once(f"{dt:6g}  {solution.substeps:5d}  {energy:15.1e}  {momentum:25.1e}")
     assert energy < 1e-10
     assert momentum < 1e-10
 ub.print_once()

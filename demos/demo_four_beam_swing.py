@@ -192,7 +192,7 @@ smooth = conserving.times < 0.6205
 ub.print_once("\n                 first peak of N      mid at 0.62 s        iterations  wall time")
 for name, (solution, place) in ways.items():
     (N, t), (u, v) = peak(solution, place), at(solution, place, 0.62)
-    each = solution.iterations / solution.parts
+    each = solution.iterations / solution.substeps
     where = f"{N:7.1f} N, {t:.4f} s  {u:9.6f} {v:9.6f} m"
     ub.print_once(f"{name:15s} {where} {each:9.2f} {solution.seconds:9.2f} s")
 ub.print_once(
@@ -283,7 +283,7 @@ assert decaying.energy.worst < 1e-9
 for solution in (exact, fine, hinged_conserving, hinged_decaying):
     assert solution.energy.worst < 1e-9
 for solution in (conserving, decaying, exact, fine, hinged_conserving, hinged_decaying):
-    assert solution.iterations <= 5 * solution.parts
+    assert solution.iterations <= 5 * solution.substeps
 
 # %% [markdown]
 # Links and stiff beams have the same motion: before the snap the forces are less than a newton, and

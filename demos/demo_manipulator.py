@@ -145,7 +145,7 @@ def line(name, one):
     """Print a row of the table: one model of the rigid arm."""
     run = one.motion
     ub.print_once(
-        f"  {name:15s} {1e3 * one.away(body):11.1e} mm  {run.iterations / run.parts:10.2f}"
+        f"  {name:15s} {1e3 * one.away(body):11.1e} mm  {run.iterations / run.substeps:10.2f}"
         f"  {run.seconds:8.2f} s  {run.energy.worst:9.1e}"
     )
 
@@ -281,11 +281,11 @@ everyone = [revolute, *by_length.values(), *by_cells.values(), *by_stiffness.val
 for one in everyone:
     rounding = eps * 1e8 * EA * turned * length / one.motion.energy.energy_transferred
     assert one.motion.energy.worst < (rounding if one is by_stiffness[1e8] else 1e-9)
-    assert one.motion.iterations <= 5 * one.motion.parts
+    assert one.motion.iterations <= 5 * one.motion.substeps
     assert not one.motion.energy.lost or max(one.motion.energy.lost["hinges"]) < 1e-20 * G_f
     if one is not revolute:
         assert one.softening.energy.worst < 1e-9 or one is by_stiffness[1e8]
-        assert one.softening.iterations <= 5 * one.softening.parts
+        assert one.softening.iterations <= 5 * one.softening.substeps
         assert abs(one.softening.energy["hinges"][-1] / G_f - 1) < 1e-9
         M = one.motion.material_at(one.root).forces[:, 2]
         assert np.abs(M).max() < 1e-8 * M_u

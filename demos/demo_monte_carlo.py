@@ -85,7 +85,7 @@ def struck(seed, record=()):
         "residual drift": u[last].mean(),
         "dissipated energy": solution.energy.lost["plastic"][-1],  # J
         "ledger": solution.energy.worst,
-        "parts": solution.parts,
+        "substeps": solution.substeps,
     }
 
 
@@ -222,7 +222,7 @@ ub.print_once("\npictures and data:", *names, sep="\n  ")
 # %%
 assert not study.failed
 assert study["ledger"].max() < 1e-9
-assert (study["parts"] == round(end / dt)).all()
+assert (study["substeps"] == round(end / dt)).all()
 ratio = {name: mean_95(study[name][1:] / study[name][0]) for name in units}
 n, means, halves = ratio["dissipated energy"]
 assert (means - halves > 1)[n >= 10].all()

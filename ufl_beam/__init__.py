@@ -76,8 +76,8 @@ from ufl_beam.mechanics.time_scheme import Coefficients, DynamicScheme, Scheme, 
 from ufl_beam.model import law_functions
 from ufl_beam.model.beams import Beam, Mesh
 from ufl_beam.model.bodies import Body, PointMass, Velocity, ground
+from ufl_beam.model.bodies import BodyPoint as BodyPoint
 from ufl_beam.model.bodies import Place as Place
-from ufl_beam.model.bodies import Spot as Spot
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connector_laws import (
     Clearance,
@@ -290,8 +290,8 @@ __all__ = [
 ]  # fmt: skip
 
 RESULTS = [
-    "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView", "Energy",
-    "Envelope", "Event", "Extent", "Film", "Modes", "Path", "Place", "Spot", "Tradeoff",
+    "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
+    "Energy", "Envelope", "Event", "Extent", "Film", "Modes", "Path", "Place", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 
@@ -307,6 +307,7 @@ OLD_NAMES = {
     "Prescribed": "PrescribedDisplacement",
     "PrintedMidpoint": "EnergyMomentumPrinted",
     "SceneError": "ModelError, or ufl_beam.ArgumentError,",
+    "Spot": "BodyPoint",
     "load": "Solution.load",
     "plot_cycles": 'plot(fatigue, "cycles", spot)',
     "plot_damage": 'plot(solution, "damage")',

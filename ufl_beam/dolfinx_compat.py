@@ -15,7 +15,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 SOURCES = Path(__file__).resolve().parents[1]
-WAYS = (
+INSTALL_HINT = (
     'Get it by conda install -c conda-forge fenics-dolfinx "petsc=*=real*" slepc4py c-compiler, '
     "by apt-get install python3-dolfinx-real (Debian 13), or in the Docker image dolfinx/dolfinx"
 ) + (f"; or run through {SOURCES}/env, see docs/installation.md" * (SOURCES / "env").is_file())
@@ -34,13 +34,16 @@ try:
     from dolfinx import mesh as mesh
 except ImportError as error:  # pragma: no cover - depends on the machine
     raise ImportError(
-        f"ufl_beam needs DOLFINx 0.9 or newer with PETSc, which is not on PyPI ({error}). {WAYS}"
+        f"ufl_beam needs DOLFINx 0.9 or newer with PETSc, which is not on PyPI ({error}). "
+        f"{INSTALL_HINT}"
     ) from error
 
 VERSION = tuple(int(number) for number in dolfinx.__version__.split(".")[:2])
 VERSIONS = f"DOLFINx {dolfinx.__version__} and FFCx {ffcx.__version__}"
 if VERSION < (0, 9):
-    raise ImportError(f"ufl_beam needs DOLFINx 0.9 or newer, this is {dolfinx.__version__}. {WAYS}")
+    raise ImportError(
+        f"ufl_beam needs DOLFINx 0.9 or newer, this is {dolfinx.__version__}. {INSTALL_HINT}"
+    )
 if np.dtype(PETSc.ScalarType) != np.float64:
     raise ImportError(
         "ufl_beam needs PETSc with real numbers of double precision; this PETSc has "

@@ -39,7 +39,7 @@ class Outcome:
 
 def outcome(solution: ub.Solution, error: float, allowed: float, note: str = "") -> Outcome:
     """The outcome of a simulation."""
-    return Outcome(error, allowed, solution.iterations / max(1, solution.parts), note)
+    return Outcome(error, allowed, solution.iterations / max(1, solution.substeps), note)
 
 
 @dataclass(frozen=True)

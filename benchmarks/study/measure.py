@@ -81,9 +81,9 @@ class Bench:
         return {
             **asdict(setting),
             "seconds": statistics.median(seconds),
-            "taken": solution.parts,
+            "taken": solution.substeps,
             "cells": len(solution.numbering.cells),
-            "iterations": solution.iterations / solution.parts,
+            "iterations": solution.iterations / solution.substeps,
             "imbalance": float(solution.energy.worst),
             "values": values.tolist(),
             "error": self._distance(values, self._exact),

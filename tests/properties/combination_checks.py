@@ -45,7 +45,7 @@ def ledger(case):
     `EnergyMomentumDecaying` may give back a part of its own loss, but no more than that.
     """
     solution = case.whole.solution
-    assert solution.open_ledger == ""
+    assert solution.imbalance_message == ""
     energy = solution.energy
     for name in ("plastic", "hinges", "friction", "numerical"):
         if name in energy.lost and case.combination.has_exact_ledger:
@@ -285,7 +285,7 @@ def farthest(run):
 
 def has_cut(*runs):
     """Whether one of the runs has cut a step."""
-    return any(run.failure or run.solution.parts > len(run.solution) - 1 for run in runs)
+    return any(run.failure or run.solution.substeps > len(run.solution) - 1 for run in runs)
 
 
 def are_near(one, other, tolerance):

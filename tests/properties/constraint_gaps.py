@@ -6,7 +6,7 @@ import math
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from ufl_beam.model.bodies import GROUND, Body, Spot
+from ufl_beam.model.bodies import GROUND, Body, BodyPoint
 from ufl_beam.model.connector_laws import Guide, PrescribedMotion
 from ufl_beam.model.functions import still
 
@@ -110,7 +110,7 @@ def _relative(solution, motion, a, b, axis):
 
 
 def _is_ground(place):
-    return isinstance(place, Spot) and place.body is GROUND
+    return isinstance(place, BodyPoint) and place.body is GROUND
 
 
 def _from_curve(solution, holder):

@@ -69,12 +69,12 @@ def damped_stop(d):
     )  # fmt: skip
 
 
-@feature("rubs", statics=False, at_end=False, elastic=False)
+@feature("has_friction", statics=False, at_end=False, elastic=False)
 def coulomb(d):
     _connect(d, f"ub.Coulomb({d.some(0.2, 2):.4g})")
 
 
-@feature("rubs", "joint", statics=False, at_end=False, elastic=False)
+@feature("has_friction", "joint", statics=False, at_end=False, elastic=False)
 def rubbing_pin(d):
     d.need_beams(2)
     d.joint = "ub.Revolute({a}, {b}, multipliers=True)"
@@ -155,7 +155,7 @@ def rough_clearance(d):
     d.connectors.append(f"ub.Bushing(ub.ground(0.2, 0.7), {d.last}.end, {law}, axis=(0.3, 1.0))")
 
 
-@feature("rubs", statics=False, at_end=False, elastic=False)
+@feature("has_friction", statics=False, at_end=False, elastic=False)
 def brake(d):
     rest = d.some(0.3, 2)
     _connect(d, f"Brake({rest:.4g}, {rest * d.some(0.5, 1):.4g}, {d.some(0.02, 0.2):.4g})")

@@ -99,7 +99,7 @@ def bend(kind="hinge"):
 
 def arrays_of(solution):
     """All that a solution kept, and what it counted, by name."""
-    counts = {"parts": np.array(solution.parts), "iterations": np.array(solution.iterations)}
+    counts = {"substeps": np.array(solution.substeps), "iterations": np.array(solution.iterations)}
     return {**solution.history(), **counts, **{f"end {n}": x for n, x in solution.internal.items()}}
 
 

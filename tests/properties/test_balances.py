@@ -77,7 +77,7 @@ def test_momentum_grows_by_the_impulses(seed, step, scheme):
     numbers.lines = []
     built = Built(numbers).run(scheme, step=step)
     solution = built.solution
-    assert solution.parts == len(solution.times) - 1  # no step was cut, whose middles are others
+    assert solution.substeps == len(solution.times) - 1  # no step was cut, whose middles are others
     t = solution.times
     middle = (t[1:] + t[:-1]) / 2
     expected = np.zeros((len(middle), 3))

@@ -29,7 +29,7 @@ def test_results_do_not_depend_on_units(seed, scheme):
     one, other = Built(numbers).run(scheme), Built(numbers, units=units).run(scheme)
     assert difference(one, other) < SAME
     assert one.solution.iterations == other.solution.iterations
-    assert one.solution.parts == other.solution.parts
+    assert one.solution.substeps == other.solution.substeps
 
 
 def test_static_results_do_not_depend_on_units(seed):
@@ -40,8 +40,8 @@ def test_static_results_do_not_depend_on_units(seed):
         Built(numbers, units=u).run(ub.Static(), steps=5, step=0.1) for u in (Units(), units)
     )
     assert difference(one, other) < SAME
-    assert one.solution.parts == other.solution.parts
-    if one.solution.parts <= 6:  # else iterations wandered before a step was cut
+    assert one.solution.substeps == other.solution.substeps
+    if one.solution.substeps <= 6:  # else iterations wandered before a step was cut
         # Before the least number of iterations a residual must be below 1e-14 of the forces: of a
         # step in which next to nothing changes, its last digits decide.
         assert abs(one.solution.iterations - other.solution.iterations) <= 1

@@ -39,4 +39,4 @@ def test_rows_of_c_are_states(seed):
     assert len(one) > STEPS / 4
     for name, values in states.items():
         assert np.array_equal(values, others[name], equal_nan=True), name
-    assert (one.parts, one.iterations) == (other.parts, other.iterations)
+    assert (one.substeps, one.iterations) == (other.substeps, other.iterations)

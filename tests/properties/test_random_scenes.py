@@ -119,7 +119,7 @@ def check_constraints(run):
 
 def check_ledger(run):
     """It closes, or the run says that it does not."""
-    worst, said = run.solution.energy.worst, run.solution.open_ledger
+    worst, said = run.solution.energy.worst, run.solution.imbalance_message
     assert not said or said in run.warnings
     if worst > CLOSED and any(f"scheme = ub.{name}" in run.source for name in EXACT):
         assert said, f"imbalance {worst:.1e} of throughput, without a word\n{run.source}"

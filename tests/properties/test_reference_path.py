@@ -157,14 +157,14 @@ def test_residuals_and_tangents(seed):
     random = np.random.default_rng(5)
     to = simulation.q + 1e-3 * scene.size * random.uniform(-1, 1, len(simulation.q))
     simulation.controllers.evaluate(simulation)
-    equation.begin(ub.Step.of(scheme, t0 + dt, t0 + 2 * dt, t0 + 2 * dt, simulation.q))
+    equation.begin(ub.Step.create(scheme, t0 + dt, t0 + 2 * dt, t0 + 2 * dt, simulation.q))
     x = supports.in_axes(to)
     r = equation.forces(to)
     equation.tangent(to)
     supports.into_axes(r)
     K = dense(equation.A)
     solver.evaluate()
-    solver.begin(ub.Step.of(scheme, t0 + dt, t0 + 2 * dt, t0 + 2 * dt, solver.q))
+    solver.begin(ub.Step.create(scheme, t0 + dt, t0 + 2 * dt, t0 + 2 * dt, solver.q))
     (of_solver, K_of_solver), free = solver.response(x), solver.supports.free
     # States of both differ by the tolerance of one step.
     assert difference(r, of_solver) < SAME

@@ -154,7 +154,7 @@ def test_searches_do_not_depend_on_units():
             ],
         )  # fmt: skip
         solution = run(scene, ub.Newmark(), t=(0, 1.32 * s), dt=0.088 * s)
-        parts.append((solution.parts, solution.iterations))
+        parts.append((solution.substeps, solution.iterations))
     assert parts[0][1] > 4 * 15  # searches, and full corrections would take 2 or 3 a step
     assert parts[0] == parts[1]
 

@@ -26,7 +26,7 @@ RUNS = {
     "adaptive": (machine, ub.EnergyMomentum(0.05, 0.02), 0.1, ub.Adaptive(1e-4)),
     "decaying": (bend, ub.EnergyMomentumDecaying(), 5.0, 0.1),
     "Newmark": (bend, ub.Newmark(0.6, 0.35), 5.0, 0.1),
-    "generalised-alpha": (bend, ub.GeneralizedAlpha(), 5.0, 0.1),
+    "generalized-alpha": (bend, ub.GeneralizedAlpha(), 5.0, 0.1),
     "static": (bend, ub.Static(), 5.0, 0.1),
     "exact static": (bend, ub.EnergyMomentumStatic(), 5.0, 0.1),
 }

@@ -195,7 +195,11 @@ class Weighted(ub.EnergyMomentumBase, ub.MidpointLoads):
             inertia=(1 / (w * dt**2), -1 / (w * dt), 0.0),  # (v1 - v0) / dt
             velocity=(1 / dt, 0.0, 0.0),  # s / dt
             rates=((1 / (w * dt), -(1 - w) / w, 0.0),),  # v1 of s/dt = (1 - w) v0 + w v1
-            slip=(self.alpha, 0.0, 0.0),  # s/dt - (v0 + v1)/2, with s replaced by v1 - v0
+            velocity_defect=(
+                self.alpha,
+                0.0,
+                0.0,
+            ),  # s/dt - (v0 + v1)/2, with s replaced by v1 - v0
         )
 
     def error_weights(self):

@@ -70,7 +70,7 @@ def require_same(one, other):
     assert one.scene is not other.scene
     # Names of the ledger may have another order on another process than the first
     assert sorted(str(one).split("\n")) == sorted(str(other).split("\n"))
-    for name in ("parts", "iterations", "seconds", "every", "open_ledger"):
+    for name in ("substeps", "iterations", "seconds", "every", "imbalance_message"):
         assert getattr(one, name) == getattr(other, name), name
     for name in ("times", "q", "v"):
         assert same(getattr(one, name), getattr(other, name)), name
@@ -146,7 +146,7 @@ def test_plastic_hinges_at_places_and_an_open_ledger(shared_path):
     load = ub.PointLoad(beam.end, force=(0, -6), amplitude=lambda t: t)
     scene = clamped(beam, loads=[load])
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.02)
-    solution.open_ledger = "the ledger is open"
+    solution.imbalance_message = "the ledger is open"
     loaded = saved(solution, shared_path)
     require_same(loaded, solution)
     assert max(abs(loaded.connector(loaded.scene.hinges[0]).motion)) > 0

@@ -448,7 +448,7 @@ def aged(path, days):
 
 
 def entries(place):
-    return sorted(path.name for path in place.iterdir() if path.name != code_cache.SWEPT)
+    return sorted(path.name for path in place.iterdir() if path.name != code_cache.CLEANED)
 
 
 def test_what_was_not_used_for_a_month_is_removed_once_a_day(place):
@@ -462,16 +462,16 @@ def test_what_was_not_used_for_a_month_is_removed_once_a_day(place):
     (place / "old_1.rest.part").mkdir()  # of a process that was killed
     (place / "gone_4.lock").touch()
     aged(place / "gone_4.lock", 31)
-    code_cache.sweep(place)
+    code_cache.clean_up(place)
     assert entries(place) == ["new_3", "new_3.lock", "used_2", "used_2.lock"]
     for name, count in (("old_1", 2), ("used_2", 1), ("new_3", 1)):
         assert builds[name](name) == count
     # On the same day nothing is looked for
     aged(place / "new_3" / CHECKSUMS, 31)
-    code_cache.sweep(place)
+    code_cache.clean_up(place)
     assert (place / "new_3").exists()
-    aged(place / code_cache.SWEPT, 2)
-    code_cache.sweep(place)
+    aged(place / code_cache.CLEANED, 2)
+    code_cache.clean_up(place)
     assert not (place / "new_3").exists()
 
 
@@ -499,7 +499,7 @@ def test_what_is_used_while_it_is_removed_stays(place, monkeypatch):
         return found
 
     monkeypatch.setattr(code_cache, "_age", used)
-    code_cache.sweep(place)
+    code_cache.clean_up(place)
     assert entries(place) == [ENTRY, f"{ENTRY}.lock"]
     assert build() == 1
 
@@ -530,5 +530,5 @@ def test_a_cache_that_cannot_be_written_is_not_swept(place, monkeypatch):
     for name in ("touch", "rename", "unlink"):
         monkeypatch.setattr(Path, name, refuse)
     monkeypatch.setattr(os, "utime", refuse)
-    code_cache.sweep(place)
+    code_cache.clean_up(place)
     assert build() == 1

@@ -120,7 +120,7 @@ def test_forms_are_those_of_the_terms(scheme):
     np.add.at(tangent, (dofs[K.row], dofs[K.col]), K.data)
 
     t = simulation.t + 0.01
-    simulation.equation.begin(ub.Step.of(scheme, simulation.t, t, t, q), beams)
+    simulation.equation.begin(ub.Step.create(scheme, simulation.t, t, t, q), beams)
     r, A = np.zeros(len(q)), simulation.equation.A
     A.data.fill(0.0)
     for term in beams:

@@ -186,7 +186,7 @@ def test_cutting_a_step_keeps_the_ledger_closed():
     solution = ub.simulate(
         ub.Scene([beam], supports=[spin]), ub.EnergyMomentum(), t=(0, 1), dt=0.25
     )
-    assert solution.parts > 4
+    assert solution.substeps > 4
     assert len(solution.times) == 5
     assert solution.energy.worst < CLOSED
 
@@ -225,20 +225,20 @@ def test_a_run_says_when_round_off_opens_its_ledger():
         solution = ub.simulate(stiff(1e18), ub.EnergyMomentum(), t=(0, 3), dt=0.1)
     # The first process says so for all.
     said = [str(one.message) for one in caught if one.category is ub.ModelWarning]
-    assert said == [solution.open_ledger] * (MPI.COMM_WORLD.rank == 0)
-    assert "round-off is estimated at" in solution.open_ledger
+    assert said == [solution.imbalance_message] * (MPI.COMM_WORLD.rank == 0)
+    assert "round-off is estimated at" in solution.imbalance_message
     assert solution.energy.worst > 1e-9
-    assert solution.open_ledger in str(solution)
-    assert "last digits of positions" in solution.open_ledger
+    assert solution.imbalance_message in str(solution)
+    assert "last digits of positions" in solution.imbalance_message
 
 
 def test_a_run_says_when_its_tolerance_opens_the_ledger():
     """No round-off there, but the energy of forces that are missed by a part of 1e-3."""
     energies = energy(lost={"numerical": np.array([0, 0.5, 1.0])})
     assert energies.worst > 1e-3
-    assert "does not explain it" in energies.opened(1e-9, 1e-13)
-    assert "last digits of positions" in energies.opened(1e-9, 1.0)
-    assert energies.opened(1.0, 0.0) == ""
+    assert "does not explain it" in energies.describe_imbalance(1e-9, 1e-13)
+    assert "last digits of positions" in energies.describe_imbalance(1e-9, 1.0)
+    assert energies.describe_imbalance(1.0, 0.0) == ""
 
 
 def test_a_scene_that_turns_as_a_whole_has_no_energy_to_balance():
@@ -248,7 +248,7 @@ def test_a_scene_that_turns_as_a_whole_has_no_energy_to_balance():
     scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), turn])
     solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.01)
     assert solution.energy.energy_transferred < 1e-9
-    assert solution.open_ledger == ""
+    assert solution.imbalance_message == ""
 
 
 @pytest.mark.parametrize("scheme", [ub.Newmark(), ub.EnergyMomentumPrinted(), ub.Static()], ids=str)
@@ -258,7 +258,7 @@ def test_schemes_that_claim_nothing_say_nothing(scheme):
     scene = clamped(beam, loads=[push])
     solution = ub.simulate(scene, scheme, t=(0, 1), dt=0.25)
     assert solution.energy.worst > 1e-9
-    assert solution.open_ledger == ""
+    assert solution.imbalance_message == ""
 
 
 def test_energies_of_nearly_nothing_are_not_compared():
@@ -266,7 +266,7 @@ def test_energies_of_nearly_nothing_are_not_compared():
     beam = ub.Beam((0, 0), (2, 1), SECTION, cells=2)
     push = ub.PointLoad(beam.end, force=(0, 1e-158), amplitude=lambda t: t)
     scene = clamped(beam, loads=[push])
-    assert ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1).open_ledger == ""
+    assert ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1).imbalance_message == ""
 
 
 def test_small_strains_keep_their_digits():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from ufl_beam.solvers.factorization import Factorisation
+from ufl_beam.solvers.factorization import Factorization
 
 
 def saddle(seed, motions=12, forces=5):
@@ -26,7 +26,7 @@ def test_negative_eigenvalues_do_not_depend_on_units(seed, unit):
     expected = int(np.sum(np.linalg.eigvalsh(A) < 0))
     scale = np.ones(len(A))
     scale[-5:], scale[::3] = unit, 1e-3 * unit
-    factors = Factorisation(csr_array(scale[:, None] * A * scale))
+    factors = Factorization(csr_array(scale[:, None] * A * scale))
     assert factors.symmetric
     assert factors.negative == expected
 
@@ -36,7 +36,7 @@ def test_sign_of_the_determinant(seed):
     """Of a matrix that is not symmetric, and of the same with two rows exchanged."""
     A = np.random.default_rng(seed).normal(size=(9, 9))
     for matrix in (A, A[[1, 0, *range(2, 9)]]):
-        factors = Factorisation(csr_array(matrix))
+        factors = Factorization(csr_array(matrix))
         assert not factors.symmetric
         assert factors.negative == int(np.linalg.det(matrix) < 0)
 
@@ -46,7 +46,7 @@ def test_factors_solve_to_round_off(seed):
     """One refinement leaves residuals of round-off: 1e-13 of sums of 17 terms of size one."""
     A = saddle(seed)
     b = np.random.default_rng(9).normal(size=len(A))
-    x = Factorisation(csr_array(A)).solve(b)
+    x = Factorization(csr_array(A)).solve(b)
     assert np.abs(A @ x - b).max() <= 1e-13 * (np.abs(A) @ np.abs(x)).max()
 
 
@@ -57,4 +57,4 @@ def test_what_has_no_inverse():
     infinite[2, 2] = np.nan
     for matrix in (singular, infinite):
         with pytest.raises(np.linalg.LinAlgError):
-            Factorisation(csr_array(matrix))
+            Factorization(csr_array(matrix))

@@ -61,9 +61,9 @@ def test_an_infinite_slope_at_zero(n, size, dt):
     np.testing.assert_allclose(found, exact, rtol=0, atol=n * 1e-9 * np.abs(exact).max())
     # No step is cut, but perhaps to where the force is a last digit (1e-49 m for n = 3).
     before = run(scene, dt=dt, t=(0, 0.5 - dt))
-    assert before.parts == len(before.times) - 1
-    assert solution.parts - (len(solution.times) - 1) in (0, 1, 2)
-    assert solution.iterations < 15 * solution.parts
+    assert before.substeps == len(before.times) - 1
+    assert solution.substeps - (len(solution.times) - 1) in (0, 1, 2)
+    assert solution.iterations < 15 * solution.substeps
 
 
 @pytest.mark.parametrize("stiffness", [1e-3, 1.0, 1e3, 1e6])
@@ -83,7 +83,7 @@ def test_an_infinite_slope_beside_any_stiffness(stiffness):
 
         exact = brentq(excess, -1e-2, 1e-2, xtol=1e-300, rtol=1e-15, maxiter=9999)
         assert x == pytest.approx(exact, rel=1e-7, abs=1e-12)
-    assert solution.parts == len(solution.times) - 1
+    assert solution.substeps == len(solution.times) - 1
 
 
 def test_several_steep_laws_on_a_beam():
@@ -95,7 +95,7 @@ def test_several_steep_laws_on_a_beam():
     scene = clamped(beam, loads=[push], connectors=props)
     solution = run(scene)
     # Last digits decide whether a step is cut: all laws have infinite slopes at t = 1/2.
-    assert solution.parts - (len(solution.times) - 1) in (0, 1, 2)
+    assert solution.substeps - (len(solution.times) - 1) in (0, 1, 2)
     for prop in props:
         history = solution.connector(prop)
         law = np.sign(history.motion) * np.abs(history.motion / 1e-3) ** 0.2
@@ -128,7 +128,7 @@ def test_vibration_of_a_steep_law():
         swung = run(scene, ub.EnergyMomentum(), t=(1, 1 + half), dt=half / steps, start=bent)
         errors.append(abs(swung.displacement(beam.end)[-1, 1] / -amplitude - 1))
         assert swung.energy.worst < 1e-9
-        assert swung.parts == steps
+        assert swung.substeps == steps
     # It turns around there: errors of its time, of second order in the step, do not show.
     assert errors[0] < 1e-3
     assert max(errors[1:]) < 1e-5

@@ -63,14 +63,14 @@ def test_a_cut_step_is_its_parts(kind, scheme):
     cut, fine = CutSteps(scene, scheme), CutSteps(scene, scheme)
     for n in range(32):
         cut.fails = 2 * (n % 5 == 0)
-        parts = cut.parts
+        parts = cut.substeps
         cut.step_to((n + 1) / 64)
         ends = np.linspace(n, n + 1, 5)[1:] if n % 5 == 0 else [n + 1]
-        if cut.parts - parts == 3:  # the parts grow again: 1/4, 1/4, 1/2
+        if cut.substeps - parts == 3:  # the parts grow again: 1/4, 1/4, 1/2
             ends = [n + 0.25, n + 0.5, n + 1]
         for end in ends:
             fine.step_to(end / 64)
-        assert cut.parts == fine.parts
+        assert cut.substeps == fine.substeps
         # Parts of a static step take their motions between its ends, which is round-off here.
         digits = 0.0 if scheme.dynamic else 1e-10
         for one, two in zip(state(cut), state(fine), strict=True):
@@ -92,7 +92,7 @@ def test_few_iterations_cut_steps_and_change_little(kind, scheme):
         ub.simulate(cantilever(kind), scheme, t=(0, 0.5), dt=dt, newton=ub.Newton(max_iterations=n))
         for dt, n in ((0.125, 3), (0.0025, 30))
     )
-    assert few.parts > 4
+    assert few.substeps > 4
     coarse, fine = (s.section_forces(s.scene.beams[0])[:, 2] for s in (few, many))
     # First order in steps of at most a quarter of the whole
     assert np.abs(coarse - fine).max() < 0.1 * np.abs(fine).max()

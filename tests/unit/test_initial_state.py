@@ -83,7 +83,7 @@ class DampedVelocities(ub.EnergyMomentumBase, ub.MidpointLoads):
             inertia=(1 / (dt**2 * after), (r - 1) / (dt * after), -r / (dt * after)),
             velocity=(1 / dt, 0.0, 0.0),
             rates=((1 / (dt * after), (c + r - 0.5) / after, -r / after),),
-            slip=(c, -r, r),
+            velocity_defect=(c, -r, r),
         )
 
     def error_weights(self):

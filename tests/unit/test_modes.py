@@ -362,7 +362,7 @@ def test_change_of_stiffness_is_its_derivative():
         derived = small._matrix(simulation.equation.tangent_change(small.q, u)).toarray()
         h = 1e-2 / np.abs(u).max()
         stencil = ((-2, 1), (-1, -8), (1, 8), (2, -1))
-        stiff = {k: small._linearised(small.q + k * h * u)[1].toarray() for k, _ in stencil}
+        stiff = {k: small._linearized(small.q + k * h * u)[1].toarray() for k, _ in stencil}
         difference = sum(weight * stiff[k] for k, weight in stencil) / (12 * h)
         assert np.abs(derived - difference).max() <= 1e-8 * np.abs(derived).max()
         right, left = small._with_laws()

@@ -32,7 +32,7 @@ def hinged_frame():
 
 def run_of(scene, steps, dt):
     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, steps * dt), dt=dt)
-    assert run.parts == steps
+    assert run.substeps == steps
     assert abs(run.energy.worst) < 1e-9
     return run
 
@@ -70,7 +70,7 @@ def test_a_cantilever_that_yields_in_many_cells(kinematic):
     exact = P / 3 / EI + P / GA + plastic
     # Moments are those of the middles of cells: of order h².
     assert run.displacement(beam.end)[-1, 1] == pytest.approx(exact, rel=2 / cells**2)
-    assert run.parts == 4
+    assert run.substeps == 4
     assert run.iterations <= 4 * 5
 
 

@@ -32,7 +32,7 @@ def pushed(force, record=()):
     scene = post(force)
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02, record=record)
     u = solution.displacement(scene.beams[0].end)[:, 0]
-    return {"history": u, "peak": u.max(), "steps": solution.parts}
+    return {"history": u, "peak": u.max(), "steps": solution.substeps}
 
 
 def square(x):

@@ -146,7 +146,7 @@ def test_ledgers_begin_with_what_acts_at_the_factor_zero(steady):
     scene = ub.Scene([CANTILEVER], **{**given, "loads": [*given["loads"], tip]})
     path = ub.follow(scene, ub.LoadControl(0.5), steps=2)
     assert path.energy.worst < 2e-6
-    assert path.open_ledger == ""
+    assert path.imbalance_message == ""
     assert max(abs(path.energy.total[0]), *(abs(x[0]) for x in path.energy.supplied.values())) > 0.5
     first = ub.follow(scene, ub.LoadControl(0.5), steps=1)
     rest = ub.follow(scene, ub.LoadControl(0.5), steps=1, start=first)
@@ -516,11 +516,14 @@ def test_what_needs_steps_in_time_is_refused():
     """Dry friction and works with velocities; dampers have no effect, as paths are quasi-static."""
     left, scene = truss()
     parts = {"beams": scene.beams, "joints": scene.joints, "supports": scene.supports}
-    rubs = ub.Slide(ub.ground(0, 0), left, ub.Coulomb(5.0), axis=(0, 1))
+    has_friction = ub.Slide(ub.ground(0, 0), left, ub.Coulomb(5.0), axis=(0, 1))
     drag = ub.VirtualWork("drag", lambda v, w, axis: -ufl.dot(v, w))
     creep = ub.VirtualWork("creep", lambda q, w, dt, axis: -ufl.dot(q, w) * dt)
     for more, said in (
-        ({"connectors": [rubs]}, r"Slide.*dry friction sticks or slides .* a path has none"),
+        (
+            {"connectors": [has_friction]},
+            r"Slide.*dry friction sticks or slides .* a path has none",
+        ),
         ({"works": [drag]}, r"'drag'.*depends on the velocity v, and a path has no time; leave v"),
         ({"works": [creep]}, r"'creep'.*depends on the step length dt, and .*; leave dt out"),
     ):

@@ -160,7 +160,7 @@ def test_a_pin_with_friction_sticks_in_two_runs_where_it_sticks_in_one():
     roof = ub.Beam((0.1, 1.0), (1.0, 1.1), section, cells=2)
     right = ub.Beam((1.0, 1.1), (1.1, 0.0), section, cells=3)
     pin = ub.Revolute(left.end, roof.start, multipliers=True)
-    rubs = ub.Turn(left.end, roof.start, ub.Coulomb(0.1168, coefficient=0.02, joint=pin))
+    has_friction = ub.Turn(left.end, roof.start, ub.Coulomb(0.1168, coefficient=0.02, joint=pin))
     stiffens = ub.ForceLaw(lambda motion, rate: 123 * motion + 2329 * motion**3)
     spring = ub.Turn(ub.ground(0, 0), roof.at(0.5), stiffens)
     loads = [
@@ -171,7 +171,7 @@ def test_a_pin_with_friction_sticks_in_two_runs_where_it_sticks_in_one():
     scene = ub.Scene(
         [left, roof, right], joints=[pin, ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Pinned(right.end)], loads=loads,
-        connectors=[spring, rubs],
+        connectors=[spring, has_friction],
     )  # fmt: skip
     tight = ub.Newton(rtol=1e-12)
 
@@ -181,6 +181,6 @@ def test_a_pin_with_friction_sticks_in_two_runs_where_it_sticks_in_one():
     whole, middle = states((0.0, 0.15)), 0.15 * 6 / 13
     first = states((0.0, middle))
     second = states((middle, 0.15), start=first)
-    force = whole.connector(rubs).force
+    force = whole.connector(has_friction).force
     assert np.ptp(force[6:]) > 0.1  # N m; it sticks and slides
-    np.testing.assert_allclose(second.connector(rubs).force, force[6:], atol=1e-8)
+    np.testing.assert_allclose(second.connector(has_friction).force, force[6:], atol=1e-8)

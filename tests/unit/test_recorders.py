@@ -463,7 +463,7 @@ def test_iterations_of_a_failed_step_count_with_and_without_recorders(most):
     def counts(*recorders):
         with pytest.raises(ub.ConvergenceError) as failure:
             run(moved, *recorders, max_states=most)
-        return failure.value.solution.parts, failure.value.solution.iterations
+        return failure.value.solution.substeps, failure.value.solution.iterations
 
     assert counts() == counts(ub.Extremes()) == counts(ub.Events())
     assert counts()[1] > 20  # most are of the failed step

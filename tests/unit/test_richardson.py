@@ -34,9 +34,11 @@ def test_a_power_is_recognised(order, first):
     # Whole orders are trusted, others get the larger factor.
     assert seen.trusted == (order in (1.0, 2.0))
     for level in (first, first + 1.3, first + 2, first + 4.5):
-        assert np.allclose(seen.lack(level), -(2.0 ** (-order * level)) * SHAPE, rtol=1e-9)
+        assert np.allclose(
+            seen.remaining_error(level), -(2.0 ** (-order * level)) * SHAPE, rtol=1e-9
+        )
     levels = np.array([first, first + 2.0])
-    assert np.allclose(seen.lack(levels), np.outer(-(2.0 ** (-order * levels)), SHAPE))
+    assert np.allclose(seen.remaining_error(levels), np.outer(-(2.0 ** (-order * levels)), SHAPE))
     rest = 2.0 * 2.0 ** (-order * (first + 2))
     safety = TRUSTED if seen.trusted else DOUBTED
     assert seen.error_bound == pytest.approx((safety - 1) * rest)
@@ -50,7 +52,7 @@ def test_two_levels_have_the_order_of_the_method():
     assert seen.seen
     assert math.isnan(seen.order)
     assert not seen.trusted
-    assert np.abs(second + seen.lack(1) - 7.0).max() < 1e-12
+    assert np.abs(second + seen.remaining_error(1) - 7.0).max() < 1e-12
     assert seen.error_bound == pytest.approx((DOUBTED - 1) * size(second - 7.0))
     assert "in theory" in str(seen)
 
@@ -60,7 +62,7 @@ def test_what_is_faster_than_the_method_is_not_believed():
     seen = Convergence.estimate(three(4.0), 0, 2.0)
     assert seen.order == pytest.approx(4.0)
     assert seen.used == 2.0
-    assert size(seen.lack(2)) + seen.error_bound > 2.0 * 2.0**-8
+    assert size(seen.remaining_error(2)) + seen.error_bound > 2.0 * 2.0**-8
     # A change that happens to be nothing leaves what the one before it would have become.
     passing = Convergence.estimate((np.array(1.0), np.array(0.0), np.array(0.0)), 0, 2.0)
     assert passing.error_bound == pytest.approx(DOUBTED * 1.0 / 4 / 3)
@@ -70,7 +72,7 @@ def test_to_and_fro_is_not_trusted():
     seen = Convergence.estimate((np.array(1.0), np.array(0.0), np.array(0.25)), 0, 2.0)
     assert seen.seen
     assert not seen.trusted
-    assert size(seen.lack(2)) + seen.error_bound == pytest.approx(DOUBTED * 0.25 / 3)
+    assert size(seen.remaining_error(2)) + seen.error_bound == pytest.approx(DOUBTED * 0.25 / 3)
 
 
 @pytest.mark.parametrize("changes", [(1.0, 1.0), (1.0, 0.8), (1.0, 3.0), (0.0, 1.0)])
@@ -80,13 +82,13 @@ def test_what_does_not_fall_is_not_seen(changes):
     seen = Convergence.estimate(values, 0, 2.0)
     assert not seen.seen
     assert seen.error_bound == seen.bound_at(9) == DOUBTED * max(changes)
-    assert seen.lack(5) == 0
+    assert seen.remaining_error(5) == 0
 
 
 def test_what_does_not_change_has_no_error():
     still = Convergence.estimate((np.array(1.0),) * 3, 0, 2.0)
     assert still.seen
-    assert (still.error_bound, still.lack(0)) == (0, 0)
+    assert (still.error_bound, still.remaining_error(0)) == (0, 0)
 
 
 def cross(base, *, cells=(0.3, 2.0), steps=(0.1, 1.0), mixed=0.0):
@@ -107,7 +109,11 @@ def test_errors_of_both_dials_add_up(base):
     one, value = cross(base)
     assert np.abs(one.limit - 7.0).max() < 1e-12
     for i, j in ((base[0] + 1, base[1] + 2), (base[0] + 0.5, base[1] + 3.7)):
-        assert np.allclose(one.cells.lack(i) + one.steps.lack(j), 7.0 - value(i, j), rtol=1e-9)
+        assert np.allclose(
+            one.cells.remaining_error(i) + one.steps.remaining_error(j),
+            7.0 - value(i, j),
+            rtol=1e-9,
+        )
 
 
 @pytest.mark.parametrize("mixed", [0.05, -0.05, -0.25])

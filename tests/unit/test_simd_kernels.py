@@ -259,7 +259,7 @@ RUNS = {
     "lossy": (scene(), ub.EnergyMomentum(alpha=0.1, beta=0.1), {}),
     "printed": (scene(), ub.EnergyMomentumPrinted(), {}),
     "decaying": (scene(), ub.EnergyMomentumDecaying(), {}),
-    "generalised": (scene(), ub.GeneralizedAlpha(0.8), {}),
+    "generalized": (scene(), ub.GeneralizedAlpha(0.8), {}),
     "degree 2": (scene(), ub.EnergyMomentum(), {"mesh": ub.Mesh(degree=2)}),
     "degree 3": (scene(), ub.EnergyMomentumPrinted(), {"mesh": ub.Mesh(degree=3)}),
     "inelastic": (scene(bending=HARD), ub.EnergyMomentum(), {}),

@@ -33,7 +33,7 @@ def braced(force, unit=1.0, *, time=lambda t: t, rhoA=0.0):
 
 def ends(scene, scheme):
     run = ub.simulate(scene, scheme, t=(0, 1), dt=0.25)
-    assert run.parts == 4
+    assert run.substeps == 4
     return run.displacement(scene.beams[1].end)[-1]
 
 
@@ -84,7 +84,7 @@ def test_a_motion_comes_to_rest():
     less than 1e-300 m, in steps without a cut."""
     scene = braced(1e4, time=lambda t: float(t < 0.1), rhoA=100.0)
     run = ub.simulate(scene, ub.EnergyMomentum(0.45, 0.45), t=(0, 12), dt=0.01)
-    assert run.parts == 1200
+    assert run.substeps == 1200
     largest = np.abs(run.displacement(scene.beams[1].end)).max(axis=1)
     assert np.isfinite(largest).all()
     assert largest[-1] < 1e-300
@@ -131,7 +131,7 @@ def test_a_beam_on_a_spring_comes_to_rest(tip):
         loads=[ub.PointLoad(post.end, force=(1e4, 0), amplitude=lambda t: float(t < 0.1))],
     )
     run = ub.simulate(scene, ub.EnergyMomentum(0.3, 0.3), t=(0, 10), dt=0.01)
-    assert run.parts == 1000
+    assert run.substeps == 1000
     assert np.abs(run.displacement(post.end)[-1]).max() < 1e-300
 
 

@@ -181,7 +181,7 @@ def test_on_several_processes_as_on_one(scheme):
         ub.simulate(tower(), scheme, t=(0, 1), dt=0.1, comm=comm)
         for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)
     )
-    assert alone.parts == together.parts == 10
+    assert alone.substeps == together.substeps == 10
     # Residuals of 1e-10 of the forces, some 1e2 N, on stiffnesses of some 10 N/m.
     assert np.abs(alone.q - together.q).max() < 1e-8
 

@@ -63,7 +63,7 @@ def test_the_step_after_loads_were_applied_does_not_go_on_like_that(reference):
     """A large load is applied in many equal parts; the step after them is not cut."""
     _, scene = cantilever(lambda b: ub.PointLoad(b.end, force=(0, 100.0)), EA=1e4, GA=4e3, EI=100.0)
     found = run(scene, ub.EnergyMomentumStatic(), dt=0.5, newton=ub.Newton(reference=reference))
-    assert found.parts == 32 + 2
+    assert found.substeps == 32 + 2
 
 
 def test_a_steady_motion_and_a_steady_actuator():
@@ -91,9 +91,9 @@ def test_loads_that_grow_are_not_applied_before():
     """Nothing precedes the first step where loads begin at zero, nor in a run that goes on."""
     _, scene = cantilever(lambda b: ub.PointLoad(b.end, force=(0, -1.0), amplitude=lambda t: t))
     first = run(scene, ub.EnergyMomentumStatic())
-    assert first.parts == 10
+    assert first.substeps == 10
     again = run(scene, ub.EnergyMomentumStatic(), t=(1, 2), start=first)
-    assert again.parts == 10
+    assert again.substeps == 10
 
 
 # -- relaxation ------------------------------------------------------------------------------------
@@ -112,7 +112,7 @@ def test_relaxation_is_not_cut():
 
     def relaxed(scheme, dt):
         rest = run(scene, scheme, t=(1, 6), dt=dt, start=bent)
-        assert rest.parts == round(5 / dt)
+        assert rest.substeps == round(5 / dt)
         return rest.reaction(scene.supports[1])[-1, 1]
 
     for scheme in (ub.Static(), ub.EnergyMomentumStatic()):

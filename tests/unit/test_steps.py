@@ -167,7 +167,7 @@ def test_steps_in_which_several_places_open_are_those_of_the_reference(scheme):
         ub.simulate(slipping(), scheme, t=(0, 0.36), dt=0.04, newton=ub.Newton(1e-12, reference=by))
         for by in (False, True)
     )
-    assert found.parts == reference.parts
+    assert found.substeps == reference.substeps
     # Newton's method stops at 1e-12 of the forces; conditions and 9 steps magnify that.
     assert np.allclose(found.q, reference.q, rtol=1e-8, atol=1e-8)
     assert np.allclose(found.v, reference.v, rtol=1e-7, atol=1e-7)
@@ -213,7 +213,7 @@ def test_static_steps_in_which_connectors_open_are_not_cut():
     simulation = ub.Simulation(jointed(), ub.Static())
     for t in np.linspace(0.0, 0.6, 31)[1:]:
         simulation.step_to(t)
-    assert simulation.parts == 30
+    assert simulation.substeps == 30
     assert simulation.entries()[2]["hinges"] > 0
 
 
@@ -235,7 +235,7 @@ def test_no_leap_beyond_a_limit_load():
     )
     simulation = ub.Simulation(scene, ub.Static())
     simulation.step_to(0.5)
-    assert simulation.parts > 1  # forces bend too much over the step to tell that nothing leapt
+    assert simulation.substeps > 1  # forces bend too much over the step to tell that nothing leapt
     with pytest.raises(ub.ConvergenceError) as caught:
         simulation.step_to(1.0)
     assert 1.5 * caught.value.solution.times[-1] == pytest.approx(1.0, rel=1e-3)
@@ -254,7 +254,7 @@ def test_now_is_read_as_the_solution(make, scheme):
         assert {*states} - {"before", "every"} == {*state} - {"before"}
         for name in state.keys() & states.keys():
             assert np.array_equal(state[name][0], states[name][-1]), name
-        assert np.array_equal(now.before(0), solution.before(-1)) or not solution.begun
+        assert np.array_equal(now.before(0), solution.before(-1)) or not solution.needs_start
         for beam in simulation.scene.beams:
             assert np.array_equal(now.diagram(beam), solution.diagram(beam))
 
@@ -328,7 +328,7 @@ def test_an_interrupt_while_something_opens():
     interrupts.append(KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
         end(simulation, 30)
-    done = simulation.parts
+    done = simulation.substeps
     assert 0 < done < 30
     for n in range(done, 30):
         simulation.step_to((n + 1) * 0.02)
@@ -355,7 +355,7 @@ def test_a_slender_beam_rolls_up_in_a_few_iterations():
     scene = clamped(beam, loads=[turns])
     simulation = ub.Simulation(scene, ub.Static())
     simulation.step_to(1.0)
-    assert simulation.parts == 1
+    assert simulation.substeps == 1
     assert simulation.iterations <= 8
     assert simulation.displacement(beam.end)[2] == pytest.approx(4 * np.pi, rel=1e-9)
 
@@ -372,7 +372,7 @@ def test_slender_beams_yield_in_a_few_iterations():
     load = ub.PointLoad(beam.end, force=(0.0, 360.0), amplitude=ub.ramp(1.0))
     simulation = ub.Simulation(clamped(beam, loads=[load]), ub.Static())
     end(simulation, 20, 0.05)
-    assert simulation.parts == 20
+    assert simulation.substeps == 20
     assert simulation.iterations <= 80
     assert simulation.displacement(beam.end)[2] > 0.95
     assert simulation.entries()[2]["plastic"] > 0
@@ -391,7 +391,7 @@ def test_singular_tangent_is_a_failed_step():
         loads=[ub.PointLoad(body.middle, force=(1.0, 0.0))],
     )
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, dt), dt=dt)
-    assert solution.parts > 1
+    assert solution.substeps > 1
     assert np.isfinite(solution.q).all()
 
 

@@ -94,7 +94,7 @@ class Probe:
         simulation.controllers.evaluate(simulation)
         for term in simulation.terms:
             term.start(simulation.q)
-        simulation.equation.begin(ub.Step.of(scheme, 0.0, 0.3, 0.3, simulation.q))
+        simulation.equation.begin(ub.Step.create(scheme, 0.0, 0.3, 0.3, simulation.q))
         self.x = simulation.supports.in_axes(simulation.q + random.uniform(-turn, turn, size))
         self.free = np.setdiff1d(np.arange(size), simulation.supports.dofs)
 
@@ -103,7 +103,7 @@ class Probe:
         """Random velocities and whatever else schemes keep, as after a step."""
         rates = simulation.inertia
         rates.commit(*random.uniform(-1, 1, (2, len(rates.v))), last_dt=0.2)
-        rates.keep(*random.uniform(-1, 1, (len(simulation.scheme.kept), len(rates.v))))
+        rates.keep(*random.uniform(-1, 1, (len(simulation.scheme.further_rates), len(rates.v))))
         numerical = (one for one in simulation.terms if isinstance(one, SecondDifferences))
         for term in numerical:
             term._change[:], term._last_dt[0] = random.uniform(-1, 1, term._change.shape), 0.2

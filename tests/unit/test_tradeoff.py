@@ -116,7 +116,7 @@ def test_a_scene_that_is_accurate_enough_stays_as_it_is(law):
     """Nothing coarser is run, and the result says so."""
     law(smooth)
     found = ask(tolerance={"value": 0.5})
-    assert (found.best.dials.dt, found.best.dials.mesh) == (0.1, LINEAR)
+    assert (found.best.setting.dt, found.best.setting.mesh) == (0.1, LINEAR)
     assert any("begin with coarser steps and cells" in note for note in found.notes)
     assert found.effort <= EFFORT
 
@@ -139,7 +139,7 @@ def test_degree_two_is_proposed_where_it_helps(law, slower, degree):
 
     tradeoff.simulate = with_degree  # the fixture restores it
     found = ask(mesh=None, tolerance={"value": 1e-5})
-    assert found.best.dials.mesh.degree == degree
+    assert found.best.setting.mesh.degree == degree
     assert 0.3e-5 <= abs(found.best.values["value"] - 1.0) <= 1e-5
     if degree == 2:
         assert found.effort <= EFFORT
@@ -156,7 +156,7 @@ def test_degree_two_is_left_where_the_scene_has_none(law):
 
     tradeoff.simulate = refuse  # the fixture restores it
     found = ask(mesh=None, tolerance={"value": 1e-4})
-    assert found.best.dials.mesh.degree == 1
+    assert found.best.setting.mesh.degree == 1
     assert 0.3e-4 <= abs(found.best.values["value"] - 1.0) <= 1e-4
 
 
@@ -172,9 +172,9 @@ def test_other_options_of_newtons_method_are_proposed_where_they_help(law):
     tradeoff.simulate = with_newton  # the fixture restores it
     for law.part in (0.5, 1.5):
         found = ask(newton=[ub.Newton(), other], tolerance={"value": 1e-4})
-        assert (found.best.dials.newton == other) == (law.part < 1)
+        assert (found.best.setting.newton == other) == (law.part < 1)
         # It was tried on a coarse run.
-        tried = [run for run in found.runs if run.dials.newton == other]
+        tried = [run for run in found.runs if run.setting.newton == other]
         assert min(run.steps for run in tried) < found.best.steps
 
 
@@ -191,7 +191,7 @@ def test_no_run_is_done_twice(law, seed):
 
     tradeoff.simulate = by_chance  # the fixture restores it
     found = ask(mesh=None, newton=None, tolerance={"value": 1e-4})
-    assert len({str(run.dials) for run in found.runs}) == len(found.runs)
+    assert len({str(run.setting) for run in found.runs}) == len(found.runs)
 
 
 @pytest.mark.parametrize("tolerance", [3e-3, 1e-3, 1e-4, 1e-5])
@@ -213,8 +213,8 @@ def test_a_budget_is_used(law, budget):
         for r in range(1, 512)
         if (n := (found.best.seconds - 0.1) / (SECONDS * (1 + 4 * r / 50))) >= 100
     )
-    dials = found.best.dials
-    assert CELLS / float(dials.mesh.refine) ** 2 + STEP * dials.dt**2 <= 1.1 * least
+    setting = found.best.setting
+    assert CELLS / float(setting.mesh.refine) ** 2 + STEP * setting.dt**2 <= 1.1 * least
 
 
 def test_the_recommendation_are_arguments_of_simulate(law):
@@ -227,15 +227,15 @@ def test_the_recommendation_are_arguments_of_simulate(law):
     assert "errors of 0.0001 of each quantity" in said
     assert f"{len(found.runs)} runs took" in said
     assert f"recommended: {found.best.dials}" in said
-    assert all(str(run.dials) in said for run in found.front)
+    assert all(str(run.setting) in said for run in found.front)
 
 
 def test_a_dial_that_does_nothing_stays_as_it_is(law):
     law(lambda h, dt, scheme, newton: CELLS * h**2)
-    assert ask(tolerance=1e-5).best.dials.dt == 0.1
+    assert ask(tolerance=1e-5).best.setting.dt == 0.1
     law(lambda h, dt, scheme, newton: STEP * dt)  # of first order
     best = ask(tolerance=1e-4).best
-    assert best.dials.mesh.refine == 1
+    assert best.setting.mesh.refine == 1
     assert 0.5e-4 < abs(best.values["value"] - 1.0) <= 1e-4
 
 
@@ -245,14 +245,14 @@ def test_the_better_scheme_wins(law):
     law(lambda h, dt, scheme, newton: smooth(h, (1 + 90 * scheme.alpha) * dt, scheme, newton))
     for schemes in ([first, second], [second, first]):
         found = ask(scheme=schemes, tolerance=1e-4)
-        assert found.best.dials.scheme == first
+        assert found.best.setting.scheme == first
     assert any("given up" in note for note in ask(scheme=[first, second], tolerance=1e-4).notes)
 
 
 def test_adaptive_steps_go_by_their_tolerance(law):
     law(smooth)
     found = ask(dt=ub.Adaptive(1e-3), tolerance=1e-4)
-    assert found.best.dials.dt.tolerance < 1e-3
+    assert found.best.setting.dt.tolerance < 1e-3
     assert abs(found.best.values["value"] - 1.0) <= 1e-4
 
 
@@ -269,8 +269,8 @@ def test_another_newton_is_taken_if_it_changes_little(law, change, taken):
     strict, loose = ub.Newton(), ub.Newton(rtol=1e-6)
     # Equal times are no reason to change.
     found = ask(tolerance=1e-4, newton=[strict, loose])
-    assert found.best.dials.newton == strict
-    assert any(run.dials.newton == loose for run in found.runs)
+    assert found.best.setting.newton == strict
+    assert any(run.setting.newton == loose for run in found.runs)
     simulate = tradeoff.simulate
 
     def faster(scene, *, newton, **others):
@@ -280,7 +280,7 @@ def test_another_newton_is_taken_if_it_changes_little(law, change, taken):
 
     tradeoff.simulate = faster  # the fixture restores it
     found = ask(tolerance=1e-4, newton=[strict, loose])
-    assert found.best.dials.newton == (loose if taken else strict)
+    assert found.best.setting.newton == (loose if taken else strict)
 
 
 def test_schemes_that_converge_to_different_limits_are_named(law):
@@ -297,7 +297,7 @@ def test_dials_that_a_scene_cannot_have_leave_the_others(law):
 
     law(error)
     found = ask(scheme=[ub.EnergyMomentum(alpha=0.1), ub.EnergyMomentum()], tolerance=1e-3)
-    assert found.best.dials.scheme == ub.EnergyMomentum()
+    assert found.best.setting.scheme == ub.EnergyMomentum()
     assert "not for this scene" in found.notes[0]
     with raises("not for this scene"):
         ask(scheme=ub.EnergyMomentum(alpha=0.1), tolerance=1e-3)
@@ -413,7 +413,7 @@ def test_statics_needs_cells_alone():
     found = ub.tradeoff(
         scene, {"tip": end}, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance={"tip": 1e-3}
     )
-    assert found.best.dials.dt == 0.5
+    assert found.best.setting.dt == 0.5
     again = ub.simulate(scene, **found.recommended, comm=MPI.COMM_SELF)
     fine = ub.simulate(
         scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=100), comm=MPI.COMM_SELF
@@ -445,9 +445,9 @@ def test_cells_and_steps_of_a_vibration_are_chosen():
     )
     size = np.abs(history(fine)).max()
     assert np.abs(found.best.values["tip"] - history(fine)).max() < 0.02 * size
-    order = 2 * found.best.dials.mesh.degree
-    assert found.crosses["tip"].cells.method == order
-    assert len({str(run.dials) for run in found.runs}) == len(found.runs)
+    order = 2 * found.best.setting.mesh.degree
+    assert found.convergence["tip"].cells.method == order
+    assert len({str(run.setting) for run in found.runs}) == len(found.runs)
     texts = COMM.allgather(str(found))
     assert len(set(texts)) == 1
     ub.plot(found)

@@ -13,7 +13,7 @@ from scenes import clamped
 from user_laws import Dashpot, PowerLaw
 
 import ufl_beam as ub
-from ufl_beam.model.material_law import has_quadratic_energies, judges_dissipation
+from ufl_beam.model.material_law import dissipation_must_grow, has_quadratic_energies
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms import energy_ledger
@@ -143,10 +143,10 @@ def test_a_law_is_judged_where_its_dissipation_is_its_own():
     own = ub.ElastoPlastic(1.0), ub.AxialBending(1.0, 1.0), PowerLaw(1.0, 1.0, 5.0), Dashpot(1.0)
     curved = ub.RambergOsgood(1.0, 0.002, 8), ub.ArmstrongFrederick(1.0, 1.0, 1.0), ub.BoucWen(1.0)
     for law in (*own, *curved):
-        assert judges_dissipation(law), law
+        assert dissipation_must_grow(law), law
         assert has_quadratic_energies(law), law
     for law in (Elastic(cubic=1.0), Elastic(initial=0.1)):
-        assert not judges_dissipation(law), law
+        assert not dissipation_must_grow(law), law
 
 
 # -- stored energy ---------------------------------------------------------------------------------

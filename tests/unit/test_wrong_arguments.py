@@ -227,7 +227,7 @@ TABLE = {
         name=V("hub", TEXT),
     ),
     "Body.at": call(BODY.at, x=V(0.0, NUMBER), y=V(0.0, NUMBER)),
-    "Spot": call(ub.Spot, body=V(BODY, OBJECT), point=V((0, 0), VECTOR)),
+    "BodyPoint": call(ub.BodyPoint, body=V(BODY, OBJECT), point=V((0, 0), VECTOR)),
     "ground": call(ub.ground, x=V(0.0, NUMBER), y=V(0.0, NUMBER)),
     # joints, connectors and their laws
     "Rigid": call(

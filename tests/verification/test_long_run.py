@@ -77,7 +77,7 @@ def test_very_many_steps(tmp_path):
     grown = watch.memory[STEPS] - watch.memory[1000]
     energy, hinges = solution.energy, solution.energy["hinges"]
     print(f"\n{solution}\n{fatigue}\nmemory grew by {grown / MEBIBYTE:.3f} MiB")
-    assert solution.parts >= STEPS
+    assert solution.substeps >= STEPS
     assert grown < 1 * MEBIBYTE
     assert watch.objects[STEPS] - watch.objects[1000] == 1  # the probe itself
     assert energy.worst < 1e-8

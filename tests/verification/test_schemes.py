@@ -143,7 +143,7 @@ def test_amplification_of_a_mode(scheme, Ω):
     solution = go(bar(), scheme, 30 * Ω / OMEGA, 30)
     u = solution.displacement(solution.scene.beams[0].end)[:, 0]
     p = polynomial(scheme, Ω)
-    begin = 3  # the first two steps of generalised-α and of what remembers a step are their own
+    begin = 3  # the first two steps of generalized-α and of what remembers a step are their own
     residual = np.convolve(u[begin:], p / np.abs(p).max(), mode="valid")
     # Round-off of strains of 0.1, which 1/Ω² of the forces make of those of inertia
     assert len(residual) > 20
@@ -306,7 +306,7 @@ def test_forces_of_the_beginning_do_their_work(scheme):
     assert np.log2(np.divide(worst[:-1], worst[1:])).min() > 1.8
 
 
-def test_moving_supports_and_joints_of_multipliers_with_generalised_alpha():
+def test_moving_supports_and_joints_of_multipliers_with_generalized_alpha():
     """A body that turns on the ground and pulls a beam whose end is moved: second order."""
 
     def scene():

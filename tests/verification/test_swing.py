@@ -231,7 +231,7 @@ def test_adaptive_steps_meet_the_table():
     assert np.abs(limit - np.delete(CONVERGED, [0, 3, 4], axis=1)).max() <= 3e-5
     equal = run_on_links(16, 5e-4, 0.64)
     assert np.abs(displacements(coarse) - exact).max() < np.abs(displacements(equal) - exact).max()
-    assert coarse.parts < equal.parts / 2
+    assert coarse.substeps < equal.substeps / 2
     assert np.abs(displacements(coarse) - exact).max() < coarse.time_error * coarse.scene.size
 
 

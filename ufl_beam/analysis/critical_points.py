@@ -22,7 +22,7 @@ from ufl_beam.display import bracketed, compact_repr
 from ufl_beam.errors import ArgumentError, StepFailed
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.stepper import Trial
-from ufl_beam.solvers.factorization import Factorisation
+from ufl_beam.solvers.factorization import Factorization
 
 INVERSE_ITERATIONS = 50  # most inverse iterations for a mode
 # Change of the mode at which the iterations end.  The relative error of the eigenvalue is about the
@@ -155,7 +155,7 @@ class Stiffness:
         lower = [diags_array(self._row_scale) @ B, diags_array(diagonal)]
         blocks = [[K, G @ diags_array(self._unit)], lower]
         try:
-            self._factors = Factorisation(csr_array(block_array(blocks)))
+            self._factors = Factorization(csr_array(block_array(blocks)))
         except np.linalg.LinAlgError:
             raise StepFailed("the tangent stiffness is singular") from None
         self.symmetric = self._factors.symmetric

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Linearised equations about a state: matrices and eigenvalues of small motions."""
+"""Linearized equations about a state: matrices and eigenvalues of small motions."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class _Standstill(Newmark):
     """Scheme of small motions, whose terms are evaluated at the present state."""
 
     has_mean_velocity = True
-    rings = False
-    kept: tuple[str, ...] = ()  # type: ignore[assignment]
+    accelerations_oscillate = False
+    further_rates: tuple[str, ...] = ()  # type: ignore[assignment]
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
         own = super().coefficients(dt, last_dt, known)
@@ -81,7 +81,7 @@ class SmallMotions:
             c, s = math.cos(support.angle), math.sin(support.angle)
             Q[i, i], Q[i, j], Q[j, i], Q[j, j] = c, -s, s, c
         self._axes = csr_array(Q)  # columns: unit motions along the axes of supports
-        _, T = self._linearised(self.q)
+        _, T = self._linearized(self.q)
         multipliers = self.numbering.multipliers
         about_forces = T.diagonal()[multipliers] != 0.0
         self._laws, constraints = multipliers[about_forces], multipliers[~about_forces]
@@ -99,11 +99,11 @@ class SmallMotions:
         A: Csr = self._simulation.inertia.M  # all matrices have this sparsity pattern
         return csr_array((data.copy(), A.indices.copy(), A.indptr.copy()), shape=(A.size, A.size))
 
-    def _linearised(self, q: Array, dt: float = AT_REST) -> tuple[Array, csr_array]:
+    def _linearized(self, q: Array, dt: float = AT_REST) -> tuple[Array, csr_array]:
         """Return all forces except inertia at ``q``, and their derivative K + C / dt."""
         simulation = self._simulation
         step = Step(0.0, dt, simulation.q, simulation.t, simulation.t, fraction=1.0)
-        r, data = simulation.equation.linearise(q, step)
+        r, data = simulation.equation.linearize(q, step)
         return r, self._matrix(data)
 
     def _reduced(self, T: csr_array) -> csr_array:
@@ -117,7 +117,7 @@ class SmallMotions:
     def unbalanced(self) -> str:
         """Return a warning of works, connectors, supports that disturb the equilibrium, or ""."""
         t = self._simulation.t
-        r, T = self._linearised(self.q)
+        r, T = self._linearized(self.q)
         sizes = abs(T).max(axis=1).toarray().ravel()
         apart = np.abs(self._axes.T @ r) > BALANCED * self.scene.size * sizes
         apart[self._simulation.supports.dofs] = False
@@ -143,7 +143,7 @@ class SmallMotions:
         squares = np.abs(K.diagonal()[heavy]) / M.diagonal()[heavy]
         highest, low = (squares.max(), squares.min()) if heavy.any() else (1.0, 1.0)
         τ = highest**-0.5
-        C = (self._reduced(self._linearised(self.q, τ)[1]) - K) * τ
+        C = (self._reduced(self._linearized(self.q, τ)[1]) - K) * τ
         round_off = ROUND_OFF * abs(K).max()
         symmetric = abs(K - K.T).max() <= round_off
         matrix = (K + K.T) / 2 if symmetric else K
@@ -227,7 +227,7 @@ class SmallMotions:
         Columns of R and rows of L are motions with the forces that follow from force laws.  The
         derivative of K is L T' R.
         """
-        (_, T), laws, Z = self._linearised(self.q), self._laws, self._Z
+        (_, T), laws, Z = self._linearized(self.q), self._laws, self._Z
         flexibility = diags_array(1 / T.diagonal()[laws])
         columns = eye_array(self.numbering.size, format="csr")[:, laws]
         right = Z - columns @ (flexibility @ (T[laws, :] @ Z))
@@ -237,7 +237,7 @@ class SmallMotions:
     def _path(self) -> Array:
         """Compute the linear change of the configuration due to loads and prescribed motions."""
         simulation, supports = self._simulation, self._simulation.supports
-        (r, T), Q = self._linearised(self.q), self._axes
+        (r, T), Q = self._linearized(self.q), self._axes
         before = supports.in_axes(self.q)
         after = before.copy()
         supports.move(after, before, Step(0.0, 1.0, self.q, simulation.t, simulation.t, 1.0))

@@ -32,12 +32,12 @@ from ufl_beam.errors import (
     require_switch,
 )
 from ufl_beam.output.output_files import (
-    above,
-    below,
+    add_prefix,
     beside,
     decoding,
     plain,
     read,
+    remove_prefix,
     require_apart,
     require_arrays,
     require_path,
@@ -122,7 +122,7 @@ class Study(Rich):
             "member": self.member, "cases": [*map(_case_text, self.cases)], "seconds": self.seconds,
             "errors": [self.failed.get(i, "") for i in range(len(self))],
         }  # fmt: skip
-        write(file, FORMAT, {**content, **above("results/", self.results)})
+        write(file, FORMAT, {**content, **add_prefix("results/", self.results)})
 
     @classmethod
     def load(cls, path: str | Path) -> Study:
@@ -134,7 +134,7 @@ class Study(Rich):
         file = require_path(path, "study")
         with decoding(file, FORMAT):
             content = read(file, FORMAT)
-            cases, results = content["cases"], below("results/", content)
+            cases, results = content["cases"], remove_prefix("results/", content)
             failed = {i: str(error) for i, error in enumerate(content["errors"]) if error}
             require_arrays(content, {"seconds": (len(cases),)})
             for name, values in results.items():

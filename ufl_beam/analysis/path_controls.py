@@ -57,7 +57,7 @@ class PathCorrector:
             zero, because norms are summed over the processes.
         factor_gradient: Gradient of the load factor.
         direction: Direction of the path at the beginning of the step.
-        sought: The predicted step.
+        predicted_step: The predicted step.
         dissipates: True if energy was dissipated in the latest accepted step.
     """
 
@@ -75,7 +75,7 @@ class PathCorrector:
         self.dissipates = False
         self.crossing: Crossing | None = None
         self._loading: list[Term] = [*simulation.loads, *simulation.connector_terms]
-        self.direction = self.sought = 0.0 * self.weights
+        self.direction = self.predicted_step = 0.0 * self.weights
 
     @property
     def start(self) -> Array:
@@ -112,7 +112,9 @@ class PathCorrector:
         """Return the change of dissipation in a small motion along ``direction``, or 0; J."""
         motion = direction[:-1]
         now, size = self.dissipation(q), self.size(motion)
-        active = any(group.response.way.any() for group in self.simulation.connector_terms)
+        active = any(
+            group.response.slip_direction.any() for group in self.simulation.connector_terms
+        )
         flows = self.subdomain.total(float(active))
         for doubled in range(MOST_DOUBLINGS if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size
@@ -188,7 +190,7 @@ class PathCorrector:
         self._A = simulation.equation.tangent_at(x, self._rates, r)
 
     def correct(self, y: Array, z: Array) -> None:
-        """Add to ``y`` the correction by the linearised equation of the control.
+        """Add to ``y`` the correction by the linearized equation of the control.
 
         Corrections are subtracted from an iterate.  ``y`` is the correction at a constant load
         factor; ``z`` is the derivative of the correction with respect to the load factor.
@@ -213,7 +215,7 @@ class PathCorrector:
         return abs(self._error(self.simulation.supports.in_plane(self._x))) <= CONTROL_TOLERANCE
 
     def _error(self, q: Array) -> float:
-        """Return the error of the equation of the control at ``q``, divided by ``reach``."""
+        """Return the error of the control equation at ``q``, divided by ``target_change``."""
         if self._normal is None:
             return self.dissipation(q) / self._reach - 1.0
         return self.along(self._normal, np.append(q, self.t) - self._end) / self._reach
@@ -232,22 +234,24 @@ class PathCorrector:
     # -- a step --------------------------------------------------------------------------------
 
     def attempt(
-        self, predicted: Array, normal: Array | None, reach: float, *, hold: bool = True
+        self, predicted: Array, normal: Array | None, target_change: float, *, hold: bool = True
     ) -> Trial:
         """Solve for an equilibrium on a plane through the end of a predicted step.
 
-        Without ``normal``, solve for a step that dissipates the energy ``reach`` (J).
+        Without ``normal``, solve for a step that dissipates the energy ``target_change`` (J).
 
         Args:
             predicted: Predicted step.
             normal: Gradient of the controlled quantity, normal to the plane.
-            reach: Change of this quantity in the step, by which its error is divided.
+            target_change: Change of this quantity in the step, by which its error is divided.
             hold: Whether hinges, cracks and springs that did not open in the last step stay closed
                 if possible, see material_points.py; false along a direction in which they open.
         """
         simulation = self.simulation
-        self._end, self._normal, self._reach = self.start + predicted, normal, reach
-        self.sought = predicted = predicted if self.crossing is None else self.crossing.predicted
+        self._end, self._normal, self._reach = self.start + predicted, normal, target_change
+        self.predicted_step = predicted = (
+            predicted if self.crossing is None else self.crossing.predicted
+        )
         self.t = simulation.t + predicted[-1]
         step, guess = self.step_at(self.t), simulation.q + predicted[:-1]
         simulation.supports.into_axes(guess)
@@ -318,9 +322,9 @@ class Control:
         If the first attempt fails and dissipation begins in the step, a second attempt changes the
         direction at the onset of dissipation.
         """
-        reach, direction = abs(self.step) * fraction, corrector.direction
+        target_change, direction = abs(self.step) * fraction, corrector.direction
         increment = 0.0 * direction
-        rest, hold = reach, True
+        rest, hold = target_change, True
         while True:
             normal = self.normal(corrector, direction)
             speed = corrector.along(normal, direction)
@@ -330,7 +334,7 @@ class Control:
                 )
             step = increment + rest / speed * direction
             try:
-                return corrector.attempt(step, normal, reach, hold=hold)
+                return corrector.attempt(step, normal, target_change, hold=hold)
             except StepFailed as failure:
                 kink = corrector.kink(step) if hold else None
                 if kink is None and hold and self.quantity:
@@ -342,7 +346,9 @@ class Control:
                 if kink is None:
                     raise
             increment, direction = kink
-            rest = max(reach - corrector.along(normal, increment), self.least_rest * reach)
+            rest = max(
+                target_change - corrector.along(normal, increment), self.least_rest * target_change
+            )
             hold = False
 
 

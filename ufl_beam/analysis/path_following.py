@@ -29,9 +29,9 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.classical_schemes import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connector_law import ConnectorLaw, require_limit
-from ufl_beam.model.connector_laws import Controller, rubs
+from ufl_beam.model.connector_laws import Controller, has_friction
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.output_files import Content, above, below, require_arrays
+from ufl_beam.output.output_files import Content, add_prefix, remove_prefix, require_arrays
 from ufl_beam.output.recorder import Recorder, checked_recorders
 from ufl_beam.parallel import communicator, progress_bar
 from ufl_beam.simulation.run import running, take_steps
@@ -101,16 +101,21 @@ class Path(Solution):
         ]
         for k, point in enumerate(self.critical):
             content[f"critical/{k}/mode"] = point.mode
-            content |= above(f"critical/{k}/state/", point.state._arrays())
+            content |= add_prefix(f"critical/{k}/state/", point.state._arrays())
         return content
 
     def _set_content(self, content: Content) -> None:
         super()._set_content(content)
         critical = []
         for k, entry in enumerate(content["critical"]):
-            state, inside = Solution(self.scene, self.numbering), below(f"critical/{k}/", content)
+            state, inside = (
+                Solution(self.scene, self.numbering),
+                remove_prefix(f"critical/{k}/", content),
+            )
             require_arrays(inside, {"mode": (self.numbering.size,)})
-            state._set_content({**{n: content[n] for n in NAMED}, **below("state/", inside)})
+            state._set_content(
+                {**{n: content[n] for n in NAMED}, **remove_prefix("state/", inside)}
+            )
             kind, factor = str(entry["kind"]), float(entry["factor"])
             n = range(len(self))[entry["n"]]
             critical.append(CriticalPoint(kind, factor, n, state, inside["mode"]))
@@ -199,7 +204,7 @@ def follow(
             bar = progress_bar(progress, comm, total=steps, unit="step")
             take_steps(simulation, stepper, recorders, bar, until=until)
         except StepFailed as failure:
-            end = simulation.t + float(stepper.corrector.sought[-1])
+            end = simulation.t + float(stepper.corrector.predicted_step[-1])
             simulation.give_up(failure, end, ADVICE)
     return path
 
@@ -209,7 +214,7 @@ def _require_load_factor(scene: Scene, t0: float) -> None:
     for connector in scene.all_connectors:
         if isinstance(connector.law, Controller):
             raise ArgumentError(f"{connector}: a controller acts in time, and a path has none")
-        if rubs(connector.law):
+        if has_friction(connector.law):
             raise ArgumentError(
                 f"{connector}: dry friction sticks or slides in time steps, and a path has none; "
                 "use simulate(scene, Static(), ...), or a Spring that yields"
@@ -361,9 +366,12 @@ class PathStepper:
         trial = self._control.solve_step(corrector, fraction)
         stiffness, direction = corrector.direction_at(trial.q1, trial.step.t1)
         step = np.append(trial.q1, trial.step.t1) - corrector.start
-        size, sought = (corrector.length(x) for x in (step, corrector.sought))
-        aligned = corrector.along(corrector.weights * step, corrector.sought)
-        reverses = aligned < LEAST_COSINE * size * sought or size > LARGEST_LENGTH_RATIO * sought
+        size, predicted_step = (corrector.length(x) for x in (step, corrector.predicted_step))
+        aligned = corrector.along(corrector.weights * step, corrector.predicted_step)
+        reverses = (
+            aligned < LEAST_COSINE * size * predicted_step
+            or size > LARGEST_LENGTH_RATIO * predicted_step
+        )
         if fraction > UNCHECKED_FRACTION and reverses:
             raise StepFailed("the path turns too sharply, or the step leaps to another branch")
         if self._control.sense(corrector, direction, step) < 0:

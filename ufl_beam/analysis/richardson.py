@@ -41,7 +41,9 @@ class Convergence:
     order: float  # observed order; NaN if there are only two levels
     used: float  # order for predictions: ``order`` limited to [LEAST_ORDER, method], or ``method``
     trusted: bool  # whether the changes fit an integer order, at most the order in theory
-    lacks: Array  # limit minus value on each level, then zero for the limit; (levels + 1, ...)
+    remaining_errors: (
+        Array  # limit minus value on each level, then zero for the limit; (levels + 1, ...)
+    )
     error_bound: float  # bound of the error of the limit; unit of the quantity
 
     __repr__ = compact_repr
@@ -67,8 +69,8 @@ class Convergence:
         if not order < LEAST_ORDER:
             rest = changes[-1] / (2**used - 1)
             bound = (TRUSTED if trusted else DOUBTED) * most / (2**used - 1) - size(rest)
-        lacks = np.stack([*(values[-1] + rest - value for value in values), 0.0 * rest])
-        return cls(coarsest, sizes, method, order, used, trusted, lacks, bound)
+        remaining_errors = np.stack([*(values[-1] + rest - value for value in values), 0.0 * rest])
+        return cls(coarsest, sizes, method, order, used, trusted, remaining_errors, bound)
 
     @property
     def seen(self) -> bool:
@@ -80,14 +82,14 @@ class Convergence:
         """Number of the finest level of the runs."""
         return self.coarsest + len(self.changes)
 
-    def lack(self, level: npt.ArrayLike) -> Array:
+    def remaining_error(self, level: npt.ArrayLike) -> Array:
         """Predict the limit minus the value on whole or fractional levels; (*level.shape, ...).
 
         The result is linear, between levels, in the size of cells or steps to the power ``used``.
         """
         levels = np.append(np.arange(len(self.changes), -1.0, -1.0), 0.0)
         s = np.append(0.0, 2.0 ** (-self.used * levels[:-1]))
-        spline = scipy.interpolate.make_interp_spline(s, self.lacks[::-1], k=1)
+        spline = scipy.interpolate.make_interp_spline(s, self.remaining_errors[::-1], k=1)
         return np.asarray(spline(2.0 ** (-self.used * (np.asarray(level) - self.coarsest))))
 
     def bound_at(self, level: float) -> float:
@@ -120,7 +122,7 @@ class SelfConvergence:
     @classmethod
     def extrapolate(cls, value: Array, cells: Convergence, steps: Convergence) -> SelfConvergence:
         """Extrapolate from the coarsest run, with the sum of the errors of cells and steps."""
-        limit = np.asarray(value + cells.lacks[0] + steps.lacks[0])
+        limit = np.asarray(value + cells.remaining_errors[0] + steps.remaining_errors[0])
         return cls(cells, steps, limit, cells.error_bound + steps.error_bound)
 
     def confirmed(self, value: Array, i: float, j: float) -> SelfConvergence:
@@ -131,7 +133,7 @@ class SelfConvergence:
         limit changes by the fraction (1 - c) (1 - s) of the term, and the rest of the term is
         uncertain.
         """
-        limit = np.asarray(value + self.cells.lack(i) + self.steps.lack(j))
+        limit = np.asarray(value + self.cells.remaining_error(i) + self.steps.remaining_error(j))
         c, s = (
             2.0 ** (-x.used * (level - x.coarsest))
             for x, level in ((self.cells, i), (self.steps, j))

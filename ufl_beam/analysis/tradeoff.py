@@ -58,7 +58,7 @@ STEP_ORDER = 2.0  # largest order of the schemes; the order of cells is twice th
 FURTHER = 2  # most levels from a base to the next; the finest run of a base is 2 levels finer
 REACH = 8  # most levels from the finest run to a setting; second-order errors fall by 2**16
 SETTINGS_PER_LEVEL = 8  # between two settings a second-order error changes by a factor of 2**(2/8)
-MOST_DOUBTS = 4  # number of bases without convergence after which the search ends
+MOST_UNCONVERGED = 4  # number of bases without convergence after which the search ends
 MOST_TRIALS = 3  # most settings tried; each costs about a quarter of the run for the limit
 SCATTER = 0.1  # relative scatter of times of equal runs on an idle machine, see bench_budget.py
 
@@ -153,8 +153,8 @@ def tradeoff(
     for search in others:
         if search.uncertainty > MOST_UNCERTAINTY:
             continue  # its coarse runs give no accurate limit
-        for name, convergence in search.crosses.items():
-            known = best.crosses[name]
+        for name, convergence in search.convergence.items():
+            known = best.convergence[name]
             apart = size(convergence.limit - known.limit)
             if apart > convergence.uncertainty + known.uncertainty:
                 notes.append(
@@ -162,8 +162,9 @@ def tradeoff(
                     "the limit of the recommended family"
                 )
     return Tradeoff(
-        runs=tuple(runs.runs.values()), best=run, t=t, crosses=best.crosses, units=best.units,
-        target=target, families=tuple(map(str, families)), notes=tuple(notes + best.remarks(run)),
+        runs=tuple(runs.runs.values()), best=run, t=t, convergence=best.convergence,
+        units=best.units, target=target, families=tuple(map(str, families)),
+        notes=tuple(notes + best.remarks(run)),
         spent=runs.spent,
     )  # fmt: skip
 
@@ -355,9 +356,9 @@ class _Runs:
         content: dict[str, Any] = {
             "seconds": solution.seconds,
             "building": solution.building,
-            "steps": solution.parts,
+            "steps": solution.substeps,
             "cells": len(solution.numbering.cells),
-            "iterations": solution.iterations / solution.parts,
+            "iterations": solution.iterations / solution.substeps,
         }
         known = next(iter(self.runs.values())).values if self.runs else {}
         for n, (name, quantity) in enumerate(self.quantities.items()):
@@ -407,11 +408,11 @@ class _Search:
 
     def __init__(self, runs: _Runs, family: int, target: Target) -> None:
         self.family = family
-        self.crosses: dict[str, SelfConvergence] = {}
+        self.convergence: dict[str, SelfConvergence] = {}
         self.units: dict[str, float] = {}
         self._runs, self._target = runs, target
         self._base = [0, 0]  # levels of cells and of steps
-        self._doubts: list[str] = []
+        self._unconverged: list[str] = []
         self._error_ratio = 1.0  # errors of runs divided by predicted errors
         # Times divided by predicted times, for each of the options of Newton's method.
         self._time_ratios = [1.0] * len(runs.newtons)
@@ -427,7 +428,7 @@ class _Search:
             expected = min(self.uncertainty, NEGLIGIBLE)  # uncertainty after refinement of the base
             candidate = self._choose(expected)
             levels = math.log2(candidate.refine), candidate.level
-            some, base = next(iter(self.crosses.values())), self._base
+            some, base = next(iter(self.convergence.values())), self._base
             finest = some.cells.finest, some.steps.finest
             far = np.greater(levels, finest).any()
             if far or self.uncertainty > self._negligible(candidate):
@@ -453,7 +454,7 @@ class _Search:
     @property
     def uncertainty(self) -> float:
         """Largest uncertainty of a limit, divided by the unit of its quantity."""
-        return max(x.uncertainty / self.units[n] for n, x in self.crosses.items())
+        return max(x.uncertainty / self.units[n] for n, x in self.convergence.items())
 
     def best(self) -> Run:
         """Return the best of all runs."""
@@ -463,7 +464,7 @@ class _Search:
         """Return notes on missing convergence, and on a run that misses the target."""
         notes = [
             f"the order of convergence is not seen: {name}{convergence}"
-            for name, convergence in self.crosses.items()
+            for name, convergence in self.convergence.items()
             if not (convergence.cells.seen and convergence.steps.seen)
         ]
         if not self._accepts(run):
@@ -476,7 +477,7 @@ class _Search:
 
     def ratio(self, run: Run, other: Run | None = None) -> float:
         """Return the largest distance from the limits, or another run, divided by ``units``."""
-        limits = {name: convergence.limit for name, convergence in self.crosses.items()}
+        limits = {name: convergence.limit for name, convergence in self.convergence.items()}
         goal = other.values if other else limits
         return max(size(run.values[name] - goal[name]) / unit for name, unit in self.units.items())
 
@@ -522,11 +523,13 @@ class _Search:
                     )
                     for line, base, order in zip(along, self._base, orders, strict=True)
                 )
-                self.crosses[name] = SelfConvergence.extrapolate(values[0][name], cells, steps)
+                self.convergence[name] = SelfConvergence.extrapolate(values[0][name], cells, steps)
             if self.uncertainty <= MOST_UNCERTAINTY or self._worst()[1]:
                 return
             self._move_base(
-                "".join(f"\n  {name}{convergence}" for name, convergence in self.crosses.items())
+                "".join(
+                    f"\n  {name}{convergence}" for name, convergence in self.convergence.items()
+                )
             )
 
     def _matters(self, values: Mapping[str, Array], finer: Mapping[str, Array]) -> bool:
@@ -541,7 +544,7 @@ class _Search:
         """Return the larger source of uncertainty, cells (0) or steps (1), and if changes fall."""
         sources = [
             (convergence.error_bound / self.units[name], axis, convergence.seen)
-            for name, x in self.crosses.items()
+            for name, x in self.convergence.items()
             for axis, convergence in enumerate((x.cells, x.steps))
         ]
         return max(sources)[1:]
@@ -549,12 +552,12 @@ class _Search:
     def _move_base(self, said: str, axis: int | None = None) -> None:
         """Refine cells (``axis`` 0) or steps (1) of the base; by default the larger error source.
 
-        Raise :class:`TradeoffError` after ``MOST_DOUBTS`` bases without convergence.
+        Raise :class:`TradeoffError` after ``MOST_UNCONVERGED`` bases without convergence.
         """
         where = self._runs.setting(self._at(2 ** self._base[0], self._base[1]))
-        self._doubts.append(f"\n  from {where} on: {said}")
-        if len(self._doubts) == MOST_DOUBTS:
-            raise TradeoffError("self-convergence is not seen" + "".join(self._doubts))
+        self._unconverged.append(f"\n  from {where} on: {said}")
+        if len(self._unconverged) == MOST_UNCONVERGED:
+            raise TradeoffError("self-convergence is not seen" + "".join(self._unconverged))
         self._base[self._worst()[0] if axis is None else axis] += 1
 
     def _confirm(self, candidate: _Candidate) -> None:
@@ -565,8 +568,8 @@ class _Search:
         self._runs.run([finer], optional=True)
         if finer in self._runs.runs:
             values, at = self._runs.runs[finer].values, (math.log2(finer.refine), finer.level)
-            for name, convergence in self.crosses.items():
-                self.crosses[name] = convergence.confirmed(values[name], *at)
+            for name, convergence in self.convergence.items():
+                self.convergence[name] = convergence.confirmed(values[name], *at)
 
     def _choose_newton(self) -> None:
         """Choose the fastest options of Newton's method that change the quantities little."""
@@ -611,7 +614,7 @@ class _Search:
 
         ``uncertainty`` of the limit is divided by units, see :class:`_Search`.
         """
-        some, setting = next(iter(self.crosses.values())), self._runs.families[self.family]
+        some, setting = next(iter(self.convergence.values())), self._runs.families[self.family]
         top = 2 ** (some.cells.finest + REACH), 2 ** (some.steps.finest + REACH)
         # The coarsest mesh has about the same number of nodes as the user's cells at degree 1.
         first = math.ceil(self._divisor / setting.mesh.degree)
@@ -620,10 +623,16 @@ class _Search:
         multiples = np.array(_geometric(1, top[1]), dtype=float)
         cell_levels, step_levels = np.log2(np.array(refine, dtype=float)), np.log2(multiples)
         likely = bound = np.zeros((len(cell_levels), len(step_levels)))
-        for name, convergence in self.crosses.items():
+        for name, convergence in self.convergence.items():
             unit = self.units[name] / self._error_ratio
-            cells = convergence.cells.lack(cell_levels).reshape(len(cell_levels), 1, -1) / unit
-            steps = convergence.steps.lack(step_levels).reshape(1, len(step_levels), -1) / unit
+            cells = (
+                convergence.cells.remaining_error(cell_levels).reshape(len(cell_levels), 1, -1)
+                / unit
+            )
+            steps = (
+                convergence.steps.remaining_error(step_levels).reshape(1, len(step_levels), -1)
+                / unit
+            )
             likely = np.maximum(likely, np.abs(cells + steps).max(axis=2))
             bound = np.maximum(bound, np.abs(cells).max(axis=2) + np.abs(steps).max(axis=2))
         seconds = self._time_ratios[self._newton] * self._seconds(
@@ -677,8 +686,12 @@ class _Search:
         """
         _, refine, level, newton = run.refinement
         bound = self._error_ratio * max(
-            (size(c.cells.lack(math.log2(refine))) + size(c.steps.lack(level))) / self.units[name]
-            for name, c in self.crosses.items()
+            (
+                size(c.cells.remaining_error(math.log2(refine)))
+                + size(c.steps.remaining_error(level))
+            )
+            / self.units[name]
+            for name, c in self.convergence.items()
         )
         if math.isfinite(self._target.budget):
             slow = run.seconds > self._target.budget

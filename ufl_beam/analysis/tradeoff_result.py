@@ -50,7 +50,7 @@ class Run:
     """Result of a run, and its cost."""
 
     refinement: Refinement  # family and refinement
-    dials: Setting  # setting
+    setting: Setting  # setting
     values: dict[str, Array]  # the quantities
     seconds: float  # wall time without compiling; s
     building: float  # wall time before the first step; s
@@ -64,7 +64,7 @@ class Run:
         return self.seconds - self.building
 
     def __str__(self) -> str:
-        return f"{self.dials}: {self.seconds:.3g} s"
+        return f"{self.setting}: {self.seconds:.3g} s"
 
     __repr__ = bracketed
 
@@ -98,7 +98,7 @@ class Tradeoff(Rich):
         runs: All runs.
         best: The run with the recommended setting.
         t: Beginning and end; s.
-        crosses: Convergence of each quantity in the family of the recommended setting.
+        convergence: Convergence of each quantity in the family of the recommended setting.
         units: The tolerances, in the unit of each quantity; with a budget, the largest magnitudes
             of the quantities.
         target: The tolerances or the budget.
@@ -116,7 +116,7 @@ class Tradeoff(Rich):
     runs: tuple[Run, ...]
     best: Run
     t: tuple[float, float]
-    crosses: Mapping[str, SelfConvergence]
+    convergence: Mapping[str, SelfConvergence]
     units: dict[str, float]
     target: Target
     families: tuple[str, ...]
@@ -126,17 +126,17 @@ class Tradeoff(Rich):
     @property
     def recommended(self) -> dict[str, Any]:
         """Arguments for ``ub.simulate(scene, **recommended)``: scheme, t, dt, mesh, newton."""
-        return {"t": self.t, **vars(self.best.dials)}
+        return {"t": self.t, **vars(self.best.setting)}
 
     @property
     def limit(self) -> dict[str, Array]:
         """Extrapolated limits of the quantities, by name."""
-        return {name: convergence.limit for name, convergence in self.crosses.items()}
+        return {name: convergence.limit for name, convergence in self.convergence.items()}
 
     @property
     def uncertainty(self) -> dict[str, float]:
         """Uncertainty of the limits, by quantity; unit of each quantity."""
-        return {name: convergence.uncertainty for name, convergence in self.crosses.items()}
+        return {name: convergence.uncertainty for name, convergence in self.convergence.items()}
 
     def errors(self, run: Run) -> dict[str, float]:
         """Return the distance of a run from the limit of each quantity, in its unit."""
@@ -164,12 +164,12 @@ class Tradeoff(Rich):
 
     def table(self) -> list[list[str]]:
         """Return a header, and cost, errors and setting of each run of ``front`` and ``best``."""
-        rows = [["", "seconds", "steps", "cells", "iterations", *self.limit, "dials"]]
+        rows = [["", "seconds", "steps", "cells", "iterations", *self.limit, "setting"]]
         for run in sorted({*self.front, self.best}, key=lambda run: run.seconds):
             rows.append([
                 "=>" if run is self.best else "", f"{run.seconds:.3g}", f"{run.steps:.0f}",
                 f"{run.cells:.0f}", f"{run.iterations:.2f}",
-                *(f"{error:.2g}" for error in self.errors(run).values()), str(run.dials),
+                *(f"{error:.2g}" for error in self.errors(run).values()), str(run.setting),
             ])  # fmt: skip
         return rows
 
@@ -177,7 +177,7 @@ class Tradeoff(Rich):
         """Return lines on convergence, cost and the recommended setting."""
         shown = {*self.front, self.best}
         lines = [f"and {len(self.runs) - len(shown)} runs that others beat in both time and error"]
-        for name, convergence in self.crosses.items():
+        for name, convergence in self.convergence.items():
             value = np.array2string(convergence.limit, precision=9, threshold=6, edgeitems=2)
             lines.append(f"{name}: limit {value} ± {convergence.uncertainty:.1g}{convergence}")
         lines.append(

@@ -33,7 +33,7 @@ T = TypeVar("T")
 CHECKSUMS = "checksums"
 """File with the name of its entry and the checksums of the other files of the entry."""
 
-SWEPT = "swept"
+CLEANED = "swept"
 """File whose modification time is the time of the last clean-up."""
 
 DAY = 86_400.0
@@ -124,15 +124,15 @@ def _age(path: Path) -> float:
     return time.time() - path.stat().st_mtime
 
 
-def sweep(place: Path) -> None:
+def clean_up(place: Path) -> None:
     """Remove entries that were not used for :data:`UNUSED`, and their locks; at most once a day.
 
     An entry is renamed before it is removed, so that no process finds an incomplete entry.
     """
     with suppress(OSError):
-        if (place / SWEPT).exists() and _age(place / SWEPT) < DAY:
+        if (place / CLEANED).exists() and _age(place / CLEANED) < DAY:
             return
-        (place / SWEPT).touch()
+        (place / CLEANED).touch()
         for lock in (lock for lock in place.glob("*.lock") if _age(lock) > UNUSED):
             entry = lock.with_suffix("")
             aside = entry.with_name(f"{entry.name}.unused.part")
@@ -178,7 +178,7 @@ def _place() -> Path:
     if why := _make_private(chosen):
         return _temporary(f"the cache {chosen} cannot be used: {why}")
     if MPI.COMM_WORLD.rank == 0:
-        sweep(chosen)
+        clean_up(chosen)
     return chosen
 
 

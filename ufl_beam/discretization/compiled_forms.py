@@ -223,7 +223,7 @@ class Kernel:
         rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
         self._packed[:, columns] = in_batches(rows, self.lanes)
 
-    def subdomain(self, source: Kernel) -> bool:
+    def reuse_values(self, source: Kernel) -> bool:
         """Use the packed values of ``source``, if these contain this form's values as one block.
 
         Returns:

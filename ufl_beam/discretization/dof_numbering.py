@@ -24,10 +24,10 @@ from ufl_beam.model.bodies import (
     GROUND,
     AttachmentPoint,
     Body,
+    BodyPoint,
     Member,
     Node,
     Place,
-    Spot,
     arm,
     node,
 )
@@ -429,7 +429,7 @@ def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
 
 def values_at(numbering: DofNumbering, place: AttachmentPoint, states: Vectors) -> Array:
     """Return values at the centre of a body, or interpolated at a place of a beam; (n, 3)."""
-    if isinstance(place, Spot):
+    if isinstance(place, BodyPoint):
         if node(place) is GROUND:
             return np.zeros((len(states), 3))
         dofs = numbering.node(place)
@@ -444,7 +444,7 @@ def velocity_at(
 ) -> Array:
     """Return the velocities of a place in ``states``; (n, 3); m/s, m/s, rad/s."""
     motion = values_at(numbering, place, velocities)
-    if isinstance(place, Spot):
+    if isinstance(place, BodyPoint):
         x, y = turned(arm(place), values_at(numbering, place, states)[:, 2]).T
         motion[:, :2] += motion[:, 2:] * np.column_stack([-y, x])
     return motion

@@ -176,7 +176,7 @@ class Fields:
         if force.lanes != tangent.lanes:  # otherwise they could not share packed coefficients
             force = self.kernel(work, q1, several=False)
             tangent = Kernel(form, q1, self.cell_dofs, self._coordinates())
-        if not tangent.subdomain(force):
+        if not tangent.reuse_values(force):
             raise ValueError("force and tangent do not have the same coefficients")
         tangent.place(A)
         return force, tangent
@@ -241,7 +241,7 @@ def mass_kernel(fields: Fields) -> Kernel:
     return fields.kernel(applied(mass_form(fields.element), q1), q1)
 
 
-def lumps(scene: Scene) -> list[tuple[AttachmentPoint, float, float]]:
+def point_masses(scene: Scene) -> list[tuple[AttachmentPoint, float, float]]:
     """List places, masses and rotary inertias of the point masses and the bodies; kg, kg m²."""
     masses = [(mass.place, mass.mass, mass.inertia) for mass in scene.masses]
     return masses + [(body.middle, body.mass, body.inertia) for body in scene.bodies]
@@ -250,7 +250,7 @@ def lumps(scene: Scene) -> list[tuple[AttachmentPoint, float, float]]:
 def mass_matrix(fields: Fields) -> Csr:
     """Assemble the mass matrix of the beams, the point masses and the bodies."""
     subdomain, M = fields.subdomain, fields.assembled(mass_form(fields.element))
-    for place, mass, inertia in lumps(subdomain.numbering.scene):
+    for place, mass, inertia in point_masses(subdomain.numbering.scene):
         dofs = subdomain.numbering.node(place)
         mine = subdomain.owns(dofs)
         local_dofs = subdomain.local(dofs[mine])

@@ -16,7 +16,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.caches import cached_by_structure
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.errors import warn
-from ufl_beam.model.bodies import GROUND, Place, Spot, carries
+from ufl_beam.model.bodies import GROUND, BodyPoint, Place, moves_with_node
 from ufl_beam.model.connector_laws import RIGID, PrescribedMotion
 from ufl_beam.model.connectors import place_of
 from ufl_beam.model.functions import value_at
@@ -162,8 +162,8 @@ def warn_of_far_points(scene: Scene) -> None:
     Coordinates relative to the centre, given to ``body.at`` by mistake, may be such points;
     ``body.at(x, y)`` takes coordinates of the undeformed scene.
     """
-    attached = (place for _, place in scene.attachments() if isinstance(place, Spot))
-    spots = dict.fromkeys(s for s in attached if s.body is not GROUND and not carries(s))
+    attached = (place for _, place in scene.attachments() if isinstance(place, BodyPoint))
+    spots = dict.fromkeys(s for s in attached if s.body is not GROUND and not moves_with_node(s))
     if not spots:
         return
     others = list(_points(scene))
@@ -195,7 +195,7 @@ def _points(scene: Scene) -> Iterator[tuple[tuple[float, float], object]]:
     for body in scene.bodies:
         yield body.center, body
     for _, place in scene.attachments():
-        yield place.point, place.body if isinstance(place, Spot) else place.beam
+        yield place.point, place.body if isinstance(place, BodyPoint) else place.beam
 
 
 def warn_of_origin(scene: Scene) -> None:

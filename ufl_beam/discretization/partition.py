@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.model.bodies import AttachmentPoint, Spot
+from ufl_beam.model.bodies import AttachmentPoint, BodyPoint
 
 
-def bisected(points: Array, number: int) -> Index:
+def bisect(points: Array, number: int) -> Index:
     """Divide points into ``number`` subdomains of equal size; return the subdomain of each point.
 
     Recursive coordinate bisection cuts the longer side of the bounding box, so that a subdomain has
@@ -66,7 +66,7 @@ class Subdomain:
     def __init__(self, numbering: Any, comm: MPI.Intracomm) -> None:
         self.numbering = numbering
         self.comm, self.alone = comm, comm.size == 1
-        cell_ranks = bisected(numbering.points[numbering.cells].mean(axis=1), comm.size)
+        cell_ranks = bisect(numbering.points[numbering.cells].mean(axis=1), comm.size)
         owner = np.full(numbering.size, comm.size, dtype=np.int32)
         for rank in reversed(range(comm.size)):  # the first process that has a dof owns it
             owner[numbering.dofs[numbering.nodes_of_cells[cell_ranks == rank]]] = rank
@@ -120,7 +120,7 @@ class Subdomain:
 
         This process then has all degrees of freedom of the place, but may not own all of them.
         """
-        if isinstance(point, Spot):
+        if isinstance(point, BodyPoint):
             return bool(self.owns(self.numbering.node(point)).all())
         place = np.searchsorted(self.cells, cell := self.numbering.cell(point))
         return bool(np.any(self.cells[place : place + 1] == cell))

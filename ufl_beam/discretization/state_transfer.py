@@ -35,7 +35,7 @@ class Transfer:
         self._old, self._new = old, new
         self._require_alike()
         bodies = [body for body in new.scene.rigid_bodies if body in old.scene.rigid_bodies]
-        news, olds = (
+        new_dofs, old_dofs = (
             np.vstack([numbering.dofs, *(numbering.node(body.middle) for body in bodies)]).ravel()
             for numbering in (new, old)
         )
@@ -48,8 +48,8 @@ class Transfer:
             if candidates := known.get(_geometry(connector)):
                 connectors[i] = candidates.pop(0)
         self._connector_map = {a: b for b, a in connectors.items()}
-        self._to = np.concatenate([news, new.multipliers[list(connectors)]])
-        self._from = np.concatenate([olds, old.multipliers[list(connectors.values())]])
+        self._to = np.concatenate([new_dofs, new.multipliers[list(connectors)]])
+        self._from = np.concatenate([old_dofs, old.multipliers[list(connectors.values())]])
 
     def _require_alike(self) -> None:
         """Raise unless beams, meshes and points are equal and all bodies are in the old scene."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Schemes whose forces act at the end of the step: statics, Newmark, generalised-α."""
+"""Schemes whose forces act at the end of the step: statics, Newmark, generalized-α."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Static(_AtEnd):
 
 
 class Weights(NamedTuple):
-    """Weights of Newmark's formulas and of the mean accelerations of generalised-α.
+    """Weights of Newmark's formulas and of the mean accelerations of generalized-α.
 
     With the acceleration a, from which u and v follow, and the acceleration ü by the forces,
 
@@ -122,10 +122,10 @@ class _Accelerated(_AtEnd):
     has_mean_velocity = False
     uses_last_step = False
     weights: Weights
-    kept: tuple[str, ...]
+    further_rates: tuple[str, ...]
 
     @property
-    def rings(self) -> bool:
+    def accelerations_oscillate(self) -> bool:
         """True if the accelerations of a prescribed motion oscillate for ever.
 
         They follow from Newmark's formulas alone, which damp errors only if 2 β > γ > 1/2.
@@ -142,7 +142,7 @@ class _Accelerated(_AtEnd):
         s, v, _, *more = np.eye(3 + known)
         forced = a0 = more[0] if known else 0 * s
         α_m, α_f, γ, β = CONSTANT
-        if 0 < known < len(self.kept):
+        if 0 < known < len(self.further_rates):
             α_m, α_f, γ, β = AVERAGE
         elif known:
             α_m, α_f, γ, β = self.weights
@@ -151,9 +151,9 @@ class _Accelerated(_AtEnd):
         v1 = v + dt * ((1 - γ) * a0 + γ * a)
         forced1 = ((1 - α_m) * a + α_m * a0 - α_f * forced) / (1 - α_f)
         lead = (a - forced1) / dt
-        if known < len(self.kept):
+        if known < len(self.further_rates):
             lead = (self.weights.α_m - self.weights.α_f) / dt * (forced1 - forced)
-        further = (forced1, lead) if known and len(self.kept) > 1 else (forced1,)
+        further = (forced1, lead) if known and len(self.further_rates) > 1 else (forced1,)
         return Coefficients(inertia=forced1, velocity=v1, rates=(v1, *further))
 
     def error_weights(self) -> tuple[float, float]:
@@ -194,7 +194,7 @@ class Newmark(_Accelerated):
     gamma: float = 0.5
     beta: float = 0.25
 
-    kept = ("acceleration",)
+    further_rates = ("acceleration",)
     advice = (
         "Try a smaller dt, or GeneralizedAlpha(0.8), or EnergyMomentum(), which conserves energy"
     )
@@ -216,7 +216,7 @@ class Newmark(_Accelerated):
 
 @dataclass(frozen=True)
 class GeneralizedAlpha(_Accelerated):
-    """Generalised-α scheme of second order with damping of high frequencies.
+    """Generalized-α scheme of second order with damping of high frequencies.
 
     The weights are by Chung and Hulbert (1993), the form is by Arnold and Brüls (2007): equilibrium
     and constraints are satisfied at the ends of the steps, and the weights average an auxiliary
@@ -243,7 +243,7 @@ class GeneralizedAlpha(_Accelerated):
 
     rho_inf: float = 0.8
 
-    kept = ("acceleration", "lead of acceleration")
+    further_rates = ("acceleration", "lead of acceleration")
     advice = (
         "Try a smaller dt, a smaller rho_inf, or EnergyMomentumDecaying(), whose energy is bounded"
     )

@@ -150,8 +150,8 @@ class MidpointLoads:
     load_weight = 0.5
     has_mean_velocity = True
     uses_last_step = False
-    rings = False
-    kept: tuple[str, ...] = ()
+    accelerations_oscillate = False
+    further_rates: tuple[str, ...] = ()
     advice = (
         "Try a smaller dt, loads and motions without jumps, or more dissipation at high "
         "frequencies, such as EnergyMomentum(alpha=0.05, beta=0.05) or EnergyMomentumDecaying()"
@@ -172,7 +172,9 @@ class _Velocities(MidpointLoads):
             inertia=(a / dt, -(1 + b) / dt, 0.0),  # P(78)
             velocity=(1 / dt, 0.0, 0.0),
             rates=((a, -b, 0.0),),
-            slip=(self.beta, 0.0, 0.0) if self.beta else None,  # P(88), with the loss D_K
+            velocity_defect=(self.beta, 0.0, 0.0)
+            if self.beta
+            else None,  # P(88), with the loss D_K
         )
 
     def error_weights(self) -> tuple[float, float]:
@@ -279,7 +281,7 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
             inertia=(1 / (dt**2 * keep), (cr - 1) / (dt * keep), -cr / (dt * keep)),
             velocity=(1 / dt, 0.0, 0.0),
             rates=((1 / (dt * keep), (c + cr - 0.5) / keep, -cr / keep),),
-            slip=(c, -cr, cr),
+            velocity_defect=(c, -cr, cr),
         )
 
     def error_weights(self) -> tuple[float, float]:

@@ -63,7 +63,7 @@ class End(NamedTuple):
     relaxed: Values  # work on plastic strain by the mean stress, minus work by the end stress
     resistance: Values  # of the discontinuity
     left: Values  # stored elastically after a break has removed the stress
-    missed: Values  # numerical loss in nonlinear elasticity, with forces over the step
+    nonlinear_loss: Values  # numerical loss in nonlinear elasticity, with forces over the step
     stress: tuple[Values, ...]
     changes: tuple[Values, ...]  # of the variables
 
@@ -208,21 +208,21 @@ class PointEquations:
         # error is in ``worked``.
         hardened = law.hardening_energy(changes)
         lost = self._elastic_growth(law, de, changes) + hardened
-        elastically, missed, C = de, zero, tuple(at[n] for n in rows(law, "stiffness"))
+        elastically, nonlinear_loss, C = de, zero, tuple(at[n] for n in rows(law, "stiffness"))
         if self._curved:
-            # ``missed`` is the value of ``worked`` below at constant variables: not dissipation.
+            # ``nonlinear_loss`` is ``worked`` below at constant variables: not dissipation.
             ends = tuple(law.as_tuple(law.stress(argument(e1), old)))
             elastically = tuple((y - x) / c for x, y, c in zip(before, ends, C, strict=True))
             work = sum(σ * e for σ, e in zip(self.elastic_stress(at), de, strict=True))
             stored = law.elastic_energy(argument(e1), old) - law.elastic_energy(argument(e0), old)
             none = State(dict.fromkeys(self._names, zero))
-            missed = work - stored - (2 * θ - 1) * self._elastic_growth(law, de, none)
+            nonlinear_loss = work - stored - (2 * θ - 1) * self._elastic_growth(law, de, none)
         worked = law.dissipation(self.strain(at), _plus(old, at_θ), changes, at["dt"])
         if worked is None:
             work = sum(σ * e for σ, e in zip(self.stress(at), de, strict=True))
             stored = elastic - law.elastic_energy(argument(e0), old)
             stored = stored + hardening - law.hardening_energy(old)
-            worked = work - stored - (2 * θ - 1) * lost - missed
+            worked = work - stored - (2 * θ - 1) * lost - nonlinear_loss
         relaxed = hardened
         for σ0, σ1, e, c in zip(before, now, elastically, C, strict=True):
             relaxed = relaxed - (σ1 - σ0) / 2 * (e - (σ1 - σ0) / c)
@@ -234,7 +234,7 @@ class PointEquations:
         return End(
             worked + zero, broken, lost + zero, elastic + zero, hardening + zero,
             positive(relaxed) + zero, resistance, left,
-            missed + zero if self._over_step else zero, now,
+            nonlinear_loss + zero if self._over_step else zero, now,
             tuple(getattr(changes, name) for name in self._names),
         )  # fmt: skip
 

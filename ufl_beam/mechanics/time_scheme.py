@@ -31,7 +31,7 @@ class Step(NamedTuple):
     """Time step of a scheme: its ends, and the times of loads and prescribed motions.
 
     Example:
-        >>> step = ub.Step.of(ub.EnergyMomentum(), 0.0, 0.1, 0.1, np.zeros(3))
+        >>> step = ub.Step.create(ub.EnergyMomentum(), 0.0, 0.1, 0.1, np.zeros(3))
         >>> step.load_time, step.motion_time, step.dt  # s
         (0.05, 0.1, 0.1)
     """
@@ -47,7 +47,7 @@ class Step(NamedTuple):
     ratio: float = 0.0  # length divided by the length of the last step; 0 if there is none
 
     @classmethod
-    def of(cls, scheme: Scheme, t0: float, t1: float, end: float, q0: Array) -> Step:
+    def create(cls, scheme: Scheme, t0: float, t1: float, end: float, q0: Array) -> Step:
         """Return the step of a scheme from ``t0`` to ``t1``: a substep of a step to ``end``.
 
         In statics a substep applies its fraction of the increment of loads and motions up to
@@ -118,13 +118,13 @@ class Coefficients(NamedTuple):
 
     The numbers of a row multiply the step of the nodes, see :func:`nodal_step`, the velocities at
     the beginning of the step, the velocities before the last step, and the known rates of
-    :attr:`DynamicScheme.kept`, in this order.
+    :attr:`DynamicScheme.further_rates`, in this order.
 
     Attributes:
         inertia: Row of the acceleration in the equation of the step.
         velocity: Row of the velocity in the equation of the step.
-        rates: Row of the velocities after the step, then a row of each rate of ``kept`` after it.
-        slip: Row of Δu/Δt minus the mean of the velocities at both ends, P(88), whose work on the
+        rates: Row of the velocities after the step, then a row of each of the ``further_rates``.
+        velocity_defect: Row of Δu/Δt minus the mean velocity of both ends, P(88), whose work on the
             change of momentum is lost.  Its first number multiplies the change of velocities.  None
             means no loss.
 
@@ -136,7 +136,7 @@ class Coefficients(NamedTuple):
     inertia: Sequence[float]
     velocity: Sequence[float]
     rates: Sequence[Sequence[float]]
-    slip: Sequence[float] | None = None
+    velocity_defect: Sequence[float] | None = None
 
 
 class DynamicScheme(Scheme, Protocol):
@@ -154,10 +154,10 @@ class DynamicScheme(Scheme, Protocol):
         ufl_beam.errors.ArgumentError: scheme: Mine is not a time scheme: it lacks coefficients, ...
     """
 
-    kept: tuple[str, ...]  # names of rates besides velocities, such as accelerations
+    further_rates: tuple[str, ...]  # names of rates besides velocities, such as accelerations
     has_mean_velocity: bool  # True if steps have a mean velocity, for friction and RotatingFrame
     uses_last_step: bool  # True if a step depends on length and velocities of the last step
-    rings: bool  # True if accelerations of prescribed motions oscillate for ever
+    accelerations_oscillate: bool  # True if accelerations of prescribed motions oscillate for ever
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
         """Return the coefficients of a step of length ``dt``.
@@ -165,8 +165,8 @@ class DynamicScheme(Scheme, Protocol):
         Args:
             dt: Length of the step; s.
             last_dt: Length of the step before; infinite if there was none; s.
-            known: Number of rates of :attr:`kept` that are known at the beginning.  After the step,
-                ``len(rates) - 1`` of these rates are known.
+            known: Number of rates of :attr:`further_rates` that are known at the beginning.  After
+                the step, ``len(rates) - 1`` of these rates are known.
         """
 
     def error_weights(self) -> tuple[float, float]:
@@ -211,7 +211,7 @@ def combined(row: Sequence[float], s: Array, rates: Any) -> Array:
     """Return the sum of a row of :class:`Coefficients` for the nodal step ``s``.
 
     ``rates`` has the rates at the beginning of the step: ``v``, ``v_before``, and as ``more`` the
-    known rates of :attr:`DynamicScheme.kept`.
+    known rates of :attr:`DynamicScheme.further_rates`.
     """
     known: tuple[Array, ...] = (s, rates.v, rates.v_before, *rates.more)
     return sum(c * x for c, x in zip(row, known, strict=True) if c) + np.zeros(len(s))

@@ -277,10 +277,10 @@ class Mesh:
         if self.refine == 1:
             return vertices
         places = sorted({0.0, 1.0, *beam.corners, *attached})
-        vertices_kept = sorted({int(np.abs(np.subtract(vertices, s)).argmin()) for s in places})
-        for first, last in pairwise(vertices_kept):
+        places_in_mesh = sorted({int(np.abs(np.subtract(vertices, s)).argmin()) for s in places})
+        for first, last in pairwise(places_in_mesh):
             if (last - first) * self.refine % 1:
-                common = math.gcd(*(b - a for a, b in pairwise(vertices_kept)))
+                common = math.gcd(*(b - a for a, b in pairwise(places_in_mesh)))
                 least = f"Fraction(1, {common})" if common > 1 else "1"
                 raise ModelError(
                     f"Mesh: refine = {self.refine} makes no whole number of the {last - first} "

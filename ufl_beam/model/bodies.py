@@ -164,18 +164,18 @@ class Body(Record):
     def _label(self) -> str:
         return self.name
 
-    def at(self, x: float, y: float) -> Spot:
+    def at(self, x: float, y: float) -> BodyPoint:
         """Return the point of the body that is at (x, y) in the undeformed scene; m."""
-        return Spot(self, (x, y))
+        return BodyPoint(self, (x, y))
 
     @property
-    def middle(self) -> Spot:
+    def middle(self) -> BodyPoint:
         """The centre of mass."""
-        return Spot(self, self.center)
+        return BodyPoint(self, self.center)
 
 
 @dataclass(frozen=True)
-class Spot:
+class BodyPoint:
     """A point of a rigid body; made by ``body.at(x, y)``, ``body.middle`` and :func:`ground`.
 
     Attributes:
@@ -208,17 +208,17 @@ GROUND = Body((0.0, 0.0), name="ground")
 """The body that does not move."""
 
 
-def ground(x: float, y: float) -> Spot:
+def ground(x: float, y: float) -> BodyPoint:
     """Return the point (x, y) of the ground; m.
 
     Example:
         >>> pivot = ub.Revolute(ub.ground(0, 0), beam.start)
         >>> pendulum = ub.Scene([beam], joints=[pivot], loads=[ub.Gravity()])
     """
-    return Spot(GROUND, (x, y))
+    return BodyPoint(GROUND, (x, y))
 
 
-AttachmentPoint = Place | Spot
+AttachmentPoint = Place | BodyPoint
 """Attachment point of a joint, support, load, mass or connector."""
 
 Node = Place | Body
@@ -261,7 +261,7 @@ def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
 
 def node(place: AttachmentPoint) -> Node:
     """Return the node of an attachment point: the place itself on a beam, otherwise the body."""
-    return place.body if isinstance(place, Spot) else place
+    return place.body if isinstance(place, BodyPoint) else place
 
 
 def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
@@ -272,18 +272,18 @@ def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
     if node(place) is GROUND:
         return 0.0, 0.0
     x, y = point or place.point
-    nx, ny = place.body.center if isinstance(place, Spot) else place.point
+    nx, ny = place.body.center if isinstance(place, BodyPoint) else place.point
     return x - nx, y - ny
 
 
-def carries(place: AttachmentPoint) -> bool:
+def moves_with_node(place: AttachmentPoint) -> bool:
     """Return whether a place always has the displacement of its node."""
     return isinstance(place, Place) or math.hypot(*arm(place)) == 0.0
 
 
 def require_place(place: Any, what: str) -> None:
     """Raise :class:`ModelError` unless ``place`` is an attachment point."""
-    if not isinstance(place, Place | Spot):
+    if not isinstance(place, Place | BodyPoint):
         raise ModelError(
             f"{what} = {shorten(place)} is not a place; use beam.start, .end or .at(s), "
             "body.at(x, y) or ground(x, y)"
@@ -293,9 +293,9 @@ def require_place(place: Any, what: str) -> None:
 def require_node(place: Any, what: str) -> None:
     """Raise :class:`ModelError` unless a place is on a beam or the centre of a moving body."""
     require_place(place, what)
-    if isinstance(place, Spot) and place.body is GROUND:
+    if isinstance(place, BodyPoint) and place.body is GROUND:
         raise ModelError(f"{what} = {place} does not move")
-    if not carries(place):
+    if not moves_with_node(place):
         raise ModelError(
             f"{what} = {place} is not the centre of the body; hold other points by joints to "
             "ground(x, y), and give masses to the body itself"

@@ -270,7 +270,7 @@ def source_location(law: object) -> str:
     return f" ({file}, line {line})"
 
 
-def judges_loss(law: ConnectorLaw) -> bool:
+def loss_must_grow(law: ConnectorLaw) -> bool:
     """Return whether the loss of a law must not decrease in a run, for steps of any length.
 
     With internal variables the loss has an integration error, unless the energy is quadratic.  An

@@ -286,29 +286,29 @@ class Clearance(Record, ConnectorLaw):
             raise ModelError("Clearance: give friction and the radius of the pin together")
 
     @property
-    def rubs(self) -> bool:
+    def has_friction(self) -> bool:
         """True if the coefficient of friction is positive, or an array or symbol."""
         return not isinstance(self.friction, Real) or self.friction > 0.0
 
     @property
     def components(self) -> int:  # type: ignore[override]
         """Number of components: 3 with friction (two displacements, rotation), otherwise 2."""
-        return 3 if self.rubs else 2
+        return 3 if self.has_friction else 2
 
     @property
     def variables(self) -> dict[str, float]:  # type: ignore[override]
         """Initial elastic deflection of the contact along the edge, with friction; m."""
-        return {"deflection": 0.0} if self.rubs else {}
+        return {"deflection": 0.0} if self.has_friction else {}
 
     def parameters(self) -> dict[str, Any]:
         """Return the parameters by name, without friction and radius if they are zero."""
-        unused = () if self.rubs else ("friction", "radius")
+        unused = () if self.has_friction else ("friction", "radius")
         return {name: x for name, x in super().parameters().items() if name not in unused}
 
     @property
     def elastic(self) -> bool:
         """True if the law dissipates no energy."""
-        return self.damping == 0.0 and not self.rubs
+        return self.damping == 0.0 and not self.has_friction
 
     def _contact(self, motion: Any, rate: Any = (0.0, 0.0)) -> tuple[Values, ...]:
         """Return elastic and damping force (N), and the unit vector from hole to pin centre."""
@@ -321,19 +321,19 @@ class Clearance(Record, ConnectorLaw):
         """Return the energy of the normal and of the tangential deflection; J."""
         pressure, *_ = self._contact(motion)
         stored = pressure**2 / (2 * self.stiffness)
-        return stored + self.stiffness * state.deflection**2 / 2 if self.rubs else stored
+        return stored + self.stiffness * state.deflection**2 / 2 if self.has_friction else stored
 
     def resistance(self, motion: Any, rate: Any, state: State, dt: Values) -> Any:
         """Return the forces of damping and friction; N, N and N m."""
         _, damped, x, y = self._contact(motion, rate)
-        if not self.rubs:
+        if not self.has_friction:
             return damped * x, damped * y
         friction = self.stiffness * state.deflection
         return damped * x - friction * y, damped * y + friction * x, friction * self.radius
 
     def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
         """Return the increment of the deflection along the edge, which sliding limits; m."""
-        if not self.rubs:
+        if not self.has_friction:
             return {}
         elastic, damped, x, y = self._contact(motion, rate)
         limit = self.friction * (elastic + damped) / self.stiffness
@@ -475,7 +475,7 @@ def resists(law: Law) -> bool:
     return law.resists if isinstance(law, ConnectorLaw) else isinstance(law, RESISTING)
 
 
-def rubs(law: object) -> bool:
+def has_friction(law: object) -> bool:
     """Return whether a law is dry friction: it sticks below a limit, and slides at the limit."""
     return isinstance(law, Coulomb) or (isinstance(law, ConnectorLaw) and law.holds)
 

@@ -24,8 +24,8 @@ from ufl_beam.model.connector_laws import (
     RigidPlastic,
     Spring,
     Stop,
+    has_friction,
     resists,
-    rubs,
 )
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import Point
@@ -159,7 +159,7 @@ def _supports_and_joints_at(scene: Scene, rows: Iterable[Row]) -> Iterator[objec
 
 def friction_repeats(scene: Scene) -> bool:
     """Return whether sticking friction makes constraints linearly dependent."""
-    friction = any(rubs(connector.law) for connector in scene.all_connectors)
+    friction = any(has_friction(connector.law) for connector in scene.all_connectors)
     return friction and _dependences(scene, friction=True)[1].shape[1] > 0
 
 
@@ -174,7 +174,7 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
 
     def holds(connector: Connector) -> bool:
         return isinstance(connector.law, (*HOLDING, RigidPlastic)) or (
-            friction and rubs(connector.law)
+            friction and has_friction(connector.law)
         )
 
     if not any(map(holds, scene.all_connectors)):
@@ -372,7 +372,7 @@ class Rated(Protocol):
     """Properties of a time scheme that :func:`require_rates` reads."""
 
     has_mean_velocity: bool
-    rings: bool
+    accelerations_oscillate: bool
 
 
 def require_rates(scene: Scene, scheme: Rated) -> None:
@@ -382,14 +382,14 @@ def require_rates(scene: Scene, scheme: Rated) -> None:
         *((c, c.law) for c in scene.all_connectors),
         *((x, x) for x in scene.loads),
     ]:
-        if (isinstance(what, RotatingFrame) or rubs(what)) and not scheme.has_mean_velocity:
+        if (isinstance(what, RotatingFrame) or has_friction(what)) and not scheme.has_mean_velocity:
             raise ModelError(
                 f"{name}: {owner} needs the mean velocity of a step, and this scheme takes all "
                 "forces at the end of the step; use EnergyMomentum() or EnergyMomentumDecaying()"
             )
     prescribed = [str(c) for c in scene.all_connectors if isinstance(c.law, HOLDING)]
     prescribed += [f"the support of {s.place}" for s in scene.supports if s.moving]
-    if prescribed and scheme.rings:
+    if prescribed and scheme.accelerations_oscillate:
         raise ModelError(
             f"{name}: {prescribed[0]} prescribes a motion, whose accelerations ring for ever "
             "without numerical damping; use GeneralizedAlpha(0.8), or EnergyMomentum()"

@@ -11,12 +11,12 @@ from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import (
     AttachmentPoint,
+    BodyPoint,
     NodeDof,
     Place,
     PlaceField,
-    Spot,
-    carries,
     ground,
+    moves_with_node,
     node,
     require_place,
 )
@@ -58,7 +58,7 @@ class Joint(Bearing, Record, ABC):
     __repr__ = bracketed
 
     def __post_init__(self) -> None:
-        places = (x for x in vars(self).values() if isinstance(x, Place | Spot))
+        places = (x for x in vars(self).values() if isinstance(x, Place | BodyPoint))
         vars(self).setdefault("places", tuple(places))
         super().__post_init__()
 
@@ -69,7 +69,7 @@ class Joint(Bearing, Record, ABC):
 
     def equal(self, component: int) -> list[NodeDof]:
         """Return equal degrees of freedom of nodes; displacements only of places that are nodes."""
-        places = [place for place in self.places if component == 2 or carries(place)]
+        places = [place for place in self.places if component == 2 or moves_with_node(place)]
         return [(node(place), component) for place in places]
 
     def _hold(self, motion: str, axis: Point, corner: Point | None = None) -> Connector:
@@ -102,7 +102,7 @@ class _AtPoint(Joint):
         for i, place in enumerate(self.places):
             require_place(place, f"{kind}: places[{i}]")
         shared = () if self.multipliers else self.joined
-        moving = [place for place in self.places if self.multipliers or not carries(place)]
+        moving = [place for place in self.places if self.multipliers or not moves_with_node(place)]
         base = next((place for place in self.places if place not in moving), self.places[0])
         motions = [("parting", (1.0, 0.0)), ("parting", (0.0, 1.0))]
         if self.multipliers and 2 in self.joined:
@@ -269,7 +269,7 @@ class Guided(Joint):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not carries(self.place):
+        if not moves_with_node(self.place):
             raise ModelError(f"Guided({self.place}): the place must be the centre of the body")
         law, name = Guide(self.curve), f"Guided({self.place}): curve"
         start = ground(*curve_point(self.curve, 0.0, name))

@@ -8,7 +8,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar
 
 from ufl_beam.errors import ModelError, closed
-from ufl_beam.model.bodies import Beams, Member, PlaceField, carries, ground
+from ufl_beam.model.bodies import Beams, Member, PlaceField, ground, moves_with_node
 from ufl_beam.model.connector_laws import PrescribedForce
 from ufl_beam.model.connectors import Component, Connector
 from ufl_beam.model.functions import Timed, TimeFunction, steady, value_at
@@ -65,7 +65,7 @@ class PointLoad(LoadAtPlace):
     @property
     def pushes(self) -> tuple[Connector, ...]:
         """Connectors that apply a load away from the centre of a body; otherwise empty."""
-        if carries(self.place):
+        if moves_with_node(self.place):
             return ()
         (x, y), fixed = self.force, ground(*self.place.point)
         parts = [("parting", x, (1.0, 0.0)), ("parting", y, (0.0, 1.0))]
@@ -99,7 +99,7 @@ class FollowerLoad(LoadAtPlace):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not carries(self.place):
+        if not moves_with_node(self.place):
             raise ModelError(
                 f"{self}: not the centre of the body; apply the force at the centre, with its "
                 "moment about the centre"

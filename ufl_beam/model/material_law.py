@@ -302,7 +302,7 @@ def require_names(result: object, law: Any, what: str) -> None:
         raise ModelError(f"{what}: the returned dict {' and '.join(wrong)}")
 
 
-def judges_dissipation(law: MaterialLaw) -> bool:
+def dissipation_must_grow(law: MaterialLaw) -> bool:
     """Return whether the dissipation of a law must not decrease in a run, for any step length.
 
     The entry "plastic" of the ledger is exact if the law defines ``dissipation``, or has quadratic

@@ -19,12 +19,12 @@ from ufl_beam.model.bodies import (
     GROUND,
     AttachmentPoint,
     Body,
+    BodyPoint,
     Member,
     NodeDof,
     Place,
     PointMass,
     Representatives,
-    Spot,
     Velocity,
     merged,
     node,
@@ -173,7 +173,7 @@ class Scene(Record, Rich):
         curves = [beam.curve for beam in self.beams]
         on_beams = points_along(curves, [vertices[b.cells, b.corners] for b in self.beams])
         others = [body.center for body in self.bodies]
-        others += [place.point for _, place in self.attachments() if isinstance(place, Spot)]
+        others += [place.point for _, place in self.attachments() if isinstance(place, BodyPoint)]
         points = np.concatenate([on_beams, np.reshape(others, (-1, 2))])
         gyration = [math.sqrt(b.inertia / b.mass) for b in self.bodies if b.mass > 0]
         return enclosing_diameter(points) or max(gyration, default=0.0) or 1.0
@@ -182,7 +182,7 @@ class Scene(Record, Rich):
     def all_connectors(self) -> tuple[Connector, ...]:
         """Connectors of joints, of ``connectors`` and of off-centre loads, and plastic hinges."""
         connectors = [holder for joint in self.joints for holder in joint.holders]
-        connectors += [one for x in self.connectors for one in x.components or (x,)]
+        connectors += [c for x in self.connectors for c in x.components or (x,)]
         connectors += [push for x in self.loads if isinstance(x, PointLoad) for push in x.pushes]
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
         bearing = [support.place for support in self.supports if 2 in support.held]
@@ -354,14 +354,14 @@ class Scene(Record, Rich):
                 holders[dof] = str(support)
 
 
-def attachment_points(scene: Scene) -> dict[Body, list[Spot]]:
+def attachment_points(scene: Scene) -> dict[Body, list[BodyPoint]]:
     """Return the different attachment points of each body and of the ground."""
     anchors = [place for joint in scene.joints for place in joint.places]
     anchors += [place for connector in scene.connectors for place in (connector.a, connector.b)]
     anchors += [x.place for x in scene.loads if isinstance(x, LoadAtPlace)]
-    points: dict[Body, dict[Spot, None]] = {body: {} for body in (*scene.bodies, GROUND)}
+    points: dict[Body, dict[BodyPoint, None]] = {body: {} for body in (*scene.bodies, GROUND)}
     for attached in anchors:
-        if isinstance(attached, Spot):
+        if isinstance(attached, BodyPoint):
             points[attached.body][attached] = None
     return {body: list(spots) for body, spots in points.items()}
 

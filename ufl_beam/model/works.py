@@ -60,9 +60,9 @@ class Work(Record):
             else:
                 require_number(value, what)
         require_function(self.density, f"{self}: density", ", ".join(self.arguments))
-        asked = self.used_arguments
+        parameters = self.used_arguments
         for name in self.numbers:
-            if name not in asked:
+            if name not in parameters:
                 raise ModelError(f"{self}: numbers[{name!r}] is no parameter of the function")
 
     def __str__(self) -> str:
@@ -74,15 +74,15 @@ class Work(Record):
     def used_arguments(self) -> tuple[str, ...]:
         """Names of the parameters of the function; an unknown name raises :class:`ModelError`."""
         known = (*self.arguments, *self.numbers)
-        asked = parameters_by_name(
+        parameters = parameters_by_name(
             self.density, known, f"{self}: the function", more=", and the names in `numbers`"
         )
-        if asked is None:
+        if parameters is None:
             raise ModelError(
                 f"{self}: the parameters of {shorten(self.density)} have no names; write a "
                 f"function of some of {', '.join(known)}"
             )
-        return asked
+        return parameters
 
     @property
     def takes_rates(self) -> bool:

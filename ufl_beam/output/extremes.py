@@ -39,7 +39,7 @@ class Extent(NamedTuple):  # with the fields of ``extent`` in loops.h
     Example:
         >>> extremes = ub.Extremes()
         >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=extremes)
-        >>> v = extremes.displacement(beam).of((-1, 1))
+        >>> v = extremes.displacement(beam).subset((-1, 1))
         >>> print(v.low.round(3), v.time_low)  # m, s
         -0.019 1.0
     """
@@ -49,7 +49,7 @@ class Extent(NamedTuple):  # with the fields of ``extent`` in loops.h
     time_low: Array
     time_high: Array
 
-    def of(self, rows: Index) -> Extent:
+    def subset(self, rows: Index) -> Extent:
         """Return the extremes at an index of the arrays, such as rows or (row, column)."""
         return Extent(*(values[rows] for values in self))
 
@@ -213,14 +213,14 @@ class Extremes(Restartable):
                 extent = Extent(*(state[name].copy() for name in names))
             self._taken.append(extent)
         if self._in_c is not None:
-            self._in_c.begin(-1 if state is None else simulation.parts, *self._taken)
+            self._in_c.begin(-1 if state is None else simulation.substeps, *self._taken)
         if state is None:
             self.write(simulation)
 
     def write(self, simulation: StateView) -> None:
         """Include the state of a step."""
         if self._in_c is not None:
-            self._in_c.add(simulation.parts, simulation.t, simulation.q, simulation.q_before)
+            self._in_c.add(simulation.substeps, simulation.t, simulation.q, simulation.q_before)
             return
         forces = simulation.now.cell_forces(0, self._fractions)
         q = simulation.subdomain.gather(simulation.q)  # the same on every process
@@ -277,7 +277,7 @@ class Extremes(Restartable):
             ArgumentError: The beam is not in the scene, or nothing was run.
         """
         cells = self.numbering.cells_of(beam)
-        return Extent(*(x.reshape(-1, 3) for x in self._extents[0].of(cells)))
+        return Extent(*(x.reshape(-1, 3) for x in self._extents[0].subset(cells)))
 
     def displacement(self, owner: Member | Body) -> Extent:
         """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
@@ -289,5 +289,5 @@ class Extremes(Restartable):
             ArgumentError: The object is not in the scene, or nothing was run.
         """
         if isinstance(owner, Body):
-            return self._extents[1].of(self.numbering.node(owner.middle).reshape(1, 3))
-        return self._extents[1].of(self.numbering.dofs[self.numbering.nodes_along(owner)])
+            return self._extents[1].subset(self.numbering.node(owner.middle).reshape(1, 3))
+        return self._extents[1].subset(self.numbering.dofs[self.numbering.nodes_along(owner)])

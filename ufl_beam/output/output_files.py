@@ -265,12 +265,12 @@ def version() -> str:
     return metadata.version("ufl_beam")
 
 
-def above(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
+def add_prefix(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
     """Return content with a prefix added to its names."""
     return {prefix + name: value for name, value in content.items()}
 
 
-def below(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
+def remove_prefix(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the content whose names begin with a prefix; remove the prefix from the names."""
     inside = ((n, v) for n, v in content.items() if n.startswith(prefix))
     return {name.removeprefix(prefix): value for name, value in inside}

@@ -110,7 +110,7 @@ class StateView(PresentState):
     subdomain: Subdomain  # degrees of freedom of this process
     fields: Fields
     parameter: Parameter  # names and formats of `t`: time, or the load factor of a path
-    parts: int  # number of steps so far; substeps count as steps
+    substeps: int  # number of steps so far; substeps count as steps
     cell_forces: CellForces
     solution: Any  # `Solution` of the run
     inertia: Inertia
@@ -169,7 +169,7 @@ class StateView(PresentState):
         """Return jumps (rad) and dissipated energies (J) of cells; see :meth:`States.damage`."""
         return self.now.damage()
 
-    def watch(self, parts: Array) -> Any:
+    def watch(self, fractions: Array) -> Any:
         """Return extremes at fractions of cells that C updates after steps; None if C cannot."""
         return None
 

@@ -108,7 +108,7 @@ class Columns:
         self._others: dict[tuple[str, str], Columns] = {}
 
     @classmethod
-    def of(
+    def create(
         cls, numbering: DofNumbering, *, moving: bool, ledger: Iterable[str], record: int | None
     ) -> Columns:
         """Make the columns of a scene.
@@ -209,7 +209,7 @@ class StateWriter:
         vectors, others = list[Any](), list[tuple[Any, int]]()
         if self.records:
             vectors, others = cell_forces.vectors, [*cell_forces.entries, *cell_forces.factors]
-        self.columns = columns = Columns.of(
+        self.columns = columns = Columns.create(
             numbering, moving=moving,
             record=numbering.size * len(vectors) + sum(n for _, n in others),
             ledger=[f"{p}: {name}" for p, of in zip(LEDGER, accounts, strict=True) for name in of],

@@ -16,7 +16,7 @@ from ufl_beam.discretization.dof_numbering import DofNumbering, turned, values_a
 from ufl_beam.discretization.function_spaces import Fields, Strains, mass_matrix
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ArgumentError, require_number
-from ufl_beam.model.bodies import AttachmentPoint, Member, Place, Spot, arm
+from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Member, Place, arm
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import nearest, parameter_step, tangent
@@ -87,8 +87,8 @@ class States:
             at the beginning of the step.
     """
 
-    between = 1.0
-    begun = False
+    equilibrium_fraction = 1.0
+    needs_start = False
     forces_from_record: Callable[[Array, Array, Array], Array] | None = None
 
     def __init__(self, numbering: DofNumbering, like: States | None = None, *blocks: Block) -> None:
@@ -97,7 +97,11 @@ class States:
         self._blocks = [*blocks]
         self._computed: tuple[tuple[int, bytes], Array] | None = None  # latest `cell_forces`
         if like is not None:
-            self.cells, self.between, self.begun = like.cells, like.between, like.begun
+            self.cells, self.equilibrium_fraction, self.needs_start = (
+                like.cells,
+                like.equilibrium_fraction,
+                like.needs_start,
+            )
             self.forces_from_record = like.forces_from_record
 
     # -- rows ----------------------------------------------------------------------------------
@@ -142,7 +146,7 @@ class States:
         states, self._blocks, self._computed = self.subset(0, len(self)), [], None
         for n in range(0, len(states), 2):
             columns, *pieces = states.row(n)
-            if states.begun and BEFORE not in columns.at:
+            if states.needs_start and BEFORE not in columns.at:
                 columns = columns.plus(BEFORE, (self.numbering.size,))
                 pieces.append(states.before(n))
             self.append(columns, *pieces)
@@ -178,7 +182,7 @@ class States:
         columns, row = self.row(n)
         if BEFORE in columns.at:
             return columns.column_of(BEFORE, row)
-        return self._row("q", n - 1 if n and self.begun else n)
+        return self._row("q", n - 1 if n and self.needs_start else n)
 
     def cell_resultants(self, n: int) -> Array:
         """Return resultants of cells, ``cell_number`` of loops.h, in a state; (9, num_cells)."""
@@ -201,8 +205,8 @@ class States:
             before = np.array([self.before(n) for n in number])
             if not np.array_equal(before, arrays["q"][[0, *number[:-1]]]):
                 arrays[BEFORE] = before  # a step does not begin at the previous state
-        for part, entries in zip(LEDGER, self.ledger(), strict=True):
-            arrays |= {f"{part}: {name}": values for name, values in entries.items()}
+        for group, entries in zip(LEDGER, self.ledger(), strict=True):
+            arrays |= {f"{group}: {name}": values for name, values in entries.items()}
         return arrays
 
     def resume(self, history: State) -> None:
@@ -215,7 +219,7 @@ class States:
         n, begins = len(history["t"]), BEFORE in history
         self._blocks, self._computed = [], None
         ledger = [name for name in history if name.startswith(tuple(f"{x}: " for x in LEDGER))]
-        columns = Columns.of(self.numbering, moving="v" in history, ledger=ledger, record=None)
+        columns = Columns.create(self.numbering, moving="v" in history, ledger=ledger, record=None)
         if begins:
             columns = columns.plus(BEFORE, (self.numbering.size,))
         rows: Array = np.zeros((n, columns.width))
@@ -252,7 +256,7 @@ class States:
             ArgumentError: The beam or body of the place is not in the scene.
         """
         motion = values_at(self.numbering, place, self.column("q"))
-        if isinstance(place, Spot):
+        if isinstance(place, BodyPoint):
             motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
         return motion
 
@@ -268,7 +272,7 @@ class States:
 
     def position(self, place: AttachmentPoint) -> Array:
         """Return the coordinates of a place in the deformed scene; (n+1, 2); m."""
-        if isinstance(place, Spot):
+        if isinstance(place, BodyPoint):
             return np.asarray(place.point + self.displacement(place)[:, :2])
         nodes, weights = self.numbering.weights(place)
         return np.asarray(weights @ self.numbering.points[nodes] + self.displacement(place)[:, :2])
@@ -370,8 +374,8 @@ class States:
         key = range(len(self))[n], pieces.tobytes()
         if self._computed is None or self._computed[0] != key:
             q = self._row("q", n)
-            if self.between < 1:
-                q = (1 - self.between) * self.before(n) + self.between * q
+            if self.equilibrium_fraction < 1:
+                q = (1 - self.equilibrium_fraction) * self.before(n) + self.equilibrium_fraction * q
             along = self.cells.along
             forces = along(slice(None), pieces, self.cell_resultants(n), q[along.dofs])
             forces.flags.writeable = False
@@ -390,14 +394,14 @@ class States:
         Raises:
             ArgumentError: The beam of the place is not in the scene.
         """
-        cell, part = self.numbering.cell_and_fraction(place)
+        cell, fraction = self.numbering.cell_and_fraction(place)
         n, dofs = range(len(self)), self.cells.along.dofs[cell]
         q = self.column("q")[:, dofs]
-        if self.between < 1:
+        if self.equilibrium_fraction < 1:
             before = np.array([self.before(k)[dofs] for k in n])
-            q = (1 - self.between) * before + self.between * q
+            q = (1 - self.equilibrium_fraction) * before + self.equilibrium_fraction * q
         resultants = np.array([self.cell_resultants(k)[:, cell] for k in n]).T
-        forces = self.cells.along(np.full(len(n), cell), np.array([part]), resultants, q)
+        forces = self.cells.along(np.full(len(n), cell), np.array([fraction]), resultants, q)
         return np.asarray(forces[:, 0])
 
     def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:

@@ -44,7 +44,7 @@ LEAST_STRAIN = 1e-10  # strain up to which section forces count as round-off and
 DRAWN_AS_ZERO = 1e-4  # fraction of the largest value below which a value is drawn as zero
 ALIKE = 0.999  # values above this fraction of the peak of an area count as equal to the peak
 LABELLED = 0.15  # peaks above this fraction of the largest value are labelled
-MOST_BEAMS = 60  # number of diagrams beyond which only extremes are labelled, without directions
+MOST_DIAGRAMS = 60  # number of diagrams beyond which only extremes are labelled, without directions
 
 CROWDED = 0.08  # if labels cover more than this fraction of the axes, only extremes are labelled
 MOST_AREAS = 500  # largest number of areas whose ordinates labels should not cover
@@ -149,7 +149,7 @@ def draw_frame(
         peaks: list[Peak] = []
         if (sizes > LEAST_STRAIN * np.array(stiffness)).any():  # more than rounding
             rows = _draw_diagrams(axes, solution, shape.nodes, what, diagrams)
-            peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MOST_BEAMS else 1.0)
+            peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MOST_DIAGRAMS else 1.0)
         draw_beams(axes, solution, shape.nodes, color=shade(INK), linewidth=2.6, zorder=4)
         draw_strokes(axes, symbols.in_plane(shape))
         meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
@@ -197,7 +197,7 @@ def _draw_diagrams(
     for outline, peak, k in _areas(axis, axis + ordinates, values, diagram):
         outlines[RED if peak > 0 else BLUE].append(outline)
         rows.append(np.array([peak, *axis[k], *ordinates[k]]))
-    if what != "N" and len(diagrams) <= MOST_BEAMS:
+    if what != "N" and len(diagrams) <= MOST_DIAGRAMS:
         firsts = {beam: k for k, (beam, _) in reversed([*enumerate(diagrams)])}
         for k in firsts.values():
             first, *_, last = np.flatnonzero(diagram == k)

@@ -96,7 +96,7 @@ def solution_page(solution: Solution) -> str:
     Small displacements are magnified.
     """
     text = notebook.lines(*solution.summary()) + notebook.energy_page(solution.energy)
-    text += notebook.lines(solution.open_ledger)
+    text += notebook.lines(solution.imbalance_message)
     moved = solution.q[:, solution.numbering.dofs[:, :2]]
     fraction = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
     magnify = max(x for x in FACTORS if x == 1 or (fraction > 0.0 and x * fraction <= VISIBLE))
@@ -232,7 +232,7 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
         )
         axes.set(xscale="log", yscale="log", xlabel="wall time of a run (s)")
         axes.set_ylabel(f"error ({tradeoff.target.measure})")
-        axes.set_title(f"recommended: {best.dials}", loc="left", fontsize=style.font_size(11.0))
+        axes.set_title(f"recommended: {best.setting}", loc="left", fontsize=style.font_size(11.0))
         budget = tradeoff.target.budget
         draw, bound = (axes.axvline, budget) if np.isfinite(budget) else (axes.axhline, 1.0)
         draw(bound, color=GREY, ls="--", lw=1.2, zorder=1)

@@ -255,7 +255,7 @@ def _draw_point_load(drawing: Drawing, load: LoadAtPlace) -> None:
     more = ", follows" if hollow else ""
     if size > 0.0:
         direction = np.array(load.force) / size
-        line = _stand(drawing, load.place, direction, size / drawing.subject.force)
+        line = _force_arrow(drawing, load.place, direction, size / drawing.subject.force)
         drawing.strokes["loads"] += _arrow(line, RED, unit, hollow=hollow)
         text = in_time(with_unit(size, "N"), load.amplitude) + more
         drawing.write(text, RED, LOADS, _beside(*line))
@@ -268,7 +268,9 @@ def _draw_point_load(drawing: Drawing, load: LoadAtPlace) -> None:
         drawing.write("0 N", RED, LOADS, _around(at, 0.0))
 
 
-def _stand(drawing: Drawing, place: AttachmentPoint, direction: Array, fraction: float) -> Array:
+def _force_arrow(
+    drawing: Drawing, place: AttachmentPoint, direction: Array, fraction: float
+) -> Array:
     """Return the line of the arrow of a force; (2, 2); m.
 
     By default the arrow ends at the loaded place.  If it would then lie on a beam, it begins at the

@@ -16,7 +16,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, require_kind, require_number, require_row, require_switch
-from ufl_beam.model.bodies import AttachmentPoint, Member, Place, Spot, require_place
+from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Member, Place, require_place
 from ufl_beam.model.records import Record
 from ufl_beam.parallel import active_comm, progress_bar
 from ufl_beam.plotting import style, symbols
@@ -323,7 +323,9 @@ class Solids:
 
         ``objects`` are beams or places of beams.  The width is at least 4 % of the scene's size.
         """
-        beams = [x.beam if isinstance(x, Place) else x for x in objects if not isinstance(x, Spot)]
+        beams = [
+            x.beam if isinstance(x, Place) else x for x in objects if not isinstance(x, BodyPoint)
+        ]
         depth = self.thickness * max((float(b.section.depth) for b in beams), default=0.0)
         return depth, max(depth, 0.04 * self.solution.scene.size)
 

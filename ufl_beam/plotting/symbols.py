@@ -17,7 +17,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model import connector_laws as laws
-from ufl_beam.model.bodies import GROUND, AttachmentPoint, Place, Spot, node
+from ufl_beam.model.bodies import GROUND, AttachmentPoint, BodyPoint, Place, node
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Guided, Joint, Link, Prismatic, Release, RigidLink
@@ -128,13 +128,15 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
         (j.places, _rotates(j)) for j in scene.joints if joint_symbol(j).grounded
     ]
     grounded += [((c.a, c.b), False) for c in scene.connectors if not c.is_rotation]
-    grounds: dict[Spot, tuple[float, bool]] = {}  # direction away; True if all joints there turn
+    grounds: dict[
+        BodyPoint, tuple[float, bool]
+    ] = {}  # direction away; True if all joints there turn
     for places, rotates in grounded:
         for point in places:
-            if isinstance(point, Spot) and point.body is GROUND:
+            if isinstance(point, BodyPoint) and point.body is GROUND:
                 far = next(place for place in places if place != point)
                 (x, y), (X, Y) = point.point, far.point
-                if (x, y) == (X, Y) and isinstance(far, Spot):
+                if (x, y) == (X, Y) and isinstance(far, BodyPoint):
                     X, Y = far.body.center
                 away = (x, y) != (X, Y)
                 inward = math.atan2(Y - y, X - x) if away else _inward(far)
@@ -202,7 +204,7 @@ def centres(shape: DeformedShape) -> Iterator[Stroke]:
             yield Stroke(in_frame(quarter, at, ahead), EDGE, 1.0, fill)
 
 
-class Look(NamedTuple):
+class JointSymbol(NamedTuple):
     """Symbol of a joint."""
 
     rod: float = 0.0  # width of a line from place to place; points
@@ -255,19 +257,19 @@ def _sleeve(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
         yield Stroke(points, INK, 2.4, layer=FRONT)
 
 
-JOINTS: dict[type[Joint], Look] = {
-    Link: Look(rod=2.6, pins=(0, 1)),
-    RigidLink: Look(rod=6.0),
-    Prismatic: Look(pins=(1,), rail=_rail, grounded=False),
-    Guided: Look(pins=(1,), rail=_guide, grounded=False),
-    Release: Look(pins=(0,), rail=_sleeve),
+JOINTS: dict[type[Joint], JointSymbol] = {
+    Link: JointSymbol(rod=2.6, pins=(0, 1)),
+    RigidLink: JointSymbol(rod=6.0),
+    Prismatic: JointSymbol(pins=(1,), rail=_rail, grounded=False),
+    Guided: JointSymbol(pins=(1,), rail=_guide, grounded=False),
+    Release: JointSymbol(pins=(0,), rail=_sleeve),
 }
 """Symbols of joints by class or base class; other joints have a pin or a thin rod."""
 
 
-def joint_symbol(joint: Joint) -> Look:
+def joint_symbol(joint: Joint) -> JointSymbol:
     """Return the symbol of a joint."""
-    plain = Look(pins=(0,)) if joint.meets else Look(rod=1.6)
+    plain = JointSymbol(pins=(0,)) if joint.meets else JointSymbol(rod=1.6)
     return next((JOINTS[kind] for kind in type(joint).__mro__ if kind in JOINTS), plain)
 
 

@@ -34,7 +34,7 @@ from ufl_beam.reference.cell_forms import (
     Force,
     Response,
     Setting,
-    lumps,
+    point_masses,
     put,
 )
 from ufl_beam.reference.return_map import MaterialPoints
@@ -107,7 +107,7 @@ class YieldingBeams(CellForce):
     """Cells with material points, whose return map computes the resultants r.
 
     In the form of the virtual work, r is a quadrature function.  UFL derives the tangent from a
-    form with b + D e, the linearisation of r in the strains e at an iterate.  So the tangent has a
+    form with b + D e, the linearization of r in the strains e at an iterate.  So the tangent has a
     material and a geometric part.
     """
 
@@ -201,7 +201,7 @@ class Mass:
     def __init__(self, numbering: DofNumbering) -> None:
         self.cells = cells = Cells(numbering, np.arange(len(numbering.cells)))
         form, diagonal = mass_form(cells.element), np.zeros(numbering.size)
-        for dofs, mass, inertia in lumps(numbering):
+        for dofs, mass, inertia in point_masses(numbering):
             np.add.at(diagonal, dofs, [mass, mass, inertia])
         self.matrix = cells.form(form).assembled() + csr_array(scipy.sparse.diags_array(diagonal))
         self._beam_form = cells.form(ufl.action(form, cells.element.q1))
@@ -258,7 +258,7 @@ class Inertia(MatrixForce):
         self.mass, self.inertia = Mass(setting.numbering), self
         super().__init__(setting, scheme, self.mass.matrix)
         self.v, self.v_before, self.more, self.last_dt = v, v, tuple[Array, ...](), math.inf
-        if scheme.coefficients(1.0, 1.0, len(scheme.kept)).slip is not None:
+        if scheme.coefficients(1.0, 1.0, len(scheme.further_rates)).velocity_defect is not None:
             setting.loses("numerical")
 
     def after(self, s: Array) -> tuple[Array, ...]:
@@ -269,9 +269,11 @@ class Inertia(MatrixForce):
         """Accept new velocities, and enter numerical losses in the ledger."""
         self.on_nodes = self.mass.on_nodes(self.rate)
         v, *more = self.after(s)
-        if self.coefficients.slip is not None:
+        if self.coefficients.velocity_defect is not None:
             change = v - self.v
-            lost = combined(self.coefficients.slip, change, self) @ (self.matrix @ change)
+            lost = combined(self.coefficients.velocity_defect, change, self) @ (
+                self.matrix @ change
+            )
             self.ledger.lost["numerical"] += float(lost)
         self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), step.dt
         self.start(q1)
@@ -282,7 +284,7 @@ class Inertia(MatrixForce):
 
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore further rates, and data of the last step that the scheme uses."""
-        pairs = zip_longest(self.scheme.kept, self.more)
+        pairs = zip_longest(self.scheme.further_rates, self.more)
         more = [archive.vector(name, known) for name, known in pairs]
         self.more = tuple(known for known in more if known is not None)
         if self.scheme.uses_last_step:

@@ -346,7 +346,7 @@ class CellForce(Force):
 # -- scenes --------------------------------------------------------------------------------------
 
 
-def lumps(numbering: DofNumbering) -> list[tuple[Index, float, float]]:
+def point_masses(numbering: DofNumbering) -> list[tuple[Index, float, float]]:
     """Return (degrees of freedom, mass, inertia) of point masses and bodies; (3,), kg, kg m²."""
     masses = [
         (numbering.node(mass.place), mass.mass, mass.inertia) for mass in numbering.scene.masses

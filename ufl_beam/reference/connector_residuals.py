@@ -38,7 +38,7 @@ The error of the differences is of second order; round-off of the curve adds les
 """
 
 
-class Linked(Force):
+class ConnectorGroup(Force):
     """Base of groups of connectors, whose forces are unknowns of the scene.
 
     Attributes:
@@ -57,7 +57,7 @@ class Linked(Force):
         self.work, self.rate, self.before, self.at_rest = np.zeros((4, len(indices)))
 
 
-class Connectors(Linked):
+class Connectors(ConnectorGroup):
     """Connectors with the same kind of relative motion, or bushings with k motions each.
 
     Each connector or bushing is a cell of unit length between its nodes.  Its forces are further
@@ -196,7 +196,7 @@ class Connectors(Linked):
             law.state(row[4:])
 
 
-class GuideForce(Linked):
+class GuideForce(ConnectorGroup):
     """Guide: a point is constrained to a curve of the plane, and free along the curve.
 
     In schemes whose forces act over the step, the force is normal to the chord of the step, so that

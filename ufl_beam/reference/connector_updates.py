@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors over a step: equations ``α e + β λ = γ``, linearised at an iterate.
+"""Laws of connectors over a step: equations ``α e + β λ = γ``, linearized at an iterate.
 
 e is the relative motion at the end of the step and λ the force that resists its growth.  A law is a
 class: ``row`` returns (α, β, γ), ``z`` has the internal variables, ``stored`` the energies.  The
@@ -147,7 +147,7 @@ class LawInStep:
 
 
 def around(forces: Callable[[Array], Any], e: Motions, increments: Motions) -> Array:
-    """Linearise forces that are functions of motions by central differences; (k, k + 2)."""
+    """Linearize forces that are functions of motions by central differences; (k, k + 2)."""
     e, increments = np.atleast_1d(e), np.diag(np.atleast_1d(increments))
     with np.errstate(all="ignore"):
         slopes = [(forces(e + δ) - forces(e - δ)) / (2 * δ.sum()) for δ in increments]
@@ -539,7 +539,7 @@ class _UserLaw(LawInStep):
         state = self.state()
         state.flags.writeable = False  # all iterates begin with the same state
         self._known = {"t": t, "dt": step.dt, "state": state}
-        self._last: tuple[float, float, float, float] | None = None  # e, λ, residual, linearised at
+        self._last: tuple[float, float, float, float] | None = None  # e, λ, residual, linearized at
 
     def _evaluate(self, e1: float) -> tuple[float, Array]:
         """Return force and internal variables after a step to the motion ``e1``."""
@@ -568,8 +568,8 @@ class _UserLaw(LawInStep):
 
         At an infinite slope, Newton's method would oscillate for ever.  The secant through the two
         latest iterates approximates the response of the rest of the scene.  If the residual does
-        not halve, the law is linearised at its intersection with this secant.  The intersection
-        must be between ``e1`` and the motion of the previous linearisation.
+        not halve, the law is linearized at its intersection with this secant.  The intersection
+        must be between ``e1`` and the motion of the previous linearization.
         """
         last, at, residual = self._last, e1, self._evaluate(e1)[0] - λ
         if last is not None and abs(residual) > abs(last[2]) / 2 and e1 != last[0]:

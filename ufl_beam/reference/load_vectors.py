@@ -15,7 +15,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import Step, acting, has_inertia
-from ufl_beam.model.bodies import GROUND, carries
+from ufl_beam.model.bodies import GROUND, moves_with_node
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.works import Potential, Work
@@ -29,7 +29,7 @@ from ufl_beam.reference.cell_forms import (
     Setting,
     coupled,
     end_forces,
-    lumps,
+    point_masses,
 )
 
 AT_REST = 1e300
@@ -92,13 +92,13 @@ class DeadLoad(LoadForce):
         scene, self._vector = numbering.scene, np.zeros(numbering.size)
         per_beam = np.zeros((len(scene.beams), 3))
         # Point loads on a body, except at its centre, are connectors in Scene.all_connectors.
-        if isinstance(load, PointLoad) and carries(load.place):
+        if isinstance(load, PointLoad) and moves_with_node(load.place):
             np.add.at(self._vector, numbering.node(load.place), [*load.force, load.moment])
         elif isinstance(load, LineLoad):
             per_beam[scene.beams.index(load.beam)] = *load.force, load.moment
         elif isinstance(load, Gravity):
             per_beam[:, :2] = np.outer([b.section.rhoA for b in scene.beams], load.acceleration)
-            for dofs, mass, _ in lumps(numbering):
+            for dofs, mass, _ in point_masses(numbering):
                 np.add.at(self._vector, dofs[:2], mass * np.array(load.acceleration))
         elif not isinstance(load, PointLoad):
             raise TypeError(f"{type(load).__name__} is not a dead load")
@@ -157,7 +157,7 @@ class FrameForce(LoadForce):
         (u, _), (w_u, _) = split(ufl.TrialFunction(element.space)), split(element.w)
         density = element.inertia[0] * ufl.dot(perpendicular(u), w_u)
         G = mass.cells.form(density * element.dx_of_mass()).assembled()
-        for (i, j, _), m, _ in lumps(numbering):
+        for (i, j, _), m, _ in point_masses(numbering):
             G = G + coupled(
                 numbering.size, np.array([i, j]), np.array([j, i]), m * np.array([-1, 1])
             )

@@ -297,7 +297,7 @@ class MaterialPoints:
         Work of relaxing viscous stresses is integrated by the trapezoidal rule.
         """
         end = self._equations.end(self.at)
-        bulk = end.worked + end.elastic + end.hardening + end.missed + end.relaxed
+        bulk = end.worked + end.elastic + end.hardening + end.nonlinear_loss + end.relaxed
         change = np.sum(self._volume * bulk) + np.sum(self._section_points.weights * end.broken)
         return float(change + self._rest_energy(self.strains)) - sum(self.stored.values())
 
@@ -314,7 +314,7 @@ class MaterialPoints:
         broken = np.sum(self._section_points.weights * (end.broken + 0 * at["length"]), axis=1)
         self.recorded[:, 4:] += np.column_stack([plastic, broken])
         numerical = 2 * α * self._rest_energy(self.strains - self.strains0)
-        numerical += np.sum(self._volume * (2 * α * end.lost + end.missed))
+        numerical += np.sum(self._volume * (2 * α * end.lost + end.nonlinear_loss))
         for name, grown in zip(self._z, end.changes, strict=True):
             at[name] += grown
         at["jump"] += at["direction"] * at["growth"]

@@ -23,7 +23,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering, turned
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, has_inertia, nodal_step
-from ufl_beam.model.connector_laws import Controller, Coulomb, rubs
+from ufl_beam.model.connector_laws import Controller, Coulomb, has_friction
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import RotatingFrame
@@ -111,13 +111,15 @@ class Solver(PresentState):
             numbering.scene,
         )
         self.t, self.q, self.q_before, self.last_dt = t, q, q, math.inf
-        self.parts = self.iterations = 0
+        self.substeps = self.iterations = 0
         controlled = [
             connector
             for connector in scene.all_connectors
             if isinstance(connector.law, Controller | Coulomb)
         ]
-        frictional = [connector for connector in scene.all_connectors if rubs(connector.law)]
+        frictional = [
+            connector for connector in scene.all_connectors if has_friction(connector.law)
+        ]
         self.requested_forces: dict[Connector, float] = dict.fromkeys(controlled, 0.0)
         self.rates: dict[Connector, float] = dict.fromkeys([*controlled, *frictional], 0.0)
         self.samples: dict[Connector, tuple[float, int]] = {}  # first time, last number
@@ -173,7 +175,7 @@ class Solver(PresentState):
         self._continues = internal is not None
         v = None if self.inertia is None else self.inertia.v
         loads: Array = np.zeros(self.numbering.size)
-        if self._continues or (has_inertia(scheme) and scheme.kept):
+        if self._continues or (has_inertia(scheme) and scheme.further_rates):
             loads = sum((load.equilibrium(self.t, self.q, v) for load in self.loads), loads)
         known = same and "reactions" in variables
         if not same:  # rates and forces of the last step belong to the forces before the jump
@@ -187,12 +189,12 @@ class Solver(PresentState):
             for group in self.connectors:
                 self.q[group.forces_at] = group.before = group.at_rest
         # Forces of beams at rest are computed in a step that is too short for viscous flow.
-        short = Step.of(scheme, 0.0, sys.float_info.min, sys.float_info.min, self.q)
+        short = Step.create(scheme, 0.0, sys.float_info.min, sys.float_info.min, self.q)
         for beam in self.beams:
             self._inner_before = self._inner_before + beam.response(short, self.q)[0]
         self.on_nodes = sum(beam.on_nodes for beam in self.beams)
         if self.inertia is None:
-            step = Step.of(scheme, self.t, self.t + 1.0, self.t + 1.0, self.q)
+            step = Step.create(scheme, self.t, self.t + 1.0, self.t + 1.0, self.q)
             step = step._replace(load_time=self.t, motion_time=self.t)
             for group in self.connectors:
                 group.begin(step)
@@ -229,7 +231,7 @@ class Solver(PresentState):
         """
         scheme, scene = self.scheme, self.scene
         at_end = has_inertia(scheme) or scheme.average(0.0, 1.0) == 1.0
-        if self.parts == 0 and not self._continues and not at_end:
+        if self.substeps == 0 and not self._continues and not at_end:
             frames = any(isinstance(load, RotatingFrame) for load in scene.loads)
             if frames or scene.works or any(f(self.t) != 0 for _, f in scene.time_functions()):
                 # Loads of the initial time are applied first, in a fraction of the step.
@@ -262,15 +264,15 @@ class Solver(PresentState):
         If ``at_rest`` is a time, the loads of that time are applied, and nodes must not turn far.
         """
         inertia = self.inertia
-        if inertia is not None and inertia.scheme.kept and not inertia.more:
+        if inertia is not None and inertia.scheme.further_rates and not inertia.more:
             # A short trial step gives the initial accelerations.
             t = self.t + TRIAL_STEP * (t1 - self.t)
-            q1, s = self._solve(Step.of(self.scheme, self.t, t, t1, self.q))
+            q1, s = self._solve(Step.create(self.scheme, self.t, t, t1, self.q))
             inertia.more = inertia.after(s)[1:]
             self.supports.before = self.supports.reactions
             for group in self.connectors:
                 group.before = q1[group.forces_at]
-        step = Step.of(self.scheme, self.t, t1, end, self.q)
+        step = Step.create(self.scheme, self.t, t1, end, self.q)
         if at_rest is not None:
             step = step._replace(load_time=at_rest, motion_time=at_rest)
         q1, s = self._solve(step)
@@ -340,7 +342,7 @@ class Solver(PresentState):
         self.supports.accept(s)
         self.on_nodes = sum(force.on_nodes for force in self.forces)
         self.q_before, self.last_dt = self.q, step.dt
-        self.q, self.t, self.parts = q1, step.t1, self.parts + 1
+        self.q, self.t, self.substeps = q1, step.t1, self.substeps + 1
         self._sum_energies()
 
     def _sum_energies(self) -> None:
@@ -603,5 +605,5 @@ class Solver(PresentState):
         columns = Columns({name: np.shape(values) for name, values in state.items()})
         row = np.concatenate([np.ravel(values) for values in state.values()])
         now = States(self.numbering, None, Block(columns, row[None], 1))
-        now.between, now.begun = between, between < 1
+        now.equilibrium_fraction, now.needs_start = between, between < 1
         return now

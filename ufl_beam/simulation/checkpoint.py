@@ -22,11 +22,11 @@ from ufl_beam.file_system import Lock
 from ufl_beam.output.output_files import (
     ADVICE,
     Content,
-    above,
-    below,
+    add_prefix,
     beside,
     decoding,
     read,
+    remove_prefix,
     require_path,
     require_writable,
     write,
@@ -96,7 +96,7 @@ class Checkpoint:
         return path, beside(path)
 
 
-class Keeper:
+class CheckpointFile:
     """Reader and writer of the checkpoint of one run.
 
     ``call`` contains the arguments of the run by name, which must be the same after a restart.
@@ -184,11 +184,13 @@ class Keeper:
         """Restore simulation, step control ``pace``, objects with a state, and recorders."""
         content, solution = self.content, simulation.solution
         with decoding(self.path, FORMAT):
-            simulation.save_or_restore(Archive(simulation.subdomain, below("state/", content)))
-            solution.resume(below("history/", content))
+            simulation.save_or_restore(
+                Archive(simulation.subdomain, remove_prefix("state/", content))
+            )
+            solution.resume(remove_prefix("history/", content))
             pace.restore(content["pace"])
             solution.seconds = float(content["seconds"])
-        solution.parts, solution.iterations = simulation.parts, simulation.iterations
+        solution.substeps, solution.iterations = simulation.substeps, simulation.iterations
         solution.time_error = pace.error
         solution.warnings = content["warnings"]
         states = content["stateful"].values()
@@ -201,7 +203,7 @@ class Keeper:
                 item.restore(state)
         for i, recorder in enumerate(self._recorders):
             try:
-                recorder.resume(simulation, below(f"recorder {i}/", content))
+                recorder.resume(simulation, remove_prefix(f"recorder {i}/", content))
             except ArgumentError as error:
                 raise ArgumentError(f"checkpoint {self.path}: {error}") from None
             except (LookupError, TypeError, ValueError) as error:
@@ -242,17 +244,17 @@ class Keeper:
         content = {
             "seconds": solution.seconds + seconds, "pace": pace.state(),
             "stateful": simulation.together(states), "warnings": solution.warnings,
-            **above("state/", archive.state()),
+            **add_prefix("state/", archive.state()),
         }  # fmt: skip
         for i, recorder in enumerate(self._recorders):
-            content |= above(f"recorder {i}/", recorder.state())
+            content |= add_prefix(f"recorder {i}/", recorder.state())
         self._require_unchanged()
         content |= {"python": PYTHON, "call": self._described.texts, "step": self._step}
         at = f" of t = {content['state/t'][0]:.9g} s"
         history = solution.history
         on_first(
             self._comm,
-            lambda: write(self.path, FORMAT, {**content, **above("history/", history())}, at),
+            lambda: write(self.path, FORMAT, {**content, **add_prefix("history/", history())}, at),
         )
         self._last_time, self._last_step = time.perf_counter(), pace.steps
 

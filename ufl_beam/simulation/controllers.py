@@ -35,7 +35,7 @@ class Controllers:
         values: Forces and friction limits, which C reads; (n,); N or N m.
         sampled: Sample time by index, for controllers with a sample time; s.
         fresh: 1 for connectors that were evaluated since C last cleared this flag; (n,).
-        asks: True if any force or limit is evaluated at the start of steps.
+        needs_evaluation: True if any force or limit is evaluated at the start of steps.
     """
 
     def __init__(self, subdomain: Subdomain) -> None:
@@ -54,7 +54,7 @@ class Controllers:
             self._changing.append((i, connector))
             if isinstance(connector.law, Controller) and connector.law.sample:
                 self.sampled[i] = connector.law.sample
-        self.asks = bool(self._changing)
+        self.needs_evaluation = bool(self._changing)
         self._indices = np.array(
             [i for i, connector in enumerate(connectors) if connector in self.at], dtype=int
         )

@@ -15,7 +15,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.errors import ArgumentError, ConvergenceError, ModelError, NoNumber, StepFailed
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
-from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, judges_loss
+from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
 from ufl_beam.model.connector_laws import (
     Coulomb,
     Damper,
@@ -24,13 +24,13 @@ from ufl_beam.model.connector_laws import (
     Stop,
 )
 from ufl_beam.model.constraint_checks import INSTEAD
-from ufl_beam.model.material_law import MaterialLaw, has_quadratic_energies, judges_dissipation
+from ufl_beam.model.material_law import MaterialLaw, dissipation_must_grow, has_quadratic_energies
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC, WORK
 from ufl_beam.output.states import States
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
-from ufl_beam.solvers.factorization import Factorisation
+from ufl_beam.solvers.factorization import Factorization
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vectors
 from ufl_beam.terms.term import KINDS
@@ -81,15 +81,15 @@ def no_equilibrium(
     q0: Array,
     times: tuple[float, float],
     advice: str,
-    loose: str,
+    free_motion: str,
 ) -> ConvergenceError | ArgumentError:
     """Return the error of a run whose smallest substep, from ``q0`` between ``times`` (s), failed.
 
-    All processes call it together.  ``loose`` describes a motion without strain; it is empty if no
-    such motion exists, or if loads resisted the motion in an earlier equilibrium.
+    All processes call it together.  ``free_motion`` describes a motion without strain; it is empty
+    if no such motion exists, or if loads resisted the motion in an earlier equilibrium.
     """
-    if loose:
-        return ModelError(f"{loose}{FREE_MOTION}{failure}")
+    if free_motion:
+        return ModelError(f"{free_motion}{FREE_MOTION}{failure}")
     (t, end), named = times, solution.parameter
     q1 = equation.supports.in_plane(newton.unknowns.copy())
     vectors = {kind: np.zeros(equation.subdomain.size) for kind in KINDS}
@@ -136,7 +136,7 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
         if not len(free):
             return ""
         try:
-            signs.append(Factorisation(csr_array(K)).negative)
+            signs.append(Factorization(csr_array(K)).negative)
             least.append(null_vectors(K)[0][-1])
         except (np.linalg.LinAlgError, RuntimeError):
             return ""
@@ -319,15 +319,15 @@ class LedgerWatch:
     Args:
         numbering: Vertices, cells and degrees of freedom of the scene.
         scheme: The time scheme.
-        claimed: Largest error of an entry of the ledger that causes no warning, as a fraction of
+        tolerance: Largest error of an entry of the ledger that causes no warning, as a fraction of
             the energy transferred.
 
     Attributes:
-        judged: Index of the last state that was checked; the run updates it when it deletes states.
+        last_checked: Index of the last checked state; the run updates it when it deletes states.
     """
 
-    def __init__(self, numbering: DofNumbering, scheme: Scheme, claimed: float) -> None:
-        self._numbering, self._claimed = numbering, claimed
+    def __init__(self, numbering: DofNumbering, scheme: Scheme, tolerance: float) -> None:
+        self._numbering, self._tolerance = numbering, tolerance
         connectors, laws = numbering.scene.all_connectors, list[MaterialLaw]()
         for beam in numbering.scene.beams:
             section_points = beam.section.section_points(beam.section.hinge)
@@ -337,7 +337,7 @@ class LedgerWatch:
             connector.law.law for connector in connectors if isinstance(connector.law, Spring)
         ]
         laws += [law for law in springs if law is not None]
-        grows = {"hinges": True, "plastic": all(map(judges_dissipation, laws))}
+        grows = {"hinges": True, "plastic": all(map(dissipation_must_grow, laws))}
         # Schemes with forces at the end of a step compute works from the mean of the forces at both
         # ends.  The error of this mean can make the entries of friction and damping fall.
         exact = grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
@@ -347,7 +347,7 @@ class LedgerWatch:
             connector.law for connector in connectors if isinstance(connector.law, ConnectorLaw)
         ]
         for law in user_laws:
-            certain = exact and (at_once or not law.variables) and judges_loss(law)
+            certain = exact and (at_once or not law.variables) and loss_must_grow(law)
             grows[law.entry] = grows.get(law.entry, exact) and certain
         self._grows = [name for name, certain in grows.items() if certain]
         prescribed = any(
@@ -357,7 +357,7 @@ class LedgerWatch:
         self._bounded = not prescribed and all(map(has_quadratic_energies, laws))
         self._in_motion = has_inertia(scheme)
         self._transferred = self._most = 0.0
-        self.judged = 0
+        self.last_checked = 0
         self._told: set[str] = set()
 
     def faults(self, states: States, every: int, *, last: bool = False) -> Iterator[str]:
@@ -366,19 +366,19 @@ class LedgerWatch:
         ``every`` is the number of steps between states.  With ``last``, an incomplete group is
         checked, too.  Only the first warning of each kind is yielded.
         """
-        number = len(states) - 1 - self.judged
+        number = len(states) - 1 - self.last_checked
         number -= 0 if last else number % GROUP_SIZE
         if number <= 0:
             return
-        states = states.subset(self.judged, self.judged + number + 1)
-        self.judged += number
+        states = states.subset(self.last_checked, self.last_checked + number + 1)
+        self.last_checked += number
         times, (state, supplied, lost) = states.times, states.ledger()
         works = sum(float(np.abs(np.diff(work)).sum()) for work in supplied.values())
         sizes = [e if name in CONTRIBUTIONS else np.abs(e - e[0]) for name, e in state.items()]
         energy = np.asarray(sum(sizes, 0.0 * times))
         self._transferred += works + max(float(np.max(energy)) - self._most, 0.0)
         self._most = max(self._most, float(np.max(energy)))
-        allowed = self._claimed * self._transferred
+        allowed = self._tolerance * self._transferred
         for name in self._grows:
             if name in lost and name not in self._told:
                 falls = -np.diff(lost[name])

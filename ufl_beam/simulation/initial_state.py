@@ -49,7 +49,7 @@ def checked_numbering(
     With ``fresh``, the run begins with the undeformed scene.  The second result describes a motion
     without strain that only loads can resist in statics; it is empty if no such motion exists.
     """
-    loose = ""
+    free_motion = ""
     require_kind(scene, Scene, "scene")
     require_scheme(scheme, "scheme")
     if has_inertia(scheme):
@@ -60,7 +60,7 @@ def checked_numbering(
             warn_of_origin(scene)
         require_rates(scene, scheme)
     else:
-        loose = require_no_mechanism(scene)
+        free_motion = require_no_mechanism(scene)
         warn_of_rates(scene)
         if fresh and scheme.theta < 1:  # the run would oscillate about equilibrium
             instead = "begin with a run by Static() or EnergyMomentumStatic(theta=1), as start="
@@ -73,7 +73,7 @@ def checked_numbering(
     numbering = DofNumbering(scene, mesh)
     if has_inertia(scheme):
         warn_of_touching(numbering)
-    return numbering, loose
+    return numbering, free_motion
 
 
 def require_scheme(scheme: Any, what: str) -> None:

@@ -33,7 +33,7 @@ from ufl_beam.output.output_files import Output, reserved
 from ufl_beam.output.recorder import Recorder, checked_recorders
 from ufl_beam.parallel import communicator, print_once, progress_bar
 from ufl_beam.reference.solver import Solver
-from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, checksum_at
+from ufl_beam.simulation.checkpoint import Checkpoint, CheckpointFile, checksum_at
 from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch
 from ufl_beam.simulation.initial_state import (
     checked_numbering,
@@ -137,7 +137,7 @@ def simulate(
             max_states=max_states, comm=comm, progress=progress,
         )  # fmt: skip
     with ExitStack() as stack:
-        keeper: Keeper | None = None
+        keeper: CheckpointFile | None = None
         if checkpoint is not None:
             step = None if isinstance(dt, Adaptive) else (t1 - t0) / step_count(t1 - t0, dt)
             call = {
@@ -146,7 +146,7 @@ def simulate(
                 "mesh": mesh_of(start, mesh), "t[1]": t1 if step is None else "any",
                 "record": [type(recorder).__qualname__ for recorder in recorders],
             }  # fmt: skip
-            keeper = Keeper(checkpoint, call, step, t1, recorders, comm)
+            keeper = CheckpointFile(checkpoint, call, step, t1, recorders, comm)
             stack.callback(keeper.lock.release)
         simulation = Simulation(
             scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
@@ -174,7 +174,7 @@ def take_steps(
     *,
     max_states: int = sys.maxsize,
     until: Callable[[Simulation], bool] | None = None,
-    keeper: Keeper | None = None,
+    keeper: CheckpointFile | None = None,
     begin: float = 0.0,
 ) -> None:
     """Take the steps of a run: store states, check the ledger, write files, show the progress.
@@ -190,8 +190,8 @@ def take_steps(
         begin: ``time.perf_counter()`` at the beginning of the run, for checkpoints; s.
     """
     solution, ended = simulation.solution, False
-    claimed = LEDGER_TOLERANCE * simulation.solver.c.rtol
-    watch = LedgerWatch(simulation.numbering, simulation.scheme, claimed)
+    tolerance = LEDGER_TOLERANCE * simulation.solver.c.rtol
+    watch = LedgerWatch(simulation.numbering, simulation.scheme, tolerance)
 
     def after_step() -> bool:
         solution.time_error = pace.error
@@ -204,7 +204,7 @@ def take_steps(
             if thins:
                 solution.downsample()
                 solution.every *= 2
-                watch.judged = len(solution) - 1
+                watch.last_checked = len(solution) - 1
         for recorder in recorders:
             recorder.write(simulation)
         if keeper is not None and (keeper.due(pace.steps) or pace.finished):
@@ -252,15 +252,15 @@ def check_ledger(simulation: Simulation) -> None:
         everyone = subdomain.comm.allgather(solution.warnings.splitlines(keepends=True))
         solution.warnings = "".join(dict.fromkeys(chain.from_iterable(everyone)))
     if getattr(simulation.scheme, "exact_ledger", False) and len(solution) > 1:
-        energy, claimed = solution.energy, LEDGER_TOLERANCE * simulation.solver.c.rtol
-        if energy.opened(claimed, 0.0):
+        energy, tolerance = solution.energy, LEDGER_TOLERANCE * simulation.solver.c.rtol
+        if energy.describe_imbalance(tolerance, 0.0):
             # Round-off errors of steps are independent, so their squares add up.
             q = solution.q[:, subdomain.dofs]
             steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
             round_off = simulation.solver.random_work(np.abs(q).max(axis=0), steps)
-            solution.open_ledger = energy.opened(claimed, round_off)
-    if solution.open_ledger and simulation.comm.rank == 0:
-        warn(solution.open_ledger)
+            solution.imbalance_message = energy.describe_imbalance(tolerance, round_off)
+    if solution.imbalance_message and simulation.comm.rank == 0:
+        warn(solution.imbalance_message)
 
 
 @contextmanager
@@ -330,20 +330,28 @@ def simulate_by_reference(
     solver = Solver(numbering, scheme, t0, q, v, rtol=newton.rtol, **options)
     between = float(scheme.average(0.0, 1.0))
     solver.start(None if start is None else internal, same=same)
-    if start is not None and start.between == between and same_unknowns(start.numbering, numbering):
+    if (
+        start is not None
+        and start.equilibrium_fraction == between
+        and same_unknowns(start.numbering, numbering)
+    ):
         goes_on = same and "reactions" in internal and not len(start.v)
         if goes_on or has_inertia(scheme):
             solver.on_nodes, solver.q_before = start.cell_resultants(-1), start.before(-1)
     solution = Solution(scene, numbering)
-    solution.between, solution.begun, solution.scheme = between, between < 1, scheme
+    solution.equilibrium_fraction, solution.needs_start, solution.scheme = (
+        between,
+        between < 1,
+        scheme,
+    )
     solution.every, solution.building = every, time.perf_counter() - begin
 
     def keep() -> None:
         columns, row = solver.now.row(0)
-        if solver.parts == 0 and has_inertia(scheme):
+        if solver.substeps == 0 and has_inertia(scheme):
             columns.column_of("reactions", row).fill(math.nan)  # unknown before the first step
         solution.append(columns, row)
-        solution.count(solver.parts, solver.iterations)
+        solution.count(solver.substeps, solver.iterations)
 
     keep()
     try:

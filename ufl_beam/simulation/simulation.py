@@ -70,7 +70,7 @@ class Simulation(Stepper):
     Attributes:
         t: Time; s.
         solution: Solution so far.
-        parts: Number of substeps so far; an undivided step counts as one substep.
+        substeps: Number of substeps so far; an undivided step counts as one substep.
         copies: Comparison of the processes if each of them computes a small scene as a whole.
 
     Example:
@@ -110,14 +110,14 @@ class Simulation(Stepper):
         if start is not None:
             require_kind(start, Solution, "start")
         fresh = start is None
-        numbering, loose = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=fresh)
+        numbering, free_motion = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=fresh)
         subdomain = Subdomain(numbering, sharing(comm, len(numbering.cells)))
         together, q, v, internal = Agreement(subdomain.comm), *initial_state(numbering, start)
         t0, same = continuation(start, scene, t0)
         equation = StepEquation(subdomain, scheme, t0, v[subdomain.dofs], together)
         inertia, q_local, loaded = equation.inertia, q[subdomain.dofs], list[Array]()
         goes_on = same and "reactions" in internal and start is not None and not len(start.v)
-        if not fresh or (inertia is not None and inertia.scheme.kept):
+        if not fresh or (inertia is not None and inertia.scheme.further_rates):
             rates = None if inertia is None else inertia.v
             past = Archive(subdomain, internal) if same else None
             loads = equation.loads
@@ -136,16 +136,16 @@ class Simulation(Stepper):
             together(equation.inner_forces, q_local)
         goes_on = goes_on or inertia is not None
         solution, forces, before = kind(scene, numbering), None, None
-        solution.between, solution.scheme = float(scheme.average(0.0, 1.0)), scheme
-        alike = start is not None and start.between == solution.between
+        solution.equilibrium_fraction, solution.scheme = float(scheme.average(0.0, 1.0)), scheme
+        alike = start is not None and start.equilibrium_fraction == solution.equilibrium_fraction
         if goes_on and alike and start is not None and same_unknowns(start.numbering, numbering):
             forces = np.ascontiguousarray(start.cell_resultants(-1)[:, subdomain.cells])
-            before = start.before(-1)[subdomain.dofs] if start.begun else None
+            before = start.before(-1)[subdomain.dofs] if start.needs_start else None
         if forces is not None or inertia is not None:
             equation.cell_forces.begin(forces)
-        super().__init__(comm, equation, newton, t0, q_local, path, solution, together, loose)
+        super().__init__(comm, equation, newton, t0, q_local, path, solution, together, free_motion)
         self._begun_at = before
-        solution.begun = solution.between < 1 or self.cell_forces.asks_for_before
+        solution.needs_start = solution.equilibrium_fraction < 1 or self.cell_forces.asks_for_before
         solution.forces_from_record = (
             self.cell_forces.forces_from_record
             if subdomain.alone
@@ -154,7 +154,7 @@ class Simulation(Stepper):
         acts = any(isinstance(load, RotatingFrame) for load in scene.loads) or bool(scene.works)
         acts = acts or any(f(t0) != 0 for _, f in scene.time_functions())
         # Whether loads that act from the start are applied in substeps at first, see stepper.py
-        self._applies = fresh and inertia is None and solution.between != 1.0 and acts
+        self._applies = fresh and inertia is None and solution.equilibrium_fraction != 1.0 and acts
         give_back_memory(len(q_local))
         if inertia is not None and (scene.all_connectors or scene.supports):
             motions = self.connections()[:, 0] if scene.all_connectors else np.zeros(0)
@@ -201,7 +201,7 @@ class Simulation(Stepper):
         ends = np.ascontiguousarray(ends, dtype=np.float64)
         number = len(ends) if self.subdomain.alone else 1  # clocks of processes differ
         try:
-            if self._applies and self.parts == 0:
+            if self._applies and self.substeps == 0:
                 self._applies = False
                 first = self.t + APPLYING * (float(ends[0]) - self.t)
                 fill(c, applies=1, begin_of_run=self.t, applied_by=first)
@@ -213,7 +213,7 @@ class Simulation(Stepper):
                 c.prediction.dt = math.inf  # the next step is not extrapolated from this step
             if keep:
                 if self.subdomain.alone and (
-                    not solution.begun or solution.parts_of_last == self.parts
+                    not solution.needs_start or solution.substeps_of_last == self.substeps
                 ):
                     columns = self._writer.columns
                     space = solution.free_rows(
@@ -226,10 +226,10 @@ class Simulation(Stepper):
             if keep and taken:
                 # The row of a divided step lacks q at the beginning of the last substep, on which
                 # forces depend.  So `keep` writes this state instead.
-                divided = solution.begun and row_limit > 0 and c.parts_of_last > 1
+                divided = solution.needs_start and row_limit > 0 and c.substeps_of_last > 1
                 if row_limit and taken > divided:
                     solution.grow(taken - divided)
-                    solution.count(self.parts - divided * c.parts_of_last, self.iterations)
+                    solution.count(self.substeps - divided * c.substeps_of_last, self.iterations)
                 if divided or not row_limit:
                     self.keep()
             if c.failure:
@@ -238,15 +238,17 @@ class Simulation(Stepper):
             self.give_up(failure, float(c.failed_end))
         return taken
 
-    def watch(self, parts: Array) -> ExtremesInC | None:
-        """Return extremes of motions, and of section forces at the fractions ``parts`` of cells.
+    def watch(self, fractions: Array) -> ExtremesInC | None:
+        """Return extremes of motions, and of section forces at ``fractions`` of cells.
 
         C updates them after each step.  The result is None if processes share the scene.
         """
         if not self.subdomain.alone:
             return None
-        along = ForcesAlongCells(self.numbering), self.solution.between
-        self._watches.append(extremes := ExtremesInC(self.fields, self.cell_forces, *along, parts))
+        along = ForcesAlongCells(self.numbering), self.solution.equilibrium_fraction
+        self._watches.append(
+            extremes := ExtremesInC(self.fields, self.cell_forces, *along, fractions)
+        )
         pointers = ffi.new("watch *[]", [watch.c for watch in self._watches])
         fill(self.time_loop, watches=len(self._watches), watch=pointers)
         return extremes
@@ -263,7 +265,7 @@ class Simulation(Stepper):
         self.end()
         raise no_equilibrium(
             self.equation, self.solver, self.solution, failure, self.q, (self.t, end),
-            advice or self.scheme.advice, self._loose,
+            advice or self.scheme.advice, self._free_motion,
         ) from failure  # fmt: skip
 
     # -- the state -----------------------------------------------------------------------------
@@ -284,14 +286,14 @@ class Simulation(Stepper):
         if self._now is None:
             columns = self._writer.columns
             size = columns.width
-            (row,) = new_rows(1, size + self.solution.begun * self.numbering.size)
+            (row,) = new_rows(1, size + self.solution.needs_start * self.numbering.size)
             self._writer.write(row[:size])
-            if self.solution.begun:
+            if self.solution.needs_start:
                 row[size:] = self.subdomain.gather(self.q_before)
                 columns = columns.plus(BEFORE, (self.numbering.size,))
             self._now = States(self.numbering, self.solution, Block(columns, row[None], 1))
             if not self.subdomain.alone or self._lacks_record:
-                self._now.forces_from_record = partial(self._gathered_forces, self.parts)
+                self._now.forces_from_record = partial(self._gathered_forces, self.substeps)
         return self._now
 
     @cached_property
@@ -306,12 +308,12 @@ class Simulation(Stepper):
         """True if the forces of cells cannot be computed from the stored numbers of a state."""
         return not self._writer.records or bool(self.cell_forces.c.given)
 
-    def _gathered_forces(self, parts: int, *_: Array) -> Array:
+    def _gathered_forces(self, substeps: int, *_: Array) -> Array:
         """Return the forces of all cells, ``cell_number`` of loops.h; (9, num_cells).
 
-        They belong to the state after ``parts`` substeps, which must be the present state.
+        They belong to the state after ``substeps`` substeps, which must be the present state.
         """
-        if parts != self.parts:
+        if substeps != self.substeps:
             raise ArgumentError("section forces of an earlier state: ask for simulation.now again")
         forces: Array = np.zeros((lib.CELL_NUMBERS, len(self.numbering.cells)))
         forces[:, self.subdomain.cells] = self.cell_forces(self.q, self.q_before)
@@ -323,27 +325,27 @@ class Simulation(Stepper):
         """Append the state to ``solution``, by default :attr:`solution`; all processes call it."""
         solution = self.solution if solution is None else solution
         columns = self._writer.columns
-        follows = not solution.begun or solution.parts_of_last == self.parts - 1
-        if self.parts and follows and not self._lacks_record:
+        follows = not solution.needs_start or solution.substeps_of_last == self.substeps - 1
+        if self.substeps and follows and not self._lacks_record:
             (row,) = solution.free_rows(columns)
             self._writer.write(row)
             solution.grow()
         else:
             _, row = self.now.row(0)
-            parts, before = [row[: columns.width]], row[columns.width :]
+            rows, before = [row[: columns.width]], row[columns.width :]
             if self._lacks_record:
                 forces = self.now.cell_resultants(0)
-                parts = [row[: columns.at[RECORD].start], forces.ravel()]
+                rows = [row[: columns.at[RECORD].start], forces.ravel()]
                 columns = columns.plus(FORCES, forces.shape, without=RECORD)
             at_rest = not len(solution) and np.array_equal(before, self.now.q[0])
             if not follows and not at_rest:
                 columns = columns.plus(BEFORE, before.shape)
-                parts.append(before)
-            solution.append(columns, *parts)
-            if self.parts == 0 and has_inertia(self.scheme):  # reactions are not yet known
+                rows.append(before)
+            solution.append(columns, *rows)
+            if self.substeps == 0 and has_inertia(self.scheme):  # reactions are not yet known
                 columns, row = solution.row(-1)
                 columns.column_of("reactions", row).fill(math.nan)
-        solution.count(self.parts, self.iterations)
+        solution.count(self.substeps, self.iterations)
 
     # -- end and restart -----------------------------------------------------------------------
 
@@ -358,7 +360,7 @@ class Simulation(Stepper):
         if self.t not in self.solution.times[-1:]:
             self.keep()
         # Iterations of failed steps count, too.
-        self.solution.parts, self.solution.iterations = self.parts, self.iterations
+        self.solution.substeps, self.solution.iterations = self.substeps, self.iterations
         self.solution.internal = self.equation.internal_variables(self.q, self.t)
 
     def snapshot(self) -> Solution:
@@ -375,7 +377,7 @@ class Simulation(Stepper):
         All processes call it together.
         """
         t, restores = archive.number("t", self.t), archive.has("t")
-        self.parts = int(archive.number("parts", self.parts))
+        self.substeps = int(archive.number("substeps", self.substeps))
         self.solver.save_or_restore(archive)
         q = archive.at_dofs("q", self.q)
         self.controllers.save_or_restore(archive, t)

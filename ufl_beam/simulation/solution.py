@@ -26,10 +26,10 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import (
     Content,
     WrongReader,
-    above,
-    below,
+    add_prefix,
     decoding,
     read,
+    remove_prefix,
     require_arrays,
     require_path,
     version,
@@ -49,7 +49,7 @@ from ufl_beam.output.states import States
 from ufl_beam.parallel import active_comm, on_first
 
 UNKNOWN = -2
-"""Value of ``parts_of_last`` if the next step does not begin at the last stored state."""
+"""Value of ``substeps_of_last`` if the next step does not begin at the last stored state."""
 
 
 class Solution(States, Rich):
@@ -60,7 +60,7 @@ class Solution(States, Rich):
     Attributes:
         scene: Model.
         numbering: Vertices, cells and degrees of freedom of the scene.
-        parts: Number of substeps; an undivided step counts as one substep.
+        substeps: Number of substeps; an undivided step counts as one substep.
         iterations: Number of Newton iterations.
         time_error: Sum of the estimated errors of all steps, see :class:`Adaptive`; NaN with equal
             steps.
@@ -68,14 +68,14 @@ class Solution(States, Rich):
         building: Wall time of building the scene in :func:`simulate`, which is not saved; s.
         every: Number of steps between stored states.
         parameter: Labels and formats of :attr:`times`, which are load factors in a path.
-        open_ledger: Message if the imbalance of the energy ledger exceeds the tolerance of the
-            scheme; empty otherwise.
+        imbalance_message: Message if the imbalance of the energy ledger exceeds the tolerance of
+            the scheme; empty otherwise.
         warnings: Warnings of the run, one in each line; see docs/warnings.md.
         internal: Data for a run that continues at the end of this run: internal variables of cells
             and connectors, reactions, rates and forces.
         scheme: Time scheme of the run; None if the solution was loaded or unpickled.
-        parts_of_last: Number of substeps up to the last stored state; :data:`UNKNOWN` if the next
-            step does not begin there.
+        substeps_of_last: Number of substeps up to the last stored state; :data:`UNKNOWN` if the
+            next step does not begin there.
 
     Example:
         >>> print((1e3 * solution.displacement(beam.end)[-1]).round(1))  # mm, mm, mrad, at t = 1 s
@@ -91,20 +91,20 @@ class Solution(States, Rich):
     def __init__(self, scene: Scene, numbering: DofNumbering, like: States | None = None) -> None:
         super().__init__(numbering, like)
         self.scene = scene
-        self.parts = self.iterations = 0
+        self.substeps = self.iterations = 0
         self.time_error, self.seconds, self.building = math.nan, 0.0, 0.0
-        self.every, self.open_ledger, self.warnings = 1, "", ""
+        self.every, self.imbalance_message, self.warnings = 1, "", ""
         self.internal: State = {}
         self.scheme: Scheme | None = like.scheme if isinstance(like, Solution) else None
-        self.parts_of_last = UNKNOWN
+        self.substeps_of_last = UNKNOWN
 
-    def count(self, parts: int, iterations: int) -> None:
+    def count(self, substeps: int, iterations: int) -> None:
         """Store the numbers of substeps and iterations up to the last state."""
-        self.parts, self.iterations, self.parts_of_last = parts, iterations, parts
+        self.substeps, self.iterations, self.substeps_of_last = substeps, iterations, substeps
 
     def downsample(self) -> None:
         """Delete every other state; the first state stays."""
-        self.parts_of_last = self.parts_of_last if len(self) % 2 else UNKNOWN
+        self.substeps_of_last = self.substeps_of_last if len(self) % 2 else UNKNOWN
         super().downsample()
 
     def history(self) -> State:
@@ -114,7 +114,7 @@ class Solution(States, Rich):
     def resume(self, history: State) -> None:
         """Restore the states of another run, see :meth:`history`."""
         super().resume(history)
-        self.every, self.parts_of_last = int(history["every"][0]), UNKNOWN
+        self.every, self.substeps_of_last = int(history["every"][0]), UNKNOWN
 
     # -- files ---------------------------------------------------------------------------------
 
@@ -183,14 +183,18 @@ class Solution(States, Rich):
         }  # fmt: skip
 
     def _arrays(self) -> State:
-        counts = {"counts": np.array([self.parts, self.iterations])}
-        return {**counts, **above("history/", self.history()), **above("internal/", self.internal)}
+        counts = {"counts": np.array([self.substeps, self.iterations])}
+        return {
+            **counts,
+            **add_prefix("history/", self.history()),
+            **add_prefix("internal/", self.internal),
+        }
 
     def _set_content(self, content: Content) -> None:
         require_arrays(content, {"counts": (2,), "history/every": (1,)})
-        self.resume(below("history/", content))
-        self.internal = below("internal/", content)
-        self.parts, self.iterations = map(int, content["counts"])
+        self.resume(remove_prefix("history/", content))
+        self.internal = remove_prefix("internal/", content)
+        self.substeps, self.iterations = map(int, content["counts"])
         for name, kind in NAMED.items():
             setattr(self, name, kind(content[name]))
 
@@ -219,8 +223,8 @@ class Solution(States, Rich):
         ends = " to ".join(f"{t:g}" for t in (*self.times[:1], *self.times[-1:]))
         lines = [
             str(self.numbering),
-            f"{self.parameter.value.format(ends)} in {self.parts} steps, "
-            f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
+            f"{self.parameter.value.format(ends)} in {self.substeps} steps, "
+            f"{self.iterations / max(self.substeps, 1):.2f} Newton iterations each, "
             f"{self.seconds:.2f} s of wall time",
         ]
         if hinges := Opened(self).hinges():
@@ -233,7 +237,7 @@ class Solution(States, Rich):
         return lines
 
     def __str__(self) -> str:
-        said = *self.summary(), str(self.energy), self.open_ledger, self.warnings
+        said = *self.summary(), str(self.energy), self.imbalance_message, self.warnings
         return "\n".join(filter(None, said))
 
     def __repr__(self) -> str:
@@ -407,12 +411,12 @@ def _fall(section_points: SectionPoints | None, scheme: Scheme) -> tuple[float, 
 
 # -- text in the file ------------------------------------------------------------------------------
 
-FORMAT = "solution of ufl_beam, 4"
+FORMAT = "solution of ufl_beam, 5"
 """Format of the file; its number is increased by each incompatible change of the format."""
 
 NAMED = {
-    "seconds": float, "time_error": float, "between": float, "begun": bool, "open_ledger": str,
-    "warnings": str,
+    "seconds": float, "time_error": float, "equilibrium_fraction": float, "needs_start": bool,
+    "imbalance_message": str, "warnings": str,
 }  # fmt: skip
 """Attributes that a file contains unchanged, and their types."""
 

@@ -22,7 +22,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import NOWHERE, Archive, State
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_scheme import Scheme, Step, has_inertia
-from ufl_beam.model.connector_laws import rubs
+from ufl_beam.model.connector_laws import has_friction
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.controllers import Controllers
@@ -39,7 +39,7 @@ from ufl_beam.terms.inertia_and_damping import (
     damping_forces,
 )
 from ufl_beam.terms.load_forces import DeadLoads, LoadTerm, load_terms
-from ufl_beam.terms.material_points import expect_entries
+from ufl_beam.terms.material_points import create_entries
 from ufl_beam.terms.term import Callbacks, Term
 from ufl_beam.terms.user_forces import Works
 
@@ -88,7 +88,7 @@ class StepEquation:
         # create the same entries, even without cells or connectors of a kind.
         self.inelastic, elastic = list[InelasticBeams](), np.ones(len(subdomain.cells), dtype=bool)
         for section_points, cells in subdomain.numbering.inelastic:
-            expect_entries(section_points, scheme, ledger)
+            create_entries(section_points, scheme, ledger)
             indices = np.flatnonzero(np.isin(subdomain.cells, cells))
             if len(indices):
                 elastic[indices] = False
@@ -191,7 +191,8 @@ class StepEquation:
         for term in (*self.inelastic, *self.connector_terms):
             term.save_or_restore(archive, q)
         friction = any(
-            rubs(connector.law) for connector in self.subdomain.numbering.scene.all_connectors
+            has_friction(connector.law)
+            for connector in self.subdomain.numbering.scene.all_connectors
         )
         if self.inertia is None or self.supports.work or friction:
             self.supports.carry_on(archive, q)
@@ -215,7 +216,7 @@ class StepEquation:
         if "reactions" in internal:
             self.supports.carry_on(archive, q)
         if self.inertia is not None and same:
-            known = sum(name in internal for name in self.inertia.scheme.kept)
+            known = sum(name in internal for name in self.inertia.scheme.further_rates)
             self.inertia.carry_on(archive, known)
             if BEFORE in internal:
                 self._pass_on_step(archive, q)
@@ -258,11 +259,11 @@ class StepEquation:
         With a time ``t`` (s), forces of connectors are added, which are unknowns in ``q``.
         """
         short, forces = sys.float_info.min, np.zeros(self.subdomain.size)
-        self.begin(Step.of(self.scheme, 0.0, short, short, q), self.beams)
+        self.begin(Step.create(self.scheme, 0.0, short, short, q), self.beams)
         for beam in self.beams:
             beam.add_residual(q, forces)
         if t is not None:
-            step = Step.of(self.scheme, t, t + 1.0, t + 1.0, q)
+            step = Step.create(self.scheme, t, t + 1.0, t + 1.0, q)
             self.begin(step._replace(load_time=t, motion_time=t), self.connector_terms)
             for group in self.connector_terms:
                 group.add_residual(q, forces)
@@ -328,7 +329,7 @@ class StepEquation:
 
     # -- derivatives about a state -------------------------------------------------------------
 
-    def linearise(self, q: Array, step: Step) -> tuple[Array, Array]:
+    def linearize(self, q: Array, step: Step) -> tuple[Array, Array]:
         """Return all forces except inertia in a step to ``q``, (size,), and their derivatives.
 
         Derivatives are ``data`` of :attr:`A`.  The axes of the plane are used, without supports.
@@ -351,7 +352,7 @@ class StepEquation:
         return self.A.data.copy()
 
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
-        """Return xᵀ K y for each pair of columns of X and Y, K as in :meth:`linearise`; (n,); J."""
+        """Return xᵀ K y for each pair of columns of X and Y, K as in :meth:`linearize`; (n,); J."""
         self.A.data.fill(0.0)
         for term in (*self.connector_terms, *self.others):
             if term.kind != "inertia":

@@ -129,11 +129,11 @@ class Stepper(StateView):
         t: Time of the initial state; s.
         q: Local configuration of the initial state.
         path: Checks of static steps; None in dynamics.
-        loose: Description of a motion that only loads may resist; empty if there is none.
+        free_motion: Description of a motion that only loads may resist; empty if there is none.
 
     Attributes:
         t: Time; s.
-        parts: Number of substeps so far; an undivided step counts as one substep.
+        substeps: Number of substeps so far; an undivided step counts as one substep.
         equation: Equation of a step, with its ``ledger``, ``controllers`` and terms.
         solver: Newton's method.
         prediction: Data of the last steps from which the initial guess is extrapolated.
@@ -146,7 +146,7 @@ class Stepper(StateView):
 
     def __init__(
         self, comm: MPI.Intracomm, equation: StepEquation, newton: Newton, t: float, q: Array,
-        path: StaticPath | None, solution: Solution, together: Agreement, loose: str,
+        path: StaticPath | None, solution: Solution, together: Agreement, free_motion: str,
     ) -> None:  # fmt: skip
         subdomain, scheme, ledger = equation.subdomain, equation.scheme, equation.ledger
         self.comm, self.subdomain, self.numbering, self.scene = (
@@ -156,7 +156,7 @@ class Stepper(StateView):
             subdomain.numbering.scene,
         )
         self.equation, self.scheme, self.ledger, self.solution = equation, scheme, ledger, solution
-        self.together, self._path, self._loose = together, path, loose
+        self.together, self._path, self._free_motion = together, path, free_motion
         self.copies, self.parameter = Copies(comm, subdomain), solution.parameter
         self.fields, self.terms, self.supports = equation.fields, equation.terms, equation.supports
         self.beams, self.inelastic = equation.beams, equation.inelastic
@@ -166,7 +166,7 @@ class Stepper(StateView):
             self.inertia = equation.inertia
         in_motion, phases = equation.inertia is not None, equation.phases
         self._begun_at: Array | None = None  # `q_before` of the initial state
-        self.parts = 0
+        self.substeps = 0
         self.prediction = Prediction(subdomain, q, equation.weights, in_motion=in_motion)
 
         again = [phase.again for phase in phases if phase.again is not None]
@@ -186,7 +186,7 @@ class Stepper(StateView):
             ffi.new("time_loop *"),
             equation=equation.c, size=subdomain.size, t=t, q=q.copy(), x=solver.unknowns, s=s,
             prediction=self.prediction.c,
-            guess=np.zeros(subdomain.size), in_parts=not in_motion,
+            guess=np.zeros(subdomain.size), proportional=not in_motion,
             load_weight=scheme.load_weight, at=1.0 if in_motion else scheme.load_weight,
             largest_turn=LARGEST_ROTATION if scheme.limits_rotation else math.inf,
             rotations=len(rotations), rotation=rotations,
@@ -234,10 +234,10 @@ class Stepper(StateView):
         # Calls that may raise come first, before any loop of C has accepted the step.
         asking = lib.phase_in_python, ffi.addressof(lib, "accept_guides")
         mine = [call for call in loops["accept"] if call[0] in asking]
-        if self._loose:
+        if self._free_motion:
             mine.insert(0, callbacks.phase(self._require_stiffness))
         loops["accept"] = mine + [call for call in loops["accept"] if call[0] not in asking]
-        if controllers.asks:
+        if controllers.needs_evaluation:
             loops["begin"].insert(0, callbacks.phase(self._evaluate_controllers))
         if self.copies.several:
             record = self.copies.compare
@@ -274,8 +274,13 @@ class Stepper(StateView):
         If they do, the tangent is regular even without stiffness against zero-energy modes.  All
         processes call the function together.
         """
-        equation, newton, numbering, loose = self.equation, self.solver, self.numbering, self._loose
-        if not loose:
+        equation, newton, numbering, free_motion = (
+            self.equation,
+            self.solver,
+            self.numbering,
+            self._free_motion,
+        )
+        if not free_motion:
             return
         newton.forget_zero_modes()
         if equation.evaluate(self._copy(q1)):
@@ -284,8 +289,8 @@ class Stepper(StateView):
             motion = np.abs(x * scales).max()
             forces = np.linalg.norm((K @ x)[scales > 0] / scales[scales > 0])
             if forces <= FREE_STIFFNESS * newton.scale() * numbering.scene.size * motion:
-                raise ModelError(f"{loose}The loads do not hold it either. {INSTEAD}")
-        self._loose = ""
+                raise ModelError(f"{free_motion}The loads do not hold it either. {INSTEAD}")
+        self._free_motion = ""
 
     # -- steps ---------------------------------------------------------------------------------
 
@@ -344,7 +349,7 @@ class Stepper(StateView):
     def _in_c(self) -> Iterator[None]:
         """Context in which C takes steps; at its end Python gets the new state."""
         c = self.time_loop
-        c.parts, c.failure, self.equation.callbacks.error = 0, lib.SUCCEEDS, None
+        c.substeps, c.failure, self.equation.callbacks.error = 0, lib.SUCCEEDS, None
         try:
             yield
         except SystemError as error:
@@ -352,11 +357,11 @@ class Stepper(StateView):
             raise error.__cause__ or error from None
         finally:
             self._moved(c.t)
-            self.parts += c.parts
-            if c.parts:
+            self.substeps += c.substeps
+            if c.substeps:
                 self._begun_at = None
             for extremes in self._watches:
-                extremes.seen = self.parts
+                extremes.seen = self.substeps
         self.warn(self._force_watch.told(), local=not self.subdomain.alone)
 
     def _fail(self) -> None:
@@ -420,7 +425,7 @@ class Stepper(StateView):
     @property
     def q_before(self) -> Array:
         """Configuration at the beginning of the last step; (size,); m, rad."""
-        if self._begun_at is not None and not self.time_loop.parts:  # C may have gone on since
+        if self._begun_at is not None and not self.time_loop.substeps:  # C may have gone on since
             return self._begun_at
         return self._copy(self.time_loop.prediction.q_before)
 

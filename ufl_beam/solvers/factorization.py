@@ -18,7 +18,7 @@ SYMMETRIC = 64 * float(np.finfo(np.float64).eps)
 """Largest difference between a scaled matrix that counts as symmetric and its transpose."""
 
 
-class Factorisation:
+class Factorization:
     """L D Lᵀ factors of a symmetric matrix, or L U factors of an unsymmetric one, by MUMPS.
 
     Rows and columns are scaled so that the largest entry of each is about one.  So the result does

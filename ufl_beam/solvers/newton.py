@@ -342,8 +342,8 @@ class Solver:
         """Save or restore the number of iterations and stiffnesses against zero-energy modes."""
         self.c.total = int(archive.number("iterations", self.c.total))
         known = self._subdomain.largest(float(self._stiffness.any()))
-        held = archive.number("idle motions are known", known)
-        self._stiffness[:] = archive.at_dofs("idle motions", self._stiffness) if held else 0.0
+        known = archive.number("idle motions are known", known)
+        self._stiffness[:] = archive.at_dofs("idle motions", self._stiffness) if known else 0.0
         self._set_stiffness()
 
 

@@ -50,7 +50,10 @@ class FormForces(Term):
         self.loops = loop("add_cells", force.cells), loop("add_cells", tangent.cells)
         self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order)]
         self._losses = [fields.kernel(form, self._q1) for form in losses]
-        self._step_kernels = [force, *(loss for loss in self._losses if not loss.subdomain(force))]
+        self._step_kernels = [
+            force,
+            *(loss for loss in self._losses if not loss.reuse_values(force)),
+        ]
         if losses:
             ledger.lost[self._entry] += 0.0
 
@@ -66,7 +69,7 @@ class FormForces(Term):
 
 @cached_forms
 def _linear_strains(element: Element) -> tuple[ufl.Form, fem.Function]:
-    """Return weighted strains, linearised about a configuration, and this configuration."""
+    """Return weighted strains, linearized about a configuration, and this configuration."""
     about = element.configuration()
     e_about = strain(about, element.axis)
     return element.sampled(e_about + ufl.derivative(e_about, about, element.q1)), about
@@ -75,9 +78,9 @@ def _linear_strains(element: Element) -> tuple[ufl.Form, fem.Function]:
 def predicted_strains(fields: Fields) -> Any:
     """Return ``predicted_strains`` of loops.h, the strains predicted by a static iteration.
 
-    In an iteration nodes move along straight lines, so rotating beams become longer than linearised
+    In an iteration nodes move along straight lines, so rotating beams become longer than linearized
     strains predict.  In slender beams the axial forces of this error spoil the next iteration.  The
-    tangent therefore uses the forces of the linearised strains, the residual the forces of the
+    tangent therefore uses the forces of the linearized strains, the residual the forces of the
     actual strains.  This is Newton's method for displacements and forces as independent unknowns of
     the functional, with the forces eliminated.  It converges in few iterations at any slenderness.
     The initial guess of a step has the same error, so cells that yield extrapolate the strains of
@@ -217,7 +220,7 @@ class ElasticBeams(FormForces, Cells):
             )  # fmt: skip
         super().__init__(forms.work, forms.losses, fields, A, ledger, tangent)
         self._work_form, self._stored = forms.work, fields.kernel(forms.stored, q1)
-        self._stored.subdomain(self._force)
+        self._stored.reuse_values(self._force)
         if tangent is not None:
             self._step_kernels.append(tangent)
             self.loops = self.loops[0], loop("add_static_tangent", self._static)
@@ -243,7 +246,7 @@ class InelasticForms(NamedTuple):
     """Forms with resultants r, or with b + D e, which is affine in the strains e."""
 
     work: ufl.Form  # virtual work of r
-    around: ufl.Form  # virtual work of b + D e, linearised at an iterate
+    around: ufl.Form  # virtual work of b + D e, linearized at an iterate
     tangent: ufl.Form  # derivative of ``around``
     r: fem.Function
     b: fem.Function
@@ -264,7 +267,7 @@ class InelasticBeams(Cells):
     """Virtual work of the resultants of cells with material points, P(34).
 
     The points map the strains of an iterate to resultants r and their derivatives D.  UFL derives
-    the material and the geometric tangent from b + D e, the resultants linearised in the strains e
+    the material and the geometric tangent from b + D e, the resultants linearized in the strains e
     about the iterate.  C evaluates points and forms.
 
     Attributes:

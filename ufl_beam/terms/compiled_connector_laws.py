@@ -194,7 +194,7 @@ class Iterate(NamedTuple):
     e: float  # motion; m or rad
     λ: float  # force; N or N m
     residual: float  # force of the law at the motion, less λ
-    at: float  # motion about which the law was linearised; m or rad
+    at: float  # motion about which the law was linearized; m or rad
 
 
 class UserLaw:
@@ -273,7 +273,7 @@ class UserLaw:
     # -- the law around an iterate -------------------------------------------------------------
 
     def line(self, e: float, λ: float) -> tuple[float, float]:
-        """Return slope and intercept of the linearised law at an iterate (``e``, ``λ``)."""
+        """Return slope and intercept of the linearized law at an iterate (``e``, ``λ``)."""
         force, last = self.force(e), self.last
         residual, at = force - λ, e
         if last is not None and abs(residual) > OVERSHOOT * abs(last.residual) and e != last.e:
@@ -284,11 +284,11 @@ class UserLaw:
         return slope, force - slope * at
 
     def _meeting(self, e: float, λ: float, last: Iterate) -> float:
-        """Return the motion about which the law is linearised after an overshoot.
+        """Return the motion about which the law is linearized after an overshoot.
 
         Where the slope of a law is infinite, Newton's method oscillates for ever.  The line through
         motions and forces of the two latest iterates approximates the rest of the scene.  The law
-        is linearised at its intersection with this line, if the intersection is between ``e`` and
+        is linearized at its intersection with this line, if the intersection is between ``e`` and
         the previous motion ``last.at``.
         """
         stiffness = max(0.0, (last.λ - λ) / (e - last.e))
@@ -370,7 +370,7 @@ class UserLaws(Response):
             law.last = None
 
     def _find_rows(self) -> None:
-        """Write the laws, linearised about the iterate, into the rows of C."""
+        """Write the laws, linearized about the iterate, into the rows of C."""
         self._rows[:, 2] = math.nan  # remains if a function raises an exception
         motions = zip(self._each, self._e1.tolist(), self._force.tolist(), strict=True)
         for row, (law, e1, λ) in zip(self._rows, motions, strict=True):

@@ -252,7 +252,7 @@ class ConnectorForces(ConnectorTerm):
             works[at] = np.where(about_force, factors * rates, works[at])
 
     def rows(self, q: Array) -> Array:
-        """Return the rows of the laws, linearised at ``q``; :attr:`latest_rows`."""
+        """Return the rows of the laws, linearized at ``q``; :attr:`latest_rows`."""
         lib.find_rows(self._in_c, doubles(q))
         return self.latest_rows
 

@@ -3,7 +3,7 @@
 
 e are the relative motions of all components of a connector at the end of the step.  λ is the force
 of the component, which resists the growth of its motion.  The row of a constraint determines e.
-Any other law determines λ as a function of e; its row is linearised about the latest iterate.
+Any other law determines λ as a function of e; its row is linearized about the latest iterate.
 
 This module has laws that prescribe a motion or a force, dampers, dry friction, springs, and
 rigid-plastic laws, such as plastic hinges of zero length.  Compiled laws and functions of a user
@@ -45,7 +45,7 @@ from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.energy_ledger import LEDGER_ENTRIES, Account, Ledger
-from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS, Points, expect_entries
+from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS, Points, create_entries
 from ufl_beam.terms.term import Callbacks
 
 CREEP = 1e-12
@@ -87,7 +87,7 @@ class Response:
         asks_at_ends: True if :meth:`accept_end` must be called when a step is accepted.
         motion: Accepted motions that solutions record, (num_connectors,); None if solutions record
             the motions of the nodes.
-        way: Direction of plastic slip in the latest iterate, 1 or -1; 0 without slip.
+        slip_direction: Direction of plastic slip in the latest iterate, 1 or -1; 0 without slip.
         sticks: True for each connector that friction holds in the latest iterate; None without
             friction.
         dissipated: Arrays (num_connectors,) of energies lost since the beginning, whose sum is
@@ -107,7 +107,7 @@ class Response:
         self._lengths = np.where(
             [connector.is_rotation for connector in connectors], 1.0, setting.scene.size
         )
-        self.way: Index = np.zeros(len(connectors), dtype=np.int32)
+        self.slip_direction: Index = np.zeros(len(connectors), dtype=np.int32)
         self.in_c: dict[str, Any] = {}
         self._in_steps: dict[str, Any] = {}
         self._time_functions: dict[str, list[tuple[TimeFunction, object]]] = {}
@@ -168,7 +168,7 @@ class Response:
 
     def remaining(self) -> Array:
         """Return the remaining fraction of elastic stiffness in the iterate; (num_connectors,)."""
-        return np.where(self.way == 0, 1.0, 0.0)
+        return np.where(self.slip_direction == 0, 1.0, 0.0)
 
     def bends(self, e1: Array) -> Array:
         """Return ∂α/∂e at constant internal variables; (num_connectors / k, k³).
@@ -270,7 +270,7 @@ class Springs(Response):
         )
         keys = [setting.scene.stream_keys[connector] for connector in connectors]
         self.points = Points(section_points, keys, np.ones(number), setting.scheme, setting.search)
-        expect_entries(section_points, setting.scheme, setting.ledger)
+        create_entries(section_points, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
         self.must_dissipate = section_points.kind.law.must_dissipate
         self.in_c = {"points": self.points.c}
@@ -410,7 +410,7 @@ class RigidPlasticLaws(Response):
         self._initial_limit = self._at["number yield_limit" if self._hardens else "number limit"]
         self._limit = self._initial_limit.copy()
         back_force, dissipated, excess = np.zeros((3, n))
-        self.way, direction_before, free = np.zeros((3, n), dtype=np.int32)
+        self.slip_direction, direction_before, free = np.zeros((3, n), dtype=np.int32)
         self.opens = {"number": n, "excess": doubles(excess), "free": integers(free)}
         self._stored = np.zeros(1)  # energy of hardening of all connectors together; J
         at = self._at["slipped"], self._at["start"]
@@ -425,7 +425,8 @@ class RigidPlasticLaws(Response):
             force=self._forms.force, end=self._forms.end, search=setting.search,
             limit=self._limit, back_force=back_force, dissipated=dissipated,
             slope=np.array([_slope(connector, setting.scene.size) for connector in connectors]),
-            excess=excess, free=free, way=self.way, way_before=direction_before,
+            excess=excess, free=free, direction=self.slip_direction,
+            direction_before=direction_before,
         )  # fmt: skip
         self.in_c = {"rigid_plastic": self._c}
         self._in_steps = {

@@ -205,18 +205,18 @@ class Energy(Mapping[str, Array], Rich):
         largest, transferred = float(np.max(np.abs(self.imbalance))), self.energy_transferred
         return largest / transferred if transferred > 0 else largest
 
-    def opened(self, claimed: float, round_off: float) -> str:
+    def describe_imbalance(self, tolerance: float, round_off: float) -> str:
         """Return a message about the imbalance; empty if it is as small as claimed, or round-off.
 
         Args:
-            claimed: Largest imbalance that the scheme claims, as a fraction of the transferred
+            tolerance: Largest imbalance that the scheme claims, as a fraction of the transferred
                 energy.
             round_off: Estimate of the error of the energy by round-off of the unknowns; J.
         """
         # Energies near the smallest floating-point number have too few digits.
         if not self.energy_transferred > sys.float_info.min / sys.float_info.epsilon:
             return ""
-        if self.worst <= claimed:
+        if self.worst <= tolerance:
             return ""
         fraction = round_off / self.energy_transferred
         stored = float(np.max(self._in_scene))
@@ -232,7 +232,7 @@ class Energy(Mapping[str, Array], Rich):
         )
         return (
             f"the energy ledger is open by {self.worst:.1e} of the transferred energy, and the "
-            f"scheme claims {claimed:.0e}: round-off is estimated at {fraction:.1e}{reason}"
+            f"scheme claims {tolerance:.0e}: round-off is estimated at {fraction:.1e}{reason}"
         )
 
     def entries(self) -> list[tuple[str, str, float]]:

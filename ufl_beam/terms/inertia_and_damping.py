@@ -44,7 +44,7 @@ from ufl_beam.mechanics.time_scheme import (
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
 from ufl_beam.terms.beam_forces import FormForces
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, knowing
+from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, fields_of_forms
 
 BEFORE = "velocity before"
 """Name of the velocities at the beginning of the last step in saved data."""
@@ -55,8 +55,8 @@ def _coefficients(scheme: Any, dt: float, last_dt: float, known: int) -> Coeffic
     """Return the coefficients of a scheme for a step as lists of numbers."""
     c = scheme.coefficients(dt, last_dt, known)
     inertia, velocity, *rates = (list(map(float, row)) for row in (*c[:2], *c.rates))
-    slip = None if c.slip is None else list(map(float, c.slip))
-    return Coefficients(inertia, velocity, rates, slip)
+    defect = None if c.velocity_defect is None else list(map(float, c.velocity_defect))
+    return Coefficients(inertia, velocity, rates, defect)
 
 
 def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
@@ -66,10 +66,10 @@ def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
         ModelError: The rows do not match :class:`Coefficients`.
     """
     known: Any = scheme
-    number = len(scheme.kept)
+    number = len(scheme.further_rates)
     try:
         c = _coefficients(known, 1.0, 1.0, number)
-        rows = c.inertia, c.velocity, *c.rates, *([c.slip] if c.slip else [])
+        rows = c.inertia, c.velocity, *c.rates, *([c.velocity_defect] if c.velocity_defect else [])
         right = len(c.rates) == 1 + number and {len(row) for row in rows} == {FURTHER + number}
         right = right and bool(np.isfinite(rows).all()) and c.rates[0][0] != 0.0
     except (TypeError, ValueError, AttributeError):
@@ -86,8 +86,8 @@ def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
 def numbers_in_python(handle: Any, c: Any) -> int:
     """Write ``scheme_numbers`` of loops.h for a step; C calls this function."""
     scheme, number = ffi.from_handle(handle)
-    inertia, velocity, rates, slip = _coefficients(scheme, c.dt, c.last_dt, c.more)
-    rows = inertia, velocity, slip or [0.0] * FURTHER, *rates
+    inertia, velocity, rates, defect = _coefficients(scheme, c.dt, c.last_dt, c.more)
+    rows = inertia, velocity, defect or [0.0] * FURTHER, *rates
     places = c.inertia, c.velocity, c.slip, *c.rates
     for place, row in zip(places, rows, strict=False):
         place[0:number] = [*row, *[0.0] * (number - len(row))]
@@ -120,21 +120,21 @@ class Inertia(Term):
         self.loops, at = self._times.loops, (fields.order, self._times.rate)
         self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at)]
         self._ledger, self._A, self.scheme = ledger, A, scheme
-        size, number = len(v), FURTHER + len(scheme.kept)
-        self.loses_energy = checked_coefficients(scheme).slip is not None
+        size, number = len(v), FURTHER + len(scheme.further_rates)
+        self.loses_energy = checked_coefficients(scheme).velocity_defect is not None
         # Rate 0, the nodal step, is stored elsewhere.  Velocities before the last step are not
         # computed: they are the old velocities.  If unused, new velocities take their memory.
         asks = self.loses_energy or scheme.uses_last_step
         self._now = np.zeros((number - V, size))
         self._next = np.zeros((number - V_BEFORE - (not asks), size))
-        self._slip = np.zeros(size if self.loses_energy else 0)
+        self._defect = np.zeros(size if self.loses_energy else 0)
         handle = ffi.new_handle((scheme, number))
         find = lib.numbers_in_python
         self.c = struct("rates", size=size, number=number, find=find, handle=handle)
         self.c.after_any = not scheme.uses_last_step
         first, *more = self._next if asks else (self._now[1], *self._next)
         for k, (rate, new) in enumerate(
-            zip(self._now, (first, self._slip, *more), strict=True), start=V
+            zip(self._now, (first, self._defect, *more), strict=True), start=V
         ):
             self.c.rate[k], self.c.new_rate[k] = doubles(rate), doubles(new)
         self.commit(v, v, math.inf)
@@ -178,7 +178,7 @@ class Inertia(Term):
         """Set the further rates; a step can begin if some are set or the scheme has none."""
         for k, rate in enumerate(more):
             self._rate(FURTHER + k)[:] = rate
-        self.c.more, self.c.ready = len(more), bool(more) or not self.scheme.kept
+        self.c.more, self.c.ready = len(more), bool(more) or not self.scheme.further_rates
 
     def commit(self, v: Array, v_before: Array, last_dt: float) -> None:
         """Set velocities, and velocities before the last step and the length of that step."""
@@ -200,7 +200,7 @@ class Inertia(Term):
     def carry_on(self, archive: Archive, known: int) -> None:
         """Save or restore the first ``known`` further rates of the scheme."""
         more = self.more or (self.v,) * known
-        self.keep(*map(archive.at_dofs, self.scheme.kept[:known], more))
+        self.keep(*map(archive.at_dofs, self.scheme.further_rates[:known], more))
 
     def pass_on_step(self, archive: Archive) -> None:
         """Save or restore velocities before the last step, and its length at each unknown."""
@@ -255,7 +255,7 @@ class KelvinVoigtForces(FormForces):
         """Return loops over the cells, which also put the factor of the step into the forms."""
         begin, accept, *_ = super().phases(callbacks)
         c = struct(
-            "viscous_forms", **knowing(self._step_kernels, self._rate),
+            "viscous_forms", **fields_of_forms(self._step_kernels, self._rate),
             of_cell=len(self._rate.x.array), time=self._time, dt=self._dt,
         )  # fmt: skip
         return Phases([*begin, loop("begin_viscous_forms", c)], accept)
@@ -352,7 +352,7 @@ class SecondDifferences(FormForces):
         begin, accept, *_ = super().phases(callbacks)
         c = struct(
             "second_differences", strains=self._strains.kernel.cells, weight=self._strains.weights,
-            of_cell=len(self._strains.weights), **knowing(self._step_kernels, self._before),
+            of_cell=len(self._strains.weights), **fields_of_forms(self._step_kernels, self._before),
             e=self._e, change=self._change, space=np.zeros(self._e.shape), last_dt=self._last_dt,
         )  # fmt: skip
         before, after = (loop(f"{name}_second_differences", c) for name in ("begin", "accept"))

@@ -19,15 +19,15 @@ from ufl_beam.discretization.compiled_forms import cached_forms
 from ufl_beam.discretization.function_spaces import (
     Element,
     Fields,
-    lumps,
     mass_kernel,
     mass_matrix,
+    point_masses,
 )
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
-from ufl_beam.model.bodies import carries
+from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.terms.energy_ledger import Ledger
@@ -185,12 +185,14 @@ def _add_forces(load: Load, subdomain: Subdomain, forces: Array) -> Array | None
         per_beam = np.outer(loaded, [*load.force, load.moment])
     elif isinstance(load, Gravity):
         g_x, g_y = load.acceleration
-        at_places = [(at, (mass * g_x, mass * g_y, 0.0)) for at, mass, _ in lumps(numbering.scene)]
+        at_places = [
+            (at, (mass * g_x, mass * g_y, 0.0)) for at, mass, _ in point_masses(numbering.scene)
+        ]
         per_beam = np.outer([beam.section.rhoA for beam in numbering.scene.beams], [g_x, g_y, 0.0])
     else:
         raise TypeError(f"{type(load).__name__} is not a dead load")
     for place, force in at_places:
-        if carries(place):  # else a connector of Scene.all_connectors applies the force
+        if moves_with_node(place):  # else a connector of Scene.all_connectors applies the force
             dofs = subdomain.numbering.node(place)
             mine = subdomain.owns(dofs)
             forces[subdomain.local(dofs[mine])] += np.array(force)[mine]
@@ -282,7 +284,7 @@ class FrameForces(LoadTerm):
         self._ledger = ledger
         # G v is the mass matrix times velocities turned by 90°; the Coriolis force is -2 Ω G v
         S, G = mass_matrix(fields), fields.assembled(_turned_mass(fields.element))
-        for at, mass, _ in lumps(subdomain.numbering.scene):
+        for at, mass, _ in point_masses(subdomain.numbering.scene):
             dofs = subdomain.numbering.node(at)[:2]
             if subdomain.owns(dofs).all():
                 u, v = subdomain.local(dofs)

@@ -66,7 +66,7 @@ FREED_STIFFNESS = 1e-30
 """Factor of the stiffness of such a hinge; its frequencies then are zero to round-off."""
 
 
-def expect_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger) -> None:
+def create_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger) -> None:
     """Create the entries of the ledger that points of a layout write.
 
     Every process calls this function, even without such points, so that all ledgers have the same

@@ -244,7 +244,7 @@ def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:
     ]  # fmt: skip
 
 
-def knowing(kernels: Sequence[Any], function: fem.Function) -> dict[str, Any]:
+def fields_of_forms(kernels: Sequence[Any], function: fem.Function) -> dict[str, Any]:
     """Return the fields ``forms`` and ``form`` for a phase that sets a function in kernels."""
     forms = [(kernel.cells, kernel.position(function)) for kernel in kernels]
     return {"forms": len(forms), "form": ffi.new("form_of_step[]", forms)}

@@ -273,7 +273,7 @@ typedef struct {
   const double *slope;         /* r > 0 of the equation of each, see rigid_plastic.c */
   double *excess;              /* |force - back force| / limit - 1 of held connectors beyond the limit */
   int32_t *free;               /* whether the search lets each slip while others are held */
-  int32_t *way, *way_before;   /* directions of slip, or 0: in the present iterate, in the last step */
+  int32_t *direction, *direction_before;   /* directions of slip, or 0: in the present iterate, in the last step */
 } rigid_plastic;
 
 typedef struct friction friction;
@@ -926,7 +926,7 @@ typedef struct {
   double *guess, *found; /* found: space for the solution from which places open */
   prediction *prediction;
   double load_weight, at; /* load_weight: of the end of a step in load_time; at: see Step */
-  int in_parts;          /* whether substeps go in proportion to loads and motions at the end of the step */
+  int proportional;          /* whether substeps go in proportion to loads and motions at the end of the step */
   int rotations, half_tangents, multipliers;
   const int32_t *rotation, *half_tangent, *multiplier;
   double turn, largest_turn; /* largest rotation in the step; limit of it, infinite if there is none */
@@ -950,7 +950,7 @@ typedef struct {
   int watches;
   force_watch *forces; /* forces of laws of a user; or none */
   const watch *const *watch;
-  int parts, parts_of_last; /* steps and substeps in the latest call; in its last step */
+  int substeps, substeps_of_last; /* steps and substeps in the latest call; in its last step */
   int failure;            /* of the latest step; see enum failure */
   double failed_end;      /* end of the smallest substep that was tried */
   double (*stop)(void *handle, double t); /* next time at which a step must stop; or none */

@@ -141,7 +141,7 @@ static inline void subtract(const double *A, const double *x, double *y)
 
 /* Write the resultants as affine functions b + D e of the strains into the tangent. Their values at
  * the strains are the forces of its geometric part. */
-static void linearise(const inelastic *m, const double *forces)
+static void linearize(const inelastic *m, const double *forces)
 {
   const points *p = m->points;
   const double *e = p->e1, *D = p->D;
@@ -216,7 +216,7 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
   const inelastic *m = self;
   points *p = m->points;
   respond_at(m, q);
-  linearise(m, m->predicted ? predict_forces(m, q) : p->r);
+  linearize(m, m->predicted ? predict_forces(m, q) : p->r);
   add_cells((void *)m->tangent, q, tangent);
   if (m->predicted) {
     take_tangent(m);

@@ -23,7 +23,7 @@ static int direction_of_slip(const rigid_plastic *p, int i, double *w, double mo
   double s[2];
   p->excess[i] = 0;
   if (limit == 0) return motion < 0 ? -1 : 1;
-  if (p->search[HOLD] && !p->way_before[i] && !p->free[i]) {
+  if (p->search[HOLD] && !p->direction_before[i] && !p->free[i]) {
     if (fabs(tested) > limit) {
       p->excess[i] = fabs(tested) / p->limit[i] - 1;
       p->search[OVER] = 1;
@@ -53,7 +53,7 @@ static void set_rows_of_rigid_plastic(const connectors *c, const double *q)
     const int way = direction_of_slip(p, i, w, motion, q[c->force[i]]);
     double *row = c->rows + 3 * i;
     row[0] = 1, row[1] = 0, row[2] = w[SLIP_START];
-    p->way[i] = way;
+    p->direction[i] = way;
     if (!way) continue;
     set_slip(w, motion, way);
     ask(p->force, w, 2, s);
@@ -68,11 +68,11 @@ double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, co
 {
   double *w = p->w, s[SLIP_OUTPUTS], sum = 0;
   for (int i = 0; i < p->number; ++i, w += p->width) {
-    if (!p->way[i]) {
+    if (!p->direction[i]) {
       sum += fmax(fabs(force[i] - p->back_force[i]) - p->limit[i] * (1 + 1e-12), 0);
       continue;
     }
-    set_slip(w, e1[i] - w[SLIP_START], p->way[i]);
+    set_slip(w, e1[i] - w[SLIP_START], p->direction[i]);
     ask(p->end, w, SLIP_OUTPUTS, s);
     sum += s[SLIP_DISSIPATED];
   }
@@ -86,7 +86,7 @@ static void commit_rigid_plastic(const rigid_plastic *p, const double *e1, doubl
   double *w = p->w, s[SLIP_OUTPUTS];
   memset(sums, 0, 3 * sizeof *sums);
   for (int i = 0; i < p->number; ++i, w += p->width) {
-    const int way = p->way[i];
+    const int way = p->direction[i];
     set_slip(w, e1[i] - w[SLIP_START], way);
     if (p->limit[i] < INFINITY) {
       ask(p->end, w, SLIP_OUTPUTS, s);
@@ -94,7 +94,7 @@ static void commit_rigid_plastic(const rigid_plastic *p, const double *e1, doubl
       p->dissipated[i] += s[SLIP_DISSIPATED];
       p->limit[i] = s[SLIP_LIMIT], p->back_force[i] = s[SLIP_BACK_FORCE];
     }
-    p->way_before[i] = w[SLIP] > 0 ? way : 0;
+    p->direction_before[i] = w[SLIP] > 0 ? way : 0;
     w[SLIPPED] += w[SLIP];
     w[SLIP_START] += way * w[SLIP];
   }

@@ -69,9 +69,9 @@ static int set_step(time_loop *m, double t1, double end)
   const double t0 = m->t, dt = t1 - t0;
   step->t0 = t0, step->t1 = t1, step->dt = dt, step->at = m->at;
   step->q0 = m->q, step->q_before = m->prediction->q_before, step->ratio = dt / m->prediction->dt;
-  step->fraction = m->in_parts ? dt / (end - t0) : 1;
-  step->load_time = m->in_parts ? end : (1 - m->load_weight) * t0 + m->load_weight * t1;
-  step->motion_time = m->in_parts ? end : t1;
+  step->fraction = m->proportional ? dt / (end - t0) : 1;
+  step->load_time = m->proportional ? end : (1 - m->load_weight) * t0 + m->load_weight * t1;
+  step->motion_time = m->proportional ? end : t1;
   if (m->applies) step->load_time = step->motion_time = m->begin_of_run;
   return !m->rates || find_numbers(m->rates, dt);
 }
@@ -337,7 +337,7 @@ int accept_step(time_loop *m)
   memcpy(m->q, m->x, m->size * sizeof *m->q);
   m->t = m->step.t1;
   m->failure = SUCCEEDS;
-  ++m->parts;
+  ++m->substeps;
   if (m->forces && !isinf(m->step.dt)) watch_forces(m->forces, m);
   for (int k = 0; k < m->watches; ++k) watch_step(m->watch[k], 1, m->t, p->q_before, m->q);
   return raised_anywhere(e) == NOTHING || fails(m, RAISED);
@@ -391,16 +391,16 @@ int take_steps(time_loop *m, int steps, const double *ends, double seconds, int 
 {
   const double end = steps > 1 ? seconds_now() + seconds : 0;
   m->failure = SUCCEEDS;
-  m->parts = 0;
+  m->substeps = 0;
   for (int k = 0; k < steps; ++k) {
-    const int before = m->parts;
+    const int before = m->substeps;
     do {
       const double stop = m->stop ? fmin(m->stop(m->stops, ends[k]), ends[k]) : ends[k];
       if (!step_or_subdivide(m, stop)) return k;
     } while (m->t != ends[k]);
     if (keeps) keep_state(m, rows + (size_t)k * m->width);
-    m->parts_of_last = m->parts - before;
-    if (m->parts_of_last > 1 || (steps > 1 && seconds_now() > end)) return k + 1;
+    m->substeps_of_last = m->substeps - before;
+    if (m->substeps_of_last > 1 || (steps > 1 && seconds_now() > end)) return k + 1;
   }
   return steps;
 }

@@ -289,7 +289,7 @@ void begin_connectors(void *self, const time_step *step, const double *q1, const
   if (c->points) begin_inelastic(t->points, step, q1, s);
   for (int i = 0; p && i < p->number; ++i) {
     p->w[i * p->width + t->dt_of_law] = step->dt;
-    p->way[i] = p->way_before[i];
+    p->direction[i] = p->direction_before[i];
   }
 }
 
@@ -298,7 +298,7 @@ void begin_connectors_again(void *self, const time_step *step, const double *q1,
   const connector_term *t = self;
   const connectors *c = t->connectors;
   const rigid_plastic *p = c->rigid_plastic;
-  if (p) memcpy(p->way, p->way_before, p->number * sizeof *p->way);
+  if (p) memcpy(p->direction, p->direction_before, p->number * sizeof *p->direction);
   if (c->friction) begin_friction_again(c->friction);
   if (c->asked) c->asked->again(c->asked->again_self);
 }
