@@ -203,7 +203,7 @@ enum { CLOSED, FLOWING, RELEASED };
 
 /* Outputs of a point at the end of a step; stresses and changes of variables follow. */
 enum point_output {
-  WORKED, BROKEN, LOST, ELASTIC, HARDENING, RELAXED, RESISTANCE, LEFT, MISSED,
+  WORKED, BROKEN, LOST, ELASTIC, HARDENING, RELAXED, RESISTANCE, LEFT, NONLINEAR_LOSS,
   POINT_OUTPUTS
 };
 

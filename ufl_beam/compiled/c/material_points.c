@@ -289,7 +289,7 @@ void commit(points *p)
       sum[2] += volume * s[LOST];
       sum[3] += volume * s[ELASTIC];
       sum[4] += volume * s[HARDENING];
-      sum[5] += volume * s[MISSED];
+      sum[5] += volume * s[NONLINEAR_LOSS];
       sum[6] += volume * s[RELAXED];
       for (int a = 0; a < d; ++a)
         for (int k = 0; k < 3; ++k) kept[k] += weight[i] * stress[a] * p->B[3 * (d * i + a) + k];
