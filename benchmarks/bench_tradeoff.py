@@ -141,7 +141,7 @@ def main():
             print(
                 f"{one['case']:20s} {tolerance:6.0e} {one['ratio']:11.2f} {one['estimated']:8.2f} "
                 f"{one['uncertain']:9.2f} {one['effort']:6.1f} {one['work']:6.1f} "
-                f"{one['runs']:4d}  {one['dials']}",
+                f"{one['runs']:4d}  {one['setting']}",
                 flush=True,
             )
 

@@ -16,7 +16,7 @@ from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.output import output_files
-from ufl_beam.output.output_files import above, beside, version
+from ufl_beam.output.output_files import add_prefix, beside, version
 
 SECTION = ub.Section(
     EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1, bending=ub.ElastoPlastic(0.5, 10.0)
@@ -36,7 +36,7 @@ def run(*, until=0.5, **more):
 class Solutions:
     """A saved solution; ``read`` gives what decides whether another one is the same."""
 
-    format = "solution of ufl_beam, 4"
+    format = "solution of ufl_beam, 5"
     advice = "Take another copy of the file, or save the solution again"
 
     def write(self, path):
@@ -65,7 +65,7 @@ class Studies:
 class Checkpoints:
     """A checkpoint, from which the run goes on to a later end."""
 
-    format = "checkpoint of ufl_beam, 4"
+    format = "checkpoint of ufl_beam, 5"
     advice = "Delete the file to begin anew, or name another"
 
     def write(self, path):
@@ -521,5 +521,5 @@ def test_a_history_is_checked_on_all_processes(shared_path, on_first_rank):
 
 
 def test_names_have_prefixes():
-    assert above("a/", {"b": 1}) == {"a/b": 1}
-    assert output_files.below("a/", {"a/b": 1, "c": 2}) == {"b": 1}
+    assert add_prefix("a/", {"b": 1}) == {"a/b": 1}
+    assert output_files.remove_prefix("a/", {"a/b": 1, "c": 2}) == {"b": 1}

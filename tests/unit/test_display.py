@@ -156,9 +156,9 @@ def test_a_tradeoff_has_its_runs():
     tip = {"tip": lambda run: run.position(BEAM.end)[-1]}
     found = ub.tradeoff(SCENE, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
     page = found._repr_html_()
-    assert cells(page)[0] == ["", "seconds", "steps", "cells", "iterations", "tip", "dials"]
+    assert cells(page)[0] == ["", "seconds", "steps", "cells", "iterations", "tip", "setting"]
     chosen = next(row for row in cells(page) if row[0] == "=&gt;")
-    assert chosen[-1] == str(found.best.dials)
+    assert chosen[-1] == str(found.best.setting)
     for line in found.remarks():
         assert line.splitlines()[0] in page
     picture(page)

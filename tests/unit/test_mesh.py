@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The dials of a mesh: places remain vertices, and what asks a solution takes any mesh."""
+"""The settings of a mesh: places remain vertices, and what asks a solution takes any mesh."""
 
 import math
 import re

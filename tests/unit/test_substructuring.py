@@ -10,7 +10,7 @@ from scipy.sparse import csr_array, eye_array, kron, random_array
 import ufl_beam as ub
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.partition import bisected
+from ufl_beam.discretization.partition import bisect
 from ufl_beam.solvers import multifrontal
 from ufl_beam.solvers.multifrontal import Multifrontal
 from ufl_beam.solvers.substructuring import Summed
@@ -177,7 +177,7 @@ def test_sums_over_processes():
 def test_parts_have_equal_sizes_and_short_borders(number):
     """In a square of 64 points a side, numbered at random."""
     points = np.random.default_rng(0).permutation(np.indices((64, 64)).reshape(2, -1).T)
-    part = bisected(points.astype(float), number)
+    part = bisect(points.astype(float), number)
     counts = np.bincount(part, minlength=number)
     assert counts.min() >= counts.max() - number
     at = np.empty((64, 64), dtype=int)
@@ -188,7 +188,7 @@ def test_parts_have_equal_sizes_and_short_borders(number):
 
 
 def test_more_parts_than_points():
-    assert sorted(bisected(np.zeros((3, 2)), 5)) == sorted(set(bisected(np.zeros((3, 2)), 5)))
+    assert sorted(bisect(np.zeros((3, 2)), 5)) == sorted(set(bisect(np.zeros((3, 2)), 5)))
 
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()], ids=["statics", "dynamics"])

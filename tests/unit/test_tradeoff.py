@@ -33,7 +33,7 @@ def law(monkeypatch):
             whole = seconds(cells, steps)
             return SimpleNamespace(
                 seconds=whole, building=BUILDING,
-                parts=steps, iterations=2 * steps,
+                substeps=steps, iterations=2 * steps,
                 numbering=SimpleNamespace(cells=range(cells)),
                 value=1.0 + error(4 / cells, length, scheme, newton),
             )  # fmt: skip
@@ -226,7 +226,7 @@ def test_the_recommendation_are_arguments_of_simulate(law):
     said = str(found)
     assert "errors of 0.0001 of each quantity" in said
     assert f"{len(found.runs)} runs took" in said
-    assert f"recommended: {found.best.dials}" in said
+    assert f"recommended: {found.best.setting}" in said
     assert all(str(run.setting) in said for run in found.front)
 
 

@@ -78,13 +78,13 @@ def test_a_tolerance_is_kept(make, part):
         scene, {"end": end}, scheme=ub.EnergyMomentum(), tolerance={"end": tolerance}, **times
     )
     print(found)
-    dials = found.best.dials
+    setting = found.best.setting
     fine = ub.simulate(
         scene,
         ub.EnergyMomentum(),
         t=times["t"],
-        dt=dials.dt / 5,
-        mesh=ub.Mesh(refine=2 * max(dials.mesh.refine, 8)),
+        dt=setting.dt / 5,
+        mesh=ub.Mesh(refine=2 * max(setting.mesh.refine, 8)),
     )
     error = np.abs(found.best.values["end"] - end(fine)).max()
     print(f"{make.__name__}: asked {tolerance:.2e}, got {error:.2e}")
@@ -117,7 +117,7 @@ def test_a_tolerance_is_used_up_at_a_limited_cost(make, part):
         scene,
         ub.EnergyMomentum(),
         t=times["t"],
-        dt=found.best.dials.dt / 10,
+        dt=found.best.setting.dt / 10,
         mesh=ub.Mesh(refine=8, degree=3),
     )
     error = np.abs(found.best.values["path"] - path(fine)).max() / np.abs(path(fine)).max()

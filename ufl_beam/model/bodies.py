@@ -195,7 +195,7 @@ class BodyPoint:
     __repr__ = bracketed
 
     def __post_init__(self) -> None:
-        require_kind(self.body, Body, "Spot: body")
+        require_kind(self.body, Body, "BodyPoint: body")
         point = require_vector(self.point, f"{self.body.name}.at(x, y)")
         object.__setattr__(self, "point", point)
 
