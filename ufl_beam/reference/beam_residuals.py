@@ -166,27 +166,6 @@ class YieldingBeams(CellForce):
         return np.column_stack([self.cells.cell_indices, data])
 
 
-def inelastic_cells(numbering: DofNumbering) -> dict[SectionPoints, Index]:
-    """Return the cells that can yield or break, by the layout of their material points."""
-    sections, section_indices = numbering.sections
-    groups: dict[SectionPoints, list[int]] = {}
-    for number, section in enumerate(sections):
-        section_points = section.section_points(section.hinge)
-        if section_points is not None and not section_points.elastic:
-            if numbering.mesh.degree > 1:
-                beam = numbering.scene.beams[int(np.argmax(section_indices == number))]
-                raise ModelError(
-                    f"Mesh: degree = {numbering.mesh.degree} is for elastic beams, and {beam.name} "
-                    "may yield or break; use degree=1 with more cells, or an elastic section"
-                )
-            groups.setdefault(section_points, []).append(number)
-    cell_sections = section_indices[numbering.beam_of_cell]
-    return {
-        section_points: np.flatnonzero(np.isin(cell_sections, group))
-        for section_points, group in groups.items()
-    }
-
-
 # -- inertia and damping -------------------------------------------------------------------------
 
 

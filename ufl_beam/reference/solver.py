@@ -35,7 +35,6 @@ from ufl_beam.reference.beam_residuals import (
     Inertia,
     YieldingBeams,
     damping_forces,
-    inelastic_cells,
 )
 from ufl_beam.reference.cell_forms import Archive, Force, Response, Setting
 from ufl_beam.reference.connector_residuals import Connectors, all_connectors
@@ -135,7 +134,7 @@ class Solver(PresentState):
         self.ledger, self.search, self.supports = setting.ledger, setting.search, Supports(setting)
         rest = np.arange(len(numbering.cells))
         self.yielding: list[YieldingBeams] = []
-        for section_points, cells in inelastic_cells(numbering).items():
+        for section_points, cells in numbering.inelastic:
             self.yielding.append(YieldingBeams(cells, section_points, setting))
             rest = np.setdiff1d(rest, cells)
         elastic = [ElasticBeams(rest, setting)] if len(rest) else []
