@@ -3,8 +3,7 @@
 #
 # The four-beam swing moves slowly for 0.64 s, then its links snap taut within microseconds.  Equal
 # steps that resolve the snap are far too short for the rest of the motion.
-# `dt=ub.Adaptive(tolerance)` chooses the length of each step by its error, which is estimated from
-# the change of the acceleration.
+# `dt=ub.Adaptive(tolerance)` chooses each step by an estimate of its error.
 #
 # This demo shows
 #

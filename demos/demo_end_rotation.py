@@ -127,8 +127,7 @@ closed = np.array([M_e, M_ep, *steady(1e6), *steady(2e7)]) / kNcm
 # trial stress of a step from the preceding *rate-independent* stress, whereas P(47) starts from the
 # viscous stress.  It uses τ = η/E instead of P(46), and a step of 1 ms at all rates.  Each step
 # then loses the overstress of the preceding steps, so the result depends on the step.  The paper's
-# "exact" values are one step of this update from first yield to the end.  The demo implements the
-# update, because the package does not contain it.
+# "exact" values are one step of this update from first yield to the end.
 
 
 # %%

@@ -1,17 +1,17 @@
 # %% [markdown]
 # # Yielding fibres: exponential damping without viscosity
 #
-# Engineers damp structures by a viscous force, after Rayleigh, because measured vibrations decay
-# exponentially.  Materials are not viscous, though: they dissipate energy by sliding and yielding
-# in small places, at any rate.  A single place of this kind acts like friction, which makes
-# amplitudes decay **linearly**.  Many places with scattered yield stresses are activated one after
-# another as the amplitude grows, and the decay is **exponential**, without viscosity.
+# Engineers model the damping of structures by viscous forces, after Rayleigh, because measured
+# vibrations decay exponentially.  But materials dissipate energy by local yielding, at any rate.
+# With one yield stress amplitudes decay **linearly**, as with friction.  If local yield stresses
+# are scattered, more points yield at larger amplitudes, and the decay is **exponential**, without
+# viscosity.
 #
 # This demo shows
 #
 # * a section of fibres, each with its own yield stress, `ElastoPlastic(yield_limit=Normal(...))`,
-# * free vibration from an initial velocity under the scheme that conserves energy exactly,
-# * the law of the decay, determined by `fit_decay`,
+# * free vibration from an initial velocity, with a scheme that conserves energy exactly,
+# * linear or exponential decay, determined by `fit_decay`,
 # * Rayleigh damping with the fitted ratio, for comparison.
 #
 # It follows section 4.5 of the paper, P(93) to P(95), and its Fig. 16.
@@ -31,23 +31,24 @@ output.mkdir(exist_ok=True)
 # ## Scene
 #
 # A bar has a heavy mass at its end, which is guided along the axis.  So all fibres have the same
-# strain and differ only in their strength.  The bar is one cell of 400 fibres.
+# strain and differ only in their yield stress.  The bar is one cell with 400 fibres.
 #
-# The paper says that the yield stress is Gaussian, with a deviation τ = 0.01 for a small,
-# homogeneous structure and τ = 1.06 for a large, heterogeneous structure; it states neither unit
-# nor mean nor amplitude.  These are **assumptions**:
+# In the paper the yield stress is Gaussian, with a deviation τ = 0.01 for a small, homogeneous
+# structure and τ = 1.06 for a large, heterogeneous structure.  The paper states no unit, mean or
+# amplitude.  These are **assumptions**:
 #
-# * τ is in MPa, and the mean is 0.2 MPa; negative samples become zero, and such fibres slide at
+# * τ is in MPa, and the mean is 0.2 MPa; negative samples become zero, so these fibres yield at
 #   once,
-# * a yielding fibre keeps 4/5 of its stiffness, by kinematic hardening: this represents the elastic
-#   neighbourhood, which returns the bar to its initial position and makes the loops slender,
-# * the initial velocity strains the bar until elastic fibres would bear 4 MPa: twenty times the
-#   mean, and four times the larger deviation.
+# * a yielding fibre keeps 4/5 of its stiffness, by kinematic hardening that represents elastic
+#   material around it; so the bar returns to its initial position,
+# * the initial velocity is such that the stress of an elastic bar would reach 4 MPa: twenty times
+#   the mean, and four times the larger deviation.
 #
-# The last ratio matters most.  A fibre of strength s that slides in a cycle of stress amplitude S
-# dissipates 4 s (S − s).  If all fibres slide, the sum grows in proportion to S, as in friction.
-# If strengths are spread over all stresses up to S, more fibres slide at a larger S, and the sum
-# grows with a higher power; a sum proportional to S² is equivalent to a viscous damper.
+# The last ratio matters most.  A fibre of yield stress s that yields in a cycle of stress amplitude
+# S dissipates energy in proportion to s (S − s).  If all fibres yield, the sum grows in proportion
+# to S, as in friction.  If yield stresses are spread over all stresses up to S, more fibres yield
+# at a larger S, and the sum grows with a higher power of S.  A sum proportional to S² is equivalent
+# to a viscous damper.
 
 # %%
 E, mean = 30e9, 0.2e6  # Pa
@@ -59,7 +60,7 @@ PERIODS = 15
 
 
 def bar(section, damping=()):
-    """The bar with the mass, moving."""
+    """Return the bar with the mass and its initial velocity."""
     rod = ub.Beam((0, 0), (length, 0), section, cells=1, name="bar")
     block = ub.Body((length, 0), mass=mass, name="block")
     return ub.Scene(
@@ -82,7 +83,7 @@ def vibrate(scene, record=()):
 
 
 def fibres(τ):
-    """The section, with this deviation in MPa."""
+    """Return the section with yield stresses of deviation τ; MPa."""
     law = ub.ElastoPlastic(ub.Normal(mean, τ * 1e6, seed=1), kinematic=4 * E)
     return ub.Section.rectangle(b=side, h=side, E=E, nu=0.2, fibres=ub.Fibres(law, number=400))
 
@@ -101,7 +102,7 @@ ub.print_once(f"τ = {deviations[-1]} MPa\n{runs[deviations[-1]]}\n")
 
 # %%
 def decay_of(solution):
-    """Decay of the swings of the mass."""
+    """Return the decay of the swings of the mass."""
     t, u = solution.times, solution.displacement(solution.scene.beams[0].end)[:, 0]
     (times, highest), (_, lowest) = (ub.peaks(t, x, prominence=0.02) for x in (u, -u))
     n = PERIODS + 1
@@ -126,8 +127,8 @@ ub.print_once(f"\nτ = 0.01 MPa\n{smooth}\n\nτ = 1.06 MPa\n{scattered}")
 # %% [markdown]
 # ## Rayleigh's damper in its place
 #
-# An elastic bar of the same period has Rayleigh damping of the fitted ratio ζ, P(92).  The damper
-# is tuned to this bar and would have to be tuned again for another bar; the fibres would not.
+# An elastic bar with the same period has Rayleigh damping with the fitted damping ratio ζ, P(92).
+# Another bar would need another coefficient of Rayleigh damping, but the same fibres.
 
 # %%
 ζ, ω_d = scattered.fitted_ratio, 2 * np.pi / scattered.period
@@ -141,12 +142,11 @@ ub.print_once(f"\nRayleigh damping, ζ = {ζ:.4f}: computed {of_damper.fitted_ra
 # %% [markdown]
 # ## Pictures
 #
-# The pictures show histories with the better law through their peaks, amplitudes over the number of
-# periods, and loops of stress and strain.  The loops are slender: their area is visible only if the
-# stress of the elastic neighbourhood is subtracted.  It is a parallelogram if all fibres slide at
-# once, and a lens if they slide one after another.  The loops are drawn at the middle of the steps,
-# where this scheme evaluates the material law; at the ends of the steps stresses deviate slightly
-# from the law to either side.
+# The pictures show displacements with the better law through their peaks, amplitudes over the
+# number of periods, and hysteresis loops of stress and strain.  The loops are so slender that 4/5
+# of the elastic stress is subtracted.  They are parallelograms if all fibres yield at once, and
+# lenses if they yield one after another.  The loops show values in the middle of the steps, where
+# this scheme evaluates the material law.
 
 # %%
 BLUE, RED, GREY = "#0072B2", "#D55E00", "#909090"
@@ -216,15 +216,15 @@ ub.print_once("\npictures and data:", *names, sep="\n  ")
 # ## Verification
 #
 # The result is the paper's transition: linear decay of the homogeneous bar, exponential decay of
-# the heterogeneous bar.  Each fit is far closer than the other law and within a hundredth of the
-# first amplitude, with any of three seeds.  The vibration lost exactly the energy that the fibres
-# dissipated.  No step needed more than five iterations: such a step would have been subdivided, and
-# its parts counted.
+# the heterogeneous bar.  In both bars the better law is far closer than the other, within a
+# hundredth of the first amplitude, also with two other seeds.  The vibration lost exactly the
+# energy that the fibres dissipated.  No step needed more than five iterations, because no step was
+# subdivided.
 #
-# The fibres are not a viscous damper, though.  The decay is exponential as long as the amplitude
-# lies within the range of strengths, here from 4.3 down to 1.2 MPa; below it few fibres slide, and
-# the decrement falls, as the last periods show.  The evidence ratio assumes independent residuals,
-# but these are dependent: it shows which law is closer, not how probable the law is.
+# But the fibres are not a viscous damper.  The decay is exponential only while the amplitude lies
+# within the range of yield stresses, here from 4.3 down to 1.2 MPa.  At smaller amplitudes few
+# fibres yield, and the decrement falls, as in the last periods.  The evidence ratio assumes
+# independent residuals.  Here they are dependent, so the ratio only shows which law is closer.
 
 # %%
 assert smooth.better == "linear"
@@ -243,7 +243,7 @@ ub.print_once("linear and exponential decay told apart")
 # %% [markdown]
 # ## Try this
 #
-# * `mean = 1e6`: the homogeneous bar slides a few times, then vibrates elastically,
-# * a tenth of the speed: only the weakest fibres slide, and the damping is much smaller,
-# * `ub.TruncatedNormal` instead of `ub.Normal`: no fibre slides at once,
+# * `mean = 1e6`: the homogeneous bar yields in a few periods, then vibrates elastically,
+# * a tenth of the speed: only the weakest fibres yield, and the damping is much smaller,
+# * `ub.TruncatedNormal` instead of `ub.Normal`: no fibre yields at once,
 # * `v=0.0, psi=0.0` left out and `linear=(0, speed)`: the bar is a cantilever that bends.
