@@ -55,8 +55,7 @@ def broken(ratio, cells=16):
 # ## The closed form
 #
 # With the jump α, the moment is M = M_u exp(-M_u α/G_f), the load F = M/L, and the displacement δ =
-# F L³/3EI + α L.  The dissipated energy is G_f (1 - M/M_u), so equal steps of dissipation are equal
-# steps of the moment.
+# F L³/3EI + α L.  The dissipated energy is G_f (1 - M/M_u), so it falls linearly with the moment M.
 
 # %%
 paths = {ratio: broken(ratio) for ratio in steepness}
@@ -87,7 +86,7 @@ for ratio, (beam, energy, path) in paths.items():
 # ## What displacement control would jump over
 #
 # Displacement control follows the path to the largest load; then the load drops at constant
-# displacement.  The area between the drop and the path is energy that becomes motion and heat.
+# displacement.  The area between the drop and the path is released energy.
 
 # %%
 beam, energy, path = paths[2.0]
