@@ -2,13 +2,13 @@
 # # A tank on a frame in a storm: which weld cracks first
 #
 # A tank stands on a steel frame of two storeys.  Turbulence shakes it at its natural frequency, so
-# that stresses alternate some thousand times in an hour.  No section yields, but welds fatigue.
+# that stresses alternate some thousand times in an hour.  No section yields, but the welds fatigue.
 #
 # This demo shows
 #
-# * `Fatigue`: rainflow cycles of the stress at named places, counted while the run goes on,
-# * `SNCurve.eurocode`, Miner's sum, the fatigue life; other curves after the run,
-# * `Extremes`: the envelope of the moments, each step included,
+# * `Fatigue`: rainflow cycles of the stress at named places, counted during the run,
+# * `SNCurve.eurocode`, Miner's sum and fatigue life, also with other curves after the run,
+# * `Extremes`: the envelope of the moments over all steps,
 # * `max_states=`, `max_rows=`: solution and files of limited size for a storm of any duration.
 
 # %%
@@ -26,9 +26,9 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## The wind
 #
-# The mean speed is 30 m/s.  Turbulence follows EN 1991-1-4, with the spectrum
-# $n S / \sigma^2 = 6.8 f / (1 + 10.2 f)^{5/3}$ with $f = n L / V$, as a sum of 300 waves of random
-# phase.  The tank is so small that each gust acts on its whole area.
+# The mean speed is 30 m/s.  Turbulence has the spectrum of EN 1991-1-4, $n S / \sigma^2 = 6.8 f /
+# (1 + 10.2 f)^{5/3}$ with $f = n L / V$.  It is a sum of 300 waves of random phase.  The tank is so
+# small that each gust acts on its whole area.
 
 # %%
 V, intensity, L = 30.0, 0.17, 120.0  # m/s, -, m
@@ -43,12 +43,12 @@ phase = rng.uniform(0, 2 * math.pi, len(middle))
 
 
 def speed(t):
-    """Speed of the wind; m/s."""
+    """Return the speed of the wind; m/s."""
     return V + amplitude @ np.cos(2 * math.pi * middle * t + phase)
 
 
 def pressure(t):
-    """Force on the tank; N."""
+    """Return the force on the tank; N."""
     return air / 2 * drag * area * speed(t) ** 2
 
 
@@ -56,7 +56,7 @@ def pressure(t):
 # ## The frame
 #
 # The frame consists of welded tubes; the tank is a mass on the upper girder.  The run starts from
-# the static equilibrium at the initial wind, since a sudden load would cause additional damage.
+# the static equilibrium with the initial wind, because a sudden load would cause additional damage.
 
 # %%
 steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0}  # Pa, -, kg/m^3
@@ -72,7 +72,7 @@ tank = ub.PointMass(upper.at(0.5), mass=18e3, inertia=40e3)  # kg, kg m^2
 
 
 def frame(wind, damping=()):
-    """The frame with a wind of this time function (N) on its tank."""
+    """Return the frame; ``wind`` is the force (N) on its tank as a function of time."""
     return ub.Scene(
         beams=[left, right, lower, upper],
         joints=[
@@ -93,8 +93,8 @@ calm = ub.simulate(frame(lambda t: pressure(0.0)), ub.Static(), t=(0, 1), dt=1, 
 # %% [markdown]
 # ## The places
 #
-# Each hot spot is a fibre of the tube, on the side in tension under the mean wind.  All welds have
-# the category 71 MPa.
+# Each hot spot is a fibre of a tube, on the side in tension under the mean wind.  All welds have
+# the detail category 71 MPa.
 
 # %%
 weld = ub.SNCurve.eurocode(71e6)  # Pa
@@ -111,7 +111,7 @@ table = output / "fatigue.csv"
 # %% [markdown]
 # ## Ten minutes of storm
 #
-# The solution and the table keep 1000 to 2000 of 15 000 steps; the cycle counts and the extremes
+# The solution and the table store 1000 to 2000 of 15 000 steps; the cycle counts and the extremes
 # include all steps.
 
 # %%
@@ -139,8 +139,8 @@ first = min(spots, key=lambda name: fatigue.life(spots[name]))
 ub.print_once(f"the {first} cracks first")
 
 # %% [markdown]
-# Other curves need no further run: here a better weld, and a parent material whose strength is
-# reduced by the mean stress.
+# Other curves need no further run, for example of a better weld, or of a parent material whose
+# strength is reduced by the mean stress.
 
 # %%
 cycles = fatigue.cycles(spots[first])
@@ -185,10 +185,10 @@ welds.savefig(output / "fatigue_welds.png")
 # ## Verification
 #
 # A lightly damped frame in a random wind responds in a narrow band: the amplitudes of its stress
-# have a Rayleigh distribution.  With one slope $m$ the damage per cycle is then
-# $(2 \sqrt 2 \sigma / \Delta\sigma)^m \Gamma(1 + m/2) / N$ with the standard deviation $\sigma$ of
-# the stress.  Gusts below the natural frequency widen the band, for which this formula
-# overestimates the damage: it is a close upper bound.
+# have a Rayleigh distribution.  With one slope $m$ the damage per cycle is then $(2 \sqrt 2 \sigma
+# / \Delta\sigma)^m \Gamma(1 + m/2) / N$ with the standard deviation $\sigma$ of the stress.  Gusts
+# below the natural frequency widen the band.  Then the formula overestimates the damage and is a
+# close upper bound.
 
 # %%
 slope_3 = ub.SNCurve(range=71e6, cycles=2e6, slope=3.0)

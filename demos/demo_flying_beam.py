@@ -1,17 +1,16 @@
 # %% [markdown]
 # # Flying beam: energy and momentum at any step size
 #
-# A soft beam is pushed and turned at one end for 2.5 s, then flies freely while it bends through
-# large rotations.  From then on its energy, its momentum and its angular momentum must not
-# change.
+# A force and a moment act at one end of a soft beam for 2.5 s.  Then the beam flies freely with
+# large bending, and its energy, linear and angular momentum must not change.
 #
 # This demo shows
 #
 # * exact conservation of all three by `EnergyMomentum()`, at small and at extremely large steps,
 # * second order of accuracy in the step, measured,
-# * the effect of `alpha` and `beta` on them.
+# * the effect of `alpha` and `beta` on energy and momentum.
 #
-# The planar "flying spaghetti" of J. C. Simo and L. Vu-Quoc (1986).
+# The problem is the planar "flying spaghetti" of J.  C.  Simo and L.  Vu-Quoc (1986).
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -28,12 +27,12 @@ section = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=10.0, depth=0.35) 
 
 
 def jump(t):
-    """Return the push of the benchmark, which starts at t = 0 and ends at t = 2.5 s suddenly."""
+    """Return the factor of the loads, which start and end suddenly at t = 0 and t = 2.5 s."""
     return float(t < 2.5)
 
 
 def fly(dt, scheme, push=jump, end=10.0, record=()):
-    """The beam from (6, 0) to (0, 8) m, pushed at its lower end until t = 2.5 s."""
+    """Simulate the beam from (6, 0) to (0, 8) m; loads act at its lower end until t = 2.5 s."""
     beam = ub.Beam((6, 0), (0, 8), section, cells=16, name="beam")
     load = ub.PointLoad(beam.start, force=(8, 0), moment=-80, amplitude=push)  # N, N m
     scene = ub.Scene([beam], loads=[load])
@@ -47,7 +46,7 @@ def fly(dt, scheme, push=jump, end=10.0, record=()):
 # %% [markdown]
 # ## Conservation
 #
-# The table shows relative drifts after the release.
+# The table shows relative changes after the loads have ended.
 
 # %%
 steps = (0.01, 0.1, 0.2)
@@ -55,7 +54,7 @@ flights = {dt: fly(dt, ub.EnergyMomentum()) for dt in steps}
 
 
 def drifts(solution):
-    """Relative change of energy and angular momentum after the release."""
+    """Return relative changes of energy and angular momentum after the loads have ended."""
     free = solution.times > 2.5 + 1e-9
     changes = []
     for values in (solution.energy.total, solution.momentum()[:, 2]):
@@ -92,15 +91,15 @@ assert drifts(with_alpha)[1] < 1e-10 < drifts(with_beta)[1]
 # %% [markdown]
 # ## Accuracy
 #
-# Conservation is not accuracy.  The position of the free end at t = 5 s, compared with a run with a
-# step of 1/640 s on the same mesh, converges with the square of the step.  This holds for a push
-# that starts and ends smoothly; a jump excites all frequencies of the mesh, and no step resolves
-# the highest frequencies.
+# Conservation does not imply accuracy.  The error of an end at t = 5 s, against a run with a step
+# of 1/640 s on the same mesh, decreases with the square of the step.  This holds for loads that
+# start and end smoothly; a jump excites all frequencies of the mesh, also frequencies that no step
+# resolves.
 
 
 # %%
 def pulse(t):
-    """Return a push of the same impulse that starts and ends smoothly."""
+    """Return a factor with the same impulse that starts and ends smoothly."""
     return 2 * np.sin(np.pi * t / 2.5) ** 2 if t < 2.5 else 0.0
 
 
@@ -138,5 +137,5 @@ ub.print_once("\npictures and data:", *sorted(str(p) for p in output.glob("flyin
 # %% [markdown]
 # ## Try this
 #
-# * `dt=0.5`: a step is subdivided if a node would turn too far, and energy is still conserved,
-# * `rhoI=0.0` in the section: rotary inertia disappears, and so does its cost.
+# * `dt=0.5`: a step is subdivided if a node would rotate too far, and energy is still conserved,
+# * `rhoI=0.0` in the section: the beam has no rotary inertia.

@@ -2,18 +2,17 @@
 # # Four-beam swing: conserving and dissipative schemes
 #
 # A flexible beam hangs from two rigid links and carries a heavy mass at mid-span.  A short push
-# makes it swing out; at t = 0.64 s the left link and the left half of the beam come into line and
-# snap taut.  The impact excites axial vibrations a thousand times faster than the swing.  A scheme
-# that conserves energy keeps these vibrations for ever; a dissipative scheme removes them without
-# changing the swing.
+# makes it swing out.  At t = 0.64 s the left link and the left half of the beam become straight and
+# snap taut.  The impact excites axial vibrations a thousand times faster than the swing.  With a
+# scheme that conserves energy these vibrations never decay; a dissipative scheme removes them
+# without changing the swing.
 #
 # This demo shows
 #
-# * revolute joints, which cost nothing: they only remove unknowns,
-# * a point mass, a load in a time table, massless links as stiff beams and as constraints,
+# * revolute joints, which only remove unknowns,
+# * a point mass, a load with a table of time, massless links as stiff beams and as constraints,
 # * plastic hinges instead of the joints, as in the paper,
-# * `EnergyMomentum()` against `EnergyMomentum(alpha, beta)`, and the ledger that accounts for the
-#   difference,
+# * `EnergyMomentum()` and `EnergyMomentum(alpha, beta)`, with their difference in the ledger,
 # * output files: XDMF for ParaView, a history table, pictures.
 #
 # The problem is from N. J. Theron (1994) and section 4.3 of the paper; the numbers at the end
@@ -34,7 +33,7 @@ output.mkdir(exist_ok=True)
 # ## Scene
 #
 # The beam lies at rest, horizontally, 0.36 m below the pivots; the left link is vertical, the right
-# one inclined by 45°.  The links represent rigid bars: they are ten thousand times as stiff as the
+# link inclined by 45°.  The links represent rigid bars: they are ten thousand times as stiff as the
 # beam and have no mass.
 
 # %%
@@ -62,7 +61,7 @@ swing = ub.Scene(
 # %% [markdown]
 # ## Two runs
 #
-# Both schemes simulate the same scene; a step is 1 ms, some two hundred times the period of the
+# Both schemes simulate the same scene.  A step is 1 ms, about two hundred times the period of the
 # axial vibration that the snap excites.
 
 # %%
@@ -84,9 +83,9 @@ ub.print_once("\nfour-beam swing, alpha = beta = 0.01\n" + str(decaying))
 # %% [markdown]
 # ## The links as constraints
 #
-# A massless rigid rod with a joint at both ends is a `Link`: a constant distance with one force.
-# The table below shows the cost and the error of the stiff beams.  With 16 cells and steps of
-# 0.2 ms the motion up to the snap agrees with the converged reference.
+# A massless rigid rod with a joint at both ends is a `Link`: a constant distance with one unknown
+# force.  The table below shows the cost and the error of the stiff beams.  With 16 cells and steps
+# of 0.2 ms the motion up to the snap agrees with the converged reference.
 
 
 # %%
@@ -109,9 +108,9 @@ fine = ub.simulate(fine_rods, ub.EnergyMomentum(), t=(0.0, 0.65), dt=2e-4, progr
 # ## Plastic hinges that have become joints
 #
 # In the paper the joints between links and beam are plastic hinges that have softened completely.
-# The units of its hinge data are inconsistent, so these numbers are assumptions: a limit of
-# 0.5 mN m, which the push soon exceeds, and a fracture energy of 10 µJ for each hinge, together a
-# three-thousandth of the energy of the push.
+# The units of its hinge data are inconsistent, so this demo assumes a limit of 0.5 mN m, which the
+# push soon exceeds, and a fracture energy of 10 µJ for each hinge.  Both hinges together dissipate
+# a three-thousandth of the energy of the push.
 
 # %%
 M_u, G_f = 0.5e-3, 10e-6  # N m, J
@@ -136,7 +135,8 @@ hinged_conserving, hinged_decaying = hinged.values()
 ub.print_once("\nfour-beam swing, plastic hinges, alpha = beta = 0.01\n" + str(hinged_decaying))
 
 # %% [markdown]
-# One reference is converged in space and time, the other has the mesh and step of the paper.
+# One reference is converged in space and time, the other reference has the mesh and step of the
+# paper.
 
 # %%
 converged = {  # s: displacements of mid-span, A and B; m
@@ -267,9 +267,8 @@ ub.print_once(
 # %% [markdown]
 # ## Verification
 #
-# The reference values come from an independent program with the same four cells and the same step,
-# so they verify the scene, the element and the scheme to the printed digits.  The ledger verifies
-# the energy balance.
+# The reference values come from an independent program with the same four cells and the same step.
+# The results agree to the printed digits, and the ledger closes.
 
 # %%
 i = {t: int(np.argmin(np.abs(conserving.times - t))) for t in (0.256, 0.5, 0.7, 1.0, 1.5, 2.5)}
@@ -287,10 +286,10 @@ for solution in (conserving, decaying, exact, fine, hinged_conserving, hinged_de
 
 # %% [markdown]
 # Links and stiff beams have the same motion: before the snap the forces are less than a newton, and
-# their deformation of the stiff beams is negligible.  The results with the mesh of the paper agree
-# to the printed digits, and the converged motion agrees up to the error of 16 cells and 0.2 ms.
-# The hinges dissipate their fracture energy once.  This changes the swing by a thousandth of the
-# motion, until the snap makes the motion sensitive to any perturbation.
+# the deformation of the stiff beams is negligible.  The results with the mesh of the paper agree to
+# the printed digits, and the converged motion agrees up to the error of 16 cells and 0.2 ms.  The
+# hinges dissipate their fracture energy once, which changes the motion by a thousandth up to the
+# snap.  After the snap the motion is sensitive to any perturbation.
 
 # %%
 assert apart_paper < 5.1e-6
@@ -319,6 +318,6 @@ ub.print_once("reference values reproduced")
 # ## Try this
 #
 # * `alpha=beta=0.5`: how much of the swing itself is lost now?
-# * `dt=2e-4` with `EnergyMomentum()`: does a smaller step calm the axial force?
+# * `dt=2e-4` with `EnergyMomentum()`: does a smaller step reduce the vibration of the axial force?
 # * twice the push: the mass loops over the pivots,
-# * `G_f = 1e-3`: the hinges dissipate a part of the energy; are they joints in the end?
+# * `G_f = 1e-3`: the hinges dissipate a part of the energy; are they revolute joints in the end?

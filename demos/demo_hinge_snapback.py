@@ -3,15 +3,15 @@
 #
 # A cantilever breaks at its clamp.  The more brittle the hinge and the more slender the beam, the
 # larger is the ratio of the energy stored in the beam to the fracture energy when the hinge opens.
-# If M_u²/G_f exceeds 3EI/L, load *and* displacement must decrease together, and neither of them can
-# be prescribed.  Only the dissipated energy always grows.
+# If M_u²/G_f exceeds 3EI/L, load *and* displacement must decrease together, so neither can be
+# prescribed.  Only the dissipated energy always grows.
 #
 # This demo shows
 #
-# * dissipation control, which also tells softening from elastic unloading,
-# * the arc length, which controls the path while nothing dissipates,
+# * dissipation control, which distinguishes softening from elastic unloading,
+# * the arc length, which controls the path while no energy is dissipated,
 # * a closed form for the whole path,
-# * energy: a test under displacement control would release the area that it jumps over.
+# * the energy that a test under displacement control would release in its jump.
 #
 # Data: EI = 1 MN m², L = 2 m, M_u = 10 kN m; fracture energies from ductile to brittle.
 
@@ -54,8 +54,8 @@ def broken(ratio, cells=16):
 # %% [markdown]
 # ## The closed form
 #
-# M = M_u exp(-M_u α/G_f) with the jump α, F = M/L, δ = F L³/3EI + α L.  The dissipated energy is
-# G_f (1 - M/M_u), so equal steps of dissipation are equal steps of the moment.
+# With the jump α, the moment is M = M_u exp(-M_u α/G_f), the load F = M/L, and the displacement δ =
+# F L³/3EI + α L.  The dissipated energy is G_f (1 - M/M_u), so it falls linearly with the moment M.
 
 # %%
 paths = {ratio: broken(ratio) for ratio in steepness}
@@ -85,9 +85,8 @@ for ratio, (beam, energy, path) in paths.items():
 # %% [markdown]
 # ## What displacement control would jump over
 #
-# Displacement control follows the curve to the peak of the displacement, then the load drops at
-# constant displacement; the area between the drop and the path is energy that becomes motion and
-# noise.
+# Displacement control follows the path to the largest load; then the load drops at constant
+# displacement.  The area between the drop and the path is released energy.
 
 # %%
 beam, energy, path = paths[2.0]
@@ -137,9 +136,9 @@ ub.print_once("\npictures:", *sorted(map(str, output.glob("hinge_snap*.png"))), 
 # %% [markdown]
 # ## Verification
 #
-# The remaining error of the deflection is due to the mesh, 1/(4·16²) of its elastic part.  The
-# error of the load, 1e-4, is due to rotations that are not quite small.  The peak is a state of
-# each path, and a limit point.
+# The remaining error of the displacement is due to the mesh, 1/(4·16²) of its elastic part.  The
+# error of the load, 1e-4, is due to finite rotations.  The peak is a state of each path and a limit
+# point.
 
 # %%
 assert np.max(worst) < 2e-3
@@ -150,4 +149,5 @@ assert np.isclose(np.max(F), M_u / L, rtol=1e-3)
 # ## Try this
 #
 # * `ub.ArcLength(0.001)` alone: where does it end, and with which message?
-# * a hinge in the middle of a beam that is clamped at both ends: three hinges, one after the other.
+# * a hinge in the middle of a beam that is clamped at both ends: three hinges open one after the
+#   other.

@@ -2,18 +2,18 @@
 # # Lattice: 200 000 cells, alone or under `mpirun`
 #
 # A wall of square bays, a hundred by a hundred, stands on clamped feet and is struck at its upper
-# left corner.  The blow runs through the wall as waves: fast waves stretch the members, and slow
-# waves bend them.
+# left corner.  The impact causes waves in the wall: fast waves stretch the members, and slow waves
+# bend them.
 #
 # This demo shows
 #
-# * size: 20 000 beams, 10 000 joints, 600 000 unknowns, with exact rotations everywhere,
-# * processes that share a scene: `mpirun -n 2 python3 demos/demo_lattice.py`, the same script,
+# * a large model: 20 000 beams, 10 000 joints, 600 000 unknowns, with exact rotations,
+# * the same script on several processes: `mpirun -n 2 python3 demos/demo_lattice.py`,
 # * a loop of your own over `Simulation.step_to`, with files written during the run,
-# * the ledger: it accounts for every joule at this size, too.
+# * the ledger, which closes for large models, too.
 #
-# Each process condenses the interior nodes of its members without communication.  The remaining
-# unknowns at the joints, a twentieth of all, are solved together.
+# Each process condenses the interior nodes of its members without communication.  The processes
+# solve for the remaining unknowns at the joints, a twentieth of all, together.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -37,8 +37,8 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# `--cells` is the approximate number of cells; it is small if another script runs this script, as
-# in the tests.
+# `--cells` is the approximate number of cells; the default is small if another script imports or
+# runs this script, as in the tests.
 
 # %%
 parser = argparse.ArgumentParser()
@@ -70,7 +70,7 @@ for j in range(bays):
         member((i, j + 1), (i + 1, j + 1))
 
 # %% [markdown]
-# Members are joined rigidly, except at every seventh joint, where each member turns freely.
+# Members are joined rigidly, except at every seventh joint, which is a hinge of all its members.
 
 # %%
 joints = [
@@ -102,8 +102,8 @@ ub.print_once(
 # %% [markdown]
 # ## Run
 #
-# The step resolves the blow, not the vibrations of single cells, which an implicit scheme need not
-# follow.  The run ends when sound in steel has travelled three quarters of the height of the wall.
+# The step resolves the duration of the load, but not the vibrations of single cells.  The run ends
+# when sound in steel has travelled three quarters of the height of the wall.
 
 # %%
 sound = np.sqrt(steel["E"] / steel["rho"])  # 5172 m/s
@@ -135,8 +135,8 @@ ub.print_once(solution.energy)
 # %% [markdown]
 # ## Pictures
 #
-# Each cell is coloured by its speed at four times.  Nothing moves ahead of the waves.  The axial
-# waves along the members form the front; behind it the members sway.
+# Each cell is coloured by its speed at four times.  Axial waves along the members form the front;
+# behind the front the members bend.  Ahead of it nearly nothing moves.
 
 # %%
 speeds = [
@@ -175,8 +175,8 @@ ub.print_once("\npictures and data:", *sorted(str(p) for p in output.glob("latti
 # ## Verification
 #
 # The ledger closes to round-off, for any number of processes.  The front of the waves is not faster
-# than sound in steel.  An implicit step moves all nodes at once, but the motion ahead of the front
-# is negligible.
+# than sound in steel.  An implicit step moves all nodes, but the motion ahead of the front is
+# negligible.
 
 # %%
 assert abs(solution.energy.worst) < 1e-9
@@ -190,7 +190,7 @@ ub.print_once("the ledger closes, and nothing overtakes sound")
 # %% [markdown]
 # ## Try this
 #
-# * `mpirun -n 2 python3 demos/demo_lattice.py`: the same numbers, in less time,
+# * `mpirun -n 2 python3 demos/demo_lattice.py`: the same results, in less time,
 # * `--cells 1000`: a wall of seven bays, in a second,
 # * `output/lattice.xdmf` in ParaView: *Warp By Vector* with the displacement, coloured by `M`; then
 #   *Rescale to data range over all timesteps*, since nothing moves at t = 0.

@@ -2,19 +2,17 @@
 # # Lee's frame: through limit points of the load and of the displacement
 #
 # Two members of 120 cm, pinned at both far ends, carry a load near their corner.  The load grows to
-# a limit, falls to zero, becomes negative, and grows again; along this path the loaded point turns
-# back twice.  Neither load control nor displacement control can follow the whole path.  The arc
-# length can.
+# a limit, falls to zero, becomes negative, and grows again; along this path the loaded point
+# reverses its direction twice.  Only arc-length control follows the whole path.
 #
 # This demo shows
 #
 # * `ub.follow`, which solves for the load factor together with the displacements,
 # * critical points, reported with their modes,
-# * prescribed motion as load: where the loaded point turns back, the path of its *motion* has limit
-#   points.
+# * a prescribed displacement instead of the load, with limit points where this point reverses.
 #
 # Data: S. L. Lee, F. S. Manuel, E. C. Rossow, "Large deflections and stability of elastic frames",
-# 1968; A = 6 cm², I = 2 cm⁴, E = 7.2e6 N/cm², ν = 0.3, shear as stiff as G A.
+# 1968; A = 6 cm², I = 2 cm⁴, E = 7.2e6 N/cm², ν = 0.3, shear stiffness G A.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -33,7 +31,7 @@ L = 1.2  # m
 
 
 def frame(cells, moved=False):
-    """Return the frame under a load of 1 kN or a motion of 1 m downwards, times the factor."""
+    """Return the loaded point, its support and the frame; the factor is in kN or m."""
     column = ub.Beam((0, 0), (0, L), section, cells=cells, name="column")
     girder = ub.Beam((0, L), (L, L), section, cells=cells, name="girder")
     place = girder.at(0.2)
@@ -52,9 +50,9 @@ def frame(cells, moved=False):
 # %% [markdown]
 # ## The path
 #
-# The length of a step combines the root mean squares of all displacements, divided by the size of
-# the frame, and of all rotations with the change of the load factor, divided by `factor`, here
-# 10 kN.
+# The arc length of a step combines three increments: the root mean squares of all displacements,
+# divided by the size of the frame, and of all rotations, and the load factor divided by `factor`,
+# here 10 kN.
 
 # %%
 place, _, scene = frame(60)
@@ -74,7 +72,7 @@ for point in path.critical:
     ub.print_once(f"{point.kind:10s} {P[point.n]:7.4f}  {-v[point.n]:7.3f}  {u[point.n]:7.3f}")
 
 # %% [markdown]
-# Where the loaded point turns back, its prescribed motion has limit points.
+# Where the loaded point reverses, its path with a prescribed displacement has limit points.
 
 # %%
 _, push, moved = frame(60, moved=True)
@@ -134,8 +132,9 @@ ub.print_once("\npictures:", *sorted(map(str, output.glob("lee_frame*.png"))), s
 # %% [markdown]
 # ## Verification
 #
-# The limit loads of a converged solution are 18.5466 and -9.3961 kN, and v turns at 61.013 and
-# 50.737 cm.  Results with sixty cells a member differ by the mesh error, which is of second order.
+# The limit loads of a converged solution are 18.5466 and -9.3961 kN, and v has extreme values of
+# 61.013 and 50.737 cm.  Results with sixty cells per member differ by the mesh error, which is of
+# second order.
 
 # %%
 assert np.allclose(P[limits], (18.5466, -9.3961), rtol=2e-3)

@@ -1,21 +1,21 @@
 # %% [markdown]
 # # Manipulator: a plastic hinge that has become a joint
 #
-# A rigid arm carries a flexible one.  They are joined by a plastic hinge, which bears moments up to
-# M_u, then softens, and becomes a perfect revolute joint when its fracture energy is dissipated.
-# In the first second the flexible arm is turned until the hinge has softened completely.  In the
-# next two seconds the rigid arm turns at 10 rad/s, and the flexible arm swings about the opened
-# hinge as it would about a revolute joint.
+# A rigid arm and a flexible arm are joined by a plastic hinge, which bears moments up to M_u, then
+# softens, and becomes a revolute joint when its fracture energy is dissipated.  In the first second
+# the tip of the flexible arm is rotated until the hinge has softened completely.  In the next two
+# seconds the rigid arm rotates at 10 rad/s, and the flexible arm swings about the open hinge as
+# about a revolute joint.
 #
 # This demo shows
 #
-# * two consecutive runs: the second starts with the state of the first, including the material,
-# * an opened hinge compared with `Revolute`,
+# * two consecutive runs: the second run starts from the final state of the first, including the
+#   material,
+# * an open hinge compared with `Revolute`,
 # * two models of a rigid part: a beam 10³ to 10⁸ times as stiff, and a `Body`.
 #
 # The problem is section 4.2 of the paper: EA = GA = 10⁶, EI = 10⁵, 10 rad/s, steps of 1 ms.  The
-# paper states geometry and hinge only in a figure: the data below are assumptions, and so is the
-# mass.
+# paper shows geometry and hinge only in a figure, so the data below are assumptions, also the mass.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -33,10 +33,10 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# Both arms are 5 m long.  The flexible arm has 0.1 kg/m, so little that it bends by millimetres;
-# the rigid arm has no mass.  The hinge is at the start of the flexible arm, whose first cell is
-# 10 mm long.  It opens at 100 N m with a fracture energy of 4 J; when the tip has turned by two
-# radians, exp(-50) of M_u is left.  Then the tip turns back.  This run is quasi-static, so no
+# Both arms are 5 m long.  The flexible arm has only 0.1 kg/m, so it bends by millimetres; the rigid
+# arm has no mass.  The hinge is at the start of the flexible arm, whose first cell is 10 mm long.
+# It opens at 100 N m and has a fracture energy of 4 J.  When the tip has rotated by two radians,
+# the hinge bears exp(-50) of M_u; then the tip rotates back.  This run is quasi-static, so no
 # vibration remains.
 #
 # The drive reaches its speed within 0.2 s.  A jump of the velocity would excite vibrations that
@@ -51,12 +51,12 @@ t_joint, t_end = 1.0, 3.0  # s
 
 
 def bend(t):
-    """Rotation of the tip while the hinge softens; rad."""
+    """Return the rotation of the tip while the hinge softens; rad."""
     return 2 * min(t / (0.8 * t_joint), (t_joint - t) / (0.2 * t_joint)) ** 3
 
 
 def drive(t):
-    """Rotation of the rigid arm; rad."""
+    """Return the rotation of the rigid arm; rad."""
     x = min(max((t - t_joint) / up, 0.0), 1.0)
     return speed * (up * (x**3 - x**4 / 2) + max(t - t_joint - up, 0.0))
 
@@ -65,9 +65,9 @@ class Manipulator:
     """The two arms and both runs.
 
     Args:
-        hinge: Length of the cell beside the hinge; m.  Zero is a revolute joint.
+        hinge: Length of the cell beside the hinge; m; with zero the joint is a `Revolute`.
         cells: Number of cells of the flexible arm, without the cell beside the hinge.
-        stiffer: Ratio of the stiffness of the rigid arm to the flexible arm; infinity is a body.
+        stiffer: Stiffness of the rigid arm divided by the flexible arm's; infinity is a `Body`.
     """
 
     def __init__(self, hinge=0.01, cells=4, stiffer=1e3, record=()):
@@ -104,15 +104,15 @@ class Manipulator:
         self.path = self.motion.position(self.tip)
 
     def away(self, other):
-        """Return the largest distance of the tips of two manipulators at the same time; m."""
+        """Return the largest distance of the tips of two manipulators at equal times; m."""
         return float(np.linalg.norm(self.path - other.path, axis=1).max())
 
 
 # %% [markdown]
 # ## Runs
 #
-# The runs vary the length of the cell beside the hinge (three lengths, and the joint), the cells of
-# the flexible arm (1, 2, 4 and 8), and the model of the rigid arm.
+# The runs vary the length of the cell beside the hinge (three lengths), the number of cells of the
+# flexible arm (1, 2, 4 and 8), and the model of the rigid arm.  One run has a revolute joint.
 
 # %%
 revolute = Manipulator(hinge=0.0)
@@ -176,7 +176,7 @@ of_time = Normalize(t_joint, t_joint + one_turn[-1])
 
 
 def strobe(axes):
-    """Draw both arms every 2π/100 s."""
+    """Draw both arms ten times per revolution."""
     for t in t_joint + one_turn:
         n = int(np.argmin(np.abs(times - t)))
         color = colors(of_time(t))
@@ -266,14 +266,14 @@ ub.print_once(
 # ## Verification
 #
 # The hinge dissipates its fracture energy while it softens and nothing afterwards, except for the
-# remaining fraction exp(-50).  The hinged arm has one cell more than the arm with `Revolute`.  This
-# is the only difference: the distance of the tips is of first order in the length of that cell.
+# remaining fraction exp(-50).  The arm with the hinge differs from the arm with `Revolute` only by
+# one more cell, so the distance of their tips is of first order in the length of this cell.
 #
-# The arm hardly bends, so the motions with one cell and with eight differ only by the bending.  The
-# deformation of the stiff beam is in inverse proportion to its stiffness, and so is its distance
-# from the rigid body.  But its strains have round-off errors, and its forces have these errors
-# times its stiffness: at 10⁸ EA the errors are 0.02 N, and act along the path of the elbow of 94 m.
-# A `Body` has no such forces, and needs two thirds of the iterations.
+# The arm hardly bends, so the motions with one cell and with eight cells differ little.  The
+# deformation of the stiff beam, and so its distance from the rigid body, is in inverse proportion
+# to its stiffness.  But the forces of the stiff beam have the round-off errors of its strains times
+# the stiffness.  With 10⁸ EA the errors of forces are 0.02 N, along the elbow's path of 94 m.  A
+# `Body` has no such errors and needs two thirds of the iterations.
 
 # %%
 eps, turned = np.finfo(float).eps, drive(t_end)  # 1, rad
@@ -302,6 +302,6 @@ ub.print_once("a softened hinge is a revolute joint, and dissipates nothing")
 # %% [markdown]
 # ## Try this
 #
-# * `bend` up to 0.05 rad only: the hinge is half broken; what does it dissipate in the motion?
-# * `up = 0.1`: the arm swings further, almost over; how far apart are hinge and joint now?
+# * `bend` up to 0.05 rad only: the hinge is half open; how much does it dissipate in the motion?
+# * `up = 0.1`: the arm swings further, almost over; how far apart are both tips now?
 # * `rhoA = 10.0`: the arm bends; how many cells does it need?

@@ -1,19 +1,19 @@
 # %% [markdown]
 # # Monte Carlo: a frame with random strength
 #
-# A portal frame is hit so that its columns yield, and it keeps a residual drift.  The drift depends
-# on the yield stresses, which vary along the columns.  The usual answer is one simulation with the
-# mean yield stress.  This demo adds 48 simulations with random yield stresses.  They show results
-# that one run cannot give: the scatter of the drift, and that frames with scatter **dissipate
-# more**, in the mean and in nearly every sample.
+# A portal frame is struck so that its columns yield, and a residual drift remains.  The drift
+# depends on the yield stresses, which vary along the columns.  Usually one simulation with the mean
+# yield stress is made.  This demo adds 48 simulations with random yield stresses.  They show the
+# scatter of the drift, and that frames with scattered yield stresses **dissipate more**, in the
+# mean and in nearly every sample.
 #
 # This demo shows
 #
-# * `ub.study`, which calls one function for many cases: one after the other here, several at a time
+# * `ub.study`, which calls a function for many cases: one after the other, or several at a time
 #   under `mpirun`, with the same results to the last bit,
 # * random yield stresses of fibres, `ElastoPlastic(yield_limit=TruncatedNormal(..., seed=))`,
 # * one file for all members, from which an interrupted study continues,
-# * the 95 % interval of the mean over the number of members.
+# * the 95 % confidence interval of the mean over the number of members.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -31,9 +31,9 @@ output.mkdir(exist_ok=True)
 # ## Scene
 #
 # The frame has columns of 4 m, clamped at the feet, a girder of 6 m, and 2 t on each corner; its
-# period is 0.23 s.  The columns have ten layers of fibres.  Each fibre of each cell draws its own
-# yield stress, with a mean of 300 MPa and a deviation of 60 MPa: much for steel, usual for timber
-# or masonry.  The girder stays elastic.  A triangular blow of 40 ms strikes a corner.
+# period is 0.23 s.  The columns have ten layers of fibres.  Each fibre of each cell has its own
+# random yield stress, with a mean of 300 MPa and a deviation of 60 MPa: much for steel, usual for
+# timber or masonry.  The girder stays elastic.  A triangular force pulse of 40 ms acts at a corner.
 #
 # The scheme conserves energy exactly, so energy is lost only in fibres.
 
@@ -66,8 +66,8 @@ def portal(strength):
 # %% [markdown]
 # ## A member
 #
-# A member is a function of the seed that returns named numbers and arrays.  The frame keeps swaying
-# elastically; its drift is the mean displacement over whole periods after the last yielding.
+# The results of a member are named numbers and arrays, which a function of the seed returns.  In
+# the end the frame sways elastically; the drift is the mean displacement over the last periods.
 
 
 # %%
@@ -97,13 +97,13 @@ ub.print_once(f"{len(study)} members, {len(study.failed)} failed\n")
 # %% [markdown]
 # ## Statistics
 #
-# The interval of a mean is Student's: mean ± t s/√n.  It holds for independent members, and for any
-# distribution if n is large.
+# Student's interval of a mean is mean ± t s/√n with the standard deviation s.  It holds for
+# independent members, and for any distribution if n is large.
 
 
 # %%
 def mean_95(x):
-    """Return mean and half of its 95 % interval for the first 2, 3, ... values."""
+    """Return numbers n = 2, 3, ..., means of the first n values and half their 95 % intervals."""
     n = np.arange(2, len(x) + 1)
     means = np.array([x[:k].mean() for k in n])
     errors = np.array([x[:k].std(ddof=1) for k in n]) / np.sqrt(n)
@@ -138,19 +138,19 @@ ub.print_once(f"the first five drift by {', '.join(f'{x:.1f}' for x in drift[:5]
 # %% [markdown]
 # ## What the numbers mean
 #
-# The **drift** is the yielding of the columns to one side minus the yielding back, a small
-# difference of large numbers.  Scatter makes it uncertain by a quarter downwards and a third
-# upwards.  The frame of mean strength is within the 95 % interval of the mean.  The first five
-# members alone would suggest the contrary, since all of them drift further than this frame.
+# The **drift** is a small difference of large numbers: the yielding of the columns to one side
+# minus the yielding back.  The scatter makes the drift uncertain by a quarter downwards and a third
+# upwards.  The drift of the frame of mean strength is within the 95 % interval of the mean.  The
+# first five members would suggest the contrary, because all of them drift further than this frame.
 #
-# The **dissipated energy** is a sum in which nothing cancels.  Weak fibres slide to and fro in all
+# The **dissipated energy** is a sum in which nothing cancels.  Weak fibres yield to and fro in all
 # swings, even in late swings, in which the frame of mean strength is elastic; the dissipation of
-# strong fibres cannot fall below zero.  So the scatter adds a tenth in the mean of the members, and
-# nearly each member dissipates more.
+# strong fibres cannot fall below zero.  So the scatter increases the mean dissipation by a tenth,
+# and nearly each member dissipates more than the frame of mean strength.
 #
 # ## One member, for ParaView
 #
-# The member with the largest drift is simulated again and written to a file.  Its result is the
+# The member with the largest drift is simulated again and written to a file.  The result is the
 # same to the last bit.
 
 # %%
@@ -215,9 +215,9 @@ ub.print_once("\npictures and data:", *names, sep="\n  ")
 #
 # The ledger of every member closes and no step was subdivided, so the scatter is not numerical.
 # From ten members on, the interval of the mean energy excludes the frame of mean strength; the
-# final interval of the mean drift includes it.  Intervals shrink with √n: half the width needs four
-# times the members.  The member simulated again, by all processes together, equals the member of
-# the study.
+# final interval of the mean drift includes it.  The width of intervals is in proportion to 1/√n:
+# half the width needs four times the members.  The member that was simulated again equals the
+# member of the study.
 
 # %%
 assert not study.failed
@@ -239,8 +239,8 @@ ub.print_once("drift uncertain, dissipated energy larger than in the frame of me
 # ## Try this
 #
 # * `mpirun -n 3 python3 demo_monte_carlo.py`: three members at a time,
-# * no `anew=True`: interrupt the study and restart it, or raise 49 to 97; only missing members are
-#   computed,
-# * `ub.Fibres(law, number=40)`: do frames of more fibres differ less from each other?
+# * without `anew=True`: interrupt the study and restart it, or change 49 to 97; only missing
+#   members are computed,
+# * `ub.Fibres(law, number=40)`: do frames with more fibres differ less from each other?
 # * `ub.Lognormal` instead of `ub.TruncatedNormal`,
 # * a blow of 400 kN, under which the frame of mean strength stays elastic.

@@ -2,17 +2,17 @@
 # # Pushover of a frame: hinges that soften to joints
 #
 # A steel frame of two storeys is pushed sideways until all its plastic hinges have lost their
-# moment.  Six hinges form, the push passes its largest value, and the hinges soften.  In the end
-# they are revolute joints, and the frame is a mechanism that must be held back against its weight.
+# moment.  Six hinges open, the push reaches its largest value, and the hinges soften.  In the end
+# they are revolute joints, and a negative push holds the mechanism.
 #
 # This demo shows
 #
-# * softening hinges at chosen places, with the rotation and the dissipation of each,
-# * displacement control, which continues beyond the limit load and through a load of zero,
+# * softening hinges at chosen places, with their rotations and dissipations,
+# * displacement control, which continues beyond the limit load and beyond a load of zero,
 # * the pushover curve beside the closed form of a mechanism with rigid members.
 #
-# Data: columns HEB 200, girders IPE 300 of steel, with a plastic moment of 148 kN m in all hinges
-# and a fracture energy of 30 kJ; 10 kN/m on both girders.
+# Data: columns HEB 200, girders IPE 300 of steel, with a plastic moment of 148 kN m and a fracture
+# energy of 30 kJ in all hinges; 10 kN/m on both girders.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -29,8 +29,8 @@ output.mkdir(exist_ok=True)
 # ## Scene
 #
 # A hinge of `hinges={s: law}` is rigid below its limit.  With `LinearSoftening` its moment falls
-# linearly with the rotation, and is zero from 2 G_f/M_u = 0.41 rad on.  The load factor is the
-# push in kN: a third at the floor, two thirds at the roof.
+# linearly with the rotation, and is zero from 2 G_f/M_u = 0.41 rad on.  The load factor is the push
+# in kN; a third of it acts at the floor, two thirds at the roof.
 
 # %%
 steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0}  # Pa, -, kg/m³
@@ -60,8 +60,8 @@ frame = ub.Scene(beams, joints=corners, supports=feet, loads=weight + push)
 # %% [markdown]
 # ## Path
 #
-# The roof moves by 2 cm a step.  `Events` lists the hinges in the order in which they open, and in
-# which they have lost their moment.
+# The roof moves by 2 cm per step.  `Events` lists when each hinge opens, and when it has lost its
+# moment.
 
 # %%
 events = ub.Events()
@@ -74,9 +74,9 @@ for event in events.found:
 # %% [markdown]
 # ## Closed form
 #
-# Rigid columns that turn by θ move the floor and the roof by h sin θ and 2h sin θ to the side, and
-# lower them by h (1 - cos θ) and 2h (1 - cos θ).  All hinges turn by θ.  The virtual work of the
-# push P, of the weights W of both girders, and of six moments M(θ) gives
+# If rigid columns rotate by θ, the floor and the roof move by h sin θ and 2h sin θ to the side, and
+# by h (1 - cos θ) and 2h (1 - cos θ) down.  All hinges rotate by θ.  The virtual work of the push
+# P, of the weight W of each girder, and of six moments M(θ) gives
 #
 # 5/3 P h cos θ + 3 W h sin θ = 6 M(θ),   M(θ) = M_u max(0, 1 - θ M_u/(2 G_f)).
 
@@ -85,7 +85,7 @@ h, W, M_u, G_f = 4.0, 60e3, hinge.limit, hinge.fracture_energy  # m, N, N m, J
 
 
 def push_of_mechanism(sway):
-    """Push (kN) of the mechanism with rigid members at a sway of the roof (m)."""
+    """Return the push (kN) of the mechanism with rigid members at a sway of the roof (m)."""
     θ = np.arcsin(sway / (2 * h))
     M = M_u * np.maximum(0, 1 - θ * M_u / (2 * G_f))
     return (6 * M - 3 * W * h * np.sin(θ)) / (5 / 3 * h * np.cos(θ)) / 1e3
@@ -108,8 +108,8 @@ ub.print_once(f"dissipated: {lost.sum() / 1e3:.3f} kJ in {len(lost)} hinges")
 # %% [markdown]
 # ## Pictures
 #
-# Left: the frame in three states, to scale.  The colour of a hinge is its moment; the number is
-# its rotation.  Arrows are the push.  Right: the pushover curve.
+# Left: the frame in three states, to scale.  The colour of a hinge shows its moment, the number its
+# rotation.  Arrows show the push.  Right: the pushover curve.
 
 # %%
 from matplotlib import colormaps
@@ -177,7 +177,7 @@ ub.print_once("\npicture:", output / "pushover.png")
 #
 # The largest push is below the limit load 6 M_u/(5/3 h) of plastic theory.  Each hinge dissipates
 # its fracture energy, and its moment is zero from then on.  The last state differs from the
-# mechanism by elastic deflections only.
+# mechanism only by elastic deflections.
 
 # %%
 assert [event.what for event in events.found] == ["opens"] * 6 + ["is free"] * 6

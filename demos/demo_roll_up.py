@@ -2,8 +2,8 @@
 # # Roll-up: a cantilever bent to a circle and beyond
 #
 # A moment at the free end bends a straight cantilever to an arc of constant curvature κ = M/EI, and
-# M = 2π EI/L closes the circle.  These large rotations have a closed-form solution, so this is the
-# first test of every geometrically exact beam.
+# M = 2π EI/L closes the circle.  This problem has large rotations and a closed-form solution, so it
+# is the usual first test of geometrically exact beams.
 #
 # This demo shows
 #
@@ -11,7 +11,7 @@
 # * rotations of any size, here two full turns,
 # * the mesh error, measured and compared with its closed form.
 #
-# Data: cantilever of the peers' benchmark, L = 1 m, aluminium, 2 cm².
+# Data: aluminium cantilever, L = 1 m, 2 cm².
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -42,7 +42,7 @@ def roll_up(cells, steps=16):
 # %% [markdown]
 # ## Two circles
 #
-# The tip runs on the curve x = sin(ML/EI) EI/M, y = (1 - cos(ML/EI)) EI/M.
+# The tip moves on the curve x = sin(ML/EI) EI/M, y = (1 - cos(ML/EI)) EI/M.
 
 # %%
 beam, solution = roll_up(cells=32)
@@ -54,10 +54,10 @@ assert np.allclose(ψ, solution.times * turns * 2 * np.pi, atol=1e-9)
 # %% [markdown]
 # ## The error of the mesh
 #
-# A cell of length h that turns by κh between its ends is a chord of length h, whereas the arc it
-# stands for has the chord h sin(κh/2)/(κh/2).  The radius of the polygon is therefore too large by
-# the factor (κh/2)/sin(κh/2), an error of second order.  There is no other error: moment and
-# curvature are exact.  We look at half a circle, where the tip is at (0, 2/κ).
+# A cell of length h, whose rotation changes by κh between its ends, is a chord of length h.  The
+# exact arc of length h has a chord of h sin(κh/2)/(κh/2).  Therefore the radius of the polygon is
+# too large by the factor (κh/2)/sin(κh/2), an error of second order.  Moment and curvature are
+# exact.  The error is measured at half a circle, where the exact tip is at (0, 2/κ).
 
 # %%
 meshes = np.array([4, 8, 16, 32, 64, 128])
@@ -96,7 +96,7 @@ ub.print_once("\npictures:", *sorted(str(p) for p in output.glob("roll_up*")), s
 # ## Verification
 #
 # The computed error equals the closed form of the polygon to solver tolerance: the element has only
-# this geometric error, in particular no locking in shear or extension.
+# this geometric error, and no locking in shear or extension.
 
 # %%
 assert np.allclose(errors, exact_errors, rtol=1e-5)
@@ -105,5 +105,5 @@ assert np.all(np.abs(orders[1:] - 2) < 0.02)
 # %% [markdown]
 # ## Try this
 #
-# * a transverse force instead of the moment; compare with the elastica,
-# * `steps=2`: how far can a static step go before it is subdivided?
+# * a transverse force instead of the moment: compare the result with the elastica,
+# * `steps=2`: how large can a static step be before it is subdivided?

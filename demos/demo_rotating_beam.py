@@ -1,16 +1,16 @@
 # %% [markdown]
 # # Rotating beam: a Campbell diagram
 #
-# The centrifugal force stretches a blade on a turning shaft, which makes the blade stiffer in
-# bending.  In the plane of rotation this force also grows outward, which makes the blade softer
-# again.  So the natural frequencies depend on the speed.  A Campbell diagram shows them over the
-# speed, and the speeds at which an excitation once, twice, ... per revolution is in resonance.
+# The centrifugal force stretches a blade on a rotating shaft, which increases the bending
+# stiffness.  In the plane of rotation the centrifugal force also grows outwards, which reduces the
+# stiffness again.  A Campbell diagram shows the natural frequencies over the speed, and the speeds
+# at which an excitation once, twice, ... per revolution is in resonance.
 #
 # This demo shows
 #
-# * `ub.RotatingFrame`, a load that makes the steady rotation a state of equilibrium,
-# * `ub.modes(scene, n, at=steady)`: frequencies, damping ratios and shapes about that state,
-#   Coriolis forces included, by SLEPc or LAPACK,
+# * `ub.RotatingFrame`, a load with which steady rotation is a state of equilibrium,
+# * `ub.modes(scene, n, at=steady)`: frequencies, damping ratios and shapes about this state, with
+#   Coriolis forces, by SLEPc or LAPACK,
 # * a closed form that bounds the frequencies, after Southwell.
 #
 # Data: an aluminium blade, clamped to the axis, in the plane of rotation.
@@ -35,7 +35,7 @@ inner = ub.KelvinVoigt(retardation_time=2e-5)  # s
 
 
 def spinning(rate):
-    """Return the blade in the frame that turns with it; rad/s."""
+    """Return the blade in a frame that rotates with it at a rate in rad/s."""
     return ub.Scene([blade], supports=[root], loads=[ub.RotatingFrame(rate)], damping=[inner])
 
 
@@ -64,9 +64,9 @@ ub.print_once(f"the root bears {pull / 1e3:.1f} kN, the tip moves out by "
 # %% [markdown]
 # ## Southwell's bound
 #
-# With the shape w(x) of the blade at rest, Rayleigh's quotient gives ω² ≤ ω₀² + (k - 1) Ω²: k is
-# the work of the centrifugal force, ∫ (L² - x²)/2 w'² dx / ∫ w² dx, and -1 is the reduction by the
-# growth of this force in the plane of rotation.  The shape at rest is known in closed form.
+# With the mode shape w(x) of the blade at rest, Rayleigh's quotient gives ω² ≤ ω₀² + (k - 1) Ω².
+# The axial force causes k = ∫ (L² - x²)/2 w'² dx / ∫ w² dx; the growth of the centrifugal force in
+# the plane of rotation causes -1.  The shape at rest is known in closed form.
 
 # %%
 x = np.linspace(0.0, 1.0, 4001)
@@ -129,10 +129,10 @@ ub.print_once("\npictures:", *sorted(str(p) for p in output.glob("rotating_beam*
 # %% [markdown]
 # ## Verification
 #
-# The computed frequencies are below the bound and close to it: the shape changes only at large
-# speeds, most in the first mode.  The damping ratios of the second and third mode fall with the
-# speed: the centrifugal force stores more and more of their energy, and only the energy stored by
-# strains is damped here.
+# The computed frequencies are below the bound and close to it, because the shapes change only at
+# large speeds, most in the first mode.  The damping ratios of the second and third mode fall with
+# the speed, because an increasing fraction of the energy is stored by the centrifugal force,
+# whereas damping acts only on strains.
 
 # %%
 assert np.all(frequencies <= bounds * (1 + 1e-6))
@@ -147,7 +147,7 @@ assert np.isclose(
 # %% [markdown]
 # ## Try this
 #
-# * an axis of rotation beside the clamp: `ub.RotatingFrame(rate, about=(-0.5, 0))`,
+# * an axis of rotation at a distance from the clamp: `ub.RotatingFrame(rate, about=(-0.5, 0))`,
 # * `ub.Pinned` instead of `ub.Clamped`: a hinged blade, which swings freely without an offset,
 # * a mass at the tip, `masses=[ub.PointMass(blade.end, 5.0)]`,
 # * `ub.animate(fast.motion(1), "mode.gif")`.

@@ -1,17 +1,17 @@
 # %% [markdown]
 # # Slider-crank: the mechanism of every engine, and a press made of it
 #
-# The first problem has known results: a stiff crank, a flexible rod and a slider without mass; a
-# constant moment turns the crank for one second.  The second is a press of machine elements: a
-# motor with a controller, a flywheel on the crank, a heavy slider with dry friction on its guide, a
-# spring that pushes the slider back, and a workpiece that the slider hits before the end of its
-# travel.
+# The first scene is a mechanism with known results: a stiff crank, a flexible rod and a slider
+# without mass; a constant moment drives the crank for one second.  The second scene is a press with
+# a motor and its controller, a flywheel on the crank, a heavy slider with dry friction on its
+# guide, a spring that pushes the slider back, and a workpiece that the slider hits before the end
+# of its travel.
 #
 # This demo shows
 #
-# * `Prismatic`, `Revolute(..., multipliers=True)` and the forces that they bear,
+# * `Prismatic` and `Revolute(..., multipliers=True)`, with their forces,
 # * `Body` for rigid parts, `Turn`, `Slide` and `Stretch` for forces between two places,
-# * `PrescribedMotion` and `Controller`: a prescribed motion, and a controlled motion,
+# * `PrescribedMotion` and `Controller` as laws of a motor,
 # * the ledger, with an entry for each source and sink.
 
 # %%
@@ -30,8 +30,8 @@ output.mkdir(exist_ok=True)
 # ## The known mechanism
 #
 # The data come from Stander and Stein, in moofeKIT: round rods, and a crank a hundred times as
-# stiff as the rod.  The initial configuration is straight.  This is a dead centre, but only for a
-# slider that drives.
+# stiff as the rod.  Crank and rod are collinear at the beginning, which is no dead centre for a
+# driven crank.
 
 # %%
 r, l, d = 0.1524, 0.3048, 6.35e-3  # m
@@ -51,8 +51,8 @@ known = ub.simulate(mechanism, ub.EnergyMomentum(), t=(0.0, 3.0), dt=2.5e-3, pro
 ub.print_once("slider-crank with a flexible rod\n" + str(known))
 
 # %% [markdown]
-# The reference values were computed with an independent program.  Their last digits hold for a step
-# of 2.5 ms, as here: with 1 ms the angle after 3 s is 18.2574.
+# The reference values were computed with an independent program.  Their last digits belong to a
+# step of 2.5 ms; with 1 ms the angle after 3 s is 18.2574.
 
 # %%
 reference = {
@@ -77,12 +77,12 @@ ub.print_once(f"kinetic energy after 1 s: {kinetic[free].mean():.6f} J; referenc
 #
 # The press has a rigid crank with the inertia of its flywheel, a steel rod 12 x 5 mm, and a slider
 # of 2 kg.  The slider has dry friction: 5 N from its seal, and 0.2 times the force on the guide.  A
-# spring pushes the slider back.  The workpiece stands 1.2 mm before the dead centre, so rod and
-# workpiece must deform once in each turn.
+# spring pushes the slider back.  The workpiece is 1.2 mm before the dead centre, so rod and
+# workpiece deform once per revolution.
 #
-# It runs twice and reaches 30 rad/s within 0.1 s: first with a motor of prescribed motion, then
-# with a controller, which reads angle and speed at the beginning of each step and applies up to
-# 15 N m.
+# There are two runs, in which the press reaches 30 rad/s within 0.1 s: one with a prescribed motion
+# of the motor, the other with a controller, which reads angle and speed at the beginning of each
+# step and applies up to 15 N m.
 
 # %%
 radius, reach = 0.05, 0.2  # m
@@ -100,7 +100,7 @@ def wanted(t):
 
 
 class Press:
-    """The press, and its motion for 0.75 s.
+    """Press, and its motion for 0.75 s.
 
     Args:
         controlled: True for a controller, False for a motor whose motion is prescribed.
@@ -151,7 +151,7 @@ class Press:
         self.speed = self.run.velocity(self.crank.middle)[:, 2]
 
     def control(self, simulation):
-        """Return a torque in proportion to the missing angle and speed of the crank; N m."""
+        """Return a torque in proportion to the errors of angle and speed of the crank; N m."""
         angle, rate = wanted(simulation.t)
         lacks = angle - simulation.displacement(self.crank.middle)[2]  # rad
         lacks_rate = rate - simulation.velocity(self.crank.middle)[2]  # rad/s
@@ -164,8 +164,8 @@ ub.print_once("\npress, motion given\n" + str(driven.run))
 ub.print_once("\npress, controlled\n" + str(controlled.run))
 
 # %% [markdown]
-# The output lists the results of each element.  The force of a connector resists its motion, so the
-# force of a driving motor is negative.
+# The output lists results of the machine elements.  The force of a connector resists its motion, so
+# the force of a driving motor is negative.
 
 # %%
 t = driven.run.times
@@ -278,11 +278,11 @@ ub.print_once("\npictures and data:", *sorted(str(p) for p in output.glob("slide
 # %% [markdown]
 # ## Verification
 #
-# Angles, positions and the energy agree with another program, to the digits of its step.  Joints do
-# no work: the energy is constant after the moment has ended.  Their forces move the parts: the
-# forces of pivot and guide together change the momentum of the mechanism, and in the press the
-# motor balances the torque of the elbow force on a crank of constant speed.  Friction dissipates
-# its force times the path, the spring dissipates nothing, and the ledger closes.
+# Angles, positions and energy agree with another program.  Joints do no work, so the energy is
+# constant after the moment has ended.  The sum of the forces of pivot and guide equals the rate of
+# the momentum of the mechanism.  In the press the torque of the motor balances the torque of the
+# elbow force, because the crank has a constant speed.  Friction dissipates its force times the
+# path, the spring dissipates nothing, and the ledger closes.
 
 # %%
 for t_known, (angle_there, x_there) in reference.items():
@@ -293,7 +293,7 @@ for t_known, (angle_there, x_there) in reference.items():
 assert abs(kinetic[free].mean() - plateau) < 1e-6
 total = known.energy.total[free]
 assert np.ptp(total) < 1e-9 * total[0]
-# In a step that turns by 0.016 rad the moment acts on 2 tan(Δψ/2): (Δψ)²/12 more.
+# The moment does work on 2 tan(Δψ/2), larger than Δψ = 0.016 rad by the fraction (Δψ)²/12.
 assert abs(known.energy["loads"][-1] / (moment * angle[row[1.0]]) - 1) < 1e-4
 pushed = known.reaction(pivot)[1:, :2] + in_guide.force[1:]
 grown = np.diff(known.momentum()[:, :2], axis=0) / np.diff(known.times)[:, None]
@@ -330,7 +330,7 @@ ub.print_once("reference values reproduced")
 # %% [markdown]
 # ## Try this
 #
-# * a `gap` of 3 mm before the dead centre: can the controller still turn the press?
-# * `coefficient=0.8`: how much more power does it take?
+# * a `gap` that ends 3 mm before the dead centre: can the controller still drive the press?
+# * `coefficient=0.8`: how much more power does the motor need?
 # * `EnergyMomentum()` instead of `alpha = beta = 0.05`: how long does the rod vibrate after a
 #   stroke?

@@ -1,16 +1,16 @@
 # %% [markdown]
 # # Speed and accuracy: cells, step and scheme
 #
-# The arm of a pick-and-place machine swings its payload through 90 degrees within 0.6 s.  How far
-# does it bend on the way, and where is the payload in the end?  `ub.tradeoff` runs this scene with
-# several settings.  It finds the cheapest setting for a required accuracy, and the most accurate
+# The arm of a pick-and-place machine rotates its payload through 90 degrees within 0.6 s.  How far
+# does the arm bend, and where is the payload in the end?  `ub.tradeoff` runs this scene with
+# several settings.  It finds the fastest setting for a required accuracy, or the most accurate
 # setting for a given wall time.
 #
 # This demo shows
 #
 # * errors of chosen quantities,
-# * competing settings: schemes, and cells with two and three nodes,
-# * the cost of the search, and quantities that it refuses.
+# * comparison of settings: schemes, and cells with two and three nodes,
+# * the cost of the search, and the error for a quantity that does not converge.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -27,8 +27,8 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# The arm is an aluminium tube with a payload at its end, in the horizontal plane.  The hub follows
-# a cam law whose acceleration begins and ends at zero.  Two cells are the coarsest mesh.
+# The arm is an aluminium tube with a payload at its end, in the horizontal plane.  The acceleration
+# of the hub is zero at the beginning and at the end.  The coarsest mesh has two cells.
 
 # %%
 L, payload = 1.5, 2.0  # m, kg
@@ -37,7 +37,7 @@ tube = ub.Section.tube(d=0.025, t=0.0015, E=70e9, nu=0.33, rho=2700.0)  # m, Pa,
 
 
 def hub(t):
-    """Rotation of the hub; rad."""
+    """Return the rotation of the hub; rad."""
     s = min(t / duration, 1.0)
     return math.pi / 2 * (s - math.sin(2 * math.pi * s) / (2 * math.pi))
 
@@ -52,8 +52,8 @@ scene = ub.Scene(
 # %% [markdown]
 # ## Quantities
 #
-# The quantities are the place of the payload at the end, and the lag of the arm behind the hub at
-# sixteen instants.  The shape of an array must not depend on the steps, so a history is
+# The quantities are the position of the payload at the end, and the lag of the arm behind the hub
+# at sixteen instants.  The shape of an array must not depend on the steps, so a history is
 # interpolated at fixed instants.
 
 # %%
@@ -61,7 +61,7 @@ instants = np.linspace(0.05, end, 16)  # s
 
 
 def place(solution):
-    """Return the place of the payload at the end; m."""
+    """Return the position of the payload at the end; m."""
     return solution.position(arm.end)[-1]
 
 
@@ -76,9 +76,8 @@ quantities = {"place": place, "lag": lag}
 # %% [markdown]
 # ## A tolerance
 #
-# The tolerances are a millimetre and two thousandths of a radian.  Two schemes compete, and, by
-# default, cells with two and with three nodes.  A coarser tolerance of Newton's method is tried in
-# the end.
+# The tolerances are a millimetre and two thousandths of a radian.  The search compares two schemes,
+# by default cells with two and three nodes, and in the end a larger tolerance of Newton's method.
 
 # %%
 accurate = ub.tradeoff(
@@ -95,7 +94,8 @@ ub.print_once(accurate)
 # %% [markdown]
 # ## A budget
 #
-# Which accuracy is possible in twice that time, with the recommended scheme and cells?
+# Which accuracy is possible in twice the time of this run, with the same scheme and degree of
+# cells?
 
 # %%
 winner = accurate.recommended
@@ -120,9 +120,9 @@ ub.plot(fast).savefig(output / "tradeoff_budget.png")
 # %% [markdown]
 # ## Verification
 #
-# The recommended arguments are passed to `simulate` unchanged.  Compared with a reference whose
-# steps and cells are much finer than in all runs, the errors are below the tolerances; the error of
-# the extrapolated limit is within its estimate.
+# The recommended arguments are passed to `simulate` unchanged.  Against a reference with much finer
+# steps and cells than all runs, the errors are below the tolerances, and the error of the
+# extrapolated limit is within its estimate.
 
 # %%
 best = ub.simulate(scene, **winner, progress=False)
@@ -148,7 +148,7 @@ ub.print_once(
 )
 
 # %% [markdown]
-# `tradeoff` refuses a quantity without a limit and reports its values: here the number of steps.
+# `tradeoff` raises an error if a quantity does not converge, here the number of steps.
 
 # %%
 try:
@@ -163,6 +163,6 @@ else:
 # %% [markdown]
 # ## Try this
 #
-# * `scheme=ub.Newmark()`, or `dt=[0.04, ub.Adaptive(1e-3)]`: do they pay here?
+# * `scheme=ub.Newmark()`, or `dt=[0.04, ub.Adaptive(1e-3)]`: are these settings faster?
 # * A hub that stops within 20 ms: which of the two quantities becomes expensive?
 # * `mpirun -n 3`: two runs at a time.

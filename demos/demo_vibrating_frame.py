@@ -1,19 +1,19 @@
 # %% [markdown]
 # # Vibrating frame: a hinge that softens is a damper
 #
-# A portal frame is struck at its top left corner and swings freely.  It is elastic except for
-# one softening hinge at the top right corner, which opens when the bending moment reaches its
-# limit.  Neither the material nor the scheme dissipates energy, so all decay comes from this hinge.
+# A portal frame is struck at its top left corner and swings freely.  It is elastic except for one
+# softening hinge at the top right corner, which opens when the bending moment reaches its limit.
+# Neither the elastic material nor the scheme dissipates energy, so only the hinge damps the frame.
 #
 # This demo shows
 #
 # * a softening plastic hinge, `Beam(..., hinges={1.0: Softening(limit, fracture_energy)})`,
 # * logarithmic decrement and damping ratio from a history, `peaks` and `fit_decay`,
 # * the ledger: the energy loss of the vibration equals the dissipation of the hinge to round-off,
-# * the limited meaning of a "damping ratio" if plasticity damps.
+# * the limited meaning of a "damping ratio" if a plastic hinge causes the damping.
 #
-# It follows section 4.4 of the paper and its Table 2, which compares fracture energies G_f of the
-# hinge, from one to ten times a first value: the tougher the hinge, the less it damps.
+# It follows section 4.4 of the paper and its Table 2, in which the fracture energy G_f of the hinge
+# grows from a first value to ten times this value: the larger G_f, the smaller the damping.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -31,12 +31,13 @@ output.mkdir(exist_ok=True)
 #
 # The paper states the section, A = 10 cm², I = 1 cm⁴, E = 1 GPa, the step of 1 ms and the duration
 # of 15 s.  Frame, mass and impulse are in a drawing without numbers, and moments of 3 kN m cannot
-# belong to EI = 10 N m²: they would bend a beam to a radius of 3 mm.  So these are **assumptions**:
+# belong to EI = 10 N m², because they would bend a beam to a radius of 3 mm.  So these are
+# **assumptions**:
 #
-# * a square frame of 1 m with clamped feet, of a material as light as water,
+# * a square frame of 1 m with clamped feet, of a material with the density of water,
 # * the limit M_u = 315 N cm, where the paper prints 315 kN cm,
 # * G_f = 150 N cm, and a triangular impulse of 0.3 s whose elastic response just exceeds M_u: both
-#   chosen to match approximately the first decrement of Table 2,
+#   are chosen to match approximately the first decrement of Table 2,
 # * a hinge at the corner, rigid before it opens: "linear elasticity with softening response".
 
 # %%
@@ -67,7 +68,7 @@ def frame(factor):
 
 
 def swing(factor, end, record=()):
-    """Simulate the free swing; every fifth step is kept, 120 in a period."""
+    """Simulate the free vibration; every fifth step is recorded, 120 per period."""
     scene, corner = frame(factor)
     scheme = ub.EnergyMomentum()  # conserves energy exactly: only the hinge dissipates
     return ub.simulate(scene, scheme, t=(0.0, end), dt=1e-3, every=5, record=record), corner
@@ -97,12 +98,12 @@ for factor in (1, 10):
 # %% [markdown]
 # ## Decrement and damping ratio
 #
-# The amplitude of a swing is half the difference between a maximum of u and the minimum beside it,
-# so the shift of the middle by the open hinge does not matter.  The corner sinks whenever the frame
-# sways, to either side, v ≈ −0.6 u²/H: its minima occur twice in a period and are proportional to
-# the square of the swing.  Half the time and twice the logarithm compensate: **both displacements
-# have the same decrement**, as in the paper's table.  Two successive minima, left and right, are
-# averaged.
+# The amplitude of a swing is half the difference between a maximum of u and the next minimum, so
+# the shift of the middle by the open hinge does not matter.  The corner sinks whenever the frame
+# sways to either side, by v ≈ −0.6 u²/H.  The minima of v occur twice in a period and are
+# proportional to the square of u.  Half the time and twice the logarithm compensate, so **both
+# displacements have the same decrement**, as in the paper's table.  The minima of two successive
+# sways, left and right, are averaged.
 
 # %%
 PERIODS = 8
@@ -162,20 +163,19 @@ for f in (1, 1.4, 10):
 # ## What the numbers mean
 #
 # The trend agrees with the paper: the damping ratio falls with every step of G_f and nearly
-# vanishes at ten times the energy.  The reason is a competition.  Each opening dissipates energy,
-# which lowers the moment of the next swing, and it lowers the limit.  In a tough hinge the limit
-# hardly changes, the swings fall below it, and from then on the frame is elastic.  In a brittle
-# hinge the limit falls as fast as the swings, and the hinge opens again and again.
+# vanishes at ten times the energy.  Each opening dissipates energy, which reduces the moment of the
+# next swing, but it also reduces the limit of the hinge.  With a large G_f the limit hardly
+# changes, the moments fall below the limit, and from then on the frame is elastic.  With a small
+# G_f the limit falls as fast as the moments, and the hinge opens again and again.
 #
 # So this damping **ends**.  A decrement is a mean over the counted periods, not a property of the
-# frame: the printout shows how it rises and falls from one period to the next.  It also depends on
-# how far the impulse exceeds the limit: after an impulse weaker by a tenth the vibration is not
-# damped at all.  A difference of one per cent in the peak moment, high frequencies included,
-# determines how long the hinge continues to open, so even the mesh has an influence: with 16 or 32
+# frame.  It also depends on how far the impulse exceeds the limit: if the impulse is weaker by a
+# tenth, the vibration is not damped at all.  A difference of one per cent in the peak moment
+# determines how long the hinge continues to open, so even the mesh has an influence.  With 16 or 32
 # cells in each beam, the first decrement is 0.061 or 0.059 instead of 0.078.  The numbers hold for
 # one frame and one mesh, but **the trend is robust**: from 1 to 1.4 to 10 times G_f the damping
 # falls on all three meshes.  The trend reverses if G_f is so small that the hinge opens completely
-# in a swing or two: then it has dissipated all of G_f, and a joint without damping remains.
+# in one or two swings: then a revolute joint without damping remains.
 #
 # ## Pictures
 
@@ -251,9 +251,9 @@ ub.print_once("\npictures and data:", *names, sep="\n  ")
 # %% [markdown]
 # ## Verification
 #
-# The results confirm the trend of Table 2: each tougher hinge damps less, and the toughest hinge
-# hardly damps.  Both directions have equal decrements.  The ledger shows that the hinge is the only
-# damper.
+# The results confirm the trend of Table 2: each larger fracture energy causes less damping, and the
+# largest nearly none.  Both directions have equal decrements.  The ledger shows that only the hinge
+# dissipates energy.
 
 # %%
 horizontal, vertical = (np.array([decay[f][d].ratio for f in factors]) for d in (0, 1))
@@ -269,6 +269,6 @@ ub.print_once("trend of Table 2 reproduced")
 # %% [markdown]
 # ## Try this
 #
-# * `fracture = 0.3`: the hinge opens completely in the first swing; how much can it damp then?
+# * `fracture = 0.3`: the hinge opens completely in the first swing; how large is the damping then?
 # * `peak = 12.5`: the hinge never opens, and all decrements are zero,
 # * `ub.LinearSoftening` instead of `ub.Softening`: the resistance vanishes completely.
