@@ -89,13 +89,13 @@ for tolerance, one in zip(tolerances, adaptive, strict=True):
     dt = np.diff(one.times)
     sum_of_estimates = one.time_error * one.scene.size
     numbers = f"{dt.min():12.2e} {dt.max():12.2e} {error(one):12.2e} {sum_of_estimates:20.2e}"
-    ub.print_once(f"{tolerance:9.0e} {one.parts:9d} {numbers}")
+    ub.print_once(f"{tolerance:9.0e} {one.substeps:9d} {numbers}")
 for one in equal:
-    dt = END / one.parts
-    ub.print_once(f"    equal {one.parts:9d} {dt:12.2e} {dt:12.2e} {error(one):12.2e}")
+    dt = END / one.substeps
+    ub.print_once(f"    equal {one.substeps:9d} {dt:12.2e} {dt:12.2e} {error(one):12.2e}")
 
 chosen = adaptive[2]
-assert error(chosen) < min(error(one) for one in equal if one.parts < 5 * chosen.parts)
+assert error(chosen) < min(error(one) for one in equal if one.substeps < 5 * chosen.substeps)
 assert error(chosen) < chosen.time_error * chosen.scene.size
 for kink in push.times[1:]:
     assert kink in chosen.times
@@ -140,7 +140,7 @@ steps.savefig(output / "adaptive_steps_lengths.png")
 with ub.picture((8, 4.8)) as errors:
     axes = errors.subplots()
     for runs, style, label in ((equal, "s--", "equal steps"), (adaptive, "o-", "adaptive steps")):
-        axes.loglog([one.parts for one in runs], [error(one) for one in runs], style, label=label)
+        axes.loglog([one.substeps for one in runs], [error(one) for one in runs], style, label=label)
     axes.set(xlabel="steps", ylabel="error of position at 0.64 s (m)")
     axes.legend()
 errors.savefig(output / "adaptive_steps_errors.png")
