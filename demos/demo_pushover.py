@@ -137,9 +137,9 @@ def draw_state(axes, n, x0):
         side = "left" if offset[0] > 0 else "right"
         turn = f"{abs(np.degrees(state.jump[n])):.0f}°"
         axes.annotate(turn, at, offset, textcoords="offset points", ha=side)
-    for place, subdomain in ((left.at(0.5), 1 / 3), (left.end, 2 / 3)):
+    for place, fraction in ((left.at(0.5), 1 / 3), (left.end, 2 / 3)):
         near = path.position(place)[n] + aside - (0.45, 0)
-        far = near - (subdomain * abs(P[n]) / 40 + 0.5, 0)
+        far = near - (fraction * abs(P[n]) / 40 + 0.5, 0)
         head, tail = (near, far) if P[n] > 0 else (far, near)
         style = {"arrowstyle": "-|>,head_width=0.3,head_length=0.5", "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", head, tail, arrowprops={"color": BLUE, "lw": 2.5, **style})
@@ -154,12 +154,12 @@ with ub.picture((11.5, 4.2)) as figure:
         shapes.text(
             x0 + 3, -1.7, title.format(f"{P[n]:.0f}".replace("-", "−")), ha="center", fontsize=14
         )
-    for subdomain, text in (
+    for fraction, text in (
         (1.0, "plastic moment"),
         (0.5, "half of it"),
         (0.0, "no moment: a joint"),
     ):
-        shapes.plot([], [], mfc=moments(subdomain), label=text, **circle)
+        shapes.plot([], [], mfc=moments(fraction), label=text, **circle)
     shapes.legend(loc="lower left", bbox_to_anchor=(0.03, 0.96), ncols=3, handletextpad=0.1)
     curve.axhline(0, color=GREY, lw=0.8)
     curve.plot(sway, push_of_mechanism(sway), "--", color=GREY, label="plastic theory")

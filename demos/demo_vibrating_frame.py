@@ -83,8 +83,8 @@ def swing(factor, end, record=()):
 
 # %%
 elastic, corner = swing(0, 2.0)
-law_residual = np.abs(elastic.section_forces_at(corner)[:, 2]).max() / limit
-ub.print_once(f"without a hinge the moment at the corner reaches {law_residual:.3f} M_u\n")
+moment_ratio = np.abs(elastic.section_forces_at(corner)[:, 2]).max() / limit
+ub.print_once(f"without a hinge the moment at the corner reaches {moment_ratio:.3f} M_u\n")
 
 factors = (1, 1.2, 1.4, 1.6, 1.8, 2, 2.2, 10)
 files = ub.XDMF(output / "vibrating_frame.xdmf", every=100)
