@@ -140,7 +140,7 @@ steps.savefig(output / "adaptive_steps_lengths.png")
 with ub.picture((8, 4.8)) as errors:
     axes = errors.subplots()
     for runs, style, label in ((equal, "s--", "equal steps"), (adaptive, "o-", "adaptive steps")):
-        axes.loglog([one.substeps for one in runs], [error(one) for one in runs], style, label=label)
+        axes.loglog([x.substeps for x in runs], [error(x) for x in runs], style, label=label)
     axes.set(xlabel="steps", ylabel="error of position at 0.64 s (m)")
     axes.legend()
 errors.savefig(output / "adaptive_steps_errors.png")
