@@ -27,7 +27,7 @@ from ufl_beam.model.softening_laws import SofteningLaw
 # -- energy and resistance -------------------------------------------------------------------------
 
 SMOOTH = 1e-7
-"""Relative difference of works by Gauss and Simpson up to which Gauss's rule counts as exact.
+"""Relative difference of works by Gauss's and Simpson's rules up to which Gauss's is used alone.
 
 Gauss's rule has four points.  The errors are of the eighth and the fourth order in the step, with
 the factors 1 / 1778112000 and 1 / 2880.  If Simpson's rule has the error 1e-7, the error of

@@ -23,7 +23,7 @@ from ufl_beam.model.softening_laws import SofteningLaw
 GAUSS_POINTS = 4
 """Number of points of Gauss's rule on the line from the beginning to the end of a step.
 
-The rule is exact up to degree 7.  Four forces cost hardly more than one strain.
+The rule is exact for polynomials up to degree 7.
 """
 
 
@@ -193,7 +193,7 @@ class EnergyMomentum(EnergyMomentumBase, _Velocities):
 
     Inelastic material satisfies its laws in the middle of the step, which is of second order.  With
     ``alpha = 1/2`` it satisfies them at the end, as in backward Euler, which is of first order.  In
-    the middle stresses lie on the yield surface, and a fully open hinge bears no moment.  At the
+    the middle, stresses lie on the yield surface, and a fully open hinge bears no moment.  At the
     ends stress and moment alternate about these values, with deviations proportional to the step; a
     small ``alpha`` damps these.  The elastic energy of material that breaks completely is lost at
     once, as "numerical".
@@ -232,22 +232,22 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
     The dissipation of :class:`EnergyMomentum` is proportional to the changes of strains and
     velocities in a step, and of first order.  Here it is proportional to second differences of
     both: a mode of circular frequency ω loses the fraction c (ω dt)⁴ of its energy in a step, with
-    c = rho_inf (1 - rho_inf) / (2 (1 + rho_inf)²), and unresolved modes are reduced to ``rho_inf``
-    of their amplitude.  The equations of the step are
+    c = rho_inf (1 - rho_inf) / (2 (1 + rho_inf)²), and the amplitude of unresolved modes is reduced
+    by the factor ``rho_inf``.  The equations of the step are
 
         resultants  C ((e0 + e1)/2 + c (Δe - r Δe')),     Δu/dt = (v0 + v1)/2 + c (Δv - r Δv'),
 
     where Δe' and Δv' are the changes in the previous step of length dt', and r = dt/dt', at most 1.
 
-    The sum of the energy and of c times the energy of Δe and Δv never grows by the scheme, for any
-    steps, because Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2.  The total loss is the entry
-    "numerical" of the ledger and never negative; a single step may give back a part of the loss of
+    The energy plus c times the energy of Δe and Δv never grows by the scheme, for any step lengths,
+    because Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2.  The total loss is the entry
+    "numerical" of the ledger and never negative; a single step may return a fraction of the loss of
     previous steps.  Linear momentum is conserved exactly, angular momentum to second order.
     Connectors and the resultants of cells that may yield or break are not damped, so that open
     hinges turn freely.
 
     Args:
-        rho_inf: Spectral radius at infinite frequency, from 1/3 to 1; 1 loses nothing.
+        rho_inf: Spectral radius at infinite frequency, from 1/3 to 1 (no loss).
 
     Raises:
         ArgumentError: ``rho_inf`` is outside [1/3, 1].

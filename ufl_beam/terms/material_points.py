@@ -57,13 +57,13 @@ DIGITS = 16 * float(np.finfo(float).eps)
 """Round-off of plastic dissipation, as a fraction of the sum of C e² over points and step ends."""
 
 EXHAUSTED = 1e-6
-"""Resistance, as a fraction of the limit, up to which modes treat an open hinge as a joint.
+"""Resistance, as a fraction of the limit, up to which modal analysis treats a hinge as a joint.
 
 At this resistance an exponential law has the same fraction of its fracture energy left.
 """
 
 FREED_STIFFNESS = 1e-30
-"""Factor of the stiffness of such a hinge; its frequencies then are zero to round-off."""
+"""Factor of the stiffness of such a hinge; the frequency of its motion is zero to round-off."""
 
 
 def create_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger) -> None:

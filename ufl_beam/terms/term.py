@@ -144,7 +144,7 @@ class Callbacks:
     def time_functions(self, functions: Sequence[tuple[TimeFunction, object]]) -> Any:
         """Return an array of ``time_function`` of loops.h for pairs of a function and its owner.
 
-        Error messages about a function name its owner, see :func:`value_at`.
+        Error messages mention the owner of the function, see :func:`value_at`.
         """
         functions_in_c = ffi.new("time_function[]", len(functions))
         for place, (function, owner) in zip(functions_in_c, functions, strict=True):
