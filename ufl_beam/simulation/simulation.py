@@ -145,7 +145,7 @@ class Simulation(Stepper):
             equation.cell_forces.begin(forces)
         super().__init__(comm, equation, newton, t0, q_local, path, solution, together, free_motion)
         self._begun_at = before
-        solution.needs_start = solution.equilibrium_fraction < 1 or self.cell_forces.asks_for_before
+        solution.needs_start = solution.equilibrium_fraction < 1 or self.cell_forces.needs_q0
         solution.forces_from_record = (
             self.cell_forces.forces_from_record
             if subdomain.alone

@@ -26,7 +26,7 @@ class CellForces:
 
     Attributes:
         c: ``cell_forces`` of loops.h.
-        asks_for_before: True if the forces depend on the configuration at the beginning of the
+        needs_q0: True if the forces depend on the configuration at the beginning of the
             step.
         vectors: Pointers to vectors of degrees of freedom that determine forces.
         entries: Pairs of a pointer to entries of a form that determine forces, and their number.
@@ -72,7 +72,7 @@ class CellForces:
             self._alive.append(accepted_values)
         if loads != ffi.NULL:
             self.factors.append((ffi.addressof(loads, "accepted"), loads.vectors))
-        self.asks_for_before = any(form.uses(q0) for form, q0, *_ in self._step_forms)
+        self.needs_q0 = any(form.uses(q0) for form, q0, *_ in self._step_forms)
         first, *between, last = subdomain.numbering.mesh.nodes - 0.5
         from_middle = np.array([first, last, *between])
         self.c = fill(

@@ -344,7 +344,7 @@ class UserLaws(Response):
         self._each = [
             UserLaw(connector, record, size, weight, x) for connector, record, size, x in arguments
         ]
-        self.asks_at_ends = any(law.state.size or law.energy for law in self._each)
+        self.needs_accept_end = any(law.state.size or law.energy for law in self._each)
         self._stored, self._force = np.zeros(1), np.zeros(n)
         self._c = struct("called_laws", force=self._force, held=self._stored)
         self.in_c = {"asked": self._c}
@@ -357,7 +357,7 @@ class UserLaws(Response):
         c.again_self = handle(self._again)
         return super().in_steps(callbacks)
 
-    def know(self, term: Any) -> None:
+    def bind_term(self, term: Any) -> None:
         """Store references to the motions, accepted and latest, and to the latest rows of laws."""
         (self._e0, self._e1), self._rows = term.motions, term.latest_rows
 

@@ -185,7 +185,7 @@ class ConnectorForces(ConnectorTerm):
         )  # fmt: skip
         self.loops = loop("add_connectors_force", self._in_c), loop("add_cells", tangent.cells)
         self.law_residual = loop("missed_by_connectors", self._in_c)
-        self.response.know(self)
+        self.response.bind_term(self)
 
     def _form(self, form: ufl.Form) -> Kernel:
         """Return a kernel of a form on the connectors, with their geometry."""
@@ -212,7 +212,7 @@ class ConnectorForces(ConnectorTerm):
         first, accept, state = ([loop(name, c)] for name in phases)
         admits = loop("points_dissipate", points) if response.must_dissipate else None
         change, again = loop("change_of_connectors", c), None
-        if response.asks_at_ends:
+        if response.needs_accept_end:
 
             def accept_user_laws(step: Any, q1: Any, s: Any) -> None:
                 """Let laws of a user accept the end of a step before any other term accepts it."""

@@ -84,7 +84,7 @@ class Response:
             accepted.
         opens: Fields of ``openable`` of loops.h if connectors may open or slip by the rule in
             material_points.py; else None.
-        asks_at_ends: True if :meth:`accept_end` must be called when a step is accepted.
+        needs_accept_end: True if :meth:`accept_end` must be called when a step is accepted.
         motion: Accepted motions that solutions record, (num_connectors,); None if solutions record
             the motions of the nodes.
         slip_direction: Direction of plastic slip in the latest iterate, 1 or -1; 0 without slip.
@@ -94,7 +94,7 @@ class Response:
             ``dissipated`` of :class:`Connection`; J.
     """
 
-    must_dissipate = asks_at_ends = False
+    must_dissipate = needs_accept_end = False
     opens: dict[str, Any] | None = None
     motion: Array | None = None
     sticks: Index | None = None
@@ -150,7 +150,7 @@ class Response:
         functions = {field: callbacks.time_functions(some) for field, some in wanted}
         return {**self._in_steps, **functions, **places}
 
-    def know(self, term: Any) -> None:
+    def bind_term(self, term: Any) -> None:
         """Store arrays and forms of the :class:`ConnectorForces` ``term`` that the laws need."""
         if self.sticks is not None:
             rate, v = term.motion_rate, term.forms.u
