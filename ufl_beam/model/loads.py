@@ -18,8 +18,7 @@ from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Reco
 class Load(Record, ABC):
     """Base of the loads; terms/load_forces.py computes their forces."""
 
-    amplitude: TimeFunction
-    """Factor on the load, a function of time t (s)."""
+    amplitude: TimeFunction  # factor on the load, a function of time t (s)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
