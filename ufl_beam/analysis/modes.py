@@ -28,7 +28,7 @@ from ufl_beam.mechanics.classical_schemes import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.constraint_checks import require_no_mechanism, require_no_prestress
-from ufl_beam.model.loads import FollowerLoad, RotatingFrame
+from ufl_beam.model.loads import Load, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork
 from ufl_beam.output.paraview_files import VTKHDF, XDMF, TimeSeries
@@ -356,7 +356,7 @@ def buckling(
     n = _checked_count("buckling", scene, n, at, mesh)
     require_number(t, "buckling: t")
     for load in (*scene.loads, *scene.works):
-        if isinstance(load, FollowerLoad | RotatingFrame | VirtualWork):
+        if isinstance(load, VirtualWork) or (isinstance(load, Load) and not load.dead):
             raise ArgumentError(
                 f"buckling: a {type(load).__name__} has a stiffness of its own; use "
                 "modes(..., at=) about states with an increasing load, and find where a frequency "

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from abc import ABC
 from dataclasses import KW_ONLY, dataclass
+from typing import ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
@@ -37,6 +38,7 @@ class Joint(Bearing, Record, ABC):
         holders: Connectors that hold the other motions that the joint prevents.
         meets: True if the places must coincide in the undeformed scene.
         advice: Text appended to the error if the places do not coincide.
+        is_rod: True if files show a line from place to place.
 
     Example:
         >>> mast = ub.Beam((2, 0), (2, 3), section, name="mast")
@@ -54,6 +56,7 @@ class Joint(Bearing, Record, ABC):
     holders: tuple[Connector, ...] = ()
     meets: bool = False
     advice: str = "RigidLink and Link join places that are apart"
+    is_rod: ClassVar[bool] = False
 
     __repr__ = bracketed
 
@@ -204,6 +207,7 @@ class RigidLink(Joint):
 
     a: PlaceField
     b: PlaceField
+    is_rod: ClassVar = True
     shared = (2,)
 
     def __post_init__(self) -> None:
@@ -234,6 +238,7 @@ class Link(Joint):
 
     a: PlaceField
     b: PlaceField
+    is_rod: ClassVar = True
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -19,6 +19,7 @@ class Load(Record, ABC):
     """Base of the loads; terms/load_forces.py computes their forces."""
 
     amplitude: TimeFunction  # factor on the load, a function of time t (s)
+    dead: ClassVar[bool] = True  # False if the forces depend on the motion
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -95,6 +96,8 @@ class FollowerLoad(LoadAtPlace):
         >>> bool(run.reaction(pushed.supports[0])[-1, 0] > 1e3)  # N: the force has turned
         True
     """
+
+    dead: ClassVar = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -182,6 +185,7 @@ class RotatingFrame(Load):
 
     # A rate that varies in time would cause a further force, the Euler force.
     amplitude: ClassVar[TimeFunction] = steady  # type: ignore[misc]
+    dead: ClassVar = False
 
 
 LOADS = PointLoad, FollowerLoad, LineLoad, Gravity, RotatingFrame

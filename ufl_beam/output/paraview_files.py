@@ -20,7 +20,6 @@ from ufl_beam.discretization.dof_numbering import turned
 from ufl_beam.errors import ArgumentError, require_count
 from ufl_beam.model.bodies import AttachmentPoint, arm
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.joints import Link, RigidLink
 from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
 from ufl_beam.output.recorder import Restartable, StateView
@@ -63,7 +62,7 @@ def scene_rods(scene: Scene) -> list[Rod]:
         others = [s for s in spots[body] if s.point != body.center] or [near]
         rods += [Rod(body.middle, place, BODY) for place in others]
     for joint in scene.joints:
-        if isinstance(joint, RigidLink | Link):
+        if joint.is_rod:
             a, b = joint.places
             pulls = next((c for c in joint.holders if c.stretches), None)
             rods.append(Rod(a, b, LINK, pulls))

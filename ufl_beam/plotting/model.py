@@ -73,7 +73,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
             around = LEFT + RIGHT, font_size(BELOW + ABOVE + REMARK * len(notes))
             least, most = (POINTS * np.array(size) - around for size in (LEAST, MOST))
             # at least as wide as the texts above the axes
-            texts = [text for text, *_ in map(scene_load, scene.loads) if text]
+            texts = [text for text, *_ in map(scene_load_caption, scene.loads) if text]
             widths = [2 * measure(text)[0] + ARROW_WIDTH for text in texts]
             first = 2 * TITLE_SIZE / LABEL_SIZE * measure(title)[0] + sum(widths)
             above = max([first, *(2 * measure(words)[0] for words in notes)])
@@ -86,7 +86,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
         _write(axes, placed, drawing.scale)
         # Loads on the whole scene are stated above the axes, at the right.
         x, y = frame[2:] - frame[:2] + (0.0, 17.0)
-        for text, arrow, angle in filter(any, map(scene_load, scene.loads)):
+        for text, arrow, angle in filter(any, map(scene_load_caption, scene.loads)):
             for words, size, rotation in ((text, LABEL_SIZE, 0.0), (arrow, ARROW_SIZE, angle)):
                 axes.annotate(
                     words, (x, y), xycoords="axes points", ha="right", va="center", color=RED,
@@ -128,7 +128,7 @@ def model_notes(scene: Scene) -> list[str]:
     return notes
 
 
-def scene_load(load: Load) -> tuple[str, str, float]:
+def scene_load_caption(load: Load) -> tuple[str, str, float]:
     """Return text, arrow and its angle (degrees) of a load on the whole scene; else empty texts."""
     if isinstance(load, Gravity):
         x, y = load.acceleration

@@ -21,7 +21,9 @@ from ufl_beam.plotting.positions import Candidate, directions, normal, points_al
 from ufl_beam.plotting.style import GREEN, INK, RED, TEXT, WHITE, number, with_unit
 from ufl_beam.plotting.symbols import FRONT, Stroke, disc
 
-LOADS, MOTIONS, CAPTIONS, NAMES = range(4)  # ranks of labels: labels of loads are placed first
+LOAD_LABELS, MOTIONS, CAPTIONS, NAMES = range(
+    4
+)  # ranks of labels: labels of loads are placed first
 MOST_LABELS = 80  # number of labels beyond which names, and then captions, are left out
 MOST_CELLS = 300  # number of cells beyond which neither cells nor possible hinges are marked
 
@@ -258,14 +260,14 @@ def _draw_point_load(drawing: Drawing, load: LoadAtPlace) -> None:
         line = _force_arrow(drawing, load.place, direction, size / drawing.subject.force)
         drawing.strokes["loads"] += _arrow(line, RED, unit, hollow=hollow)
         text = in_time(with_unit(size, "N"), load.amplitude) + more
-        drawing.write(text, RED, LOADS, _beside(*line))
+        drawing.write(text, RED, LOAD_LABELS, _beside(*line))
     if load.moment:
         radius = 1.7 * unit + drawing.stack((load.place.point, "moment"), 0.8 * unit)
         drawing.strokes["loads"] += _arrow(_arc(at, radius, load.moment), RED, unit, hollow=hollow)
         text = in_time(with_unit(abs(load.moment), "N m"), load.amplitude) + more
-        drawing.write(text, RED, LOADS, _around(at, radius))
+        drawing.write(text, RED, LOAD_LABELS, _around(at, radius))
     if not size and not load.moment:
-        drawing.write("0 N", RED, LOADS, _around(at, 0.0))
+        drawing.write("0 N", RED, LOAD_LABELS, _around(at, 0.0))
 
 
 def _force_arrow(
@@ -323,15 +325,15 @@ def _draw_line_load(drawing: Drawing, load: LineLoad) -> None:
                 ends = at + np.outer((-0.9 * unit, 0.9 * unit), direction)
                 drawing.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
             spots = [Candidate(at, left, aside + 0.3 * unit) for at, _ in _normals(axis)]
-        drawing.write(in_time(with_unit(size, "N/m"), load.amplitude), RED, LOADS, spots)
+        drawing.write(in_time(with_unit(size, "N/m"), load.amplitude), RED, LOAD_LABELS, spots)
     if load.moment:
         for at in spaced(3.2 * unit):
             line = _arc(at, 0.75 * unit, load.moment)
             drawing.strokes["loads"] += _arrow(line, RED, 0.7 * unit)
         text = in_time(with_unit(abs(load.moment), "N m/m"), load.amplitude)
-        drawing.write(text, RED, LOADS, _along(axis, 0.9 * unit))
+        drawing.write(text, RED, LOAD_LABELS, _along(axis, 0.9 * unit))
     if not size and not load.moment:
-        drawing.write("0 N/m", RED, LOADS, _along(axis, 0.0))
+        drawing.write("0 N/m", RED, LOAD_LABELS, _along(axis, 0.0))
 
 
 # -- motions -----------------------------------------------------------------------------------

@@ -117,7 +117,7 @@ class DeadLoads(_AtDofs):
         for load in loads:
             key = id(load.amplitude)
             _, vector = vectors.setdefault(key, (load, np.zeros(subdomain.size)))
-            if (along := _add_forces(load, subdomain, vector)) is not None:
+            if (along := _add_dead_load(load, subdomain, vector)) is not None:
                 in_cells[key] = in_cells.get(key, 0.0) + along
         for key, along in in_cells.items():
             np.add.at(vectors[key][1], subdomain.cell_dofs, along)
@@ -170,7 +170,7 @@ class DeadLoads(_AtDofs):
             self._factors[2, k] = archive.number(f"part of dead loads {k}", factor)
 
 
-def _add_forces(load: Load, subdomain: Subdomain, forces: Array) -> Array | None:
+def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> Array | None:
     """Add the concentrated forces of a dead load with the factor 1 to ``forces``.
 
     Returns:
