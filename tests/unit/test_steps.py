@@ -344,7 +344,9 @@ class Short(ub.EnergyMomentum):
 
 
 def test_coefficients_of_another_number_are_refused():
-    with pytest.raises(ub.ArgumentError, match=r"Short.*coefficients.*rows of 3 \+ known numbers"):
+    with pytest.raises(
+        ub.ArgumentError, match=r"Short.*coefficients.*rows have 3 \+ known finite numbers"
+    ):
         ub.Simulation(elastic(), Short())
 
 

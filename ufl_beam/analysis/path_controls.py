@@ -25,7 +25,7 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
 from ufl_beam.terms.term import Term
 
-MOST_DOUBLINGS = 30  # largest number of doublings of a step until something dissipates in it
+MOST_DOUBLINGS = 30  # largest number of doublings of a step in searches for a dissipated energy
 ONSET_FRACTION = 1e-6  # dissipated energy at the onset, as a fraction of the energy in the step
 CONTROL_TOLERANCE = 1e-9  # largest error of the equation of the control, as a fraction of a step
 
@@ -34,9 +34,9 @@ class Crossing(NamedTuple):
     """Step to a bifurcation point, with the critical mode there.
 
     Along the mode the tangent is singular and the load does no work, so a correction along the mode
-    would be round-off divided by zero.  Hence the component of a correction along the mode is
-    ``speed`` times the change of the load factor, as on the path.  The mode is in the axes of the
-    supports.
+    would be round-off divided by zero.  Therefore this component of the correction is
+    prescribed: ``speed`` times the change of the load factor, the ratio on the path.  The mode is
+    in the axes of the supports.
     """
 
     predicted: Array
@@ -109,7 +109,7 @@ class PathCorrector:
         return self.subdomain.total(local)
 
     def dissipation_side(self, q: Array, direction: Array) -> float:
-        """Return the change of dissipation in a small motion along ``direction``, or 0; J."""
+        """Return how much more a motion along ``direction`` dissipates than one against it; J."""
         motion = direction[:-1]
         now, size = self.dissipation(q), self.size(motion)
         active = any(
@@ -124,7 +124,10 @@ class PathCorrector:
         return 0.0
 
     def kink(self, step: Array) -> tuple[Array, Array] | None:
-        """Return the increment to an onset of dissipation in ``step``, and the direction there."""
+        """Return the part of ``step`` up to an onset of dissipation, and the direction after it.
+
+        The result is None if the last step dissipated energy, or if ``step`` does not.
+        """
         q, motion = self.simulation.q, step[:-1]
         self.begin()
         if self.dissipates or not (whole := self.dissipation(q + motion)) > 0:
@@ -142,7 +145,7 @@ class PathCorrector:
             if self.dissipation(q + high * motion) >= energy:
                 return increment + self._length_to(energy, q, motion, (low, high), 12) * direction
             low, high = high, 2 * high
-        raise StepFailed("nothing dissipates in the direction of the path")
+        raise StepFailed(f"less than {energy:g} J dissipates in the direction of the path")
 
     def _length_to(
         self, energy: float, q: Array, motion: Array, between: tuple[float, float], halvings: int
@@ -173,7 +176,7 @@ class PathCorrector:
         self.simulation.equation.begin(self.step_at(self.t), self._loading)
 
     def tangent(self, x: Array, r: Array) -> None:
-        """Assemble the tangent, and add the derivative with respect to the load factor to ``r``.
+        """Assemble the tangent, and add the derivative of the residual by the load factor to ``r``.
 
         The derivative is a central difference, which is exact for linear time functions.
         """
@@ -190,7 +193,7 @@ class PathCorrector:
         self._A = simulation.equation.tangent_at(x, self._rates, r)
 
     def correct(self, y: Array, z: Array) -> None:
-        """Add to ``y`` the correction by the linearized equation of the control.
+        """Find the load factor by the linearized control equation, and add its correction to ``y``.
 
         Corrections are subtracted from an iterate.  ``y`` is the correction at a constant load
         factor; ``z`` is the derivative of the correction with respect to the load factor.
@@ -217,13 +220,13 @@ class PathCorrector:
     def _error(self, q: Array) -> float:
         """Return the error of the control equation at ``q``, divided by ``target_change``."""
         if self._normal is None:
-            return self.dissipation(q) / self._reach - 1.0
-        return self.along(self._normal, np.append(q, self.t) - self._end) / self._reach
+            return self.dissipation(q) / self._target_change - 1.0
+        return self.along(self._normal, np.append(q, self.t) - self._end) / self._target_change
 
     def _error_derivative(self, direction: Array) -> float:
-        """Return the derivative of :meth:`_error` along a direction; of energies by differences."""
+        """Return the derivative of :meth:`_error`, for energies by differences."""
         if self._normal is not None:
-            return self.along(self._normal, direction) / self._reach
+            return self.along(self._normal, direction) / self._target_change
         q, size = self.simulation.supports.in_plane(self._x), self.size(direction[:-1])
         if size == 0.0:
             return 0.0
@@ -248,7 +251,7 @@ class PathCorrector:
                 if possible, see material_points.py; false along a direction in which they open.
         """
         simulation = self.simulation
-        self._end, self._normal, self._reach = self.start + predicted, normal, target_change
+        self._end, self._normal, self._target_change = self.start + predicted, normal, target_change
         self.predicted_step = predicted = (
             predicted if self.crossing is None else self.crossing.predicted
         )
@@ -267,7 +270,7 @@ class PathCorrector:
     def direction_at(self, q: Array, t: float) -> tuple[Stiffness, Array]:
         """Return the stiffness of a state, and the direction of the path that raises the factor."""
         self.t, supports = t, self.simulation.supports
-        for _ in range(2):  # the first tangent of a step is for the forces before it
+        for _ in range(2):  # the first tangent uses the forces before the step
             rate = np.zeros(self.subdomain.size)
             self.simulation.together(self.tangent, supports.in_axes(q), rate)
         stiffness = Stiffness(self.subdomain, self._A, supports.dofs, rate, self._all_weights)
@@ -292,7 +295,7 @@ class Control:
     step: float
     factor = 1.0  # change of the load factor that counts as much as a length of 1
     quantity = ""  # name of the controlled quantity if it may have an extremum on a path
-    least_rest = 0.0  # least length of a step after a kink, as a fraction of the step
+    least_rest = 0.0  # least rest of a step after a kink, as a fraction of the step
 
     def __post_init__(self) -> None:
         require_number(self.step, f"{type(self).__name__}: step")
@@ -303,7 +306,7 @@ class Control:
         """Raise :class:`ArgumentError` if the control does not fit the scene."""
 
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
-        """Return the gradient of the controlled quantity, with the sign for growth in a step.
+        """Return the gradient of the controlled quantity, with the sign for which it grows.
 
         By default the quantity is the arc length along ``direction``.
         """
@@ -390,7 +393,8 @@ class ArcLength(Control):
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return a positive number if the path continues along ``direction``.
 
-        ``step`` sets the initial sense; later dissipation grows, or the path turns less than π/2.
+        At first the sign of ``step`` decides.  Later dissipation grows in this sense or, if it does
+        not decide, the path turns by less than π/2.
         """
         if increment is None:
             return self.step * float(direction[-1])
@@ -400,7 +404,7 @@ class ArcLength(Control):
 
 @dataclass(frozen=True)
 class LoadControl(Control):
-    """Load control by equal steps of the load factor, up to the limit load.
+    """Load control up to the limit load: steps change the load factor by ``step`` or less.
 
     Args:
         step: Change of the load factor; negative if the factor is to fall.
@@ -518,8 +522,8 @@ class DissipationControl(Control):
     def solve_step(self, corrector: PathCorrector, fraction: float) -> Trial:
         """Solve for a step that dissipates the energy ``step``, or for an arc-length step.
 
-        The step is by arc length while nothing dissipates, and if the step by energy fails after a
-        step with dissipation.
+        An arc-length step is taken if the last step dissipated no energy and this step does not,
+        or if the step by energy fails.
         """
         if not corrector.dissipates:
             with suppress(StepFailed):

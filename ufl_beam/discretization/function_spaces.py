@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Finite element of the beams, with which forms are written, and the cells of a subdomain.
 
-Forms do not depend on a scene: they are defined on one cell and compiled once per process.  Only
-integrals of a user are defined on the cells of a scene, as a mesh of DOLFINx.
+Forms do not depend on a scene: they are defined on one cell and compiled once per process.
+Integrals of a user and the reference solver need a DOLFINx mesh with the cells of a scene.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Element:
         return fem.Function(fem.functionspace(self._cell, element))
 
     def sampled(self, values: Expr) -> ufl.Form:
-        """Return a form for ``values`` (3,) at the points of ``dx(1)``, times weights of sum 1."""
+        """Return a linear form whose cell vector has ``values`` (3,) times weights of sum 1."""
         z = ufl.TestFunction(self.at_points(3).function_space)
         return ufl.dot(values, z) / self.axis.h * self.dx(1)
 
@@ -169,7 +169,7 @@ class Fields:
         return kernel
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
-        """Compile a virtual work and, to add to ``A``, its derivative; both share their values."""
+        """Compile a virtual work and its derivative, added to ``A``, with the same coefficients."""
         form, lanes = derivative(work, q1), self._coordinates_in_lanes
         force = self.kernel(work, q1)
         tangent = Kernel(form, q1, self.cell_dofs, self._coordinates(), lanes)

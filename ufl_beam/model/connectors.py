@@ -54,7 +54,7 @@ class Connector(Record, ABC):
         a, b: The places.
         law: Law of the force.
         axis: Unit vector, for motions along an axis.
-        corner: Point, fixed to the node of ``a``, to which the motion of ``b`` refers, or None.
+        corner: Point that moves with the node of ``a`` and replaces place a in the motion, or None.
         component: Index of the motion in the law of a :class:`Bushing`, otherwise 0.
         components: Connectors of the components of a :class:`Bushing`, otherwise empty.
 
@@ -126,7 +126,7 @@ class Connector(Record, ABC):
         return self.motion == "sliding"
 
     def rigidly(self) -> tuple[Factors, Factors]:
-        """Return the factors for the nodes of a and b, in the undeformed scene."""
+        """Return the derivatives of the motion by (u, v, ψ) of both nodes, undeformed."""
         if self.is_rotation:
             return (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)
         (dx, dy), length = self.apart, math.hypot(*self.apart)
@@ -320,10 +320,10 @@ def plastic_hinges(
     """Return plastic hinges of zero length as connectors, whose motions are jumps of rotation.
 
     Possible hinges are ``Beam(hinges=)``, and ``Section(hinge=)`` at both ends of a beam.  A hinge
-    at an end is left out if the end bears no moment, or only the moment of a load: that load acts
-    on the beam, because nothing beyond the hinge could bear it.  If a joint only transmits
-    a moment between two beams, both bear the same moment.  Then only the weaker beam has a hinge,
-    because a hinge of the stronger beam would never open.
+    at an end is left out if the end bears no moment, or only the moment of a load.  Nothing outside
+    of such a hinge could bear this moment, so the load acts on the beam.  If a joint connects two
+    beams and no other part at it bears a moment, both beams bear the same moment.  Then the hinge
+    of the stronger beam is left out if the moment of the weaker hinge never exceeds its limit.
     """
     laws = {place: law for place, law in may_have.items() if law.opens}
     if not laws:
@@ -367,7 +367,7 @@ def place_of(hinge: Connector) -> Place:
 def _never_opens(place: Place, others: Sequence[Node], laws: Mapping[Place, HingeLaw]) -> bool:
     """Return whether a hinge never opens, because the only other beam at the joint yields first.
 
-    If both hinges have the same limit, the first hinge in ``laws`` yields first.
+    Of two bounded laws with the same limit, the first in ``laws`` counts as the weaker one.
     """
     if len(others) > 1 or not isinstance(others[0], Place) or others[0] not in laws:
         return False

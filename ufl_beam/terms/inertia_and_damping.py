@@ -50,7 +50,7 @@ BEFORE = "velocity before"
 """Name of the velocities at the beginning of the last step in saved data."""
 
 
-@lru_cache(maxsize=1024)  # constant steps between rounded times have about ten lengths
+@lru_cache(maxsize=1024)  # differences of rounded times have about ten values
 def _coefficients(scheme: Any, dt: float, last_dt: float, known: int) -> Coefficients:
     """Return the coefficients of a scheme for a step as lists of numbers."""
     c = scheme.coefficients(dt, last_dt, known)
@@ -76,8 +76,8 @@ def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
         right = False
     if not right or FURTHER + number > lib.MOST_RATES:
         raise ModelError(
-            f"{scheme!r}: coefficients(dt, last_dt, known) must return Coefficients with rows of "
-            f"3 + known numbers, {1 + number} of them in rates, see docs/extending.md"
+            f"{scheme!r}: coefficients(dt, last_dt, known) must return Coefficients, whose rows "
+            f"have 3 + known finite numbers, with {1 + number} rows in rates, see docs/extending.md"
         )
     return c
 
@@ -104,7 +104,7 @@ class Inertia(Term):
     Attributes:
         scheme: The time scheme.
         c: ``rates`` of loops.h; its ``last_dt`` is infinite before the first step.
-        loses_energy: True if the scheme loses energy by the rates.
+        loses_energy: True if the scheme has a ``velocity_defect``, whose work is lost.
 
     Raises:
         ModelError: The scheme has coefficients that do not match :class:`Coefficients`.
@@ -123,7 +123,7 @@ class Inertia(Term):
         size, number = len(v), FURTHER + len(scheme.further_rates)
         self.loses_energy = checked_coefficients(scheme).velocity_defect is not None
         # Rate 0, the nodal step, is stored elsewhere.  Velocities before the last step are not
-        # computed: they are the old velocities.  If unused, new velocities take their memory.
+        # computed: they are the old velocities.  Without a use, new velocities overwrite them.
         asks = self.loses_energy or scheme.uses_last_step
         self._now = np.zeros((number - V, size))
         self._next = np.zeros((number - V_BEFORE - (not asks), size))
@@ -156,7 +156,7 @@ class Inertia(Term):
     # -- the rates -----------------------------------------------------------------------------
 
     def _rate(self, k: int) -> Array:
-        """Return a view of the rate ``k`` in the memory of C."""
+        """Return a view of the rate ``k``; C exchanges the arrays in each step."""
         return np.frombuffer(ffi.buffer(self.c.rate[k], 8 * self.c.size))
 
     @property
@@ -203,7 +203,7 @@ class Inertia(Term):
         self.keep(*map(archive.at_dofs, self.scheme.further_rates[:known], more))
 
     def pass_on_step(self, archive: Archive) -> None:
-        """Save or restore velocities before the last step, and its length at each unknown."""
+        """Save or restore velocities before the last step, and its length as a vector."""
         v_before = archive.at_dofs(BEFORE, self.v_before)
         lengths = archive.at_dofs("last step", np.full(self.c.size, self.c.last_dt))
         self.commit(self.v, v_before, float(lengths[0]) if len(lengths) else self.c.last_dt)
@@ -234,7 +234,7 @@ def _work_and_loss(
 
 @cached_forms
 def _viscous_forms(element: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Return forms of virtual work and lost energy, and the function of their factor."""
+    """Return forms of virtual work and lost energy, and the coefficient that is their factor."""
     rate = element.at_points()
     return *_work_and_loss(element, scheme, rate, ufl.zero(3)), rate
 
@@ -305,7 +305,7 @@ def damping_forces(
     damping: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
     rates: Inertia | None,
 ) -> list[Term]:  # fmt: skip
-    """Return the terms of a damping on the cells of a process; empty without such cells."""
+    """Return the terms of a damping; empty if the process has no damped cells."""
     ledger.lost["damping"] += 0.0
     if isinstance(damping, Rayleigh):
         if rates is None:
@@ -329,7 +329,10 @@ def damping_forces(
 
 @cached_forms
 def _change_forms(element: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Return forms of virtual work and lost energy, and the function r Δe' in them."""
+    """Return forms of virtual work and lost energy, and their coefficient r Δe'.
+
+    Δe' is the change of strain in the last step, r the ratio of the step lengths.
+    """
     before = element.at_points(3)
     return *_work_and_loss(element, scheme, element.constant(scheme.lost_fraction), before), before
 
