@@ -110,7 +110,7 @@ def test_this_run_is_sanitized():
         source = "double get(const double *x, int n) { return x[n]; }"
         m = jit.compiled(
             "sanitizer_probe", "double get(const double *x, int n);", lambda: source,
-            made_of=[source], flags=["-O3"],
+            depends_on=[source], flags=["-O3"],
         )
         x = m.ffi.from_buffer("double[]", np.ones(1000))
         print("last", m.lib.get(x, 999), flush=True)
