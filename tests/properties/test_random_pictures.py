@@ -8,7 +8,7 @@ import pytest
 from random_machines import script
 
 import ufl_beam as ub
-from ufl_beam.plotting.model import model_notes, scene_load
+from ufl_beam.plotting.model import model_notes, scene_load_caption
 from ufl_beam.plotting.model_drawing import Subject, draw
 
 PARTS = ("joints", "supports", "loads", "masses", "initial", "damping", "connectors")
@@ -25,7 +25,7 @@ def amount(scene):
     drawing = draw(Subject(scene), scene.size / 300.0)
     strokes = [stroke for group in drawing.strokes.values() for stroke in group]
     assert all(np.isfinite(stroke.points).all() for stroke in strokes)
-    whole = [load for load in scene.loads if any(scene_load(load))]
+    whole = [load for load in scene.loads if any(scene_load_caption(load))]
     return len(strokes) + len(drawing.labels) + len(whole) + len(model_notes(scene))
 
 
