@@ -63,16 +63,18 @@ from ufl_beam.errors import (
     ModelWarning,
     TradeoffError,
 )
-from ufl_beam.mechanics.classical_schemes import GeneralizedAlpha, Newmark, Static
-from ufl_beam.mechanics.energy_momentum_schemes import (
+from ufl_beam.mechanics.time_scheme import Coefficients, DynamicScheme, Scheme, Step
+from ufl_beam.mechanics.time_schemes import (
     EnergyMomentum,
     EnergyMomentumBase,
     EnergyMomentumDecaying,
     EnergyMomentumPrinted,
     EnergyMomentumStatic,
-    MidpointLoads,
+    GeneralizedAlpha,
+    MidpointDynamics,
+    Newmark,
+    Static,
 )
-from ufl_beam.mechanics.time_scheme import Coefficients, DynamicScheme, Scheme, Step
 from ufl_beam.model import law_functions
 from ufl_beam.model.beams import Beam, Mesh
 from ufl_beam.model.bodies import Body, PointMass, Velocity, ground
@@ -219,7 +221,7 @@ __all__ = [
     "Lognormal",
     "MaterialLaw",
     "Mesh",
-    "MidpointLoads",
+    "MidpointDynamics",
     "ModelError",
     "ModelWarning",
     "Newmark",
@@ -302,7 +304,7 @@ OLD_NAMES = {
     "ExactStep": "EnergyMomentumBase",
     "Hardening": "ElastoPlastic",
     "Midpoint": "EnergyMomentum",
-    "Midway": "MidpointLoads",
+    "Midway": "MidpointDynamics",
     "Motor": "PrescribedMotion",
     "Prescribed": "PrescribedDisplacement",
     "PrintedMidpoint": "EnergyMomentumPrinted",

@@ -244,7 +244,7 @@ class Combination:
         own = {
             "Coefficients",
             "EnergyMomentumBase",
-            "MidpointLoads",
+            "MidpointDynamics",
             "Scheme",
             "DynamicScheme",
             "Step",

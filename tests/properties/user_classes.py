@@ -180,7 +180,7 @@ class Integral:
 
 
 @dataclass(frozen=True)
-class Weighted(ub.EnergyMomentumBase, ub.MidpointLoads):
+class Weighted(ub.EnergyMomentumBase, ub.MidpointDynamics):
     """Midpoint rule with one weight for resultants and velocities, as in docs/extending.md."""
 
     weight: float = 0.55

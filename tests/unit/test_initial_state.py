@@ -69,7 +69,7 @@ def test_a_run_in_two_parts_is_the_run():
 
 
 @dataclass(frozen=True)
-class DampedVelocities(ub.EnergyMomentumBase, ub.MidpointLoads):
+class DampedVelocities(ub.EnergyMomentumBase, ub.MidpointDynamics):
     """Δu/dt = (v0 + v1)/2 + c (Δv - r Δv'), with the change Δv' of velocities in the last step."""
 
     c: float = 0.05

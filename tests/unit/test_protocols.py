@@ -51,7 +51,7 @@ def test_each_member_counts(name):
 
 def test_a_scheme_with_inertia_that_lacks_something():
     @dataclass(frozen=True)
-    class Mine(ub.EnergyMomentumBase, ub.MidpointLoads):
+    class Mine(ub.EnergyMomentumBase, ub.MidpointDynamics):
         alpha = 0.0
 
     refused("lacks coefficients, error_weights", Mine())

@@ -508,7 +508,7 @@ RECORDS_OF_RUNS = {
 
 WITHOUT_PARAMETERS = {
     "Static", "EnergyMomentumPrinted", "Extremes", "Recorder", "print_once", "Scheme",
-    "DynamicScheme", "ConnectorLaw", "EnergyMomentumBase", "MidpointLoads", "MaterialLaw",
+    "DynamicScheme", "ConnectorLaw", "EnergyMomentumBase", "MidpointDynamics", "MaterialLaw",
     "SofteningLaw", "law_functions",
 }  # fmt: skip
 

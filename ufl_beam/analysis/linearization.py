@@ -18,8 +18,8 @@ from scipy.sparse.linalg import splu
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.errors import ArgumentError, ModelWarning
-from ufl_beam.mechanics.classical_schemes import Newmark
 from ufl_beam.mechanics.time_scheme import Coefficients, Step
+from ufl_beam.mechanics.time_schemes import Newmark
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.scene import Scene

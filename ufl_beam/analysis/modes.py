@@ -24,7 +24,7 @@ from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Rich
 from ufl_beam.errors import ArgumentError, require_count, require_kind, require_number, warn
-from ufl_beam.mechanics.classical_schemes import Static
+from ufl_beam.mechanics.time_schemes import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.constraint_checks import require_no_mechanism, require_no_prestress

@@ -26,7 +26,7 @@ from ufl_beam.errors import (
     require_kind,
     require_switch,
 )
-from ufl_beam.mechanics.classical_schemes import Static
+from ufl_beam.mechanics.time_schemes import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connector_law import ConnectorLaw, require_limit
 from ufl_beam.model.connector_laws import Controller, has_friction

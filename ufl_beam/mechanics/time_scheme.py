@@ -3,8 +3,7 @@
 
 A scheme states in UFL how strains vary and which resultants act in a step.  It also states how
 velocities follow from displacements, and when loads act.  Material laws and the solver use schemes
-only through the protocols in this module.  Schemes whose forces act over the step are in
-energy_momentum_schemes.py; schemes whose forces act at its end are in classical_schemes.py.
+only through the protocols in this module.  The schemes are in time_schemes.py.
 """
 
 from __future__ import annotations
@@ -142,12 +141,12 @@ class Coefficients(NamedTuple):
 class DynamicScheme(Scheme, Protocol):
     """Protocol of time schemes with inertia, whose ``dynamic`` is true.
 
-    A base class to begin with is :class:`MidpointLoads`; docs/extending.md has an example.
+    A base class to begin with is :class:`MidpointDynamics`; docs/extending.md has an example.
 
     Example:
         >>> from dataclasses import dataclass
         >>> @dataclass(frozen=True)
-        ... class Mine(ub.EnergyMomentumBase, ub.MidpointLoads):
+        ... class Mine(ub.EnergyMomentumBase, ub.MidpointDynamics):
         ...     alpha = 0.0
         >>> ub.simulate(scene, Mine(), t=(0, 1), dt=0.1)
         Traceback (most recent call last):
