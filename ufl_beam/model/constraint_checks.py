@@ -182,7 +182,7 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
     same, fixed = scene.representatives, _fixed(scene)
     turned = (support for support in scene.supports if support.angle)
     rows = [*_rows(scene, holds, turned)]
-    entries: list[dict[NodeDof, float]] = []
+    combined: list[dict[NodeDof, float]] = []
     rows_at: dict[NodeDof, set[int]] = defaultdict(set)
     for number, (_, row) in enumerate(rows):
         sums: dict[NodeDof, float] = defaultdict(float)
@@ -190,15 +190,15 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
             for component, factor in enumerate(factors):
                 sums[same[carrier, component]] += factor
         # Factors at both ends that act on the same degree of freedom cancel to round-off.
-        entries.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
-        for dof in entries[-1]:
+        combined.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
+        for dof in combined[-1]:
             rows_at[dof].add(number)
     left = set(range(len(rows)))
     alone = [dof for dof, indices in rows_at.items() if len(indices) == 1]
     while alone:
         for number in rows_at[alone.pop()] & left:
             left.discard(number)
-            for dof in entries[number]:
+            for dof in combined[number]:
                 rows_at[dof].discard(number)
                 if len(rows_at[dof]) == 1:
                     alone.append(dof)
@@ -209,7 +209,7 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
     terms = [
         (columns.setdefault(dof, len(columns)), column, factor)
         for column, number in enumerate(indices)
-        for dof, factor in entries[number].items()
+        for dof, factor in combined[number].items()
     ]
     gradients = _sparse(terms, (max(len(columns), 1), len(indices)))
     return [rows[number] for number in indices], _null_space(gradients)

@@ -68,10 +68,10 @@ class PointLoad(LoadAtPlace):
         if moves_with_node(self.place):
             return ()
         (x, y), fixed = self.force, ground(*self.place.point)
-        parts = [("parting", x, (1.0, 0.0)), ("parting", y, (0.0, 1.0))]
-        parts += [("turning", self.moment, (1.0, 0.0))] * bool(self.moment)
+        components = [("parting", x, (1.0, 0.0)), ("parting", y, (0.0, 1.0))]
+        components += [("turning", self.moment, (1.0, 0.0))] * bool(self.moment)
         connectors = []
-        for motion, size, axis in parts:
+        for motion, size, axis in components:
 
             def push(t: float, size: float = size) -> float:
                 return size * value_at(self.amplitude, t, self)

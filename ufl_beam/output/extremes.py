@@ -143,9 +143,9 @@ class ExtremesInC:
         if steps == self.seen:
             return
         resultants = self._forces(q, before)
-        previous, self._forces.c.given = self._forces.c.given, doubles(resultants)
+        previous, self._forces.c.initial = self._forces.c.initial, doubles(resultants)
         lib.watch_step(self.c, 0, t, doubles(before), doubles(q))
-        self._forces.c.given = previous
+        self._forces.c.initial = previous
         self.seen = steps
 
     def begin(self, steps: int, forces: Extent, motion: Extent) -> None:

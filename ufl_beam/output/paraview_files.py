@@ -58,8 +58,8 @@ def scene_rods(scene: Scene) -> list[Rod]:
     for body in scene.bodies:
         x, y = body.center
         # A body with attachments at its centre alone also gets a line, which shows its rotation.
-        near = body.at(x + 0.02 * scene.size, y)
-        others = [s for s in spots[body] if s.point != body.center] or [near]
+        beside = body.at(x + 0.02 * scene.size, y)
+        others = [s for s in spots[body] if s.point != body.center] or [beside]
         rods += [Rod(body.middle, place, BODY) for place in others]
     for joint in scene.joints:
         if joint.is_rod:

@@ -202,7 +202,7 @@ class StateWriter:
         inelastic: Sequence[Any], connector_terms: Sequence[Any], cell_forces: CellForces,
     ) -> None:  # fmt: skip
         self._time_loop, self._subdomain = time_loop, subdomain
-        self._alive, self._kinds = list[Any](), list[Any]()
+        self._alive, self._groups = list[Any](), list[Any]()
         numbering, moving = subdomain.numbering, time_loop.rates != ffi.NULL
         accounts = ledger.state, ledger.supplied, ledger.lost
         self.records = subdomain.alone or not subdomain.largest(float(len(cell_forces.entries)))
@@ -256,8 +256,9 @@ class StateWriter:
             for field, values in connector.recorded:
                 apart = values.strides[0] // values.itemsize * np.arange(len(rows))
                 self._add(self._place(values), apart, rows + Connection._fields.index(field))
-        kept = ffi.new("kept_numbers[]", self._kinds)
-        fill(time_loop, kinds=len(kept), kept=kept, width=columns.width, sums=at["q"].start)
+        groups = ffi.new("group_columns[]", self._groups)
+        fill(time_loop, num_groups=len(groups), groups=groups, width=columns.width)
+        time_loop.sums = at["q"].start
 
     def _place(self, values: Any) -> Any:
         """Return a pointer to the address of the numbers of an array, or ``values`` of C."""
@@ -269,13 +270,13 @@ class StateWriter:
 
     def _copy(self, place: Any, first: int, number: int) -> None:
         """Let C write ``number`` contiguous numbers to the row, from the index ``first`` on."""
-        self._kinds.append((place, number, first, ffi.NULL, ffi.NULL))
+        self._groups.append((place, number, first, ffi.NULL, ffi.NULL))
 
     def _add(self, place: Any, at: Index, to: Index) -> None:
         """Let C add the numbers at the indices ``at`` to the row at the indices ``to``."""
         both = [np.ascontiguousarray(x.ravel(), dtype=np.int32) for x in (at, to)]
         self._alive.append(both)
-        self._kinds.append((place, at.size, 0, *map(integers, both)))
+        self._groups.append((place, at.size, 0, *map(integers, both)))
 
     def write(self, row: Array) -> None:
         """Write the present state of C to ``row``; all processes call this method together."""

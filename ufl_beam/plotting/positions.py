@@ -145,12 +145,12 @@ class Canvas:
         ``origin`` is given, they are relative to this place at the same time.
         """
         ground = np.reshape([point.point for point in self.spots[GROUND]], (-1, 2))
-        found = []
+        shapes = []
         for shape in (self.undeformed, *map(self.shape, self._shown)):
             bodies = [shape.body_points(body, outline) for body, outline in self.outlines.items()]
             points = np.concatenate([shape.nodes, ground, *bodies])
-            found.append(points if origin is None else points - shape.at(origin))
-        return np.concatenate(found)
+            shapes.append(points if origin is None else points - shape.at(origin))
+        return np.concatenate(shapes)
 
     @cached_property
     def travels(self) -> dict[Connector, Range]:

@@ -115,15 +115,15 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
     """Yield symbols of supports, and of points of the ground with joints or connectors."""
     scene = shape.canvas.scene
     # Place, colour, index of SUPPORTS, direction away from the support, angle unless clamped
-    found: list[tuple[AttachmentPoint, str, int, float, float]] = []
+    symbols: list[tuple[AttachmentPoint, str, int, float, float]] = []
     for support in scene.supports:
         place, held = support.place, support.held
         color = ORANGE if support.moving else GROUND_GREY
         if len(held) == 3:
-            found.append((place, color, 3, _inward(place) + shape.rotation(place), 0.0))
+            symbols.append((place, color, 3, _inward(place) + shape.rotation(place), 0.0))
         else:
             angle = support.angle - (0.0 if 1 in held else math.pi / 2)
-            found.append((place, color, len({0, 1} & set(held)), _inward(place), angle))
+            symbols.append((place, color, len({0, 1} & set(held)), _inward(place), angle))
     grounded: list[tuple[Sequence[AttachmentPoint], bool]] = [
         (j.places, _rotates(j)) for j in scene.joints if joint_symbol(j).grounded
     ]
@@ -143,8 +143,8 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
                 known, before = grounds.get(point, (inward, True))
                 grounds[point] = known, before and rotates
     for point, (inward, rotates) in grounds.items():
-        found.append((point, GROUND_GREY, 2 if rotates else 3, inward, 0.0))
-    for place, color, fixed, inward, angle in found:
+        symbols.append((point, GROUND_GREY, 2 if rotates else 3, inward, 0.0))
+    for place, color, fixed, inward, angle in symbols:
         if fixed == 3:
             angle = inward - math.pi / 2
         elif math.sin(inward - angle) < -0.5:  # the symbol would lie on the beam

@@ -150,8 +150,8 @@ class Solver(PresentState):
         damping = damping_forces(setting, self.inertia)
         self.forces: list[Force] = [*self.inner, *self.loads, *inertia, *damping]
         self._groups = [group for group in self.connectors if isinstance(group, Connectors)]
-        opening = (law.opens for group in self._groups for law in group.laws)
-        self._candidates: list[Any] = [candidate for candidate in opening if candidate is not None]
+        candidates = (law.opens for group in self._groups for law in group.laws)
+        self._candidates: list[Any] = [candidate for candidate in candidates if candidate is not None]
         self._candidates += [beams.points for beams in self.yielding if beams.points.softens]
 
         self._weights: Array = np.ones(numbering.size)  # make forces and moments comparable

@@ -306,7 +306,7 @@ class Simulation(Stepper):
     @property
     def _lacks_record(self) -> bool:
         """True if the forces of cells cannot be computed from the stored numbers of a state."""
-        return not self._writer.records or bool(self.cell_forces.c.given)
+        return not self._writer.records or bool(self.cell_forces.c.initial)
 
     def _gathered_forces(self, substeps: int, *_: Array) -> Array:
         """Return the forces of all cells, ``cell_number`` of loops.h; (9, num_cells).

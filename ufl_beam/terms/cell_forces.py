@@ -87,7 +87,7 @@ class CellForces:
     def begin(self, values: Array | None) -> None:
         """Set the initial forces to ``values``, (9, num_cells), or to stresses of the residual."""
         if values is not None:
-            fill(self.c, given=values)
+            fill(self.c, initial=values)
             return
         for c in self._forces:
             if c.kind == lib.STRESS and c.latest:
@@ -136,20 +136,20 @@ class CellForces:
     def forces_from_record(self, record: Array, q: Array, before: Array) -> Array:
         """Compute the forces from a ``record`` of vectors, entries and factors, in this order."""
         arrays = [*((x, self._subdomain.size) for x in self.vectors), *self.entries, *self.factors]
-        values, addresses, at = self.c.given, [place[0] for place, _ in arrays], 0
+        values, addresses, at = self.c.initial, [place[0] for place, _ in arrays], 0
         record = np.array(record)
         try:
-            self.c.given = ffi.NULL
+            self.c.initial = ffi.NULL
             for place, n in arrays:
                 place[0] = doubles(record[at : at + n])
                 at += n
             return self(q, before)
         finally:
-            self.c.given = values
+            self.c.initial = values
             for (place, _), old in zip(arrays, addresses, strict=True):
                 place[0] = old
 
     def save_or_restore(self, archive: Archive, q: Array, before: Array) -> None:
         """Save or restore the resultants of the accepted step."""
         values = archive.rows("forces of cells", self._subdomain.cells, self(q, before).T)
-        fill(self.c, given=np.ascontiguousarray(values.T))
+        fill(self.c, initial=np.ascontiguousarray(values.T))

@@ -332,7 +332,7 @@ class Guides(ConnectorTerm):
         """Return loops that begin at the accepted points of the curves, and accept new points."""
         self._callbacks = callbacks
         curves = [callbacks.handle(curve, 2 * lib.CURVE_POINTS) for curve in self._curves]
-        fill(self._c, ask=lib.curve_in_python, curve=ffi.new("void *[]", curves))
+        fill(self._c, points=lib.curve_in_python, curve=ffi.new("void *[]", curves))
         self._c.report, self._c.handle = lib.run_in_python, callbacks.handle(self._report)
         begin, accept = (loop(name, self._c) for name in ("begin_guides", "accept_guides"))
         return Phases([begin], [accept], again=begin)

@@ -155,7 +155,7 @@ class Callbacks:
                 place.points, (place.t, place.y) = len(points[0]), map(doubles, points)
                 self._alive += points
             else:
-                place.ask = lib.time_in_python
+                place.value = lib.time_in_python
                 place.handle = self.handle(partial(value_at, function, owner=owner))
         return functions_in_c
 

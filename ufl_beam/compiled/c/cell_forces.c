@@ -4,7 +4,7 @@
 /* Accept the forces of the latest residual as those of the accepted step. */
 void accept_cell_forces(cell_forces *c)
 {
-  c->given = 0;
+  c->initial = 0;
   for (int k = 0; k < c->forces; ++k) {
     force_in_cells *f = c->force + k;
     double *last = f->accepted;
@@ -99,8 +99,8 @@ void find_cell_forces(const cell_forces *c, int now, double *out)
 {
   const size_t size = (size_t)CELL_NUMBERS * c->cells * sizeof *out;
   const places p = {out, c->cells, 1, 1, CELL_NUMBERS};
-  if (c->given) {
-    memcpy(out, c->given, size);
+  if (c->initial) {
+    memcpy(out, c->initial, size);
     return;
   }
   memset(out, 0, size);
@@ -125,7 +125,7 @@ static void widen(const extent *e, size_t begin, int number, const double *restr
 void watch_step(const watch *w, int now, double t, const double *before, const double *q)
 {
   const cells *c = w->along;
-  const int n = c->lanes, in_order = w->in_order && !w->forces->given;
+  const int n = c->lanes, in_order = w->in_order && !w->forces->initial;
   const double b = w->between;
   const double *at = q;
   widen(&w->of_motion, 0, w->of_motion.size, q, t);

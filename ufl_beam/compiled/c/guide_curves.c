@@ -18,7 +18,7 @@ static double product_of(const double *a, const double *b) { return a[0] * b[0] 
 static void expand_curve(const guides *g, int k, double s, curve_around *c)
 {
   double p[CURVE_POINTS][2];
-  g->ask(g->curve[k], s, g->step[k], p[0]);
+  g->points(g->curve[k], s, g->step[k], p[0]);
   c->middle = s;
   for (int i = 0; i < 2; ++i) {
     const double odd = p[3][i] - p[1][i], even = p[3][i] + p[1][i] - 2 * p[2][i];

@@ -156,7 +156,7 @@ typedef struct {
   const loads_in_cells *loads; /* or none */
   const double *from_middle;   /* position of each node of a cell relative to its middle, divided by the
                                 * length of the cell */
-  const double *given;         /* known resultants of the state before the first step; then none */
+  const double *initial;       /* known resultants of the state before the first step; then none */
 } cell_forces;
 
 void accept_cell_forces(cell_forces *c);
@@ -371,7 +371,7 @@ typedef struct {
   double *s;               /* parameter of the latest nearest point */
   guide_frame *frame;      /* of the latest iterate */
   curve_around *around;    /* latest polynomials */
-  void (*ask)(void *curve, double s, double step, double *out); /* computes CURVE_POINTS points of a curve */
+  void (*points)(void *curve, double s, double step, double *out); /* computes CURVE_POINTS points of a curve */
   void *const *curve;
   int lost;                /* guide without a nearest point, which `report` tells Python */
   void (*report)(void *handle);
@@ -656,7 +656,7 @@ void compare_differences(prediction *p);
 typedef struct {
   int points;
   const double *t, *y;
-  double (*ask)(void *handle, double t);
+  double (*value)(void *handle, double t);
   void *handle;
 } time_function;
 
@@ -916,7 +916,7 @@ typedef struct {
   double *const *from;
   int number, first;     /* first: index in the row, if the numbers are contiguous */
   const int32_t *at, *to; /* indices, or none */
-} kept_numbers;
+} group_columns;
 
 /* The time loop of a scene: its state, and all terms of the equation. */
 typedef struct {
@@ -943,9 +943,9 @@ typedef struct {
   int states;
   double *state;      /* entries of the ledger that are functions of the state, contiguous */
   time_step step;
-  int kinds, width, sums; /* kinds of numbers of a state; length of a row, and of its first part, in
+  int num_groups, width, sums; /* groups of numbers of a state; length of a row, and of its first part, in
                            * which numbers are added */
-  const kept_numbers *kept;
+  const group_columns *groups;
   cell_forces *cell_forces;
   int watches;
   force_watch *forces; /* forces of laws of a user; or none */

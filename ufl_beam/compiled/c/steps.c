@@ -374,8 +374,8 @@ static double seconds_now(void)
 void keep_state(const time_loop *m, double *row)
 {
   memset(row, 0, m->sums * sizeof *row);
-  for (int k = 0; k < m->kinds; ++k) {
-    const kept_numbers *n = m->kept + k;
+  for (int k = 0; k < m->num_groups; ++k) {
+    const group_columns *n = m->groups + k;
     const double *from = *n->from;
     if (!n->to)
       memcpy(row + n->first, from, n->number * sizeof *row);

@@ -5,7 +5,7 @@
 double value_at(const time_function *f, double t)
 {
   const int last = f->points - 1;
-  if (last < 0) return f->ask(f->handle, t);
+  if (last < 0) return f->value(f->handle, t);
   if (t <= f->t[0] || last == 0) return f->y[0];
   if (t >= f->t[last]) return f->y[last];
   int low = 0, high = last;
