@@ -151,7 +151,9 @@ class Solver(PresentState):
         self.forces: list[Force] = [*self.inner, *self.loads, *inertia, *damping]
         self._groups = [group for group in self.connectors if isinstance(group, Connectors)]
         candidates = (law.opens for group in self._groups for law in group.laws)
-        self._candidates: list[Any] = [candidate for candidate in candidates if candidate is not None]
+        self._candidates: list[Any] = [
+            candidate for candidate in candidates if candidate is not None
+        ]
         self._candidates += [beams.points for beams in self.yielding if beams.points.softens]
 
         self._weights: Array = np.ones(numbering.size)  # make forces and moments comparable
