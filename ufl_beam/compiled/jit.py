@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compilation of C modules and UFL forms, once on each machine.
+"""Compilation of C modules and UFL forms into a cache, which later runs use.
 
 The C compiler is no additional requirement, because FFCx needs it at run time, too.
 """
@@ -60,7 +60,7 @@ SANITIZERS = [
 sanitize`."""
 
 EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else []
-"""Flags appended for every library: the sanitizers if ``UFL_BEAM_SANITIZE=1``, else none."""
+"""Flags appended for every library: sanitizers if ``UFL_BEAM_SANITIZE`` is set and not 0."""
 
 
 NATIVE = "-march=native"

@@ -41,13 +41,13 @@ class Step(NamedTuple):
     load_time: float  # time at which loads are taken; s
     motion_time: float  # time at which prescribed motions are taken; s
     fraction: float  # applied fraction of the remaining increment of loads and motions; 1: all
-    at: float = 1.0  # fraction of the increment of loads in the step equation; 1: at the end
+    at: float = 1.0  # fraction of the applied increment of loads that acts in the step equation
     q_before: Array | None = None  # configuration at the beginning of the last step, if ratio > 0
     ratio: float = 0.0  # length divided by the length of the last step; 0 if there is none
 
     @classmethod
     def create(cls, scheme: Scheme, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Return the step of a scheme from ``t0`` to ``t1``: a substep of a step to ``end``.
+        """Return the step from ``t0`` to ``t1``; if ``t1 < end``, a substep of the step to ``end``.
 
         In statics a substep applies its fraction of the increment of loads and motions up to
         ``end``.  Sudden loads, too, can thus be applied in substeps.
@@ -80,8 +80,8 @@ class Scheme(Protocol):
 
     dynamic: bool  # True if the scheme has inertia
     advice: str  # for the error if a step finds no equilibrium
-    load_weight: float  # fraction of the step at which loads act; in statics, of their increment
-    weight_of_before: float  # weight of the last step's forces in the mean that does the work
+    load_weight: float  # when loads act, as a fraction of the step; in statics, how much of them
+    weight_of_before: float  # weight of the forces before the step in its work, see acting()
     half_tangents: bool  # True if forces work on 2 tan(Δψ/2) of a rotation, else on Δψ
     limits_rotation: bool  # True if a step that turns a node by more than 0.75 π is subdivided
     theta: float  # fraction of the step at which inelastic material satisfies its laws
@@ -99,13 +99,19 @@ class Scheme(Protocol):
         """Return (N, V, M) in the step equation, from stiffness and strains at both ends."""
 
     def average(self, before: Expr, now: Expr) -> Expr:
-        """Return the average of a vector or length at both ends of the step, for variations."""
+        """Return the vector or length in the variations of relative motions.
+
+        It is the mean of both ends if forces act over the step, ``now`` if they act at its end.
+        """
 
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
         """Return the value of a function of the configuration in the step equation."""
 
     def virtual_rotation(self, rotation_a: Expr, rotation_b: Expr, w: Expr) -> Expr:
-        """Return the variation of a relative rotation whose virtual motion is ``w``."""
+        """Return the variation of the rotation of b relative to a, which rotate in the step.
+
+        ``w`` is the difference of the virtual nodal rotations of b and a.
+        """
 
 
 CHANGE, V, V_BEFORE, FURTHER = range(4)
@@ -123,9 +129,9 @@ class Coefficients(NamedTuple):
         inertia: Row of the acceleration in the equation of the step.
         velocity: Row of the velocity in the equation of the step.
         rates: Row of the velocities after the step, then a row of each of the ``further_rates``.
-        velocity_defect: Row of Δu/Δt minus the mean velocity of both ends, P(88), whose work on the
-            change of momentum is lost.  Its first number multiplies the change of velocities.  None
-            means no loss.
+        velocity_defect: Row of the defect Δu/Δt - (v0 + v1)/2, P(88).  The defect times the change
+            of momentum is the numerical loss.  Its first number multiplies v1 - v0 instead of the
+            step of the nodes.  None means no loss.
 
     Example:
         >>> print(ub.EnergyMomentum().coefficients(dt=0.1, last_dt=0.1, known=0).rates)
@@ -154,7 +160,7 @@ class DynamicScheme(Scheme, Protocol):
     """
 
     further_rates: tuple[str, ...]  # names of rates besides velocities, such as accelerations
-    has_mean_velocity: bool  # True if steps have a mean velocity, for friction and RotatingFrame
+    has_mean_velocity: bool  # True if friction and RotatingFrame can use the step's mean velocity
     uses_last_step: bool  # True if a step depends on length and velocities of the last step
     accelerations_oscillate: bool  # True if accelerations of prescribed motions oscillate for ever
 
@@ -209,8 +215,8 @@ def increment_to_rest(scheme: Scheme, dt: float) -> float:
 def combined(row: Sequence[float], s: Array, rates: Any) -> Array:
     """Return the sum of a row of :class:`Coefficients` for the nodal step ``s``.
 
-    ``rates`` has the rates at the beginning of the step: ``v``, ``v_before``, and as ``more`` the
-    known rates of :attr:`DynamicScheme.further_rates`.
+    ``rates`` has the velocities ``v`` at the beginning of the step, ``v_before`` at the beginning
+    of the last step, and as ``more`` the known rates of :attr:`DynamicScheme.further_rates`.
     """
     known: tuple[Array, ...] = (s, rates.v, rates.v_before, *rates.more)
     return sum(c * x for c, x in zip(row, known, strict=True) if c) + np.zeros(len(s))

@@ -340,18 +340,20 @@ class EnergyMomentumStatic(EnergyMomentumBase):
 
     :class:`Static` has equilibrium at the ends of steps and computes works by the trapezoidal rule.
     This scheme uses the step equation of :class:`EnergyMomentum`.  Inelastic material satisfies its
-    laws at the fraction ``theta`` of the step.  The solution is of first order in the step with
-    ``theta=1`` and of second order with ``theta=1/2``, see docs/schemes.md for measured errors.
+    laws at the fraction ``theta`` of the step.  Under loads that grow, the solution is of first
+    order in the step with ``theta=1`` and of second order with ``theta=1/2``.  Cyclic loads reduce
+    the order with ``theta=1/2``; docs/schemes.md has measured errors.
     Loads that act from the start are applied in the first step, in substeps with small rotations of
     nodes.  At a jump to another branch of equilibria the run continues, and the released energy is
     in the entry "numerical"; :class:`Static` stops there.  Viscous forces act in real time, as in
     :class:`Static`.
 
     Args:
-        theta: Fraction of the step at which resultants and loads are in equilibrium.  With 1/2 no
-            energy is lost, but the states at the ends may oscillate about equilibrium.  With 1 they
-            tend to equilibrium, and the loss is the entry "numerical" of the ledger.  Moments that
-            are uniform in equilibrium vary along a beam by the fraction (Δψ/2)² in a step.
+        theta: Fraction of the step at which resultants and loads are in equilibrium.  With 1/2 the
+            scheme dissipates no elastic energy, but the states at the ends may oscillate about
+            equilibrium.  With 1 they tend to equilibrium, and the loss is the entry "numerical" of
+            the ledger.  If nodes rotate by Δψ in a step, a moment that should be uniform along a
+            beam has the relative error (Δψ/2)².
 
     Raises:
         ArgumentError: ``theta`` is outside [1/2, 1].
@@ -426,7 +428,7 @@ class _Velocities(MidpointDynamics):
         )
 
     def error_weights(self) -> tuple[float, float]:
-        """Return the error of the trapezoidal rule plus the delays by both kinds of dissipation."""
+        """Return the error of the trapezoidal rule, plus the errors of both dissipations."""
         return self.beta, 1 / 12 + self.alpha
 
 
@@ -477,20 +479,21 @@ class EnergyMomentum(EnergyMomentumBase, _Velocities):
 class EnergyMomentumDecaying(EnergyMomentumBase, MidpointDynamics):
     """Midpoint rule of second order that dissipates the energy of high frequencies.
 
-    The dissipation of :class:`EnergyMomentum` is proportional to the changes of strains and
-    velocities in a step, and of first order.  Here it is proportional to second differences of
-    both: a mode of circular frequency ω loses the fraction c (ω dt)⁴ of its energy in a step, with
-    c = rho_inf (1 - rho_inf) / (2 (1 + rho_inf)²), and the amplitude of unresolved modes is reduced
-    by the factor ``rho_inf``.  The equations of the step are
+    :class:`EnergyMomentum` dissipates by terms of first order: the changes of strains and
+    velocities in a step.  Here the terms are second differences of both.  If ω dt is small, a mode
+    of circular frequency ω loses the fraction c (ω dt)⁴ of its energy in a step, with
+    c = rho_inf (1 - rho_inf) / (2 (1 + rho_inf)²).  The amplitude of a mode with a large ω dt is
+    multiplied by ``rho_inf`` in each step.  The equations of the step are
 
         resultants  C ((e0 + e1)/2 + c (Δe - r Δe')),     Δu/dt = (v0 + v1)/2 + c (Δv - r Δv'),
 
     where Δe' and Δv' are the changes in the previous step of length dt', and r = dt/dt', at most 1.
 
-    The energy plus c times the energy of Δe and Δv never grows by the scheme, for any step lengths,
-    because Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2.  The total loss is the entry
-    "numerical" of the ledger and never negative; a single step may return a fraction of the loss of
-    previous steps.  Linear momentum is conserved exactly, angular momentum to second order.
+    Without loads the energy, plus c times the energy of strains Δe and velocities Δv, never grows,
+    whatever the lengths of the steps are, because
+    Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2.  The total loss is the entry "numerical" of
+    the ledger and never negative; a single step may return a fraction of the loss of previous
+    steps.  Linear momentum is conserved exactly, angular momentum to second order.
     Connectors and the resultants of cells that may yield or break are not damped, so that open
     hinges turn freely.
 
@@ -517,8 +520,8 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointDynamics):
     @property
     def lost_fraction(self) -> float:  # type: ignore[override]
         """Fraction c of the energy of second differences of strains and velocities that is lost."""
-        # In a step a mode of infinite frequency is multiplied by the larger root λ = -rho_inf of
-        # (λ + 1)/2 + c (λ - 1)²/λ = 0.
+        # In a step a mode of infinite frequency is multiplied by the root of larger magnitude,
+        # λ = -rho_inf, of (λ + 1)/2 + c (λ - 1)²/λ = 0.
         return self.rho_inf * (1 - self.rho_inf) / (2 * (1 + self.rho_inf) ** 2)
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
@@ -533,7 +536,7 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointDynamics):
         )
 
     def error_weights(self) -> tuple[float, float]:
-        """Return the error of the trapezoidal rule plus the delay by the second differences."""
+        """Return the error of the trapezoidal rule, plus the error of the second differences."""
         return 0.0, 1 / 12 + self.lost_fraction
 
 

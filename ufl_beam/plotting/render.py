@@ -39,7 +39,7 @@ QUANTITIES = {name: (f"{words} {name}", unit) for name, (words, unit) in RESULTA
 QUANTITIES["rotation"] = "rotation", "rad"
 PIN = "#707070"  # colour of joints
 
-UP = np.array([0.0, 1.0, 0.0])  # upwards in the picture; the frame is in the plane of x and y
+UP = np.array([0.0, 1.0, 0.0])  # upwards in the picture; the scene is in the plane of x and y
 
 Direction = tuple[float, float, float]
 
@@ -62,7 +62,7 @@ class Camera(Record):
     By default it is fixed and shows the whole motion.
 
     Attributes:
-        direction: View direction; (x, y, z).  The frame is in the plane of x and y; y is upwards
+        direction: View direction; (x, y, z).  The scene is in the plane of x and y; y is upwards
             in the picture, and (0, 0, -1) is the front view.
         follow: Place that the camera moves with, so that the place is at rest in the picture.
         width: Width of the picture around the followed place, or around the middle of the motion;
@@ -84,7 +84,7 @@ class Camera(Record):
     width: Annotated[float | None, partial(require_number, positive=True)] = None
 
     def aim(self, plotter: Any, box: Array, shape: DeformedShape, size: tuple[int, int]) -> None:
-        """Fit a box into the picture, above the colour bar and below the time.
+        """Fit a box between the colour bar and the line with the time, or show ``width``.
 
         Args:
             plotter: Plotter of PyVista.
@@ -128,7 +128,7 @@ def render(
     camera: Camera = CAMERA,
     size: tuple[int, int] = (1600, 900),
 ) -> None:
-    """Write a rendered picture of the frame at the n-th recorded time.
+    """Write a rendered picture of the scene at the n-th recorded time.
 
     In the plane, beams have the depth of their section.  Their width is equal to this depth, or
     larger if beams are too slender to be visible.  Bodies are plates around their attachment
@@ -147,7 +147,7 @@ def render(
     Raises:
         ArgumentError: A wrong argument; the message says which.
         ImportError: PyVista is missing.
-        RuntimeError: There is neither a screen nor Xvfb for VTK before 9.4.
+        RuntimeError: VTK is older than 9.4, and there is neither a screen nor Xvfb.
 
     Example:
         >>> ub.render(solution, "beam.png", quantity="M", size=(640, 360))
@@ -197,7 +197,7 @@ def animate(
     Raises:
         ArgumentError: A wrong argument; the message says which.
         ImportError: PyVista is missing, or ffmpeg for MP4; the message says how to install it.
-        RuntimeError: There is neither a screen nor Xvfb for VTK before 9.4, or ffmpeg failed.
+        RuntimeError: VTK is older than 9.4 without a screen or Xvfb, or ffmpeg failed.
 
     Example:
         >>> ub.animate(solution, "beam.gif", fps=5, seconds=0.4, size=(320, 192))
@@ -321,7 +321,8 @@ class Solids:
     def thickest(self, objects: Iterable[Member | AttachmentPoint]) -> tuple[float, float]:
         """Return the largest depth (in the plane) and width of beams; m.
 
-        ``objects`` are beams or places of beams.  The width is at least 4 % of the scene's size.
+        ``objects`` are beams or places; points of bodies do not count.  The width is at least 4 %
+        of the scene's size.
         """
         beams = [
             x.beam if isinstance(x, Place) else x for x in objects if not isinstance(x, BodyPoint)

@@ -297,7 +297,7 @@ class Solver(PresentState):
             and not (rotation := self._largest_rotation(q1)) <= LARGEST_ROTATION
         ):
             raise StepFailed(
-                f"a node turns by {rotation:.3g} rad in the step, and |Δψ| must stay below π; "
+                f"a node turns by {rotation:.3g} rad in the step, more than the limit of 0.75 π; "
                 "reduce dt"
             )
         in_beams = sum(beam.change(step, q1) for beam in self.beams)

@@ -81,8 +81,8 @@ LARGEST_ROTATION = 0.75 * math.pi
 """Largest rotation of a node in a step; rad.  Algorithmic strains are valid up to π."""
 
 LEAST_AT_REST, LEAST_IN_MOTION = 2, 1
-"""Least numbers of Newton iterations in statics and in dynamics.  A step with a residual far below
-the tolerance needs fewer.
+"""Least numbers of Newton iterations in statics and in dynamics.  Newton's method stops earlier
+only if the residual is far below the tolerance.
 
 Near buckling, a load hardly larger than the tolerance moves a column far.  In dynamics the inertia
 of the column prevents this.
@@ -95,12 +95,13 @@ The relative error of a moment in a substep is a quarter of the square of this a
 """
 
 FREE_STIFFNESS = 1e-3
-"""Loads resist a motion without strain only if its stiffness exceeds this fraction of (size of the
-forces) / (size of the scene).  A weight or a tension gives some tenths of this quotient."""
+"""Loads count as resisting a motion without strain only if the stiffness against it exceeds this
+fraction of (size of the forces) · (size of the scene); N m.  The motion is measured as an angle,
+and the stiffness as a moment per angle.  A weight or a tension gives tenths of the product."""
 
 SHORT_SUBSTEP = 512
-"""The rotation in a substep is not limited if the substep is at most 1/512 of the time in which
-loads are applied, because still shorter substeps would rotate as far."""
+"""A substep of at most 1/512 of the time in which loads are applied may exceed APPLYING_ROTATION.
+If nodes rotate that far in so short a time, the scene jumps, and shorter substeps do not help."""
 
 MOST_SUBSTEPS: int = lib.MOST_SUBSTEPS
 """Largest number of substeps of a step."""
@@ -217,8 +218,8 @@ class Stepper(StateView):
     def _add_callbacks(self) -> None:
         """Add functions of Python to the phases of the terms in a step.
 
-        Here `fill` is not used, because it would store references to the functions, and so to this
-        object.
+        Handles of Python functions are assigned without `fill`, which would store references to the
+        functions, and so to this object.
         """
         c, callbacks, controllers = self.time_loop, self.equation.callbacks, self.controllers
         loops = {
@@ -271,8 +272,8 @@ class Stepper(StateView):
     def _require_stiffness(self, step: Any, q1: Any, s: Any) -> None:
         """Raise if the loads do not resist a motion that only loads can resist.
 
-        If they do, the tangent is regular even without stiffness against zero-energy modes.  All
-        processes call the function together.
+        If they do, the tangent stays regular without the artificial stiffness that the solver adds
+        against zero-energy modes.  All processes call the function together.
         """
         equation, newton, numbering, free_motion = (
             self.equation,
@@ -312,8 +313,8 @@ class Stepper(StateView):
         """Solve for a step and its load factor, which is stored as the time at its end.
 
         ``step`` has the times of the initial guess.  The guess is in the axes of supports.  With
-        ``hold``, hinges and springs that did not open further in the last step stay closed if an
-        equilibrium exists in which their forces are within the limits; see material_points.py.
+        ``hold``, a hinge or spring that did not open further in the last step keeps its opening if
+        an equilibrium exists in which its force is within the limit; see material_points.py.
         """
         c = self.time_loop
         self.solver.follow(border)
@@ -329,7 +330,7 @@ class Stepper(StateView):
         return self._trial(solved)
 
     def accept(self, trial: Trial) -> None:
-        """Accept the step of the latest :meth:`attempt`."""
+        """Accept the step of the latest :meth:`attempt` or :meth:`attempt_along`."""
         self.time_loop.step.t1 = trial.step.t1
         with self._in_c():
             accepted = lib.accept_step(self.time_loop)
@@ -368,7 +369,7 @@ class Stepper(StateView):
         """Raise the error of the latest step; all processes call it together."""
         c, callbacks = self.time_loop, self.equation.callbacks
         error, callbacks.error = callbacks.error, None
-        if not self.equation.c.raised:  # a discarded iterate has raised the exception
+        if not self.equation.c.raised:  # Newton's method discarded the iterate that raised it
             error = None
         failure, c.failure = c.failure, lib.SUCCEEDS
         if failure == lib.RAISED:
@@ -378,7 +379,7 @@ class Stepper(StateView):
             raise self.solver.failure()
         if failure == lib.TURNS_TOO_FAR:
             raise StepFailed(
-                f"a node turns by {c.turn:.3g} rad in the step, and |Δψ| must stay below π; "
+                f"a node turns by {c.turn:.3g} rad in the step, more than the limit of 0.75 π; "
                 "reduce dt"
             )
         if failure == lib.APPLIED_TOO_FAST:
@@ -425,7 +426,7 @@ class Stepper(StateView):
     @property
     def q_before(self) -> Array:
         """Configuration at the beginning of the last step; (size,); m, rad."""
-        if self._begun_at is not None and not self.time_loop.substeps:  # C may have gone on since
+        if self._begun_at is not None and not self.time_loop.substeps:  # no step accepted since
             return self._begun_at
         return self._copy(self.time_loop.prediction.q_before)
 
