@@ -112,8 +112,9 @@ class Balance:
             force, moment = beam.section.rhoA * self.field(x), 0.0
             for load in self.scene.loads:
                 if isinstance(load, ub.LineLoad) and load.beam is beam:
-                    force = force + self.factor(load.amplitude) * np.array(load.force)
-                    moment += self.factor(load.amplitude) * load.moment
+                    factor = self.factor(load.amplitude) * load.factors(np.array([place.s]))[0]
+                    force = force + factor * np.array(load.force)
+                    moment += factor * load.moment
             of_works = self._of_works(beam, place, (s0, s1), length)
             total += w / 2 * length * self.at(place, force + of_works[:2], moment + of_works[2])
         return total

@@ -185,9 +185,14 @@ def moment(d):
     )
 
 
+PART = ", span=(0.0, 0.5), profile=(0.0, 2.0)"
+CURVED = ", profile=lambda s: 1 - 4 * (s - 0.5) ** 2"
+
+
 @feature()
 def line_load(d):
     more = d.one(["", f", moment={d.some(-2, 2):.3f}"])
+    more += d.one(["", ", span=(0.25, 0.75)", ", profile=(1.5, -0.5)", PART, CURVED])
     d.loads.append(
         f"ub.LineLoad(b0, force=({d.some(-20, 20):.3f}, {d.some(-20, 20):.3f}){more}, "
         f"amplitude={d.time()})"

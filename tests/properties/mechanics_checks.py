@@ -117,7 +117,7 @@ def momentum(case):
             mass += sum(one.mass for one in (*scene.masses, *scene.bodies))
             add(factor * mass * np.array(load.acceleration))
         elif isinstance(load, ub.LineLoad):
-            add(factor * _length(solution, load.beam) * np.array(load.force))
+            add(factor * _loaded_length(solution, load) * np.array(load.force))
         else:
             turn = solution.displacement(load.place)[:, 2]
             mean = (turn[1:] + turn[:-1]) / 2 * isinstance(load, ub.FollowerLoad)
@@ -139,6 +139,14 @@ def momentum(case):
     change = np.diff(solution.momentum()[:, :2], axis=0)
     missing = np.abs(change - dt[:, None] * force).max() / (size * dt.max())
     assert missing < FORCES, missing
+
+
+def _loaded_length(solution, load):
+    """Integral of the profile of a line load along the cells of its beam; m."""
+    numbering, (points, weights) = solution.numbering, np.polynomial.legendre.leggauss(4)
+    s, cells = numbering.parameters(load.beam), numbering.cells_of(load.beam)
+    at = (s[:-1, None] + s[1:, None]) / 2 + np.outer(np.diff(s) / 2, points)
+    return numbering.lengths(cells) @ load.factors(at) @ weights / 2
 
 
 def _length(solution, beam):

@@ -163,3 +163,98 @@ def test_work_of_follower_loads_among_many_entries():
     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, 0.5), dt=0.02)
     assert run.energy.supplied["loads"][-1] > 0.001
     assert run.energy.worst < 1e-9
+
+
+# -- line loads on a part of a beam, and with a profile -------------------------------------------
+
+
+def on_two_supports(degree=1, **load):
+    """A stiff beam of 2 m on two supports under a line load of 60 N/m downwards, in statics."""
+    beam = ub.Beam((0, 0), (2, 0), STIFF, cells=5)
+    supports = [ub.Pinned(beam.start), ub.Roller(beam.end)]
+    scene = ub.Scene([beam], supports=supports, loads=[ub.LineLoad(beam, force=(0, -60), **load)])
+    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, mesh=ub.Mesh(degree=degree)), beam
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+@pytest.mark.parametrize(
+    ("load", "moment"),
+    [
+        ({"profile": (0.0, 1.0)}, lambda x: 20 * x - 5 * x**3),
+        ({"profile": lambda s: s}, lambda x: 20 * x - 5 * x**3),
+        ({"profile": (1.0, -1.0)}, lambda x: 20 * x - 30 * x**2 + 10 * x**3),
+        (
+            {"span": (0.25, 0.75)},
+            lambda x: 30 * x - 30 * np.maximum(x - 0.5, 0) ** 2 + 30 * np.maximum(x - 1.5, 0) ** 2,
+        ),
+        (
+            {"span": (0.0, 0.5), "profile": (2.0, 0.0)},
+            lambda x: 50 * x - 60 * x**2 + 20 * x**3,
+        ),
+    ],
+)
+def test_moments_under_a_load_with_a_profile_or_a_span(load, moment, degree):
+    run, beam = on_two_supports(degree, **load)
+    diagram = run.diagram(beam)
+    x = 2 * diagram.s
+    inside = x <= 1.0 if load.get("span") == (0.0, 0.5) else x <= 2.0
+    expected = moment(x)
+    # 1e-7: rotations of the stiff beam, see STIFF
+    assert diagram.M[inside] == pytest.approx(expected[inside], abs=1e-7 * np.abs(expected).max())
+
+
+def test_a_smooth_profile_has_the_reactions_of_its_integral():
+    wave = reaction_of(lambda b: ub.LineLoad(b, (0, -3), profile=lambda s: math.sin(math.pi * s)))
+    total = 3 * 2 * 2 / math.pi
+    # Gauss's rule with 4 points in 4 cells: (π/4)⁸ / 8! · 4!⁴ / (9 · 8!²) is below 1e-8
+    assert wave == pytest.approx([0, total, total], abs=1e-7 * total)
+
+
+def test_a_profile_also_scales_the_moment():
+    couple = reaction_of(lambda b: ub.LineLoad(b, moment=5, span=(0.5, 1), profile=(1, 3)))
+    check(couple, [0, 0, -5 * 2 * 1.0])
+
+
+def test_two_halves_are_a_whole():
+    """In large motion, on any number of processes."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=6)
+    push = ub.Table([0, 0.2, 0.4], [0, 1, 0])
+    runs = []
+    for spans in ([(0, 1)], [(0, 0.5), (0.5, 1)]):
+        loads = [ub.LineLoad(beam, (5, -90), 3.0, push, span=span) for span in spans]
+        scene = ub.Scene([beam], supports=[ub.Pinned(beam.start)], loads=loads)
+        runs.append(ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.02))
+    whole, halves = runs
+    assert np.abs(whole.q[-1]).max() > 0.5
+    assert np.abs(whole.q - halves.q).max() < 1e-9  # Newton's tolerance
+    assert whole.energy.worst < 1e-9
+
+
+def test_a_load_with_a_profile_is_saved(tmp_path):
+    load = {"span": (0.2, 0.6), "profile": ub.Table([0.2, 0.4, 0.6], [0, 1, 0])}
+    run, beam = on_two_supports(**load)
+    path = MPI.COMM_WORLD.bcast(tmp_path) / "run.npz"
+    run.save(path)
+    loaded = ub.Solution.load(path)
+    saved = loaded.scene.loads[0]
+    assert (saved.span, saved.profile) == (load["span"], load["profile"])
+    np.testing.assert_array_equal(loaded.diagram(loaded.scene.beams[0]).M, run.diagram(beam).M)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"span": (0.2, 1.3)}, r"span = \(0.2, 1.3\) must be two parameters of the beam"),
+        ({"span": (0.6, 0.2)}, "0 <= first < last <= 1"),
+        ({"span": (0.5, 0.5)}, "0 <= first < last <= 1"),
+        ({"span": 0.5}, "span = 0.5 must be a pair"),
+        ({"profile": 2.0}, "profile = 2.0 must be a pair"),
+        ({"profile": (1.0, math.nan)}, r"profile\[1\]"),
+        ({"profile": lambda s: 1 / s if s else math.inf}, "profile returned inf at s = 0"),
+        ({"profile": lambda s: "much"}, "profile returned 'much' at s = 0"),
+    ],
+)
+def test_wrong_spans_and_profiles_are_refused(wrong, message):
+    beam = ub.Beam((0, 0), (2, 0), STIFF)
+    with pytest.raises(ub.ModelError, match="LineLoad on beam.*" + message):
+        ub.LineLoad(beam, force=(0, -1), **wrong)

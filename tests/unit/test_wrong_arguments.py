@@ -300,7 +300,11 @@ TABLE = {
     # loads, supports, masses
     "PointLoad": call(ub.PointLoad, place=PLACE, force=V((1, 0), VECTOR), **TIMED),
     "FollowerLoad": call(ub.FollowerLoad, place=PLACE, force=V((1, 0), VECTOR), **TIMED),
-    "LineLoad": call(ub.LineLoad, beam=V(BEAM, NO_BEAM), force=V((1, 0), VECTOR), **TIMED),
+    "LineLoad": call(
+        ub.LineLoad, beam=V(BEAM, NO_BEAM), force=V((1, 0), VECTOR), **TIMED,
+        span=V((0.2, 0.6), [*VECTOR, (0.6, 0.2), (0.2, 0.2), (-0.1, 0.5), (0.5, 1.1)]),
+        profile=V((0.0, 1.0), [*VECTOR, *(f for f in TIME if f is not ARRAY)]),
+    ),
     "Gravity": call(
         ub.Gravity, acceleration=V((0, -9.81), VECTOR), amplitude=V(lambda t: t, [*TIME, None])
     ),

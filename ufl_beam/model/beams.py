@@ -252,6 +252,17 @@ class Mesh:
         at = np.polynomial.legendre.Legendre.basis(p)(2 * self.nodes - 1)
         return np.asarray(1 / (p * (p + 1) * at**2))
 
+    @cached_property
+    def gauss(self) -> tuple[Array, Array]:
+        """Four Gauss points as fractions of a cell, and their weights times those of the nodes.
+
+        The shapes are (4,) and (4, p+1).  The integral over a cell of a function times a Lagrange
+        polynomial is exact if the function is a polynomial up to degree 7 - p.
+        """
+        points, weights = np.polynomial.legendre.leggauss(4)
+        s = (1 + points) / 2
+        return s, weights[:, None] / 2 * self.weights(s)
+
     def weights(self, s: npt.ArrayLike) -> Array:
         """Evaluate the Lagrange polynomials of a cell at ``s``, from 0 to 1; (..., nodes)."""
         powers = np.power.outer(s, np.arange(self.degree + 1))

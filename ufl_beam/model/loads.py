@@ -4,10 +4,21 @@
 from __future__ import annotations
 
 from abc import ABC
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from ufl_beam.errors import ModelError, closed
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.errors import (
+    ArgumentError,
+    ModelError,
+    closed,
+    require_returned,
+    require_vector,
+    shorten,
+)
 from ufl_beam.model.bodies import Beams, Member, PlaceField, ground, moves_with_node
 from ufl_beam.model.connector_laws import PrescribedForce
 from ufl_beam.model.connectors import Component, Connector
@@ -108,16 +119,43 @@ class FollowerLoad(LoadAtPlace):
             )
 
 
+def require_span(span: object, what: str) -> tuple[float, float]:
+    """Return the ends of a part of a beam as two increasing parameters from 0 to 1, or raise."""
+    first, last = require_vector(span, what)
+    if not 0.0 <= first < last <= 1.0:
+        raise ModelError(
+            f"{what} = {shorten(span)} must be two parameters of the beam, 0 <= first < last <= 1"
+        )
+    return first, last
+
+
+Profile = tuple[float, float] | Callable[[float], float]
+
+
+def require_profile(profile: object, what: str) -> Profile:
+    """Return the profile of a load with two finite numbers, or a function of s, or raise."""
+    return profile if callable(profile) else require_vector(profile, what)
+
+
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
 class LineLoad(Load):
-    """Distributed dead force and moment along a beam, per undeformed length.
+    """Distributed dead force and moment along a beam or a part of it, per undeformed length.
 
     Args:
         beam: Loaded beam.
         force: (f_x, f_y); N/m.
         moment: Moment, positive counter-clockwise; N m/m.
         amplitude: Factor on force and moment, a function of time t (s).
+        span: Parameters of the beam at both ends of the load, from 0 (start) to 1 (end).  They are
+            vertices of the mesh.
+        profile: Factors on force and moment at both ends of the span, linear between them; or a
+            function of the parameter s of the beam.  Forces on the nodes are exact if the profile
+            is a polynomial up to degree 4 in each cell, section forces between them if it is linear
+            in each cell.
+
+    Raises:
+        ModelError: The span is not inside the beam, or the profile is no number somewhere.
 
     Example:
         >>> snow = ub.LineLoad(beam, force=(0, -1e3))
@@ -125,17 +163,54 @@ class LineLoad(Load):
         >>> run = ub.simulate(loaded, ub.Static(), t=(0, 1), dt=1.0)
         >>> print(run.reaction(loaded.supports[0])[-1, 1:].round())  # N, N m
         [2000. 2000.]
+        >>> drift = ub.LineLoad(beam, force=(0, -1e3), span=(0.5, 1.0), profile=(0.0, 2.0))
+        >>> loaded = ub.Scene([beam], supports=scene.supports, loads=[drift])
+        >>> run = ub.simulate(loaded, ub.Static(), t=(0, 1), dt=1.0)
+        >>> print(run.reaction(loaded.supports[0])[-1, 1:].round())  # 1 kN at 5/3 m
+        [1000. 1667.]
     """
 
     beam: Instance[Member]
     force: Vector = (0.0, 0.0)
     moment: Number = 0.0
     amplitude: Timed = steady
+    _: KW_ONLY
+    span: Annotated[tuple[float, float], require_span] = (0.0, 1.0)
+    profile: Annotated[Profile, require_profile] = (1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.factors(np.array(self.span))
 
     def __str__(self) -> str:
         return f"LineLoad on {self.beam.name}"
 
     _label = __str__
+
+    def factors(self, s: Array) -> Array:
+        """Return the factors of the profile at parameters ``s``; zero outside of the span.
+
+        Raises:
+            ModelError: The profile is not a finite number at one of them.
+        """
+        first, last = self.span
+        if not callable(self.profile):
+            start, end = self.profile
+            return np.where((s < first) | (s > last), 0.0, np.interp(s, self.span, (start, end)))
+        factors = np.zeros(s.shape)
+        for index, at in np.ndenumerate(s):
+            if first <= at <= last:
+                where = f"s = {at:.9g}"
+                try:
+                    value = self.profile(float(at))
+                    factors[index] = require_returned(value, "profile", where, finite=True)
+                except ArgumentError as error:
+                    raise ModelError(f"{self}: {error}") from None
+                except Exception as error:
+                    raise ModelError(
+                        f"{self}: profile fails at {where}: {shorten(error)}"
+                    ) from error
+        return factors
 
 
 @closed(OWN_LOAD)

@@ -45,6 +45,7 @@ from ufl_beam.model.loads import (
     LOADS,
     Damping,
     KelvinVoigt,
+    LineLoad,
     Load,
     LoadAtPlace,
     PointLoad,
@@ -248,8 +249,8 @@ class Scene(Record, Rich):
         for load in self.loads:
             if isinstance(load, LoadAtPlace):
                 yield load, load.place
-            elif beam := getattr(load, "beam", None):
-                yield load, beam.start
+            elif isinstance(load, LineLoad):
+                yield from ((load, load.beam.at(s)) for s in load.span)
         for velocity in self.initial:
             for member in velocity.beams:
                 yield "Velocity", member.middle if isinstance(member, Body) else member.start

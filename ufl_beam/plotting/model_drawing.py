@@ -49,7 +49,11 @@ class Subject:
             for k, member in enumerate(objects):
                 self.names[member] = f"{member.name} {k}" if known[member.name] > 1 else member.name
         forces = [x.force for x in scene.loads if isinstance(x, LoadAtPlace)]
-        lines = [x.force for x in scene.loads if isinstance(x, LineLoad)]
+        lines = [
+            np.abs(self.line(x)[1]).max() * np.array(x.force)
+            for x in scene.loads
+            if isinstance(x, LineLoad)
+        ]
         speeds = [
             velocity.at(*at)[:2]
             for velocity in scene.initial
@@ -62,6 +66,18 @@ class Subject:
         )
         ends = [(x[0], x[1], x[-1], x[-2]) for x in self.axes.values()]
         self._ends: Array = np.reshape(ends, (-1, 2, 2))
+
+    def line(self, load: LineLoad) -> tuple[Array, Array]:
+        """Return points of the axis in the span of a load, (n, 2); m, and factors of its profile.
+
+        The points are the vertices and, with a profile that varies, 99 points between the ends.
+        """
+        s = np.array(load.beam.vertices(self.scene.attached[load.beam]))
+        low, high = (np.abs(s - end).argmin() for end in load.span)
+        s = s[low : high + 1]
+        if callable(load.profile) or load.profile[0] != load.profile[1]:
+            s = np.union1d(s, np.linspace(s[0], s[-1], 101))
+        return np.array([load.beam.curve(x) for x in s], float), load.factors(s)
 
     def directions_at(self, place: AttachmentPoint) -> Array:
         """Return the directions in which beams leave a place; (n, 2)."""
@@ -295,25 +311,31 @@ def _force_arrow(
 
 def _draw_line_load(drawing: Drawing, load: LineLoad) -> None:
     """Draw arrows of a line load, which end on the beam or are parallel to it, and moments."""
-    axis, unit, size = drawing.subject.axes[load.beam], drawing.outside, math.hypot(*load.force)
+    (axis, factors), unit = drawing.subject.line(load), drawing.outside
+    largest = factors[np.abs(factors).argmax()]  # the sizes in labels are the largest ones
+    size, moment = math.hypot(*load.force) * abs(largest), load.moment * largest
+    shares = factors / largest if largest else factors
+    lengths = positions.lengths_along(axis)
 
-    def spaced(distance: float, *, ends: bool = False) -> Array:
-        """Return equally spaced points, about ``distance`` apart; (n, 2); m."""
-        number = max(1, round(positions.lengths_along(axis)[-1] / distance))
-        steps = np.arange(number + 1) if ends else np.arange(number) + 0.5
-        return points_along(axis, steps / number)
+    def spaced(distance: float, *, ends: bool = False) -> tuple[Array, Array]:
+        """Return equally spaced points, about ``distance`` apart, (n, 2); m, and their shares."""
+        number = max(1, round(lengths[-1] / distance))
+        steps = (np.arange(number + 1) if ends else np.arange(number) + 0.5) / number
+        return points_along(axis, steps), np.interp(steps * lengths[-1], lengths, shares)
 
     if size > 0.0:
-        direction, chord = np.array(load.force) / size, axis[-1] - axis[0]
+        direction, chord = np.array(load.force) * largest / size, axis[-1] - axis[0]
         if abs(normal(chord) @ direction) > 0.25 * np.linalg.norm(chord):
             height = (1.3 + 1.1 * size / drawing.subject.line_load) * unit
             begin = drawing.stack((load.beam, *np.round(direction, 6)), height + 0.35 * unit)
-            low, high = begin + 0.3 * unit, begin + 0.3 * unit + height
-            line = axis - high * direction
+            low = begin + 0.3 * unit
+            line = axis - np.outer(low + height * np.abs(shares), direction)
             drawing.strokes["loads"] += [Stroke(line, RED, 1.2, layer=FRONT)]
-            for foot in spaced(2.0 * unit, ends=True):
-                ends = foot - np.outer((high, low), direction)
-                drawing.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
+            for foot, share in zip(*spaced(2.0 * unit, ends=True), strict=True):
+                if height * abs(share) > 0.5 * unit:
+                    ends = foot - np.outer((low + height * abs(share), low), direction)
+                    ends = ends if share > 0 else ends[::-1]
+                    drawing.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
             outwards = [
                 (at, left if left @ direction < 0 else -left) for at, left in _normals(line)
             ]
@@ -321,18 +343,21 @@ def _draw_line_load(drawing: Drawing, load: LineLoad) -> None:
         else:
             aside = 0.8 * unit + drawing.stack((load.beam, "along"), 0.7 * unit)
             left = normal(direction)
-            for at in spaced(2.4 * unit) + aside * left:
-                ends = at + np.outer((-0.9 * unit, 0.9 * unit), direction)
-                drawing.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
+            for at, share in zip(*spaced(2.4 * unit), strict=True):
+                if abs(share) > 0.05:
+                    half = 0.9 * unit * math.copysign(1.0, share)
+                    ends = at + aside * left + np.outer((-half, half), direction)
+                    drawing.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
             spots = [Candidate(at, left, aside + 0.3 * unit) for at, _ in _normals(axis)]
         drawing.write(in_time(with_unit(size, "N/m"), load.amplitude), RED, LOAD_LABELS, spots)
-    if load.moment:
-        for at in spaced(3.2 * unit):
-            line = _arc(at, 0.75 * unit, load.moment)
-            drawing.strokes["loads"] += _arrow(line, RED, 0.7 * unit)
-        text = in_time(with_unit(abs(load.moment), "N m/m"), load.amplitude)
+    if moment:
+        for at, share in zip(*spaced(3.2 * unit), strict=True):
+            if abs(share) > 0.05:
+                line = _arc(np.asarray(at), 0.75 * unit, math.copysign(moment, moment * share))
+                drawing.strokes["loads"] += _arrow(line, RED, 0.7 * unit)
+        text = in_time(with_unit(abs(moment), "N m/m"), load.amplitude)
         drawing.write(text, RED, LOAD_LABELS, _along(axis, 0.9 * unit))
-    if not size and not load.moment:
+    if not size and not moment:
         drawing.write("0 N/m", RED, LOAD_LABELS, _along(axis, 0.0))
 
 

@@ -90,21 +90,32 @@ class DeadLoad(LoadForce):
         super().__init__(load, setting)
         numbering = setting.numbering
         scene, self._vector = numbering.scene, np.zeros(numbering.size)
-        per_beam = np.zeros((len(scene.beams), 3))
+        cells, nodes = np.arange(len(numbering.cells)), numbering.mesh.nodes
+        along: Array = np.zeros((len(cells), 3, len(nodes)))  # forces on the nodes in order
         # Point loads on a body, except at its centre, are connectors in Scene.all_connectors.
         if isinstance(load, PointLoad) and moves_with_node(load.place):
             np.add.at(self._vector, numbering.node(load.place), [*load.force, load.moment])
         elif isinstance(load, LineLoad):
-            per_beam[scene.beams.index(load.beam)] = *load.force, load.moment
+            s = numbering.parameters(load.beam)
+            for cell, s0, s1 in zip(numbering.cells_of(load.beam), s[:-1], s[1:], strict=True):
+                for point, weight in zip(*np.polynomial.legendre.leggauss(5), strict=True):
+                    at = (1 + point) / 2
+                    factor = load.factors(np.array([s0 + at * (s1 - s0)]))[0] * weight / 2
+                    along[cell] += np.outer(
+                        [*load.force, load.moment], factor * numbering.mesh.weights(at)
+                    )
         elif isinstance(load, Gravity):
-            per_beam[:, :2] = np.outer([b.section.rhoA for b in scene.beams], load.acceleration)
+            rhoA = np.array([beam.section.rhoA for beam in scene.beams])[numbering.beam_of_cell]
+            along[:, :2] = np.multiply.outer(
+                np.outer(rhoA, load.acceleration), numbering.mesh.fractions
+            )
             for dofs, mass, _ in point_masses(numbering):
                 np.add.at(self._vector, dofs[:2], mass * np.array(load.acceleration))
         elif not isinstance(load, PointLoad):
             raise TypeError(f"{type(load).__name__} is not a dead load")
-        cells, (first, *between, last) = np.arange(len(numbering.cells)), numbering.mesh.fractions
-        total = per_beam[numbering.beam_of_cell] * numbering.lengths(cells)[:, None]
-        along = total[:, :, None] * np.array([first, last, *between])  # (num_cells, 3, nodes)
+        along *= numbering.lengths(cells)[:, None, None]
+        inner = range(1, len(nodes) - 1)
+        along = along[:, :, [0, len(nodes) - 1, *inner]]  # in the order of the nodes of cells
         np.add.at(self._vector, numbering.dofs[numbering.nodes_of_cells].transpose(0, 2, 1), along)
         self.along = end_forces(numbering, "density", cells, -along)
 

@@ -177,18 +177,28 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> Array | N
         Forces along beams as consistent forces on the nodes of the cells, (num_cells, dofs of a
         cell); None if there are none.
     """
-    numbering, per_beam, at_places = subdomain.numbering, None, []
+    numbering, at_places = subdomain.numbering, []
+    beam_of_cell = numbering.beam_of_cell[subdomain.cells]
+    # Forces per length, (num_cells, points, 3), and the weights of the nodes at these points
+    per_length: Array | None = None
+    weights = numbering.mesh.fractions[None]
     if isinstance(load, PointLoad):
         at_places = [(load.place, (*load.force, load.moment))]
     elif isinstance(load, LineLoad):
-        loaded = [beam is load.beam for beam in numbering.scene.beams]
-        per_beam = np.outer(loaded, [*load.force, load.moment])
+        parameters = numbering.parameters(load.beam)
+        first = subdomain.cells - numbering.cells_of(load.beam)[0]
+        loaded = (first >= 0) & (first < len(parameters) - 1)
+        first, (points, weights) = first[loaded], numbering.mesh.gauss
+        s = parameters[first, None] + np.outer(np.diff(parameters)[first], points)
+        per_length = np.zeros((len(loaded), len(points), 3))
+        per_length[loaded] = load.factors(s)[:, :, None] * [*load.force, load.moment]
     elif isinstance(load, Gravity):
         g_x, g_y = load.acceleration
         at_places = [
             (at, (mass * g_x, mass * g_y, 0.0)) for at, mass, _ in point_masses(numbering.scene)
         ]
-        per_beam = np.outer([beam.section.rhoA for beam in numbering.scene.beams], [g_x, g_y, 0.0])
+        rhoA = np.array([beam.section.rhoA for beam in numbering.scene.beams])
+        per_length = rhoA[beam_of_cell, None, None] * [g_x, g_y, 0.0]
     else:
         raise TypeError(f"{type(load).__name__} is not a dead load")
     for place, force in at_places:
@@ -196,14 +206,13 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> Array | N
             dofs = subdomain.numbering.node(place)
             mine = subdomain.owns(dofs)
             forces[subdomain.local(dofs[mine])] += np.array(force)[mine]
-    if per_beam is None:
+    if per_length is None:
         return None
-    loads = (
-        per_beam[numbering.beam_of_cell[subdomain.cells]]
-        * subdomain.numbering.lengths(subdomain.cells)[:, None]
-    )
-    first, *between, last = numbering.mesh.fractions
-    return np.kron(loads, [first, last, *between])
+    lengths = numbering.lengths(subdomain.cells)
+    along = lengths[:, None, None] * (per_length.transpose(0, 2, 1) @ weights)
+    first_to_last = np.arange(weights.shape[1])
+    order = [0, first_to_last[-1], *first_to_last[1:-1]]  # of nodes in a cell
+    return np.ascontiguousarray(along[:, :, order].reshape(len(along), -1))
 
 
 class FollowerLoads(_AtDofs):
