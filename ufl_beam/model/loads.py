@@ -152,7 +152,8 @@ class LineLoad(Load):
         profile: Factors on force and moment at both ends of the span, linear between them; or a
             function of the parameter s of the beam.  Forces on the nodes are exact if the profile
             is a polynomial up to degree 4 in each cell, section forces between them if it is linear
-            in each cell.
+            in each cell.  A file of a solution has values of the function, and is
+            linear between them.
 
     Raises:
         ModelError: The span is not inside the beam, or the profile is no number somewhere.

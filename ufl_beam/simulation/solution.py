@@ -20,8 +20,9 @@ from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.fibres import SectionPoints
-from ufl_beam.model.functions import Curve, nearest, parameter_step
+from ufl_beam.model.functions import Curve, Table, nearest, parameter_step
 from ufl_beam.model.joints import START_INTERVAL
+from ufl_beam.model.loads import LineLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import (
     Content,
@@ -36,6 +37,7 @@ from ufl_beam.output.output_files import (
     write,
 )
 from ufl_beam.output.serialization import (
+    SAMPLES,
     Description,
     SavedCurve,
     SavedFunction,
@@ -171,6 +173,12 @@ class Solution(States, Rich):
                 return SavedCurve.sampled(function, 0.0, 1.0, numbering.parameters(owner))
             if field == "curve":
                 return _used_curve(self, function)
+            if isinstance(owner, LineLoad) and field == "profile":
+                ends, (points, _) = numbering.parameters(owner.beam), numbering.mesh.gauss
+                in_forces = ends[:-1, None] + np.outer(np.diff(ends), points)
+                s = np.union1d(in_forces, np.linspace(*owner.span, SAMPLES + 1))
+                s = s[(s >= owner.span[0]) & (s <= owner.span[1])]
+                return Table(tuple(map(float, s)), tuple(map(float, owner.factors(s))))
             if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):
                 return SavedFunction.sampled(function, map(float, self.times))
             return None
