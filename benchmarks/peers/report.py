@@ -121,7 +121,7 @@ def draw(records):
             ax.loglog(*zip(*front(some), strict=True), style, color=colour, ms=6, label=name)
         ax.set_title(NAMES[problem], loc="left")
         ax.set(xlabel="time of the loop (s)", ylabel="error (m)")
-        ax.numbering(which="major", color="0.9")
+        ax.grid(which="major", color="0.9")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     figure.savefig(PICTURE)
 

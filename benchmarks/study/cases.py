@@ -140,17 +140,18 @@ def bent_cantilever():
 
 CASES = (
     Case("flying beam", "smooth", "A free beam, thrown by a force and a moment in the form of a "
-         "sine pulse.", flying_beam, 2.0, 20),
+         "pulse sin²(πt) of 1 s.", flying_beam, 2.0, 20),
     Case("double pendulum", "smooth", "Two slender beams that fall.", pendulum, 0.8, 20),
-    Case("swing", "stiff", "A beam with a mass, on links that are ten thousand times as stiff, "
-         "until these are taut.", swing, 0.6, 30),
+    Case("swing", "stiff", "A beam with a mass swings on links that are ten thousand times as "
+         "stiff.", swing, 0.6, 30),
     Case("hit cantilever", "impulsive", "A steel bar and a blow of 2 ms at its end.",
          hit_cantilever, 0.04, 40),
-    Case("yielding cantilever", "plastic", "A viscoplastic steel bar, pulled beyond its limit "
-         "moment.", yielding_cantilever, 0.1, 40, elastic=False),
-    Case("breaking arm", "softening", "An arm whose hub stops within 20 ms and whose flange "
-         "softens to a joint.", breaking_arm, 0.16, 80, elastic=False),
-    Case("bent cantilever", "static", "A cantilever bent by six times EI/L².", bent_cantilever,
-         1.0, 10, dynamic=False),
+    Case("yielding cantilever", "plastic", "A viscoplastic steel cantilever, bent beyond its "
+         "limit moment by a force at its end.", yielding_cantilever, 0.1, 40, elastic=False),
+    Case("breaking arm", "softening", "A rotating arm whose hub is stopped within 20 ms; a "
+         "hinge in its flange softens until it bears no moment.", breaking_arm, 0.16, 80,
+         elastic=False),
+    Case("bent cantilever", "static", "A cantilever bent by a force of 6 EI/L² at its end.",
+         bent_cantilever, 1.0, 10, dynamic=False),
 )  # fmt: skip
 """What the study is about; the order is that of the docs."""

@@ -97,8 +97,8 @@ def base(case: Case, quick: bool) -> Setting:
 def one_by_one(case: Case, quick: bool) -> Iterator[tuple[str, Setting]]:
     """Name of the dial, and the base with that dial turned."""
     here = base(case, quick)
-    for refine in (here.refine // 2, 2 * here.refine):
-        yield f"cells: refine {refine}", replace(here, refine=refine)
+    for name, refine in (("half", here.refine // 2), ("twice", 2 * here.refine)):
+        yield f"cells: {name}", replace(here, refine=refine)
     if case.elastic:
         for degree in (2, 3):
             yield f"cells: degree {degree}", replace(here, degree=degree)

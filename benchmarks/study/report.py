@@ -7,6 +7,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any
 
+import numpy as np
 from advice import TARGETS, advice, cheapest, overall
 from figures import draw_case, draw_dials
 
@@ -17,10 +18,11 @@ INTRODUCTION = """\
 
 Written by `make study`; do not edit. The study measures time and error of each setting in scenes
 that are smooth, stiff, impulsive, plastic, softening and static. The time is the wall time of a run
-with the building of its scene, without compilation. The error is the largest distance of a place
-from its position in a reference run, at ten instants, relative to the size of the scene. The
-reference run is finer than all others; targets below twice its estimated error are omitted. The
-scenes are small, and times depend on the machine, so use the ratios of times.
+with the building of its scene, without compilation. The error is the largest difference of a
+coordinate of one place from a reference run, at ten instants, relative to the size of the scene.
+The reference run is finer than all others. Errors below twice its own estimated error cannot be
+measured; the tables have "—" there. The scenes are small, and times depend on the machine, so use
+the ratios of times.
 [`ub.tradeoff`](tradeoff.md) finds the settings for a scene of your own.
 """
 
@@ -40,21 +42,22 @@ def save(study: dict[str, Any], docs: Path) -> None:
         *(f"Without {name}: {_cut(why)}\n" for name, why in study["failed"].items()),
         "## Recommended settings",
         "",
-        "Each line has the fastest setting for an error, and the times of other schemes for the "
-        'same error, relative to it; "as long" is within 15 %.',
+        "Each line has the fastest setting that reaches an error, and the times of other schemes "
+        'for the same error as multiples of its time; "as long" is at most 1.15 times.',
         "",
         *(fill(line, 155, subsequent_indent="  ") for line in advice(cases)),
         "",
         "Time of each scheme for an error, relative to the fastest scheme: the geometric mean over "
-        "the scenes in which it reaches the error, and the number of these scenes:",
+        "the scenes in which it reaches the error, and the number of these scenes, of those in "
+        "which any scheme reaches it:",
         "",
         *overall(cases),
         "",
         "## Each setting by itself",
         "",
         "Each setting is changed alone, from a base that is stated for each scene below. Time and "
-        "error are relative to the base. The change is the distance from the result of the base, "
-        "relative to the size of the scene.",
+        "error are relative to the base. The change is the largest difference of a coordinate from "
+        "the result of the base, relative to the size of the scene.",
         "",
         "![Time and error as each setting is varied](pictures/study_dials.png)",
         "",
@@ -82,7 +85,8 @@ def _section(case: Case, picture: Path) -> list[str]:
     ]
     for target in TARGETS:
         run = cheapest(case, target)
-        lines.append(f"| {target:g} | " + (_row(run) if run else "not reached | | | | | |") + " |")
+        missing = "—" if target < 2 * case["reference"] else "not reached"
+        lines.append(f"| {target:g} | " + (_row(run) if run else f"{missing} | | | | | |") + " |")
     if "failed" in here:
         return [*lines, "", f"The base of single settings failed: {here['failed']}", ""]
     lines += [
@@ -103,8 +107,13 @@ def _section(case: Case, picture: Path) -> list[str]:
             f"| {run['iterations']:.2f} | {run['imbalance']:.1e} |"
         )
     failed = {run["scheme"]: run["failed"] for run in case["runs"] if "failed" in run}
+    runs = {
+        scheme: np.sum([("failed" in r, 1) for r in case["runs"] if r["scheme"] == scheme], axis=0)
+        for scheme in failed
+    }
     lines += [""] + [
-        f"{scheme} fails in some settings: {_cut(why)}  " for scheme, why in failed.items()
+        f"{scheme} fails in {runs[scheme][0]} of {runs[scheme][1]} settings: {why}  "
+        for scheme, why in failed.items()
     ]
     return [*lines, ""]
 

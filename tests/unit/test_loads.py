@@ -270,3 +270,11 @@ def test_wrong_spans_and_profiles_are_refused(wrong, message):
     beam = ub.Beam((0, 0), (2, 0), STIFF)
     with pytest.raises(ub.ModelError, match="LineLoad on beam.*" + message):
         ub.LineLoad(beam, force=(0, -1), **wrong)
+
+
+def test_weight_of_a_body_without_beams():
+    """No cell bears a load."""
+    body = ub.Body((0, 0), mass=2.0, inertia=1.0)
+    scene = ub.Scene(bodies=[body], loads=[ub.Gravity()])
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1)
+    assert run.position(body.middle)[-1] == pytest.approx([0, -9.81 / 2], abs=1e-9)

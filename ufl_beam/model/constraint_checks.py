@@ -391,6 +391,6 @@ def require_rates(scene: Scene, scheme: Rated) -> None:
     prescribed += [f"the support of {s.place}" for s in scene.supports if s.moving]
     if prescribed and scheme.accelerations_oscillate:
         raise ModelError(
-            f"{name}: {prescribed[0]} prescribes a motion, whose accelerations ring for ever "
+            f"{name}: {prescribed[0]} prescribes a motion, whose accelerations oscillate for ever "
             "without numerical damping; use GeneralizedAlpha(0.8), or EnergyMomentum()"
         )

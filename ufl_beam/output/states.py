@@ -466,7 +466,8 @@ class States:
     def material_at(self, place: Place) -> Material:
         """Return the material state of the cell at a place at all times; (n+1, ...).
 
-        ``forces`` are section forces in the middle of the cell.  If a plastic hinge is at the
+        ``forces`` are section forces in the middle of the cell; of a yielding cell, forces of its
+        law for the strains at the stored time.  If a plastic hinge is at the
         place, ``forces[:, 2]`` is the moment of the hinge in each step, ``jump`` its rotation, and
         ``hinge`` its dissipated energy.
 

@@ -210,9 +210,9 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> Array | N
         return None
     lengths = numbering.lengths(subdomain.cells)
     along = lengths[:, None, None] * (per_length.transpose(0, 2, 1) @ weights)
-    first_to_last = np.arange(weights.shape[1])
-    order = [0, first_to_last[-1], *first_to_last[1:-1]]  # of nodes in a cell
-    return np.ascontiguousarray(along[:, :, order].reshape(len(along), -1))
+    nodes = weights.shape[1]
+    order = [0, nodes - 1, *range(1, nodes - 1)]  # of nodes in a cell
+    return np.ascontiguousarray(along[:, :, order].reshape(len(along), 3 * nodes))
 
 
 class FollowerLoads(_AtDofs):
