@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Functions of arrays and UFL expressions, for laws of materials, softening and connectors.
 
-Arrays may be complex, because the reference solver differentiates by complex steps: use
+Arrays may be complex, because some derivatives are computed by complex steps: use
 :func:`absolute` instead of ``abs``.  The operators + - * / and ** are the Python operators.
 
 Example:

@@ -30,7 +30,8 @@ For an exponential traction the relative error of the mean is below 1e-12 in a s
 """
 
 SMALL_GROWTH = 1e-4
-"""Growth above which mean tractions are differences of energies, as a multiple of energy/limit.
+"""Growth, as a multiple of energy/limit, above which the mean traction is the difference of
+energies divided by the growth.
 
 At this growth the difference loses four digits.  For a smaller growth quadrature is exact to
 round-off, or to 1e-10 of the energy if the step contains a kink.
@@ -156,7 +157,7 @@ class _LimitAndEnergy(Record, SofteningLaw):
 
     @property
     def steepest(self) -> tuple[float, float]:
-        """Upper bound of the decrease per opening, and zero as an opening with this decrease."""
+        """Upper bound of the decrease per opening, and zero, where exponential softening has it."""
         return self.limit * (self.limit / self.fracture_energy), 0.0
 
 
@@ -230,7 +231,7 @@ def require_softening(law: object, what: str) -> None:
         if hasattr(value, "draw"):
             raise ModelError(
                 f"{kind}: {field.name} = {shorten(value)} is a distribution, but the parameters of "
-                "softening are the same in all cells; give the distribution to ElastoPlastic(limit)"
+                "softening are the same in all cells; give a number"
             )
         require_field(value, f"{kind}: {field.name}")
     try:
@@ -260,12 +261,12 @@ def traction_properties(law: SofteningLaw) -> TractionProperties:
     limit = float(t[0])
     if limit <= 0:
         raise ModelError(
-            f"{kind}: its traction is {limit:g} at zero opening; it must be positive: this is "
-            "the limit. For a hinge that never resists give Softening(0.0, 1.0)"
+            f"{kind}: its traction at zero opening, which is the limit, is {limit:g}; it must be "
+            "positive. For a hinge that never resists give Softening(0.0, 1.0)"
         )
     _require_not_negative(kind, edges, t)
     energy = _integral(law, edges)
-    if t[-1] > 0:  # add the energy of larger openings by the power law of the last decade
+    if t[-1] > 0:  # add the energy of larger openings by the power law of the last two decades
         power = np.log(t[-17] / t[-1]) / np.log(edges[-1] / edges[-17])
         if power <= 1.01:
             raise ModelError(

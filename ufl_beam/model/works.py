@@ -132,7 +132,8 @@ class VirtualWork(Work):
             ``Mesh(degree=1)``.  Each further degree of the mesh adds two.
 
     Raises:
-        ModelError: The name is taken.  In a run, the function returns no UFL scalar linear in w.
+        ModelError: The name is empty, or an entry of the ledger of the package.  Scenes refuse two
+            works of one name.  Runs refuse a result that is no UFL scalar linear in w.
 
     Example:
         >>> def drag(v, w, c):
@@ -160,12 +161,14 @@ class Potential(Work):
     :class:`EnergyMomentum` and related schemes use the mean of the forces over the step.  The work
     of the forces is then the increment of the energy: to round-off for polynomials up to degree 8,
     otherwise with an error of order nine in the step.  The energy is the entry ``name`` in
-    ``energy.state``; ``energy.supplied["name in time"]`` is energy gained by changes in time.
+    ``energy.state``; the entry of ``energy.supplied`` with the name and " in time", such as
+    "soil in time", is the energy gained by explicit dependence on time.
 
     It has the arguments of :class:`VirtualWork`.
 
     Raises:
-        ModelError: The name is taken.  In a run, the function returns no UFL scalar with q.
+        ModelError: The name is empty, or an entry of the ledger of the package.  Scenes refuse two
+            works of one name.  Runs refuse a result that is no UFL scalar with q.
 
     Example:
         >>> soil = ub.Potential("soil", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": 1e6})  # N/m²

@@ -130,7 +130,7 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
     grounded += [((c.a, c.b), False) for c in scene.connectors if not c.is_rotation]
     grounds: dict[
         BodyPoint, tuple[float, bool]
-    ] = {}  # direction away; True if all joints there turn
+    ] = {}  # direction away from the ground; True if only joints that turn are there
     for places, rotates in grounded:
         for point in places:
             if isinstance(point, BodyPoint) and point.body is GROUND:
@@ -214,13 +214,13 @@ class JointSymbol(NamedTuple):
 
 
 def _rail(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
-    """Draw the rail, as long as the range of motion, and the block on it."""
+    """Draw the rail, somewhat longer than the range of motion, and the block on it."""
     (across,), (base, slider) = joint.holders, joint.places
     unit, start, block = shape.canvas.unit, shape.at(base), shape.at(slider)
     ahead = -normal(shape.turned(across.axis, base))
     s = float((block - start) @ ahead)
     low, high = shape.canvas.travels[across]
-    # If rotations are magnified, the block may be outside this range.
+    # If displacements are magnified, the block may be outside this range, as rotations are not.
     low, high = min(low, s) - 1.8 * unit, max(high, s) + 1.8 * unit
     rail = block + np.outer((low - s, high - s), ahead)
     yield Stroke(rail, STEEL, 2.2)
@@ -245,12 +245,13 @@ def _guide(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
 
 def _sleeve(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
     """Draw two bars along the free direction of a release, or a box if both directions are free."""
-    if 0 in joint.shared:
+    if isinstance(joint, Release) and 0 in joint.joined:
         return
     place = joint.places[0]
-    axis = shape.turned(joint.holders[0].axis if joint.holders else (0.0, 1.0), place)
+    holders = [holder for holder in joint.holders if not holder.is_rotation]
+    axis = shape.turned(holders[0].axis if holders else (0.0, 1.0), place)
     bars = [[(-0.9, t), (0.9, t)] for t in (0.6, -0.6)]
-    if not joint.holders:
+    if not holders:
         bars += [[(s, -0.6), (s, 0.6)] for s in (0.9, -0.9)]
     for bar in bars:
         points = in_frame(bar, shape.at(place), -shape.canvas.unit * normal(axis))
@@ -285,7 +286,7 @@ def rods(shape: DeformedShape) -> Iterator[Stroke]:
 
 
 def rails(shape: DeformedShape) -> Iterator[Stroke]:
-    """Draw rails, guide curves, and the blocks on them."""
+    """Draw rails with their blocks, guide curves, and the bars of releases."""
     for joint in shape.canvas.scene.joints:
         if draw := joint_symbol(joint).rail:
             yield from draw(shape, joint)

@@ -54,7 +54,8 @@ class LoadTerm(Term):
     """Forces that depend on time or on the configuration.
 
     Attributes:
-        vector: ``vector`` of loops.h: forces whose norm is in the scale of the convergence test.
+        vector: ``vector`` of loops.h: forces of the term; their norm is added to the force with
+            which the convergence test compares the residual.
     """
 
     kind = "loads"
@@ -64,7 +65,7 @@ class LoadTerm(Term):
 
     @abstractmethod
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Set the loads before the next step to the loads at the time ``t``, and return them.
+        """Begin at the time ``t``: take its loads as the loads before the first step; return them.
 
         The state ``q`` is assumed to be in equilibrium with these loads.  ``v`` are the velocities,
         None in statics.  ``past`` is the end of an earlier run of the same scene, if there is one.
@@ -78,7 +79,7 @@ class _AtDofs(LoadTerm):
     """Loads that act at some degrees of freedom, with sizes that are functions of time.
 
     Attributes:
-        dofs: Local degrees of freedom that any process loads: the columns of the forces.
+        dofs: Local degrees of freedom that are loaded on any process; the columns of ``_forces``.
     """
 
     _forces: Array  # (rows, dofs); the first row is in the step equation
@@ -125,8 +126,8 @@ class DeadLoads(_AtDofs):
         # Forces in the equation, and at the end of the last step.
         self._set_dofs(subdomain, np.any(whole, axis=0) * 1.0, owners, rows=2)
         self._vectors = [vector[self.dofs] for vector in whole]
-        # Factors of the vectors: in the equation, at the end of the step, at the end of the last
-        # step, and in the equation of the last step.
+        # Rows: factors in the equation of this step, at its end, at its beginning, and in the
+        # equation of the previous step.
         self._factors: Array = np.zeros((4, len(vectors)))
         self._along = [in_cells.get(key) for key in vectors]
         self.loops = loop("subtract_vector", self.vector), None
@@ -143,7 +144,7 @@ class DeadLoads(_AtDofs):
         return ffi.gc(c, lambda _, alive=(c, along): None)  # solutions outlive the term
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the load vectors that begin and accept a step."""
+        """Return the loops that begin and accept a step."""
         number = len(self._vectors)
         c = self._c = struct(
             "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=number,
@@ -255,7 +256,7 @@ class FollowerLoads(_AtDofs):
         self.loops = loop("subtract_follower_loads", self._c), tangent
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the loads that begin and accept a step."""
+        """Return the loops that begin and accept a step."""
         c = fill(self._c, factor=callbacks.time_functions(self._in_time))
         c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_follower_loads", c)], [loop("accept_follower_loads", c)])
@@ -283,7 +284,8 @@ def _turned_mass(element: Element) -> ufl.Form:
 class FrameForces(LoadTerm):
     """Centrifugal forces, which have a potential, and Coriolis forces, which do no work.
 
-    Rotary inertia causes no moments, because its spin is constant in steady rotation.
+    Rotary inertia causes no further moments, because a constant rate of the frame adds a constant
+    to the angular velocity of a cross-section.
     """
 
     def __init__(
@@ -327,7 +329,7 @@ class FrameForces(LoadTerm):
         self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at_cells)]
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the degrees of freedom that begin and accept a step."""
+        """Return the loops that begin and accept a step."""
         self._c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_frame", self._c)], [loop("accept_frame", self._c)])
 
@@ -342,6 +344,6 @@ class FrameForces(LoadTerm):
         return self._force.copy()
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore the forces in the equation of the last step, and their load factor."""
+        """Save or restore the forces of the last step, and the load factor at its end."""
         self._force[:] = self._before[:] = archive.added("rotating frame", self._before)
         self._c.grown = archive.number("growth of the rotating frame", self._c.grown)
