@@ -458,7 +458,7 @@ class OfNumPy(Mine):
 
 
 REFUSED = [
-    (FromNothing(), "traction is 0 at zero opening; it must be positive"),
+    (FromNothing(), "traction at zero opening, which is the limit, is 0; it must be positive"),
     (BelowZero(), r"traction is -\S+ at the opening \S+, where it would drive"),
     (Lasting(), "energy is not finite; let it fall to zero, or faster than 1/opening"),
     (Jumping(), r"traction jumps from 1 to 0 at the opening 1"),
