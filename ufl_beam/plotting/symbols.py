@@ -322,7 +322,7 @@ class LawSymbol(NamedTuple):
     words: Callable[[Any, str, str], str] = lambda law, force, unit: type(law).__name__.lower()
     """Function of law, unit of force and unit of motion that returns the parameters as text."""
     turning: list[Stroke] | None = None  # around a pin; by default the straight one with spokes
-    sweep: float = math.pi + 1.0  # angle from place a to place b in the undeformed scene; rad
+    sweep: float = math.pi + 1.0  # angle of the undeformed symbol around the pin; rad
     spins: bool = False  # True if it rotates rigidly with b; else it joins a and b
 
 
@@ -333,7 +333,7 @@ def _drive(straight: list[Stroke], fill: str, tail: float = -2.0, *more: Stroke)
     return LawSymbol(straight, turning=turning, sweep=1.4 * math.pi, spins=True)
 
 
-CENTRE = -9.0  # coordinate t of the pin
+CENTRE = -9.0  # coordinate t beyond the pin, drawn at the least radius
 _SPOKES = [_line((s, CENTRE), (s, 0)) for s in (-2, 2)]
 _TEETH = [(float(s), 0.55 * (-1.0) ** k) for k, s in enumerate(np.linspace(-1.0, 1.0, 13)[1::2])]
 _BOXED = [_line((-2, 0), (-0.8, 0)), _line((0.8, 0), (2, 0)), _box(-0.8, 0.8, 0.6, WHITE)]
@@ -361,7 +361,7 @@ def _friction_in_words(law: laws.Coulomb, force: str, unit: str) -> str:
     return f"friction {' + '.join(words)}"
 
 
-LAWS: dict[type, LawSymbol] = {  # drives are orange, filled if they prescribe the motion
+LAWS: dict[type, LawSymbol] = {  # drives are filled with orange if they prescribe the motion
     laws.Spring: LawSymbol(
         [_line((-2, 0), (-1, 0), *_TEETH, (1, 0), (2, 0))],
         lambda law, force, unit: with_unit(law.stiffness, f"{force}/{unit}")
