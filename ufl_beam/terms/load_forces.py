@@ -306,8 +306,8 @@ class FrameForces(LoadTerm):
         G.data *= coriolis
         self._matrices, self._A = (Product(S), Product(G)), A
         x, y = (np.ascontiguousarray(axis, dtype=np.int32) for axis in subdomain.translations())
-        # Vectors from the centre of rotation to all nodes.  Those of beams are written last, because
-        # nodes joined to the ground share its degrees of freedom, but are not at its centre.
+        # Vectors from the centre of rotation to all nodes.  Nodes of beams are written last: if
+        # they are joined to the ground, they share its freedoms, but are not at its centre.
         numbering, from_axis = subdomain.numbering, np.zeros(subdomain.numbering.size)
         centers = np.array([body.center for body in numbering.scene.rigid_bodies]).reshape(-1, 2)
         points = np.concatenate([centers, numbering.points]) - frame.about
