@@ -60,10 +60,12 @@ def advice(cases: list[Case]) -> list[str]:
 
 def _others(case: Case, target: float, best: Run) -> str:
     """What the other schemes take for the same error."""
-    ratios, never = {}, []
+    ratios, never, refused = {}, [], []
     for scheme in schemes([case]):
         run = cheapest(case, target, scheme=scheme)
-        if run is None:
+        if not any(one["scheme"] == scheme for one in good(case)):
+            refused.append(scheme)
+        elif run is None:
             never.append(scheme)
         elif scheme != best["scheme"]:
             ratios[scheme] = run["seconds"] / best["seconds"]
@@ -74,6 +76,8 @@ def _others(case: Case, target: float, best: Run) -> str:
     parts += [f"{scheme} {ratio:.1f} times" for scheme, ratio in ratios.items() if ratio > EQUAL]
     if never:
         parts.append(f"{', '.join(never)} {'does' if len(never) == 1 else 'do'} not reach it here")
+    if refused:
+        parts.append(f"all runs with {', '.join(refused)} fail")
     return "; ".join(parts) or "there is no other"
 
 

@@ -17,11 +17,12 @@ INTRODUCTION = """\
 # Speed and accuracy: the study
 
 Written by `make study`; do not edit. The study measures time and error of each setting in scenes
-that are smooth, stiff, impulsive, plastic, softening and static. The time is the wall time of a run
-with the building of its scene, without compilation. The error is the largest difference of a
+that are smooth, stiff, impulsive, plastic, softening and static. The time is the wall time of
+`ub.simulate` with its setup, without compilation. The error is the largest difference of a
 coordinate of one place from a reference run, at ten instants, relative to the size of the scene.
 The reference run is finer than all others. Errors below twice its own estimated error cannot be
-measured; the tables have "—" there. The scenes are small, and times depend on the machine, so use
+measured; the tables have "—" there. Iterations are counted per step. The imbalance of the ledger is
+a fraction of the transferred energy. The scenes are small, and times depend on the machine, so use
 the ratios of times.
 [`ub.tradeoff`](tradeoff.md) finds the settings for a scene of your own.
 """

@@ -188,6 +188,14 @@ class DofNumbering:
         """Return the parameters s of the vertices of a beam, from 0 (start) to 1 (end)."""
         return self._parameters[self._index(beam)]
 
+    def gauss_parameters(self, beam: Member) -> Array:
+        """Return the parameters s of the points of :attr:`Mesh.gauss` in the cells of a beam.
+
+        The shape is (num_cells, 4).
+        """
+        s = self.parameters(beam)
+        return np.asarray(s[:-1, None] + np.outer(np.diff(s), self.mesh.gauss[0]))
+
     def vertices_of(self, beam: Member) -> Index:
         """Return the vertices of a beam from start to end."""
         i = self._index(beam)

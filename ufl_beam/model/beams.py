@@ -254,10 +254,10 @@ class Mesh:
 
     @cached_property
     def gauss(self) -> tuple[Array, Array]:
-        """Four Gauss points as fractions of a cell, and their weights times those of the nodes.
+        """Gauss points from 0 to 1 in a cell, (4,), and weights for consistent forces, (4, p+1).
 
-        The shapes are (4,) and (4, p+1).  The integral over a cell of a function times a Lagrange
-        polynomial is exact if the function is a polynomial up to degree 7 - p.
+        A row of values at the points times the weights is the mean of the function times each
+        Lagrange polynomial.  It is exact for polynomials up to degree 7 - p.
         """
         points, weights = np.polynomial.legendre.leggauss(4)
         s = (1 + points) / 2

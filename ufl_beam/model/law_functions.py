@@ -2,7 +2,8 @@
 """Functions of arrays and UFL expressions, for laws of materials, softening and connectors.
 
 Arrays may be complex, because some derivatives are computed by complex steps: use
-:func:`absolute` instead of ``abs``.  The operators + - * / and ** are the Python operators.
+:func:`absolute` instead of ``abs``.  Besides these functions, laws use the
+operators + - * / and **.
 
 Example:
     >>> f = ub.law_functions

@@ -120,7 +120,7 @@ class FollowerLoad(LoadAtPlace):
 
 
 def require_span(span: object, what: str) -> tuple[float, float]:
-    """Return the ends of a part of a beam as two increasing parameters from 0 to 1, or raise."""
+    """Return ``span`` as two increasing parameters from 0 to 1, or raise."""
     first, last = require_vector(span, what)
     if not 0.0 <= first < last <= 1.0:
         raise ModelError(
@@ -133,7 +133,7 @@ Profile = tuple[float, float] | Callable[[float], float]
 
 
 def require_profile(profile: object, what: str) -> Profile:
-    """Return the profile of a load with two finite numbers, or a function of s, or raise."""
+    """Return ``profile`` as two finite numbers or a function of s, or raise."""
     return profile if callable(profile) else require_vector(profile, what)
 
 
@@ -147,13 +147,13 @@ class LineLoad(Load):
         force: (f_x, f_y); N/m.
         moment: Moment, positive counter-clockwise; N m/m.
         amplitude: Factor on force and moment, a function of time t (s).
-        span: Parameters of the beam at both ends of the load, from 0 (start) to 1 (end).  They are
-            vertices of the mesh.
+        span: Parameters of the beam at both ends of the load, from 0 (start of the beam) to 1
+            (end).  Both ends become vertices of the mesh.
         profile: Factors on force and moment at both ends of the span, linear between them; or a
-            function of the parameter s of the beam.  Forces on the nodes are exact if the profile
-            is a polynomial up to degree 4 in each cell, section forces between them if it is linear
-            in each cell.  A file of a solution has values of the function, and is
-            linear between them.
+            function of the parameter s of the beam.  Consistent nodal forces are exact for
+            polynomials up to degree 4 in each cell.  Section forces are exact at the ends of cells.
+            Between these they are exact for forces that are linear in each cell, and moments that
+            are constant.  A saved solution has samples of the function.
 
     Raises:
         ModelError: The span is not inside the beam, or the profile is no number somewhere.
@@ -189,7 +189,7 @@ class LineLoad(Load):
     _label = __str__
 
     def factors(self, s: Array) -> Array:
-        """Return the factors of the profile at parameters ``s``; zero outside of the span.
+        """Return the factors of the profile at parameters ``s``; they are zero outside of the span.
 
         Raises:
             ModelError: The profile is not a finite number at one of them.

@@ -158,11 +158,12 @@ class Potential(Work):
 
     The function returns the energy per undeformed length.  Its parameters may be ``q``, ``axis``,
     ``t`` and the names in ``numbers``, see :class:`VirtualWork`.  UFL derives the forces.
-    :class:`EnergyMomentum` and related schemes use the mean of the forces over the step.  The work
-    of the forces is then the increment of the energy: to round-off for polynomials up to degree 8,
-    otherwise with an error of order nine in the step.  The energy is the entry ``name`` in
-    ``energy.state``; the entry of ``energy.supplied`` with the name and " in time", such as
-    "soil in time", is the energy gained by explicit dependence on time.
+    Energy-momentum schemes use the mean of the forces over the step.  The work of the forces is
+    then the increment of the energy: to round-off for polynomials up to degree 8, otherwise with an
+    error of order nine in the step.  With ``alpha`` the dissipated part is the entry "numerical".
+    The energy is the entry ``name`` in ``energy.state``.  The entry of ``energy.supplied`` with the
+    name and " in time", such as "soil in time", is the energy gained by explicit dependence on
+    time.
 
     It has the arguments of :class:`VirtualWork`.
 

@@ -153,7 +153,7 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
 
 
 def supports(shape: DeformedShape) -> Iterator[Stroke]:
-    """Draw supports; fixed supports are on hatched ground."""
+    """Draw supports; supports that do not move are on hatched ground."""
     unit = shape.canvas.outside
     for at, angle, outlines, color, _ in support_symbols(shape):
         ahead = unit * directions(angle)

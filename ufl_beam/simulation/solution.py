@@ -66,8 +66,8 @@ class Solution(States, Rich):
         iterations: Number of Newton iterations.
         time_error: Sum of the estimated errors of all steps, see :class:`Adaptive`; NaN with equal
             steps.
-        seconds: Wall time of the run, building the scene included; s.
-        building: Wall time of building the scene in :func:`simulate`, which is not saved; s.
+        seconds: Wall time of the run with the setup of the simulation; s.
+        building: Wall time of the setup in :func:`simulate`, which is not saved; s.
         every: Number of steps between stored states.
         parameter: Labels and formats of :attr:`times`, which are load factors in a path.
         imbalance_message: Message if the imbalance of the energy ledger exceeds the tolerance of
@@ -174,9 +174,8 @@ class Solution(States, Rich):
             if field == "curve":
                 return _used_curve(self, function)
             if isinstance(owner, LineLoad) and field == "profile":
-                ends, (points, _) = numbering.parameters(owner.beam), numbering.mesh.gauss
-                in_forces = ends[:-1, None] + np.outer(np.diff(ends), points)
-                s = np.union1d(in_forces, np.linspace(*owner.span, SAMPLES + 1))
+                even = np.linspace(*owner.span, SAMPLES + 1)
+                s = np.union1d(numbering.gauss_parameters(owner.beam), even)
                 s = s[(s >= owner.span[0]) & (s <= owner.span[1])]
                 return Table(tuple(map(float, s)), tuple(map(float, owner.factors(s))))
             if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):

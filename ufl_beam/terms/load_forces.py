@@ -118,8 +118,9 @@ class DeadLoads(_AtDofs):
         for load in loads:
             key = id(load.amplitude)
             _, vector = vectors.setdefault(key, (load, np.zeros(subdomain.size)))
-            if (along := _add_dead_load(load, subdomain, vector)) is not None:
-                in_cells[key] = in_cells.get(key, 0.0) + along
+            if (in_some := _add_dead_load(load, subdomain, vector)) is not None:
+                cells, on_nodes = in_some
+                in_cells.setdefault(key, np.zeros(subdomain.cell_dofs.shape))[cells] += on_nodes
         for key, along in in_cells.items():
             np.add.at(vectors[key][1], subdomain.cell_dofs, along)
         owners, whole = zip(*vectors.values(), strict=True)
@@ -171,49 +172,42 @@ class DeadLoads(_AtDofs):
             self._factors[2, k] = archive.number(f"part of dead loads {k}", factor)
 
 
-def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> Array | None:
+def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Index, Array] | None:
     """Add the concentrated forces of a dead load with the factor 1 to ``forces``.
 
     Returns:
-        Forces along beams as consistent forces on the nodes of the cells, (num_cells, dofs of a
-        cell); None if there are none.
+        Local cells with forces along them, (n,), and consistent forces on the nodes of these cells,
+        (n, dofs of a cell); None if there are none.
     """
-    numbering, at_places = subdomain.numbering, []
-    beam_of_cell = numbering.beam_of_cell[subdomain.cells]
-    # Forces per length, (num_cells, points, 3), and the weights of the nodes at these points
-    per_length: Array | None = None
-    weights = numbering.mesh.fractions[None]
+    numbering, cells = subdomain.numbering, subdomain.cells
+    mesh, at_places, loaded = numbering.mesh, [], None
     if isinstance(load, PointLoad):
         at_places = [(load.place, (*load.force, load.moment))]
     elif isinstance(load, LineLoad):
-        parameters = numbering.parameters(load.beam)
-        first = subdomain.cells - numbering.cells_of(load.beam)[0]
-        loaded = (first >= 0) & (first < len(parameters) - 1)
-        first, (points, weights) = first[loaded], numbering.mesh.gauss
-        s = parameters[first, None] + np.outer(np.diff(parameters)[first], points)
-        per_length = np.zeros((len(loaded), len(points), 3))
-        per_length[loaded] = load.factors(s)[:, :, None] * [*load.force, load.moment]
+        beam_cells = numbering.cells_of(load.beam)
+        loaded = np.flatnonzero((cells >= beam_cells[0]) & (cells <= beam_cells[-1]))
+        s = numbering.gauss_parameters(load.beam)[cells[loaded] - beam_cells[0]]
+        shares, density = load.factors(s) @ mesh.gauss[1], [*load.force, load.moment]
     elif isinstance(load, Gravity):
         g_x, g_y = load.acceleration
         at_places = [
             (at, (mass * g_x, mass * g_y, 0.0)) for at, mass, _ in point_masses(numbering.scene)
         ]
         rhoA = np.array([beam.section.rhoA for beam in numbering.scene.beams])
-        per_length = rhoA[beam_of_cell, None, None] * [g_x, g_y, 0.0]
+        loaded = np.arange(len(cells))
+        shares = np.outer(rhoA[numbering.beam_of_cell[cells]], mesh.fractions)
+        density = [g_x, g_y, 0.0]
     else:
         raise TypeError(f"{type(load).__name__} is not a dead load")
     for place, force in at_places:
         if moves_with_node(place):  # else a connector of Scene.all_connectors applies the force
-            dofs = subdomain.numbering.node(place)
+            dofs = numbering.node(place)
             mine = subdomain.owns(dofs)
             forces[subdomain.local(dofs[mine])] += np.array(force)[mine]
-    if per_length is None:
+    if loaded is None:
         return None
-    lengths = numbering.lengths(subdomain.cells)
-    along = lengths[:, None, None] * (per_length.transpose(0, 2, 1) @ weights)
-    nodes = weights.shape[1]
-    order = [0, nodes - 1, *range(1, nodes - 1)]  # of nodes in a cell
-    return np.ascontiguousarray(along[:, :, order].reshape(len(along), 3 * nodes))
+    first, *between, last = (numbering.lengths(cells[loaded])[:, None] * shares).T
+    return loaded, np.kron(density, np.column_stack([first, last, *between]))
 
 
 class FollowerLoads(_AtDofs):
