@@ -454,3 +454,39 @@ def test_buckling_with_each_law(law):
         assert 1.03 * free < factor < 1.1 * free
     else:
         assert factor == pytest.approx(free, rel=0.01)
+
+
+def portal(loads):
+    left, right = (ub.Beam((x, 0), (x, 4), SECTION, cells=6) for x in (0, 6))
+    girder = ub.Beam((0, 4), (6, 4), SECTION, cells=8)
+    return ub.Scene(
+        [left, girder, right],
+        joints=[ub.Rigid(left.end, girder.start), ub.Rigid(girder.end, right.end)],
+        supports=[ub.Clamped(left.start), ub.Clamped(right.start)],
+        loads=loads(girder),
+    )
+
+
+def test_factors_of_loads_that_bend_beams_are_marked():
+    """A load along a girder bends it long before the columns buckle."""
+    columns = portal(lambda beam: [ub.PointLoad(x, (0, -1)) for x in (beam.start, beam.end)])
+    good = ub.buckling(columns, 2)
+    assert good.errors.max() < 0.02
+    along = portal(lambda beam: [ub.LineLoad(beam, (0, -1 / 3))])
+    with pytest.warns(ub.ModelWarning, match="are no buckling loads.*bend beams"):
+        wrong = ub.buckling(along, 2)
+    assert wrong.errors.min() > 0.5
+    assert abs(wrong.factors[0]) < 0.5 * good.factors[0]
+    assert all("no buckling load" in title for title in wrong.titles)
+
+
+def test_errors_of_factors_estimate_the_change_of_factors():
+    """A force across a column, 0.3 % of its load, changes the factor by less than the estimate."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=16)
+    across, alone = (
+        ub.buckling(clamped(beam, loads=[ub.PointLoad(beam.end, (-1.0, y))]), 1)
+        for y in (0.003, 0.0)
+    )
+    assert alone.errors[0] < 1e-3
+    change = 1 - across.factors[0] / alone.factors[0]
+    assert change < across.errors[0] < 3 * change

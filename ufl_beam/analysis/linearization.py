@@ -207,8 +207,13 @@ class SmallMotions:
 
     # -- buckling ------------------------------------------------------------------------------
 
-    def buckling(self, n: int) -> tuple[Array, Array | Complex]:
-        """Compute up to n buckling factors nearest to zero, and their shapes; (n,), (size, n)."""
+    def buckling(self, n: int) -> tuple[Array, Array | Complex, Array]:
+        """Compute up to n buckling factors nearest to zero, their shapes, and estimated errors.
+
+        The shapes are (n,), (size, n) and (n,).  At a factor λ the stiffness of the shape would
+        vanish if the stiffness changed linearly.  The error is the stiffness of the shape in the
+        configuration q + λ u of the linear path u, divided by its stiffness in the state q.
+        """
         u = self._path()
         right, left = self._with_laws()
         change = csr_array(
@@ -219,7 +224,13 @@ class SmallMotions:
         # Solve again in the space of these shapes, because works are more accurate than matrices.
         works = self._simulation.equation.tangent_works(self.q, u, right @ x, left.T @ x)
         factors, mix = eigensolvers.small(works[0], -works[1])
-        return self._nearest(n, factors, (x @ mix).astype(complex))
+        order = np.argsort(np.abs(factors), kind="stable")[:n]
+        factors, x = factors[order], (x @ mix)[:, order]
+        errors = []
+        for factor, y in zip(factors, x.T, strict=True):
+            T, after = (self._linearized(q)[1] for q in (self.q, self.q + factor * u))
+            errors.append(abs(((y @ left) @ after @ (right @ y)) / ((y @ left) @ T @ (right @ y))))
+        return *self._nearest(n, factors, x.astype(complex)), np.array(errors)
 
     def _with_laws(self) -> tuple[csr_array, csr_array]:
         """Return the matrices R and L that reduce the tangent T of all unknowns to K = L T R.
