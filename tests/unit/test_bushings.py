@@ -235,6 +235,7 @@ def test_steps_need_no_python():
     simulation.close()
 
 
+@pytest.mark.filterwarnings("ignore:buckling. the factors:ufl_beam.ModelWarning")
 def test_buckling_and_modes():
     """The bends of the law, against a spring that is the same in one component."""
 

@@ -405,6 +405,7 @@ def test_modes_keep_the_variables():
     assert ub.modes(scene, 1).omega[0] == pytest.approx(math.sqrt(50.0 / 2.0), rel=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:buckling. the factors:ufl_beam.ModelWarning")
 def test_buckling_on_a_spring_of_ones_own():
     """A column on a turning spring with a load: the bend of the law belongs to its derivative."""
     column = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e7, GA=1e7, EI=1e5), cells=4)

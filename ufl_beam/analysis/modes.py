@@ -381,8 +381,8 @@ def buckling(
         listed = ", ".join(f"{factor:.4g}" for factor in factors[wrong])
         warn(
             f"buckling: the factors {listed} are no buckling loads: the stiffness of their shapes "
-            "does not vanish there, because the loads bend beams before they buckle. Give forces "
-            "at the nodes instead of along beams, give at= a state closer to buckling, follow the "
+            "does not vanish there, because the loads bend or turn beams first. Give forces at the "
+            "nodes instead of along beams, give at= a state closer to buckling, follow the "
             "path with ub.follow, or find where a frequency of modes(..., at=) vanishes"
         )
     return Buckling(scene, small.numbering, small.q, shapes, factors, errors)
