@@ -304,6 +304,7 @@ OLD_NAMES = {
     "ExactStep": "EnergyMomentumBase",
     "Hardening": "ElastoPlastic",
     "Midpoint": "EnergyMomentum",
+    "MidpointLoads": "MidpointDynamics",
     "Midway": "MidpointDynamics",
     "Motor": "PrescribedMotion",
     "Prescribed": "PrescribedDisplacement",

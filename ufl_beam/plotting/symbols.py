@@ -124,13 +124,13 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
         else:
             angle = support.angle - (0.0 if 1 in held else math.pi / 2)
             symbols.append((place, color, len({0, 1} & set(held)), _inward(place), angle))
-    grounded: list[tuple[Sequence[AttachmentPoint], bool]] = [
+    # Places, and whether the joint rotates; None for connectors, which leave its symbol as it is
+    grounded: list[tuple[Sequence[AttachmentPoint], bool | None]] = [
         (j.places, _rotates(j)) for j in scene.joints if joint_symbol(j).grounded
     ]
-    grounded += [((c.a, c.b), False) for c in scene.connectors if not c.is_rotation]
-    grounds: dict[
-        BodyPoint, tuple[float, bool]
-    ] = {}  # direction away from the ground; True if only joints that turn are there
+    grounded += [((c.a, c.b), None) for c in scene.connectors if not c.is_rotation]
+    # Direction away from the ground; True if there are joints, and all rotate
+    grounds: dict[BodyPoint, tuple[float, bool]] = {}
     for places, rotates in grounded:
         for point in places:
             if isinstance(point, BodyPoint) and point.body is GROUND:
@@ -140,8 +140,8 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
                     X, Y = far.body.center
                 away = (x, y) != (X, Y)
                 inward = math.atan2(Y - y, X - x) if away else _inward(far)
-                known, before = grounds.get(point, (inward, True))
-                grounds[point] = known, before and rotates
+                known, before = grounds.get(point, (inward, rotates is not None))
+                grounds[point] = known, before and rotates is not False
     for point, (inward, rotates) in grounds.items():
         symbols.append((point, GROUND_GREY, 2 if rotates else 3, inward, 0.0))
     for place, color, fixed, inward, angle in symbols:

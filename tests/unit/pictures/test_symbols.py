@@ -12,6 +12,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.path import Path
 
 import ufl_beam as ub
+from ufl_beam.plotting import positions, symbols
 from ufl_beam.plotting.style import INK, WHITE
 from ufl_beam.plotting.symbols import EDGE, FILLED
 
@@ -315,3 +316,20 @@ def test_points_of_the_ground_are_supports(engine_drawn):
     np.testing.assert_allclose((spring[0] + spring[1]) / 2, (4.5, 0.4), atol=1e-12)
     away = np.array([4.5 - 3.2, 0.4 - 0.1])
     assert ((spring - (4.5, 0.4)) @ away > -1e-12).all()
+
+
+def test_a_spring_leaves_the_symbol_of_a_pin_as_it_is():
+    """Ground with a joint that turns is a pin, also if a spring acts there."""
+    beam, ground = ub.Beam((0, 0), (1, 0), ub.Section(EA=1.0, GA=1.0, EI=1.0)), ub.ground(0, 0)
+    pin, spring = ub.Revolute(ground, beam.start), ub.Stretch(ground, beam.at(0.5), ub.Spring(1.0))
+
+    def outline(joints, connectors):
+        scene = ub.Scene(
+            [beam], supports=[ub.Clamped(beam.end)], joints=joints, connectors=connectors
+        )
+        shape = positions.Canvas.at_scale(scene, 1.0, 1.0).undeformed
+        *_, (_, _, outlines, *_) = symbols.support_symbols(shape)
+        return str(outlines)
+
+    assert outline([pin], [spring]) == outline([pin], [])
+    assert outline([], [spring]) != outline([pin], [])
