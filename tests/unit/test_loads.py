@@ -278,3 +278,23 @@ def test_weight_of_a_body_without_beams():
     scene = ub.Scene(bodies=[body], loads=[ub.Gravity()])
     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1)
     assert run.position(body.middle)[-1] == pytest.approx([0, -9.81 / 2], abs=1e-9)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_path_its_envelope_and_its_reactions_agree(degree):
+    """Under a load with a profile on a part of a beam, which bends far."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=6)
+    load = ub.LineLoad(
+        beam, (0, -50), span=(0.3, 0.8), profile=lambda s: (s - 0.3) * (0.8 - s),
+        amplitude=lambda t: t,
+    )  # fmt: skip
+    scene, extremes = clamped(beam, loads=[load]), ub.Extremes(points=3)
+    control, mesh = ub.DisplacementControl(beam.end, "v", -0.2), ub.Mesh(degree=degree)
+    path = ub.follow(scene, control, steps=5, record=extremes, mesh=mesh)
+    total = 50 * 2 * 0.5**3 / 6 * path.times
+    assert path.displacement(beam.end)[-1, 1] == pytest.approx(-1.0, rel=1e-9)
+    assert path.reaction(scene.supports[0])[:, 1] == pytest.approx(total, abs=1e-9 * total[-1])
+    M = np.array([path.diagram(beam, n, points=3).M for n in range(len(path.times))])
+    recorded = extremes.section_forces(beam)
+    np.testing.assert_allclose(recorded.low[..., 2].ravel(), M.min(axis=0), atol=1e-12)
+    np.testing.assert_allclose(recorded.high[..., 2].ravel(), M.max(axis=0), atol=1e-12)
