@@ -135,9 +135,9 @@ class Solver(PresentState):
         rest = np.arange(len(numbering.cells))
         self.yielding: list[YieldingBeams] = []
         for section_points, cells in numbering.inelastic:
-            self.yielding.append(YieldingBeams(cells, section_points, setting))
+            self.yielding.append(YieldingBeams(cells, section_points, setting, t))
             rest = np.setdiff1d(rest, cells)
-        elastic = [ElasticBeams(rest, setting)] if len(rest) else []
+        elastic = [ElasticBeams(rest, setting, t)] if len(rest) else []
         self.beams = [*self.yielding, *elastic]
         self.connectors = all_connectors(setting)
         self.inertia = None
@@ -178,6 +178,8 @@ class Solver(PresentState):
         loads: Array = np.zeros(self.numbering.size)
         if self._continues or (has_inertia(scheme) and scheme.further_rates):
             loads = sum((load.equilibrium(self.t, self.q, v) for load in self.loads), loads)
+            for beam in self.beams:
+                beam.imposed.start(self.t)
         known = same and "reactions" in variables
         if not same:  # rates and forces of the last step belong to the forces before the jump
             lasting = (n for n, x in variables.items() if x.ndim == 2 or n == "reactions")
