@@ -305,7 +305,7 @@ def pictures_of(case):
         "energy": lambda: ub.plot(solution, "energy"),
         "history": lambda: ub.plot(solution, "history", [beam.end]),
     }  # fmt: skip
-    if case.combination.has("bending=", "axial=", "fibres=", "hinge=", "interaction="):
+    if case.combination.has("bending=", "axial=ub.", "fibres=", "hinge=", "interaction="):
         drawn["dissipation"] = lambda: ub.plot(solution, "dissipation")
         drawn["curvature"] = lambda: ub.plot(solution, "moment-curvature", beam.at(0.3))
     if case.combination.seed % 12 == 5:  # these take seconds

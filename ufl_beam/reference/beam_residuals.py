@@ -89,13 +89,17 @@ class ElasticBeams(CellForce):
 
     def change(self, step: Step, q1: Array) -> float:
         """Return the energy stored in the step, and the work on imposed strains; J."""
-        stored = self.energy(q1) - self.stored["stored"]
-        return stored + float(self._work_on_imposed.assembled())
+        return self.energy(q1) - self.stored["stored"] + self.work_on_imposed()
+
+    def work_on_imposed(self) -> float:
+        """Return the work of the resultants on the change of imposed strains in the step; J."""
+        return float(self._work_on_imposed.assembled())
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Accept the end of the step; store the changes of the strains if the scheme uses them."""
         super().accept(step, q1, s)
-        self._supplied["loads"] -= float(self._work_on_imposed.assembled())
+        if self.imposed.change.any():
+            self._supplied["loads"] -= self.work_on_imposed()
         self.imposed.accept()
         if self._decays:
             self._last_change = self.cells.strains(q1) - self.cells.strains(step.q0)
@@ -155,9 +159,9 @@ class YieldingBeams(CellForce):
     def change(self, step: Step, q1: Array) -> float:
         """Return the energy stored and dissipated in the step, and the work on imposed strains."""
         self.points.require_dissipation(self._names)
-        return self.points.change() + self._work_on_imposed()
+        return self.points.change() + self.work_on_imposed()
 
-    def _work_on_imposed(self) -> float:
+    def work_on_imposed(self) -> float:
         """Return the work of the resultants on the change of imposed strains in the step; J."""
         before, w = self.points.recorded[:, :3], self._weight
         acting = w * before + (1 - w) * self.points.r
@@ -166,7 +170,8 @@ class YieldingBeams(CellForce):
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Accept the internal variables at the end of the step."""
-        self._supplied["loads"] -= self._work_on_imposed()
+        if self.imposed.change.any():
+            self._supplied["loads"] -= self.work_on_imposed()
         self.imposed.accept()
         self.points.accept()
 

@@ -74,7 +74,9 @@ static double work_on_imposed_strains(const imposed_strains *all, const double *
 /* Internal forces do this work in addition to the energy that cells store and dissipate. */
 void change_of_imposed_strains(void *self, const double *q1, energy_change *sum)
 {
-  sum->in_beams += work_on_imposed_strains(self, q1);
+  const double work = work_on_imposed_strains(self, q1);
+  sum->in_beams += work;
+  sum->effort += fabs(work);
 }
 
 void accept_imposed_strains(void *self, const time_step *step, const double *q1, const double *s)

@@ -892,7 +892,7 @@ typedef struct {
 } force_watch;
 
 /* Energy stored and dissipated in a step, and the sum of the magnitudes of the works on
- * connectors. */
+ * connectors and on imposed strains. */
 typedef struct { double in_beams, in_connectors, effort; } energy_change;
 
 /* Adds the contribution of a term in a step to q1. */
