@@ -308,10 +308,11 @@ TABLE = {
     "ImposedStrain": call(
         ub.ImposedStrain, beam=V(BEAM, NO_BEAM),
         **{
-            name: V((0.0, 1e-4), [*VECTOR[1:], *(f for f in TIME if f is not ARRAY)])
+            name: V((0.0, 1e-4), ["x", *VECTOR[3:], *TIME[3:]])
             for name in ("axial", "curvature", "shear")
         },
-        span=V((0.2, 0.6), [*VECTOR, (0.6, 0.2), (0.2, 0.2), (-0.1, 0.5), (0.5, 1.1)]), **TIMED,
+        span=V((0.2, 0.6), [*VECTOR, (0.6, 0.2), (0.2, 0.2), (-0.1, 0.5), (0.5, 1.1)]),
+        amplitude=V(lambda t: t, [*TIME, None]),
     ),
     "Gravity": call(
         ub.Gravity, acceleration=V((0, -9.81), VECTOR), amplitude=V(lambda t: t, [*TIME, None])

@@ -21,7 +21,7 @@ from ufl_beam.model.records import Instance
 
 
 def require_along(value: object, what: str) -> Profile:
-    """Return a number as a pair of equal numbers, a pair of numbers or a function of s, or raise."""
+    """Return a pair of numbers (two times a single number) or a function of s, or raise."""
     if callable(value):
         return value
     if isinstance(value, Real):
@@ -143,7 +143,7 @@ class ImposedStrain(Load):
         P = require_number(force, "ImposedStrain.tendon: force")
         e = require_along(eccentricity, "ImposedStrain.tendon: eccentricity")
         section, (first, last) = beam.section, require_span(span, "ImposedStrain.tendon: span")
-        s = np.linspace(first, last, 101)
+        s = first + (last - first) * np.arange(101.0) / 100
         at = profile_at(s, e, (first, last), "ImposedStrain.tendon: eccentricity")
         far = np.abs(at).argmax()
         if abs(at[far]) > section.depth / 2:

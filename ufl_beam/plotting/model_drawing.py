@@ -75,11 +75,12 @@ class Subject:
         """
         s = np.array(load.beam.vertices(self.scene.attached[load.beam]))
         low, high = (np.abs(s - end).argmin() for end in load.span)
-        s, strained = s[low : high + 1], isinstance(load, ImposedStrain)
-        if strained or callable(load.profile) or load.profile[0] != load.profile[1]:
+        s = s[low : high + 1]
+        profile = load.profile if isinstance(load, LineLoad) else load.strains
+        if callable(profile) or profile[0] != profile[1]:
             s = np.union1d(s, np.linspace(s[0], s[-1], 101))
         axis = np.array([load.beam.curve(x) for x in s], float)
-        return axis, load.strains(s) if strained else load.factors(s)
+        return axis, load.strains(s) if isinstance(load, ImposedStrain) else load.factors(s)
 
     def directions_at(self, place: AttachmentPoint) -> Array:
         """Return the directions in which beams leave a place; (n, 2)."""

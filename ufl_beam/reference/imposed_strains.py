@@ -40,7 +40,7 @@ class ImposedStrains:
                     )
                     own = np.polynomial.legendre.leggauss(degree)[0]
                     field[k] = np.polynomial.legendre.legval(own, fit).T
-        self._reached = np.zeros(len(self._loads))
+        self._reached: Array = np.zeros(len(self._loads))
         if has_inertia(setting.scheme):
             self.start(t0)
         else:
@@ -63,7 +63,8 @@ class ImposedStrains:
 
     def _put(self, end: Array) -> None:
         self._end = end
-        before, self.values = (np.tensordot(x, self._fields, 1) for x in (self._reached, end))
+        before: Array = np.einsum("l,lcpk->cpk", self._reached, self._fields)
+        self.values: Array = np.einsum("l,lcpk->cpk", end, self._fields)
         self.change = self.values - before
         put(self.before, before)
         put(self.now, self.values)

@@ -138,7 +138,7 @@ class Solver(PresentState):
             self.yielding.append(YieldingBeams(cells, section_points, setting, t))
             rest = np.setdiff1d(rest, cells)
         elastic = [ElasticBeams(rest, setting, t)] if len(rest) else []
-        self.beams = [*self.yielding, *elastic]
+        self.beams: list[ElasticBeams | YieldingBeams] = [*self.yielding, *elastic]
         self.connectors = all_connectors(setting)
         self.inertia = None
         if has_inertia(scheme):
@@ -327,7 +327,7 @@ class Solver(PresentState):
         work = float(acting(self.scheme, self._inner_before, self._inner) @ s)
         size = abs(work) + abs(in_beams)
         size += sum(float(np.abs(group.taken(q1)).sum()) for group in self._groups)
-        size += sum(abs(beam.work_on_imposed()) for beam in self.beams)
+        size += sum((abs(beam.work_on_imposed()) for beam in self.beams), 0.0)
         energies = (abs(x) for account in vars(self.ledger).values() for x in account.values())
         slack = self.scheme.slack * size + KINK_WORK * sum(energies) + sys.float_info.min
         slack += float(self._round_off(self.supports.axes @ q1) @ np.abs(s))

@@ -21,8 +21,8 @@ from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import Curve, Table, nearest, parameter_step
-from ufl_beam.model.joints import START_INTERVAL
 from ufl_beam.model.imposed_strains import ImposedStrain
+from ufl_beam.model.joints import START_INTERVAL
 from ufl_beam.model.loads import LineLoad, profile_at
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import (

@@ -142,7 +142,7 @@ class ImposedStrains(LoadTerm):
             arrays[self._index[id(load.amplitude)], mine] += shares @ load.strains(s)
         if not arrays.any():
             return None
-        self._cells.append(CellStrains(arrays))
+        self._cells.append(CellStrains([*arrays]))
         self._cells[-1].put(self._factors[1].tolist())
         return self._cells[-1]
 
