@@ -95,6 +95,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
+from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import (
     Guided,
     Joint,
@@ -212,6 +213,7 @@ __all__ = [
     "Guided",
     "History",
     "HotSpot",
+    "ImposedStrain",
     "Joint",
     "KelvinVoigt",
     "LineLoad",

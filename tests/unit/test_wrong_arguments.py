@@ -305,6 +305,15 @@ TABLE = {
         span=V((0.2, 0.6), [*VECTOR, (0.6, 0.2), (0.2, 0.2), (-0.1, 0.5), (0.5, 1.1)]),
         profile=V((0.0, 1.0), [*VECTOR, *(f for f in TIME if f is not ARRAY)]),
     ),
+    "ImposedStrain": call(
+        ub.ImposedStrain, beam=V(BEAM, NO_BEAM),
+        **{
+            name: V((0.0, 1e-4), ["x", *VECTOR[3:], *TIME[3:]])
+            for name in ("axial", "curvature", "shear")
+        },
+        span=V((0.2, 0.6), [*VECTOR, (0.6, 0.2), (0.2, 0.2), (-0.1, 0.5), (0.5, 1.1)]),
+        amplitude=V(lambda t: t, [*TIME, None]),
+    ),
     "Gravity": call(
         ub.Gravity, acceleration=V((0, -9.81), VECTOR), amplitude=V(lambda t: t, [*TIME, None])
     ),
@@ -623,6 +632,7 @@ OWNERS = {
         "loads": [ub.FollowerLoad(BEAM.end, force=(1, 0), amplitude=f)]
     },
     "LineLoad on girder": lambda f: {"loads": [ub.LineLoad(BEAM, force=(1, 0), amplitude=f)]},
+    "ImposedStrain of girder": lambda f: {"loads": [ub.ImposedStrain(BEAM, 1e-4, amplitude=f)]},
     "Gravity": lambda f: {"loads": [ub.Gravity(amplitude=f)]},
     "PrescribedDisplacement at girder.start": lambda f: {
         "supports": [ub.PrescribedDisplacement(BEAM.start, u=0, v=f, psi=0)]

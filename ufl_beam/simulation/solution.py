@@ -21,8 +21,9 @@ from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import Curve, Table, nearest, parameter_step
+from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import START_INTERVAL
-from ufl_beam.model.loads import LineLoad
+from ufl_beam.model.loads import LineLoad, profile_at
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import (
     Content,
@@ -173,11 +174,12 @@ class Solution(States, Rich):
                 return SavedCurve.sampled(function, 0.0, 1.0, numbering.parameters(owner))
             if field == "curve":
                 return _used_curve(self, function)
-            if isinstance(owner, LineLoad) and field == "profile":
+            if isinstance(owner, LineLoad | ImposedStrain) and field != "amplitude":
                 even = np.linspace(*owner.span, SAMPLES + 1)
                 s = np.union1d(numbering.gauss_parameters(owner.beam), even)
                 s = s[(s >= owner.span[0]) & (s <= owner.span[1])]
-                return Table(tuple(map(float, s)), tuple(map(float, owner.factors(s))))
+                values = profile_at(s, function, owner.span, f"{owner}: {field}")
+                return Table(tuple(map(float, s)), tuple(map(float, values)))
             if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):
                 return SavedFunction.sampled(function, map(float, self.times))
             return None

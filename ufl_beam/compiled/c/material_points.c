@@ -144,10 +144,11 @@ static inline void subtract(const double *A, const double *x, double *y)
 static void linearize(const inelastic *m, const double *forces)
 {
   const points *p = m->points;
-  const double *e = p->e1, *D = p->D;
+  const double *e = p->e1, *D = p->D, *imposed = m->imposed;
   for (int c = 0; c < p->cells; ++c, e += 3, forces += 3, D += 9) {
     double b[3] = {forces[0], forces[1], forces[2]};
     subtract(D, e, b);
+    if (imposed) subtract(D, imposed + 6 * c + 3, b); /* the form adds D times the whole strains */
     put_in_cell(m->tangent, c, m->at_b, 3, b);
     put_in_cell(m->tangent, c, m->at_D, 9, D);
   }
@@ -195,6 +196,7 @@ void respond_at(const inelastic *m, const double *q)
   memcpy(m->latest, q, m->size * sizeof *q);
   memset(p->e1, 0, 3 * p->cells * sizeof *p->e1);
   add_cells((void *)m->strains, q, p->e1);
+  for (int k = 0; m->imposed && k < 3 * p->cells; ++k) p->e1[k] -= m->imposed[k / 3 * 6 + 3 + k % 3];
   p->linear = 0;
   if (m->predicted && p->line && !m->predicted->exact) {
     predict_strains(m->predicted, q);
