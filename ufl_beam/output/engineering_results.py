@@ -169,19 +169,17 @@ def _directions(states: States, connector: Connector) -> Array:
     """Return x of the directions in which b moves if a motion grows, in the steps; (n+1,)."""
     if connector.motion == "parting":
         return np.full(len(states), connector.axis[0])
-    e, parts = states.equilibrium_fraction, []
-    for weight, some in ((e, states), (1 - e, before(states))):
-        if not weight:
-            continue
+    e, (x, y) = states.equilibrium_fraction, connector.axis
+    along, length = np.zeros((2, len(states)))
+    for weight, some in ((e, states), (1 - e, states if e == 1 else before(states))):
         if connector.stretches:
             between = some.position(connector.b) - some.position(connector.a)
-            parts.append(weight * np.column_stack([between, np.linalg.norm(between, axis=1)]))
+            along += weight * between[:, 0]
+            length += weight * np.linalg.norm(between, axis=1)
         else:
-            angle = some.displacement(connector.a)[:, 2] if connector.follows_a else 0.0
-            x, y = connector.axis
-            parts.append(weight * np.column_stack([x * np.cos(angle) - y * np.sin(angle)]))
-    mean = sum(parts)
-    return np.asarray(mean[:, 0] / mean[:, 2] if connector.stretches else mean[:, 0])
+            angle = some.displacement(connector.a)[:, 2]
+            along += weight * (x * np.cos(angle) - y * np.sin(angle))
+    return along / length if connector.stretches else along
 
 
 def before(states: States) -> States:

@@ -223,7 +223,7 @@ class Extremes(Restartable):
             self._taken.append(extent)
         if self._in_c is not None:
             self._in_c.begin(-1 if state is None else simulation.substeps, *self._taken[:2])
-        self._before = np.full((1 + size) * self._accelerated, np.nan)
+        self._before: Array = np.full((1 + size) * self._accelerated, np.nan)
         if state is None:
             self.write(simulation)
         elif self._accelerated:
@@ -247,8 +247,9 @@ class Extremes(Restartable):
         if self._accelerated:
             v = simulation.subdomain.gather(simulation.velocities()[0])
             now = np.append(simulation.t, v)
-            found.append((self._taken[2], (now - self._before)[1:] / (now - self._before)[0]))
-            self._before = now
+            change = now - self._before
+            found.append((self._taken[2], change[1:] / change[0]))
+            self._before[:] = now
         for extent, values in found:
             for reached, when, beyond in (
                 (extent.low, extent.time_low, values < extent.low),

@@ -165,10 +165,11 @@ class History(Restartable):
 
     def _row(self, simulation: StateView) -> bytes:
         motion = [simulation.displacement(place) for place in self._places]
-        for place, before in zip(self._accelerated, self._before, strict=True):
+        for i, place in enumerate(self._accelerated):
             now = np.append(simulation.t, simulation.velocity(place))
-            motion.append((now - before)[1:] / (now - before)[0])
-            before[:] = now
+            change = now - self._before[i]
+            motion.append(change[1:] / change[0])
+            self._before[i] = now
         connectors = list(self._followed)
         connections = simulation.connections()[connectors, :3] if connectors else ()
         energies = [energy for group in simulation.entries() for energy in group.values()]

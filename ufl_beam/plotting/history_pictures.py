@@ -274,10 +274,10 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
 
 def draw_storeys(storeys: Storeys, *, quantity: str = "drift", ax: Axes | None = None) -> Figure:
     """Draw the largest and least drift ratio or shear of each storey over the height."""
-    values, label = 100 * storeys.ratio, "drift ratio (%)"
-    if quantity == "shear":
-        factor, prefix = style.decimal_prefix(float(np.nanmax(np.abs(storeys.shear))))
-        values, label = storeys.shear / factor, f"storey shear ({prefix}N)"
+    factor, prefix = style.decimal_prefix(float(np.nanmax(np.abs(storeys.shear))))
+    drift = quantity == "drift"
+    values = np.asarray(100 * storeys.ratio if drift else storeys.shear / factor)
+    label = "drift ratio (%)" if drift else f"storey shear ({prefix}N)"
     edges = [place.point[1] for place in storeys.levels]
     with style.panel(ax, (5.0, 6.0)) as axes:
         axes.axvline(0.0, color=GREY, linewidth=1.0, zorder=1)

@@ -92,10 +92,10 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             hot spot of "cycles".
         options: ``n`` is the index of a recorded time, negative from the end.  ``magnify`` is a
             factor on displacements.  ``times`` (s) are replaced by the nearest recorded times;
-            ``count`` is a number of shapes.  ``component`` is "u", "v" or "psi", or a rate
-            such as "du/dt" or "d2u/dt2".  ``numbers`` are indices of modes, all by default.  ``amplitude`` is their
-            largest displacement, as a fraction of the size of the scene.  ``ax`` are axes to draw
-            in, instead of a new figure.
+            ``count`` is a number of shapes.  ``component`` is "u", "v" or "psi", or a rate of one
+            of them, such as "du/dt" or "d2u/dt2".  ``numbers`` are indices of modes, all by
+            default.  ``amplitude`` is their largest displacement, as a fraction of the size of the
+            scene.  ``ax`` are axes to draw in, instead of a new figure.
 
     Raises:
         ArgumentError: There is no such picture, or one of its arguments is wrong; the message says
