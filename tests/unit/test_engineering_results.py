@@ -106,7 +106,7 @@ def test_results_of_several_processes_are_those_of_one():
         rows = run.hinges(LIMITS).rows
         numbers = [row[2:7] for row in rows]
         tables.append((storeys.shear[1:], run.acceleration(mast.end)[1:], numbers))
-        assert [str(row.where) for row in rows][0].startswith("Turn")
+        assert len(rows) == 2
     for one, other in zip(*tables, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-6 * np.nanmax(np.abs(other)))
 
@@ -270,7 +270,7 @@ def test_levels_may_be_anywhere(towers):
 
 def test_tables_are_texts_with_aligned_columns(towers):
     mast = towers.scene["mast"]
-    storeys = towers.storeys([mast.start, mast.at(0.5), mast.end])
+    storeys = towers.storeys([mast.start, mast.at(0.2), mast.end])
     lines = str(storeys).splitlines()
     assert len({len(line) for line in lines}) == 1
     assert lines[0].split("  ")[0] == "storey"
@@ -282,7 +282,7 @@ def test_tables_are_texts_with_aligned_columns(towers):
 def test_tables_are_frames_of_pandas(towers):
     pandas = pytest.importorskip("pandas")
     mast = towers.scene["mast"]
-    frame = towers.storeys([mast.start, mast.at(0.5), mast.end]).frame()
+    frame = towers.storeys([mast.start, mast.at(0.2), mast.end]).frame()
     assert isinstance(frame, pandas.DataFrame)
     np.testing.assert_allclose(frame["shear [N]"], 3e3, rtol=1e-9)
 
@@ -291,20 +291,20 @@ def test_missing_pandas_is_named(towers, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     mast = towers.scene["mast"]
     storeys = towers.storeys([mast.start, mast.end])
-    with pytest.raises(ImportError, match="needs pandas, .* pip install pandas"):
+    with pytest.raises(ImportError, match=r"needs pandas, .* pip install pandas"):
         storeys.frame()
 
 
 @pytest.mark.serial
 def test_profiles_of_storeys_are_drawn(towers):
     mast = towers.scene["mast"]
-    storeys = towers.storeys([mast.start, mast.at(0.5), mast.end])
+    storeys = towers.storeys([mast.start, mast.at(0.2), mast.end])
     for quantity, values in (("drift", 100 * storeys.ratio[-1]), ("shear", [3.0, 3.0])):
         (axes,) = ub.plot(storeys, quantity).axes
         _, largest, least = axes.lines
         np.testing.assert_allclose(largest.get_xdata()[::2], values)
         np.testing.assert_allclose(least.get_xdata(), 0.0)
-        np.testing.assert_allclose(largest.get_ydata(), [0.0, 1.5, 1.5, 3.0])
+        np.testing.assert_allclose(largest.get_ydata(), [0.0, 0.6, 0.6, 3.0])
     assert axes.get_xlabel() == "storey shear (kN)"
 
 
