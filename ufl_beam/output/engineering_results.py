@@ -271,13 +271,12 @@ def hinges_of(
     """Collect the hinges of a solution; see :meth:`Solution.hinges`."""
     _require_limits(limits)
     scene = states.scene
-    if of is None:
-        of = (*scene.beams, *scene.connectors)
-    chosen = require_all(of, "hinges: of", (Member, Connector))
-    for i, owner in enumerate(chosen):
-        if owner not in (*scene.beams, *scene.connectors):
+    known = {*scene.beams, *scene.connectors}
+    owners = known if of is None else require_all(of, "hinges: of", (Member, Connector))
+    for i, owner in enumerate(owners):
+        if owner not in known:
             raise ArgumentError(f"hinges: of[{i}] = {shorten(owner)} is not in the scene")
-    rows = []
+    rows, chosen = list[HingeState](), {*owners}
 
     def add(
         where: Place | Connector, motion: Array, plastic: Array, lost: Array,
