@@ -131,6 +131,8 @@ from ufl_beam.model.softening_laws import LinearSoftening, Softening, SofteningL
 from ufl_beam.model.supports import Clamped, Pinned, PrescribedDisplacement, Roller, Support
 from ufl_beam.model.works import Potential, VirtualWork
 from ufl_beam.output.dolfinx_view import DolfinxView as DolfinxView
+from ufl_beam.output.engineering_results import HingeTable as HingeTable
+from ufl_beam.output.engineering_results import Storeys as Storeys
 from ufl_beam.output.extremes import Extent as Extent
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import (
@@ -295,7 +297,8 @@ __all__ = [
 
 RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
-    "Energy", "Envelope", "Event", "Extent", "Film", "Modes", "Path", "Place", "Tradeoff",
+    "Energy", "Envelope", "Event", "Extent", "Film", "HingeTable", "Modes", "Path", "Place",
+    "Storeys", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 

@@ -458,9 +458,10 @@ TABLE = {
     ),
     "History": call(
         ub.History,
-        path=V("run.csv", PATH), places=V((), LIST), connectors=V((), LIST), every=V(1, COUNT),
-        max_rows=V(10, COUNT),
+        path=V("run.csv", PATH), places=V((), LIST), connectors=V((), LIST),
+        accelerations=V((), LIST), every=V(1, COUNT), max_rows=V(10, COUNT),
     ),
+    "Extremes": call(ub.Extremes, points=V(2, [*NUMBER, 1]), accelerations=V(False, SWITCH)),
     "Checkpoint": call(
         ub.Checkpoint,
         path=V("run.h5", PATH), every=V(1, optional(COUNT)), minutes=V(None, optional(FROM_ZERO)),
@@ -520,7 +521,7 @@ RECORDS_OF_RUNS = {
 """Made by runs and by functions of the package, not by users."""
 
 WITHOUT_PARAMETERS = {
-    "Static", "EnergyMomentumPrinted", "Extremes", "Recorder", "print_once", "Scheme",
+    "Static", "EnergyMomentumPrinted", "Recorder", "print_once", "Scheme",
     "DynamicScheme", "ConnectorLaw", "EnergyMomentumBase", "MidpointDynamics", "MaterialLaw",
     "SofteningLaw", "law_functions",
 }  # fmt: skip
@@ -564,7 +565,7 @@ WORDS = {
 }
 """Words in the place of a parameter's name."""
 
-PLACES = {"places", "place", "follow"}
+PLACES = {"accelerations", "places", "place", "follow"}
 """Of recorders and cameras; errors of places are a `ModelError`."""
 
 

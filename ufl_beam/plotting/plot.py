@@ -13,6 +13,7 @@ from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.engineering_results import Storeys
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
 from ufl_beam.plotting.frame_pictures import draw_damage_state, draw_shape
@@ -23,6 +24,7 @@ from ufl_beam.plotting.history_pictures import (
     draw_history,
     draw_modes,
     draw_shapes,
+    draw_storeys,
     draw_study,
     draw_tradeoff,
 )
@@ -49,6 +51,7 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     },
     Shapes: {"modes": draw_modes},
     Extremes: {name: partial(draw_extremes, quantity=name) for name in ("M", "N", "V")},
+    Storeys: {name: partial(draw_storeys, quantity=name) for name in ("drift", "shear")},
     Fatigue: {"cycles": draw_cycles},
     Study: {"results": draw_study},
     Tradeoff: {"errors": draw_tradeoff},
@@ -76,6 +79,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Solution         "moment-curvature"  moment of a cell; a place, ``ax``
     Modes, Buckling  "modes"             shapes side by side; ``numbers``, ``amplitude``
     Extremes         "M", "N", "V"       envelope of a section force; ``ax``
+    Storeys          "drift", "shear"    extremes over the height; ``ax``
     Fatigue          "cycles"            rainflow matrix and spectrum; a hot spot
     Study            "results"           results over the cases
     Tradeoff         "errors"            errors over wall times; ``ax``
@@ -88,10 +92,10 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             hot spot of "cycles".
         options: ``n`` is the index of a recorded time, negative from the end.  ``magnify`` is a
             factor on displacements.  ``times`` (s) are replaced by the nearest recorded times;
-            ``count`` is a number of shapes.  ``component`` is "u", "v", "psi", "du/dt", "dv/dt" or
-            "dpsi/dt".  ``numbers`` are indices of modes, all by default.  ``amplitude`` is their
-            largest displacement, as a fraction of the size of the scene.  ``ax`` are axes to draw
-            in, instead of a new figure.
+            ``count`` is a number of shapes.  ``component`` is "u", "v" or "psi", or a rate of one
+            of them, such as "du/dt" or "d2u/dt2".  ``numbers`` are indices of modes, all by
+            default.  ``amplitude`` is their largest displacement, as a fraction of the size of the
+            scene.  ``ax`` are axes to draw in, instead of a new figure.
 
     Raises:
         ArgumentError: There is no such picture, or one of its arguments is wrong; the message says
