@@ -66,8 +66,7 @@ def dissipated_per_length(solution: Solution, n: int) -> Array:
     numbering = solution.numbering
     energy = np.zeros(len(numbering.cells))
     for beam in solution.scene.beams:
-        section_points = beam.section.section_points(None)
-        if section_points is not None and not section_points.elastic:
+        if not all(points.elastic for points in beam.section.section_points(None)):
             state = solution.material(beam, n)
             cracks = state.hinge if beam.section.fibres is not None else 0.0
             energy[numbering.cells_of(beam)] = state.plastic + cracks
