@@ -44,6 +44,12 @@ from ufl_beam.analysis.modes import Buckling as Buckling
 from ufl_beam.analysis.modes import Modes as Modes
 from ufl_beam.analysis.modes import buckling, modes
 from ufl_beam.analysis.parameter_study import Study, study
+from ufl_beam.analysis.section_analysis import (
+    InteractionDiagram,
+    MomentCurvature,
+    interaction_diagram,
+    moment_curvature,
+)
 from ufl_beam.analysis.path_controls import (
     ArcLength,
     DisplacementControl,
@@ -276,9 +282,11 @@ __all__ = [
     "fit_decay",
     "follow",
     "ground",
+    "interaction_diagram",
     "law_functions",
     "logarithmic_decrement",
     "modes",
+    "moment_curvature",
     "peaks",
     "picture",
     "plot",
@@ -293,7 +301,8 @@ __all__ = [
 
 RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
-    "Energy", "Envelope", "Event", "Extent", "Film", "Modes", "Path", "Place", "Tradeoff",
+    "Energy", "Envelope", "Event", "Extent", "Film", "InteractionDiagram", "Modes",
+    "MomentCurvature", "Path", "Place", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 
