@@ -44,12 +44,6 @@ from ufl_beam.analysis.modes import Buckling as Buckling
 from ufl_beam.analysis.modes import Modes as Modes
 from ufl_beam.analysis.modes import buckling, modes
 from ufl_beam.analysis.parameter_study import Study, study
-from ufl_beam.analysis.section_analysis import (
-    InteractionDiagram,
-    MomentCurvature,
-    interaction_diagram,
-    moment_curvature,
-)
 from ufl_beam.analysis.path_controls import (
     ArcLength,
     DisplacementControl,
@@ -58,6 +52,9 @@ from ufl_beam.analysis.path_controls import (
 )
 from ufl_beam.analysis.path_following import Path as Path
 from ufl_beam.analysis.path_following import follow
+from ufl_beam.analysis.section_analysis import InteractionDiagram as InteractionDiagram
+from ufl_beam.analysis.section_analysis import MomentCurvature as MomentCurvature
+from ufl_beam.analysis.section_analysis import interaction_diagram, moment_curvature
 from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff as Tradeoff
 from ufl_beam.errors import (

@@ -39,9 +39,9 @@ def test_inputs_of_points_are_where_c_has_them():
         assert inputs[: len(of_c)] == of_c
         assert len(set(inputs)) == len(inputs)
     for name in names("point_input"):
-        assert getattr(lib, name.upper()) == inputs_of_points(SECTION.section_points(None)[0]).index(
-            name
-        )
+        assert getattr(lib, name.upper()) == inputs_of_points(
+            SECTION.section_points(None)[0]
+        ).index(name)
     assert len(names("point_input")) == lib.POINT_INPUTS
 
 

@@ -17,6 +17,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import (
     ArgumentError,
     StepFailed,
+    require_array,
     require_count,
     require_kind,
     require_number,
@@ -94,7 +95,11 @@ class _State:
         e, low, high, width, last = self._strain, -math.inf, math.inf, 0.0, math.inf
         for _ in range(MOST_ITERATIONS):
             r, D = self.response(e, curvature)
-            excess, slope, size = float(r[0, 0]) - N, float(D[0, 0, 0]), abs(curvature) * self._depth
+            excess, slope, size = (
+                float(r[0, 0]) - N,
+                float(D[0, 0, 0]),
+                abs(curvature) * self._depth,
+            )
             if not math.isfinite(excess):
                 return None
             met = abs(excess) <= TOLERANCE * self._EA * (abs(e) + size) or excess == 0.0
@@ -111,7 +116,9 @@ class _State:
             after = e - excess / slope if slope > 0 else math.nan
             if not (low < after < high and (abs(excess) < last / 2 or high - low == math.inf)):
                 width = 2 * width or max(size, abs(excess) / self._EA)
-                after = (low + high) / 2 if high - low < math.inf else e - math.copysign(width, excess)
+                after = (
+                    (low + high) / 2 if high - low < math.inf else e - math.copysign(width, excess)
+                )
             e, last = after, abs(excess)
         return None
 
@@ -184,18 +191,16 @@ def moment_curvature(
         2.24e+05 N m, 3.5e+04 J/m
     """
     what = "moment_curvature"
-    K, forces = require_row(curvature, f"{what}: curvature"), np.asarray(N)
-    if forces.ndim:
-        forces = require_row(N, f"{what}: N")
-    else:
-        forces = np.full(len(K), require_number(N, f"{what}: N"))
-    if len(forces) != len(K) or not len(K):
-        raise ArgumentError(f"{what}: {len(forces)} axial forces for {len(K)} curvatures")
+    K, forces = require_row(curvature, f"{what}: curvature"), require_array(N, f"{what}: N")
+    if not len(K):
+        raise ArgumentError(f"{what}: curvature is empty")
+    if forces.ndim and forces.shape != K.shape:
+        raise ArgumentError(f"{what}: N has the shape {forces.shape}, curvature {K.shape}")
     require_number(dt, f"{what}: dt", positive=True)
     state, before, rows = _State(section, 1, length, what), np.zeros(2), list[list[float]]()
-    path = np.column_stack([K, forces])
-    loads_first = int(K[0] != 0 and forces[0] != 0)
-    for after in [np.array([0.0, forces[0]])] * loads_first + list(path):
+    path = np.column_stack(np.broadcast_arrays(K, forces))
+    loads_first = int(K[0] != 0 and path[0, 1] != 0)
+    for after in [np.array([0.0, path[0, 1]])] * loads_first + list(path):
         done, part, found = 0, PARTS, None
         while done < PARTS:
             target = before + (after - before) * ((done + part) / PARTS)
@@ -222,7 +227,7 @@ def moment_curvature(
     return MomentCurvature(K, moments, forces, strains, lost)
 
 
-# -- interaction of axial force and moment -----------------------------------------------------------
+# -- interaction of axial force and moment ---------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +270,7 @@ class InteractionDiagram:
         Raises:
             ArgumentError: The section cannot bear N.
         """
-        above = self.N >= require_number(N, "moments: N")
+        above = require_number(N, "moments: N") <= self.N
         at = np.flatnonzero(above[1:] != above[:-1])
         if not len(at):
             raise ArgumentError(f"moments: N = {N:g} N is beyond the diagram, {self!r}")

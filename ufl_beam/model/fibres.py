@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from abc import ABC, abstractmethod
 from collections import Counter
@@ -195,7 +196,6 @@ class PlacedFibres:
         (A, S), laws = np.diff(below(cuts)), (fibres,)
         material = np.zeros(len(A), dtype=int)
         if core is not None and below_in_core is not None:
-            require_kind(core, Fibres, "Section: core")
             within = np.diff(below_in_core(cuts))
             inside = within[0] > 1e-9 * A
             (A, S), laws = np.hstack([[A, S] - within, within[:, inside]]), (fibres, core)
@@ -220,17 +220,21 @@ class PlacedFibres:
                 gap = float(np.diff(np.unique(at[of])).max(initial=0.0))
                 if at[of].min() - gap / 2 <= bar <= at[of].max() + gap / 2:
                     break
-            width, left = gap, np.full(len(of), -1.0)
-            while not (left > 0).all():
-                if width > 2 * (high - low):
+            width, away = gap or 1.0, at[of] - bar
+            removed = np.full(len(of), math.inf)
+            while not ((removed >= 0) & (removed < areas[of])).all():
+                if width > 2 * (high - low + gap):
                     raise ModelError(
-                        f"Section.reinforced: bars of {area:g} m² at y = {bar:g} m displace more "
-                        "than the fibres of the section there"
+                        f"Section.reinforced: bars of A = {area:g} m² at y = {bar:g} m displace "
+                        "more than the fibres of the section there"
                     )
-                near = areas[of] * np.maximum(1 - np.abs(at[of] - bar) / (width or 1.0), 0.0)
-                left = areas[of] - area * near / near.sum()
-                width *= 2
-            areas[of] = left
+                # Near fibres lose the area, if possible with its centroid at the bar.
+                near = areas[of] * np.maximum(1 - np.abs(away) / width, 0.0)
+                removed, width = near * (area / near.sum()), 2 * width
+                if away[near > 0].min() < 0 < away[near > 0].max():
+                    m0, m1, m2 = near.sum(), near @ away, near @ away**2
+                    removed = near * area * (m2 - m1 * away) / (m0 * m2 - m1**2)
+            areas[of] -= removed
         return PlacedFibres.about_centroid(
             (bars, *self.fibres), np.concatenate([np.zeros(len(y), dtype=int), self.material + 1]),
             *(np.concatenate(pair) for pair in ((np.full(len(y), E), self.E), (y, at), (A, areas))),

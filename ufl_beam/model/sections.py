@@ -195,9 +195,7 @@ class Section(Record):
         if not (areas > 0).all():
             raise ModelError(f"{what}: all areas A must be positive")
         if np.ptp(at) == 0.0:
-            raise ModelError(
-                f"{what}: all fibres at one y have no bending stiffness; spread them"
-            )
+            raise ModelError(f"{what}: all fibres at one y have no bending stiffness; spread them")
         if isinstance(fibres, list | tuple):
             each = require_all(fibres, f"{what}: fibres", Fibres)
         else:
@@ -250,7 +248,9 @@ class Section(Record):
         """
         what = "Section.reinforced"
         if self.fibres is None:
-            raise ModelError(f"{what}: the section has no fibres; create it with fibres=Fibres(law)")
+            raise ModelError(
+                f"{what}: the section has no fibres; create it with fibres=Fibres(law)"
+            )
         require_kind(fibres, Fibres, f"{what}: fibres")
         require_number(E, f"{what}: E", positive=True)
         at, areas = (require_array(x, f"{what}: {name}") for name, x in (("y", y), ("A", A)))
@@ -375,6 +375,7 @@ def _require_positive(owner: str, **sizes: float) -> None:
 
 def _require_cover(owner: str, core: object, cover: float, size: float) -> None:
     """Raise :class:`ModelError` unless ``core`` and ``cover`` fit a section of this size (m)."""
+    require_kind(core, (Fibres, type(None)), f"{owner}: core")
     require_number(cover, f"{owner}: cover", at_least=0.0)
     if core is None and cover > 0.0:
         raise ModelError(f"{owner}: cover without core; give the law of the core, too")

@@ -77,7 +77,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Solution            "shape"             the frame at one time; ``n``, ``magnify``, ``ax``
     Solution            "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
     Solution            "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
-    Solution            "shapes"            several shapes; ``times`` or ``count``, ``magnify``, ``ax``
+    Solution            "shapes"            shapes; ``times`` or ``count``, ``magnify``, ``ax``
     Solution            "history"           motion over time; places, ``component``, ``ax``
     Solution            "energy"            the energy ledger over time
     Solution            "dissipation"       energy losses over time; ``ax``
