@@ -33,7 +33,10 @@ PARTS = 1024
 """Number of smallest substeps in a step of curvature and axial force."""
 
 TOLERANCE = 1e-13
-"""Error of N, as a fraction of EA times the largest strain, up to which N is met."""
+"""Error of N, as a fraction of EA times the largest strain so far, up to which N is met."""
+
+MOST_STRAIN = 10.0
+"""Largest axial strain among those that are tried."""
 
 MOST_ITERATIONS = 200
 """Largest number of corrections of the axial strain in a substep."""
@@ -57,6 +60,7 @@ class _State:
         # Without points the section is elastic; otherwise the points have the elastic resultants.
         self._rest = np.zeros(3) if points else np.array([section.EA, section.GA, section.EI])
         self._EA, self._depth, self._strain, self._length = section.EA, section.depth, 0.0, lengths
+        self._largest = 0.0  # strain so far, of the axis or by curvature
 
     def begin(self, dt: float) -> None:
         """Begin a step of length ``dt``; s."""
@@ -92,30 +96,28 @@ class _State:
         too small and too large, because N may be constant over intervals of perfect plasticity.
         """
         self.begin(dt)
+        by_curvature = abs(curvature) * self._depth
         e, low, high, width, last = self._strain, -math.inf, math.inf, 0.0, math.inf
         for _ in range(MOST_ITERATIONS):
             r, D = self.response(e, curvature)
-            excess, slope, size = (
-                float(r[0, 0]) - N,
-                float(D[0, 0, 0]),
-                abs(curvature) * self._depth,
-            )
-            if not math.isfinite(excess):
+            excess, slope = float(r[0, 0]) - N, float(D[0, 0, 0])
+            if not math.isfinite(excess) or abs(e) > MOST_STRAIN:
                 return None
-            met = abs(excess) <= TOLERANCE * self._EA * (abs(e) + size) or excess == 0.0
-            if met or high - low <= 4 * np.finfo(float).eps * (abs(e) + size):
-                if not met and abs(excess) > 1e-9 * self._EA * (abs(e) + size):
+            largest = max(self._largest, abs(e) + by_curvature)
+            met = abs(excess) <= TOLERANCE * self._EA * largest
+            if met or high - low <= 4 * np.finfo(float).eps * largest:
+                if not met and abs(excess) > 1e4 * TOLERANCE * self._EA * largest:
                     return None  # N jumps
                 try:
                     self.accept()
                 except StepFailed:
                     return None
-                self._strain = e
+                self._strain, self._largest = e, largest
                 return e, float(r[0, 2])
             low, high = (e, high) if excess < 0 else (low, e)
             after = e - excess / slope if slope > 0 else math.nan
             if not (low < after < high and (abs(excess) < last / 2 or high - low == math.inf)):
-                width = 2 * width or max(size, abs(excess) / self._EA)
+                width = 2 * width or max(by_curvature, abs(excess) / self._EA)
                 after = (
                     (low + high) / 2 if high - low < math.inf else e - math.copysign(width, excess)
                 )
