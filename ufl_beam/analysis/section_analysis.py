@@ -206,7 +206,7 @@ def moment_curvature(
         done, part, found = 0, PARTS, None
         while done < PARTS:
             target = before + (after - before) * ((done + part) / PARTS)
-            found = state.reach(*target, dt * part / PARTS)
+            found = state.reach(float(target[0]), float(target[1]), dt * part / PARTS)
             if found is not None:
                 done += part
                 part = math.gcd(done, PARTS)

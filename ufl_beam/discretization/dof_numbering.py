@@ -261,7 +261,7 @@ class DofNumbering:
     def inelastic_cells(self) -> Index:
         """Cells that can yield or break, ascending; (m,)."""
         groups = [cells for _, cells in self.inelastic]
-        return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *groups]))
+        return np.asarray(np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *groups])))
 
     def lengths(self, cells: Index) -> Array:
         """Compute lengths of cells; (len(cells),); m."""

@@ -193,14 +193,15 @@ class PlacedFibres:
             raise ModelError("Fibres: number = 1 has no bending stiffness; use 2 or more")
         cuts = np.union1d(np.linspace(-h / 2, h / 2, fibres.number + 1), np.array(edges))
         cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * h, 0, True)]
-        (A, S), laws = np.diff(below(cuts)), (fibres,)
-        material = np.zeros(len(A), dtype=int)
+        layers, laws = np.diff(below(cuts)), [fibres]
+        material: Index = np.zeros(layers.shape[1], dtype=np.int64)
         if core is not None and below_in_core is not None:
             within = np.diff(below_in_core(cuts))
-            inside = within[0] > 1e-9 * A
-            (A, S), laws = np.hstack([[A, S] - within, within[:, inside]]), (fibres, core)
+            inside = within[0] > 1e-9 * layers[0]
+            layers, laws = np.hstack([layers - within, within[:, inside]]), [fibres, core]
             material = np.repeat([0, 1], [len(inside), inside.sum()])
-        return cls(laws, material, np.full(len(A), E), S / A, A, 0.0, (-h / 2, h / 2))
+        A, S = layers
+        return cls(tuple(laws), material, np.full(len(A), E), S / A, A, 0.0, (-h / 2, h / 2))
 
     def with_bars(self, bars: Fibres, E: float, y: Array, A: Array) -> PlacedFibres:
         """Add bars of areas ``A`` (m²) at ``y`` (m) instead of other fibres, those of a core first.
@@ -235,11 +236,10 @@ class PlacedFibres:
                     m0, m1, m2 = near.sum(), near @ away, near @ away**2
                     removed = near * area * (m2 - m1 * away) / (m0 * m2 - m1**2)
             areas[of] -= removed
-        return PlacedFibres.about_centroid(
-            (bars, *self.fibres), np.concatenate([np.zeros(len(y), dtype=int), self.material + 1]),
-            *(np.concatenate(pair) for pair in ((np.full(len(y), E), self.E), (y, at), (A, areas))),
-            ends=self.ends,
-        )  # fmt: skip
+        material = np.concatenate([np.zeros(len(y), dtype=np.int64), self.material + 1])
+        moduli = np.concatenate([np.full(len(y), E), self.E])
+        y, A = np.concatenate([y, at]), np.concatenate([A, areas])
+        return self.about_centroid((bars, *self.fibres), material, moduli, y, A, self.ends)
 
     @property
     def EA(self) -> float:

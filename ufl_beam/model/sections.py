@@ -257,7 +257,7 @@ class Section(Record):
         if at.ndim != 1 or at.shape != areas.shape or not (areas > 0).all():
             raise ModelError(f"{what}: y and A must be lists of equal length, with positive areas")
         placed = self.fibres.with_bars(fibres, E, at, areas)
-        rhoA = None if self.massless_by_default else self.rhoA
+        rhoA: Any = None if self.massless_by_default else self.rhoA
         return replace(self, EA=placed.EA, EI=placed.EI, rhoA=rhoA, fibres=placed)
 
     @classmethod

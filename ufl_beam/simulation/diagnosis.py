@@ -228,7 +228,8 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     for beams in equation.inelastic:
         cells, _ = beams.recorded()
         works[:, cells] += beams.points.works(strains[cells])
-    left_in_cells = np.divide(*works, out=np.ones(len(works[0])), where=works[1] > 0)
+    now, elastic = works
+    left_in_cells = np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0)
     if subdomain.comm.size > 1:
         subdomain.comm.Allreduce(MPI.IN_PLACE, connectors)
         subdomain.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)

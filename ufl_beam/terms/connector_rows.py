@@ -298,7 +298,8 @@ class Springs(Response):
     def remaining(self) -> Array:
         """Return the remaining fraction of elastic stiffness in the iterate; (num_connectors,)."""
         now, elastic = self.points.works(np.eye(1, 3).repeat(len(self._strains), axis=0))
-        return np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0)
+        left = np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0)
+        return np.asarray(left)
 
     def state(self) -> Array:
         """Return the internal variables of the points."""
