@@ -157,6 +157,17 @@ def test_sections_that_cannot_bear_n():
     assert np.isfinite(result.moment).all()
 
 
+def test_pictures_show_the_results():
+    result = ub.moment_curvature(rectangle(10), K_YIELD * np.linspace(0, 3, 7), N=-1e6)
+    diagram = ub.interaction_diagram(rectangle(10), (0.01, 0.01), points=16)
+    for shown, x, y in ((result, "curvature", "moment"), (diagram, "M", "N")):
+        (axes,) = ub.plot(shown).axes
+        lines = [line.get_xydata() for line in axes.lines if len(line.get_xydata()) > 2]
+        (data,) = lines
+        assert np.array_equal(data, np.column_stack([getattr(shown, x), getattr(shown, y)]))
+    assert axes.yaxis_inverted()  # compression is at the top
+
+
 # -- interaction -----------------------------------------------------------------------------------
 
 

@@ -244,7 +244,7 @@ class Section(Record):
             ...     b=0.3, h=0.4, E=30e9, nu=0.2, rho=2500.0, fibres=cover, core=core, cover=0.03
             ... ).reinforced(y=[-0.15, 0.15], A=[1e-3, 1e-3], E=200e9, fibres=steel)
             >>> print(f"{column.EA:.3g} {column.EI:.3g}")  # N, N m²
-            3.94e+09 5.54e+07
+            3.94e+09 5.55e+07
         """
         what = "Section.reinforced"
         if self.fibres is None:
