@@ -424,7 +424,7 @@ def _fall(section_points: SectionPoints, scheme: Scheme) -> tuple[float, float]:
 
 # -- text in the file ------------------------------------------------------------------------------
 
-FORMAT = "solution of ufl_beam, 5"
+FORMAT = "solution of ufl_beam, 6"
 """Format of the file; its number is increased by each incompatible change of the format."""
 
 NAMED = {
