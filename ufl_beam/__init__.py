@@ -52,6 +52,9 @@ from ufl_beam.analysis.path_controls import (
 )
 from ufl_beam.analysis.path_following import Path as Path
 from ufl_beam.analysis.path_following import follow
+from ufl_beam.analysis.section_analysis import InteractionDiagram as InteractionDiagram
+from ufl_beam.analysis.section_analysis import MomentCurvature as MomentCurvature
+from ufl_beam.analysis.section_analysis import interaction_diagram, moment_curvature
 from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff as Tradeoff
 from ufl_beam.errors import (
@@ -280,9 +283,11 @@ __all__ = [
     "fit_decay",
     "follow",
     "ground",
+    "interaction_diagram",
     "law_functions",
     "logarithmic_decrement",
     "modes",
+    "moment_curvature",
     "peaks",
     "picture",
     "plot",
@@ -297,8 +302,8 @@ __all__ = [
 
 RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
-    "Energy", "Envelope", "Event", "Extent", "Film", "HingeTable", "Modes", "Path", "Place",
-    "Storeys", "Tradeoff",
+    "Energy", "Envelope", "Event", "Extent", "Film", "HingeTable", "InteractionDiagram", "Modes",
+    "MomentCurvature", "Path", "Place", "Storeys", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 
