@@ -73,26 +73,6 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
 
     By default, the first quantity of the class is drawn.  A ``Path`` is a ``Solution``.
 
-    shown            quantity            picture and further arguments
-    ===============  ==================  ========================================================
-    Scene            "model"             the whole model, before any run; ``ax``
-    Solution         "shape"             the frame at one time; ``n``, ``magnify``, ``ax``
-    Solution         "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
-    Solution         "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
-    Solution         "shapes"            several shapes; ``times`` or ``count``, ``magnify``, ``ax``
-    Solution         "history"           motion over time; places, ``component``, ``ax``
-    Solution         "energy"            the energy ledger over time
-    Solution         "dissipation"       energy losses over time; ``ax``
-    Solution         "hinge"             moment of a hinge over its jump; a place, ``ax``
-    Solution         "moment-curvature"  moment of a cell; a place, ``ax``
-    Modes, Buckling  "modes"             shapes side by side; ``numbers``, ``amplitude``
-    Extremes         "M", "N", "V"       envelope of a section force; ``ax``
-    Storeys          "drift", "shear"    extremes over the height; ``ax``
-    Fatigue          "cycles"            rainflow matrix and spectrum; a hot spot
-    Study            "results"           results over the cases
-    Tradeoff         "errors"            errors over wall times; ``ax``
-    ===============  ==================  ========================================================
-=======
     ==================  ==================  ========================================================
     shown               quantity            picture and further arguments
     ==================  ==================  ========================================================
