@@ -93,6 +93,7 @@ from ufl_beam.model.connector_laws import (
     Stop,
 )
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
+from ufl_beam.model.deteriorating_laws import Backbone, IbarraKrawinkler
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
 from ufl_beam.model.joints import (
@@ -173,6 +174,7 @@ __all__ = [
     "ArgumentTypeError",
     "ArmstrongFrederick",
     "AxialBending",
+    "Backbone",
     "Beam",
     "Body",
     "BoucWen",
@@ -212,6 +214,7 @@ __all__ = [
     "Guided",
     "History",
     "HotSpot",
+    "IbarraKrawinkler",
     "Joint",
     "KelvinVoigt",
     "LineLoad",

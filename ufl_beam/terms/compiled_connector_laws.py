@@ -112,7 +112,7 @@ class CompiledLaws(Response):
         for name, value in law.variables.items():
             at[f"state {name}"][:] = value
         for name in law.parameters():
-            at[f"number {name}"][:] = [getattr(x, name) for x in self._laws[::k]]
+            at[f"number {name}"][:] = [x.parameters()[name] for x in self._laws[::k]]
         self._stored, lost = np.zeros(n), np.zeros(n * k)  # the first component has the loss
         self.dissipated = (lost,)
         variables = [at[f"state {name}"] for name in law.variables]

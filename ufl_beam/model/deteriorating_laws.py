@@ -1,0 +1,351 @@
+# SPDX-License-Identifier: MIT
+"""Laws of hinges and springs whose strength and stiffness deteriorate with dissipated energy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+from ufl_beam.errors import ModelError, closed
+from ufl_beam.model.checks import require_number
+from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.law_functions import Values, below, larger, positive, sign, smaller, where
+from ufl_beam.model.material_law import State
+from ufl_beam.model.records import Instance, Positive, Record
+
+OWN_LAW = "state a ConnectorLaw of your own"
+"""Advice in the error that a subclass of a closed class raises."""
+
+FALL = 0.1
+"""Rotation in which the strength falls to zero after the ultimate one, as a fraction of this."""
+
+LEAST_STIFFNESS = 0.1
+"""Smallest unloading stiffness, as a fraction of the elastic stiffness."""
+
+UNBOUNDED = 1e100
+"""Number that stands for infinity, for which compiled expressions would be NaN."""
+
+FromZeroOrInfinite = Annotated[float, partial(require_number, positive=True, infinite=True)]
+Exponent = Annotated[float, partial(require_number, at_least=1.0)]
+
+
+@closed(OWN_LAW)
+@dataclass(frozen=True)
+class Backbone(Record):
+    """Backbone of a hinge in one direction: yielding, capping, residual and ultimate rotation.
+
+    Rotations are in rad and moments in N m; for forces they are displacements in m and N.  The
+    moment grows by the factor ``overstrength`` from the yield rotation to the capping rotation,
+    which is larger by ``capping``.  Then it falls along a straight line, which would reach zero
+    after the rotation ``post_capping``, to the fraction ``residual`` of the yield moment.
+
+    Args:
+        yield_limit: Effective yield moment; N m.
+        capping: Plastic rotation from yielding to capping; rad.
+        post_capping: Rotation from capping to zero moment; rad.  The default, infinity, means that
+            the moment does not fall.
+        overstrength: Capping moment divided by the yield moment, at least 1.
+        residual: Residual moment divided by the yield moment, from 0 to 1.
+        ultimate: Rotation, elastic part included, after which the moment falls to zero within a
+            tenth of this rotation; rad.
+
+    Raises:
+        ModelError: A number is out of range, or the backbone turns back.
+
+    Example:
+        >>> steel = ub.Backbone(  # N m; rad
+        ...     3e5, capping=0.025, post_capping=0.2, overstrength=1.1, residual=0.4, ultimate=0.3
+        ... )
+    """
+
+    yield_limit: Positive
+    capping: float
+    post_capping: FromZeroOrInfinite = math.inf
+    overstrength: float = 1.0
+    residual: float = 0.0
+    ultimate: FromZeroOrInfinite = math.inf
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("capping", "overstrength", "residual"):
+            require_number(getattr(self, name), f"Backbone: {name}")
+        if self.capping <= 0.0:
+            raise ModelError(
+                f"Backbone: capping = {self.capping:g} rad is the plastic rotation from yielding "
+                "to capping; the backbone would turn back at the yield moment, so give a positive "
+                "rotation"
+            )
+        if self.overstrength < 1.0:
+            raise ModelError(
+                f"Backbone: overstrength = {self.overstrength:g}; the capping moment must be at "
+                "least the yield moment"
+            )
+        if not 0.0 <= self.residual <= 1.0:
+            raise ModelError(
+                f"Backbone: residual = {self.residual:g} is a fraction of the yield moment and "
+                "must lie between 0 and 1; above it the moment would rise again"
+            )
+        if self.ultimate <= self.capping:
+            raise ModelError(
+                f"Backbone: the ultimate rotation {self.ultimate:g} rad must exceed the capping "
+                f"rotation, whose plastic part is {self.capping:g} rad"
+            )
+
+    def numbers(self, stiffness: float) -> dict[str, float]:
+        """Return intercepts and slopes of the lines of the backbone, for an elastic stiffness."""
+        limit, yields = self.yield_limit, self.yield_limit / stiffness
+        caps, largest = yields + self.capping, self.overstrength * limit
+        hardening = (largest - limit) / self.capping
+        if self.ultimate <= caps:
+            raise ModelError(
+                f"Backbone: the ultimate rotation {self.ultimate:g} rad must exceed the capping "
+                f"rotation {caps:g} rad, the yield rotation {yields:g} rad and its plastic part"
+            )
+        if hardening > stiffness / 2:
+            raise ModelError(
+                f"Backbone: between the yield rotation {yields:g} rad and the capping rotation "
+                f"{caps:g} rad the slope is {hardening:.4g} N m/rad; it must be at most half the "
+                f"elastic stiffness {stiffness:.4g} N m/rad"
+            )
+        falls = largest / self.post_capping
+        last, steep, ultimate = 2 * largest, 0.0, min(self.ultimate, UNBOUNDED)
+        if ultimate < UNBOUNDED:
+            last = max(largest - falls * (ultimate - caps), self.residual * limit)
+            last = last if last > 0.0 else largest  # the strength is lost before
+            steep = max(last / (FALL * ultimate), 2 * falls)
+        return {
+            "first": limit - hardening * yields,
+            "hardening": hardening,
+            "reference": largest + falls * caps,
+            "falls": falls,
+            "residual": self.residual * limit,
+            "last": last,
+            "ultimate": ultimate,
+            "steep": steep,
+            "largest": largest,
+        }
+
+
+class _Bound(NamedTuple):
+    """Bound of positive moments: straight lines of a deteriorated backbone."""
+
+    first: Values  # hardening line: intercept with the axis of moments
+    hardening: Values  # and slope
+    reference: Values  # falling line: intercept
+    falls: Values  # and fall of the moment per rotation
+    residual: Values
+    most: Values  # largest moment
+    last: Values  # moment at the ultimate rotation
+    ultimate: Values
+    steep: Values  # fall of the moment per rotation after the ultimate one
+    least_slope: Values  # in place of zero, where a slope is a divisor
+
+    def breaking(self, x: Values) -> Values:
+        """Return the moment of the line that begins at the ultimate rotation."""
+        return self.last + self.steep * (self.ultimate - x)
+
+    def fallen(self, x: Values) -> Values:
+        """Return the moment on the falling line, or a smaller one after the ultimate rotation."""
+        falling = larger(self.residual, self.reference - self.falls * x)
+        return positive(smaller(self.breaking(x), falling))
+
+    def at(self, x: Values) -> Values:
+        """Return the bound."""
+        lines = smaller(self.first + self.hardening * x, self.reference - self.falls * x)
+        bound = smaller(self.most, larger(self.residual, lines))
+        return positive(smaller(self.breaking(x), bound))
+
+    def meets(self, stiffness: Values, p: Values) -> Values:
+        """Return the rotation where an elastic line, which starts at ``p``, meets the bound."""
+        hardening = (self.first + stiffness * p) / (stiffness - self.hardening)
+        falling = (self.reference + stiffness * p) / (stiffness + self.falls)
+        breaking = (self.breaking(0.0) + stiffness * p) / (stiffness + self.steep)
+        lines = larger(self.residual / stiffness + p, smaller(hardening, falling))
+        bound = smaller(self.most / stiffness + p, lines)
+        return larger(p, smaller(breaking, bound))
+
+    def integral(self, start: Values, end: Values) -> Values:
+        """Return the integral of the bound, which is linear between its kinks."""
+        up, down, steep, steeper = (
+            larger(slope, self.least_slope)
+            for slope in (self.hardening, self.falls, self.steep, self.steep - self.falls)
+        )
+        caps, top = (self.reference - self.first) / (up + down), self.breaking(0.0)
+        lines = smaller((top - self.residual) / steep, (top - self.reference) / steeper)
+        breaks = larger((top - self.most) / steep, lines)
+        kinks = (
+            smaller(caps, (self.residual - self.first) / up),
+            smaller(caps, (self.most - self.first) / up),
+            larger(caps, (self.reference - self.most) / down),
+            larger(caps, (self.reference - self.residual) / down),
+        )
+        kinks = (*(smaller(kink, breaks) for kink in kinks), breaks, top / steep)
+        total, x, moment = 0.0, start, self.at(start)
+        for kink in (*kinks, end):
+            next_x = smaller(end, larger(x, kink))
+            next_moment = self.at(next_x)
+            total += (next_x - x) * (moment + next_moment) / 2
+            x, moment = next_x, next_moment
+        return total
+
+
+@closed(OWN_LAW)
+@dataclass(frozen=True)
+class IbarraKrawinkler(Record, ConnectorLaw):
+    """Bilinear hysteresis with capping, residual strength and deterioration by dissipated energy.
+
+    The moment moves elastically between two bounds, which are the backbones of both directions;
+    their hardening lines stay in place (kinematic hardening).  An excursion ends where the moment
+    changes its sign.  If E of n excursions have dissipated the energies E_i, the last one causes
+
+    β = (E_n / (Λ My - sum E_i))^c
+
+    with the yield moment My.  The hardening line of the direction in which the moment begins to
+    grow is then multiplied by 1 - β with Λ = ``strength``, and the intercept of its falling line
+    with the axis of moments by 1 - β with Λ = ``softening``.  A moment that was reached on the
+    falling line is never exceeded again.  The unloading stiffness is multiplied by 1 - β with
+    Λ = ``unloading`` and the energy up to the reversal; it remains above a tenth of the elastic one
+    and above twice the hardening slope.
+    When one of the β reaches 1, the moment is zero after the end of the excursion.  After Ibarra,
+    Medina and Krawinkler, Earthquake Eng. Struct. Dyn. 34 (2005), and Lignos and Krawinkler, J.
+    Struct. Eng. 137 (2011).
+
+    Args:
+        stiffness: Elastic stiffness; N m/rad or N/m.
+        backbone: Backbone of positive moments, and of negative ones unless ``negative`` is given.
+        negative: Backbone of negative moments, with positive numbers.
+        strength: Reference cumulative rotation Λ of the basic strength; rad or m.  The default,
+            infinity, means no deterioration, here and below.
+        softening: Λ of the strength after capping; rad or m.
+        unloading: Λ of the unloading stiffness; rad or m.
+        exponent: Exponent c, at least 1.
+
+    Raises:
+        ModelError: A number is out of range, the hardening exceeds half the stiffness, or the
+            ultimate rotation does not exceed the capping rotation.
+
+    Example:
+        >>> backbone = ub.Backbone(3e5, capping=0.025, post_capping=0.2, overstrength=1.1)
+        >>> law = ub.IbarraKrawinkler(3e7, backbone, strength=1.0, softening=1.0, unloading=2.0)
+        >>> base = ub.Turn(ub.ground(0, 0), beam.start, law)
+        >>> arm = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[base])
+    """
+
+    stiffness: Positive
+    backbone: Instance[Backbone]
+    negative: Instance[Backbone | None] = None
+    strength: FromZeroOrInfinite = math.inf
+    softening: FromZeroOrInfinite = math.inf
+    unloading: FromZeroOrInfinite = math.inf
+    exponent: Exponent = 1.0
+
+    rate_independent: ClassVar[bool] = True
+    variables: ClassVar[Mapping[str, float]] = {
+        "plastic": 0.0,  # motion at zero moment on the present elastic line
+        "side": 1.0,  # sign of the moments of the present excursion
+        "dissipated": 0.0,  # in the present excursion
+        "spent": 0.0,  # in all excursions before
+        "rest": 1.0,  # unloading stiffness divided by the elastic one
+        "rest_before": 1.0,  # the same when the excursion began
+        # factors of the hardening line, of the reference moment and of the capping moment
+        **{f"{name}_{side}": x for side in ("plus", "minus")
+           for name, x in (("basic", 1.0), ("falling", 1.0), ("most", 1.0))},
+    }  # fmt: skip
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        backbones = {"plus": self.backbone, "minus": self.negative or self.backbone}
+        numbers = {
+            f"{name}_{side}": x
+            for side, backbone in backbones.items()
+            for name, x in backbone.numbers(self.stiffness).items()
+        }
+        limit = self.backbone.yield_limit
+        for name in ("strength", "softening", "unloading"):
+            numbers[f"{name}_energy"] = min(getattr(self, name) * limit, UNBOUNDED)
+        slope = max(numbers["hardening_plus"], numbers["hardening_minus"])
+        numbers["least"] = max(LEAST_STIFFNESS, 2 * slope / self.stiffness)
+        numbers |= {"stiffness": self.stiffness, "exponent": self.exponent}
+        object.__setattr__(self, "_numbers", numbers)
+        vars(self).update(numbers)
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the numbers of the lines of both backbones, and the reference energies."""
+        return self._numbers
+
+    def energy(self, motion: Values, state: State) -> Values:
+        """Return the elastic energy; J."""
+        return state.rest * self.stiffness * (motion - state.plastic) ** 2 / 2
+
+    def increments(
+        self, motion: Values, rate: Values, state: State, dt: Values
+    ) -> Mapping[str, Values]:
+        """Return the changes of the variables on a monotone way to the motion."""
+        stiffness = state.rest * self.stiffness
+        way = sign(motion - state.plastic)  # of the moment
+        x, p = way * motion, way * state.plastic
+        crosses = below(way * state.side, 0.0)
+
+        def here(name: str, of: Any = self) -> Values:
+            return where(below(way, 0.0), getattr(of, f"{name}_minus"), getattr(of, f"{name}_plus"))
+
+        def lost(capacity: Values, spent: Values, energy: Values) -> Values:
+            """Return β^(1/c), at most 1."""
+            left = larger(capacity - spent - energy, 1e-12 * capacity)
+            return smaller(positive(energy) / left, 1.0)
+
+        # the end of an excursion
+        ended = where(crosses, state.dissipated, 0.0)
+        ratios = [
+            lost(capacity, state.spent, ended)
+            for capacity in (self.strength_energy, self.softening_energy, self.unloading_energy)
+        ]
+        works = below(larger(larger(*ratios[:2]), ratios[2]), 1.0)
+        basic, falling = (
+            here(name, state) * (1 - ratio**self.exponent)
+            for name, ratio in zip(("basic", "falling"), ratios, strict=False)
+        )
+        most, other = (where(works, most, 0.0) for most in (
+            here("most", state), where(below(way, 0.0), state.most_plus, state.most_minus)
+        ))  # fmt: skip
+        spent, dissipated = state.spent + ended, state.dissipated - ended
+        before = where(crosses, state.rest, state.rest_before)
+
+        # the bound, at x >= 0 of moments that are positive in this excursion
+        bound = _Bound(
+            first=basic * here("first"), hardening=basic * here("hardening"),
+            reference=falling * here("reference"), falls=here("falls"), residual=here("residual"),
+            most=most * here("largest"), last=here("last"), ultimate=here("ultimate"), steep=here("steep"),
+            least_slope=1e-12 * self.stiffness,
+        )  # fmt: skip
+        limit = bound.at(x)
+        flows = below(limit, stiffness * (x - p))
+        start = bound.meets(stiffness, p)
+        work = dissipated + stiffness * (start - p) ** 2 / 2 + bound.integral(start, larger(x, start))
+        energy = work - limit**2 / (2 * before * self.stiffness)
+        ratio = lost(self.unloading_energy, spent, energy)
+        rest = larger(before * (1 - ratio**self.exponent), smaller(before, self.least))
+        after = rest * self.stiffness
+
+        def changed(new: Values, old: Values) -> Values:
+            return where(flows, new, old)
+
+        most = changed(smaller(most, bound.fallen(x) / here("largest")), most)
+        other = changed(smaller(other, positive(bound.breaking(x)) / here("last")), other)
+        new = {
+            "plastic": way * changed(x - limit / after, p),
+            "side": way,
+            "dissipated": changed(work - limit**2 / (2 * after), dissipated),
+            "spent": spent,
+            "rest": changed(rest, state.rest),
+            "rest_before": before,
+        }
+        for side, is_here in (("plus", below(-way, 0.0)), ("minus", below(way, 0.0))):
+            pairs = (("basic", basic), ("falling", falling))
+            for name, value in pairs:
+                new[f"{name}_{side}"] = where(is_here, value, getattr(state, f"{name}_{side}"))
+            new[f"most_{side}"] = where(is_here, most, other)
+        return {name: value - getattr(state, name) for name, value in new.items()}
