@@ -167,6 +167,18 @@ def rigid_plastic(d):
     d.connectors.append(f"ub.Slide(ub.ground(0.2, 0.7), {d.last}.at(0.5), {law}, axis=(0.3, 1.0))")
 
 
+@feature(elastic=False)
+def deteriorating(d):
+    M, k, n = d.some(1, 4), 200.0, d.one([1, 1.3, 2])
+    plus, minus = (
+        f"ub.Backbone({M * f:.4g}, {d.some(1, 4) * M / k:.4g}, {d.some(4, 30) * M / k:.4g}, "
+        f"{d.some(1, 1.2):.3g}, {d.some(0, 0.5):.3g}, {d.some(20, 60) * M / k:.4g})"
+        for f in (1, d.some(0.7, 1))
+    )
+    E = [f"{d.some(5, 50) * M / k:.4g}" for _ in range(3)]
+    _connect(d, f"ub.IbarraKrawinkler({k}, {plus}, {minus}, {', '.join(E)}, {n})", "SLT")
+
+
 # -- loads, works, masses, damping -------------------------------------------------------------
 
 

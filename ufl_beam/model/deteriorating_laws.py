@@ -20,7 +20,7 @@ OWN_LAW = "state a ConnectorLaw of your own"
 """Advice in the error that a subclass of a closed class raises."""
 
 FALL = 0.1
-"""Rotation in which the strength falls to zero after the ultimate one, as a fraction of this."""
+"""Longest fall to zero strength after the ultimate rotation, as a fraction of this rotation."""
 
 LEAST_STIFFNESS = 0.1
 """Smallest unloading stiffness, as a fraction of the elastic stiffness."""
@@ -49,8 +49,8 @@ class Backbone(Record):
             the moment does not fall.
         overstrength: Capping moment divided by the yield moment, at least 1.
         residual: Residual moment divided by the yield moment, from 0 to 1.
-        ultimate: Rotation, elastic part included, after which the moment falls to zero within a
-            tenth of this rotation; rad.
+        ultimate: Rotation, elastic part included, after which the moment falls to zero within at
+            most a tenth of this rotation, and at least twice as steeply as after capping; rad.
 
     Raises:
         ModelError: A number is out of range, or the backbone turns back.
