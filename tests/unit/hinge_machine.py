@@ -21,7 +21,11 @@ class Machine:
             yields, top = b.yield_limit / stiffness, b.overstrength * b.yield_limit
             slope = (top - b.yield_limit) / b.capping
             self.least = max(self.least, 2 * slope / stiffness)
-            caps, falls, residual = yields + b.capping, top / b.post_capping, b.residual * b.yield_limit
+            caps, falls, residual = (
+                yields + b.capping,
+                top / b.post_capping,
+                b.residual * b.yield_limit,
+            )
             self.tops[way] = top
             self.lines[way] = {
                 "hardening": [b.yield_limit - slope * yields, slope],
@@ -42,6 +46,7 @@ class Machine:
 
     def value(self, way, x):
         """Bound of moments in a direction, at x and moments that count positive there."""
+
         def at(name):
             return self.lines[way][name][0] + self.lines[way][name][1] * x
 
@@ -51,7 +56,7 @@ class Machine:
         return 0.0 if self.dead else max(bound, 0.0)
 
     def area(self, way, a, b):
-        """Integral of the bound from a to b, by trapezoids between all intersections of its lines."""
+        """Integral of the bound from a to b, by trapezoids between all intersections of lines."""
         lines = [line for name, line in self.lines[way].items() if name != "whole"] + [[0.0, 0.0]]
         cuts = {a, b}
         for (a0, s0), (a1, s1) in itertools.combinations(lines, 2):
@@ -59,7 +64,8 @@ class Machine:
                 cuts.add((a1 - a0) / (s0 - s1))
         cuts = sorted(cuts)
         return sum(
-            (q - p) * (self.value(way, p) + self.value(way, q)) / 2 for p, q in itertools.pairwise(cuts)
+            (q - p) * (self.value(way, p) + self.value(way, q)) / 2
+            for p, q in itertools.pairwise(cuts)
         )
 
     def beta(self, energy, capacity):
@@ -75,7 +81,7 @@ class Machine:
         elastic = self.M + self.K * (x - self.x)
         if elastic * self.way < 0:  # the moment changes its sign on the elastic line
             zero = self.x - self.M / self.K
-            self.work += -self.M**2 / (2 * self.K)
+            self.work += -(self.M**2) / (2 * self.K)
             self.end_excursion()
             self.x, self.M = zero, 0.0
             elastic = self.K * (x - zero)

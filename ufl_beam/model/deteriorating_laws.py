@@ -203,15 +203,14 @@ class IbarraKrawinkler(Record, ConnectorLaw):
 
     β = (E_n / (Λ My - sum E_i))^c
 
-    with the yield moment My.  The hardening line of the direction in which the moment begins to
+    with the yield moment My of ``backbone``.  The hardening line of the direction in which the moment begins to
     grow is then multiplied by 1 - β with Λ = ``strength``, and the intercept of its falling line
     with the axis of moments by 1 - β with Λ = ``softening``.  A moment that was reached on the
     falling line is never exceeded again.  The unloading stiffness is multiplied by 1 - β with
     Λ = ``unloading`` and the energy up to the reversal; it remains above a tenth of the elastic one
-    and above twice the hardening slope.
-    When one of the β reaches 1, the moment is zero after the end of the excursion.  After Ibarra,
-    Medina and Krawinkler, Earthquake Eng. Struct. Dyn. 34 (2005), and Lignos and Krawinkler, J.
-    Struct. Eng. 137 (2011).
+    and above twice the hardening slope.  When one of the β reaches 1, the moment is zero after the
+    end of the excursion.  After Ibarra, Medina and Krawinkler, Earthquake Eng. Struct. Dyn. 34
+    (2005), and Lignos and Krawinkler, J. Struct. Eng. 137 (2011).
 
     Args:
         stiffness: Elastic stiffness; N m/rad or N/m.
@@ -269,12 +268,11 @@ class IbarraKrawinkler(Record, ConnectorLaw):
         slope = max(numbers["hardening_plus"], numbers["hardening_minus"])
         numbers["least"] = max(LEAST_STIFFNESS, 2 * slope / self.stiffness)
         numbers |= {"stiffness": self.stiffness, "exponent": self.exponent}
-        object.__setattr__(self, "_numbers", numbers)
-        vars(self).update(numbers)
+        vars(self).update(numbers, _numbers=numbers)
 
     def parameters(self) -> dict[str, Any]:
         """Return the numbers of the lines of both backbones, and the reference energies."""
-        return self._numbers
+        return dict(vars(self)["_numbers"])
 
     def energy(self, motion: Values, state: State) -> Values:
         """Return the elastic energy; J."""
@@ -284,13 +282,13 @@ class IbarraKrawinkler(Record, ConnectorLaw):
         self, motion: Values, rate: Values, state: State, dt: Values
     ) -> Mapping[str, Values]:
         """Return the changes of the variables on a monotone way to the motion."""
-        stiffness = state.rest * self.stiffness
+        numbers, stiffness = vars(self), state.rest * self.stiffness
         way = sign(motion - state.plastic)  # of the moment
         x, p = way * motion, way * state.plastic
         crosses = below(way * state.side, 0.0)
 
-        def here(name: str, of: Any = self) -> Values:
-            return where(below(way, 0.0), getattr(of, f"{name}_minus"), getattr(of, f"{name}_plus"))
+        def here(name: str, of: Mapping[str, Values] = numbers) -> Values:
+            return where(below(way, 0.0), of[f"{name}_minus"], of[f"{name}_plus"])
 
         def lost(capacity: Values, spent: Values, energy: Values) -> Values:
             """Return β^(1/c), at most 1."""
@@ -299,18 +297,15 @@ class IbarraKrawinkler(Record, ConnectorLaw):
 
         # the end of an excursion
         ended = where(crosses, state.dissipated, 0.0)
-        ratios = [
-            lost(capacity, state.spent, ended)
-            for capacity in (self.strength_energy, self.softening_energy, self.unloading_energy)
-        ]
-        works = below(larger(larger(*ratios[:2]), ratios[2]), 1.0)
-        basic, falling = (
-            here(name, state) * (1 - ratio**self.exponent)
-            for name, ratio in zip(("basic", "falling"), ratios, strict=False)
+        by_strength, by_softening, by_unloading = (
+            lost(numbers[f"{name}_energy"], state.spent, ended)
+            for name in ("strength", "softening", "unloading")
         )
-        most, other = (where(works, most, 0.0) for most in (
-            here("most", state), where(below(way, 0.0), state.most_plus, state.most_minus)
-        ))  # fmt: skip
+        basic = here("basic", vars(state)) * (1 - by_strength**self.exponent)
+        falling = here("falling", vars(state)) * (1 - by_softening**self.exponent)
+        works = below(larger(larger(by_strength, by_softening), by_unloading), 1.0)
+        most = where(works, here("most", vars(state)), 0.0)
+        other = where(works, where(below(way, 0.0), state.most_plus, state.most_minus), 0.0)
         spent, dissipated = state.spent + ended, state.dissipated - ended
         before = where(crosses, state.rest, state.rest_before)
 
@@ -318,16 +313,18 @@ class IbarraKrawinkler(Record, ConnectorLaw):
         bound = _Bound(
             first=basic * here("first"), hardening=basic * here("hardening"),
             reference=falling * here("reference"), falls=here("falls"), residual=here("residual"),
-            most=most * here("largest"), last=here("last"), ultimate=here("ultimate"), steep=here("steep"),
-            least_slope=1e-12 * self.stiffness,
+            most=most * here("largest"), last=here("last"), ultimate=here("ultimate"),
+            steep=here("steep"), least_slope=1e-12 * self.stiffness,
         )  # fmt: skip
         limit = bound.at(x)
         flows = below(limit, stiffness * (x - p))
         start = bound.meets(stiffness, p)
-        work = dissipated + stiffness * (start - p) ** 2 / 2 + bound.integral(start, larger(x, start))
+        work = (
+            dissipated + stiffness * (start - p) ** 2 / 2 + bound.integral(start, larger(x, start))
+        )
         energy = work - limit**2 / (2 * before * self.stiffness)
-        ratio = lost(self.unloading_energy, spent, energy)
-        rest = larger(before * (1 - ratio**self.exponent), smaller(before, self.least))
+        ratio = lost(numbers["unloading_energy"], spent, energy)
+        rest = larger(before * (1 - ratio**self.exponent), smaller(before, numbers["least"]))
         after = rest * self.stiffness
 
         def changed(new: Values, old: Values) -> Values:
@@ -344,8 +341,7 @@ class IbarraKrawinkler(Record, ConnectorLaw):
             "rest_before": before,
         }
         for side, is_here in (("plus", below(-way, 0.0)), ("minus", below(way, 0.0))):
-            pairs = (("basic", basic), ("falling", falling))
-            for name, value in pairs:
+            for name, value in (("basic", basic), ("falling", falling)):
                 new[f"{name}_{side}"] = where(is_here, value, getattr(state, f"{name}_{side}"))
             new[f"most_{side}"] = where(is_here, most, other)
         return {name: value - getattr(state, name) for name, value in new.items()}
