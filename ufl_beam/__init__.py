@@ -93,9 +93,9 @@ from ufl_beam.model.connector_laws import (
     Stop,
 )
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
-from ufl_beam.model.deteriorating_laws import Backbone, IbarraKrawinkler
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
+from ufl_beam.model.hinge_laws import AxialBendingHinge, Backbone, IbarraKrawinkler
 from ufl_beam.model.joints import (
     Guided,
     Joint,
@@ -174,6 +174,7 @@ __all__ = [
     "ArgumentTypeError",
     "ArmstrongFrederick",
     "AxialBending",
+    "AxialBendingHinge",
     "Backbone",
     "Beam",
     "Body",

@@ -168,6 +168,13 @@ def rigid_plastic(d):
 
 
 @feature(elastic=False)
+def axial_bending_hinge(d):
+    N, M = d.some(2, 20), d.some(0.5, 3)
+    law = f"ub.AxialBendingHinge({N:.4g}, {M:.4g}, {d.some(300, 900):.4g}, 500.0, 100.0)"
+    d.connectors.append(f"ub.Bushing(ub.ground(0.2, 0.7), {d.last}.end, {law}, axis=(0.3, 1.0))")
+
+
+@feature(elastic=False)
 def deteriorating(d):
     M, k, n = d.some(1, 4), 200.0, d.one([1, 1.3, 2])
     plus, minus = (

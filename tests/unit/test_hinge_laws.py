@@ -285,7 +285,7 @@ import sys
 sys.path[:0] = [{here!r}, {tests!r}]
 from ufl_beam import parallel
 parallel.SMALLEST_SUBDOMAIN = 1
-import test_deteriorating_laws as t
+import test_hinge_laws as t
 hinges, scene = t.frame()
 run = t.sway(scene)
 t.ub.print_once(repr(t.ends(hinges, run)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of hinges and springs whose strength and stiffness deteriorate with dissipated energy."""
+"""Laws of hinges: deterioration by dissipated energy, and interaction of N and M."""
 
 from __future__ import annotations
 
@@ -12,7 +12,16 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 from ufl_beam.errors import ModelError, closed
 from ufl_beam.model.checks import require_number
 from ufl_beam.model.connector_law import ConnectorLaw
-from ufl_beam.model.law_functions import Values, below, larger, positive, sign, smaller, where
+from ufl_beam.model.law_functions import (
+    Values,
+    absolute,
+    below,
+    larger,
+    positive,
+    sign,
+    smaller,
+    where,
+)
 from ufl_beam.model.material_law import State
 from ufl_beam.model.records import Instance, Positive, Record
 
@@ -203,14 +212,14 @@ class IbarraKrawinkler(Record, ConnectorLaw):
 
     β = (E_n / (Λ My - sum E_i))^c
 
-    with the yield moment My of ``backbone``.  The hardening line of the direction in which the moment begins to
-    grow is then multiplied by 1 - β with Λ = ``strength``, and the intercept of its falling line
-    with the axis of moments by 1 - β with Λ = ``softening``.  A moment that was reached on the
-    falling line is never exceeded again.  The unloading stiffness is multiplied by 1 - β with
-    Λ = ``unloading`` and the energy up to the reversal; it remains above a tenth of the elastic one
-    and above twice the hardening slope.  When one of the β reaches 1, the moment is zero after the
-    end of the excursion.  After Ibarra, Medina and Krawinkler, Earthquake Eng. Struct. Dyn. 34
-    (2005), and Lignos and Krawinkler, J. Struct. Eng. 137 (2011).
+    with the yield moment My of ``backbone``.  The hardening line of the direction in which the
+    moment begins to grow is then multiplied by 1 - β with Λ = ``strength``, and the intercept of
+    its falling line with the axis of moments by 1 - β with Λ = ``softening``.  A moment that was
+    reached on the falling line is never exceeded again.  The unloading stiffness is multiplied by
+    1 - β with Λ = ``unloading`` and the energy up to the reversal; it remains above a tenth of the
+    elastic one and above twice the hardening slope.  When one of the β reaches 1, the moment is
+    zero after the end of the excursion.  After Ibarra, Medina and Krawinkler, Earthquake Eng.
+    Struct. Dyn. 34 (2005), and Lignos and Krawinkler, J. Struct. Eng. 137 (2011).
 
     Args:
         stiffness: Elastic stiffness; N m/rad or N/m.
@@ -345,3 +354,77 @@ class IbarraKrawinkler(Record, ConnectorLaw):
                 new[f"{name}_{side}"] = where(is_here, value, getattr(state, f"{name}_{side}"))
             new[f"most_{side}"] = where(is_here, most, other)
         return {name: value - getattr(state, name) for name, value in new.items()}
+
+
+# -- interaction of N and M ------------------------------------------------------------------------
+
+ITERATIONS = 8
+"""Newton iterations for the flow, which converge to round-off from the lower bound of the flow."""
+
+
+@closed(OWN_LAW)
+@dataclass(frozen=True)
+class AxialBendingHinge(Record, ConnectorLaw):
+    """Law of a :class:`Bushing` for a hinge that yields by (N/Np)² + abs(M)/Mp = 1.
+
+    The yield surface is the one of :class:`AxialBending` with sharp corners, with associated flow.
+    The components are the motion along the axis of the bushing, with the axial force N; across it,
+    elastic; and the rotation, with the moment M.
+
+    Args:
+        axial: Np, the yield force; N.
+        bending: Mp, the plastic moment; N m.
+        along: Elastic stiffness along the axis; N/m.
+        across: Elastic stiffness across the axis; N/m.
+        turning: Elastic stiffness of the rotation; N m/rad.
+
+    Raises:
+        ModelError: A number is not positive.
+
+    Example:
+        >>> law = ub.AxialBendingHinge(  # N, N m; N/m, N/m, N m/rad
+        ...     axial=5e6, bending=2.5e5, along=1e10, across=1e10, turning=1e9
+        ... )
+        >>> foot = ub.Bushing(ub.ground(0, 0), beam.start, law, axis=(1, 0))
+        >>> cantilever = ub.Scene([beam], connectors=[foot])
+    """
+
+    axial: Positive
+    bending: Positive
+    along: Positive
+    across: Positive
+    turning: Positive
+
+    components: ClassVar[int] = 3
+    variables: ClassVar[Mapping[str, float]] = {"stretch": 0.0, "rotation": 0.0}
+
+    def energy(self, motion: Any, state: State) -> Values:
+        """Return the elastic energy; J."""
+        x, y, turn = motion
+        elastic = self.along * (x - state.stretch) ** 2 + self.across * y**2
+        return (elastic + self.turning * (turn - state.rotation) ** 2) / 2
+
+    def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
+        """Return the increments of the plastic motions: projection on the yield surface.
+
+        The flow γ satisfies n²/(1 + a γ)² + m - b γ = 1 with the trial forces n and m.  The left
+        side is convex and falls, so Newton's method from a lower bound increases to the solution.
+        """
+        elastic = motion[0] - state.stretch, motion[2] - state.rotation
+        n = self.along * absolute(elastic[0]) / self.axial
+        m = self.turning * absolute(elastic[1]) / self.bending
+        a, b = 2 * self.along / self.axial**2, self.turning / self.bending**2
+        m = larger(m, b * (n - 1) / a)  # for smaller moments the projection is the corner
+        flow = positive(larger((n - 1) / a, (m - 1) / b))
+        for _ in range(ITERATIONS):
+            ratio = n / (1 + a * flow)
+            excess = ratio**2 + m - b * flow - 1
+            flow = flow + excess / (2 * a * ratio**2 / (1 + a * flow) + b)
+        yields, new = below(1.0, n**2 + m), (n / (1 + a * flow), m - b * flow)
+        return {
+            name: where(yields, sign(e) * (absolute(e) - size * limit / stiffness), 0.0)
+            for name, e, size, limit, stiffness in zip(
+                self.variables, elastic, new, (self.axial, self.bending),
+                (self.along, self.turning), strict=True,
+            )
+        }  # fmt: skip
