@@ -95,7 +95,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
-from ufl_beam.model.hinge_laws import AxialBendingHinge, Backbone, IbarraKrawinkler
+from ufl_beam.model.hinge_laws import AxialBendingHinge, Backbone, IbarraKrawinkler, PinchingHinge
 from ufl_beam.model.joints import (
     Guided,
     Joint,
@@ -232,6 +232,7 @@ __all__ = [
     "Newton",
     "Normal",
     "Perzyna",
+    "PinchingHinge",
     "Pinned",
     "PointLoad",
     "PointMass",

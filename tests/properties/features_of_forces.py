@@ -183,7 +183,10 @@ def deteriorating(d):
         for f in (1, d.some(0.7, 1))
     )
     E = [f"{d.some(5, 50) * M / k:.4g}" for _ in range(3)]
-    _connect(d, f"ub.IbarraKrawinkler({k}, {plus}, {minus}, {', '.join(E)}, {n})", "SLT")
+    kind, more = "IbarraKrawinkler", ""
+    if d.one([True, False]):
+        kind, more = "PinchingHinge", f", {d.some(0.2, 1):.3g}, {d.some(0, 1):.3g}, {E[1]}"
+    _connect(d, f"ub.{kind}({k}, {plus}, {minus}, {', '.join(E)}, {n}{more})", "SLT")
 
 
 # -- loads, works, masses, damping -------------------------------------------------------------
