@@ -313,9 +313,7 @@ class _DeterioratingHinge(Record, ConnectorLaw):
 
         # the end of an excursion
         ended = where(crosses, state.dissipated, 0.0)
-        ratios = {
-            name: lost(numbers[f"{name}_energy"], state.spent, ended) for name in self.modes
-        }
+        ratios = {name: lost(numbers[f"{name}_energy"], state.spent, ended) for name in self.modes}
         basic = here("basic", vars(state)) * (1 - ratios["strength"] ** self.exponent)
         falling = here("falling", vars(state)) * (1 - ratios["softening"] ** self.exponent)
         works = below(reduce(larger, ratios.values()), 1.0)
