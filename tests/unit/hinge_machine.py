@@ -27,7 +27,9 @@ class Machine:
         capacities = strength, softening, unloading, reloading
         self.energies = [x * backbones[0].yield_limit for x in capacities]
         self.kappas, self.path, self.target, self.steepest = kappas, [], 0.0, 0.0
-        self.peaks = {way: b.yield_limit / stiffness for way, b in zip((1, -1), backbones, strict=True)}
+        self.peaks = {
+            way: b.yield_limit / stiffness for way, b in zip((1, -1), backbones, strict=True)
+        }
         self.lines, self.tops = {}, {}
         for way, b in zip((1, -1), backbones, strict=True):
             yields, top = b.yield_limit / stiffness, b.overstrength * b.yield_limit
