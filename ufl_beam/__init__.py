@@ -98,6 +98,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
+from ufl_beam.model.hinge_laws import AxialBendingHinge, Backbone, IbarraKrawinkler, PinchingHinge
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import (
     Guided,
@@ -179,6 +180,8 @@ __all__ = [
     "ArgumentTypeError",
     "ArmstrongFrederick",
     "AxialBending",
+    "AxialBendingHinge",
+    "Backbone",
     "Beam",
     "Body",
     "BoucWen",
@@ -218,6 +221,7 @@ __all__ = [
     "Guided",
     "History",
     "HotSpot",
+    "IbarraKrawinkler",
     "ImposedStrain",
     "Joint",
     "KelvinVoigt",
@@ -235,6 +239,7 @@ __all__ = [
     "Newton",
     "Normal",
     "Perzyna",
+    "PinchingHinge",
     "Pinned",
     "PointLoad",
     "PointMass",

@@ -34,6 +34,7 @@ STEEL = {"E": 210e9, "nu": 0.3}
 LAW = ub.ElastoPlastic(1.0)
 BREAKS = ub.Softening(10.0, 5.0)
 SPRING = ub.Spring(1.0)
+BACKBONE = ub.Backbone(1.0, 1.0)
 JOINT = ub.Revolute(BEAM.end, OTHER.start, multipliers=True)
 
 # -- kinds of parameters: what each of them must refuse ------------------------------------------
@@ -110,6 +111,12 @@ CORE = {"core": V(None, optional(NO_LAW)), "cover": V(0.0, [*NUMBER, -1.0, 0.2])
 SOFTENING = {"limit": V(1.0, LIMIT), "fracture_energy": V(1.0, POSITIVE)}
 NORMAL = {"mean": V(1.0, POSITIVE), "deviation": V(0.1, POSITIVE), "seed": V(1, SEED)}
 MESH = {"mesh": V(None, optional(OBJECT))}
+CAPACITY = V(1.0, optional([*LIMIT, 0.0]))
+HINGE = {
+    "stiffness": V(1.0, POSITIVE), "backbone": V(BACKBONE, OBJECT),
+    "negative": V(None, optional(OBJECT)), "strength": CAPACITY, "softening": CAPACITY,
+    "unloading": CAPACITY, "exponent": V(1.0, [*POSITIVE, 0.5]),
+}  # fmt: skip
 OF_WORKS = {
     "name": V("wind", [*TEXT, "", "kinetic"]),
     "beams": V(None, optional(LIST)),
@@ -284,6 +291,22 @@ TABLE = {
         ub.Stop,
         stiffness=V(1.0, POSITIVE), low=V(-1.0, [*NO_NUMBER, None, NAN, 1.0]),
         high=V(1.0, [*NO_NUMBER, None, NAN, -1.0]), damping=V(1.0, FROM_ZERO),
+    ),
+    "Backbone": call(
+        ub.Backbone,
+        yield_limit=V(1.0, POSITIVE), capping=V(1.0, POSITIVE),
+        post_capping=V(1.0, [*LIMIT, 0.0]), overstrength=V(1.0, [*NUMBER, 0.9]),
+        residual=V(0.5, [*FROM_ZERO, 1.1]), ultimate=V(2.0, [*LIMIT, 0.0, 1.0]),
+    ),
+    "IbarraKrawinkler": call(ub.IbarraKrawinkler, **HINGE),
+    "PinchingHinge": call(
+        ub.PinchingHinge, **HINGE,
+        kappa_F=V(0.5, [*POSITIVE, 1.1]), kappa_D=V(0.5, [*FROM_ZERO, 1.1]), reloading=CAPACITY,
+    ),
+    "AxialBendingHinge": call(
+        ub.AxialBendingHinge,
+        axial=V(1.0, POSITIVE), bending=V(1.0, POSITIVE), along=V(1.0, POSITIVE),
+        across=V(1.0, POSITIVE), turning=V(1.0, POSITIVE),
     ),
     "Clearance": call(
         ub.Clearance,

@@ -268,6 +268,31 @@ class Kernel:
         return value
 
 
+def _without_copies(expressions: Sequence[Expr]) -> tuple[Expr, ...]:
+    """Return expressions in which equal nodes are the same object.
+
+    The time in which UFL compares two equal nodes grows exponentially with their depth.
+    """
+    found: dict[int, Expr] = {}  # the node to use, by the identity of a node
+    known: dict[Any, Expr] = {}
+    for expression in expressions:
+        waiting = [expression]
+        while waiting:
+            node = waiting[-1]
+            if missing := [x for x in node.ufl_operands if id(x) not in found]:
+                waiting += missing
+                continue
+            waiting.pop()
+            if id(node) not in found:
+                operands = tuple(found[id(x)] for x in node.ufl_operands)
+                key = (type(node), *map(id, operands)) if operands else node
+                if key not in known:
+                    same = all(x is y for x, y in zip(operands, node.ufl_operands, strict=True))
+                    known[key] = node if same else node._ufl_expr_reconstruct_(*operands)
+                found[id(node)] = known[key]
+    return tuple(found[id(expression)] for expression in expressions)
+
+
 class Pointwise:
     """Compiler of functions of values at a point; ``inputs`` are the names of these values.
 
@@ -285,6 +310,7 @@ class Pointwise:
 
     def compile(self, *outputs: Expr) -> Any:
         """Compile a C function of the outputs, valid as long as this object exists."""
+        outputs = _without_copies(outputs)
         z = ufl.TestFunction(self._values(len(outputs)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
         form, _ = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)

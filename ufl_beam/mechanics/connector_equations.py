@@ -10,7 +10,7 @@ slip in the step; the same Python function serves UFL expressions and numbers.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,18 +61,24 @@ def law_step(
     rate = law.as_argument([(x1 - x0) / dt for x0, x1 in pairs])
     names = () if frozen else tuple(law.variables)
     old = State({name: at[f"state {name}"] for name in law.variables})
-    changes = law.increments(e, rate, old, θ * dt) if names else {}
+    changes = law.increments(e, rate, old, θ * dt) if names and not law.rate_independent else {}
 
+    @cache  # equal expressions must be the same objects, or UFL takes very long to compare them
     def after(fraction: Expr | float) -> State:
         """Return the variables after a fraction of the step."""
-        return State(vars(old) | {n: getattr(old, n) + fraction / θ * changes[n] for n in names})
+        grown = {n: fraction / θ * changes[n] for n in changes}
+        if names and law.rate_independent:
+            moved = law.as_argument([(1 - fraction) * x0 + fraction * x1 for x0, x1 in pairs])
+            grown = dict(law.increments(moved, rate, old, fraction * dt))
+        return State(vars(old) | {n: getattr(old, n) + grown[n] for n in names})
 
     end = {n: ufl.variable(ufl.as_ufl(z)) for n, z in vars(after(1.0)).items()}
     zero = ufl.as_ufl(0.0)
     if law.holds:  # a law with a limit has only a sliding force; return its magnitude
         sliding = ufl.as_ufl(law.sliding(e, rate, after(θ), dt))
         return LawStep((sliding,), zero, zero, tuple(end.values()))
-    resistances = law.each(law.resistance(e, rate, after(θ), dt))
+    resists = type(law).resistance is not ConnectorLaw.resistance
+    resistances = law.each(law.resistance(e, rate, after(θ if resists else 1.0), dt))
     elastic = _elastic_forces(law, e0, e1, after(load_weight), scheme)
     forces = tuple(f + ufl.as_ufl(r) for f, r in zip(elastic, resistances, strict=True))
     moved = [ufl.variable(x1) for x1 in e1]

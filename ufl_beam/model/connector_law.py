@@ -56,6 +56,9 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
         entry: Name of the entry in ``energy.lost`` for work that is not stored.
         active: True if the law may supply energy, as a drive does.  Otherwise runs warn if the
             lost energy decreases.
+        rate_independent: True if the increments are exact for a monotone motion of any length.
+            The variables after a fraction of a step are then the increments for this fraction;
+            otherwise they are proportional to the fraction.
 
     Example:
         >>> from dataclasses import dataclass
@@ -81,6 +84,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
     components: ClassVar[int] = 1
     entry: ClassVar[str] = "connectors"
     active: ClassVar[bool] = False
+    rate_independent: ClassVar[bool] = False
 
     def energy(self, motion: Any, state: State) -> Values:
         """Return the recoverable energy, zero by default; J.

@@ -140,7 +140,11 @@ class LawInStep:
         both = (1 - θ) * e0 + θ * e1, (e1 - e0) / self.dt
         e, rate = (self.law.as_argument([*values[:, None]]) for values in both)
         z = {name: np.array([self.z[f"state {name}"]]) for name in self.law.variables}
-        if fraction and z:
+        if fraction and z and self.law.rate_independent:
+            moved = self.law.as_argument([*((1 - fraction) * e0 + fraction * e1)[:, None]])
+            changes = self.law.increments(moved, rate, State(z), fraction * self.dt)
+            z = {name: x + changes[name] for name, x in z.items()}
+        elif fraction and z:
             changes = self.law.increments(e, rate, State(z), θ * self.dt)
             z = {name: x + fraction / θ * changes[name] for name, x in z.items()}
         return e, rate, State(z)

@@ -1,0 +1,600 @@
+# SPDX-License-Identifier: MIT
+"""Laws of hinges: deterioration by dissipated energy, and interaction of N and M."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial, reduce
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+from ufl_beam.errors import ModelError, closed
+from ufl_beam.model.checks import require_number
+from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.law_functions import (
+    Values,
+    absolute,
+    below,
+    larger,
+    positive,
+    sign,
+    smaller,
+    where,
+)
+from ufl_beam.model.material_law import State
+from ufl_beam.model.records import Instance, NotNegative, Positive, Record
+
+OWN_LAW = "state a ConnectorLaw of your own"
+"""Advice in the error that a subclass of a closed class raises."""
+
+FALL = 0.1
+"""Longest fall to zero strength after the ultimate rotation, as a fraction of this rotation."""
+
+LEAST_STIFFNESS = 0.1
+"""Smallest unloading stiffness, as a fraction of the elastic stiffness."""
+
+STEEPER = 1.1
+"""Smallest unloading stiffness after pinching, divided by the slope of the reloading path."""
+
+UNBOUNDED = 1e100
+"""Number that stands for infinity, for which compiled expressions would be NaN."""
+
+FromZeroOrInfinite = Annotated[float, partial(require_number, positive=True, infinite=True)]
+Exponent = Annotated[float, partial(require_number, at_least=1.0)]
+
+
+@closed(OWN_LAW)
+@dataclass(frozen=True)
+class Backbone(Record):
+    """Backbone of a hinge in one direction: yielding, capping, residual and ultimate rotation.
+
+    Rotations are in rad and moments in N m; for forces they are displacements in m and N.  The
+    moment grows by the factor ``overstrength`` from the yield rotation to the capping rotation,
+    which is larger by ``capping``.  Then it falls along a straight line, which would reach zero
+    after the rotation ``post_capping``, to the fraction ``residual`` of the yield moment.
+
+    Args:
+        yield_limit: Effective yield moment; N m.
+        capping: Plastic rotation from yielding to capping; rad.
+        post_capping: Rotation from capping to zero moment; rad.  The default, infinity, means that
+            the moment does not fall.
+        overstrength: Capping moment divided by the yield moment, at least 1.
+        residual: Residual moment divided by the yield moment, from 0 to 1.
+        ultimate: Rotation, elastic part included, after which the moment falls to zero within at
+            most a tenth of this rotation, and at least twice as steeply as after capping; rad.
+
+    Raises:
+        ModelError: A number is out of range, or the backbone turns back.
+
+    Example:
+        >>> steel = ub.Backbone(  # N m; rad
+        ...     3e5, capping=0.025, post_capping=0.2, overstrength=1.1, residual=0.4, ultimate=0.3
+        ... )
+    """
+
+    yield_limit: Positive
+    capping: float
+    post_capping: FromZeroOrInfinite = math.inf
+    overstrength: float = 1.0
+    residual: float = 0.0
+    ultimate: FromZeroOrInfinite = math.inf
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("capping", "overstrength", "residual"):
+            require_number(getattr(self, name), f"Backbone: {name}")
+        if self.capping <= 0.0:
+            raise ModelError(
+                f"Backbone: capping = {self.capping:g} rad is the plastic rotation from yielding "
+                "to capping; the backbone would turn back at the yield moment, so give a positive "
+                "rotation"
+            )
+        if self.overstrength < 1.0:
+            raise ModelError(
+                f"Backbone: overstrength = {self.overstrength:g}; the capping moment must be at "
+                "least the yield moment"
+            )
+        if not 0.0 <= self.residual <= 1.0:
+            raise ModelError(
+                f"Backbone: residual = {self.residual:g} is a fraction of the yield moment and "
+                "must lie between 0 and 1; above it the moment would rise again"
+            )
+        if self.ultimate <= self.capping:
+            raise ModelError(
+                f"Backbone: the ultimate rotation {self.ultimate:g} rad must exceed the capping "
+                f"rotation, whose plastic part is {self.capping:g} rad"
+            )
+
+    def numbers(self, stiffness: float) -> dict[str, float]:
+        """Return intercepts and slopes of the lines of the backbone, for an elastic stiffness."""
+        limit, yields = self.yield_limit, self.yield_limit / stiffness
+        caps, largest = yields + self.capping, self.overstrength * limit
+        hardening = (largest - limit) / self.capping
+        if self.ultimate <= caps:
+            raise ModelError(
+                f"Backbone: the ultimate rotation {self.ultimate:g} rad must exceed the capping "
+                f"rotation {caps:g} rad, the yield rotation {yields:g} rad and its plastic part"
+            )
+        if hardening > stiffness / 2:
+            raise ModelError(
+                f"Backbone: between the yield rotation {yields:g} rad and the capping rotation "
+                f"{caps:g} rad the slope is {hardening:.4g} N m/rad; it must be at most half the "
+                f"elastic stiffness {stiffness:.4g} N m/rad"
+            )
+        falls = largest / self.post_capping
+        last, steep, ultimate = 2 * largest, 0.0, min(self.ultimate, UNBOUNDED)
+        if ultimate < UNBOUNDED:
+            last = max(largest - falls * (ultimate - caps), self.residual * limit)
+            last = last if last > 0.0 else largest  # the strength is lost before
+            steep = max(last / (FALL * ultimate), 2 * falls)
+        return {
+            "first": limit - hardening * yields,
+            "hardening": hardening,
+            "reference": largest + falls * caps,
+            "falls": falls,
+            "residual": self.residual * limit,
+            "last": last,
+            "ultimate": ultimate,
+            "steep": steep,
+            "largest": largest,
+        }
+
+
+class _Bound(NamedTuple):
+    """Bound of positive moments: straight lines of a deteriorated backbone."""
+
+    first: Values  # hardening line: intercept with the axis of moments
+    hardening: Values  # and slope
+    reference: Values  # falling line: intercept
+    falls: Values  # and fall of the moment per rotation
+    residual: Values
+    most: Values  # largest moment
+    last: Values  # moment at the ultimate rotation
+    ultimate: Values
+    steep: Values  # fall of the moment per rotation after the ultimate one
+    least_slope: Values  # in place of zero, where a slope is a divisor
+
+    def breaking(self, x: Values) -> Values:
+        """Return the moment of the line that begins at the ultimate rotation."""
+        return self.last + self.steep * (self.ultimate - x)
+
+    def fallen(self, x: Values) -> Values:
+        """Return the moment on the falling line, or a smaller one after the ultimate rotation."""
+        falling = larger(self.residual, self.reference - self.falls * x)
+        return positive(smaller(self.breaking(x), falling))
+
+    def at(self, x: Values) -> Values:
+        """Return the bound."""
+        lines = smaller(self.first + self.hardening * x, self.reference - self.falls * x)
+        bound = smaller(self.most, larger(self.residual, lines))
+        return positive(smaller(self.breaking(x), bound))
+
+    def meets(self, stiffness: Values, p: Values) -> Values:
+        """Return the rotation where an elastic line, which starts at ``p``, meets the bound."""
+        hardening = (self.first + stiffness * p) / (stiffness - self.hardening)
+        falling = (self.reference + stiffness * p) / (stiffness + self.falls)
+        breaking = (self.breaking(0.0) + stiffness * p) / (stiffness + self.steep)
+        lines = larger(self.residual / stiffness + p, smaller(hardening, falling))
+        bound = smaller(self.most / stiffness + p, lines)
+        return larger(p, smaller(breaking, bound))
+
+    def integral(self, start: Values, end: Values) -> Values:
+        """Return the integral of the bound, which is linear between its kinks."""
+        up, down, steep, steeper = (
+            larger(slope, self.least_slope)
+            for slope in (self.hardening, self.falls, self.steep, self.steep - self.falls)
+        )
+        caps, top = (self.reference - self.first) / (up + down), self.breaking(0.0)
+        lines = smaller((top - self.residual) / steep, (top - self.reference) / steeper)
+        breaks = larger((top - self.most) / steep, lines)
+        kinks = (
+            smaller(caps, (self.residual - self.first) / up),
+            smaller(caps, (self.most - self.first) / up),
+            larger(caps, (self.reference - self.most) / down),
+            larger(caps, (self.reference - self.residual) / down),
+        )
+        kinks = (*(smaller(kink, breaks) for kink in kinks), breaks, top / steep)
+        total, x, moment = 0.0, start, self.at(start)
+        for kink in (*kinks, end):
+            next_x = smaller(end, larger(x, kink))
+            next_moment = self.at(next_x)
+            total += (next_x - x) * (moment + next_moment) / 2
+            x, moment = next_x, next_moment
+        return total
+
+
+class _Reloading(NamedTuple):
+    """Bound of positive moments that follows two lines to a target, then the backbone."""
+
+    backbone: _Bound
+    start: Values  # rotation where the first line begins at zero moment
+    first: Values  # slopes of both lines
+    second: Values
+    target: Values  # rotation where the second line ends
+    moment: Values  # moment there
+
+    def lines(self, x: Values) -> Values:
+        """Return the moment on the lines, of which the second one is never less steep."""
+        second = self.moment - self.second * (self.target - x)
+        return positive(larger(self.first * (x - self.start), second))
+
+    def at(self, x: Values) -> Values:
+        """Return the bound."""
+        return where(below(x, self.target), self.lines(x), self.backbone.at(x))
+
+    def meets(self, stiffness: Values, p: Values) -> Values:
+        """Return the rotation where an elastic line, which starts at ``p``, meets the bound."""
+        first = (stiffness * p - self.first * self.start) / (stiffness - self.first)
+        root = self.moment - self.second * self.target
+        x = larger(p, larger(first, (root + stiffness * p) / (stiffness - self.second)))
+        return where(below(x, self.target), x, self.backbone.meets(stiffness, p))
+
+    def integral(self, start: Values, end: Values) -> Values:
+        """Return the integral of the bound."""
+        last, steeper = larger(start, smaller(end, self.target)), self.second - self.first
+        root = self.second * self.target - self.moment
+        corner = (root - self.first * self.start) / larger(steeper, self.backbone.least_slope)
+        total, x, moment = 0.0, start, self.lines(start)
+        for kink in (self.start, corner, last):
+            next_x = smaller(last, larger(x, kink))
+            next_moment = self.lines(next_x)
+            total += (next_x - x) * (moment + next_moment) / 2
+            x, moment = next_x, next_moment
+        return total + self.backbone.integral(larger(start, self.target), larger(end, self.target))
+
+
+@dataclass(frozen=True)
+class _DeterioratingHinge(Record, ConnectorLaw):
+    """Base of hinges that deteriorate by dissipated energy."""
+
+    stiffness: Positive
+    backbone: Instance[Backbone]
+    negative: Instance[Backbone | None] = None
+    strength: FromZeroOrInfinite = math.inf
+    softening: FromZeroOrInfinite = math.inf
+    unloading: FromZeroOrInfinite = math.inf
+    exponent: Exponent = 1.0
+
+    rate_independent: ClassVar[bool] = True
+    modes: ClassVar[tuple[str, ...]] = "strength", "softening", "unloading"
+    variables: ClassVar[Mapping[str, float]] = {
+        "plastic": 0.0,  # motion at zero moment on the present elastic line
+        "side": 1.0,  # sign of the moments of the present excursion
+        "dissipated": 0.0,  # in the present excursion
+        "spent": 0.0,  # in all excursions before
+        "rest": 1.0,  # unloading stiffness divided by the elastic one
+        "rest_before": 1.0,  # the same when the excursion began
+        # factors of the hardening line, of the reference moment and of the capping moment
+        **{f"{name}_{side}": x for side in ("plus", "minus")
+           for name, x in (("basic", 1.0), ("falling", 1.0), ("most", 1.0))},
+    }  # fmt: skip
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        backbones = {"plus": self.backbone, "minus": self.negative or self.backbone}
+        numbers = {
+            f"{name}_{side}": x
+            for side, backbone in backbones.items()
+            for name, x in backbone.numbers(self.stiffness).items()
+        }
+        limit = self.backbone.yield_limit
+        for name in self.modes:
+            numbers[f"{name}_energy"] = min(getattr(self, name) * limit, UNBOUNDED)
+        slope = max(numbers["hardening_plus"], numbers["hardening_minus"])
+        numbers["least"] = max(LEAST_STIFFNESS, 2 * slope / self.stiffness)
+        numbers |= {"stiffness": self.stiffness, "exponent": self.exponent}
+        vars(self).update(numbers, _numbers=numbers)
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the numbers of the lines of both backbones, and the reference energies."""
+        return dict(vars(self)["_numbers"])
+
+    def energy(self, motion: Values, state: State) -> Values:
+        """Return the elastic energy; J."""
+        return state.rest * self.stiffness * (motion - state.plastic) ** 2 / 2
+
+    def increments(
+        self, motion: Values, rate: Values, state: State, dt: Values
+    ) -> Mapping[str, Values]:
+        """Return the changes of the variables on a monotone way to the motion."""
+        numbers, stiffness = vars(self), state.rest * self.stiffness
+        way = sign(motion - state.plastic)  # of the moment
+        x, p = way * motion, way * state.plastic
+        crosses = below(way * state.side, 0.0)
+
+        def here(name: str, of: Mapping[str, Values] = numbers) -> Values:
+            return where(below(way, 0.0), of[f"{name}_minus"], of[f"{name}_plus"])
+
+        def lost(capacity: Values, spent: Values, energy: Values) -> Values:
+            """Return β^(1/c), at most 1."""
+            left = larger(capacity - spent - energy, 1e-12 * capacity)
+            return smaller(positive(energy) / left, 1.0)
+
+        # the end of an excursion
+        ended = where(crosses, state.dissipated, 0.0)
+        ratios = {name: lost(numbers[f"{name}_energy"], state.spent, ended) for name in self.modes}
+        basic = here("basic", vars(state)) * (1 - ratios["strength"] ** self.exponent)
+        falling = here("falling", vars(state)) * (1 - ratios["softening"] ** self.exponent)
+        works = below(reduce(larger, ratios.values()), 1.0)
+        most = where(works, here("most", vars(state)), 0.0)
+        other = where(works, where(below(way, 0.0), state.most_plus, state.most_minus), 0.0)
+        spent, dissipated = state.spent + ended, state.dissipated - ended
+        before = where(crosses, state.rest, state.rest_before)
+
+        # the bound, at x >= 0 of moments that are positive in this excursion
+        backbone = _Bound(
+            first=basic * here("first"), hardening=basic * here("hardening"),
+            reference=falling * here("reference"), falls=here("falls"), residual=here("residual"),
+            most=most * here("largest"), last=here("last"), ultimate=here("ultimate"),
+            steep=here("steep"), least_slope=1e-12 * self.stiffness,
+        )  # fmt: skip
+        bound, path = self._path(backbone, state, here, p, before, crosses, ratios)
+        limit = bound.at(x)
+        flows = below(limit, stiffness * (x - p))
+        start = bound.meets(stiffness, p)
+        work = (
+            dissipated + stiffness * (start - p) ** 2 / 2 + bound.integral(start, larger(x, start))
+        )
+        energy = work - limit**2 / (2 * before * self.stiffness)
+        ratio = lost(numbers["unloading_energy"], spent, energy)
+        least = larger(numbers["least"], path["least_rest"]) if path else numbers["least"]
+        rest = larger(before * (1 - ratio**self.exponent), smaller(before, least))
+        after = rest * self.stiffness
+
+        def changed(new: Values, old: Values) -> Values:
+            return where(flows, new, old)
+
+        fallen = smaller(most, backbone.fallen(x) / here("largest"))
+        if path:  # on the way to the target the moment is below the backbone
+            fallen = where(below(x, path["target"]), most, fallen)
+        most = changed(fallen, most)
+        other = changed(smaller(other, positive(backbone.breaking(x)) / here("last")), other)
+        new = {
+            "plastic": way * changed(x - limit / after, p),
+            "side": way,
+            "dissipated": changed(work - limit**2 / (2 * after), dissipated),
+            "spent": spent,
+            "rest": changed(rest, state.rest),
+            "rest_before": before,
+            **path,
+        }
+        for side, is_here in (("plus", below(-way, 0.0)), ("minus", below(way, 0.0))):
+            for name, value in (("basic", basic), ("falling", falling)):
+                new[f"{name}_{side}"] = where(is_here, value, getattr(state, f"{name}_{side}"))
+            new[f"most_{side}"] = where(is_here, most, other)
+            if path:
+                peak = getattr(state, f"peak_{side}")
+                aims = where(crosses, path["target"] / here("yields"), peak)
+                reached = larger(aims, changed(x / here("yields"), aims))
+                new[f"peak_{side}"] = where(is_here, reached, peak)
+        return {name: value - getattr(state, name) for name, value in new.items()}
+
+    def _path(
+        self,
+        backbone: _Bound,
+        state: State,
+        here: Callable[..., Values],
+        p: Values,
+        before: Values,
+        crosses: Values,
+        ratios: Mapping[str, Values],
+    ) -> tuple[_Bound | _Reloading, dict[str, Values]]:
+        """Return the bound of an excursion, and the new values of the variables of its path."""
+        return backbone, {}
+
+
+@closed(OWN_LAW)
+@dataclass(frozen=True)
+class IbarraKrawinkler(_DeterioratingHinge):
+    """Bilinear hysteresis with capping, residual strength and deterioration by dissipated energy.
+
+    The moment moves elastically between two bounds, which are the backbones of both directions;
+    their hardening lines stay in place (kinematic hardening).  An excursion ends where the moment
+    changes its sign.  If E of n excursions have dissipated the energies E_i, the last one causes
+
+    β = (E_n / (Λ My - sum E_i))^c
+
+    with the yield moment My of ``backbone``.  The hardening line of the direction in which the
+    moment begins to grow is then multiplied by 1 - β with Λ = ``strength``, and the intercept of
+    its falling line with the axis of moments by 1 - β with Λ = ``softening``.  A moment that was
+    reached on the falling line is never exceeded again.  The unloading stiffness is multiplied by
+    1 - β with Λ = ``unloading`` and the energy up to the reversal; it remains above a tenth of the
+    elastic one and above twice the hardening slope.  When one of the β reaches 1, the moment is
+    zero after the end of the excursion.  After Ibarra, Medina and Krawinkler, Earthquake Eng.
+    Struct. Dyn. 34 (2005), and Lignos and Krawinkler, J. Struct. Eng. 137 (2011).
+
+    Args:
+        stiffness: Elastic stiffness; N m/rad or N/m.
+        backbone: Backbone of positive moments, and of negative ones unless ``negative`` is given.
+        negative: Backbone of negative moments, with positive numbers.
+        strength: Reference cumulative rotation Λ of the basic strength; rad or m.  The default,
+            infinity, means no deterioration, here and below.
+        softening: Λ of the strength after capping; rad or m.
+        unloading: Λ of the unloading stiffness; rad or m.
+        exponent: Exponent c, at least 1.
+
+    Raises:
+        ModelError: A number is out of range, the hardening exceeds half the stiffness, or the
+            ultimate rotation does not exceed the capping rotation.
+
+    Example:
+        >>> backbone = ub.Backbone(3e5, capping=0.025, post_capping=0.2, overstrength=1.1)
+        >>> law = ub.IbarraKrawinkler(3e7, backbone, strength=1.0, softening=1.0, unloading=2.0)
+        >>> base = ub.Turn(ub.ground(0, 0), beam.start, law)
+        >>> arm = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[base])
+    """
+
+
+@closed(OWN_LAW)
+@dataclass(frozen=True)
+class PinchingHinge(_DeterioratingHinge):
+    """Peak-oriented or pinching hysteresis with the backbone of Ibarra, Medina and Krawinkler.
+
+    Backbones and deterioration are those of :class:`IbarraKrawinkler`.  Where the moment changes
+    its sign, at the rotation x0, the path aims at the largest rotation of earlier excursions in
+    the new direction, at first the yield rotation, and at its moment M on the deteriorated
+    backbone.  With ``kappa_F`` = 1 the path is straight (peak-oriented).  Otherwise it has two
+    lines, which meet at 1 - ``kappa_D`` times the rotation that unloading from the target leaves,
+    and at ``kappa_F`` times the moment of the straight path; if x0 is beyond this rotation, the
+    path is straight.  At each change of the sign the target rotation is multiplied by 1 + β with
+    Λ = ``reloading``.  The unloading stiffness remains at least 1.1 times the slope of the path
+    where this slope is less than the stiffness before.  The hinge corresponds to IMKPinching and
+    IMKPeakOriented of OpenSees.
+
+    Args:
+        stiffness: Elastic stiffness; N m/rad or N/m.
+        backbone: Backbone of positive moments, and of negative ones unless ``negative`` is given.
+        negative: Backbone of negative moments, with positive numbers.
+        strength: Reference cumulative rotation Λ of the basic strength; rad or m.  The default,
+            infinity, means no deterioration, here and below.
+        softening: Λ of the strength after capping; rad or m.
+        unloading: Λ of the unloading stiffness; rad or m.
+        exponent: Exponent c, at least 1.
+        kappa_F: Factor κF of the moment where both lines meet, above 0 and at most 1.
+        kappa_D: Factor κD of the rotation there, from 0 to 1.
+        reloading: Λ of the accelerated deterioration of the reloading stiffness; rad or m.
+
+    Raises:
+        ModelError: A number is out of range, the hardening exceeds half the stiffness, or the
+            ultimate rotation does not exceed the capping rotation.
+
+    Example:
+        >>> backbone = ub.Backbone(3e5, capping=0.025, post_capping=0.2, overstrength=1.1)
+        >>> law = ub.PinchingHinge(3e7, backbone, strength=1.0, kappa_F=0.4, kappa_D=0.3)
+        >>> base = ub.Turn(ub.ground(0, 0), beam.start, law)
+        >>> arm = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[base])
+    """
+
+    kappa_F: Annotated[float, partial(require_number, positive=True)] = 1.0
+    kappa_D: NotNegative = 0.0
+    reloading: FromZeroOrInfinite = math.inf
+
+    modes: ClassVar[tuple[str, ...]] = (*_DeterioratingHinge.modes, "reloading")
+    variables: ClassVar[Mapping[str, float]] = {
+        **_DeterioratingHinge.variables,
+        "start": 0.0,  # motion where the present excursion began
+        "target": 0.0,  # size of the motion at which its path aims
+        "least_rest": 0.0,  # lower bound of the unloading stiffness divided by the elastic one
+        "peak_plus": 1.0,  # largest motions divided by the yield rotations
+        "peak_minus": 1.0,
+    }
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("kappa_F", "kappa_D"):
+            if getattr(self, name) > 1.0:
+                raise ModelError(
+                    f"PinchingHinge: {name} = {getattr(self, name):g} is a fraction, at most 1"
+                )
+        backbones = {"plus": self.backbone, "minus": self.negative or self.backbone}
+        yields = {f"yields_{n}": b.yield_limit / self.stiffness for n, b in backbones.items()}
+        more = yields | {name: getattr(self, name) for name in ("kappa_F", "kappa_D")}
+        vars(self)["_numbers"].update(more)
+        vars(self).update(more)
+
+    def _path(
+        self,
+        backbone: _Bound,
+        state: State,
+        here: Callable[..., Values],
+        p: Values,
+        before: Values,
+        crosses: Values,
+        ratios: Mapping[str, Values],
+    ) -> tuple[_Bound | _Reloading, dict[str, Values]]:
+        """Return the bound of an excursion, and the new values of the variables of its path."""
+        stiffness, least = before * self.stiffness, 1e-12 * here("yields")
+        farther = 1 + ratios["reloading"] ** self.exponent
+        aims = here("peak", vars(state)) * here("yields") * farther
+        target = where(crosses, aims, state.target)
+        start = where(crosses, p, state.start)
+        moment = backbone.at(target)
+        slope = moment / larger(target - start, least)
+        remains = target - moment / stiffness
+        turn = remains - self.kappa_D * positive(remains)
+        first = where(below(start, turn), self.kappa_F * slope, slope)
+        second = (moment - first * (turn - start)) / larger(target - turn, least)
+        second = where(below(start, turn), second, slope)
+        # otherwise the elastic line reaches the backbone before the target
+        reloads = below((1 + 1e-6) * moment, stiffness * (target - start))
+        first, second = where(reloads, first, 0.0), where(reloads, second, 0.0)
+        bound = _Reloading(
+            backbone, start, first, second, where(reloads, target, -UNBOUNDED), moment
+        )
+        least_rest = where(crosses, STEEPER * second / self.stiffness, state.least_rest)
+        return bound, {"start": start, "target": target, "least_rest": least_rest}
+
+
+# -- interaction of N and M ------------------------------------------------------------------------
+
+ITERATIONS = 8
+"""Newton iterations for the flow, which converge to round-off from the lower bound of the flow."""
+
+
+@closed(OWN_LAW)
+@dataclass(frozen=True)
+class AxialBendingHinge(Record, ConnectorLaw):
+    """Law of a :class:`Bushing` for a hinge that yields by (N/Np)² + abs(M)/Mp = 1.
+
+    The yield surface is the one of :class:`AxialBending` with sharp corners, with associated flow.
+    The components are the motion along the axis of the bushing, with the axial force N; across it,
+    elastic; and the rotation, with the moment M.
+
+    Args:
+        axial: Np, the yield force; N.
+        bending: Mp, the plastic moment; N m.
+        along: Elastic stiffness along the axis; N/m.
+        across: Elastic stiffness across the axis; N/m.
+        turning: Elastic stiffness of the rotation; N m/rad.
+
+    Raises:
+        ModelError: A number is not positive.
+
+    Example:
+        >>> law = ub.AxialBendingHinge(  # N, N m; N/m, N/m, N m/rad
+        ...     axial=5e6, bending=2.5e5, along=1e10, across=1e10, turning=1e9
+        ... )
+        >>> foot = ub.Bushing(ub.ground(0, 0), beam.start, law, axis=(1, 0))
+        >>> cantilever = ub.Scene([beam], connectors=[foot])
+    """
+
+    axial: Positive
+    bending: Positive
+    along: Positive
+    across: Positive
+    turning: Positive
+
+    components: ClassVar[int] = 3
+    variables: ClassVar[Mapping[str, float]] = {"stretch": 0.0, "rotation": 0.0}
+
+    def energy(self, motion: Any, state: State) -> Values:
+        """Return the elastic energy; J."""
+        x, y, turn = motion
+        elastic = self.along * (x - state.stretch) ** 2 + self.across * y**2
+        return (elastic + self.turning * (turn - state.rotation) ** 2) / 2
+
+    def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
+        """Return the increments of the plastic motions: projection on the yield surface.
+
+        The flow γ satisfies n²/(1 + a γ)² + m - b γ = 1 with the trial forces n and m.  The left
+        side is convex and falls, so Newton's method from a lower bound increases to the solution.
+        """
+        elastic = motion[0] - state.stretch, motion[2] - state.rotation
+        n = self.along * absolute(elastic[0]) / self.axial
+        m = self.turning * absolute(elastic[1]) / self.bending
+        a, b = 2 * self.along / self.axial**2, self.turning / self.bending**2
+        m = larger(m, b * (n - 1) / a)  # for smaller moments the projection is the corner
+        flow = positive(larger((n - 1) / a, (m - 1) / b))
+        for _ in range(ITERATIONS):
+            ratio = n / (1 + a * flow)
+            excess = ratio**2 + m - b * flow - 1
+            flow = flow + excess / (2 * a * ratio**2 / (1 + a * flow) + b)
+        yields, new = below(1.0, n**2 + m), (n / (1 + a * flow), m - b * flow)
+        return {
+            name: where(yields, sign(e) * (absolute(e) - size * limit / stiffness), 0.0)
+            for name, e, size, limit, stiffness in zip(
+                self.variables, elastic, new, (self.axial, self.bending),
+                (self.along, self.turning), strict=True,
+            )
+        }  # fmt: skip
