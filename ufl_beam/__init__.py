@@ -95,6 +95,8 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
+from ufl_beam.model.ground_motion import GroundMotion
+from ufl_beam.model.ground_motion import ResponseSpectrum as ResponseSpectrum
 from ufl_beam.model.joints import (
     Guided,
     Joint,
@@ -209,6 +211,7 @@ __all__ = [
     "Gerber",
     "Goodman",
     "Gravity",
+    "GroundMotion",
     "Guided",
     "History",
     "HotSpot",
