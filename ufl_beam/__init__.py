@@ -52,6 +52,8 @@ from ufl_beam.analysis.path_controls import (
 )
 from ufl_beam.analysis.path_following import Path as Path
 from ufl_beam.analysis.path_following import follow
+from ufl_beam.analysis.response_spectra import ResponseSpectrum as ResponseSpectrum
+from ufl_beam.analysis.response_spectra import response_spectrum
 from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff as Tradeoff
 from ufl_beam.errors import (
@@ -96,7 +98,6 @@ from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
 from ufl_beam.model.ground_motion import GroundMotion
-from ufl_beam.model.ground_motion import ResponseSpectrum as ResponseSpectrum
 from ufl_beam.model.joints import (
     Guided,
     Joint,
@@ -289,6 +290,7 @@ __all__ = [
     "rainflow",
     "ramp",
     "render",
+    "response_spectrum",
     "simulate",
     "study",
     "tradeoff",
@@ -296,7 +298,8 @@ __all__ = [
 
 RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
-    "Energy", "Envelope", "Event", "Extent", "Film", "Modes", "Path", "Place", "Tradeoff",
+    "Energy", "Envelope", "Event", "Extent", "Film", "Modes", "Path", "Place", "ResponseSpectrum",
+    "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 
