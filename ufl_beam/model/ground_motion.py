@@ -19,16 +19,14 @@ import scipy  # its subpackages are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import compact_repr
-from ufl_beam.errors import (
-    ArgumentError,
-    ModelError,
-    closed,
+from ufl_beam.errors import ModelError, shorten
+from ufl_beam.file_system import require_path
+from ufl_beam.model.checks import (
+    raising_model_errors,
     require_count,
     require_number,
     require_row,
-    shorten,
 )
-from ufl_beam.file_system import require_path
 from ufl_beam.model.functions import Table
 from ufl_beam.model.records import Positive, Record, Text
 
@@ -55,7 +53,6 @@ def require_motion(values: npt.ArrayLike, what: str) -> tuple[float, ...]:
     return tuple(map(float, row))
 
 
-@closed("any function of t will do as an amplitude")
 @dataclass(frozen=True, repr=False)
 class GroundMotion(Record):
     """Acceleration of the ground at equal time steps from t = 0 on, linear between them.
@@ -119,7 +116,9 @@ class GroundMotion(Record):
         what = "GroundMotion.from_history"
         t, a = require_row(times, f"{what}: times"), require_row(values, f"{what}: values")
         if len(t) != len(a) or len(t) < 2:
-            raise ModelError(f"{what}: {len(t)} times and {len(a)} values; give two of each or more")
+            raise ModelError(
+                f"{what}: {len(t)} times and {len(a)} values; give two of each or more"
+            )
         if dt is None:
             return cls(_equal_step(t, lambda k: f"{what}: times[{k}]", "; or give dt="), a, name)
         dt = require_number(dt, f"{what}: dt", positive=True)
@@ -145,32 +144,33 @@ class GroundMotion(Record):
             dt: Time step of a text file without times; s.
 
         Raises:
-            ArgumentError: The file cannot be read, or the unit is missing or unknown.
-            ModelError: The data have text, missing numbers or uneven time steps; the message has
-                the file and the line.
+            ModelError: The file cannot be read, the unit is missing or unknown, or the data have
+                text, missing numbers or uneven time steps; the message has the file and the line.
 
         Example:
             >>> np.savetxt("record.txt", [[0.00, 0.0], [0.01, 0.5], [0.02, 0.0]])
             >>> ub.GroundMotion.read("record.txt", unit="g").values
             (0.0, 4.903325, 0.0)
         """
-        file = require_path(path, "GroundMotion.read")
+        file = raising_model_errors(require_path)(path, "GroundMotion.read")
         try:
             lines = file.read_text("utf-8-sig", errors="replace").splitlines()
         except OSError as error:
-            raise ArgumentError(f"GroundMotion.read: {file}: {error.strerror}") from None
+            raise ModelError(f"GroundMotion.read: {file}: {error.strerror}") from None
         head, first, count = "\n".join(lines[:4]), 0, None
         if header := next(filter(None, (re.search(x, head, re.I | re.M) for x in PEER)), None):
             first, count, step = 4, int(header[1]), float(header[2])
             if dt is not None and not math.isclose(dt, step, rel_tol=1e-9):
-                raise ArgumentError(f"{file}: dt = {dt:g} s, but the file has {step:g} s")
+                raise ModelError(f"{file}: dt = {dt:g} s, but the file has {step:g} s")
             dt = step
             if unit is None and (stated := re.search(r"UNITS\s+OF\s+(\S+)", head, re.I)):
                 unit = stated[1].strip(".,")
         known = re.sub(r"/s(ec)?(/s(ec)?|\^2|²)$", "/s2", str(unit).lower())
         if known not in UNITS:
-            said = "has no unit" if unit is None else f"has unit = {shorten(unit)}, which is unknown"
-            raise ArgumentError(f"{file}: the record {said}; give unit= one of {', '.join(UNITS)}")
+            wrong = (
+                "the record has no unit" if unit is None else f"unit = {shorten(unit)} is unknown"
+            )
+            raise ModelError(f"{file}: {wrong}; give unit= one of {', '.join(UNITS)}")
         rows = [*_rows(file, lines, first)]
         if not rows:
             raise ModelError(f"{file}: the file has no numbers")
@@ -179,7 +179,7 @@ class GroundMotion(Record):
         if dt is not None:
             dt = require_number(dt, "GroundMotion.read: dt", positive=True)
             if columns == {2} and len(t) > 2 and np.allclose(np.diff(t), dt, rtol=EVEN, atol=0.0):
-                raise ArgumentError(f"{file}: the first column has times with this step; omit dt=")
+                raise ModelError(f"{file}: the first column has times with this step; omit dt=")
             values = [x for _, row in rows for x in row]
         elif columns != {2}:
             number, row = next((number, row) for number, row in rows if len(row) != 2)
@@ -211,9 +211,7 @@ class GroundMotion(Record):
     @cached_property
     def acceleration(self) -> Table:
         """Acceleration as a function of time; m/s²."""
-        return Table(
-            [self.dt * k for k in range(len(self.values) + 1)], (*self.values, 0.0)
-        )
+        return Table([self.dt * k for k in range(len(self.values) + 1)], (*self.values, 0.0))
 
     @property
     def velocity(self) -> Integral:
@@ -238,10 +236,10 @@ class GroundMotion(Record):
     def scaled(self, factor: float | None = None, *, peak: float | None = None) -> GroundMotion:
         """Return the record times a factor, or with a given peak acceleration; m/s²."""
         if (factor is None) == (peak is None):
-            raise ArgumentError("GroundMotion.scaled: give either factor or peak")
+            raise ModelError("GroundMotion.scaled: give either factor or peak")
         if peak is not None:
             if not self.peak:
-                raise ArgumentError(f"GroundMotion.scaled: {self.name} is zero and has no peak")
+                raise ModelError(f"GroundMotion.scaled: {self.name} is zero and has no peak")
             factor = require_number(peak, "GroundMotion.scaled: peak", positive=True) / self.peak
         factor = require_number(factor, "GroundMotion.scaled: factor")
         return replace(self, values=factor * np.array(self.values))
@@ -262,7 +260,7 @@ class GroundMotion(Record):
         if highpass is not None:
             highpass = require_number(highpass, "GroundMotion.corrected: highpass", positive=True)
             if highpass >= highest:
-                raise ArgumentError(
+                raise ModelError(
                     f"GroundMotion.corrected: highpass = {highpass:g} Hz must be below the highest "
                     f"frequency of the record, {highest:g} Hz"
                 )
@@ -286,7 +284,7 @@ class GroundMotion(Record):
             return replace(self, dt=dt, values=np.interp(t, self.histories[0][:-1], self.values))
         ratio = Fraction(self.dt / dt).limit_denominator(1000)
         if not math.isclose(ratio * dt, self.dt, rel_tol=1e-9):
-            raise ArgumentError(
+            raise ModelError(
                 f"GroundMotion.resampled: dt = {dt:g} s and the step, {self.dt:g} s, are not in "
                 "the ratio of small whole numbers"
             )
@@ -329,7 +327,6 @@ def _equal_step(times: Array, at: Callable[[int], str], remedy: str = "") -> flo
     return dt
 
 
-@closed("any function of t will do")
 @dataclass(frozen=True)
 class Integral:
     """First or second integral of a ground motion from t = 0 on, a function of time.
