@@ -331,7 +331,7 @@ class Rayleigh(Record):
         if min(w1, w2) <= 0 or w1 == w2:
             raise ModelError(f"{what}: omega = ({w1:g}, {w2:g}) must be two positive frequencies")
         mass, stiffness = np.linalg.solve([[0.5 / w1, w1 / 2], [0.5 / w2, w2 / 2]], [z1, z2])
-        if min(mass, stiffness) < 0:
+        if min(z1, z2) <= 0 or min(mass, stiffness) < 0:
             raise ModelError(
                 f"{what}: ratios = ({z1:g}, {z2:g}) at omega = ({w1:g}, {w2:g}) rad/s need the "
                 f"factors mass = {mass:.3g}, stiffness = {stiffness:.3g}, which must not be "
