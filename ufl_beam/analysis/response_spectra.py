@@ -20,7 +20,8 @@ from ufl_beam.model.ground_motion import GroundMotion
 POINTS = 100
 """Smallest number of steps in the elastic period of an oscillator.
 
-The error of yielding oscillators is of second order; see tests/verification/test_spectra.py.
+The error of yielding oscillators is of second order; see
+tests/verification/test_ground_motions.py.
 """
 
 RATIO = 1.05

@@ -278,7 +278,9 @@ class Rayleigh(Record):
     """Rayleigh damping (a0 M + a1 K) v with the stiffness K of the undeformed scene, P(92).
 
     The damping ratio of a mode of circular frequency ω is a0/(2ω) + a1 ω/2.  This damping is not
-    objective: it acts on rigid rotations and open hinges.  In large motion use KelvinVoigt.
+    objective: it acts on rigid rotations.  In large motion use KelvinVoigt.  It also acts on
+    yielding cells and on hinges that open in cells, but neither on hinges of zero length nor on
+    springs, see docs/howto_earthquake.md.
 
     Args:
         mass: Factor a0 on the mass matrix; 1/s.
