@@ -120,7 +120,8 @@ class GroundMotion(Record):
                 f"{what}: {len(t)} times and {len(a)} values; give two of each or more"
             )
         if dt is None:
-            return cls(_equal_step(t, lambda k: f"{what}: times[{k}]", "; or give dt="), a, name)
+            dt = _equal_step(t, lambda k: f"{what}: times[{k}]", "; or give dt=")
+            return cls(dt, tuple(a), name)
         dt = require_number(dt, f"{what}: dt", positive=True)
         if (np.diff(t) <= 0).any():
             k = int(np.argmax(np.diff(t) <= 0))
@@ -242,7 +243,7 @@ class GroundMotion(Record):
                 raise ModelError(f"GroundMotion.scaled: {self.name} is zero and has no peak")
             factor = require_number(peak, "GroundMotion.scaled: peak", positive=True) / self.peak
         factor = require_number(factor, "GroundMotion.scaled: factor")
-        return replace(self, values=factor * np.array(self.values))
+        return replace(self, values=[factor * a for a in self.values])
 
     def corrected(self, degree: int = 1, *, highpass: float | None = None) -> GroundMotion:
         """Return the record without the drift of its velocity.
