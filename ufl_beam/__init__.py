@@ -52,6 +52,8 @@ from ufl_beam.analysis.path_controls import (
 )
 from ufl_beam.analysis.path_following import Path as Path
 from ufl_beam.analysis.path_following import follow
+from ufl_beam.analysis.response_spectra import ResponseSpectrum as ResponseSpectrum
+from ufl_beam.analysis.response_spectra import response_spectrum
 from ufl_beam.analysis.section_analysis import InteractionDiagram as InteractionDiagram
 from ufl_beam.analysis.section_analysis import MomentCurvature as MomentCurvature
 from ufl_beam.analysis.section_analysis import interaction_diagram, moment_curvature
@@ -98,6 +100,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
+from ufl_beam.model.ground_motion import GroundMotion
 from ufl_beam.model.hinge_laws import AxialBendingHinge, Backbone, IbarraKrawinkler, PinchingHinge
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import (
@@ -218,6 +221,7 @@ __all__ = [
     "Gerber",
     "Goodman",
     "Gravity",
+    "GroundMotion",
     "Guided",
     "History",
     "HotSpot",
@@ -300,15 +304,17 @@ __all__ = [
     "rainflow",
     "ramp",
     "render",
+    "response_spectrum",
     "simulate",
     "study",
     "tradeoff",
 ]  # fmt: skip
 
 RESULTS = [
-    "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
-    "Energy", "Envelope", "Event", "Extent", "Film", "HingeTable", "InteractionDiagram", "Modes",
-    "MomentCurvature", "Path", "Place", "Storeys", "Tradeoff",
+    "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram",
+    "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film", "HingeTable",
+    "InteractionDiagram", "Modes", "MomentCurvature", "Path", "Place", "ResponseSpectrum",
+    "Storeys", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 

@@ -44,7 +44,7 @@ ELSEWHERE = {
     "analyses of sections": {"interaction_diagram", "moment_curvature"},
     "analyses of histories": {
         "damping", "damping_ratio", "fit_decay", "logarithmic_decrement",
-        "peaks", "rainflow",
+        "peaks", "rainflow", "response_spectrum",
     },
     "other controls of paths": {"ArcLength", "DisplacementControl", "DissipationControl"},
     "many runs": {"Study", "TradeoffError", "study", "tradeoff"},

@@ -10,21 +10,26 @@ from typing import TYPE_CHECKING, Any
 
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
+from ufl_beam.analysis.response_spectra import ResponseSpectrum
 from ufl_beam.analysis.section_analysis import InteractionDiagram, MomentCurvature
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ArgumentError, shorten
+from ufl_beam.model.ground_motion import GroundMotion
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.engineering_results import Storeys
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
 from ufl_beam.plotting.frame_pictures import draw_damage_state, draw_shape
 from ufl_beam.plotting.history_pictures import (
+    SPECTRA,
     draw_cycles,
     draw_energy,
     draw_extremes,
     draw_history,
     draw_modes,
+    draw_motion,
     draw_shapes,
+    draw_spectrum,
     draw_storeys,
     draw_study,
     draw_tradeoff,
@@ -64,6 +69,8 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Tradeoff: {"errors": draw_tradeoff},
     MomentCurvature: {"moment-curvature": draw_section_moments},
     InteractionDiagram: {"interaction": draw_interaction},
+    GroundMotion: {"motion": draw_motion},
+    ResponseSpectrum: {name: partial(draw_spectrum, quantity=name) for name in SPECTRA},
 }
 """Pictures by class and quantity; the first one of a class is drawn by default."""
 
@@ -94,6 +101,8 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Tradeoff            "errors"            errors over wall times; ``ax``
     MomentCurvature     "moment-curvature"  moment of a section over its curvature; ``ax``
     InteractionDiagram  "interaction"       axial force over moment of a section; ``ax``
+    GroundMotion        "motion"            acceleration, velocity, displacement over time
+    ResponseSpectrum    any of its arrays   "pseudo_acceleration" by default, over the period; ``ax``
     ==================  ==================  ========================================================
 
     Args:
