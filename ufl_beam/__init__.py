@@ -111,6 +111,7 @@ from ufl_beam.model.loads import (
     KelvinVoigt,
     LineLoad,
     PointLoad,
+    Pressure,
     Rayleigh,
     RotatingFrame,
 )
@@ -230,6 +231,7 @@ __all__ = [
     "Perzyna",
     "Pinned",
     "PointLoad",
+    "Pressure",
     "PointMass",
     "Potential",
     "PrescribedDisplacement",

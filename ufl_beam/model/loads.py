@@ -137,9 +137,53 @@ def require_profile(profile: object, what: str) -> Profile:
     return profile if callable(profile) else require_vector(profile, what)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class LoadAlongBeam(Load):
+    """Base of the loads that are distributed along a beam or a part of it."""
+
+    beam: Instance[Member]
+    _: KW_ONLY
+    span: Annotated[tuple[float, float], require_span] = (0.0, 1.0)
+    profile: Annotated[Profile, require_profile] = (1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.factors(np.array(self.span))
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__} on {self.beam.name}"
+
+    _label = __str__
+
+    def factors(self, s: Array) -> Array:
+        """Return the factors of the profile at parameters ``s``; they are zero outside of the span.
+
+        Raises:
+            ModelError: The profile is not a finite number at one of them.
+        """
+        first, last = self.span
+        if not callable(self.profile):
+            start, end = self.profile
+            return np.where((s < first) | (s > last), 0.0, np.interp(s, self.span, (start, end)))
+        factors = np.zeros(s.shape)
+        for index, at in np.ndenumerate(s):
+            if first <= at <= last:
+                where = f"s = {at:.9g}"
+                try:
+                    value = self.profile(float(at))
+                    factors[index] = require_returned(value, "profile", where, finite=True)
+                except ArgumentError as error:
+                    raise ModelError(f"{self}: {error}") from None
+                except Exception as error:
+                    raise ModelError(
+                        f"{self}: profile fails at {where}: {shorten(error)}"
+                    ) from error
+        return factors
+
+
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
-class LineLoad(Load):
+class LineLoad(LoadAlongBeam):
     """Distributed dead force and moment along a beam or a part of it, per undeformed length.
 
     Args:
@@ -171,47 +215,43 @@ class LineLoad(Load):
         [1000. 1667.]
     """
 
-    beam: Instance[Member]
     force: Vector = (0.0, 0.0)
     moment: Number = 0.0
     amplitude: Timed = steady
-    _: KW_ONLY
-    span: Annotated[tuple[float, float], require_span] = (0.0, 1.0)
-    profile: Annotated[Profile, require_profile] = (1.0, 1.0)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.factors(np.array(self.span))
 
-    def __str__(self) -> str:
-        return f"LineLoad on {self.beam.name}"
+@closed(OWN_LOAD)
+@dataclass(frozen=True, eq=False, repr=False)
+class Pressure(LoadAlongBeam):
+    """Pressure on a beam or a part of it: forces that turn with the deformed axis.
 
-    _label = __str__
+    The forces are per deformed length, so a pressure p on a closed line has the potential p times
+    the enclosed area.  A pressure on an open line is not conservative if its ends move.
 
-    def factors(self, s: Array) -> Array:
-        """Return the factors of the profile at parameters ``s``; they are zero outside of the span.
+    Args:
+        beam: Loaded beam.
+        normal: Force along the normal, which points to the left of the direction of the beam; N/m.
+        tangential: Force along the axis, in the direction of the beam; N/m.
+        amplitude: Factor on both forces, a function of time t (s).
+        span: As in :class:`LineLoad`.
+        profile: As in :class:`LineLoad`.
 
-        Raises:
-            ModelError: The profile is not a finite number at one of them.
-        """
-        first, last = self.span
-        if not callable(self.profile):
-            start, end = self.profile
-            return np.where((s < first) | (s > last), 0.0, np.interp(s, self.span, (start, end)))
-        factors = np.zeros(s.shape)
-        for index, at in np.ndenumerate(s):
-            if first <= at <= last:
-                where = f"s = {at:.9g}"
-                try:
-                    value = self.profile(float(at))
-                    factors[index] = require_returned(value, "profile", where, finite=True)
-                except ArgumentError as error:
-                    raise ModelError(f"{self}: {error}") from None
-                except Exception as error:
-                    raise ModelError(
-                        f"{self}: profile fails at {where}: {shorten(error)}"
-                    ) from error
-        return factors
+    Raises:
+        ModelError: The span is not inside the beam, or the profile is no number somewhere.
+
+    Example:
+        >>> wind = ub.Pressure(beam, normal=-1e3)
+        >>> blown = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[wind])
+        >>> run = ub.simulate(blown, ub.Static(), t=(0, 1), dt=1.0)
+        >>> print(run.reaction(blown.supports[0])[-1, :2].round(2))  # N; the tip has turned
+        [  -0.67 2000.  ]
+    """
+
+    normal: Number = 0.0
+    tangential: Number = 0.0
+    amplitude: Timed = steady
+
+    dead: ClassVar = False
 
 
 @closed(OWN_LOAD)
@@ -264,7 +304,7 @@ class RotatingFrame(Load):
     dead: ClassVar = False
 
 
-LOADS = PointLoad, FollowerLoad, LineLoad, Gravity, RotatingFrame
+LOADS = PointLoad, FollowerLoad, LineLoad, Pressure, Gravity, RotatingFrame
 """All classes of loads."""
 
 

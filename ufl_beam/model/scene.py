@@ -45,7 +45,7 @@ from ufl_beam.model.loads import (
     LOADS,
     Damping,
     KelvinVoigt,
-    LineLoad,
+    LoadAlongBeam,
     Load,
     LoadAtPlace,
     PointLoad,
@@ -71,7 +71,7 @@ class Scene(Record, Rich):
             :class:`Link`, :class:`Guided`, :class:`Release`.
         supports: :class:`Clamped`, :class:`Pinned`, :class:`Roller`,
             :class:`PrescribedDisplacement`.
-        loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`,
+        loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Pressure`, :class:`Gravity`,
             :class:`RotatingFrame`.
         masses: :class:`PointMass`.
         initial: :class:`Velocity`; by default the scene is at rest.
@@ -249,7 +249,7 @@ class Scene(Record, Rich):
         for load in self.loads:
             if isinstance(load, LoadAtPlace):
                 yield load, load.place
-            elif isinstance(load, LineLoad):
+            elif isinstance(load, LoadAlongBeam):
                 yield from ((load, load.beam.at(s)) for s in load.span)
         for velocity in self.initial:
             for member in velocity.beams:

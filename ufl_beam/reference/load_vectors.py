@@ -17,7 +17,15 @@ from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import Step, acting, has_inertia
 from ufl_beam.model.bodies import GROUND, moves_with_node
 from ufl_beam.model.functions import value_at
-from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
+from ufl_beam.model.loads import (
+    FollowerLoad,
+    Gravity,
+    LineLoad,
+    Load,
+    PointLoad,
+    Pressure,
+    RotatingFrame,
+)
 from ufl_beam.model.works import Potential, Work
 from ufl_beam.reference.beam_residuals import Mass
 from ufl_beam.reference.cell_forms import (
@@ -142,6 +150,42 @@ class Follower(LoadForce):
         np.add.at(force, self._dofs, [x, y, M])
         rotations = np.repeat(self._dofs[2], 2)
         return force, coupled(self.size, self._dofs[:2], rotations, np.array([-y, x]))
+
+
+class PressureForce(LoadForce):
+    """Pressure: forces along dx and its normal, by the work of each node's shape function."""
+
+    def __init__(self, load: Pressure, setting: Setting) -> None:
+        super().__init__(load, setting)
+        self._numbering = numbering = setting.numbering
+        cells, mesh = numbering.cells_of(load.beam), numbering.mesh
+        s, nodes = numbering.parameters(load.beam), numbering.nodes_of_cells[cells]
+        start, *inner, end = range(len(mesh.nodes))
+        order = [start, end, *inner]  # of the nodes of cells
+        forces: Array = np.zeros((len(cells), 2 * len(order), 2 * len(order)))
+        turned = np.array([[load.tangential, -load.normal], [load.normal, load.tangential]])
+        for matrix, s0, s1 in zip(forces, s[:-1], s[1:], strict=True):
+            for point, weight in zip(*np.polynomial.legendre.leggauss(5), strict=True):
+                at = (1 + point) / 2
+                factor = load.factors(np.array([s0 + at * (s1 - s0)]))[0] * weight / 2
+                pair = np.outer(mesh.weights(at)[order], mesh.slopes(at)[order])
+                matrix += np.kron(turned, factor * pair)
+        self._cells, self._matrices = cells, forces
+        dofs = numbering.dofs[nodes][:, :, :2].transpose(0, 2, 1).reshape(len(cells), -1)
+        self._places = numbering.points[nodes].transpose(0, 2, 1).reshape(dofs.shape)
+        self._dofs, rows = dofs, np.repeat(dofs, dofs.shape[1], axis=1).ravel()
+        columns = np.tile(dofs, dofs.shape[1]).ravel()
+        self._slope = csr_array((forces.ravel(), (rows, columns)), shape=(self.size, self.size))
+
+    def forces(self, q: Array) -> Response:
+        """Return the nodal forces, which are linear in the positions of the nodes."""
+        x, vector = self._places + q[self._dofs], np.zeros(self.size)
+        on_cells = np.einsum("kij,kj->ki", self._matrices, x)
+        np.add.at(vector, self._dofs, on_cells)
+        on_nodes = np.zeros((len(on_cells), 3, self._dofs.shape[1] // 2))
+        on_nodes[:, :2] = on_cells.reshape(len(on_cells), 2, -1)
+        self.along = end_forces(self._numbering, "density", self._cells, -on_nodes)
+        return vector, self._slope
 
 
 class FrameForce(LoadForce):
@@ -287,6 +331,8 @@ def all_loads(setting: Setting, mass: Mass | None, t0: float) -> list[LoadForce 
             loads.append(FrameForce(load, setting, mass or Mass(setting.numbering)))
         elif isinstance(load, FollowerLoad):
             loads.append(Follower(load, setting))
+        elif isinstance(load, Pressure):
+            loads.append(PressureForce(load, setting))
         else:
             loads.append(DeadLoad(load, setting))
     return [*loads, *(WorkForce(work, setting, t0) for work in setting.numbering.scene.works)]

@@ -22,7 +22,7 @@ from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import Curve, Table, nearest, parameter_step
 from ufl_beam.model.joints import START_INTERVAL
-from ufl_beam.model.loads import LineLoad
+from ufl_beam.model.loads import LoadAlongBeam
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import (
     Content,
@@ -173,7 +173,7 @@ class Solution(States, Rich):
                 return SavedCurve.sampled(function, 0.0, 1.0, numbering.parameters(owner))
             if field == "curve":
                 return _used_curve(self, function)
-            if isinstance(owner, LineLoad) and field == "profile":
+            if isinstance(owner, LoadAlongBeam) and field == "profile":
                 even = np.linspace(*owner.span, SAMPLES + 1)
                 s = np.union1d(numbering.gauss_parameters(owner.beam), even)
                 s = s[(s >= owner.span[0]) & (s <= owner.span[1])]

@@ -7,7 +7,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -29,7 +29,16 @@ from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.functions import value_at
-from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
+from ufl_beam.model.loads import (
+    FollowerLoad,
+    Gravity,
+    LineLoad,
+    Load,
+    LoadAlongBeam,
+    PointLoad,
+    Pressure,
+    RotatingFrame,
+)
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term
 
@@ -41,12 +50,15 @@ def load_terms(fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> list[L
         ledger.supplied["loads"] += 0.0
     followers = [load for load in loads if isinstance(load, FollowerLoad)]
     frames = [load for load in loads if isinstance(load, RotatingFrame)]
-    dead = [load for load in loads if load not in (*followers, *frames)]
+    pressures = [load for load in loads if isinstance(load, Pressure)]
+    dead = [load for load in loads if load.dead]
     terms: list[LoadTerm] = [FrameForces(x, fields, scheme, ledger, A) for x in frames]
     if dead:
         terms.append(DeadLoads(dead, subdomain, scheme, ledger))
     if followers:
         terms.append(FollowerLoads(followers, subdomain, scheme, ledger, A))
+    if pressures:
+        terms.append(Pressures(pressures, subdomain, scheme, ledger, A))
     return terms
 
 
@@ -184,10 +196,8 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Ind
     if isinstance(load, PointLoad):
         at_places = [(load.place, (*load.force, load.moment))]
     elif isinstance(load, LineLoad):
-        beam_cells = numbering.cells_of(load.beam)
-        loaded = np.flatnonzero((cells >= beam_cells[0]) & (cells <= beam_cells[-1]))
-        s = numbering.gauss_parameters(load.beam)[cells[loaded] - beam_cells[0]]
-        shares, density = load.factors(s) @ mesh.gauss[1], [*load.force, load.moment]
+        loaded, factors = _loaded_cells(load, subdomain)
+        shares, density = factors @ mesh.gauss[1], [*load.force, load.moment]
     elif isinstance(load, Gravity):
         g_x, g_y = load.acceleration
         at_places = [
@@ -208,6 +218,15 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Ind
         return None
     first, *between, last = (numbering.lengths(cells[loaded])[:, None] * shares).T
     return loaded, np.kron(density, np.column_stack([first, last, *between]))
+
+
+def _loaded_cells(load: LoadAlongBeam, subdomain: Subdomain) -> tuple[Index, Array]:
+    """Return the local cells of the loaded beam, and the profile at their Gauss points, (n, 4)."""
+    numbering, cells = subdomain.numbering, subdomain.cells
+    beam_cells = numbering.cells_of(load.beam)
+    loaded = np.flatnonzero((cells >= beam_cells[0]) & (cells <= beam_cells[-1]))
+    s = numbering.gauss_parameters(load.beam)[cells[loaded] - beam_cells[0]]
+    return loaded, load.factors(s)
 
 
 class FollowerLoads(_AtDofs):
@@ -267,6 +286,88 @@ class FollowerLoads(_AtDofs):
         """Save or restore the forces in the equation of the last step, and sizes at its end."""
         self._forces[:] = archive.added("follower loads", self._whole(self._forces[1]))[self.dofs]
         self._sizes[:] = archive.rows("follower loads", self._indices, self._sizes[2])
+
+
+class Pressures(_AtDofs):
+    """Forces along beams that turn with the deformed axis, per deformed length.
+
+    A force along dx and its normal has nodal forces that are linear in the positions of the nodes.
+    """
+
+    def __init__(
+        self,
+        loads: Sequence[Pressure],
+        subdomain: Subdomain,
+        scheme: Scheme,
+        ledger: Ledger,
+        A: Csr,
+    ) -> None:
+        self._ledger, numbering, mesh = ledger, subdomain.numbering, subdomain.numbering.mesh
+        start, *inner, end = range(mesh.degree + 1)
+        in_order = [start, end, *inner]  # of the nodes of cells
+        points, weights = mesh.gauss
+        at_points = weights[:, in_order, None] * mesh.slopes(points)[:, None, in_order]
+        pairs = [_loaded_cells(load, subdomain) for load in loads]
+        order: Index = np.concatenate([cells for cells, _ in pairs])
+        of_load = np.repeat(np.arange(len(loads)), [len(cells) for cells, _ in pairs])
+        shares = np.tensordot(np.concatenate([factors for _, factors in pairs]), at_points, 1)
+        nodes = numbering.nodes_of_cells[subdomain.cells[order]]
+        dofs = subdomain.cell_dofs[order, : 2 * nodes.shape[1]]
+        loaded: Array = np.zeros(subdomain.size)
+        loaded[dofs] = 1.0
+        self._set_dofs(subdomain, loaded, loads, rows=2)
+        rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None, :])
+        self._factors = np.zeros((3, len(loads)))  # in the equation, at its end, before the step
+        self._q0: Array = np.zeros(subdomain.size)
+        each, second = np.zeros((2, len(order), 3 * nodes.shape[1]))
+        self._each = ffi.new("double *[1]", [doubles(each)]), each
+        self._c = struct(
+            "pressures", loads=len(loads), cells=len(order), nodes=nodes.shape[1],
+            size=len(self.dofs), dof=self.dofs, load=of_load.astype(np.int32),
+            at=np.searchsorted(self.dofs, dofs).astype(np.int32), share=shares,
+            place=np.ascontiguousarray(numbering.points[nodes].transpose(0, 2, 1)), q0=self._q0,
+            part=scheme.load_weight, tangential=np.array([load.tangential for load in loads]),
+            normal=np.array([load.normal for load in loads]), now=self._factors[0],
+            end=self._factors[1], before=self._factors[2],
+            entry=A.positions(rows.ravel(), columns.ravel()), each=self._each[0],
+            force=self._forces[0], force_before=self._forces[1],
+            weight_of_before=scheme.weight_of_before,
+        )  # fmt: skip
+        tangent = loop("add_tangent_of_pressures", self._c)
+        self.loops, self._A = (loop("subtract_pressures", self._c), tangent), A
+        self.in_cells = [InCells(lambda: _Entries(self._each[0], second), lib.DENSITY, order)]
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Return the loops that begin and accept a step."""
+        c = fill(self._c, factor=callbacks.time_functions(self._in_time))
+        c.work = self._ledger.supplied.pointer("loads")
+        return Phases([loop("begin_pressures", c)], [loop("accept_pressures", c)])
+
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
+        """Set the loads before the next step to the loads at the time ``t``, and return them."""
+        self._factors[:] = self._factors_at(t)
+        self._q0[:] = q
+        self._c.q0 = doubles(self._q0)
+        self.add_residual(q, np.zeros(self._size))
+        self._forces[1] = self._forces[0]
+        return self._whole(self._forces[0])
+
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
+        """Save or restore the forces in the equation of the last step, and factors at its end."""
+        self._forces[:] = archive.added("pressures", self._whole(self._forces[1]))[self.dofs]
+        for k, factor in enumerate(self._factors[2]):
+            self._factors[:, k] = archive.number(f"factor of pressure {k}", factor)
+
+
+class _Entries(NamedTuple):
+    """Forces on the nodes of cells that C stores in each residual, as a compiled form does."""
+
+    each: Any
+    second: Array
+
+    def keep_entries(self) -> tuple[Any, int, Array]:
+        """Return a pointer to the address of the array, one cell in a batch, a second array."""
+        return self.each, 1, self.second
 
 
 @cached_forms

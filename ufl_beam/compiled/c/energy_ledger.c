@@ -67,6 +67,14 @@ void accept_follower_loads(void *self, const time_step *step, const double *q1, 
   memcpy(f->before, f->end, 3 * (size_t)f->number * sizeof *f->end);
 }
 
+void accept_pressures(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const pressures *p = self;
+  *p->work += work_in_step(p->size, p->dof, p->weight_of_before, p->force_before, p->force, s);
+  memcpy(p->force_before, p->force, p->size * sizeof *p->force);
+  memcpy(p->before, p->end, p->loads * sizeof *p->end);
+}
+
 void accept_frame(void *self, const time_step *step, const double *q1, const double *s)
 {
   rotating_frame *f = self;

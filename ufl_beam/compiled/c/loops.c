@@ -99,6 +99,50 @@ void add_tangent_of_follower_loads(void *self, const double *q, double *tangent)
   }
 }
 
+void subtract_pressures(void *self, const double *q, double *r)
+{
+  const pressures *p = self;
+  const int n = p->nodes;
+  double *e = *p->each;
+  memset(p->force, 0, p->size * sizeof *p->force);
+  for (int k = 0; k < p->cells; ++k, e += 3 * n) {
+    const int32_t *at = p->at + 2 * n * k;
+    const double factor = p->now[p->load[k]];
+    const double along = factor * p->tangential[p->load[k]], across = factor * p->normal[p->load[k]];
+    double x[8]; /* of the four nodes of degree 3 */
+    for (int i = 0; i < 2 * n; ++i) {
+      const int dof = p->dof[at[i]];
+      x[i] = p->place[2 * n * k + i] + p->q0[dof] + p->part * (q[dof] - p->q0[dof]);
+    }
+    for (int i = 0; i < n; ++i) {
+      const double *share = p->share + (n * k + i) * n;
+      double a = 0, b = 0;
+      for (int j = 0; j < n; ++j) a += share[j] * x[j], b += share[j] * x[n + j];
+      e[i] = across * b - along * a, e[n + i] = -across * a - along * b;
+      p->force[at[i]] -= e[i], p->force[at[n + i]] -= e[n + i];
+    }
+  }
+  for (int i = 0; i < p->size; ++i) r[p->dof[i]] -= p->force[i];
+}
+
+void add_tangent_of_pressures(void *self, const double *q, double *tangent)
+{
+  const pressures *p = self;
+  const int n = p->nodes;
+  for (int k = 0; k < p->cells; ++k) {
+    const double factor = p->part * p->now[p->load[k]];
+    const double along = factor * p->tangential[p->load[k]], across = factor * p->normal[p->load[k]];
+    const int32_t *entry = p->entry + 4 * n * n * k;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        const double share = p->share[(n * k + i) * n + j];
+        const int32_t *x = entry + i * 2 * n + j, *y = x + 2 * n * n;
+        tangent[x[0]] -= along * share, tangent[x[n]] += across * share;
+        tangent[y[0]] -= across * share, tangent[y[n]] -= along * share;
+      }
+  }
+}
+
 /* Expand CALL for the number of entries of a row. The compiler knows the usual numbers: one for
  * lumped masses, three for consistent masses. */
 #define FOR_WIDTH(width, CALL) \

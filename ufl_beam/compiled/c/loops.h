@@ -11,7 +11,7 @@ typedef struct { part *add; void *self; } call;
 /* Several contributions. */
 typedef struct { int number; const call *part; } calls;
 part add_calls, add_cells, add_static_tangent, subtract_vector, subtract_follower_loads,
-  add_tangent_of_follower_loads, subtract_frame_forces, add_tangent_of_frame, add_step_force,
+  add_tangent_of_follower_loads, subtract_pressures, add_tangent_of_pressures, subtract_frame_forces, add_tangent_of_frame, add_step_force,
   add_step_tangent, add_inelastic_force, add_inelastic_tangent;
 
 /* -- forms and constant matrices --------------------------------------------------------------- */
@@ -703,6 +703,25 @@ typedef struct {
   double weight_of_before, *work;
 } follower_loads;
 
+/* Forces along beams that turn with the deformed axis, see Pressures. Displacements of a cell are x
+ * of all nodes, then y. */
+typedef struct {
+  int loads, cells, nodes, size; /* nodes: of a cell; size: of `dof` */
+  const int32_t *dof;      /* degrees of freedom that are loaded */
+  const int32_t *load, *at; /* load of each cell; index in `dof` of each displacement of a cell */
+  const double *share;     /* cells x nodes x nodes: force on a node by the position of a node */
+  const double *place;     /* positions of the nodes of the undeformed cells */
+  const double *q0;        /* configuration at the beginning of the step */
+  double part;             /* fraction of the increment at which the loads act */
+  const double *tangential, *normal; /* of each load, for the factor 1 */
+  const time_function *factor;
+  double *now, *end, *before; /* factors in the equation, at the end of the step, at the end of the last step */
+  const int32_t *entry;    /* entries of the tangent: 2 nodes x 2 nodes of each cell */
+  double **each;           /* minus the forces on the nodes of cells in the latest residual: x, y, moments */
+  double *force, *force_before; /* in the latest residual, in the last step; size */
+  double weight_of_before, *work;
+} pressures;
+
 /* Vectors of loads at some degrees of freedom times functions of time, see DeadLoads. */
 typedef struct {
   int size, vectors;
@@ -964,7 +983,8 @@ typedef struct {
 } time_loop;
 
 phase begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
-  accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_frame, accept_frame, begin_works,
+  accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_pressures,
+  accept_pressures, begin_frame, accept_frame, begin_works,
   accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
   accept_second_differences, begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
   begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,

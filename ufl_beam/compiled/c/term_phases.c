@@ -99,6 +99,16 @@ void begin_follower_loads(void *self, const time_step *step, const double *q1, c
   }
 }
 
+void begin_pressures(void *self, const time_step *step, const double *q1, const double *s)
+{
+  pressures *p = self;
+  for (int k = 0; k < p->loads; ++k) {
+    const double change = step->fraction * (value_at(p->factor + k, step->load_time) - p->before[k]);
+    p->end[k] = p->before[k] + change, p->now[k] = p->before[k] + step->at * change;
+  }
+  p->q0 = step->q0;
+}
+
 void begin_frame(void *self, const time_step *step, const double *q1, const double *s)
 {
   rotating_frame *f = self;
