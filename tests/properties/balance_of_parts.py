@@ -115,9 +115,22 @@ class Balance:
                     factor = self.factor(load.amplitude) * load.factors(np.array([place.s]))[0]
                     force = force + factor * np.array(load.force)
                     moment += factor * load.moment
+                if isinstance(load, ub.Pressure) and load.beam is beam:
+                    factor = self.factor(load.amplitude) * load.factors(np.array([place.s]))[0]
+                    x, y = factor * self._slope(place, s1 - s0) / length
+                    along, across = load.tangential, load.normal
+                    force = force + [along * x - across * y, along * y + across * x]
             of_works = self._of_works(beam, place, (s0, s1), length)
             total += w / 2 * length * self.at(place, force + of_works[:2], moment + of_works[2])
         return total
+
+    def _slope(self, place, width):
+        """Derivative of the position by the fraction of a cell; exact for cubic polynomials."""
+        x = [
+            self.solution.position(place.beam.at(place.s + k * width / 50))[-1]
+            for k in (-2, -1, 1, 2)
+        ]
+        return 50 * (8 * (x[2] - x[1]) - (x[3] - x[0])) / 12
 
     def _nodes(self, beam, k):
         """Vertices of the k-th cell of a beam."""

@@ -200,6 +200,15 @@ def line_load(d):
 
 
 @feature()
+def pressure(d):
+    more = d.one(["", ", span=(0.25, 0.75)", ", profile=(1.5, -0.5)", PART, CURVED])
+    d.loads.append(
+        f"ub.Pressure(b0, {d.some(-20, 20):.3f}, {d.some(-20, 20):.3f}{more}, "
+        f"amplitude={d.time()})"
+    )
+
+
+@feature()
 def gravity(d):
     d.loads.append(f"ub.Gravity(({d.some(-5, 5):.3f}, -9.81), amplitude={d.time()})")
 

@@ -59,7 +59,9 @@ def jumps(case):
     scene, solution = case.exact.names["scene"], case.exact.solution
     attached, supports = {}, {}
     for owner, place in scene.attachments():
-        if isinstance(place, ub.Place) and not isinstance(owner, ub.LineLoad | ub.VirtualWork):
+        if isinstance(place, ub.Place) and not isinstance(
+            owner, ub.LineLoad | ub.Pressure | ub.VirtualWork
+        ):
             attached.setdefault((place.beam, round(place.s, 9)), []).append(owner)
     for support in scene.supports:
         supports[support.place.beam, round(support.place.s, 9)] = support
@@ -98,7 +100,7 @@ def momentum(case):
         words.has("ub.EnergyMomentum(", "ub.EnergyMomentumDecaying", "Weighted"),
         "other means of forces",
     )
-    only(not words.has("VirtualWork", "Potential", "RotatingFrame", "Rayleigh", "Guided"), "field")
+    only(not words.has("VirtualWork", "Potential", "RotatingFrame", "Rayleigh", "Guided", "Pressure"), "field")
     only(not case.exact.failure, "a step fails")
     solution, scene = case.exact.solution, case.exact.names["scene"]
     only(solution.substeps == len(solution) - 1, "a step was cut")

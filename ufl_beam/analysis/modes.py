@@ -355,7 +355,8 @@ def buckling(
 
     Raises:
         ArgumentError: The call is wrong; the scene is free to move; nothing acts on it; or it has a
-            :class:`FollowerLoad`, :class:`RotatingFrame` or :class:`VirtualWork`.
+            :class:`FollowerLoad`, :class:`Pressure`, :class:`RotatingFrame` or
+            :class:`VirtualWork`.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-1.0, 0))
