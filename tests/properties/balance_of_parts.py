@@ -119,10 +119,23 @@ class Balance:
                     factor = self.factor(load.amplitude) * load.factors(np.array([place.s]))[0]
                     x, y = factor * self._slope(place, s1 - s0) / length
                     along, across = load.tangential, load.normal
-                    force = force + [along * x - across * y, along * y + across * x]
+                    force = force + np.array([along * x - across * y, along * y + across * x])
+                if isinstance(load, ub.MovingLoad) and load.beam is beam:
+                    total += w / 2 * self._of_moving_load(load, k)
             of_works = self._of_works(beam, place, (s0, s1), length)
             total += w / 2 * length * self.at(place, force + of_works[:2], moment + of_works[2])
         return total
+
+    def _of_moving_load(self, load, k):
+        """Force on the k-th cell, at its place on the axis between the nodes."""
+        numbering, d = self.solution.numbering, load.position(self.t)
+        ends = np.append(0.0, np.cumsum(numbering.lengths(numbering.cells_of(load.beam))))
+        cell = np.searchsorted(ends, d) - 1 if d else 0
+        if not 0.0 <= d <= ends[-1] or cell != k:
+            return np.zeros(3)
+        s, ξ = numbering.parameters(load.beam), (d - ends[k]) / (ends[k + 1] - ends[k])
+        place = load.beam.at(s[k] + ξ * (s[k + 1] - s[k]))
+        return self.at(place, self.factor(load.amplitude) * np.array(load.force))
 
     def _slope(self, place, width):
         """Derivative of the position by the fraction of a cell; exact for cubic polynomials."""

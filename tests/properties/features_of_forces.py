@@ -203,8 +203,16 @@ def line_load(d):
 def pressure(d):
     more = d.one(["", ", span=(0.25, 0.75)", ", profile=(1.5, -0.5)", PART, CURVED])
     d.loads.append(
-        f"ub.Pressure(b0, {d.some(-20, 20):.3f}, {d.some(-20, 20):.3f}{more}, "
-        f"amplitude={d.time()})"
+        f"ub.Pressure(b0, {d.some(-20, 20):.3f}, {d.some(-20, 20):.3f}{more}, amplitude={d.time()})"
+    )
+
+
+@feature()
+def moving_load(d):
+    place = d.one(["3 * t / END - 1", "0.2 + 0.1 * math.sin(20 * t)", "0.5"])
+    d.loads.append(
+        f"ub.MovingLoad(b0, lambda t: {place.replace('END', f'{d.end:.4g}')}, "
+        f"({d.some(-15, 15):.3f}, {d.some(-15, 15):.3f}), {d.time()})"
     )
 
 

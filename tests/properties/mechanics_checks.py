@@ -60,7 +60,7 @@ def jumps(case):
     attached, supports = {}, {}
     for owner, place in scene.attachments():
         if isinstance(place, ub.Place) and not isinstance(
-            owner, ub.LineLoad | ub.Pressure | ub.VirtualWork
+            owner, ub.LineLoad | ub.Pressure | ub.MovingLoad | ub.VirtualWork
         ):
             attached.setdefault((place.beam, round(place.s, 9)), []).append(owner)
     for support in scene.supports:
@@ -100,7 +100,18 @@ def momentum(case):
         words.has("ub.EnergyMomentum(", "ub.EnergyMomentumDecaying", "Weighted"),
         "other means of forces",
     )
-    only(not words.has("VirtualWork", "Potential", "RotatingFrame", "Rayleigh", "Guided", "Pressure"), "field")
+    only(
+        not words.has(
+            "VirtualWork",
+            "Potential",
+            "RotatingFrame",
+            "Rayleigh",
+            "Guided",
+            "Pressure",
+            "MovingLoad",
+        ),
+        "field",
+    )
     only(not case.exact.failure, "a step fails")
     solution, scene = case.exact.solution, case.exact.names["scene"]
     only(solution.substeps == len(solution) - 1, "a step was cut")

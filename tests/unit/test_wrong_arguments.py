@@ -98,6 +98,10 @@ def V(value, kind):
 
 PLACE = V(BEAM.end, NO_PLACE)
 TIMED = {"moment": V(1.0, NUMBER), "amplitude": V(lambda t: t, [*TIME, None])}
+PART = {
+    "span": V((0.2, 0.6), [*VECTOR, (0.6, 0.2), (0.2, 0.2), (-0.1, 0.5), (0.5, 1.1)]),
+    "profile": V((0.0, 1.0), [*VECTOR, *(f for f in TIME if f is not ARRAY)]),
+}
 SHAPE = {
     "E": V(1.0, POSITIVE),
     "nu": V(0.3, [*NUMBER, 0.6, -1.0]),
@@ -301,9 +305,15 @@ TABLE = {
     "PointLoad": call(ub.PointLoad, place=PLACE, force=V((1, 0), VECTOR), **TIMED),
     "FollowerLoad": call(ub.FollowerLoad, place=PLACE, force=V((1, 0), VECTOR), **TIMED),
     "LineLoad": call(
-        ub.LineLoad, beam=V(BEAM, NO_BEAM), force=V((1, 0), VECTOR), **TIMED,
-        span=V((0.2, 0.6), [*VECTOR, (0.6, 0.2), (0.2, 0.2), (-0.1, 0.5), (0.5, 1.1)]),
-        profile=V((0.0, 1.0), [*VECTOR, *(f for f in TIME if f is not ARRAY)]),
+        ub.LineLoad, beam=V(BEAM, NO_BEAM), force=V((1, 0), VECTOR), **TIMED, **PART
+    ),
+    "Pressure": call(
+        ub.Pressure, beam=V(BEAM, NO_BEAM), normal=V(1.0, NUMBER), tangential=V(1.0, NUMBER),
+        amplitude=TIMED["amplitude"], **PART,
+    ),
+    "MovingLoad": call(
+        ub.MovingLoad, beam=V(BEAM, NO_BEAM), position=V(lambda t: t, [*TIME, None]),
+        force=V((1, 0), VECTOR), amplitude=TIMED["amplitude"],
     ),
     "Gravity": call(
         ub.Gravity, acceleration=V((0, -9.81), VECTOR), amplitude=V(lambda t: t, [*TIME, None])
@@ -623,6 +633,10 @@ OWNERS = {
         "loads": [ub.FollowerLoad(BEAM.end, force=(1, 0), amplitude=f)]
     },
     "LineLoad on girder": lambda f: {"loads": [ub.LineLoad(BEAM, force=(1, 0), amplitude=f)]},
+    "MovingLoad on girder": lambda f: {
+        "loads": [ub.MovingLoad(BEAM, f, force=(1, 0)), ub.MovingLoad(BEAM, lambda t: t, (1, 0), f)]
+    },
+    "Pressure on girder": lambda f: {"loads": [ub.Pressure(BEAM, 1.0, amplitude=f)]},
     "Gravity": lambda f: {"loads": [ub.Gravity(amplitude=f)]},
     "PrescribedDisplacement at girder.start": lambda f: {
         "supports": [ub.PrescribedDisplacement(BEAM.start, u=0, v=f, psi=0)]

@@ -256,6 +256,42 @@ class Pressure(LoadAlongBeam):
 
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
+class MovingLoad(Load):
+    """Dead force that moves along a beam.
+
+    Nodal forces are consistent: the force times the shape functions of the cell in which it is.
+    Section forces are exact at the ends of cells.  Inside the cell of the load they are those of a
+    distributed force with the same resultant, so that there bending moments have errors up to
+    0.15 times the force times the length of the cell.
+
+    Args:
+        beam: Beam along which the force moves.
+        position: Distance from the start of the beam along the undeformed axis, a function of time
+            t (s); m.  The force acts while the distance is between zero and the length of the beam.
+        force: (F_x, F_y); N.
+        amplitude: Factor on the force, a function of time t (s).
+
+    Example:
+        >>> axle = ub.MovingLoad(beam, lambda t: 10.0 * t, force=(0, -1e4))  # 10 m/s
+        >>> crossed = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[axle])
+        >>> run = ub.simulate(crossed, ub.Static(), t=(0, 0.3), dt=0.1)  # it leaves at t = 0.2 s
+        >>> print(run.reaction(crossed.supports[0])[:, 2].round())  # N m
+        [    0. 10000. 20000.     0.]
+    """
+
+    beam: Instance[Member]
+    position: Timed
+    force: Vector = (0.0, 0.0)
+    amplitude: Timed = steady
+
+    def __str__(self) -> str:
+        return f"MovingLoad on {self.beam.name}"
+
+    _label = __str__
+
+
+@closed(OWN_LOAD)
+@dataclass(frozen=True, eq=False, repr=False)
 class Gravity(Load):
     """Weight of all beams, bodies and point masses.
 
@@ -304,7 +340,7 @@ class RotatingFrame(Load):
     dead: ClassVar = False
 
 
-LOADS = PointLoad, FollowerLoad, LineLoad, Pressure, Gravity, RotatingFrame
+LOADS = PointLoad, FollowerLoad, LineLoad, Pressure, MovingLoad, Gravity, RotatingFrame
 """All classes of loads."""
 
 

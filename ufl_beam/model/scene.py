@@ -45,9 +45,10 @@ from ufl_beam.model.loads import (
     LOADS,
     Damping,
     KelvinVoigt,
-    LoadAlongBeam,
     Load,
+    LoadAlongBeam,
     LoadAtPlace,
+    MovingLoad,
     PointLoad,
     RotatingFrame,
 )
@@ -71,8 +72,8 @@ class Scene(Record, Rich):
             :class:`Link`, :class:`Guided`, :class:`Release`.
         supports: :class:`Clamped`, :class:`Pinned`, :class:`Roller`,
             :class:`PrescribedDisplacement`.
-        loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Pressure`, :class:`Gravity`,
-            :class:`RotatingFrame`.
+        loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Pressure`,
+            :class:`MovingLoad`, :class:`Gravity`, :class:`RotatingFrame`.
         masses: :class:`PointMass`.
         initial: :class:`Velocity`; by default the scene is at rest.
         damping: :class:`Rayleigh`, :class:`KelvinVoigt`, in addition to dissipation of materials.
@@ -227,6 +228,7 @@ class Scene(Record, Rich):
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
         """Iterate over (owner, function of time) for loads, supports, connectors and works."""
         yield from ((load, load.amplitude) for load in self.loads)
+        yield from ((load, load.position) for load in self.loads if isinstance(load, MovingLoad))
         yield from ((x, motion) for x in self.supports for motion in x.held.values())
         for connector in self.all_connectors:
             if isinstance(connector.law, PrescribedMotion):
@@ -251,6 +253,8 @@ class Scene(Record, Rich):
                 yield load, load.place
             elif isinstance(load, LoadAlongBeam):
                 yield from ((load, load.beam.at(s)) for s in load.span)
+            elif isinstance(load, MovingLoad):
+                yield load, load.beam.start
         for velocity in self.initial:
             for member in velocity.beams:
                 yield "Velocity", member.middle if isinstance(member, Body) else member.start

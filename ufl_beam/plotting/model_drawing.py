@@ -14,7 +14,14 @@ from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import AttachmentPoint, Body, Member, Place, Velocity
 from ufl_beam.model.connectors import law_of, place_of
 from ufl_beam.model.functions import TimeFunction, steady
-from ufl_beam.model.loads import FollowerLoad, LineLoad, LoadAlongBeam, LoadAtPlace, Pressure
+from ufl_beam.model.loads import (
+    FollowerLoad,
+    LineLoad,
+    LoadAlongBeam,
+    LoadAtPlace,
+    MovingLoad,
+    Pressure,
+)
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.plotting import positions, symbols
@@ -49,7 +56,7 @@ class Subject:
             known = Counter(member.name for member in objects)
             for k, member in enumerate(objects):
                 self.names[member] = f"{member.name} {k}" if known[member.name] > 1 else member.name
-        forces = [x.force for x in scene.loads if isinstance(x, LoadAtPlace)]
+        forces = [x.force for x in scene.loads if isinstance(x, LoadAtPlace | MovingLoad)]
         lines = [
             np.abs(self.line(x)[1]).max() * _components(x)
             for x in scene.loads
@@ -169,6 +176,8 @@ def draw(subject: Subject, scale: float) -> Drawing:
             _draw_line_load(drawing, load)
         elif isinstance(load, LoadAtPlace):
             _draw_point_load(drawing, load)
+        elif isinstance(load, MovingLoad):
+            _draw_moving_load(drawing, load)
     for velocity in scene.initial:
         _draw_velocity(drawing, velocity)
     return drawing
@@ -287,6 +296,20 @@ def _draw_point_load(drawing: Drawing, load: LoadAtPlace) -> None:
         drawing.write("0 N", RED, LOAD_LABELS, _around(at, 0.0))
 
 
+def _draw_moving_load(drawing: Drawing, load: MovingLoad) -> None:
+    """Draw the force at its place at t = 0, or at the end of the beam where it is closest."""
+    size, subject = math.hypot(*load.force), drawing.subject
+    length = float(positions.lengths_along(subject.axes[load.beam])[-1])
+    place = load.beam.at(min(max(float(load.position(0.0)) / length, 0.0), 1.0))
+    if not size:
+        drawing.write("0 N", RED, LOAD_LABELS, _around(np.array(place.point), 0.0))
+        return
+    line = _force_arrow(drawing, place, np.array(load.force) / size, size / subject.force)
+    drawing.strokes["loads"] += _arrow(line, RED, drawing.outside)
+    text = in_time(with_unit(size, "N"), load.amplitude) + ", moves"
+    drawing.write(text, RED, LOAD_LABELS, _beside(*line))
+
+
 def _force_arrow(
     drawing: Drawing, place: AttachmentPoint, direction: Array, fraction: float
 ) -> Array:
@@ -339,8 +362,8 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
         number = max(1, round(lengths[-1] / distance))
         steps = (np.arange(number + 1) if ends else np.arange(number) + 0.5) / number
         at = steps * lengths[-1]
-        columns = [np.interp(at, lengths, x) for x in (shares, *ways.T)]
-        return list(zip(points_along(axis, steps), columns[0], np.stack(columns[1:], 1), strict=True))
+        share, *way = (np.interp(at, lengths, x) for x in (shares, *ways.T))
+        return list(zip(points_along(axis, steps), share, np.column_stack(way), strict=True))
 
     if size > 0.0:
         direction, chord = force / size, axis[-1] - axis[0]
@@ -369,7 +392,9 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
                     ends = at + aside * normal(way) + np.outer((-half, half), way)
                     drawing.strokes["loads"] += _arrow(ends, RED, unit, hollow=turns, size=0.62)
             spots = [
-                Candidate(at, direction[0] * left if turns else normal(direction), aside + 0.3 * unit)
+                Candidate(
+                    at, direction[0] * left if turns else normal(direction), aside + 0.3 * unit
+                )
                 for at, left in _normals(axis)
             ]
         text = in_time(with_unit(size, "N/m"), load.amplitude) + ", follows" * turns

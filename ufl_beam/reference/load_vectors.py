@@ -22,6 +22,7 @@ from ufl_beam.model.loads import (
     Gravity,
     LineLoad,
     Load,
+    MovingLoad,
     PointLoad,
     Pressure,
     RotatingFrame,
@@ -188,6 +189,56 @@ class PressureForce(LoadForce):
         return vector, self._slope
 
 
+class MovingForce(LoadForce):
+    """Force that moves along a beam; substeps apply a part of the change of the nodal forces."""
+
+    def __init__(self, load: MovingLoad, setting: Setting) -> None:
+        super().__init__(load, setting)
+        self._numbering, self._moving = setting.numbering, load
+        self._reached_forces = self._forces_at(0.0, 0.0)
+
+    def _forces_at(self, t: float, size: float) -> tuple[Array, Array]:
+        """Return the nodal forces at a time, and :attr:`on_nodes`."""
+        numbering, load = self._numbering, self._moving
+        d, cells = value_at(load.position, t, load), numbering.cells_of(load.beam)
+        nodes, mesh = numbering.nodes_of_cells, numbering.mesh
+        on_nodes, vector = np.zeros((1, 3, len(mesh.nodes))), np.zeros(self.size)
+        ends = np.append(0.0, np.cumsum(numbering.lengths(cells)))
+        cell = min(max(int(np.searchsorted(ends, d)) - 1, 0), len(cells) - 1)
+        if 0.0 <= d <= ends[-1]:
+            start, *inner, end = range(len(mesh.nodes))
+            shares = mesh.weights((d - ends[cell]) / (ends[cell + 1] - ends[cell]))
+            shares = shares[[start, end, *inner]] * size
+            on_nodes[0, :2] = np.outer(load.force, shares)
+            np.add.at(vector, numbering.dofs[nodes[cells[cell]], :2].T, on_nodes[0, :2])
+        return vector, end_forces(numbering, "density", cells[cell : cell + 1], -on_nodes)
+
+    def forces(self, q: Array) -> Response:
+        """Return the forces of the latest step, and their derivative, which is zero."""
+        return self.force, csr_array((self.size, self.size))
+
+    def response(self, step: Step, q1: Array) -> Response:
+        """Return minus the forces, and their derivative, which is zero."""
+        size = value_at(self.time, step.load_time, self.load)
+        wanted = self._forces_at(step.load_time, size)
+        pairs = list(zip(self._reached_forces, wanted, strict=True))
+        self._end_forces = [a + step.fraction * (b - a) for a, b in pairs]
+        self.force, self.on_nodes = (a + step.at * step.fraction * (b - a) for a, b in pairs)
+        return -self.force, csr_array((self.size, self.size))
+
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
+        """Enter the work of the load on the nodal step in the ledger."""
+        self._end = 0.0
+        super().accept(step, q1, s)
+        self._reached_forces = self._end_forces
+
+    def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
+        """Return the load at time ``t``, which is assumed in equilibrium with the initial state."""
+        self._reached_forces = self._forces_at(t, value_at(self.time, t, self.load))
+        self.force = self._before = self._reached_forces[0]
+        return self.force
+
+
 class FrameForce(LoadForce):
     """Centrifugal forces, which have a potential, and Coriolis forces, which do no work.
 
@@ -331,6 +382,8 @@ def all_loads(setting: Setting, mass: Mass | None, t0: float) -> list[LoadForce 
             loads.append(FrameForce(load, setting, mass or Mass(setting.numbering)))
         elif isinstance(load, FollowerLoad):
             loads.append(Follower(load, setting))
+        elif isinstance(load, MovingLoad):
+            loads.append(MovingForce(load, setting))
         elif isinstance(load, Pressure):
             loads.append(PressureForce(load, setting))
         else:

@@ -427,7 +427,7 @@ NAMED = {
 }  # fmt: skip
 """Attributes that a file contains unchanged, and their types."""
 
-TIME_FUNCTIONS = ("amplitude", "u", "v", "psi", "motion", "force", "numbers")
+TIME_FUNCTIONS = ("amplitude", "position", "u", "v", "psi", "motion", "force", "numbers")
 """Names of fields with functions of time; "force" of controllers and force laws is an exception."""
 
 

@@ -27,6 +27,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import (
@@ -35,6 +36,7 @@ from ufl_beam.model.loads import (
     LineLoad,
     Load,
     LoadAlongBeam,
+    MovingLoad,
     PointLoad,
     Pressure,
     RotatingFrame,
@@ -51,7 +53,8 @@ def load_terms(fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> list[L
     followers = [load for load in loads if isinstance(load, FollowerLoad)]
     frames = [load for load in loads if isinstance(load, RotatingFrame)]
     pressures = [load for load in loads if isinstance(load, Pressure)]
-    dead = [load for load in loads if load.dead]
+    moving = [load for load in loads if isinstance(load, MovingLoad)]
+    dead = [load for load in loads if load.dead and load not in moving]
     terms: list[LoadTerm] = [FrameForces(x, fields, scheme, ledger, A) for x in frames]
     if dead:
         terms.append(DeadLoads(dead, subdomain, scheme, ledger))
@@ -59,6 +62,8 @@ def load_terms(fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> list[L
         terms.append(FollowerLoads(followers, subdomain, scheme, ledger, A))
     if pressures:
         terms.append(Pressures(pressures, subdomain, scheme, ledger, A))
+    if moving:
+        terms.append(MovingLoads(moving, subdomain, scheme, ledger))
     return terms
 
 
@@ -303,8 +308,7 @@ class Pressures(_AtDofs):
         A: Csr,
     ) -> None:
         self._ledger, numbering, mesh = ledger, subdomain.numbering, subdomain.numbering.mesh
-        start, *inner, end = range(mesh.degree + 1)
-        in_order = [start, end, *inner]  # of the nodes of cells
+        in_order = _in_order(mesh)
         points, weights = mesh.gauss
         at_points = weights[:, in_order, None] * mesh.slopes(points)[:, None, in_order]
         pairs = [_loaded_cells(load, subdomain) for load in loads]
@@ -357,6 +361,74 @@ class Pressures(_AtDofs):
         self._forces[:] = archive.added("pressures", self._whole(self._forces[1]))[self.dofs]
         for k, factor in enumerate(self._factors[2]):
             self._factors[:, k] = archive.number(f"factor of pressure {k}", factor)
+
+
+class MovingLoads(_AtDofs):
+    """Forces that move along beams: consistent nodal forces of the cell in which each is."""
+
+    def __init__(
+        self, loads: Sequence[MovingLoad], subdomain: Subdomain, scheme: Scheme, ledger: Ledger
+    ) -> None:
+        self._ledger, numbering, mesh = ledger, subdomain.numbering, subdomain.numbering.mesh
+        self._positions = [(load.position, load) for load in loads]
+        cells = [numbering.cells_of(load.beam) for load in loads]
+        order: Index = np.flatnonzero(np.isin(subdomain.cells, np.concatenate(cells)))
+        self._cells: Index = subdomain.cells[order]
+        number = np.full(len(numbering.cells), -1, dtype=np.int32)
+        number[self._cells] = np.arange(len(order))
+        along = [np.append(0.0, np.cumsum(numbering.lengths(x))) for x in cells]
+        dofs = subdomain.cell_dofs[order, : 2 * len(mesh.nodes)]
+        loaded: Array = np.zeros(subdomain.size)
+        loaded[dofs] = 1.0
+        self._set_dofs(subdomain, loaded, loads, rows=2)
+        # On cells: in the equation, at the end of the step, before the step
+        self._on_cells = np.zeros((3, *dofs.shape))
+        each, second = np.zeros((2, len(order), 3 * len(mesh.nodes)))
+        self._each = ffi.new("double *[1]", [doubles(each)]), each
+        self._c = struct(
+            "moving_loads", loads=len(loads), cells=len(order), nodes=len(mesh.nodes),
+            size=len(self.dofs), dof=self.dofs,
+            at=np.searchsorted(self.dofs, dofs).astype(np.int32),
+            first=np.cumsum([0, *map(len, cells)]).astype(np.int32),
+            cell=np.concatenate([number[x] for x in cells]),
+            ends=np.concatenate([np.column_stack([x[:-1], x[1:]]) for x in along]),
+            polynomial=mesh.polynomials[:, _in_order(mesh)].T.copy(),
+            given=np.array([load.force for load in loads]), now=self._on_cells[0],
+            end=self._on_cells[1], before=self._on_cells[2], each=self._each[0],
+            force=self._forces[0], force_before=self._forces[1],
+            weight_of_before=scheme.weight_of_before,
+        )  # fmt: skip
+        self.loops = loop("subtract_moving_loads", self._c), None
+        self.in_cells = [InCells(lambda: _Entries(self._each[0], second), lib.DENSITY, order)]
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Return the loops that begin and accept a step."""
+        self._callbacks = callbacks
+        factor, position = map(callbacks.time_functions, (self._in_time, self._positions))
+        c = fill(self._c, factor=factor, position=position)
+        c.work = self._ledger.supplied.pointer("loads")
+        return Phases([loop("begin_moving_loads", c)], [loop("accept_moving_loads", c)])
+
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
+        """Set the loads before the next step to the loads at the time ``t``, and return them."""
+        step = struct("time_step", load_time=t, fraction=1.0, at=1.0)
+        lib.begin_moving_loads(self._c, step, ffi.NULL, ffi.NULL)
+        self._callbacks.synchronize()
+        self._on_cells[2] = self._on_cells[0]
+        self.add_residual(q, np.zeros(self._size))
+        self._forces[1] = self._forces[0]
+        return self._whole(self._forces[0])
+
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
+        """Save or restore the forces in the equation of the last step, and at its end."""
+        self._forces[:] = archive.added("moving loads", self._whole(self._forces[1]))[self.dofs]
+        self._on_cells[:] = archive.rows("moving loads", self._cells, self._on_cells[2])
+
+
+def _in_order(mesh: Mesh) -> list[int]:
+    """Return the positions along a cell of its nodes: both vertices, then the nodes between."""
+    first, *between, last = range(len(mesh.nodes))
+    return [first, last, *between]
 
 
 class _Entries(NamedTuple):

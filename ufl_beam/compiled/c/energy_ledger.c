@@ -75,6 +75,14 @@ void accept_pressures(void *self, const time_step *step, const double *q1, const
   memcpy(p->before, p->end, p->loads * sizeof *p->end);
 }
 
+void accept_moving_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const moving_loads *m = self;
+  *m->work += work_in_step(m->size, m->dof, m->weight_of_before, m->force_before, m->force, s);
+  memcpy(m->force_before, m->force, m->size * sizeof *m->force);
+  memcpy(m->before, m->end, 2 * (size_t)m->nodes * m->cells * sizeof *m->end);
+}
+
 void accept_frame(void *self, const time_step *step, const double *q1, const double *s)
 {
   rotating_frame *f = self;

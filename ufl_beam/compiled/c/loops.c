@@ -143,6 +143,20 @@ void add_tangent_of_pressures(void *self, const double *q, double *tangent)
   }
 }
 
+void subtract_moving_loads(void *self, const double *q, double *r)
+{
+  const moving_loads *m = self;
+  const int n = 2 * m->nodes;
+  double *e = *m->each;
+  memset(m->force, 0, m->size * sizeof *m->force);
+  for (int k = 0; k < m->cells; ++k, e += 3 * m->nodes)
+    for (int i = 0; i < n; ++i) {
+      e[i] = -m->now[n * k + i];
+      m->force[m->at[n * k + i]] += m->now[n * k + i];
+    }
+  for (int i = 0; i < m->size; ++i) r[m->dof[i]] -= m->force[i];
+}
+
 /* Expand CALL for the number of entries of a row. The compiler knows the usual numbers: one for
  * lumped masses, three for consistent masses. */
 #define FOR_WIDTH(width, CALL) \

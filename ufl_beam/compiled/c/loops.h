@@ -11,7 +11,7 @@ typedef struct { part *add; void *self; } call;
 /* Several contributions. */
 typedef struct { int number; const call *part; } calls;
 part add_calls, add_cells, add_static_tangent, subtract_vector, subtract_follower_loads,
-  add_tangent_of_follower_loads, subtract_pressures, add_tangent_of_pressures, subtract_frame_forces, add_tangent_of_frame, add_step_force,
+  add_tangent_of_follower_loads, subtract_pressures, add_tangent_of_pressures, subtract_moving_loads, subtract_frame_forces, add_tangent_of_frame, add_step_force,
   add_step_tangent, add_inelastic_force, add_inelastic_tangent;
 
 /* -- forms and constant matrices --------------------------------------------------------------- */
@@ -722,6 +722,23 @@ typedef struct {
   double weight_of_before, *work;
 } pressures;
 
+/* Forces that move along beams, see MovingLoads. Forces on a cell are x of its nodes, then y. */
+typedef struct {
+  int loads, cells, nodes, size; /* nodes: of a cell; size: of `dof` */
+  const int32_t *dof;       /* degrees of freedom that may be loaded */
+  const int32_t *at;        /* index in `dof` of each displacement of a cell */
+  const int32_t *first;     /* first cell of each load, in the next two arrays; and their number */
+  const int32_t *cell;      /* index of the cell on this process, or -1 */
+  const double *ends;       /* distances of both ends from the start of the beam */
+  const double *polynomial; /* coefficients of the shape functions: nodes x powers */
+  const double *given;      /* force for the factor 1, two numbers of each load */
+  const time_function *factor, *position;
+  double *now, *end, *before; /* on cells: in the equation, at the end of the step, at the end of the last step */
+  double **each;            /* minus the forces on the nodes of cells in the latest residual: x, y, moments */
+  double *force, *force_before; /* in the latest residual, in the last step; size */
+  double weight_of_before, *work;
+} moving_loads;
+
 /* Vectors of loads at some degrees of freedom times functions of time, see DeadLoads. */
 typedef struct {
   int size, vectors;
@@ -984,7 +1001,7 @@ typedef struct {
 
 phase begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
   accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_pressures,
-  accept_pressures, begin_frame, accept_frame, begin_works,
+  accept_pressures, begin_moving_loads, accept_moving_loads, begin_frame, accept_frame, begin_works,
   accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
   accept_second_differences, begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
   begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,

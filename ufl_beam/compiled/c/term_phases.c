@@ -109,6 +109,37 @@ void begin_pressures(void *self, const time_step *step, const double *q1, const 
   p->q0 = step->q0;
 }
 
+/* Forces on the nodes of cells at the time t. */
+static void find_moving_loads(const moving_loads *m, double t, double *out)
+{
+  const int n = m->nodes;
+  memset(out, 0, 2 * (size_t)n * m->cells * sizeof *out);
+  for (int k = 0; k < m->loads; ++k) {
+    const double factor = value_at(m->factor + k, t), place = value_at(m->position + k, t);
+    int i = m->first[k];
+    while (i < m->first[k + 1] && !(place <= m->ends[2 * i + 1])) ++i;
+    if (i == m->first[k + 1] || place < m->ends[2 * i] || m->cell[i] < 0) continue;
+    const double s = (place - m->ends[2 * i]) / (m->ends[2 * i + 1] - m->ends[2 * i]);
+    double *on = out + 2 * n * m->cell[i];
+    for (int j = 0; j < n; ++j) {
+      double share = 0;
+      for (int power = n - 1; power >= 0; --power) share = share * s + m->polynomial[j * n + power];
+      on[j] += factor * share * m->given[2 * k], on[n + j] += factor * share * m->given[2 * k + 1];
+    }
+  }
+}
+
+void begin_moving_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const moving_loads *m = self;
+  find_moving_loads(m, step->load_time, m->end);
+  for (int i = 0; i < 2 * m->nodes * m->cells; ++i) {
+    const double before = m->before[i];
+    if (step->fraction != 1) m->end[i] = before + step->fraction * (m->end[i] - before);
+    m->now[i] = step->at == 1 ? m->end[i] : before + step->at * (m->end[i] - before);
+  }
+}
+
 void begin_frame(void *self, const time_step *step, const double *q1, const double *s)
 {
   rotating_frame *f = self;
