@@ -40,6 +40,7 @@ from ufl_beam.analysis.free_decay import (
     logarithmic_decrement,
     peaks,
 )
+from ufl_beam.analysis.imperfections import imperfect
 from ufl_beam.analysis.modes import Buckling as Buckling
 from ufl_beam.analysis.modes import Modes as Modes
 from ufl_beam.analysis.modes import buckling, modes
@@ -280,6 +281,7 @@ __all__ = [
     "fit_decay",
     "follow",
     "ground",
+    "imperfect",
     "law_functions",
     "logarithmic_decrement",
     "modes",

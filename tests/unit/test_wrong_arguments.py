@@ -341,6 +341,7 @@ TABLE = {
             name: V(0.0, [*(v for v in OPTIONAL_NUMBER), *(f for f in TIME if callable(f))])
             for name in ("u", "v", "psi")
         },
+        along=V((1.0, 0.5), [*VECTOR, (0, 0)]),
     ),
     "PointMass": call(
         ub.PointMass, place=PLACE, mass=V(1.0, FROM_ZERO), inertia=V(0.0, FROM_ZERO)
@@ -424,6 +425,13 @@ TABLE = {
         ub.buckling,
         scene=V(SCENE, OBJECT), n=V(1, COUNT), t=V(1.0, NUMBER), at=V(None, optional(OBJECT)),
         **MESH,
+    ),
+    "imperfect": call(
+        ub.imperfect,
+        scene=V(SCENE, OBJECT), sway=V(0.01, NUMBER),
+        bow=V({BEAM: 0.01}, [1.0, "ab", {BEAM: NAN}, {BEAM: "x"}, {1: 0.1}]),
+        mode=V(None, optional(OBJECT)), k=V(0, [v for v in COUNT if v not in (0.0, None)]),
+        amplitude=V(0.1, NUMBER),
     ),
     "study": call(
         ub.study,
