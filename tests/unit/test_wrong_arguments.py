@@ -430,7 +430,7 @@ TABLE = {
         ub.imperfect,
         scene=V(SCENE, OBJECT), sway=V(0.01, NUMBER),
         bow=V({BEAM: 0.01}, [1.0, "ab", {BEAM: NAN}, {BEAM: "x"}, {1: 0.1}]),
-        mode=V(None, optional(OBJECT)), k=V(0, [v for v in COUNT if v not in (0.0, None)]),
+        mode=V(None, optional(OBJECT)), k=V(0, [None, "2", -1, 1.5, NAN]),
         amplitude=V(0.1, NUMBER),
     ),
     "study": call(

@@ -257,12 +257,19 @@ class Pressure(LoadAlongBeam):
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
 class MovingLoad(Load):
-    """Dead force that moves along a beam.
+    """Dead force, and mass, that move along a beam.
 
     Nodal forces are consistent: the force times the shape functions of the cell in which it is.
     Section forces are exact at the ends of cells.  Inside the cell of the load they are those of a
     distributed force with the same resultant, so that there bending moments have errors up to
     0.15 times the force times the length of the cell.
+
+    In dynamics, the acceleration of the mass is the one of the axis at its place, plus
+    s̈ t + (2 ṡ ψ̇ + ṡ² κ) n with the distance s and the rotation ψ and curvature κ of the axis; t
+    and n are tangent and normal of the cross-section.  The kinetic energy of the mass on the beam
+    is part of "kinetic" in the ledger; "loads" contains the energy that the drive of the mass
+    supplies, and with which the mass enters and leaves.  ``Gravity`` does not weigh this mass:
+    ``force`` contains its weight.  Analyses of modes ignore it.
 
     Args:
         beam: Beam along which the force moves.
@@ -270,6 +277,7 @@ class MovingLoad(Load):
             t (s); m.  The force acts while the distance is between zero and the length of the beam.
         force: (F_x, F_y); N.
         amplitude: Factor on the force, a function of time t (s).
+        mass: Mass that moves with the force; kg.
 
     Example:
         >>> axle = ub.MovingLoad(beam, lambda t: 10.0 * t, force=(0, -1e4))  # 10 m/s
@@ -283,6 +291,8 @@ class MovingLoad(Load):
     position: Timed
     force: Vector = (0.0, 0.0)
     amplitude: Timed = steady
+    _: KW_ONLY
+    mass: NotNegative = 0.0
 
     def __str__(self) -> str:
         return f"MovingLoad on {self.beam.name}"

@@ -115,7 +115,9 @@ class StepEquation:
         )  # fmt: skip
         self.connector_terms = together(connector_terms, subdomain, connectors, A)
 
-        self.loads: list[LoadTerm] = load_terms(fields, scheme, ledger, A)
+        self.loads: list[LoadTerm] = load_terms(
+            fields, scheme, ledger, A, None if inertia is None else inertia.c
+        )
         if scene.works:
             self.loads.append(together(Works, fields, scheme, ledger, A, t0))
         self.supports = Supports(subdomain, scheme, ledger, A)

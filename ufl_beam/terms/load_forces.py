@@ -45,8 +45,13 @@ from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term
 
 
-def load_terms(fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> list[LoadTerm]:
-    """Create the terms of the loads of a scene, one for all loads with the same kind of force."""
+def load_terms(
+    fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr, rates: Any = None
+) -> list[LoadTerm]:
+    """Create the terms of the loads of a scene, one for all loads with the same kind of force.
+
+    ``rates`` of loops.h are the rates of the scene; None in statics.
+    """
     subdomain, loads = fields.subdomain, fields.subdomain.numbering.scene.loads
     if loads:
         ledger.supplied["loads"] += 0.0
@@ -63,7 +68,7 @@ def load_terms(fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> list[L
     if pressures:
         terms.append(Pressures(pressures, subdomain, scheme, ledger, A))
     if moving:
-        terms.append(MovingLoads(moving, subdomain, scheme, ledger))
+        terms.append(MovingLoads(moving, subdomain, scheme, ledger, A, rates))
     return terms
 
 
@@ -364,10 +369,20 @@ class Pressures(_AtDofs):
 
 
 class MovingLoads(_AtDofs):
-    """Forces that move along beams: consistent nodal forces of the cell in which each is."""
+    """Forces and masses that move along beams: consistent nodal forces of the cell of each.
+
+    The axis at a mass has the tangent and the curvature of the rotations, without shear and
+    stretch: rotations are continuous between cells, slopes of displacements are not.
+    """
 
     def __init__(
-        self, loads: Sequence[MovingLoad], subdomain: Subdomain, scheme: Scheme, ledger: Ledger
+        self,
+        loads: Sequence[MovingLoad],
+        subdomain: Subdomain,
+        scheme: Scheme,
+        ledger: Ledger,
+        A: Csr,
+        rates: Any,
     ) -> None:
         self._ledger, numbering, mesh = ledger, subdomain.numbering, subdomain.numbering.mesh
         self._positions = [(load.position, load) for load in loads]
@@ -398,7 +413,22 @@ class MovingLoads(_AtDofs):
             force=self._forces[0], force_before=self._forces[1],
             weight_of_before=scheme.weight_of_before,
         )  # fmt: skip
-        self.loops = loop("subtract_moving_loads", self._c), None
+        self._A, tangent, mass = A, None, np.array([load.mass for load in loads])
+        self._kinetic = np.zeros(len(loads))
+        self._heavy = rates is not None and bool(mass.any())
+        if self._heavy:
+            whole, n = subdomain.cell_dofs[order], 2 * len(mesh.nodes)
+            rows, columns = np.broadcast_arrays(whole[:, :n, None], whole[:, None, :])
+            fill(
+                self._c, rates=rates, mass=mass, kinetic=self._kinetic,
+                here=np.full(len(loads), -1, dtype=np.int32), motion=np.zeros((len(loads), 3)),
+                freedom=whole.astype(np.int32),
+                entry=A.positions(rows.ravel(), columns.ravel()),
+                angle=numbering.axis_angles[self._cells], part=scheme.load_weight,
+                half_tangents=scheme.half_tangents,
+            )  # fmt: skip
+            tangent = loop("add_tangent_of_moving_masses", self._c)
+        self.loops = loop("subtract_moving_loads", self._c), tangent
         self.in_cells = [InCells(lambda: _Entries(self._each[0], second), lib.DENSITY, order)]
 
     def phases(self, callbacks: Callbacks) -> Phases:
@@ -407,15 +437,26 @@ class MovingLoads(_AtDofs):
         factor, position = map(callbacks.time_functions, (self._in_time, self._positions))
         c = fill(self._c, factor=factor, position=position)
         c.work = self._ledger.supplied.pointer("loads")
-        return Phases([loop("begin_moving_loads", c)], [loop("accept_moving_loads", c)])
+        energies = []
+        if self._heavy:
+            c.stored = self._ledger.state.pointer("kinetic")
+            energies = [loop("add_energy_of_moving_masses", c)]
+        return Phases([loop("begin_moving_loads", c)], [loop("accept_moving_loads", c)], energies)
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Set the loads before the next step to the loads at the time ``t``, and return them."""
-        step = struct("time_step", load_time=t, fraction=1.0, at=1.0)
+        """Set the loads before the next step to the loads at the time ``t``, and return them.
+
+        These are the forces only: masses have no acceleration before the first step.
+        """
+        step = struct("time_step", load_time=t, fraction=1.0, at=1.0, dt=1.0)
+        rates, self._c.rates = self._c.rates, ffi.NULL
         lib.begin_moving_loads(self._c, step, ffi.NULL, ffi.NULL)
+        if self._heavy:
+            lib.start_moving_masses(self._c, t, doubles(q), doubles(v))
         self._callbacks.synchronize()
         self._on_cells[2] = self._on_cells[0]
         self.add_residual(q, np.zeros(self._size))
+        self._c.rates = rates
         self._forces[1] = self._forces[0]
         return self._whole(self._forces[0])
 
@@ -423,6 +464,8 @@ class MovingLoads(_AtDofs):
         """Save or restore the forces in the equation of the last step, and at its end."""
         self._forces[:] = archive.added("moving loads", self._whole(self._forces[1]))[self.dofs]
         self._on_cells[:] = archive.rows("moving loads", self._cells, self._on_cells[2])
+        for k, energy in enumerate(self._kinetic):
+            self._kinetic[k] = archive.total(f"energy of moving mass {k}", energy)
 
 
 def _in_order(mesh: Mesh) -> list[int]:

@@ -115,16 +115,15 @@ static void find_moving_loads(const moving_loads *m, double t, double *out)
   const int n = m->nodes;
   memset(out, 0, 2 * (size_t)n * m->cells * sizeof *out);
   for (int k = 0; k < m->loads; ++k) {
-    const double factor = value_at(m->factor + k, t), place = value_at(m->position + k, t);
-    int i = m->first[k];
-    while (i < m->first[k + 1] && !(place <= m->ends[2 * i + 1])) ++i;
-    if (i == m->first[k + 1] || place < m->ends[2 * i] || m->cell[i] < 0) continue;
-    const double s = (place - m->ends[2 * i]) / (m->ends[2 * i + 1] - m->ends[2 * i]);
+    const double factor = value_at(m->factor + k, t);
+    double s, shape[4];
+    const int i = find_loaded_cell(m, k, value_at(m->position + k, t), &s);
+    if (i < 0) continue;
     double *on = out + 2 * n * m->cell[i];
+    find_shapes(m, s, shape, 0);
     for (int j = 0; j < n; ++j) {
-      double share = 0;
-      for (int power = n - 1; power >= 0; --power) share = share * s + m->polynomial[j * n + power];
-      on[j] += factor * share * m->given[2 * k], on[n + j] += factor * share * m->given[2 * k + 1];
+      on[j] += factor * shape[j] * m->given[2 * k];
+      on[n + j] += factor * shape[j] * m->given[2 * k + 1];
     }
   }
 }
@@ -132,6 +131,15 @@ static void find_moving_loads(const moving_loads *m, double t, double *out)
 void begin_moving_loads(void *self, const time_step *step, const double *q1, const double *s)
 {
   const moving_loads *m = self;
+  const double half = step->dt / 2;
+  for (int k = 0; m->rates && k < m->loads; ++k) { /* speed and acceleration by differences */
+    double place[3], *motion = m->motion + 3 * k;
+    for (int j = 0; j < 3; ++j) place[j] = value_at(m->position + k, step->load_time + (j - 1) * half);
+    m->here[k] = m->mass[k] > 0 ? find_loaded_cell(m, k, place[1], motion) : -1;
+    motion[1] = (place[2] - place[0]) / step->dt;
+    motion[2] = (place[2] - 2 * place[1] + place[0]) / (half * half);
+  }
+  if (m->rates) ((moving_loads *)self)->q0 = step->q0;
   find_moving_loads(m, step->load_time, m->end);
   for (int i = 0; i < 2 * m->nodes * m->cells; ++i) {
     const double before = m->before[i];
