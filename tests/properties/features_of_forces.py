@@ -212,7 +212,7 @@ def moving_load(d):
     place = d.one(["3 * t / END - 1", "0.2 + 0.1 * math.sin(20 * t)", "0.5"])
     d.loads.append(
         f"ub.MovingLoad(b0, lambda t: {place.replace('END', f'{d.end:.4g}')}, "
-        f"({d.some(-15, 15):.3f}, {d.some(-15, 15):.3f}), {d.time()})"
+        f"({d.some(-15, 15):.3f}, {d.some(-15, 15):.3f}), {d.time()}{d.one(['', ', mass=0.5'])})"
     )
 
 

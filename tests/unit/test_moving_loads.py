@@ -21,14 +21,14 @@ def wave(t):
     return 1 + 0.3 * math.sin(20 * t)
 
 
-def crossed(section=SECTION, cells=5, **more):
+def crossed(section=SECTION, cells=5, mass=0.0):
     """A cantilever of 2 m: one load enters, crosses and leaves it; the other one turns back."""
     beam = ub.Beam((0, 0), (2, 0), section, cells=cells)
     loads = [
         ub.MovingLoad(beam, lambda t: 10 * t - 0.5, (4, -40), wave),
-        ub.MovingLoad(beam, lambda t: 1.2 + 0.5 * math.sin(9 * t), (0, 15)),
+        ub.MovingLoad(beam, lambda t: 1.2 + 0.5 * math.sin(9 * t), (0, 15), mass=mass),
     ]
-    return clamped(beam, loads=loads, **more), beam
+    return clamped(beam, loads=loads), beam
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])
@@ -37,7 +37,7 @@ def test_reactions_and_diagrams_are_those_of_a_force_at_its_place(degree):
     beam = ub.Beam((0, 0), (2, 0), STIFF, cells=4)
     load = ub.MovingLoad(beam, lambda t: t - 0.25, (3, -7))
     scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), ub.Roller(beam.end)], loads=[load])
-    moved = run(scene, ub.Static(), t=(0, 2.5), dt=0.125, mesh=ub.Mesh(degree=degree))
+    moved = run(scene, ub.Static(), t=(0, 2.375), dt=0.125, mesh=ub.Mesh(degree=degree))
     d = moved.times - 0.25
     there = (d >= 0) & (d <= 2)
     left, right = (moved.reaction(support) for support in scene.supports)
@@ -62,32 +62,34 @@ def test_reactions_and_diagrams_are_those_of_a_force_at_its_place(degree):
     assert max(errors) <= 4 / 27 * 7 * 0.5 + 1e-6
 
 
-@pytest.mark.parametrize("degree", [1, 3])
 @pytest.mark.parametrize(
-    "scheme",
-    [ub.Static(), ub.EnergyMomentumStatic(), ub.EnergyMomentum(), ub.GeneralizedAlpha(0.8)],
-)
-def test_moving_loads_in_both_solvers(scheme, degree):
-    scene, beam = crossed()
+    ("scheme", "degree"),
+    [
+        (ub.Static(), 3), (ub.EnergyMomentumStatic(), 1), (ub.EnergyMomentum(0.1), 1),
+        (ub.EnergyMomentum(), 3), (ub.GeneralizedAlpha(0.8), 1), (ub.EnergyMomentumDecaying(), 2),
+    ],
+)  # fmt: skip
+def test_moving_loads_and_masses_in_both_solvers(scheme, degree):
+    scene, beam = crossed(mass=2.0, cells=3)
     mine, other = (
-        run(scene, scheme, t=(0, 0.3), dt=0.02, mesh=ub.Mesh(degree=degree), newton=newton)
+        run(scene, scheme, t=(0, 0.28), dt=0.04, mesh=ub.Mesh(degree=degree), newton=newton)
         for newton in (ub.Newton(rtol=1e-12), ub.Newton(rtol=1e-12, reference=True))
     )
-    assert np.abs(mine.displacement(beam.end)).max() > 0.1
+    assert np.abs(mine.displacement(beam.end)).max() > 0.05
     np.testing.assert_allclose(mine.q, other.q, rtol=0, atol=1e-9)
     size = mine.energy.energy_transferred
     for entry in mine.energy:
         np.testing.assert_allclose(mine.energy[entry], other.energy[entry], atol=1e-9 * size)
-    for n in (3, 12):
+    for n in (3, 6):
         M, reference = mine.diagram(beam, n).M, other.diagram(beam, n).M
         np.testing.assert_allclose(M, reference, rtol=0, atol=1e-9 * np.abs(M).max())
-    if scheme == ub.EnergyMomentum():
+    if isinstance(scheme, ub.EnergyMomentum):
         assert_balanced(mine.energy)
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentumStatic(), ub.EnergyMomentum()])
 def test_a_run_with_moving_loads_is_resumed_and_saved(scheme, tmp_path):
-    scene, _ = crossed()
+    scene, _ = crossed(mass=2.0)
     whole = run(scene, scheme, t=(0, 0.4), dt=0.02)
     folder = MPI.COMM_WORLD.bcast(tmp_path)
     for end in (0.2, 0.4):
@@ -103,7 +105,7 @@ def test_a_run_with_moving_loads_is_resumed_and_saved(scheme, tmp_path):
 
 
 def test_processes_share_moving_loads():
-    scene, beam = crossed(cells=7)
+    scene, beam = crossed(cells=7, mass=2.0)
     together, alone = (
         run(scene, t=(0, 0.3), dt=0.02, comm=comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
     )

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Actions of structural engineering: pressure on a ring."""
+"""Actions of structural engineering: pressure on a ring; loads and masses that cross a bridge."""
 
 import math
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import ufl_beam as ub
 
@@ -67,10 +68,10 @@ BRIDGE = ub.Section(EA=1e10, GA=1e10, EI=EI, rhoA=MU, rhoI=1e-6)
 """Shear and rotary inertia change results by EI/(GA L²) = 1e-6."""
 
 
-def crossing(speed, steps, *, masses=(), until=1.5, degree=3):
-    """A bridge of 10 m, which a force of 1 kN crosses."""
+def crossing(speed, steps, *, mass=0.0, until=1.5, degree=3):
+    """A bridge of 10 m, which a force of 1 kN and a mass cross."""
     beam = ub.Beam((0, 0), (L, 0), BRIDGE, cells=8)
-    load = ub.MovingLoad(beam, lambda t: speed * t, (0, -P))
+    load = ub.MovingLoad(beam, lambda t: speed * t, (0, -P), mass=mass)
     supports = [ub.Pinned(beam.start), ub.Roller(beam.end)]
     scene, end = ub.Scene([beam], supports=supports, loads=[load]), until * L / speed
     mesh = ub.Mesh(degree=degree)
@@ -105,3 +106,37 @@ def test_moving_load():
     assert np.abs(w2 - expected).max() < 1e-3 * size
     assert np.abs(w2 + (w2 - w1) / 3 - expected).max() < 5e-4 * size
     assert fine.energy.worst < 1e-9
+
+
+def test_moving_mass():
+    """[calc] Nine sine modes with the mass and its convective acceleration, integrated by SciPy.
+
+    w_tt + 2 c w_xt + c² w_xx at the place c t, with a mass of 30 % of the bridge.  The error is
+    4.6e-4 with these steps, 1.9e-4 with half of them, and tends to 1e-4 of the modal truncation.
+    """
+    c, m, number = 0.3 * math.pi / L * math.sqrt(EI / MU), 0.3 * MU * L, 9
+    k = np.arange(1, number + 1) * math.pi / L
+
+    def rates(t, y, convective):
+        f = np.sin(k * c * t)
+        of_velocity, of_place = 2 * c * k * np.cos(k * c * t), -((c * k) ** 2) * f
+        q, v = np.split(y, 2)
+        force = -P - convective * m * (of_velocity @ v + of_place @ q)
+        rest = 2 / (MU * L) * f * force - k**4 * EI / MU * q
+        # Inverse of 1 + a f fᵀ
+        a = 2 * m / (MU * L)
+        return np.concatenate([v, rest - a * f * (f @ rest) / (1 + a * (f @ f))])
+
+    beam, run = crossing(c, 400, mass=m, until=1.0)
+    expected, without = (
+        np.sin(k * L / 2)
+        @ solve_ivp(
+            rates, (0, L / c), np.zeros(2 * number), t_eval=run.times, args=(convective,),
+            rtol=1e-6, atol=1e-9, method="DOP853",
+        ).y[:number]
+        for convective in (1.0, 0.0)
+    )  # fmt: skip
+    size = np.abs(expected).max()
+    assert np.abs(run.displacement(beam.at(0.5))[:, 1] - expected).max() < 1e-3 * size
+    assert np.abs(without - expected).max() > 0.05 * size
+    assert run.energy.worst < 1e-9
