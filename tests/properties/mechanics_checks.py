@@ -201,6 +201,11 @@ def modes(case):
         else replace(load, amplitude=lambda t, load=load, end=t0: load.amplitude(end))
         for load in scene.loads
     ]  # fmt: skip
+    held = [
+        replace(load, position=lambda t, load=load, end=t0: load.position(end), mass=0.0)
+        if isinstance(load, ub.MovingLoad) else load
+        for load in held
+    ]  # fmt: skip
     still = replace(scene, loads=held)
     creep = [one.retardation_time for one in scene.damping if isinstance(one, ub.KelvinVoigt)]
     if creep:  # until nothing moves

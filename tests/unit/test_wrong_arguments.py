@@ -313,7 +313,7 @@ TABLE = {
     ),
     "MovingLoad": call(
         ub.MovingLoad, beam=V(BEAM, NO_BEAM), position=V(lambda t: t, [*TIME, None]),
-        force=V((1, 0), VECTOR), amplitude=TIMED["amplitude"],
+        force=V((1, 0), VECTOR), amplitude=TIMED["amplitude"], mass=V(1.0, FROM_ZERO),
     ),
     "Gravity": call(
         ub.Gravity, acceleration=V((0, -9.81), VECTOR), amplitude=V(lambda t: t, [*TIME, None])
