@@ -210,8 +210,9 @@ def pressure(d):
 @feature()
 def moving_load(d):
     place = d.one(["3 * t / END - 1", "0.2 + 0.1 * math.sin(20 * t)", "0.5"])
+    beam = d.one(["b0", "[b1, b2]"]) if len(d.beams) > 2 else "b0"
     d.loads.append(
-        f"ub.MovingLoad(b0, lambda t: {place.replace('END', f'{d.end:.4g}')}, "
+        f"ub.MovingLoad({beam}, lambda t: {place.replace('END', f'{d.end:.4g}')}, "
         f"({d.some(-15, 15):.3f}, {d.some(-15, 15):.3f}), {d.time()}{d.one(['', ', mass=0.5'])})"
     )
 

@@ -134,7 +134,7 @@ def momentum(case):
             add(factor * _loaded_length(solution, load) * np.array(load.force))
         elif load in moving:
             places = np.array([load.position(x) for x in middle])[:, None]
-            there = (places >= 0) & (places <= _length(solution, load.beam))
+            there = (places >= 0) & (places <= sum(_length(solution, x) for x in load.route))
             add(there * factor * np.array(load.force))
         else:
             turn = solution.displacement(load.place)[:, 2]

@@ -2,12 +2,13 @@
 """Forces that move along beams."""
 
 import math
+from itertools import pairwise
 
 from mpi4py import MPI
 
 import numpy as np
 import pytest
-from helpers import assert_balanced, run
+from helpers import assert_balanced, raises, run
 from scenes import clamped
 
 import ufl_beam as ub
@@ -111,6 +112,30 @@ def test_processes_share_moving_loads():
     )
     np.testing.assert_allclose(together.q, alone.q, rtol=0, atol=1e-9)
     np.testing.assert_allclose(together.diagram(beam).M, alone.diagram(beam).M, atol=1e-7)
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()])
+def test_a_load_crosses_several_beams_as_one(scheme):
+    """At the vertex between them, at t = 0.1 s, the force acts once."""
+
+    def crossed(*ends):
+        beams = [ub.Beam(a, b, SECTION, cells=2, name=f"b{a[0]}") for a, b in pairwise(ends)]
+        joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
+        route = beams if len(beams) > 1 else beams[0]
+        load = ub.MovingLoad(route, lambda t: 10 * t, (3, -40), mass=2.0)
+        scene = ub.Scene(beams, joints=joints, supports=[ub.Clamped(beams[0].start)], loads=[load])
+        mesh, newton = ub.Mesh(refine=3 - len(beams)), ub.Newton(rtol=1e-12)
+        moved = run(scene, scheme, t=(0, 0.3), dt=0.05, mesh=mesh, newton=newton)
+        return moved.displacement(beams[-1].end), moved.reaction(scene.supports[0])[1:]
+
+    for two, one in zip(crossed((0, 0), (1, 0), (2, 0)), crossed((0, 0), (2, 0)), strict=True):
+        np.testing.assert_allclose(two, one, atol=1e-9 * np.abs(one).max())
+
+
+def test_beams_of_a_load_meet():
+    a, b = ub.Beam((0, 0), (1, 0), SECTION, name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
+    with raises("MovingLoad: beam", "a starts 2 m from the end of b", kind=ub.ModelError):
+        ub.MovingLoad([b, a], lambda t: t, (0, -1))
 
 
 def test_a_load_that_stands_still_is_a_point_load():

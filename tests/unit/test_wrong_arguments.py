@@ -312,7 +312,9 @@ TABLE = {
         amplitude=TIMED["amplitude"], **PART,
     ),
     "MovingLoad": call(
-        ub.MovingLoad, beam=V(BEAM, NO_BEAM), position=V(lambda t: t, [*TIME, None]),
+        ub.MovingLoad,
+        beam=V(BEAM, [*(x for x in NO_BEAM if not isinstance(x, list)), []]),
+        position=V(lambda t: t, [*TIME, None]),
         force=V((1, 0), VECTOR), amplitude=TIMED["amplitude"], mass=V(1.0, FROM_ZERO),
     ),
     "Gravity": call(

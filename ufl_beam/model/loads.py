@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
+from itertools import pairwise
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -13,8 +15,10 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import (
     ArgumentError,
+    ArgumentTypeError,
     ModelError,
     closed,
+    require_all,
     require_returned,
     require_vector,
     shorten,
@@ -254,10 +258,29 @@ class Pressure(LoadAlongBeam):
     dead: ClassVar = False
 
 
+def require_route(beams: object, what: str) -> Member | tuple[Member, ...]:
+    """Return a beam, or several in a row as a tuple, or raise."""
+    if isinstance(beams, Member):
+        return beams
+    if not isinstance(beams, Sequence):
+        raise ArgumentTypeError(f"{what} = {shorten(beams)} is neither a Beam nor a list of beams")
+    route: tuple[Member, ...] = require_all(beams, what, Member)
+    if not route:
+        raise ModelError(f"{what} is empty; give the beam along which the load moves")
+    for a, b in pairwise(route):
+        gap = math.dist(a.end.point, b.start.point)
+        if gap > 1e-9 * math.dist(a.start.point, a.end.point):
+            raise ModelError(
+                f"{what}: {b.name} starts {gap:.6g} m from the end of {a.name}; give beams in the "
+                "order and direction of the distance"
+            )
+    return route
+
+
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
 class MovingLoad(Load):
-    """Dead force, and mass, that move along a beam.
+    """Dead force, and mass, that move along a beam, or along several beams in a row.
 
     Nodal forces are consistent: the force times the shape functions of the cell in which it is.
     Section forces are exact at the ends of cells.  Inside the cell of the load they are those of a
@@ -272,12 +295,16 @@ class MovingLoad(Load):
     ``force`` contains its weight.  Analyses of modes ignore it.
 
     Args:
-        beam: Beam along which the force moves.
-        position: Distance from the start of the beam along the undeformed axis, a function of time
-            t (s); m.  The force acts while the distance is between zero and the length of the beam.
+        beam: Beam along which the force moves, or a sequence of beams, each of which starts where
+            the one before ends.
+        position: Distance from the start of the first beam along the undeformed axis, a function of
+            time t (s); m.  The force acts while it is between zero and the length of the beams.
         force: (F_x, F_y); N.
         amplitude: Factor on the force, a function of time t (s).
         mass: Mass that moves with the force; kg.
+
+    Raises:
+        ModelError: A beam does not start where the one before ends.
 
     Example:
         >>> axle = ub.MovingLoad(beam, lambda t: 10.0 * t, force=(0, -1e4))  # 10 m/s
@@ -287,7 +314,7 @@ class MovingLoad(Load):
         [    0. 10000. 20000.     0.]
     """
 
-    beam: Instance[Member]
+    beam: Annotated[Member | Sequence[Member], require_route]
     position: Timed
     force: Vector = (0.0, 0.0)
     amplitude: Timed = steady
@@ -295,9 +322,14 @@ class MovingLoad(Load):
     mass: NotNegative = 0.0
 
     def __str__(self) -> str:
-        return f"MovingLoad on {self.beam.name}"
+        return f"MovingLoad on {', '.join(beam.name for beam in self.route)}"
 
     _label = __str__
+
+    @property
+    def route(self) -> tuple[Member, ...]:
+        """The beams in the order of the distance."""
+        return (self.beam,) if isinstance(self.beam, Member) else tuple(self.beam)
 
 
 @closed(OWN_LOAD)

@@ -254,7 +254,7 @@ class Scene(Record, Rich):
             elif isinstance(load, LoadAlongBeam):
                 yield from ((load, load.beam.at(s)) for s in load.span)
             elif isinstance(load, MovingLoad):
-                yield load, load.beam.start
+                yield from ((load, beam.start) for beam in load.route)
         for velocity in self.initial:
             for member in velocity.beams:
                 yield "Velocity", member.middle if isinstance(member, Body) else member.start

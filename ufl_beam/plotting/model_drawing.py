@@ -297,10 +297,13 @@ def _draw_point_load(drawing: Drawing, load: LoadAtPlace) -> None:
 
 
 def _draw_moving_load(drawing: Drawing, load: MovingLoad) -> None:
-    """Draw the force at its place at t = 0, or at the end of the beam where it is closest."""
+    """Draw the force at its place at t = 0, or at the end of the beams where it is closest."""
     size, subject = math.hypot(*load.force), drawing.subject
-    length = float(positions.lengths_along(subject.axes[load.beam])[-1])
-    place = load.beam.at(min(max(float(load.position(0.0)) / length, 0.0), 1.0))
+    lengths = [positions.lengths_along(subject.axes[beam])[-1] for beam in load.route]
+    ends = np.cumsum(lengths)
+    distance = min(max(float(load.position(0.0)), 0.0), ends[-1])
+    k = int(np.searchsorted(ends, distance))
+    place = load.route[k].at(float(1.0 - (ends[k] - distance) / lengths[k]))
     if not size:
         drawing.write("0 N", RED, LOAD_LABELS, _around(np.array(place.point), 0.0))
         return

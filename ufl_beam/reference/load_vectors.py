@@ -213,7 +213,8 @@ class MovingForce(LoadForce):
     def _at(self, t: float) -> tuple[int, Array, Array, Array] | None:
         """Return the cell at a time, its degrees of freedom (3, n), shapes, and their slopes."""
         numbering, load = self._numbering, self._moving
-        d, cells = value_at(load.position, t, load), numbering.cells_of(load.beam)
+        d = value_at(load.position, t, load)
+        cells = np.concatenate([numbering.cells_of(beam) for beam in load.route])
         ends, mesh = np.append(0.0, np.cumsum(numbering.lengths(cells))), numbering.mesh
         if not 0.0 <= d <= ends[-1]:
             return None
@@ -285,11 +286,14 @@ class MovingForce(LoadForce):
                 slope = slope + csr_array((values.ravel(), pairs), shape=slope.shape)
         return *self._on_cell(step.load_time, force), csr_array(slope)
 
-    def _kinetic(self, t: float, speed: float, q: Array, v: Array) -> float:
+    def _kinetic(self, t: float, q: Array, v: Array) -> float:
         """Return the kinetic energy of the mass, zero outside of the beam."""
         if (at := self._at(t)) is None:
             return 0.0
         cell, dofs, shapes, slopes = at
+        dt, load = 1e-5, self._moving
+        p = [value_at(load.position, t + k * dt, load) for k in range(3)]
+        speed = (4 * p[1] - 3 * p[0] - p[2]) / (2 * dt)
         θ, _ = self._direction(cell, shapes, slopes, q[dofs[2]])
         velocity = v[dofs[:2]] @ shapes + speed * np.array([math.cos(θ), math.sin(θ)])
         return float(self._moving.mass / 2 * velocity @ velocity)
@@ -314,9 +318,7 @@ class MovingForce(LoadForce):
         super().accept(step, q1, s)
         self._reached_forces = self._end_forces
         if self._inertia is not None:
-            speed, gain = self._speeds(step)
-            speed += gain * (step.t1 - step.load_time)
-            energy = self._kinetic(step.t1, speed, q1, self._inertia.after(s)[0])
+            energy = self._kinetic(step.t1, q1, self._inertia.after(s)[0])
             self.supplied["loads"] += energy - self.stored["kinetic"]
             self.stored = {"kinetic": energy}
 
@@ -325,10 +327,7 @@ class MovingForce(LoadForce):
         self._reached_forces = self._forces_at(t)
         self.force = self._before = self._reached_forces[0]
         if self._inertia is not None and v is not None:
-            places = [
-                value_at(self._moving.position, x, self._moving) for x in (t - 1e-5, t + 1e-5)
-            ]
-            self.stored = {"kinetic": self._kinetic(t, (places[1] - places[0]) / 2e-5, q, v)}
+            self.stored = {"kinetic": self._kinetic(t, q, v)}
         return self.force
 
 

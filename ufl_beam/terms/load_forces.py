@@ -386,7 +386,7 @@ class MovingLoads(_AtDofs):
     ) -> None:
         self._ledger, numbering, mesh = ledger, subdomain.numbering, subdomain.numbering.mesh
         self._positions = [(load.position, load) for load in loads]
-        cells = [numbering.cells_of(load.beam) for load in loads]
+        cells = [np.concatenate([numbering.cells_of(x) for x in load.route]) for load in loads]
         order: Index = np.flatnonzero(np.isin(subdomain.cells, np.concatenate(cells)))
         self._cells: Index = subdomain.cells[order]
         number = np.full(len(numbering.cells), -1, dtype=np.int32)

@@ -75,14 +75,17 @@ void accept_pressures(void *self, const time_step *step, const double *q1, const
   memcpy(p->before, p->end, p->loads * sizeof *p->end);
 }
 
-/* Kinetic energy of mass k at a distance and a speed along the beam; zero outside of the beam. v:
- * velocities; or none, then they follow from the step s. */
-static double energy_of_moving_mass(const moving_loads *m, int k, double distance, double speed,
-                                    const double *q, const double *v, const double *s)
+/* Kinetic energy of mass k at the time t; zero outside of the beam. v: velocities; or none, then they
+ * follow from the step s. */
+static double energy_of_moving_mass(const moving_loads *m, int k, double t, const double *q,
+                                    const double *v, const double *s)
 {
   const int n = m->nodes;
-  double place, shape[4], x = 0, y = 0;
-  const int i = find_loaded_cell(m, k, distance, &place);
+  const double dt = 1e-5; /* s, for the speed: a parabola through later places, some t begin at 0 */
+  double p[3], place, shape[4], x = 0, y = 0;
+  for (int j = 0; j < 3; ++j) p[j] = value_at(m->position + k, t + j * dt);
+  const double speed = (4 * p[1] - 3 * p[0] - p[2]) / (2 * dt);
+  const int i = find_loaded_cell(m, k, p[0], &place);
   if (i < 0) return 0;
   const int32_t *dof = m->freedom + 3 * n * m->cell[i];
   const double *ends = m->angle + 2 * m->cell[i];
@@ -103,12 +106,7 @@ static double energy_of_moving_mass(const moving_loads *m, int k, double distanc
 /* Set the kinetic energies of the masses at the time t. */
 void start_moving_masses(const moving_loads *m, double t, const double *q, const double *v)
 {
-  const double dt = 1e-5; /* s, for the speed */
-  for (int k = 0; k < m->loads; ++k) {
-    const double before = value_at(m->position + k, t - dt), after = value_at(m->position + k, t + dt);
-    const double place = value_at(m->position + k, t);
-    m->kinetic[k] = energy_of_moving_mass(m, k, place, (after - before) / (2 * dt), q, v, 0);
-  }
+  for (int k = 0; k < m->loads; ++k) m->kinetic[k] = energy_of_moving_mass(m, k, t, q, v, 0);
 }
 
 void add_energy_of_moving_masses(void *self, const time_step *step, const double *q1, const double *s)
@@ -122,9 +120,7 @@ void accept_moving_loads(void *self, const time_step *step, const double *q1, co
   const moving_loads *m = self;
   *m->work += work_in_step(m->size, m->dof, m->weight_of_before, m->force_before, m->force, s);
   for (int k = 0; m->rates && k < m->loads; ++k) {
-    const double *motion = m->motion + 3 * k, speed = motion[1] + motion[2] * (step->t1 - step->load_time);
-    const double place = value_at(m->position + k, step->t1);
-    const double energy = energy_of_moving_mass(m, k, place, speed, q1, 0, s);
+    const double energy = energy_of_moving_mass(m, k, step->t1, q1, 0, s);
     *m->work += energy - m->kinetic[k];
     m->kinetic[k] = energy;
   }
