@@ -40,6 +40,7 @@ from ufl_beam.analysis.free_decay import (
     logarithmic_decrement,
     peaks,
 )
+from ufl_beam.analysis.imperfections import imperfect
 from ufl_beam.analysis.modes import Buckling as Buckling
 from ufl_beam.analysis.modes import Modes as Modes
 from ufl_beam.analysis.modes import buckling, modes
@@ -118,7 +119,9 @@ from ufl_beam.model.loads import (
     Gravity,
     KelvinVoigt,
     LineLoad,
+    MovingLoad,
     PointLoad,
+    Pressure,
     Rayleigh,
     RotatingFrame,
 )
@@ -239,6 +242,7 @@ __all__ = [
     "MidpointDynamics",
     "ModelError",
     "ModelWarning",
+    "MovingLoad",
     "Newmark",
     "Newton",
     "Normal",
@@ -251,6 +255,7 @@ __all__ = [
     "PrescribedDisplacement",
     "PrescribedForce",
     "PrescribedMotion",
+    "Pressure",
     "Prismatic",
     "RambergOsgood",
     "Rayleigh",
@@ -292,6 +297,7 @@ __all__ = [
     "fit_decay",
     "follow",
     "ground",
+    "imperfect",
     "interaction_diagram",
     "law_functions",
     "logarithmic_decrement",

@@ -115,9 +115,36 @@ class Balance:
                     factor = self.factor(load.amplitude) * load.factors(np.array([place.s]))[0]
                     force = force + factor * np.array(load.force)
                     moment += factor * load.moment
+                if isinstance(load, ub.Pressure) and load.beam is beam:
+                    factor = self.factor(load.amplitude) * load.factors(np.array([place.s]))[0]
+                    x, y = factor * self._slope(place, s1 - s0) / length
+                    along, across = load.tangential, load.normal
+                    force = force + np.array([along * x - across * y, along * y + across * x])
+                if isinstance(load, ub.MovingLoad):
+                    total += w / 2 * self._of_moving_load(load, beam, k)
             of_works = self._of_works(beam, place, (s0, s1), length)
             total += w / 2 * length * self.at(place, force + of_works[:2], moment + of_works[2])
         return total
+
+    def _of_moving_load(self, load, beam, k):
+        """Force on the k-th cell of a beam, at its place on the axis between the nodes."""
+        numbering, d = self.solution.numbering, load.position(self.t)
+        cells = np.concatenate([numbering.cells_of(one) for one in load.route])
+        ends = np.append(0.0, np.cumsum(numbering.lengths(cells)))
+        i = np.searchsorted(ends, d) - 1 if d else 0
+        if not 0.0 <= d <= ends[-1] or cells[i] != numbering.cells_of(beam)[k]:
+            return np.zeros(3)
+        s, ξ = numbering.parameters(beam), (d - ends[i]) / (ends[i + 1] - ends[i])
+        place = beam.at(s[k] + ξ * (s[k + 1] - s[k]))
+        return self.at(place, self.factor(load.amplitude) * np.array(load.force))
+
+    def _slope(self, place, width):
+        """Derivative of the position by the fraction of a cell; exact for cubic polynomials."""
+        x = [
+            self.solution.position(place.beam.at(place.s + k * width / 50))[-1]
+            for k in (-2, -1, 1, 2)
+        ]
+        return 50 * (8 * (x[2] - x[1]) - (x[3] - x[0])) / 12
 
     def _nodes(self, beam, k):
         """Vertices of the k-th cell of a beam."""

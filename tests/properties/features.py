@@ -267,10 +267,11 @@ def propped(d):
 @feature("tip")
 def moved_tip(d):
     component, size = d.one([("u", 0.05), ("v", 0.1), ("psi", 0.3)])
+    along = d.one(["", ", along=(1.0, 0.4)"]) if component != "psi" else ""
     way = f"ub.Table([0.0, {d.end / 2:.4g}, {d.end:.4g}], [0.0, {size}, {-size / 2}])"
     if not d.static:  # kinks of motions are blows, of which the energy does not converge
         way = f"lambda t: {size} * (1.0 - math.cos({d.some(2, 6) / d.end:.4g} * t))"
-    d.supports.append(f"ub.PrescribedDisplacement({d.last}.end, {component}={way})")
+    d.supports.append(f"ub.PrescribedDisplacement({d.last}.end, {component}={way}{along})")
 
 
 @feature("root")

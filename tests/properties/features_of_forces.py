@@ -232,6 +232,24 @@ def imposed_strain(d):
 
 
 @feature()
+def pressure(d):
+    more = d.one(["", ", span=(0.25, 0.75)", ", profile=(1.5, -0.5)", PART, CURVED])
+    d.loads.append(
+        f"ub.Pressure(b0, {d.some(-20, 20):.3f}, {d.some(-20, 20):.3f}{more}, amplitude={d.time()})"
+    )
+
+
+@feature()
+def moving_load(d):
+    place = d.one(["3 * t / END - 1", "0.2 + 0.1 * math.sin(20 * t)", "0.5"])
+    beam = d.one(["b0", "[b1, b2]"]) if len(d.beams) > 2 else "b0"
+    d.loads.append(
+        f"ub.MovingLoad({beam}, lambda t: {place.replace('END', f'{d.end:.4g}')}, "
+        f"({d.some(-15, 15):.3f}, {d.some(-15, 15):.3f}), {d.time()}{d.one(['', ', mass=0.5'])})"
+    )
+
+
+@feature()
 def gravity(d):
     d.loads.append(f"ub.Gravity(({d.some(-5, 5):.3f}, -9.81), amplitude={d.time()})")
 

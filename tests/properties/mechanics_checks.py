@@ -60,7 +60,8 @@ def jumps(case):
     attached, supports = {}, {}
     for owner, place in scene.attachments():
         if isinstance(place, ub.Place) and not isinstance(
-            owner, ub.LineLoad | ub.ImposedStrain | ub.VirtualWork
+            owner,
+            ub.LineLoad | ub.Pressure | ub.MovingLoad | ub.ImposedStrain | ub.VirtualWork,
         ):
             attached.setdefault((place.beam, round(place.s, 9)), []).append(owner)
     for support in scene.supports:
@@ -100,10 +101,22 @@ def momentum(case):
         words.has("ub.EnergyMomentum(", "ub.EnergyMomentumDecaying", "Weighted"),
         "other means of forces",
     )
-    only(not words.has("VirtualWork", "Potential", "RotatingFrame", "Rayleigh", "Guided"), "field")
+    only(
+        not words.has(
+            "VirtualWork",
+            "Potential",
+            "RotatingFrame",
+            "Rayleigh",
+            "Guided",
+            "Pressure",
+        ),
+        "field",
+    )
     only(not case.exact.failure, "a step fails")
     solution, scene = case.exact.solution, case.exact.names["scene"]
     only(solution.substeps == len(solution) - 1, "a step was cut")
+    moving = [load for load in scene.loads if isinstance(load, ub.MovingLoad)]
+    only(not any(load.mass for load in moving), "a mass that comes and goes")
     t, dt = solution.times, np.diff(solution.times)
     middle = (t[1:] + t[:-1]) / 2
     force, size = np.zeros((len(dt), 2)), 0.0
@@ -120,6 +133,10 @@ def momentum(case):
             add(factor * mass * np.array(load.acceleration))
         elif isinstance(load, ub.LineLoad):
             add(factor * _loaded_length(solution, load) * np.array(load.force))
+        elif load in moving:
+            places = np.array([load.position(x) for x in middle])[:, None]
+            there = (places >= 0) & (places <= sum(_length(solution, x) for x in load.route))
+            add(there * factor * np.array(load.force))
         elif not isinstance(load, ub.ImposedStrain):
             turn = solution.displacement(load.place)[:, 2]
             mean = (turn[1:] + turn[:-1]) / 2 * isinstance(load, ub.FollowerLoad)
@@ -189,6 +206,11 @@ def modes(case):
         load if isinstance(load, ub.RotatingFrame)
         else replace(load, amplitude=lambda t, load=load, end=t0: load.amplitude(end))
         for load in scene.loads
+    ]  # fmt: skip
+    held = [
+        replace(load, position=lambda t, load=load, end=t0: load.position(end), mass=0.0)
+        if isinstance(load, ub.MovingLoad) else load
+        for load in held
     ]  # fmt: skip
     still = replace(scene, loads=held)
     creep = [one.retardation_time for one in scene.damping if isinstance(one, ub.KelvinVoigt)]

@@ -48,6 +48,7 @@ ELSEWHERE = {
     },
     "other controls of paths": {"ArcLength", "DisplacementControl", "DissipationControl"},
     "many runs": {"Study", "TradeoffError", "study", "tradeoff"},
+    "other geometry of ordinary scenes": {"imperfect"},
     "errors and words": {"ConvergenceError", "CopiesDiffer", "ModelWarning", "ArgumentError",
         "ArgumentTypeError", "ModelError", "print_once"},
     "pictures of what is not in every combination, or of a second each": {

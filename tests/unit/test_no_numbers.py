@@ -60,6 +60,14 @@ LATER = {
         girder(loads=lambda b: ub.LineLoad(b, (1, 0), amplitude=after(v))),
         "LineLoad on girder: the time function is",
     ),
+    "MovingLoad": lambda v: (
+        girder(loads=lambda b: ub.MovingLoad(b, after(v), (1, 0))),
+        "MovingLoad on girder: the time function is",
+    ),
+    "Pressure": lambda v: (
+        girder(loads=lambda b: ub.Pressure(b, 1.0, amplitude=after(v))),
+        "Pressure on girder: the time function is",
+    ),
     "Gravity": lambda v: (
         girder(loads=lambda b: ub.Gravity(amplitude=after(v))),
         "Gravity: the time function is",

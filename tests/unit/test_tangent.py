@@ -30,6 +30,7 @@ def scene(kind):
         loads += [
             ub.FollowerLoad(b.at(1 / 3), force=(20, -30), moment=7),
             ub.FollowerLoad(c.start, force=(-10, 20)),
+            ub.Pressure(b, 20.0, -30.0, profile=(0.5, 2.0)),
         ]
     if "roller" in kind:
         supports[1] = ub.Roller(c.end, along=(2, 1))

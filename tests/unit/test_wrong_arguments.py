@@ -101,6 +101,10 @@ def V(value, kind):
 
 PLACE = V(BEAM.end, NO_PLACE)
 TIMED = {"moment": V(1.0, NUMBER), "amplitude": V(lambda t: t, [*TIME, None])}
+PART = {
+    "span": V((0.2, 0.6), [*VECTOR, (0.6, 0.2), (0.2, 0.2), (-0.1, 0.5), (0.5, 1.1)]),
+    "profile": V((0.0, 1.0), [*VECTOR, *(f for f in TIME if f is not ARRAY)]),
+}
 SHAPE = {
     "E": V(1.0, POSITIVE),
     "nu": V(0.3, [*NUMBER, 0.6, -1.0]),
@@ -340,9 +344,17 @@ TABLE = {
     "PointLoad": call(ub.PointLoad, place=PLACE, force=V((1, 0), VECTOR), **TIMED),
     "FollowerLoad": call(ub.FollowerLoad, place=PLACE, force=V((1, 0), VECTOR), **TIMED),
     "LineLoad": call(
-        ub.LineLoad, beam=V(BEAM, NO_BEAM), force=V((1, 0), VECTOR), **TIMED,
-        span=V((0.2, 0.6), [*VECTOR, (0.6, 0.2), (0.2, 0.2), (-0.1, 0.5), (0.5, 1.1)]),
-        profile=V((0.0, 1.0), [*VECTOR, *(f for f in TIME if f is not ARRAY)]),
+        ub.LineLoad, beam=V(BEAM, NO_BEAM), force=V((1, 0), VECTOR), **TIMED, **PART
+    ),
+    "Pressure": call(
+        ub.Pressure, beam=V(BEAM, NO_BEAM), normal=V(1.0, NUMBER), tangential=V(1.0, NUMBER),
+        amplitude=TIMED["amplitude"], **PART,
+    ),
+    "MovingLoad": call(
+        ub.MovingLoad,
+        beam=V(BEAM, [*(x for x in NO_BEAM if not isinstance(x, list)), []]),
+        position=V(lambda t: t, [*TIME, None]),
+        force=V((1, 0), VECTOR), amplitude=TIMED["amplitude"], mass=V(1.0, FROM_ZERO),
     ),
     "ImposedStrain": call(
         ub.ImposedStrain, beam=V(BEAM, NO_BEAM),
@@ -409,6 +421,7 @@ TABLE = {
             name: V(0.0, [*(v for v in OPTIONAL_NUMBER), *(f for f in TIME if callable(f))])
             for name in ("u", "v", "psi")
         },
+        along=V((1.0, 0.5), [*VECTOR, (0, 0)]),
     ),
     "PointMass": call(
         ub.PointMass, place=PLACE, mass=V(1.0, FROM_ZERO), inertia=V(0.0, FROM_ZERO)
@@ -492,6 +505,13 @@ TABLE = {
         ub.buckling,
         scene=V(SCENE, OBJECT), n=V(1, COUNT), t=V(1.0, NUMBER), at=V(None, optional(OBJECT)),
         **MESH,
+    ),
+    "imperfect": call(
+        ub.imperfect,
+        scene=V(SCENE, OBJECT), sway=V(0.01, NUMBER),
+        bow=V({BEAM: 0.01}, [1.0, "ab", {BEAM: NAN}, {BEAM: "x"}, {1: 0.1}]),
+        mode=V(None, optional(OBJECT)), k=V(0, [None, "2", -1, 1.5, NAN]),
+        amplitude=V(0.1, NUMBER),
     ),
     "study": call(
         ub.study,
@@ -729,6 +749,10 @@ OWNERS = {
     },
     "LineLoad on girder": lambda f: {"loads": [ub.LineLoad(BEAM, force=(1, 0), amplitude=f)]},
     "ImposedStrain of girder": lambda f: {"loads": [ub.ImposedStrain(BEAM, 1e-4, amplitude=f)]},
+    "MovingLoad on girder": lambda f: {
+        "loads": [ub.MovingLoad(BEAM, f, force=(1, 0)), ub.MovingLoad(BEAM, lambda t: t, (1, 0), f)]
+    },
+    "Pressure on girder": lambda f: {"loads": [ub.Pressure(BEAM, 1.0, amplitude=f)]},
     "Gravity": lambda f: {"loads": [ub.Gravity(amplitude=f)]},
     "PrescribedDisplacement at girder.start": lambda f: {
         "supports": [ub.PrescribedDisplacement(BEAM.start, u=0, v=f, psi=0)]

@@ -355,7 +355,8 @@ def buckling(
 
     Raises:
         ArgumentError: The call is wrong; the scene is free to move; nothing acts on it; or it has a
-            :class:`FollowerLoad`, :class:`RotatingFrame`, :class:`ImposedStrain` or
+            :class:`FollowerLoad`, :class:`Pressure`, :class:`RotatingFrame`,
+            :class:`ImposedStrain` or
             :class:`VirtualWork`.
 
     Example:

@@ -269,6 +269,23 @@ class DofNumbering:
         x, y = (self.points[end] - self.points[start]).T
         return np.asarray(np.sqrt(x * x + y * y))
 
+    @cached_property
+    def axis_angles(self) -> Array:
+        """Directions of the smooth undeformed axis at both ends of cells; (num_cells, 2); rad."""
+        x, y = (self.points[self.cells[:, 1]] - self.points[self.cells[:, 0]]).T
+        chords = np.asarray(np.arctan2(y, x))
+        # The axis bisects the angle between two cells at a vertex, except at corners of the beam.
+        half = np.angle(np.exp(1j * np.diff(chords))) / 2
+        half[np.diff(self.beam_of_cell) != 0] = np.nan
+        for beam in self.scene.beams:
+            if beam.corners:
+                at_corners = np.isin(self.parameters(beam)[1:-1], beam.corners)
+                half[self.cells_of(beam)[:-1][at_corners]] = np.nan
+        # With one smooth neighbour the axis of a cell is circular; without a neighbour, straight.
+        first, last = np.append(np.nan, -half), np.append(half, np.nan)
+        both = np.where(np.isnan(first), -last, first), np.where(np.isnan(last), -first, last)
+        return np.asarray(chords[:, None] + np.nan_to_num(np.column_stack(both)))
+
     def hinges(self, beam: Member) -> list[SofteningLaw | None]:
         """Return the law of the hinge in the middle of each cell of a beam, or None."""
         return [beam.section.hinge] * len(self.cells_of(beam))

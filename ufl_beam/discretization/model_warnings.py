@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.caches import cached_by_structure
-from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.discretization.dof_numbering import DofNumbering, turned
 from ufl_beam.errors import warn
 from ufl_beam.model.bodies import GROUND, BodyPoint, Place, moves_with_node
 from ufl_beam.model.connector_laws import RIGID, PrescribedMotion
@@ -232,6 +232,10 @@ def warn_of_jumps(numbering: DofNumbering, t: float, q: Array, motions: Array) -
 
     ``motions`` are the relative motions of the connectors in this state; (num_connectors,).
     """
+    q = q.copy()
+    for support in numbering.scene.supports:
+        dofs = numbering.node(support.place)[:2]
+        q[dofs] = turned(q[dofs], np.full(1, -support.angle))[0]
     starts = [
         (
             f"{support}: {COMPONENTS[c]}",

@@ -266,16 +266,16 @@ class Mesh:
     def weights(self, s: npt.ArrayLike) -> Array:
         """Evaluate the Lagrange polynomials of a cell at ``s``, from 0 to 1; (..., nodes)."""
         powers = np.power.outer(s, np.arange(self.degree + 1))
-        return np.asarray(powers @ self._polynomials)
+        return np.asarray(powers @ self.polynomials)
 
     def slopes(self, s: npt.ArrayLike) -> Array:
         """Evaluate the derivatives of :meth:`weights` with respect to ``s``; (..., nodes)."""
         powers = np.arange(1, self.degree + 1) * np.power.outer(s, np.arange(self.degree))
-        return np.asarray(powers @ self._polynomials[1:])
+        return np.asarray(powers @ self.polynomials[1:])
 
     @cached_property
-    def _polynomials(self) -> Array:
-        """Coefficients of the Lagrange polynomials, in columns."""
+    def polynomials(self) -> Array:
+        """Coefficients of the Lagrange polynomials of a cell, in columns; (p+1, p+1)."""
         return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)))
 
     def vertices(self, beam: Member, attached: Sequence[float]) -> list[float]:

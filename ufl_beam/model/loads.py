@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
+from itertools import pairwise
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -13,8 +15,10 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import (
     ArgumentError,
+    ArgumentTypeError,
     ModelError,
     closed,
+    require_all,
     require_returned,
     require_vector,
     shorten,
@@ -160,9 +164,36 @@ def profile_at(s: Array, profile: Profile, span: tuple[float, float], what: str)
     return values
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class LoadAlongBeam(Load):
+    """Base of the loads that are distributed along a beam or a part of it."""
+
+    beam: Instance[Member]
+    _: KW_ONLY
+    span: Annotated[tuple[float, float], require_span] = (0.0, 1.0)
+    profile: Annotated[Profile, require_profile] = (1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.factors(np.array(self.span))
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__} on {self.beam.name}"
+
+    _label = __str__
+
+    def factors(self, s: Array) -> Array:
+        """Return the factors of the profile at parameters ``s``; they are zero outside of the span.
+
+        Raises:
+            ModelError: The profile is not a finite number at one of them.
+        """
+        return profile_at(s, self.profile, self.span, f"{self}: profile")
+
+
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
-class LineLoad(Load):
+class LineLoad(LoadAlongBeam):
     """Distributed dead force and moment along a beam or a part of it, per undeformed length.
 
     Args:
@@ -194,30 +225,117 @@ class LineLoad(Load):
         [1000. 1667.]
     """
 
-    beam: Instance[Member]
     force: Vector = (0.0, 0.0)
     moment: Number = 0.0
     amplitude: Timed = steady
-    _: KW_ONLY
-    span: Annotated[tuple[float, float], require_span] = (0.0, 1.0)
-    profile: Annotated[Profile, require_profile] = (1.0, 1.0)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.factors(np.array(self.span))
+
+@closed(OWN_LOAD)
+@dataclass(frozen=True, eq=False, repr=False)
+class Pressure(LoadAlongBeam):
+    """Pressure on a beam or a part of it: forces that turn with the deformed axis.
+
+    The forces are per deformed length, so a pressure p on a closed line has the potential p times
+    the enclosed area.  A pressure on an open line is not conservative if its ends move.
+
+    Args:
+        beam: Loaded beam.
+        normal: Force along the normal, which points to the left of the direction of the beam; N/m.
+        tangential: Force along the axis, in the direction of the beam; N/m.
+        amplitude: Factor on both forces, a function of time t (s).
+        span: As in :class:`LineLoad`.
+        profile: As in :class:`LineLoad`.
+
+    Raises:
+        ModelError: The span is not inside the beam, or the profile is no number somewhere.
+
+    Example:
+        >>> wind = ub.Pressure(beam, normal=-1e3)
+        >>> blown = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[wind])
+        >>> run = ub.simulate(blown, ub.Static(), t=(0, 1), dt=1.0)
+        >>> print(run.reaction(blown.supports[0])[-1, :2].round(2))  # N; the tip has turned
+        [  -0.67 2000.  ]
+    """
+
+    normal: Number = 0.0
+    tangential: Number = 0.0
+    amplitude: Timed = steady
+
+    dead: ClassVar = False
+
+
+def require_route(beams: object, what: str) -> Member | tuple[Member, ...]:
+    """Return a beam, or several in a row as a tuple, or raise."""
+    if isinstance(beams, Member):
+        return beams
+    if not isinstance(beams, Sequence):
+        raise ArgumentTypeError(f"{what} = {shorten(beams)} is neither a Beam nor a list of beams")
+    route: tuple[Member, ...] = require_all(beams, what, Member)
+    if not route:
+        raise ModelError(f"{what} is empty; give the beam along which the load moves")
+    for a, b in pairwise(route):
+        gap = math.dist(a.end.point, b.start.point)
+        if gap > 1e-9 * math.dist(a.start.point, a.end.point):
+            raise ModelError(
+                f"{what}: {b.name} starts {gap:.6g} m from the end of {a.name}; give beams in the "
+                "order and direction of the distance"
+            )
+    return route
+
+
+@closed(OWN_LOAD)
+@dataclass(frozen=True, eq=False, repr=False)
+class MovingLoad(Load):
+    """Dead force, and mass, that move along a beam, or along several beams in a row.
+
+    Nodal forces are consistent: the force times the shape functions of the cell in which it is.
+    Section forces are exact at the ends of cells.  Inside the cell of the load they are those of a
+    distributed force with the same resultant, so that there bending moments have errors up to
+    0.15 times the force times the length of the cell.
+
+    In dynamics, the acceleration of the mass is the one of the axis at its place, plus
+    s̈ t + (2 ṡ ψ̇ + ṡ² κ) n with the distance s and the rotation ψ and curvature κ of the axis; t
+    and n are tangent and normal of the cross-section.  The kinetic energy of the mass on the beam
+    is part of "kinetic" in the ledger; "loads" contains the energy that the drive of the mass
+    supplies, and with which the mass enters and leaves.  ``Gravity`` does not weigh this mass:
+    ``force`` contains its weight.  Analyses of modes ignore it.
+
+    Args:
+        beam: Beam along which the force moves, or a sequence of beams, each of which starts where
+            the one before ends.
+        position: Distance from the start of the first beam along the undeformed axis, a function of
+            time t (s); m.  The force acts while it is between zero and the length of the beams.
+        force: (F_x, F_y); N.
+        amplitude: Factor on the force, a function of time t (s).
+        mass: Mass that moves with the force; kg.
+
+    Raises:
+        ModelError: A beam does not start where the one before ends.
+
+    Example:
+        >>> axle = ub.MovingLoad(beam, lambda t: 10.0 * t, force=(0, -1e4))  # 10 m/s
+        >>> crossed = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[axle])
+        >>> run = ub.simulate(crossed, ub.Static(), t=(0, 0.3), dt=0.1)  # it leaves at t = 0.2 s
+        >>> print(run.reaction(crossed.supports[0])[:, 2].round())  # N m
+        [    0. 10000. 20000.     0.]
+    """
+
+    beam: Annotated[Member | Sequence[Member], require_route]
+    position: Timed
+    force: Vector = (0.0, 0.0)
+    amplitude: Timed = steady
+    _: KW_ONLY
+    mass: NotNegative = 0.0
 
     def __str__(self) -> str:
-        return f"LineLoad on {self.beam.name}"
+        return f"MovingLoad on {', '.join(beam.name for beam in self.route)}"
 
     _label = __str__
 
-    def factors(self, s: Array) -> Array:
-        """Return the factors of the profile at parameters ``s``; they are zero outside of the span.
-
-        Raises:
-            ModelError: The profile is not a finite number at one of them.
-        """
-        return profile_at(s, self.profile, self.span, f"{self}: profile")
+    @property
+    def route(self) -> tuple[Member, ...]:
+        """The beams in the order of the distance."""
+        return (self.beam,) if isinstance(self.beam, Member) else tuple(self.beam)
 
 
 @closed(OWN_LOAD)
@@ -270,7 +388,7 @@ class RotatingFrame(Load):
     dead: ClassVar = False
 
 
-LOADS = PointLoad, FollowerLoad, LineLoad, Gravity, RotatingFrame
+LOADS = PointLoad, FollowerLoad, LineLoad, Pressure, MovingLoad, Gravity, RotatingFrame
 """All classes of loads."""
 
 

@@ -46,9 +46,10 @@ from ufl_beam.model.loads import (
     LOADS,
     Damping,
     KelvinVoigt,
-    LineLoad,
     Load,
+    LoadAlongBeam,
     LoadAtPlace,
+    MovingLoad,
     PointLoad,
     RotatingFrame,
 )
@@ -72,8 +73,8 @@ class Scene(Record, Rich):
             :class:`Link`, :class:`Guided`, :class:`Release`.
         supports: :class:`Clamped`, :class:`Pinned`, :class:`Roller`,
             :class:`PrescribedDisplacement`.
-        loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`,
-            :class:`ImposedStrain`,
+        loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Pressure`,
+            :class:`MovingLoad`, :class:`ImposedStrain`, :class:`Gravity`,
             :class:`RotatingFrame`.
         masses: :class:`PointMass`.
         initial: :class:`Velocity`; by default the scene is at rest.
@@ -229,6 +230,7 @@ class Scene(Record, Rich):
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
         """Iterate over (owner, function of time) for loads, supports, connectors and works."""
         yield from ((load, load.amplitude) for load in self.loads)
+        yield from ((load, load.position) for load in self.loads if isinstance(load, MovingLoad))
         yield from ((x, motion) for x in self.supports for motion in x.held.values())
         for connector in self.all_connectors:
             if isinstance(connector.law, PrescribedMotion):
@@ -251,8 +253,10 @@ class Scene(Record, Rich):
         for load in self.loads:
             if isinstance(load, LoadAtPlace):
                 yield load, load.place
-            elif isinstance(load, LineLoad | ImposedStrain):
+            elif isinstance(load, LoadAlongBeam | ImposedStrain):
                 yield from ((load, load.beam.at(s)) for s in load.span)
+            elif isinstance(load, MovingLoad):
+                yield from ((load, beam.start) for beam in load.route)
         for velocity in self.initial:
             for member in velocity.beams:
                 yield "Velocity", member.middle if isinstance(member, Body) else member.start

@@ -128,10 +128,21 @@ class Roller(Support):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PrescribedDisplacement(Support):
-    """Prescribed motion of a place by numbers or functions of time; m, m, rad.
+    """Prescribed motion of a place by numbers or functions of time, such as a settlement.
 
     A number is the value from the first step on, also in statics.  For a motion that grows in time
-    give a function such as ``lambda t: 0.1 * t``.  Components without a value are free.
+    give a function such as ``lambda t: 0.1 * t``.  Components without a value are free.  The work
+    of moving supports is the entry "supports" of ``energy.supplied``.
+
+    Args:
+        place: Supported place: on a beam, or the centre of a body.
+        u: Displacement along x, or in the direction ``along``; m.
+        v: Displacement along y, or to the left of the direction ``along``; m.
+        psi: Rotation; rad.
+        along: Direction of ``u``, for a support at an angle.
+
+    Raises:
+        ModelError: No component is prescribed, or ``along`` is zero.
 
     Example:
         >>> turned = ub.PrescribedDisplacement(
@@ -146,6 +157,17 @@ class PrescribedDisplacement(Support):
     u: Motion | None = None
     v: Motion | None = None
     psi: Motion | None = None
+    along: Vector = (1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not any(self.along):
+            raise ModelError(f"{self}: along = (0, 0) is no direction")
+
+    @property
+    def angle(self) -> float:  # type: ignore[override]
+        """Direction of ``u``; rad."""
+        return math.atan2(self.along[1], self.along[0])
 
     @cached_property
     def held(self) -> dict[int, TimeFunction]:

@@ -127,19 +127,7 @@ class ForcesAlongCells:
         self.dofs: Index = numbering.dofs[nodes].transpose(0, 2, 1)
         self._works = bool(numbering.scene.works)
         self._places: Array = numbering.points[nodes[:, self._along]].transpose(2, 0, 1)
-        x, y = self._places[:, :, -1] - self._places[:, :, 0]
-        chords = np.asarray(np.arctan2(y, x))
-        # The axis bisects the angle between two cells at a vertex, except at corners of the beam.
-        half = np.angle(np.exp(1j * np.diff(chords))) / 2
-        half[np.diff(numbering.beam_of_cell) != 0] = np.nan
-        for beam in numbering.scene.beams:
-            if beam.corners:
-                at_corners = np.isin(numbering.parameters(beam)[1:-1], beam.corners)
-                half[numbering.cells_of(beam)[:-1][at_corners]] = np.nan
-        # With one smooth neighbour the axis of a cell is circular; without a neighbour, straight.
-        first, last = np.append(np.nan, -half), np.append(half, np.nan)
-        both = np.where(np.isnan(first), -last, first), np.where(np.isnan(last), -first, last)
-        self.angles: Array = chords[:, None] + np.nan_to_num(np.column_stack(both))
+        self.angles: Array = numbering.axis_angles
 
     def __call__(
         self,

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,14 @@ from ufl_beam.model.bodies import AttachmentPoint, Body, Member, Place, Velocity
 from ufl_beam.model.connectors import law_of, place_of
 from ufl_beam.model.functions import TimeFunction, steady
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.model.loads import FollowerLoad, LineLoad, LoadAtPlace
+from ufl_beam.model.loads import (
+    FollowerLoad,
+    LineLoad,
+    LoadAlongBeam,
+    LoadAtPlace,
+    MovingLoad,
+    Pressure,
+)
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.plotting import positions, symbols
@@ -49,11 +57,11 @@ class Subject:
             known = Counter(member.name for member in objects)
             for k, member in enumerate(objects):
                 self.names[member] = f"{member.name} {k}" if known[member.name] > 1 else member.name
-        forces = [x.force for x in scene.loads if isinstance(x, LoadAtPlace)]
+        forces = [x.force for x in scene.loads if isinstance(x, LoadAtPlace | MovingLoad)]
         lines = [
-            np.abs(self.line(x)[1]).max() * np.array(x.force)
+            np.abs(self.line(x)[1]).max() * _components(x)
             for x in scene.loads
-            if isinstance(x, LineLoad)
+            if isinstance(x, LoadAlongBeam)
         ]
         speeds = [
             velocity.at(*at)[:2]
@@ -68,7 +76,7 @@ class Subject:
         ends = [(x[0], x[1], x[-1], x[-2]) for x in self.axes.values()]
         self._ends: Array = np.reshape(ends, (-1, 2, 2))
 
-    def line(self, load: LineLoad | ImposedStrain) -> tuple[Array, Array]:
+    def line(self, load: LoadAlongBeam | ImposedStrain) -> tuple[Array, Array]:
         """Return points of the axis in the span of a load, (n, 2); m, and its factors or strains.
 
         The points are the vertices and, if factors or strains vary, 99 points between the ends.
@@ -76,7 +84,7 @@ class Subject:
         s = np.array(load.beam.vertices(self.scene.attached[load.beam]))
         low, high = (np.abs(s - end).argmin() for end in load.span)
         s = s[low : high + 1]
-        profile = load.profile if isinstance(load, LineLoad) else load.strains
+        profile = load.profile if isinstance(load, LoadAlongBeam) else load.strains
         if callable(profile) or profile[0] != profile[1]:
             s = np.union1d(s, np.linspace(s[0], s[-1], 101))
         axis = np.array([load.beam.curve(x) for x in s], float)
@@ -166,13 +174,15 @@ def draw(subject: Subject, scale: float) -> Drawing:
         spots = _around(np.array(mass.place.point), 0.45 * drawing.unit)
         drawing.write(f"{mass.mass:.4g} kg", INK, CAPTIONS, spots)
     # Line loads come first, so that forces are stacked above them.
-    for load in sorted(scene.loads, key=lambda load: not isinstance(load, LineLoad)):
-        if isinstance(load, LineLoad):
+    for load in sorted(scene.loads, key=lambda load: not isinstance(load, LoadAlongBeam)):
+        if isinstance(load, LoadAlongBeam):
             _draw_line_load(drawing, load)
         elif isinstance(load, ImposedStrain):
             _draw_imposed_strain(drawing, load)
         elif isinstance(load, LoadAtPlace):
             _draw_point_load(drawing, load)
+        elif isinstance(load, MovingLoad):
+            _draw_moving_load(drawing, load)
     for velocity in scene.initial:
         _draw_velocity(drawing, velocity)
     return drawing
@@ -291,6 +301,23 @@ def _draw_point_load(drawing: Drawing, load: LoadAtPlace) -> None:
         drawing.write("0 N", RED, LOAD_LABELS, _around(at, 0.0))
 
 
+def _draw_moving_load(drawing: Drawing, load: MovingLoad) -> None:
+    """Draw the force at its place at t = 0, or at the end of the beams where it is closest."""
+    size, subject = math.hypot(*load.force), drawing.subject
+    lengths = [positions.lengths_along(subject.axes[beam])[-1] for beam in load.route]
+    ends = np.cumsum(lengths)
+    distance = min(max(float(load.position(0.0)), 0.0), ends[-1])
+    k = int(np.searchsorted(ends, distance))
+    place = load.route[k].at(float(1.0 - (ends[k] - distance) / lengths[k]))
+    if not size:
+        drawing.write("0 N", RED, LOAD_LABELS, _around(np.array(place.point), 0.0))
+        return
+    line = _force_arrow(drawing, place, np.array(load.force) / size, size / subject.force)
+    drawing.strokes["loads"] += _arrow(line, RED, drawing.outside)
+    text = in_time(with_unit(size, "N"), load.amplitude) + ", moves"
+    drawing.write(text, RED, LOAD_LABELS, _beside(*line))
+
+
 def _force_arrow(
     drawing: Drawing, place: AttachmentPoint, direction: Array, fraction: float
 ) -> Array:
@@ -314,49 +341,74 @@ def _force_arrow(
     return np.asarray(at + ends if pulls else at - ends[::-1])
 
 
-def _draw_line_load(drawing: Drawing, load: LineLoad) -> None:
-    """Draw arrows of a line load, which end on the beam or are parallel to it, and moments."""
+def _components(load: LoadAlongBeam) -> Array:
+    """Return the force per length along x and y, or along the axis and its normal; (2,); N/m."""
+    if isinstance(load, Pressure):
+        return np.array([load.tangential, load.normal])
+    assert isinstance(load, LineLoad)
+    return np.array(load.force)
+
+
+def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
+    """Draw arrows of a line load, which end on the beam or are parallel to it, and moments.
+
+    Arrows of a pressure have hollow heads.
+    """
     (axis, factors), unit = drawing.subject.line(load), drawing.outside
     largest = factors[np.abs(factors).argmax()]  # the sizes in labels are the largest ones
-    size, moment = math.hypot(*load.force) * abs(largest), load.moment * largest
+    force, turns = _components(load) * largest, isinstance(load, Pressure)
+    size, moment = math.hypot(*force), load.moment * largest if isinstance(load, LineLoad) else 0.0
     shares = factors / largest if largest else factors
     lengths = positions.lengths_along(axis)
+    ways: Array = np.tile(force / (size or 1.0), (len(axis), 1))  # direction at each point
+    if turns:
+        tangents = unit_vectors(np.gradient(axis, lengths, axis=0))
+        ways = ways[:, :1] * tangents + ways[:, 1:] * normal(tangents)
 
-    def spaced(distance: float, *, ends: bool = False) -> tuple[Array, Array]:
-        """Return equally spaced points, about ``distance`` apart, (n, 2); m, and their shares."""
+    def spaced(distance: float, *, ends: bool = False) -> list[Any]:
+        """List equally spaced points, about ``distance`` apart; m, with shares and directions."""
         number = max(1, round(lengths[-1] / distance))
         steps = (np.arange(number + 1) if ends else np.arange(number) + 0.5) / number
-        return points_along(axis, steps), np.interp(steps * lengths[-1], lengths, shares)
+        at = steps * lengths[-1]
+        share, *way = (np.interp(at, lengths, x) for x in (shares, *ways.T))
+        return list(zip(points_along(axis, steps), share, np.column_stack(way), strict=True))
 
     if size > 0.0:
-        direction, chord = np.array(load.force) * largest / size, axis[-1] - axis[0]
-        if abs(normal(chord) @ direction) > 0.25 * np.linalg.norm(chord):
+        direction, chord = force / size, axis[-1] - axis[0]
+        across = direction[1] if turns else normal(chord) @ direction / np.linalg.norm(chord)
+        if abs(across) > 0.25:
             height = (1.3 + 1.1 * size / drawing.subject.line_load) * unit
             begin = drawing.stack((load.beam, *np.round(direction, 6)), height + 0.35 * unit)
             low = begin + 0.3 * unit
-            line = axis - np.outer(low + height * np.abs(shares), direction)
+            line = axis - (low + height * np.abs(shares))[:, None] * ways
             drawing.strokes["loads"] += [Stroke(line, RED, 1.2, layer=FRONT)]
-            for foot, share in zip(*spaced(2.0 * unit, ends=True), strict=True):
+            for foot, share, way in spaced(2.0 * unit, ends=True):
                 if height * abs(share) > 0.5 * unit:
-                    ends = foot - np.outer((low + height * abs(share), low), direction)
+                    ends = foot - np.outer((low + height * abs(share), low), way)
                     ends = ends if share > 0 else ends[::-1]
-                    drawing.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
+                    drawing.strokes["loads"] += _arrow(ends, RED, unit, hollow=turns, size=0.62)
             outwards = [
-                (at, left if left @ direction < 0 else -left) for at, left in _normals(line)
+                (at, left if (across if turns else left @ direction) < 0 else -left)
+                for at, left in _normals(line)
             ]
             spots = [Candidate(at, side) for at, out in outwards for side in (out, -out)]
         else:
             aside = 0.8 * unit + drawing.stack((load.beam, "along"), 0.7 * unit)
-            left = normal(direction)
-            for at, share in zip(*spaced(2.4 * unit), strict=True):
+            for at, share, way in spaced(2.4 * unit):
                 if abs(share) > 0.05:
                     half = 0.9 * unit * math.copysign(1.0, share)
-                    ends = at + aside * left + np.outer((-half, half), direction)
-                    drawing.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
-            spots = [Candidate(at, left, aside + 0.3 * unit) for at, _ in _normals(axis)]
-        drawing.write(in_time(with_unit(size, "N/m"), load.amplitude), RED, LOAD_LABELS, spots)
+                    ends = at + aside * normal(way) + np.outer((-half, half), way)
+                    drawing.strokes["loads"] += _arrow(ends, RED, unit, hollow=turns, size=0.62)
+            spots = [
+                Candidate(
+                    at, direction[0] * left if turns else normal(direction), aside + 0.3 * unit
+                )
+                for at, left in _normals(axis)
+            ]
+        text = in_time(with_unit(size, "N/m"), load.amplitude) + ", follows" * turns
+        drawing.write(text, RED, LOAD_LABELS, spots)
     if moment:
-        for at, share in zip(*spaced(3.2 * unit), strict=True):
+        for at, share, _ in spaced(3.2 * unit):
             if abs(share) > 0.05:
                 line = _arc(np.asarray(at), 0.75 * unit, math.copysign(moment, moment * share))
                 drawing.strokes["loads"] += _arrow(line, RED, 0.7 * unit)

@@ -14,13 +14,28 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import perpendicular, split
-from ufl_beam.mechanics.time_scheme import Step, acting, has_inertia
+from ufl_beam.mechanics.time_scheme import (
+    Step,
+    acting,
+    combined,
+    has_inertia,
+    nodal_step,
+)
 from ufl_beam.model.bodies import GROUND, moves_with_node
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
+from ufl_beam.model.loads import (
+    FollowerLoad,
+    Gravity,
+    LineLoad,
+    Load,
+    MovingLoad,
+    PointLoad,
+    Pressure,
+    RotatingFrame,
+)
 from ufl_beam.model.works import Potential, Work
-from ufl_beam.reference.beam_residuals import Mass
+from ufl_beam.reference.beam_residuals import Inertia, Mass
 from ufl_beam.reference.cell_forms import (
     Archive,
     CellForce,
@@ -143,6 +158,178 @@ class Follower(LoadForce):
         np.add.at(force, self._dofs, [x, y, M])
         rotations = np.repeat(self._dofs[2], 2)
         return force, coupled(self.size, self._dofs[:2], rotations, np.array([-y, x]))
+
+
+class PressureForce(LoadForce):
+    """Pressure: forces along dx and its normal, by the work of each node's shape function."""
+
+    def __init__(self, load: Pressure, setting: Setting) -> None:
+        super().__init__(load, setting)
+        self._numbering = numbering = setting.numbering
+        cells, mesh = numbering.cells_of(load.beam), numbering.mesh
+        s, nodes = numbering.parameters(load.beam), numbering.nodes_of_cells[cells]
+        start, *inner, end = range(len(mesh.nodes))
+        order = [start, end, *inner]  # of the nodes of cells
+        forces: Array = np.zeros((len(cells), 2 * len(order), 2 * len(order)))
+        turned = np.array([[load.tangential, -load.normal], [load.normal, load.tangential]])
+        for matrix, s0, s1 in zip(forces, s[:-1], s[1:], strict=True):
+            for point, weight in zip(*np.polynomial.legendre.leggauss(5), strict=True):
+                at = (1 + point) / 2
+                factor = load.factors(np.array([s0 + at * (s1 - s0)]))[0] * weight / 2
+                pair = np.outer(mesh.weights(at)[order], mesh.slopes(at)[order])
+                matrix += np.kron(turned, factor * pair)
+        self._cells, self._matrices = cells, forces
+        dofs = numbering.dofs[nodes][:, :, :2].transpose(0, 2, 1).reshape(len(cells), -1)
+        self._places = numbering.points[nodes].transpose(0, 2, 1).reshape(dofs.shape)
+        self._dofs, rows = dofs, np.repeat(dofs, dofs.shape[1], axis=1).ravel()
+        columns = np.tile(dofs, dofs.shape[1]).ravel()
+        self._slope = csr_array((forces.ravel(), (rows, columns)), shape=(self.size, self.size))
+
+    def forces(self, q: Array) -> Response:
+        """Return the nodal forces, which are linear in the positions of the nodes."""
+        x, vector = self._places + q[self._dofs], np.zeros(self.size)
+        on_cells = np.einsum("kij,kj->ki", self._matrices, x)
+        np.add.at(vector, self._dofs, on_cells)
+        on_nodes = np.zeros((len(on_cells), 3, self._dofs.shape[1] // 2))
+        on_nodes[:, :2] = on_cells.reshape(len(on_cells), 2, -1)
+        self.along = end_forces(self._numbering, "density", self._cells, -on_nodes)
+        return vector, self._slope
+
+
+class MovingForce(LoadForce):
+    """Force and mass that move along a beam.
+
+    Substeps in statics apply a part of the change of the nodal forces.  The axis at the mass has
+    the tangent and the curvature of the rotations.
+    """
+
+    def __init__(self, load: MovingLoad, setting: Setting, inertia: Inertia | None) -> None:
+        super().__init__(load, setting)
+        self._numbering, self._moving = setting.numbering, load
+        self._inertia = inertia if load.mass else None
+        self._reached_forces = self._on_cell(0.0, np.zeros(2))
+        if self._inertia is not None:
+            self.stored = {"kinetic": 0.0}
+
+    def _at(self, t: float) -> tuple[int, Array, Array, Array] | None:
+        """Return the cell at a time, its degrees of freedom (3, n), shapes, and their slopes."""
+        numbering, load = self._numbering, self._moving
+        d = value_at(load.position, t, load)
+        cells = np.concatenate([numbering.cells_of(beam) for beam in load.route])
+        ends, mesh = np.append(0.0, np.cumsum(numbering.lengths(cells))), numbering.mesh
+        if not 0.0 <= d <= ends[-1]:
+            return None
+        i = max(int(np.searchsorted(ends, d)) - 1, 0)
+        first, *inner, last = range(len(mesh.nodes))
+        h, order = ends[i + 1] - ends[i], [first, last, *inner]
+        s, dofs = (d - ends[i]) / h, numbering.dofs[numbering.nodes_of_cells[cells[i]]]
+        return int(cells[i]), dofs.T, mesh.weights(s)[order], mesh.slopes(s)[order] / h
+
+    def _on_cell(self, t: float, force: Array) -> tuple[Array, Array]:
+        """Return the nodal forces of a force at the place of a time, and :attr:`on_nodes`."""
+        vector, at = np.zeros(self.size), self._at(t)
+        if at is None:
+            return vector, np.zeros((9, len(self._numbering.cells)))
+        cell, dofs, shapes, _ = at
+        on_nodes = np.zeros((1, 3, len(shapes)))
+        on_nodes[0, :2] = np.outer(force, shapes)
+        np.add.at(vector, dofs[:2], on_nodes[0, :2])
+        return vector, end_forces(self._numbering, "density", np.array([cell]), -on_nodes)
+
+    def _forces_at(self, t: float) -> tuple[Array, Array]:
+        size = value_at(self.time, t, self.load)
+        return self._on_cell(t, size * np.array(self._moving.force))
+
+    def _direction(self, cell: int, shapes: Array, slopes: Array, ψ: Array) -> tuple[float, float]:
+        """Return angle and curvature of the axis at a place of a cell with the rotations ψ."""
+        (first, last), h = (
+            self._numbering.axis_angles[cell],
+            self._numbering.lengths(np.array([cell]))[0],
+        )
+        ends = np.array([0.0, 1.0, *self._numbering.mesh.nodes[1:-1]])
+        return float(first + (shapes @ ends) * (last - first) + shapes @ ψ), float(
+            (last - first) / h + slopes @ ψ
+        )
+
+    def _speeds(self, step: Step) -> tuple[float, float]:
+        """Return speed and acceleration along the beam at the time of the loads."""
+        half, load = step.dt / 2, self._moving
+        before, now, after = (
+            value_at(load.position, step.load_time + k * half, load) for k in (-1, 0, 1)
+        )
+        return (after - before) / step.dt, (after - 2 * now + before) / half**2
+
+    def _of_mass(self, step: Step, q1: Array) -> tuple[Array, Array, csr_array]:
+        """Return nodal forces of the mass, :attr:`on_nodes`, and the derivative of the forces."""
+        inertia, at, slope = self._inertia, self._at(step.load_time), csr_array((self.size,) * 2)
+        if inertia is None or at is None:
+            return *self._on_cell(step.load_time, np.zeros(2)), slope
+        cell, dofs, shapes, slopes = at
+        s = nodal_step(self.scheme, step.q0, q1, self._numbering.rotations)
+        rows = inertia.scheme.coefficients(step.dt, inertia.last_dt, len(inertia.more))[:2]
+        a, v = (combined(row, s, inertia) for row in rows)
+        θ, κ = self._direction(cell, shapes, slopes, self.place(step, q1)[dofs[2]])
+        speed, gain = self._speeds(step)
+        t, n = np.array([math.cos(θ), math.sin(θ)]), np.array([-math.sin(θ), math.cos(θ)])
+        turn = 2 * speed * (shapes @ v[dofs[2]]) + speed**2 * κ
+        force = -self._moving.mass * (a[dofs[:2]] @ shapes + gain * t + turn * n)
+        c_a, c_v = (row[0] for row in rows)
+        w, half = self.scheme.load_weight, s[dofs[2]] / 2 * self.scheme.half_tangents
+        by_turn = np.outer(n, 2 * speed * c_v * (1 + half**2) * shapes + w * speed**2 * slopes)
+        by_ψ = -self._moving.mass * (by_turn + w * np.outer(gain * n - turn * t, shapes))
+        for k in (0, 1):
+            for column, row_values in (
+                (dofs[k], -self._moving.mass * c_a * shapes),
+                (dofs[2], by_ψ[k]),
+            ):
+                values = np.outer(shapes, row_values)
+                pairs = (np.repeat(dofs[k], len(shapes)), np.tile(column, len(shapes)))
+                slope = slope + csr_array((values.ravel(), pairs), shape=slope.shape)
+        return *self._on_cell(step.load_time, force), csr_array(slope)
+
+    def _kinetic(self, t: float, q: Array, v: Array) -> float:
+        """Return the kinetic energy of the mass, zero outside of the beam."""
+        if (at := self._at(t)) is None:
+            return 0.0
+        cell, dofs, shapes, slopes = at
+        dt, load = 1e-5, self._moving
+        p = [value_at(load.position, t + k * dt, load) for k in range(3)]
+        speed = (4 * p[1] - 3 * p[0] - p[2]) / (2 * dt)
+        θ, _ = self._direction(cell, shapes, slopes, q[dofs[2]])
+        velocity = v[dofs[:2]] @ shapes + speed * np.array([math.cos(θ), math.sin(θ)])
+        return float(self._moving.mass / 2 * velocity @ velocity)
+
+    def forces(self, q: Array) -> Response:
+        """Return the forces of the latest step, and their derivative, which is zero."""
+        return self.force, csr_array((self.size, self.size))
+
+    def response(self, step: Step, q1: Array) -> Response:
+        """Return minus the forces, and their derivative, which is zero."""
+        wanted = self._forces_at(step.load_time)
+        pairs = list(zip(self._reached_forces, wanted, strict=True))
+        self._end_forces = [a + step.fraction * (b - a) for a, b in pairs]
+        self.force, self.on_nodes = (a + step.at * step.fraction * (b - a) for a, b in pairs)
+        force, on_nodes, slope = self._of_mass(step, q1)
+        self.force, self.on_nodes = self.force + force, self.on_nodes + on_nodes
+        return -self.force, csr_array(-slope)
+
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
+        """Enter the work of the load, and of the drive of the mass, in the ledger."""
+        self._end = 0.0
+        super().accept(step, q1, s)
+        self._reached_forces = self._end_forces
+        if self._inertia is not None:
+            energy = self._kinetic(step.t1, q1, self._inertia.after(s)[0])
+            self.supplied["loads"] += energy - self.stored["kinetic"]
+            self.stored = {"kinetic": energy}
+
+    def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
+        """Return the load at time ``t``, which is assumed in equilibrium with the initial state."""
+        self._reached_forces = self._forces_at(t)
+        self.force = self._before = self._reached_forces[0]
+        if self._inertia is not None and v is not None:
+            self.stored = {"kinetic": self._kinetic(t, q, v)}
+        return self.force
 
 
 class FrameForce(LoadForce):
@@ -280,9 +467,10 @@ class WorkForce(CellForce):
             self._before = archive.vector(f"work of {self._work.name}", self._before)
 
 
-def all_loads(setting: Setting, mass: Mass | None, t0: float) -> list[LoadForce | WorkForce]:
+def all_loads(setting: Setting, inertia: Inertia | None, t0: float) -> list[LoadForce | WorkForce]:
     """Return all loads and works of a scene."""
     loads: list[LoadForce | WorkForce] = []
+    mass = None if inertia is None else inertia.mass
     for load in setting.numbering.scene.loads:
         if isinstance(load, RotatingFrame):
             loads.append(FrameForce(load, setting, mass or Mass(setting.numbering)))
@@ -290,6 +478,10 @@ def all_loads(setting: Setting, mass: Mass | None, t0: float) -> list[LoadForce 
             loads.append(Follower(load, setting))
         elif isinstance(load, ImposedStrain):  # see imposed_strains.py
             setting.ledger.supplied["loads"] += 0.0
+        elif isinstance(load, MovingLoad):
+            loads.append(MovingForce(load, setting, inertia))
+        elif isinstance(load, Pressure):
+            loads.append(PressureForce(load, setting))
         else:
             loads.append(DeadLoad(load, setting))
     return [*loads, *(WorkForce(work, setting, t0) for work in setting.numbering.scene.works)]

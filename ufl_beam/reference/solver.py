@@ -144,8 +144,7 @@ class Solver(PresentState):
         if has_inertia(scheme):
             self.inertia = Inertia(setting, scheme, self.supports.stop(v))
         inertia = [] if self.inertia is None else [self.inertia]
-        mass = None if self.inertia is None else self.inertia.mass
-        self.loads = all_loads(setting, mass, t)
+        self.loads = all_loads(setting, self.inertia, t)
         self.inner: list[Force] = [*self.beams, *self.connectors]
         damping = damping_forces(setting, self.inertia)
         self.forces: list[Force] = [*self.inner, *self.loads, *inertia, *damping]

@@ -27,7 +27,7 @@ from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import Curve, Table, nearest, parameter_step
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import START_INTERVAL
-from ufl_beam.model.loads import LineLoad, profile_at
+from ufl_beam.model.loads import LoadAlongBeam, profile_at
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.engineering_results import HingeTable, Storeys, hinges_of, storeys_of
 from ufl_beam.output.output_files import (
@@ -178,7 +178,7 @@ class Solution(States, Rich):
                 return SavedCurve.sampled(function, 0.0, 1.0, numbering.parameters(owner))
             if field == "curve":
                 return _used_curve(self, function)
-            if isinstance(owner, LineLoad | ImposedStrain) and field != "amplitude":
+            if isinstance(owner, LoadAlongBeam | ImposedStrain) and field != "amplitude":
                 even = np.linspace(*owner.span, SAMPLES + 1)
                 s = np.union1d(numbering.gauss_parameters(owner.beam), even)
                 s = s[(s >= owner.span[0]) & (s <= owner.span[1])]
@@ -513,7 +513,7 @@ NAMED = {
 }  # fmt: skip
 """Attributes that a file contains unchanged, and their types."""
 
-TIME_FUNCTIONS = ("amplitude", "u", "v", "psi", "motion", "force", "numbers")
+TIME_FUNCTIONS = ("amplitude", "position", "u", "v", "psi", "motion", "force", "numbers")
 """Names of fields with functions of time; "force" of controllers and force laws is an exception."""
 
 

@@ -124,7 +124,9 @@ class StepEquation:
         )  # fmt: skip
         self.connector_terms = together(connector_terms, subdomain, connectors, A)
 
-        self.loads: list[LoadTerm] = load_terms(fields, scheme, ledger, A)
+        self.loads: list[LoadTerm] = load_terms(
+            fields, scheme, ledger, A, None if inertia is None else inertia.c
+        )
         if imposed is not None:
             self.loads.append(imposed)
         if scene.works:

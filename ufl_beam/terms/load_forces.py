@@ -7,7 +7,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -27,28 +27,48 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.functions import value_at
-from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
+from ufl_beam.model.loads import (
+    FollowerLoad,
+    Gravity,
+    LineLoad,
+    Load,
+    LoadAlongBeam,
+    MovingLoad,
+    PointLoad,
+    Pressure,
+    RotatingFrame,
+)
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term
 
 
-def load_terms(fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> list[LoadTerm]:
-    """Create the terms of the loads of a scene, one for all loads with the same kind of force."""
+def load_terms(
+    fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr, rates: Any = None
+) -> list[LoadTerm]:
+    """Create the terms of the loads of a scene, one for all loads with the same kind of force.
+
+    ``rates`` of loops.h are the rates of the scene; None in statics.
+    """
     subdomain, loads = fields.subdomain, fields.subdomain.numbering.scene.loads
     if loads:
         ledger.supplied["loads"] += 0.0
     followers = [load for load in loads if isinstance(load, FollowerLoad)]
     frames = [load for load in loads if isinstance(load, RotatingFrame)]
-    strains = [load for load in loads if isinstance(load, ImposedStrain)]  # see imposed_strains.py
-    dead = [load for load in loads if load not in (*followers, *frames, *strains)]
+    pressures = [load for load in loads if isinstance(load, Pressure)]
+    moving = [load for load in loads if isinstance(load, MovingLoad)]
+    dead = [load for load in loads if load.dead and load not in moving]
     terms: list[LoadTerm] = [FrameForces(x, fields, scheme, ledger, A) for x in frames]
     if dead:
         terms.append(DeadLoads(dead, subdomain, scheme, ledger))
     if followers:
         terms.append(FollowerLoads(followers, subdomain, scheme, ledger, A))
+    if pressures:
+        terms.append(Pressures(pressures, subdomain, scheme, ledger, A))
+    if moving:
+        terms.append(MovingLoads(moving, subdomain, scheme, ledger, A, rates))
     return terms
 
 
@@ -186,10 +206,8 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Ind
     if isinstance(load, PointLoad):
         at_places = [(load.place, (*load.force, load.moment))]
     elif isinstance(load, LineLoad):
-        beam_cells = numbering.cells_of(load.beam)
-        loaded = np.flatnonzero((cells >= beam_cells[0]) & (cells <= beam_cells[-1]))
-        s = numbering.gauss_parameters(load.beam)[cells[loaded] - beam_cells[0]]
-        shares, density = load.factors(s) @ mesh.gauss[1], [*load.force, load.moment]
+        loaded, factors = _loaded_cells(load, subdomain)
+        shares, density = factors @ mesh.gauss[1], [*load.force, load.moment]
     elif isinstance(load, Gravity):
         g_x, g_y = load.acceleration
         at_places = [
@@ -210,6 +228,15 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Ind
         return None
     first, *between, last = (numbering.lengths(cells[loaded])[:, None] * shares).T
     return loaded, np.kron(density, np.column_stack([first, last, *between]))
+
+
+def _loaded_cells(load: LoadAlongBeam, subdomain: Subdomain) -> tuple[Index, Array]:
+    """Return the local cells of the loaded beam, and the profile at their Gauss points, (n, 4)."""
+    numbering, cells = subdomain.numbering, subdomain.cells
+    beam_cells = numbering.cells_of(load.beam)
+    loaded = np.flatnonzero((cells >= beam_cells[0]) & (cells <= beam_cells[-1]))
+    s = numbering.gauss_parameters(load.beam)[cells[loaded] - beam_cells[0]]
+    return loaded, load.factors(s)
 
 
 class FollowerLoads(_AtDofs):
@@ -269,6 +296,193 @@ class FollowerLoads(_AtDofs):
         """Save or restore the forces in the equation of the last step, and sizes at its end."""
         self._forces[:] = archive.added("follower loads", self._whole(self._forces[1]))[self.dofs]
         self._sizes[:] = archive.rows("follower loads", self._indices, self._sizes[2])
+
+
+class Pressures(_AtDofs):
+    """Forces along beams that turn with the deformed axis, per deformed length.
+
+    A force along dx and its normal has nodal forces that are linear in the positions of the nodes.
+    """
+
+    def __init__(
+        self,
+        loads: Sequence[Pressure],
+        subdomain: Subdomain,
+        scheme: Scheme,
+        ledger: Ledger,
+        A: Csr,
+    ) -> None:
+        self._ledger, numbering, mesh = ledger, subdomain.numbering, subdomain.numbering.mesh
+        in_order = _in_order(mesh)
+        points, weights = mesh.gauss
+        at_points = weights[:, in_order, None] * mesh.slopes(points)[:, None, in_order]
+        pairs = [_loaded_cells(load, subdomain) for load in loads]
+        order: Index = np.concatenate([cells for cells, _ in pairs])
+        of_load = np.repeat(np.arange(len(loads)), [len(cells) for cells, _ in pairs])
+        shares = np.tensordot(np.concatenate([factors for _, factors in pairs]), at_points, 1)
+        nodes = numbering.nodes_of_cells[subdomain.cells[order]]
+        dofs = subdomain.cell_dofs[order, : 2 * nodes.shape[1]]
+        loaded: Array = np.zeros(subdomain.size)
+        loaded[dofs] = 1.0
+        self._set_dofs(subdomain, loaded, loads, rows=2)
+        rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None, :])
+        self._factors = np.zeros((3, len(loads)))  # in the equation, at its end, before the step
+        self._q0: Array = np.zeros(subdomain.size)
+        each, second = np.zeros((2, len(order), 3 * nodes.shape[1]))
+        self._each = ffi.new("double *[1]", [doubles(each)]), each
+        self._c = struct(
+            "pressures", loads=len(loads), cells=len(order), nodes=nodes.shape[1],
+            size=len(self.dofs), dof=self.dofs, load=of_load.astype(np.int32),
+            at=np.searchsorted(self.dofs, dofs).astype(np.int32), share=shares,
+            place=np.ascontiguousarray(numbering.points[nodes].transpose(0, 2, 1)), q0=self._q0,
+            part=scheme.load_weight, tangential=np.array([load.tangential for load in loads]),
+            normal=np.array([load.normal for load in loads]), now=self._factors[0],
+            end=self._factors[1], before=self._factors[2],
+            entry=A.positions(rows.ravel(), columns.ravel()), each=self._each[0],
+            force=self._forces[0], force_before=self._forces[1],
+            weight_of_before=scheme.weight_of_before,
+        )  # fmt: skip
+        tangent = loop("add_tangent_of_pressures", self._c)
+        self.loops, self._A = (loop("subtract_pressures", self._c), tangent), A
+        self.in_cells = [InCells(lambda: _Entries(self._each[0], second), lib.DENSITY, order)]
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Return the loops that begin and accept a step."""
+        c = fill(self._c, factor=callbacks.time_functions(self._in_time))
+        c.work = self._ledger.supplied.pointer("loads")
+        return Phases([loop("begin_pressures", c)], [loop("accept_pressures", c)])
+
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
+        """Set the loads before the next step to the loads at the time ``t``, and return them."""
+        self._factors[:] = self._factors_at(t)
+        self._q0[:] = q
+        self._c.q0 = doubles(self._q0)
+        self.add_residual(q, np.zeros(self._size))
+        self._forces[1] = self._forces[0]
+        return self._whole(self._forces[0])
+
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
+        """Save or restore the forces in the equation of the last step, and factors at its end."""
+        self._forces[:] = archive.added("pressures", self._whole(self._forces[1]))[self.dofs]
+        for k, factor in enumerate(self._factors[2]):
+            self._factors[:, k] = archive.number(f"factor of pressure {k}", factor)
+
+
+class MovingLoads(_AtDofs):
+    """Forces and masses that move along beams: consistent nodal forces of the cell of each.
+
+    The axis at a mass has the tangent and the curvature of the rotations, without shear and
+    stretch: rotations are continuous between cells, slopes of displacements are not.
+    """
+
+    def __init__(
+        self,
+        loads: Sequence[MovingLoad],
+        subdomain: Subdomain,
+        scheme: Scheme,
+        ledger: Ledger,
+        A: Csr,
+        rates: Any,
+    ) -> None:
+        self._ledger, numbering, mesh = ledger, subdomain.numbering, subdomain.numbering.mesh
+        self._positions = [(load.position, load) for load in loads]
+        cells = [np.concatenate([numbering.cells_of(x) for x in load.route]) for load in loads]
+        order: Index = np.flatnonzero(np.isin(subdomain.cells, np.concatenate(cells)))
+        self._cells: Index = subdomain.cells[order]
+        number = np.full(len(numbering.cells), -1, dtype=np.int32)
+        number[self._cells] = np.arange(len(order))
+        along = [np.append(0.0, np.cumsum(numbering.lengths(x))) for x in cells]
+        dofs = subdomain.cell_dofs[order, : 2 * len(mesh.nodes)]
+        loaded: Array = np.zeros(subdomain.size)
+        loaded[dofs] = 1.0
+        self._set_dofs(subdomain, loaded, loads, rows=2)
+        # On cells: in the equation, at the end of the step, before the step
+        self._on_cells = np.zeros((3, *dofs.shape))
+        each, second = np.zeros((2, len(order), 3 * len(mesh.nodes)))
+        self._each = ffi.new("double *[1]", [doubles(each)]), each
+        self._c = struct(
+            "moving_loads", loads=len(loads), cells=len(order), nodes=len(mesh.nodes),
+            size=len(self.dofs), dof=self.dofs,
+            at=np.searchsorted(self.dofs, dofs).astype(np.int32),
+            first=np.cumsum([0, *map(len, cells)]).astype(np.int32),
+            cell=np.concatenate([number[x] for x in cells]),
+            ends=np.concatenate([np.column_stack([x[:-1], x[1:]]) for x in along]),
+            polynomial=mesh.polynomials[:, _in_order(mesh)].T.copy(),
+            given=np.array([load.force for load in loads]), now=self._on_cells[0],
+            end=self._on_cells[1], before=self._on_cells[2], each=self._each[0],
+            force=self._forces[0], force_before=self._forces[1],
+            weight_of_before=scheme.weight_of_before,
+        )  # fmt: skip
+        self._A, tangent, mass = A, None, np.array([load.mass for load in loads])
+        self._kinetic = np.zeros(len(loads))
+        self._heavy = rates is not None and bool(mass.any())
+        if self._heavy:
+            whole, n = subdomain.cell_dofs[order], 2 * len(mesh.nodes)
+            rows, columns = np.broadcast_arrays(whole[:, :n, None], whole[:, None, :])
+            fill(
+                self._c, rates=rates, mass=mass, kinetic=self._kinetic,
+                here=np.full(len(loads), -1, dtype=np.int32), motion=np.zeros((len(loads), 3)),
+                freedom=whole.astype(np.int32),
+                entry=A.positions(rows.ravel(), columns.ravel()),
+                angle=numbering.axis_angles[self._cells], part=scheme.load_weight,
+                half_tangents=scheme.half_tangents,
+            )  # fmt: skip
+            tangent = loop("add_tangent_of_moving_masses", self._c)
+        self.loops = loop("subtract_moving_loads", self._c), tangent
+        self.in_cells = [InCells(lambda: _Entries(self._each[0], second), lib.DENSITY, order)]
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Return the loops that begin and accept a step."""
+        self._callbacks = callbacks
+        factor, position = map(callbacks.time_functions, (self._in_time, self._positions))
+        c = fill(self._c, factor=factor, position=position)
+        c.work = self._ledger.supplied.pointer("loads")
+        energies = []
+        if self._heavy:
+            c.stored = self._ledger.state.pointer("kinetic")
+            energies = [loop("add_energy_of_moving_masses", c)]
+        return Phases([loop("begin_moving_loads", c)], [loop("accept_moving_loads", c)], energies)
+
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
+        """Set the loads before the next step to the loads at the time ``t``, and return them.
+
+        These are the forces only: masses have no acceleration before the first step.
+        """
+        step = struct("time_step", load_time=t, fraction=1.0, at=1.0, dt=1.0)
+        rates, self._c.rates = self._c.rates, ffi.NULL
+        lib.begin_moving_loads(self._c, step, ffi.NULL, ffi.NULL)
+        if self._heavy:
+            lib.start_moving_masses(self._c, t, doubles(q), doubles(v))
+        self._callbacks.synchronize()
+        self._on_cells[2] = self._on_cells[0]
+        self.add_residual(q, np.zeros(self._size))
+        self._c.rates = rates
+        self._forces[1] = self._forces[0]
+        return self._whole(self._forces[0])
+
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
+        """Save or restore the forces in the equation of the last step, and at its end."""
+        self._forces[:] = archive.added("moving loads", self._whole(self._forces[1]))[self.dofs]
+        self._on_cells[:] = archive.rows("moving loads", self._cells, self._on_cells[2])
+        for k, energy in enumerate(self._kinetic):
+            self._kinetic[k] = archive.total(f"energy of moving mass {k}", energy)
+
+
+def _in_order(mesh: Mesh) -> list[int]:
+    """Return the positions along a cell of its nodes: both vertices, then the nodes between."""
+    first, *between, last = range(len(mesh.nodes))
+    return [first, last, *between]
+
+
+class _Entries(NamedTuple):
+    """Forces on the nodes of cells that C stores in each residual, as a compiled form does."""
+
+    each: Any
+    second: Array
+
+    def keep_entries(self) -> tuple[Any, int, Array]:
+        """Return a pointer to the address of the array, one cell in a batch, a second array."""
+        return self.each, 1, self.second
 
 
 @cached_forms

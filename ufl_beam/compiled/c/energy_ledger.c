@@ -102,6 +102,67 @@ void accept_follower_loads(void *self, const time_step *step, const double *q1, 
   memcpy(f->before, f->end, 3 * (size_t)f->number * sizeof *f->end);
 }
 
+void accept_pressures(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const pressures *p = self;
+  *p->work += work_in_step(p->size, p->dof, p->weight_of_before, p->force_before, p->force, s);
+  memcpy(p->force_before, p->force, p->size * sizeof *p->force);
+  memcpy(p->before, p->end, p->loads * sizeof *p->end);
+}
+
+/* Kinetic energy of mass k at the time t; zero outside of the beam. v: velocities; or none, then they
+ * follow from the step s. */
+static double energy_of_moving_mass(const moving_loads *m, int k, double t, const double *q,
+                                    const double *v, const double *s)
+{
+  const int n = m->nodes;
+  const double dt = 1e-5; /* s, for the speed: a parabola through later places, some t begin at 0 */
+  double p[3], place, shape[4], x = 0, y = 0;
+  for (int j = 0; j < 3; ++j) p[j] = value_at(m->position + k, t + j * dt);
+  const double speed = (4 * p[1] - 3 * p[0] - p[2]) / (2 * dt);
+  const int i = find_loaded_cell(m, k, p[0], &place);
+  if (i < 0) return 0;
+  const int32_t *dof = m->freedom + 3 * n * m->cell[i];
+  const double *ends = m->angle + 2 * m->cell[i];
+  double angle = ends[0] + place * (ends[1] - ends[0]);
+  find_shapes(m, place, shape, 0);
+  for (int j = 0; j < 3 * n; ++j) {
+    const double share = shape[j % n];
+    const int d = dof[j];
+    const double rate = j >= 2 * n ? 0 : v ? v[d] : rate_at(m->rates, m->rates->now->rates[0], d, s[d]);
+    if (j < n) x += share * rate;
+    else if (j < 2 * n) y += share * rate;
+    else angle += share * q[d];
+  }
+  x += speed * cos(angle), y += speed * sin(angle);
+  return m->mass[k] / 2 * (x * x + y * y);
+}
+
+/* Set the kinetic energies of the masses at the time t. */
+void start_moving_masses(const moving_loads *m, double t, const double *q, const double *v)
+{
+  for (int k = 0; k < m->loads; ++k) m->kinetic[k] = energy_of_moving_mass(m, k, t, q, v, 0);
+}
+
+void add_energy_of_moving_masses(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const moving_loads *m = self;
+  for (int k = 0; k < m->loads; ++k) *m->stored += m->kinetic[k];
+}
+
+void accept_moving_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const moving_loads *m = self;
+  *m->work += work_in_step(m->size, m->dof, m->weight_of_before, m->force_before, m->force, s);
+  for (int k = 0; m->rates && k < m->loads; ++k) {
+    const double energy = energy_of_moving_mass(m, k, step->t1, q1, 0, s);
+    *m->work += energy - m->kinetic[k];
+    m->kinetic[k] = energy;
+  }
+  memcpy(m->force_before, m->force, m->size * sizeof *m->force);
+  memcpy(m->before, m->end, 2 * (size_t)m->nodes * m->cells * sizeof *m->end);
+}
+
 void accept_frame(void *self, const time_step *step, const double *q1, const double *s)
 {
   rotating_frame *f = self;

@@ -110,6 +110,173 @@ void add_tangent_of_follower_loads(void *self, const double *q, double *tangent)
   }
 }
 
+void subtract_pressures(void *self, const double *q, double *r)
+{
+  const pressures *p = self;
+  const int n = p->nodes;
+  double *e = *p->each;
+  memset(p->force, 0, p->size * sizeof *p->force);
+  for (int k = 0; k < p->cells; ++k, e += 3 * n) {
+    const int32_t *at = p->at + 2 * n * k;
+    const double factor = p->now[p->load[k]];
+    const double along = factor * p->tangential[p->load[k]], across = factor * p->normal[p->load[k]];
+    double x[8]; /* of the four nodes of degree 3 */
+    for (int i = 0; i < 2 * n; ++i) {
+      const int dof = p->dof[at[i]];
+      x[i] = p->place[2 * n * k + i] + p->q0[dof] + p->part * (q[dof] - p->q0[dof]);
+    }
+    for (int i = 0; i < n; ++i) {
+      const double *share = p->share + (n * k + i) * n;
+      double a = 0, b = 0;
+      for (int j = 0; j < n; ++j) a += share[j] * x[j], b += share[j] * x[n + j];
+      e[i] = across * b - along * a, e[n + i] = -across * a - along * b;
+      p->force[at[i]] -= e[i], p->force[at[n + i]] -= e[n + i];
+    }
+  }
+  for (int i = 0; i < p->size; ++i) r[p->dof[i]] -= p->force[i];
+}
+
+void add_tangent_of_pressures(void *self, const double *q, double *tangent)
+{
+  const pressures *p = self;
+  const int n = p->nodes;
+  for (int k = 0; k < p->cells; ++k) {
+    const double factor = p->part * p->now[p->load[k]];
+    const double along = factor * p->tangential[p->load[k]], across = factor * p->normal[p->load[k]];
+    const int32_t *entry = p->entry + 4 * n * n * k;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        const double share = p->share[(n * k + i) * n + j];
+        const int32_t *x = entry + i * 2 * n + j, *y = x + 2 * n * n;
+        tangent[x[0]] -= along * share, tangent[x[n]] += across * share;
+        tangent[y[0]] -= across * share, tangent[y[n]] -= along * share;
+      }
+  }
+}
+
+/* Index of the cell of load k at a distance, or -1 if it is not on the beam or not on this process;
+ * and its place in the cell, from 0 to 1. */
+static int find_loaded_cell(const moving_loads *m, int k, double distance, double *s)
+{
+  int i = m->first[k];
+  while (i < m->first[k + 1] && !(distance <= m->ends[2 * i + 1])) ++i;
+  if (i == m->first[k + 1] || distance < m->ends[2 * i] || m->cell[i] < 0) return -1;
+  *s = (distance - m->ends[2 * i]) / (m->ends[2 * i + 1] - m->ends[2 * i]);
+  return i;
+}
+
+/* Values of the shape functions of a cell, and their derivatives by s; or none. */
+static void find_shapes(const moving_loads *m, double s, double *value, double *slope)
+{
+  for (int j = 0; j < m->nodes; ++j) {
+    const double *c = m->polynomial + j * m->nodes;
+    double v = 0, d = 0;
+    for (int power = m->nodes - 1; power >= 0; --power) d = d * s + v, v = v * s + c[power];
+    value[j] = v;
+    if (slope) slope[j] = d;
+  }
+}
+
+/* State of the axis at a mass, and its convective acceleration, of which `turn` is along the normal. */
+typedef struct {
+  double shape[4], slope[4]; /* slope: by the length of the axis */
+  double c, s, turn, acceleration, speed, curvature;
+  const double *inertia, *velocity;
+  const int32_t *x, *y, *psi;
+  int cell;
+} on_axis;
+
+static double step_of(const moving_loads *m, const double *q, int dof, int turns)
+{
+  const double change = q[dof] - m->q0[dof];
+  return turns && m->half_tangents ? 2 * tan(change / 2) : change;
+}
+
+/* A row of coefficients times the rates at a degree of freedom, for the step s. */
+static double rate_at(const rates *r, const double *row, int dof, double s)
+{
+  double sum = row[0] * s;
+  for (int j = 1; j < r->number; ++j)
+    if (row[j] != 0) sum += row[j] * r->rate[j][dof];
+  return sum;
+}
+
+static int find_on_axis(const moving_loads *m, int k, const double *q, on_axis *a)
+{
+  const int i = m->here[k], n = m->nodes;
+  if (i < 0) return 0;
+  const double place = m->motion[3 * k], length = m->ends[2 * i + 1] - m->ends[2 * i];
+  find_shapes(m, place, a->shape, a->slope);
+  a->cell = m->cell[i], a->speed = m->motion[3 * k + 1], a->acceleration = m->motion[3 * k + 2];
+  a->x = m->freedom + 3 * n * a->cell, a->y = a->x + n, a->psi = a->y + n;
+  a->inertia = m->rates->now->inertia, a->velocity = m->rates->now->velocity;
+  const double *ends = m->angle + 2 * a->cell;
+  double angle = ends[0] + place * (ends[1] - ends[0]), spin = 0;
+  a->curvature = (ends[1] - ends[0]) / length;
+  for (int j = 0; j < n; ++j) {
+    const int dof = a->psi[j];
+    const double psi = m->q0[dof] + m->part * (q[dof] - m->q0[dof]);
+    a->slope[j] /= length;
+    angle += a->shape[j] * psi, a->curvature += a->slope[j] * psi;
+    spin += a->shape[j] * rate_at(m->rates, a->velocity, dof, step_of(m, q, dof, 1));
+  }
+  a->c = cos(angle), a->s = sin(angle);
+  a->turn = 2 * a->speed * spin + a->speed * a->speed * a->curvature;
+  return 1;
+}
+
+void subtract_moving_loads(void *self, const double *q, double *r)
+{
+  const moving_loads *m = self;
+  const int n = m->nodes;
+  double *e = *m->each;
+  memset(m->force, 0, m->size * sizeof *m->force);
+  for (int k = 0; k < m->cells; ++k)
+    for (int i = 0; i < 2 * n; ++i) e[3 * n * k + i] = -m->now[2 * n * k + i];
+  for (int k = 0; m->rates && k < m->loads; ++k) {
+    on_axis a;
+    if (!find_on_axis(m, k, q, &a)) continue;
+    double x = a.acceleration * a.c - a.turn * a.s, y = a.acceleration * a.s + a.turn * a.c;
+    for (int j = 0; j < n; ++j) {
+      x += a.shape[j] * rate_at(m->rates, a.inertia, a.x[j], step_of(m, q, a.x[j], 0));
+      y += a.shape[j] * rate_at(m->rates, a.inertia, a.y[j], step_of(m, q, a.y[j], 0));
+    }
+    for (int j = 0; j < n; ++j) {
+      e[3 * n * a.cell + j] += m->mass[k] * a.shape[j] * x;
+      e[3 * n * a.cell + n + j] += m->mass[k] * a.shape[j] * y;
+    }
+  }
+  for (int k = 0; k < m->cells; ++k)
+    for (int i = 0; i < 2 * n; ++i) m->force[m->at[2 * n * k + i]] -= e[3 * n * k + i];
+  for (int i = 0; i < m->size; ++i) r[m->dof[i]] -= m->force[i];
+}
+
+void add_tangent_of_moving_masses(void *self, const double *q, double *tangent)
+{
+  const moving_loads *m = self;
+  const int n = m->nodes;
+  for (int k = 0; k < m->loads; ++k) {
+    on_axis a;
+    if (!find_on_axis(m, k, q, &a)) continue;
+    for (int i = 0; i < n; ++i) {
+      /* Derivatives of the convective acceleration by a rotation: along the normal and the tangent */
+      const double half = step_of(m, q, a.psi[i], 1) / 2;
+      const double spin = a.velocity[0] * (m->half_tangents ? 1 + half * half : 1);
+      const double along = -m->part * a.turn * a.shape[i];
+      const double across = m->part * (a.acceleration * a.shape[i] + a.speed * a.speed * a.slope[i])
+        + 2 * a.speed * spin * a.shape[i];
+      const double x = along * a.c - across * a.s, y = along * a.s + across * a.c;
+      for (int j = 0; j < n; ++j) {
+        const int32_t *entry = m->entry + 6 * n * n * a.cell + 3 * n * j, *below = entry + 3 * n * n;
+        const double size = m->mass[k] * a.shape[j];
+        tangent[entry[i]] += size * a.inertia[0] * a.shape[i];
+        tangent[below[n + i]] += size * a.inertia[0] * a.shape[i];
+        tangent[entry[2 * n + i]] += size * x, tangent[below[2 * n + i]] += size * y;
+      }
+    }
+  }
+}
+
 /* Expand CALL for the number of entries of a row. The compiler knows the usual numbers: one for
  * lumped masses, three for consistent masses. */
 #define FOR_WIDTH(width, CALL) \

@@ -11,7 +11,7 @@ typedef struct { part *add; void *self; } call;
 /* Several contributions. */
 typedef struct { int number; const call *part; } calls;
 part add_calls, add_cells, add_static_tangent, subtract_vector, subtract_follower_loads,
-  add_tangent_of_follower_loads, subtract_frame_forces, add_tangent_of_frame, add_step_force,
+  add_tangent_of_follower_loads, subtract_pressures, add_tangent_of_pressures, subtract_moving_loads, add_tangent_of_moving_masses, subtract_frame_forces, add_tangent_of_frame, add_step_force,
   add_step_tangent, add_inelastic_force, add_inelastic_tangent;
 
 /* -- forms and constant matrices --------------------------------------------------------------- */
@@ -708,6 +708,25 @@ typedef struct {
 /* Imposed strains of the cells of a term, see CellStrains: elastic cells, whose forms have the strains
  * as a coefficient, or cells with material points. */
 typedef struct {
+  int loads, cells, nodes, size; /* nodes: of a cell; size: of `dof` */
+  const int32_t *dof;       /* degrees of freedom that may be loaded */
+  const int32_t *at;        /* index in `dof` of each displacement of a cell */
+  const int32_t *first;     /* first cell of each load, in the next two arrays; and their number */
+  const int32_t *cell;      /* index of the cell on this process, or -1 */
+  const double *ends;       /* distances of both ends from the start of the beam */
+  const double *polynomial; /* coefficients of the shape functions: nodes x powers */
+  const double *given;      /* force for the factor 1, two numbers of each load */
+  const time_function *factor, *position;
+  double *now, *end, *before; /* on cells: in the equation, at the end of the step, at the end of the last step */
+  double **each;            /* minus the forces on the nodes of cells in the latest residual: x, y, moments */
+  int loads, cells, nodes, size; /* nodes: of a cell; size: of `dof` */
+  const int32_t *dof;      /* degrees of freedom that are loaded */
+  const int32_t *load, *at; /* load of each cell; index in `dof` of each displacement of a cell */
+  const double *share;     /* cells x nodes x nodes: force on a node by the position of a node */
+  const double *place;     /* positions of the nodes of the undeformed cells */
+  const double *q0;        /* configuration at the beginning of the step */
+  double part;             /* fraction of the increment at which the loads act */
+  const double *tangential, *normal; /* of each load, for the factor 1 */
   int cells, points;
   const double *const *field; /* for each function of time: strains for a factor of 1; cells * points * 3 */
   double *strains;            /* cells * points * 6: strains at the beginning and at the end of a step */
@@ -718,14 +737,41 @@ typedef struct {
   double *before; /* with material points: resultants in the accepted state; cells * 3 */
 } imposed_cells;
 
+void start_moving_masses(const moving_loads *m, double t, const double *q, const double *v);
+/* Forces and masses that move along beams, see MovingLoads. Forces on a cell are x of its nodes, then
+ * y. */
+typedef struct rates rates;
 typedef struct {
   int functions, groups;
   const time_function *factor;
+  double *now, *end, *before; /* factors in the equation, at the end of the step, at the end of the last step */
+  const int32_t *entry;    /* entries of the tangent: 2 nodes x 2 nodes of each cell */
+  double **each;           /* minus the forces on the nodes of cells in the latest residual: x, y, moments */
+  double *force, *force_before; /* in the latest residual, in the last step; size */
+  double weight_of_before, *work;
+  /* If a load has a mass in dynamics; otherwise none: */
+  const rates *rates;
+  const double *mass;
+  double *kinetic, *stored; /* energy of each mass in the accepted state; entry of the ledger */
+  int32_t *here;            /* index of the cell of each mass in the arrays of `first`, or -1 */
+  double *motion;           /* of each mass: fraction of the cell, speed, acceleration along the beam */
+  const int32_t *freedom;   /* degrees of freedom of each cell: x, y, rotations */
+  const int32_t *entry;     /* entries of the tangent: 2 nodes x 3 nodes of each cell */
+  const double *angle;      /* directions of the undeformed axis at both ends of each cell */
+  const double *q0;         /* configuration at the beginning of the step */
+  double part;              /* fraction of the increment at which loads act */
+  int half_tangents;        /* whether rotations have the nodal step 2 tan(change / 2) */
+} moving_loads;
+  double *force, *force_before; /* in the latest residual, in the last step; size */
+  double weight_of_before, *work;
+} pressures;
   double *factors, *factors_at_end; /* at the beginning and at the end of the step */
   imposed_cells *const *group;
   double weight_of_before, *supplied;
 } imposed_strains;
 
+/* Forces along beams that turn with the deformed axis, see Pressures. Displacements of a cell are x
+ * of all nodes, then y. */
 /* Vectors of loads at some degrees of freedom times functions of time, see DeadLoads. */
 typedef struct {
   int size, vectors;
@@ -794,7 +840,7 @@ typedef struct {
 } scheme_numbers;
 
 /* Velocities and further rates of a time scheme. */
-typedef struct {
+struct rates {
   int size, number;            /* of the rates; the first is a step or a change of velocities */
   double *rate[MOST_RATES];
   double *new_rate[MOST_RATES]; /* space for new rates; new velocities may use the space of the previous
@@ -807,7 +853,7 @@ typedef struct {
   const scheme_numbers *now;   /* coefficients of this step */
   int (*find)(void *handle, scheme_numbers *numbers);
   void *handle;
-} rates;
+};
 
 /* Dry friction: connectors stick (0) or slip in one of two directions (-1, 1). */
 struct friction {
@@ -987,7 +1033,9 @@ typedef struct {
 } time_loop;
 
 phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
-  accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_frame, accept_frame, begin_works,
+  accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_pressures,
+  accept_pressures, begin_moving_loads, accept_moving_loads,
+  add_energy_of_moving_masses, begin_frame, accept_frame, begin_works,
   accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
   accept_second_differences, begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
   begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,

@@ -129,6 +129,55 @@ void begin_follower_loads(void *self, const time_step *step, const double *q1, c
   }
 }
 
+void begin_pressures(void *self, const time_step *step, const double *q1, const double *s)
+{
+  pressures *p = self;
+  for (int k = 0; k < p->loads; ++k) {
+    const double change = step->fraction * (value_at(p->factor + k, step->load_time) - p->before[k]);
+    p->end[k] = p->before[k] + change, p->now[k] = p->before[k] + step->at * change;
+  }
+  p->q0 = step->q0;
+}
+
+/* Forces on the nodes of cells at the time t. */
+static void find_moving_loads(const moving_loads *m, double t, double *out)
+{
+  const int n = m->nodes;
+  memset(out, 0, 2 * (size_t)n * m->cells * sizeof *out);
+  for (int k = 0; k < m->loads; ++k) {
+    const double factor = value_at(m->factor + k, t);
+    double s, shape[4];
+    const int i = find_loaded_cell(m, k, value_at(m->position + k, t), &s);
+    if (i < 0) continue;
+    double *on = out + 2 * n * m->cell[i];
+    find_shapes(m, s, shape, 0);
+    for (int j = 0; j < n; ++j) {
+      on[j] += factor * shape[j] * m->given[2 * k];
+      on[n + j] += factor * shape[j] * m->given[2 * k + 1];
+    }
+  }
+}
+
+void begin_moving_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const moving_loads *m = self;
+  const double half = step->dt / 2;
+  for (int k = 0; m->rates && k < m->loads; ++k) { /* speed and acceleration by differences */
+    double place[3], *motion = m->motion + 3 * k;
+    for (int j = 0; j < 3; ++j) place[j] = value_at(m->position + k, step->load_time + (j - 1) * half);
+    m->here[k] = m->mass[k] > 0 ? find_loaded_cell(m, k, place[1], motion) : -1;
+    motion[1] = (place[2] - place[0]) / step->dt;
+    motion[2] = (place[2] - 2 * place[1] + place[0]) / (half * half);
+  }
+  if (m->rates) ((moving_loads *)self)->q0 = step->q0;
+  find_moving_loads(m, step->load_time, m->end);
+  for (int i = 0; i < 2 * m->nodes * m->cells; ++i) {
+    const double before = m->before[i];
+    if (step->fraction != 1) m->end[i] = before + step->fraction * (m->end[i] - before);
+    m->now[i] = step->at == 1 ? m->end[i] : before + step->at * (m->end[i] - before);
+  }
+}
+
 void begin_frame(void *self, const time_step *step, const double *q1, const double *s)
 {
   rotating_frame *f = self;

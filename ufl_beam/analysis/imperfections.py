@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: MIT
+"""Initial imperfections: scenes with another geometry, free of stress."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from ufl_beam.analysis.modes import Shapes
+from ufl_beam.arrays import Array
+from ufl_beam.errors import ArgumentError, require_count, require_kind, require_number
+from ufl_beam.model.beams import Beam
+from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body, BodyPoint, Place
+from ufl_beam.model.functions import Curve, Point
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.sections import Section
+
+
+def imperfect(
+    scene: Scene, *, sway: float = 0.0, bow: Mapping[Beam, float] | None = None,
+    mode: Shapes | None = None, k: int = 0, amplitude: float = 0.0,
+) -> Scene:  # fmt: skip
+    """Return a scene with initial imperfections: the same model in another geometry without stress.
+
+    Sway, bows and mode add up.  Beams and bodies of the new scene are new objects of the same
+    names, such as ``new["column"].end``.  Functions of users that refer to places, such as
+    controllers, keep the places of ``scene``.
+
+    Args:
+        scene: Perfect model.
+        sway: Inclination of the whole scene, with its lowest beam end fixed: displacement along x
+            divided by height, such as 1/200.
+        bow: Amplitudes of half sine waves of beams as fractions of the distance of their ends, such
+            as ``{column: 1 / 300}``; positive to the left of the direction of the beam.
+        mode: Result of :func:`buckling` or :func:`modes` of ``scene``.
+        k: Index of the mode.
+        amplitude: Largest displacement of the mode, positive or negative; m.
+
+    Raises:
+        ArgumentError: The call is wrong: nothing changes the geometry; a beam of ``bow`` is not in
+            the scene, or has a joint between its ends; the mode is complex, or of other beams.
+        ModelError: Joints do not fit together in the new geometry.
+
+    Example:
+        >>> load = ub.PointLoad(beam.end, force=(-1e6, 0))
+        >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+        >>> crooked = ub.imperfect(column, mode=ub.buckling(column, 1), amplitude=2 / 500)
+        >>> run = ub.simulate(crooked, ub.Static(), t=(0, 1), dt=0.5)
+        >>> tip = run.displacement(crooked["beam"].end)[-1, 1]
+        >>> print(round(abs(tip) / (2 / 500), 3))  # 1 / (8.84 - 1), the load is 1/8.84 of Euler's
+        0.128
+    """
+    require_kind(scene, Scene, "imperfect: scene")
+    require_number(sway, "imperfect: sway")
+    require_number(amplitude, "imperfect: amplitude")
+    require_count(k, "imperfect: k", at_least=0)
+    bows = {} if bow is None else bow
+    require_kind(bows, Mapping, "imperfect: bow")
+    for beam, size in bows.items():
+        if beam not in scene.beams:
+            raise ArgumentError(f"imperfect: bow: {beam} is not in the scene")
+        require_number(size, f"imperfect: bow of {beam.name}")
+        for joint in scene.joints:
+            if any(isinstance(x, Place) and x.beam is beam and 0 < x.s < 1 for x in joint.places):
+                raise ArgumentError(
+                    f"imperfect: bow of {beam.name}: {joint} is between its ends; divide the beam "
+                    "there, or give the scaled mode of ub.buckling"
+                )
+    if mode is not None:
+        require_kind(mode, Shapes, "imperfect: mode")
+        if mode.scene.beams != scene.beams or mode.scene.bodies != scene.bodies:
+            raise ArgumentError("imperfect: mode is of other beams or bodies")
+        if np.iscomplexobj(mode.shapes[:, k : k + 1]):
+            raise ArgumentError(f"imperfect: mode {k} is complex; its phases differ")
+    if not sway and not any(bows.values()) and (mode is None or not amplitude):
+        raise ArgumentError(
+            "imperfect: nothing changes the geometry; give sway=, bow= or mode= with amplitude="
+        )
+    change = _Change(scene, sway, bows, mode, k, amplitude)
+    return change(scene)  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True, eq=False)
+class Displaced:
+    """Curve of a beam plus displacements: sway, a half sine wave, and linear interpolation."""
+
+    curve: Curve
+    sway: float
+    lowest: float  # y of the points without sway; m
+    bow: Point  # amplitude of the half sine wave; m
+    s: Array
+    shape: Array  # displacements at the parameters ``s``; (n, 2); m
+
+    def __call__(self, s: float) -> Point:
+        """Return the point at a parameter; m."""
+        x, y = self.curve(s)
+        wave = math.sin(math.pi * s) if 0.0 < s < 1.0 else 0.0
+        u, v = (float(np.interp(s, self.s, values)) for values in self.shape.T)
+        return (
+            float(x + self.sway * (y - self.lowest) + self.bow[0] * wave + u),
+            float(y + self.bow[1] * wave + v),
+        )
+
+
+class _Change:
+    """Change of geometry; a call returns a record with new beams, bodies and places."""
+
+    def __init__(
+        self, scene: Scene, sway: float, bows: Mapping[Beam, float], mode: Shapes | None, k: int,
+        amplitude: float,
+    ) -> None:  # fmt: skip
+        self._sway, self._bows, self._mode, self._k = sway, bows, mode, k
+        self._amplitude = amplitude
+        self._lowest = min([y for beam in scene.beams for _, y in beam.ends], default=0.0)
+        self._made: dict[int, tuple[Any, Any]] = {}  # by id; the reference keeps the id in use
+
+    def __call__(self, old: Any) -> Any:
+        """Return an object with new places, or the object itself if it has none."""
+        if id(old) not in self._made:
+            self._made[id(old)] = old, self._renew(old)
+        return self._made[id(old)][1]
+
+    def _renew(self, old: Any) -> Any:
+        if old is GROUND or isinstance(old, type | Section):
+            return old
+        if isinstance(old, Beam):
+            curve = self._curve(old)
+            return _rebuilt(old, curve=curve, ends=(curve(0.0), curve(1.0)))
+        if isinstance(old, Body):
+            return _rebuilt(old, center=self._point(old.middle))
+        if isinstance(old, BodyPoint):
+            return BodyPoint(self(old.body), self._point(old))
+        if isinstance(old, Mapping):
+            pairs = [(self(key), self(value)) for key, value in old.items()]
+            same = all(value is old.get(key) for key, value in pairs)
+            return old if same else dict(pairs)
+        if isinstance(old, list | tuple) and not hasattr(old, "_fields"):
+            items = [self(item) for item in old]
+            same = all(item is value for item, value in zip(items, old, strict=True))
+            return old if same else type(old)(items)
+        if is_dataclass(old):
+            values = {f.name: getattr(old, f.name) for f in fields(old) if f.init}
+            changed = {name: self(value) for name, value in values.items()}
+            same = all(changed[name] is value for name, value in values.items())
+            return old if same else _rebuilt(old, **changed)
+        return old
+
+    def _curve(self, beam: Beam) -> Displaced:
+        (x0, y0), (x1, y1) = beam.ends
+        size = self._bows.get(beam, 0.0)
+        s = np.array([0.0, 1.0])
+        if self._mode is not None:
+            numbering = self._mode.numbering
+            s, parts = numbering.parameters(beam), 1 if numbering.mesh.degree == 1 else 12
+            s = np.interp(np.arange(parts * (len(s) - 1) + 1) / parts, np.arange(len(s)), s)
+        shape = np.array([self._motion(beam.at(float(x))) for x in s])
+        bow = (-size * (y1 - y0), size * (x1 - x0))
+        return Displaced(beam.curve, self._sway, self._lowest, bow, s, shape)
+
+    def _motion(self, place: AttachmentPoint) -> Array:
+        """Return the displacement of a place in the mode; (2,); m."""
+        if self._mode is None:
+            return np.zeros(2)
+        return np.asarray(self._amplitude * self._mode.shape(self._k, place)[:2])
+
+    def _point(self, place: BodyPoint) -> Point:
+        (x, y), (u, v) = place.point, self._motion(place)
+        return float(x + self._sway * (y - self._lowest) + u), float(y + v)
+
+
+def _rebuilt(old: Any, **changed: Any) -> Any:
+    """Return a copy of a record with other values of some fields, which are checked anew."""
+    new = object.__new__(type(old))
+    for field in fields(old):
+        if field.init:
+            value = changed.get(field.name, getattr(old, field.name))
+            object.__setattr__(new, field.name, value)
+    getattr(new, "__post_init__", lambda: None)()
+    return new
