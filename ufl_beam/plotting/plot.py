@@ -102,7 +102,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     MomentCurvature     "moment-curvature"  moment of a section over its curvature; ``ax``
     InteractionDiagram  "interaction"       axial force over moment of a section; ``ax``
     GroundMotion        "motion"            acceleration, velocity, displacement over time
-    ResponseSpectrum    any of its arrays   "pseudo_acceleration" by default, over the period; ``ax``
+    ResponseSpectrum    any of its arrays   over the period; "pseudo_acceleration" by default
     ==================  ==================  ========================================================
 
     Args:
