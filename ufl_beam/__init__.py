@@ -127,6 +127,7 @@ from ufl_beam.model.material_laws import (
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.sections import Section
 from ufl_beam.model.softening_laws import LinearSoftening, Softening, SofteningLaw
+from ufl_beam.model.steel_laws import MenegottoPinto
 from ufl_beam.model.supports import Clamped, Pinned, PrescribedDisplacement, Roller, Support
 from ufl_beam.model.works import Potential, VirtualWork
 from ufl_beam.output.dolfinx_view import DolfinxView as DolfinxView
@@ -220,6 +221,7 @@ __all__ = [
     "LoadControl",
     "Lognormal",
     "MaterialLaw",
+    "MenegottoPinto",
     "Mesh",
     "MidpointDynamics",
     "ModelError",
