@@ -16,6 +16,7 @@ from ufl_beam.model.law_functions import (
     exp,
     larger,
     log,
+    positive,
     sign,
     smaller,
     where,
@@ -81,44 +82,43 @@ class MenegottoPinto(_Plastic):
     a4: Positive = 1.0
     active: ClassVar[bool] = True  # energy of the Bauschinger effect is not in the stored energy
     memory: ClassVar[bool] = True
-    # The branch has a start, a span ε0 - εr and a sharpness R.  "turned" is the branch that begins
-    # if the strain turns at "last".  A span of zero is that of virgin steel.
+    # The branch has a start, a level σr/C, a span ε0 - εr and a sharpness R.  "turned" is the branch
+    # that begins if the strain turns at "last".  A span of zero is that of virgin steel.
     variables: ClassVar[Mapping[str, float]] = dict.fromkeys(
-        ("plastic", "last", "largest", "least", "start", "start_stress", "span", "sharpness")
+        ("plastic", "last", "largest", "least", "start", "level", "span", "sharpness")
         + ("turned_span", "turned_sharpness"),
         0.0,
     )
 
     def increments(self, strain: Values, state: State, dt: Values) -> dict[str, Values]:
         """Return the increments; strains that change by less than a limit leave the branch."""
-        C, b, y = self.C, self.hardening, self.yield_limit / self.C
+        b, y = self.hardening, self.yield_limit / self.C
         change, none = strain - state.last, STANDSTILL * y
         virgin = below(absolute(state.span), 1e-4 * none)
         turns = below(change * where(virgin, 0.0, sign(state.span)), -none)
 
         start = where(turns, state.last, state.start)
-        level = where(turns, C * (state.last - state.plastic), state.start_stress)
+        level = where(turns, state.last - state.plastic, state.level)
         span = where(turns, state.turned_span, where(virgin, sign(change) * y, state.span))
         R = where(turns, state.turned_sharpness, where(virgin, self.R0, state.sharpness))
         x = (strain - start) / span
-        size = larger(absolute(x), 1e-30)
-        z = exp(-R * absolute(log(size)))
-        curve = x / larger(size, 1.0) * exp(-log(1 + z) / R)  # x/(1 + abs(x)^R)^(1/R)
-        stress = level + C * span * (b * x + (1 - b) * curve)
+        size = log(larger(absolute(x), 1e-30))
+        root = positive(size) + log(1 + exp(-R * absolute(size))) / R  # log(1 + abs(x)^R)/R
+        elastic = level + (strain - start) * (b + (1 - b) * exp(-root))  # strain of the stress
 
         up = below(span, 0.0)  # the direction after a reversal
         largest, least = larger(state.largest, strain), smaller(state.least, strain)
         highest, lowest = larger(largest, y), smaller(least, -y)
         a, per = where(up, self.a3, self.a1), where(up, self.a4, self.a2)
         shift = 1 + a * ((highest - lowest) / (2 * per * y)) ** 0.8
-        turned = where(up, y, -y) * shift + (b * C * strain - stress) / (C * (1 - b))
+        turned = where(up, y, -y) * shift + (b * strain - elastic) / (1 - b)
         ξ = absolute(where(up, highest, lowest) - strain - turned) / y
         moves = {
             "last": strain, "largest": largest, "least": least, "start": start,
-            "start_stress": level, "span": span, "sharpness": R, "turned_span": turned,
+            "level": level, "span": span, "sharpness": R, "turned_span": turned,
             "turned_sharpness": self.R0 * (1 - self.cR1 * ξ / (self.cR2 + ξ)),
         }  # fmt: skip
         stays = below(absolute(change), none)
         return {
             name: where(stays, 0.0, new - getattr(state, name)) for name, new in moves.items()
-        } | {"plastic": strain - stress / C - state.plastic}
+        } | {"plastic": strain - elastic - state.plastic}
