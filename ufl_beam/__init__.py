@@ -92,6 +92,7 @@ from ufl_beam.model.connector_laws import (
     Spring,
     Stop,
 )
+from ufl_beam.model.concrete_laws import KentPark, Mander
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
@@ -215,12 +216,14 @@ __all__ = [
     "HotSpot",
     "Joint",
     "KelvinVoigt",
+    "KentPark",
     "LineLoad",
     "LinearSoftening",
     "Link",
     "LoadControl",
     "Lognormal",
     "MaterialLaw",
+    "Mander",
     "MenegottoPinto",
     "Mesh",
     "MidpointDynamics",

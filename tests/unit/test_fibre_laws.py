@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Laws of steel and concrete fibres against state machines in plain Python, point by point."""
 
+from functools import cache
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from helpers import require_no_gain
@@ -102,3 +105,118 @@ def test_errors_of_equilibrium_are_no_reversals():
     strains = np.concatenate([[far], far + noise, [0.055]])[:, None]
     found, _ = followed(law, strains)
     assert found[-1, 0] == pytest.approx(steel02([0.055], C, 3.0, 0.02)[0], rel=1e-8)
+
+
+# -- concrete ------------------------------------------------------------------------------------
+
+
+def kent_park(x, f, residual, ultimate):
+    """Compressive stress by Scott, Park and Priestley (1982); the parabola begins with C."""
+    peak = 2 * f / C
+    if x <= peak:
+        return f * (2 * x / peak - (x / peak) ** 2)
+    return max(residual, f - (f - residual) * (x - peak) / (ultimate - peak))
+
+
+def mander(x, f, strain, spalling=np.inf):
+    """Compressive stress by equations (3) to (6) of Mander, Priestley and Park (1988)."""
+    r, ratio = C / (C - f / strain), min(x, 2 * strain if spalling < np.inf else x) / strain
+    stress = f * ratio * r / (r - 1 + ratio**r)
+    if spalling < np.inf and x > 2 * strain:
+        stress *= max(0.0, (spalling - x) / (spalling - 2 * strain))
+    return stress
+
+
+def concrete(strains, backbone, peak, last, t=0.0, crack=None):
+    """Stresses and dissipated energies of paths: Concrete01 of OpenSees, and secant tension.
+
+    ``crack`` is the tensile stress at a strain beyond t/C.  Dissipated is the work in many parts of
+    each step, minus what unloading returns.
+    """
+    parts = 2000
+    largest = widest = work = before = 0.0
+    e_last, stresses = 0.0, []
+    for target in strains:
+        for e in np.linspace(e_last, target, parts + 1)[1:]:
+            largest = max(largest, -e)
+            η, f = min(largest, last) / peak, backbone(largest)
+            ratio = 0.145 * η**2 + 0.13 * η if η < 2 else 0.707 * (η - 2) + 0.84
+            if largest - ratio * peak > f / C:
+                rest = ratio * peak
+                slope = f / (largest - rest)
+            else:
+                rest, slope = largest - f / C, C
+            if e + rest <= 0:
+                s = slope * (e + rest)
+            else:
+                widest = max(widest, e + rest)
+                s = C * (e + rest) if widest <= t / C else crack(widest) * (e + rest) / widest
+            work += (s + before) / 2 * (target - e_last) / parts
+            before = s
+        e_last = target
+        stresses.append(s)
+    return stresses, work - s * (e_last + rest) / 2
+
+
+t, G = 0.4, 0.02  # Pa, J/m²: cells shorter than 50 m
+FURTHER = (G / LENGTH - t**2 / (2 * C)) / t  # strain of the exponential decay
+
+
+def linear(e):
+    """Stress on the line from the limit, with the area G/length below the whole path."""
+    return max(0.0, t * (1 - (e - t / C) / (2 * G / (LENGTH * t) - t / C)))
+
+
+def exponential(e):
+    return t * np.exp(-(e - t / C) / FURTHER)
+
+
+CONCRETES = {
+    "Kent-Park": (ub.KentPark(3.0, 0.6, 0.08), kent_park, (3.0, 0.6, 0.08), 0.08, None),
+    "Kent-Park, linear": (
+        ub.KentPark(3.0, 0.6, 0.08, tension=ub.LinearSoftening(t, G)),
+        kent_park, (3.0, 0.6, 0.08), 0.08, linear,
+    ),
+    "Kent-Park, exponential": (
+        ub.KentPark(3.0, 0.0, 0.05, tension=ub.Softening(t, G)),
+        kent_park, (3.0, 0.0, 0.05), 0.05, exponential,
+    ),
+    "Mander": (ub.Mander(3.0, 0.04), mander, (3.0, 0.04), np.inf, None),
+    "Mander, spalling, linear": (
+        ub.Mander(3.0, 0.025, 0.08, tension=ub.LinearSoftening(t, G)),
+        mander, (3.0, 0.025, 0.08), np.inf, linear,
+    ),
+}  # fmt: skip
+
+
+STRAINS = np.concatenate([  # random walks, each step in four
+    np.linspace(a, b, 5)[1:] for a, b in pairwise([np.zeros(4), *(histories(4, 10, 3) - 0.01)])
+])  # fmt: skip
+
+
+@cache
+def expected_of(name):
+    """Stresses (steps, bars) and dissipated energies per volume."""
+    law, curve, parameters, last, crack = CONCRETES[name]
+    peak = 2 * 3.0 / C if curve is kent_park else law.strain
+    paths = [
+        concrete(path, lambda x: curve(x, *parameters), peak, last, 0.0 if crack is None else t,
+                 crack or (lambda e: 0.0))
+        for path in STRAINS.T
+    ]  # fmt: skip
+    return np.column_stack([s for s, _ in paths]), np.array([lost for _, lost in paths])
+
+
+@each_scheme
+@pytest.mark.parametrize("name", CONCRETES)
+def test_concrete_over_random_paths(name, scheme):
+    """[calc] Stresses to round-off; energies to the error of the trapezoidal rule, 1e-6.
+
+    They do not depend on the scheme.  Those of Kent and Park are in closed form, and those of
+    Mander by Gauss's rule in each step.
+    """
+    found, bars = followed(CONCRETES[name][0], STRAINS, scheme)
+    stresses, lost = expected_of(name)
+    assert found == pytest.approx(stresses, abs=1e-12 * C)
+    assert bars.dissipated()[0] / LENGTH == pytest.approx(lost, abs=1e-6 * lost.max())
+    assert stresses.min() < -2.0
