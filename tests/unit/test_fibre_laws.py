@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from helpers import require_no_gain
+from helpers import raises, require_restart
 from scenes import clamped
 from uniaxial_points import LENGTH, Bars, C, histories
 
@@ -133,7 +133,7 @@ def concrete(strains, backbone, peak, last, t=0.0, crack=None):
     ``crack`` is the tensile stress at a strain beyond t/C.  Dissipated is the work in many parts of
     each step, minus what unloading returns.
     """
-    parts = 2000
+    parts = 500
     largest = widest = work = before = 0.0
     e_last, stresses = 0.0, []
     for target in strains:
@@ -220,3 +220,142 @@ def test_concrete_over_random_paths(name, scheme):
     assert found == pytest.approx(stresses, abs=1e-12 * C)
     assert bars.dissipated()[0] / LENGTH == pytest.approx(lost, abs=1e-6 * lost.max())
     assert stresses.min() < -2.0
+
+
+@pytest.mark.parametrize("law", [ub.Softening, ub.LinearSoftening])
+@pytest.mark.parametrize("cells", [1, 4, 16])
+def test_a_broken_bar_dissipates_the_fracture_energy(law, cells):
+    """[closed] G times the area, for any number of cells, of which the first is 10 % weaker."""
+    t, G, L = 2.5e6, 100.0, 0.4  # Pa, J/m², m; a bar of G E/t² = 0.48 m would snap back
+
+    def part(a, b, strength, number):
+        concrete = ub.KentPark(30e6, 6e6, 0.006, law(strength * t, G))
+        fibres = ub.Fibres(concrete, number=2)
+        section = ub.Section.rectangle(0.02, 0.02, E=30e9, nu=0.2, fibres=fibres)
+        return ub.Beam((a, 0), (b, 0), section, cells=number)
+
+    beams = [part(0, L / cells, 0.9, 1)]
+    beams += [part(L / cells, L, 1.0, cells - 1)] if cells > 1 else []
+    joints = [ub.Rigid(beams[0].end, beams[1].start)] if cells > 1 else []
+    pull = ub.PrescribedDisplacement(
+        beams[-1].end, u=lambda x: 2.5e-3 * x**2, v=lambda x: 0.0, psi=lambda x: 0.0
+    )
+    scene = ub.Scene(beams, joints=joints, supports=[ub.Clamped(beams[0].start), pull])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01)
+    assert run.energy.lost["plastic"][-1] == pytest.approx(G * 4e-4, rel=1e-6)
+
+
+# -- in scenes -----------------------------------------------------------------------------------
+
+LAWS = {
+    "steel": ub.MenegottoPinto(12e6, 0.02, a1=0.1, a3=0.1),
+    "Kent-Park": ub.KentPark(30e6, 6e6, 0.01, ub.Softening(2e6, 200.0)),
+    "Mander": ub.Mander(30e6, 0.003, 0.01, ub.LinearSoftening(2e6, 200.0)),
+}
+each_law = pytest.mark.parametrize("law", LAWS)
+
+
+def column(law):
+    """A column under an axial force, pushed to and fro beyond yielding and cracking; its spring."""
+    fibres = ub.Fibres(law, number=6)
+    section = ub.Section.rectangle(0.3, 0.3, E=30e9, nu=0.2, rho=2.5e5, fibres=fibres)
+    beam = ub.Beam((0, 0), (0, 2), section, cells=2)
+    spring = ub.Slide(ub.ground(0, 2), beam.end, ub.Spring(1e6), axis=(1, 0))
+    push = ub.Table([0, 0.2, 0.6, 0.9], [0.0, 1.0, -1.0, 0.6])
+    loads = [
+        ub.PointLoad(beam.end, force=(0, -600e3), amplitude=ub.ramp(0.2)),
+        ub.PointLoad(beam.end, force=(30e3, 0), amplitude=push),
+    ]
+    return clamped(beam, loads=loads, connectors=[spring]), spring
+
+
+def stepped(scene, scheme, t=(0, 0.9), **options):
+    """A run in steps of a twelfth of the first period."""
+    return ub.simulate(scene, scheme, t=t, dt=0.02, **options)
+
+
+@pytest.mark.parametrize(
+    ("law", "scheme"),
+    [("steel", ub.EnergyMomentum()), ("Kent-Park", ub.Static()), ("Mander", ub.EnergyMomentum())],
+    ids=str,
+)
+def test_the_reference_solver_finds_the_same(law, scheme):
+    """Displacements and energies to the tolerance of both solvers; the ledger closes."""
+    scene, _ = column(LAWS[law])
+    found, reference = (
+        stepped(scene, scheme, (0, 0.4), newton=ub.Newton(rtol=1e-12, reference=one))
+        for one in (False, True)
+    )
+    np.testing.assert_allclose(found.q, reference.q, rtol=0, atol=1e-9 * np.abs(found.q).max())
+    lost = found.energy["plastic"]
+    assert lost[-1] > 5.0  # J
+    for entry in found.energy:
+        a, b = found.energy[entry], reference.energy[entry]
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * found.energy.energy_transferred)
+    if isinstance(scheme, ub.EnergyMomentum):
+        assert found.energy.worst < 1e-9
+    if law != "steel":
+        assert np.diff(lost).min() >= -1e-12 * lost[-1]  # round-off
+
+
+@each_law
+def test_a_resumed_run_is_the_same(law, tmp_path):
+    scene, spring = column(LAWS[law])
+    require_restart(stepped, scene, [spring], ub.EnergyMomentum(), tmp_path, 0.8)
+
+
+# -- refusals ------------------------------------------------------------------------------------
+
+
+def section_of(law, E=30e9):
+    return ub.Section.rectangle(0.3, 0.3, E=E, nu=0.2, fibres=ub.Fibres(law, number=6))
+
+
+@pytest.mark.parametrize(
+    ("make", "parts"),
+    [
+        (lambda: ub.MenegottoPinto(5e8, 1.0), ["MenegottoPinto: hardening = 1 must lie"]),
+        (lambda: ub.MenegottoPinto(5e8, 0.01, cR1=1.0), ["MenegottoPinto: cR1 = 1 must lie"]),
+        (lambda: ub.MenegottoPinto(5e8, 0.01, a2=0.0), ["MenegottoPinto: a2 = 0 must be positive"]),
+        (lambda: ub.KentPark(-3e7, 0.0, 0.01), ["KentPark: strength", "must be positive"]),
+        (lambda: ub.KentPark(3e7, 4e7, 0.01), ["residual = 4e+07", "exceed the strength"]),
+        (lambda: ub.KentPark(3e7, 6e6, 0.01, 2e6), ["KentPark: tension", "2000000"]),
+        (
+            lambda: section_of(ub.KentPark(3e7, 6e6, 0.0015)),
+            ["KentPark: ultimate = 0.0015", "2 strength/E = 0.002", "turn back"],
+        ),
+        (lambda: ub.KentPark(3e7, 6e6, 0.01, ub.Softening(2e6, -1.0)), ["fracture_energy"]),
+        (lambda: ub.KentPark.confined(30.0), ["KentPark.confined: strength = 30"]),
+        (lambda: ub.Mander(3e7, 0.004, 0.007), ["spalling = 0.007", "exceed 2 strain = 0.008"]),
+        (
+            lambda: section_of(ub.Mander(3e7, 0.002), E=15e9),
+            ["Mander: E = 1.5e+10", "1.02 strength/strain = 1.53e+10", "turns back"],
+        ),
+        (lambda: ub.Mander.confined(30e6, -1.0), ["Mander.confined: pressure"]),
+    ],
+)
+def test_laws_that_turn_back_are_refused(make, parts):
+    with raises(*parts):
+        make()
+
+
+def test_a_cell_that_is_too_long_for_the_fracture_energy_is_refused():
+    """[closed] Longest cell: 2 G E/t² = 0.96 m; the message names the place."""
+    law = ub.KentPark(30e6, 6e6, 0.01, ub.Softening(2.5e6, 100.0))
+    beam = ub.Beam((0, 0), (0, 2), section_of(law), cells=2, name="column")
+    with raises("column at (0, 0.5): KentPark: tension", "1 m", "0.96 m", "above 104"):
+        ub.simulate(clamped(beam), ub.Static(), t=(0, 1), dt=0.5)
+    ub.simulate(clamped(beam), ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=2))
+
+
+def test_confined_strengths():
+    """[calc] Equations of both papers by hand, for f = 30 MPa."""
+    law = ub.Mander.confined(30e6, 3e6)
+    K = -1.254 + 2.254 * 1.794**0.5 - 0.2
+    assert law.strength == pytest.approx(30e6 * K, rel=1e-12)
+    assert law.strain == pytest.approx(0.002 * (1 + 5 * (K - 1)), rel=1e-12)
+    law = ub.KentPark.confined(30e6, ratio=0.02, yield_limit=300e6, width=0.4, spacing=0.1)
+    Z = 0.5 / (11.7 / 3350 + 0.75 * 0.02 * 2 - 0.002 * 1.2)
+    assert law.strength == pytest.approx(36e6, rel=1e-12)
+    assert law.residual == pytest.approx(7.2e6, rel=1e-12)
+    assert law.ultimate == pytest.approx(0.0024 + 0.8 / Z, rel=1e-12)
