@@ -80,6 +80,7 @@ from ufl_beam.model.beams import Beam, Mesh
 from ufl_beam.model.bodies import Body, PointMass, Velocity, ground
 from ufl_beam.model.bodies import BodyPoint as BodyPoint
 from ufl_beam.model.bodies import Place as Place
+from ufl_beam.model.concrete_laws import KentPark, Mander
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connector_laws import (
     Clearance,
@@ -92,7 +93,6 @@ from ufl_beam.model.connector_laws import (
     Spring,
     Stop,
 )
-from ufl_beam.model.concrete_laws import KentPark, Mander
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
@@ -222,8 +222,8 @@ __all__ = [
     "Link",
     "LoadControl",
     "Lognormal",
-    "MaterialLaw",
     "Mander",
+    "MaterialLaw",
     "MenegottoPinto",
     "Mesh",
     "MidpointDynamics",

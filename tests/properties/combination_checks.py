@@ -26,7 +26,6 @@ import ufl_beam as ub
 from ufl_beam import parallel
 from ufl_beam.reference.solver import Solver
 
-
 MEMORY = "MenegottoPinto", "KentPark", "Mander"
 """Laws with memory."""
 

@@ -84,6 +84,7 @@ def test_menegotto_pinto_over_random_paths(steel, scheme):
 
 def test_menegotto_pinto_in_small_steps_dissipates_the_area_of_its_loops():
     """[calc] Second order: a quarter of the error for half the step, to 1e-6 by extrapolation."""
+
     def turned(n):
         return 0.05 * np.interp(np.arange(1, 4 * n + 1) / n, range(5), [0, 1, -0.4, 0.7, 0.6])
 

@@ -234,8 +234,8 @@ class DofNumbering:
         """Material points of cells that can yield or break, with the cells that have these points.
 
         Raises:
-            ModelError: There are such cells, and the degree of the mesh is above 1, or a cell is too
-                long for a law.
+            ModelError: There are such cells, and the degree of the mesh is above 1, or a cell is
+                too long for a law.
         """
         groups = dict[SectionPoints, list[int]]()
         sections, beam_sections = self.sections

@@ -261,9 +261,7 @@ class KentPark(_Concrete):
         """Return the compressive stress at a compressive strain that was never exceeded."""
         f, r, x = self.strength, self.residual, strain / self.peak
         slope = (f - r) / (self.ultimate - self.peak)
-        return where(
-            below(x, 1.0), f * x * (2 - x), r + slope * positive(self.ultimate - strain)
-        )
+        return where(below(x, 1.0), f * x * (2 - x), r + slope * positive(self.ultimate - strain))
 
     def area(self, low: Values, high: Values) -> Values:
         """Return the integral of the backbone between two strains, in closed form."""

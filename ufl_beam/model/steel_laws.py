@@ -82,13 +82,12 @@ class MenegottoPinto(_Plastic):
     a4: Positive = 1.0
     active: ClassVar[bool] = True  # energy of the Bauschinger effect is not in the stored energy
     memory: ClassVar[bool] = True
-    # The branch has a start, a level σr/C, a span ε0 - εr and a sharpness R.  "turned" is the branch
+    # A branch has a start, a level σr/C, a span ε0 - εr and a sharpness R.  "turned" is the branch
     # that begins if the strain turns at "last".  A span of zero is that of virgin steel.
-    variables: ClassVar[Mapping[str, float]] = dict.fromkeys(
-        ("plastic", "last", "largest", "least", "start", "level", "span", "sharpness")
-        + ("turned_span", "turned_sharpness"),
-        0.0,
-    )
+    variables: ClassVar[Mapping[str, float]] = {
+        "plastic": 0.0, "last": 0.0, "largest": 0.0, "least": 0.0, "start": 0.0, "level": 0.0,
+        "span": 0.0, "sharpness": 0.0, "turned_span": 0.0, "turned_sharpness": 0.0,
+    }  # fmt: skip
 
     def increments(self, strain: Values, state: State, dt: Values) -> dict[str, Values]:
         """Return the increments; strains that change by less than a limit leave the branch."""
