@@ -86,6 +86,7 @@ from ufl_beam.model.beams import Beam, Mesh
 from ufl_beam.model.bodies import Body, PointMass, Velocity, ground
 from ufl_beam.model.bodies import BodyPoint as BodyPoint
 from ufl_beam.model.bodies import Place as Place
+from ufl_beam.model.concrete_laws import KentPark, Mander
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connector_laws import (
     Clearance,
@@ -138,6 +139,7 @@ from ufl_beam.model.material_laws import (
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.sections import Section
 from ufl_beam.model.softening_laws import LinearSoftening, Softening, SofteningLaw
+from ufl_beam.model.steel_laws import MenegottoPinto
 from ufl_beam.model.supports import Clamped, Pinned, PrescribedDisplacement, Roller, Support
 from ufl_beam.model.works import Potential, VirtualWork
 from ufl_beam.output.dolfinx_view import DolfinxView as DolfinxView
@@ -232,12 +234,15 @@ __all__ = [
     "ImposedStrain",
     "Joint",
     "KelvinVoigt",
+    "KentPark",
     "LineLoad",
     "LinearSoftening",
     "Link",
     "LoadControl",
     "Lognormal",
+    "Mander",
     "MaterialLaw",
+    "MenegottoPinto",
     "Mesh",
     "MidpointDynamics",
     "ModelError",

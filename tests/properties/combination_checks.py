@@ -26,6 +26,9 @@ import ufl_beam as ub
 from ufl_beam import parallel
 from ufl_beam.reference.solver import Solver
 
+MEMORY = "MenegottoPinto", "KentPark", "Mander"
+"""Laws with memory."""
+
 
 @check
 def failed_step(case):
@@ -42,12 +45,16 @@ def failed_step(case):
 def ledger(case):
     """It closes as the scheme claims; what was lost never comes back, to digits of the whole.
 
-    `EnergyMomentumDecaying` may give back a part of its own loss, but no more than that.
+    `EnergyMomentumDecaying` may give back a part of its own loss, but no more than that.  Laws with
+    memory have errors of steps of both signs, and steel that of the Bauschinger effect.
     """
     solution = case.whole.solution
     assert solution.imbalance_message == ""
     energy = solution.energy
+    either = {"plastic": ("MenegottoPinto",), "numerical": MEMORY}
     for name in ("plastic", "hinges", "friction", "numerical"):
+        if case.combination.has(*either.get(name, ())):
+            continue
         if name in energy.lost and case.combination.has_exact_ledger:
             gives_back = name == "numerical" and case.combination.has("EnergyMomentumDecaying")
             least = energy.lost[name] if gives_back else np.diff(energy.lost[name])

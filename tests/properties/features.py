@@ -164,6 +164,20 @@ def fibres(d):
     d.section(0, d.one(shapes))
 
 
+@feature("section", "any section", elastic=False)
+def fibres_of_steel_or_concrete(d):
+    strength, limit = d.some(2e5, 4e5), d.some(1e5, 2e5)
+    kind, energy = d.one(["Softening", "LinearSoftening"]), d.some(300, 900)
+    tension = f"tension=ub.{kind}({limit:.5g}, {energy:.4g})"
+    law = d.one([
+        f"ub.MenegottoPinto({limit / 2:.5g}, {d.some(0.02, 0.2):.3g}, a1=0.1, a3=0.05)",
+        f"ub.KentPark({strength:.5g}, {strength / 3:.5g}, {strength / 2e7:.4g}, {tension})",
+        f"ub.Mander({strength:.5g}, {strength / 6e7:.4g}, {tension})",
+    ])  # fmt: skip
+    fibres = f"ub.Fibres({law}, number=4)"
+    d.section(0, f"ub.Section.rectangle(0.01, 0.1, E=1.2e8, nu=0.3, rho=1e3, fibres={fibres})")
+
+
 @feature("hinges", elastic=False)
 def hinges(d):
     M, place = d.some(3, 9), d.one([0.0, 0.0, 0.5])

@@ -98,14 +98,18 @@ def test_all_checks_of_a_combination_pass(seed, tmp_path):
 @pytest.mark.serial
 @pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 def test_all_checks_pass_if_iterates_go_far(tmp_path):
-    """Forces of a rotating frame are 10⁷ times those in equilibrium at some iterates."""
+    """Forces of a rotating frame are 10⁷ times those in equilibrium at some iterates.
+
+    The reference solver cuts steps, however small, so that there is nothing to compare.
+    """
     source = Path(__file__).with_name("far_iterates.txt").read_text(encoding="utf-8")
     features = tuple(one for one in FEATURES if one.name in source.splitlines()[0])
-    require_all_checks(Combination(157, "chain", features, source), tmp_path)
+    checks = [name for name in CHECKS if name != "reference"]
+    require_all_checks(Combination(157, "chain", features, source), tmp_path, checks)
 
 
-def require_all_checks(combination, folder):
-    found = outcome_of(combination, folder, CHECKS)
+def require_all_checks(combination, folder, checks=CHECKS):
+    found = outcome_of(combination, folder, checks)
     flags = {name: words for name, words in found.items() if words not in KNOWN}
     assert not flags, f"{flags}\n{combination.source}"
 

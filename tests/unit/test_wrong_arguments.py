@@ -195,6 +195,33 @@ TABLE = {
         exponent=V(2.0, [*POSITIVE, 0.5]), shape=V(0.6, [*FROM_ZERO, 0.4, 1.1]),
         strength=V(0.1, FROM_ZERO),
     ),
+    "MenegottoPinto": call(
+        ub.MenegottoPinto,
+        yield_limit=V(1.0, POSITIVE), hardening=V(0.1, [*FROM_ZERO, 1.0]), R0=V(20.0, POSITIVE),
+        cR1=V(0.9, [*FROM_ZERO, 1.0]), cR2=V(0.15, POSITIVE), a1=V(0.1, FROM_ZERO),
+        a2=V(1.0, POSITIVE), a3=V(0.1, FROM_ZERO), a4=V(1.0, POSITIVE),
+    ),
+    "KentPark": call(
+        ub.KentPark,
+        strength=V(3.0, POSITIVE), residual=V(1.0, [*FROM_ZERO, 4.0]), ultimate=V(1.0, POSITIVE),
+        tension=V(BREAKS, NO_SOFTENING),
+    ),
+    "KentPark.confined": call(
+        ub.KentPark.confined,
+        strength=V(3e7, [*POSITIVE, 30.0]), ratio=V(0.01, FROM_ZERO),
+        yield_limit=V(4e8, FROM_ZERO), width=V(0.3, FROM_ZERO), spacing=V(0.1, POSITIVE),
+        tension=V(BREAKS, NO_SOFTENING),
+    ),
+    "Mander": call(
+        ub.Mander,
+        strength=V(3.0, POSITIVE), strain=V(1.0, POSITIVE),
+        spalling=V(3.0, [*NO_NUMBER, NAN, 2.0, -INF]), tension=V(BREAKS, NO_SOFTENING),
+    ),
+    "Mander.confined": call(
+        ub.Mander.confined,
+        strength=V(3e7, POSITIVE), pressure=V(1e6, FROM_ZERO), strain=V(0.002, POSITIVE),
+        tension=V(BREAKS, NO_SOFTENING),
+    ),
     "AxialBending": call(
         ub.AxialBending,
         axial=V(1.0, POSITIVE), bending=V(1.0, POSITIVE), rounding=V(0.1, POSITIVE),

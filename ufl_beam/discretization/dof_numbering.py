@@ -236,7 +236,8 @@ class DofNumbering:
         Cells whose laws are of several classes occur once for each class.
 
         Raises:
-            ModelError: There are such cells, and the degree of the mesh is above 1.
+            ModelError: There are such cells, and the degree of the mesh is above 1, or a cell is
+                too long for a law.
         """
         groups = dict[SectionPoints, list[int]]()
         sections, beam_sections = self.sections
@@ -252,10 +253,15 @@ class DofNumbering:
                 for of_class in points:
                     groups.setdefault(of_class, []).append(number)
         cell_sections = beam_sections[self.beam_of_cell]
-        return [
+        found = [
             (section_points, np.flatnonzero(np.isin(cell_sections, group)))
             for section_points, group in groups.items()
         ]
+        for section_points, cells in found:
+            lengths = self.lengths(cells)
+            if fault := section_points.fault(float(lengths.max(initial=0.0))):
+                raise ModelError(f"{self.describe_cell(int(cells[lengths.argmax()]))}: {fault}")
+        return found
 
     @cached_property
     def inelastic_cells(self) -> Index:

@@ -2,7 +2,8 @@
 """Equations of a material point over a step, for UFL expressions and for arrays.
 
 The law holds at t_n+θ.  A backward-Euler step of length θ dt gives the changes of its variables up
-to t_n+θ; divided by θ, they are the changes in the whole step.
+to t_n+θ; divided by θ, they are the changes in the whole step.  Laws with memory follow the path of
+the strain up to t_n+θ and up to the end of the step.
 """
 
 from __future__ import annotations
@@ -70,7 +71,9 @@ class End(NamedTuple):
 
 @lru_cache(maxsize=128)
 def curved(kind: Kind) -> bool:
-    """Return whether stresses are nonlinear in strains at constant variables."""
+    """Return whether stresses are nonlinear in strains, at constant variables or by memory."""
+    if kind.law.memory:
+        return True
 
     def symbol(_: str) -> Expr:
         return ufl.variable(ufl.as_ufl(0.5))
@@ -102,7 +105,8 @@ class PointEquations:
         law, parameters = self._kind
         C = tuple(at[name] for name in rows(law, "stiffness"))
         return law.with_parameters(
-            law.as_argument(C), {name: at[f"number {name}"] for name in parameters}
+            law.as_argument(C),
+            {"length": at["length"], **{name: at[f"number {name}"] for name in parameters}},
         )
 
     def softening(self, at: At) -> SofteningLaw | None:
@@ -201,36 +205,50 @@ class PointEquations:
 
         at_θ, old = self.changes(at), self.state(at)
         changes = State({name: getattr(at_θ, name) * (1 / θ) for name in self._names})
+        if law.memory:
+            changes = State(law.increments(argument(e1), old, at["dt"]))
         new = _plus(old, changes)
         before, now = (law.as_tuple(law.stress(argument(e), z)) for e, z in ((e0, old), (e1, new)))
         elastic, hardening = law.elastic_energy(argument(e1), new), law.hardening_energy(new)
-        # ``lost`` is exact for quadratic energies.  For other laws that state no dissipation, its
-        # error is in ``worked``.
-        hardened = law.hardening_energy(changes)
-        lost = self._elastic_growth(law, de, changes) + hardened
-        elastically, nonlinear_loss, C = de, zero, tuple(at[n] for n in rows(law, "stiffness"))
-        if self._curved:
-            # ``nonlinear_loss`` is ``worked`` below at constant variables: not dissipation.
-            ends = tuple(law.as_tuple(law.stress(argument(e1), old)))
-            elastically = tuple((y - x) / c for x, y, c in zip(before, ends, C, strict=True))
-            work = sum(σ * e for σ, e in zip(self.elastic_stress(at), de, strict=True))
-            stored = law.elastic_energy(argument(e1), old) - law.elastic_energy(argument(e0), old)
-            none = State(dict.fromkeys(self._names, zero))
-            nonlinear_loss = work - stored - (2 * θ - 1) * self._elastic_growth(law, de, none)
-        worked = law.dissipation(self.strain(at), _plus(old, at_θ), changes, at["dt"])
-        if worked is None:
-            work = sum(σ * e for σ, e in zip(self.stress(at), de, strict=True))
-            stored = elastic - law.elastic_energy(argument(e0), old)
-            stored = stored + hardening - law.hardening_energy(old)
-            worked = work - stored - (2 * θ - 1) * lost - nonlinear_loss
-        relaxed = hardened
-        for σ0, σ1, e, c in zip(before, now, elastically, C, strict=True):
-            relaxed = relaxed - (σ1 - σ0) / 2 * (e - (σ1 - σ0) / c)
+        stored = elastic - law.elastic_energy(argument(e0), old)
+        stored = stored + hardening - law.hardening_energy(old)
+        work = sum(σ * e for σ, e in zip(self.stress(at), de, strict=True))
+        if law.memory:
+            # The stresses at both ends are exact.  By their mean, ``worked`` does not depend on the
+            # scheme; ``nonlinear_loss`` is the rest of the work of the stress at t_n+θ.
+            lost = relaxed = zero
+            worked = law.dissipation(argument(e1), new, changes, at["dt"])
+            if worked is None:
+                means = ((x + y) / 2 for x, y in zip(before, now, strict=True))
+                worked = sum(σ * e for σ, e in zip(means, de, strict=True)) - stored
+            nonlinear_loss = work - stored - worked
+        else:
+            # ``lost`` is exact for quadratic energies.  For other laws that state no dissipation,
+            # its error is in ``worked``.
+            hardened = law.hardening_energy(changes)
+            lost = self._elastic_growth(law, de, changes) + hardened
+            elastically, nonlinear_loss, C = de, zero, tuple(at[n] for n in rows(law, "stiffness"))
+            if self._curved:
+                # ``nonlinear_loss`` is ``worked`` below at constant variables: not dissipation.
+                ends = tuple(law.as_tuple(law.stress(argument(e1), old)))
+                elastically = tuple((y - x) / c for x, y, c in zip(before, ends, C, strict=True))
+                curve = sum(σ * e for σ, e in zip(self.elastic_stress(at), de, strict=True))
+                none = State(dict.fromkeys(self._names, zero))
+                linear = (2 * θ - 1) * self._elastic_growth(law, de, none)
+                elastically_stored = law.elastic_energy(argument(e1), old)
+                elastically_stored -= law.elastic_energy(argument(e0), old)
+                nonlinear_loss = curve - elastically_stored - linear
+            worked = law.dissipation(self.strain(at), _plus(old, at_θ), changes, at["dt"])
+            if worked is None:
+                worked = work - stored - (2 * θ - 1) * lost - nonlinear_loss
+            relaxed = hardened
+            for σ0, σ1, e, c in zip(before, now, elastically, C, strict=True):
+                relaxed = relaxed - (σ1 - σ0) / 2 * (e - (σ1 - σ0) / c)
         broken, resistance, left = zero, zero, zero
         if softening is not None:
             broken = a * softening.mean_traction(at["opening"], a)
             resistance = softening.traction(at["opening"] + a)
-            left = law.elastic_energy(e1[0] - now[0] / C[0], new)
+            left = law.elastic_energy(e1[0] - now[0] / at["stiffness"], new)
         return End(
             worked + zero, broken, lost + zero, elastic + zero, hardening + zero,
             positive(relaxed) + zero, resistance, left,

@@ -149,6 +149,11 @@ class Spring(Record):
     law: Annotated[MaterialLaw | None, require_law] = None
     softening: Annotated[SofteningLaw | None, require_softening] = None
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.law is not None and (fault := self.law.fault(self.stiffness, 1.0)):
+            raise ModelError(f"Spring: {type(self.law).__name__}: {fault}")
+
 
 @closed(OWN_LAW)
 @dataclass(frozen=True)

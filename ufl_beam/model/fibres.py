@@ -57,6 +57,10 @@ class SectionPoints:
     hinges: bool = False  # True if the breaking point is a hinge, with a jump of rotation
     number: int = 0  # number of this object in its section
 
+    def __post_init__(self) -> None:
+        if fault := self.fault(0.0):
+            raise ModelError(fault)
+
     @property
     def elastic(self) -> bool:
         """True if the points neither yield nor break."""
@@ -66,6 +70,16 @@ class SectionPoints:
     def yields(self) -> bool:
         """True if the law of any point can yield."""
         return any(not law.elastic for law, _ in self.laws)
+
+    def fault(self, length: float) -> str:
+        """Return the first error of the laws in a cell of a length, or empty; m, 0 if unknown."""
+        stiffness, first = np.reshape(self.stiffness, (len(self.weights), -1)), 0
+        for law, n in self.laws:
+            for C in np.unique(stiffness[first : first + n], axis=0):
+                if fault := law.fault(law.as_argument(tuple(C.tolist())), length):
+                    return f"{type(law).__name__}: {fault}"
+            first += n
+        return ""
 
     @cached_property
     def kind(self) -> Kind:

@@ -47,8 +47,13 @@ class MaterialLaw(ABC):
         resultants: ``"NM"`` or ``"NVM"`` if the law couples these resultants; strain, stress and
             ``C`` are then tuples.  By default a law has one strain and one stress.
         C: Elastic stiffness.
+        length: Length of the cell of a fibre or resultant; m.  Laws whose energy is per area, such
+            as fracture energies, divide by it.  It is 1 for springs.
         active: True if the law may supply energy, for example by swelling.  Otherwise a step is
             refused if the solution of :meth:`residuals` has a negative dissipation.
+        memory: True if the variables record the path of the strain, such as its largest value or
+            its last reversal, at any rate of strain.  :meth:`increments` is then also called with
+            the strain at the end of the step, and variables are not extrapolated from t_n+θ.
 
     Example:
         >>> from dataclasses import dataclass
@@ -68,7 +73,9 @@ class MaterialLaw(ABC):
     variables: ClassVar[Mapping[str, float]] = {}
     resultants: ClassVar[str] = ""
     active: ClassVar[bool] = False
+    memory: ClassVar[bool] = False
     C: Values
+    length: Values = 1.0
 
     @abstractmethod
     def stress(self, strain: Values, state: State) -> Values:
@@ -92,6 +99,13 @@ class MaterialLaw(ABC):
         """
         return {}
 
+    def fault(self, C: Values, length: float) -> str:
+        """Return the error of the parameters at points of stiffness ``C``; empty if there is none.
+
+        ``length`` is the length of the cell, or 0 before cells are known; m.
+        """
+        return ""
+
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
         """Return the residuals of a backward-Euler step, one for each variable.
 
@@ -111,7 +125,8 @@ class MaterialLaw(ABC):
         None, the default, stands for the work that is neither stored nor lost by the time scheme.
 
         Args:
-            strain: Strain at the instant of the step at which the law holds.
+            strain: Strain at the instant of the step at which the law holds; with ``memory`` at
+                the end of the step.
             state: Variables at this instant.
             changes: Increments of the variables in the step.
             dt: Length of the step; s.
@@ -207,6 +222,10 @@ def require_law(law: object, what: str, interaction: bool = False) -> None:
     if len(ways) != (1 if law.variables else len(ways)):
         has = "both increments and residuals" if ways else "neither increments nor residuals"
         raise ModelError(f"{kind} has {has}; define one of the two methods")
+    if law.memory and ways == ["residuals"]:
+        raise ModelError(
+            f"{kind} has memory = True and residuals; laws with memory define increments"
+        )
     parameters = law.parameters(uniform(law, np.ones(1)))
     if "C" in parameters:
         raise ModelError(f"{kind}.parameters has the name C, the name of the elastic stiffness")
