@@ -6,7 +6,7 @@ from __future__ import annotations
 import struct
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property, partial
 from typing import Annotated, Any, NamedTuple
@@ -24,11 +24,8 @@ from ufl_beam.model.functions import Point
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import MaterialLaw, require_law, uniform
 from ufl_beam.model.records import Positive, Record
+from ufl_beam.model.shapes import Shape
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
-
-Below = Callable[[Array], Array]
-"""Function of y: area up to y and its first moment, each up to a constant; (2, n); m², m³."""
-
 
 class Kind(NamedTuple):
     """A law with all parameters equal to 1, and the names of the parameters."""
@@ -145,18 +142,19 @@ class PlacedFibres:
     __repr__ = compact_repr
 
     @classmethod
-    def layers(
-        cls, fibres: Fibres | None, E: float, h: float, below: Below, edges: Sequence[float] = ()
-    ) -> PlacedFibres | None:
-        """Create layers of equal thickness over the depth ``h`` (m), with cuts at ``edges`` (m)."""
+    def layers(cls, fibres: Fibres | None, E: float, shape: Shape) -> PlacedFibres | None:
+        """Create layers of equal thickness over the depth of a shape, with cuts at its corners."""
         if fibres is None:
             return None
         require_kind(fibres, Fibres, "Section: fibres")
         if fibres.number < 2:
             raise ModelError("Fibres: number = 1 has no bending stiffness; use 2 or more")
-        cuts = np.union1d(np.linspace(-h / 2, h / 2, fibres.number + 1), np.array(edges))
-        cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * h, 0, True)]
-        A, S = np.diff(below(cuts))
+        depth = shape.top - shape.bottom
+        corners = np.array([y for loop in (shape.corners, *shape.holes) for _, y, *_ in loop])
+        cuts = np.linspace(shape.bottom, shape.top, fibres.number + 1)
+        cuts = np.union1d(cuts, np.clip(corners - shape.y, shape.bottom, shape.top))
+        cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * depth, 0, True)]
+        A, S, _ = np.diff(shape.below(cuts))
         return cls(fibres, E, S / A, A)
 
     @property
