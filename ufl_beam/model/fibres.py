@@ -27,6 +27,7 @@ from ufl_beam.model.records import Positive, Record
 from ufl_beam.model.shapes import Shape
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
+
 class Kind(NamedTuple):
     """A law with all parameters equal to 1, and the names of the parameters."""
 
@@ -149,12 +150,11 @@ class PlacedFibres:
         require_kind(fibres, Fibres, "Section: fibres")
         if fibres.number < 2:
             raise ModelError("Fibres: number = 1 has no bending stiffness; use 2 or more")
-        depth = shape.top - shape.bottom
-        corners = np.array([y for loop in (shape.corners, *shape.holes) for _, y, *_ in loop])
-        cuts = np.linspace(shape.bottom, shape.top, fibres.number + 1)
-        cuts = np.union1d(cuts, np.clip(corners - shape.y, shape.bottom, shape.top))
-        cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * depth, 0, True)]
-        A, S, _ = np.diff(shape.below(cuts))
+        low, high = shape.bottom, shape.top
+        corners = [y - shape.y for loop in (shape.corners, *shape.holes) for _, y, *_ in loop]
+        cuts = np.union1d(np.linspace(low, high, fibres.number + 1), np.clip(corners, low, high))
+        cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * (high - low), 0, True)]
+        A, S, _ = np.diff(shape.below(np.asarray(cuts, float)))
         return cls(fibres, E, S / A, A)
 
     @property

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import KW_ONLY, dataclass, field
 from difflib import get_close_matches
 from functools import cache, partial
@@ -17,7 +18,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ufl_beam.errors import ModelError
+from ufl_beam.errors import ModelError, shorten
 from ufl_beam.model.checks import require_array, require_kind, require_number, require_text
 from ufl_beam.model.fibres import Fibres, PlacedFibres, SectionPoints
 from ufl_beam.model.material_law import MaterialLaw, require_law
@@ -186,11 +187,12 @@ class Section(Record):
             raise ModelError(f'Section: axis = {axis!r} must be "strong" or "weak"')
         if abs(shape.obliquity) > 1e-6:
             raise ModelError(
-                f"Section.of_shape: ∫ x y dA is {shape.obliquity:.2g} of ∫ y² dA, not 0, so bending "
-                "in the plane moves the beam out of the plane; turn the shape to its principal "
-                "axes, or give Section(EA=, GA=, EI=) of a beam that is held in the plane"
+                f"Section.of_shape: bending would move the beam out of the plane: ∫ x y dA is "
+                f"{shape.obliquity:.2g} ∫ y² dA, not 0; turn the shape to its principal axes, or "
+                "give Section(EA=, GA=, EI=) of a beam that is held in the plane"
             )
-        shape = shape if axis == "strong" else shape.turned()
+        # Files compare objects that are one with such that are equal: each section has its own.
+        shape = copy(shape) if axis == "strong" else shape.turned()
         return cls._of_material(
             shape.A, shape.I, E, nu, rho, shear_factor, depth=shape.top - shape.bottom,
             fibres=PlacedFibres.layers(fibres, E, shape), shape=shape, **laws,
@@ -262,9 +264,7 @@ class Section(Record):
             raise ModelError(
                 f"Section.tube: wall t = {t} m is thicker than the radius of d = {d} m"
             )
-        return cls.of_shape(
-            rounded_rectangle(d, d, d / 2, t), **{"shear_factor": 1 / 2} | material
-        )
+        return cls.of_shape(rounded_rectangle(d, d, d / 2, t), **{"shear_factor": 1 / 2} | material)
 
     @classmethod
     def box(cls, b: float, h: float, t: float, r: float = 0.0, **material: Any) -> Section:
@@ -278,9 +278,7 @@ class Section(Record):
         if material.get("axis") == "weak":
             b, h, material = h, b, material | {"axis": "strong"}
         if 2 * t >= min(b, h):
-            raise ModelError(
-                f"Section.box: two walls do not fit: b = {b}, h = {h}, t = {t} m"
-            )
+            raise ModelError(f"Section.box: two walls do not fit: b = {b}, h = {h}, t = {t} m")
         return cls._thin_walled(rounded_rectangle(b, h, r, t), box_walls(b, h, t), material)
 
     @classmethod
@@ -364,8 +362,9 @@ class Section(Record):
             53.81 cm², 8356 cm⁴, 628.4 cm³
             >>> girder = ub.Section.steel("W14X90", axis="weak", E=200e9)
         """
-        name = re.sub(r"\s", "", require_text(designation, "Section.steel: designation")).upper()
-        name = re.sub(r"^HE(\d+)([ABM])$", r"HE\2\1", name.replace("×", "X"))
+        require_text(designation, "Section.steel: designation")
+        name = "".join(designation.upper().replace("×", "X").split())
+        name = re.sub(r"^HE(\d+)([ABM])$", r"HE\2\1", name)
         table = _steel_table()
         if name not in table:
             similar = ", ".join(get_close_matches(name, table, n=5, cutoff=0.0))
@@ -374,8 +373,12 @@ class Section(Record):
                 f"and HSS; similar designations are {similar}"
             )
         kind, sizes = table[name]
-        create = {"I": cls.i_shape, "C": cls.channel, "box": cls.box, "tube": cls.tube}[kind]
-        return create(*sizes, **{"E": 210e9, "nu": 0.3, "rho": 7850.0} | material)
+        material = {"E": 210e9, "nu": 0.3, "rho": 7850.0} | material
+        if kind == "box":
+            return cls.box(*sizes, **material)
+        if kind == "tube":
+            return cls.tube(*sizes, **material)
+        return (cls.i_shape if kind == "I" else cls.channel)(*sizes, **material)
 
     @classmethod
     def of_sectionproperties(cls, analysed: Any, *, axis: str = "x", **laws: Any) -> Section:
@@ -398,8 +401,8 @@ class Section(Record):
         what = "Section.of_sectionproperties"
         if not type(analysed).__module__.startswith("sectionproperties."):
             raise ModelError(
-                f"{what}: a {type(analysed).__name__} is not an analysed Section of the package "
-                "sectionproperties, which `pip install sectionproperties` installs"
+                f"{what}: {shorten(analysed)} must be a Section of the package sectionproperties "
+                "(pip install sectionproperties)"
             )
         if axis not in ("x", "y"):
             raise ModelError(f'{what}: axis = {axis!r} must be "x" or "y"')

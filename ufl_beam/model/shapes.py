@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import chain, pairwise
 from typing import Annotated
 
 import numpy as np
@@ -22,6 +23,9 @@ from ufl_beam.model.records import Record
 
 Loop = tuple[tuple[float, float, float], ...]
 """Corners (x, y, radius) of a closed polygon before they are rounded; m."""
+
+Piece = tuple[complex, complex, complex, float, float, float]
+"""Start and end of a straight line, and zeros; or zeros, centre, radius and angles of an arc; m."""
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 """Gauss points between two corners: round-off for circles, the least smooth shapes."""
@@ -107,17 +111,27 @@ class Shape(Record):
     def outlines(self) -> list[Complex]:
         """Return the polygons x + iy, m, with arcs as chords; y is measured from the centroid."""
         loops = []
-        for loop in (self.corners, *self.holes):
+        for loop in self._pieces:
             points = [
                 centre + r * np.exp(1j * np.linspace(first, last, 12, endpoint=False))
                 if r
                 else np.array([start])
-                for start, _, centre, r, first, last in _pieces(loop)
+                for start, _, centre, r, first, last in loop
             ]
             loops.append(np.concatenate([*points, points[0][:1]]) - 1j * self.y)
         return loops
 
     # -- integrals -----------------------------------------------------------------------------
+
+    @cached_property
+    def _pieces(self) -> list[list[Piece]]:
+        """Lines and arcs of the outline, counterclockwise, and of holes, clockwise."""
+        loops: list[list[Piece]] = []
+        for loop in (self.corners, *self.holes):
+            x, y, _ = np.transpose(loop)
+            clockwise = float(np.roll(x, 1) @ y - np.roll(y, 1) @ x) < 0
+            loops.append(_pieces(loop if clockwise == bool(loops) else loop[::-1]))
+        return loops
 
     @cached_property
     def _lines(self) -> tuple[Array, float]:
@@ -126,28 +140,22 @@ class Shape(Record):
         The rows are p, q, s, r, c, y0, y1, with c, y0 and y1 measured from the centroid.
         """
         rows = []
-        for number, loop in enumerate((self.corners, *self.holes)):
-            x, y, _ = np.transpose(loop)
-            clockwise = float(np.roll(x, 1) @ y - np.roll(y, 1) @ x) < 0
-            for start, end, centre, r, first, last in _pieces(
-                loop[::-1] if clockwise != (number > 0) else loop
-            ):
-                if r:
-                    side, c = math.copysign(1, math.cos((first + last) / 2)), centre.imag
-                    y0, y1 = c + r * math.sin(first), c + r * math.sin(last)
-                    rows.append((centre.real, 0.0, side, r, c, y0, y1))
-                elif start.imag != end.imag:
-                    slope = (end.real - start.real) / (end.imag - start.imag)
-                    rows.append((start.real, slope, 0.0, 0.0, start.imag, start.imag, end.imag))
-        lines = np.array(rows).T
-        centre = 0.0
+        for start, end, middle, r, first, last in chain.from_iterable(self._pieces):
+            if r:
+                side, c = math.copysign(1, math.cos((first + last) / 2)), middle.imag
+                y0, y1 = c + r * math.sin(first), c + r * math.sin(last)
+                rows.append((middle.real, 0.0, side, r, c, y0, y1))
+            elif start.imag != end.imag:
+                slope = (end.real - start.real) / (end.imag - start.imag)
+                rows.append((start.real, slope, 0.0, 0.0, start.imag, start.imag, end.imag))
+        lines, centre = np.reshape(rows, (-1, 7)).T.copy(), 0.0
         for _ in range(2):  # the second time against round-off of a distant origin
             self.__dict__["_lines"] = lines, centre
             A, S, _ = self.below(np.array([np.inf]))[:, 0]
             if not A > 0:
                 raise ModelError("Shape: it has no area, or its holes are larger than it")
             lines[4:] -= S / A
-            centre += S / A
+            centre += float(S / A)
         return lines, centre
 
     def below(self, y: Array) -> Array:
@@ -221,7 +229,7 @@ class Shape(Record):
         return self._moments[0]
 
     @property
-    def I(self) -> float:
+    def I(self) -> float:  # noqa: E743 - the letter of mechanics
         """Second moment of area; m⁴."""
         return self._moments[1]
 
@@ -239,18 +247,15 @@ class Shape(Record):
         )  # fmt: skip
         return float(-2 * self.below(np.array([halving]))[1, 0])
 
-    @property
+    @cached_property
     def obliquity(self) -> float:
         """Product of inertia ∫ x y dA, divided by the second moment ∫ y² dA."""
         y, weights, x, signs = self._strips
         return float(weights @ (y * (signs * x**2).sum(axis=0)) / 2 / self.I)
 
 
-def _pieces(loop: Loop) -> list[tuple[complex, complex, complex, float, float, float]]:
-    """Return start, end, centre, radius and angles of the arcs and straight lines of a loop.
-
-    Straight lines have the radius 0.  No arc passes the top or bottom of its circle.
-    """
+def _pieces(loop: Sequence[Sequence[float]]) -> list[Piece]:
+    """Return the arcs and straight lines of a loop; no arc passes the top or bottom of a circle."""
     x, y, radii = np.transpose(loop)
     z = x + 1j * y
     lengths = np.abs(np.roll(z, -1) - z)
@@ -277,7 +282,7 @@ def _pieces(loop: Loop) -> list[tuple[complex, complex, complex, float, float, f
             tops = np.pi * (np.arange(math.ceil(low / np.pi - 0.5), high / np.pi - 0.5 + 1) + 0.5)
             tops = tops[(tops > low + 1e-9) & (tops < high - 1e-9)]
             angles = sorted([first, *tops, last], reverse=last < first)
-            pieces += [(0j, 0j, centre, r, a, b) for a, b in zip(angles, angles[1:], strict=False)]
+            pieces += [(0j, 0j, centre, r, a, b) for a, b in pairwise(angles)]
         j = (i + 1) % len(loop)
         if lengths[i] > (cut[i] + cut[j]) * (1 + 1e-9):
             start, end = z[i] + cut[i] * ahead[i], z[j] - cut[j] * ahead[i]
@@ -294,6 +299,7 @@ The shear flow is zero where nothing ends, and at the ends of the last walls by 
 """
 
 
+@lru_cache(maxsize=256)
 def rounded_rectangle(b: float, h: float, r: float, t: float = 0.0) -> Shape:
     """Create a rectangle with corners of radius ``r``, and with a hole if ``t`` is a wall; m."""
 
@@ -304,9 +310,8 @@ def rounded_rectangle(b: float, h: float, r: float, t: float = 0.0) -> Shape:
     return Shape(corners(b, h, r), [corners(b - 2 * t, h - 2 * t, max(r - t, 0))] if hollow else ())
 
 
-def flanged(
-    kind: str, h: float, b: float, tw: float, tf: float, r: float
-) -> tuple[Shape, Walls]:
+@lru_cache(maxsize=256)
+def flanged(kind: str, h: float, b: float, tw: float, tf: float, r: float) -> tuple[Shape, Walls]:
     """Create an "I", a "T" with its flange above, or a channel "C" with its web at x = 0.
 
     ``r`` (m) is the radius of the fillets between web and flanges.
@@ -314,10 +319,10 @@ def flanged(
     left, web, right = (-b / 2, -tw / 2, b / 2) if kind != "C" else (0.0, 0.0, b)
     face, rim = h / 2 - tf, h / 2
     half = [(web + tw, face, r), (right, face, 0.0), (right, rim, 0.0)]
-    half += [(left, rim, 0.0)] if kind == "C" else [(left, rim, 0.0), (left, face, 0.0), (web, face, r)]
-    foot = [(web, -rim, 0.0), (web + tw, -rim, 0.0)] if kind == "T" else [
-        (x, -y, radius) for x, y, radius in half[::-1]
-    ]
+    half += [(left, rim, 0.0), (left, face, 0.0), (web, face, r)][: 1 if kind == "C" else 3]
+    foot = [(x, -y, radius) for x, y, radius in half[::-1]]
+    if kind == "T":
+        foot = [(web, -rim, 0.0), (web + tw, -rim, 0.0)]
     middle, top = complex(web + tw / 2), complex(web + tw / 2, (face + rim) / 2)
     tips = (left, right) if kind != "C" else (right,)
     flange: Walls = [(complex(x, top.imag), top, tf) for x in tips]
