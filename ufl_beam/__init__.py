@@ -52,6 +52,9 @@ from ufl_beam.analysis.path_controls import (
 )
 from ufl_beam.analysis.path_following import Path as Path
 from ufl_beam.analysis.path_following import follow
+from ufl_beam.analysis.section_analysis import InteractionDiagram as InteractionDiagram
+from ufl_beam.analysis.section_analysis import MomentCurvature as MomentCurvature
+from ufl_beam.analysis.section_analysis import interaction_diagram, moment_curvature
 from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff as Tradeoff
 from ufl_beam.errors import (
@@ -278,9 +281,11 @@ __all__ = [
     "fit_decay",
     "follow",
     "ground",
+    "interaction_diagram",
     "law_functions",
     "logarithmic_decrement",
     "modes",
+    "moment_curvature",
     "peaks",
     "picture",
     "plot",
@@ -295,7 +300,8 @@ __all__ = [
 
 RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
-    "Energy", "Envelope", "Event", "Extent", "Film", "Modes", "Path", "Place", "Tradeoff",
+    "Energy", "Envelope", "Event", "Extent", "Film", "InteractionDiagram", "Modes",
+    "MomentCurvature", "Path", "Place", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 

@@ -233,21 +233,24 @@ class DofNumbering:
     def inelastic(self) -> list[tuple[SectionPoints, Index]]:
         """Material points of cells that can yield or break, with the cells that have these points.
 
+        Cells whose laws are of several classes occur once for each class.
+
         Raises:
             ModelError: There are such cells, and the degree of the mesh is above 1.
         """
         groups = dict[SectionPoints, list[int]]()
         sections, beam_sections = self.sections
         for number, section in enumerate(sections):
-            section_points = section.section_points(section.hinge)
-            if section_points is not None and not section_points.elastic:
+            points = section.section_points(section.hinge)
+            if not all(of_class.elastic for of_class in points):
                 if self.mesh.degree > 1:
                     beam = self.scene.beams[int(np.argmax(beam_sections == number))]
                     raise ModelError(
                         f"Mesh: degree = {self.mesh.degree} is for elastic beams, and {beam.name} "
                         "may yield or break; use degree=1 with more cells, or an elastic section"
                     )
-                groups.setdefault(section_points, []).append(number)
+                for of_class in points:
+                    groups.setdefault(of_class, []).append(number)
         cell_sections = beam_sections[self.beam_of_cell]
         return [
             (section_points, np.flatnonzero(np.isin(cell_sections, group)))
@@ -258,7 +261,7 @@ class DofNumbering:
     def inelastic_cells(self) -> Index:
         """Cells that can yield or break, ascending; (m,)."""
         groups = [cells for _, cells in self.inelastic]
-        return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups]))
+        return np.asarray(np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *groups])))
 
     def lengths(self, cells: Index) -> Array:
         """Compute lengths of cells; (len(cells),); m."""

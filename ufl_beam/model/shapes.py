@@ -108,8 +108,28 @@ class Shape(Record):
         corners, *holes = [[(-y, x, r) for x, y, r in loop] for loop in (self.corners, *self.holes)]
         return Shape(corners, holes)
 
+    def inset(self, distance: float) -> Shape:
+        """Return the shape of the points farther than a distance (m) from the outline and holes.
+
+        Raises:
+            ModelError: The distance is so large that sides of a polygon vanish.
+        """
+        loops = []
+        for loop in self._loops:
+            x, y, radii = np.transpose(loop)
+            z = x + 1j * y
+            ahead = np.roll(z, -1) - z
+            ahead /= np.abs(ahead)
+            turn = ahead / np.roll(ahead, 1)
+            z += distance * 1j * (np.roll(ahead, 1) + ahead) / (1 + turn.real)
+            radii = np.maximum(radii - distance * np.sign(turn.imag), 0.0)
+            if not (((np.roll(z, -1) - z) / ahead).real > 0).all():
+                raise ModelError(f"Shape.inset: sides vanish at {distance:g} m from {self!r}")
+            loops.append(np.column_stack([z.real, z.imag, radii]))
+        return Shape(loops[0], loops[1:])  # type: ignore[arg-type]
+
     def outlines(self) -> list[Complex]:
-        """Return the polygons x + iy, m, with arcs as chords; y is measured from the centroid."""
+        """Return the outline and holes as closed polygons x + iy, m, with arcs as chords."""
         loops = []
         for loop in self._pieces:
             points = [
@@ -118,20 +138,25 @@ class Shape(Record):
                 else np.array([start])
                 for start, _, centre, r, first, last in loop
             ]
-            loops.append(np.concatenate([*points, points[0][:1]]) - 1j * self.y)
+            loops.append(np.concatenate([*points, points[0][:1]]))
         return loops
 
     # -- integrals -----------------------------------------------------------------------------
 
     @cached_property
-    def _pieces(self) -> list[list[Piece]]:
-        """Lines and arcs of the outline, counterclockwise, and of holes, clockwise."""
-        loops: list[list[Piece]] = []
+    def _loops(self) -> list[Loop]:
+        """Corners of the outline, counterclockwise, and of holes, clockwise."""
+        loops: list[Loop] = []
         for loop in (self.corners, *self.holes):
             x, y, _ = np.transpose(loop)
             clockwise = float(np.roll(x, 1) @ y - np.roll(y, 1) @ x) < 0
-            loops.append(_pieces(loop if clockwise == bool(loops) else loop[::-1]))
+            loops.append(tuple(loop if clockwise == bool(loops) else loop[::-1]))
         return loops
+
+    @cached_property
+    def _pieces(self) -> list[list[Piece]]:
+        """Lines and arcs of the outline, counterclockwise, and of holes, clockwise."""
+        return [_pieces(loop) for loop in self._loops]
 
     @cached_property
     def _lines(self) -> tuple[Array, float]:
@@ -312,11 +337,11 @@ def rounded_rectangle(b: float, h: float, r: float, t: float = 0.0) -> Shape:
 
 @lru_cache(maxsize=256)
 def flanged(kind: str, h: float, b: float, tw: float, tf: float, r: float) -> tuple[Shape, Walls]:
-    """Create an "I", a "T" with its flange above, or a channel "C" with its web at x = 0.
+    """Create an "I", a "T" with its flange above, or a channel "C" with its web on the left.
 
     ``r`` (m) is the radius of the fillets between web and flanges.
     """
-    left, web, right = (-b / 2, -tw / 2, b / 2) if kind != "C" else (0.0, 0.0, b)
+    left, web, right = (-b / 2, -tw / 2, b / 2) if kind != "C" else (-b / 2, -b / 2, b / 2)
     face, rim = h / 2 - tf, h / 2
     half = [(web + tw, face, r), (right, face, 0.0), (right, rim, 0.0)]
     half += [(left, rim, 0.0), (left, face, 0.0), (web, face, r)][: 1 if kind == "C" else 3]

@@ -275,7 +275,7 @@ class DolfinxView:
         tables = [np.zeros((len(self._view.subdomain.numbering.cells), k)) for k in (3, 9)]
         for cells, *values in (beams.about_state() for beams in self._view.inelastic):
             for table, rows in zip(tables, values, strict=True):
-                table[cells] = rows
+                table[cells] += rows
         for function, table in zip(self._around, tables, strict=False):  # none in elastic scenes
             put_in_cells(function, table[self.cells])
         return forms

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
+from ufl_beam.analysis.section_analysis import InteractionDiagram, MomentCurvature
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.model.scene import Scene
@@ -27,7 +28,13 @@ from ufl_beam.plotting.history_pictures import (
     draw_study,
     draw_tradeoff,
 )
-from ufl_beam.plotting.inelastic_pictures import draw_dissipation, draw_hinge, draw_moment_curvature
+from ufl_beam.plotting.inelastic_pictures import (
+    draw_dissipation,
+    draw_hinge,
+    draw_interaction,
+    draw_moment_curvature,
+    draw_section_moments,
+)
 from ufl_beam.plotting.model import draw_model
 from ufl_beam.plotting.section_pictures import draw_section
 from ufl_beam.plotting.style import RESULTANTS
@@ -55,6 +62,8 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Fatigue: {"cycles": draw_cycles},
     Study: {"results": draw_study},
     Tradeoff: {"errors": draw_tradeoff},
+    MomentCurvature: {"moment-curvature": draw_section_moments},
+    InteractionDiagram: {"interaction": draw_interaction},
 }
 """Pictures by class and quantity; the first one of a class is drawn by default."""
 
@@ -64,26 +73,28 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
 
     By default, the first quantity of the class is drawn.  A ``Path`` is a ``Solution``.
 
-    ===============  ==================  ========================================================
-    shown            quantity            picture and further arguments
-    ===============  ==================  ========================================================
-    Scene            "model"             the whole model, before any run; ``ax``
-    Section          "section"           outline and fibres of a cross-section; ``ax``
-    Solution         "shape"             the frame at one time; ``n``, ``magnify``, ``ax``
-    Solution         "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
-    Solution         "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
-    Solution         "shapes"            several shapes; ``times`` or ``count``, ``magnify``, ``ax``
-    Solution         "history"           motion over time; places, ``component``, ``ax``
-    Solution         "energy"            the energy ledger over time
-    Solution         "dissipation"       energy losses over time; ``ax``
-    Solution         "hinge"             moment of a hinge over its jump; a place, ``ax``
-    Solution         "moment-curvature"  moment of a cell; a place, ``ax``
-    Modes, Buckling  "modes"             shapes side by side; ``numbers``, ``amplitude``
-    Extremes         "M", "N", "V"       envelope of a section force; ``ax``
-    Fatigue          "cycles"            rainflow matrix and spectrum; a hot spot
-    Study            "results"           results over the cases
-    Tradeoff         "errors"            errors over wall times; ``ax``
-    ===============  ==================  ========================================================
+    ==================  ==================  ========================================================
+    shown               quantity            picture and further arguments
+    ==================  ==================  ========================================================
+    Scene               "model"             the whole model, before any run; ``ax``
+    Section             "section"           outline and fibres of a cross-section; ``ax``
+    Solution            "shape"             the frame at one time; ``n``, ``magnify``, ``ax``
+    Solution            "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
+    Solution            "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
+    Solution            "shapes"            shapes; ``times`` or ``count``, ``magnify``, ``ax``
+    Solution            "history"           motion over time; places, ``component``, ``ax``
+    Solution            "energy"            the energy ledger over time
+    Solution            "dissipation"       energy losses over time; ``ax``
+    Solution            "hinge"             moment of a hinge over its jump; a place, ``ax``
+    Solution            "moment-curvature"  moment of a cell; a place, ``ax``
+    Modes, Buckling     "modes"             shapes side by side; ``numbers``, ``amplitude``
+    Extremes            "M", "N", "V"       envelope of a section force; ``ax``
+    Fatigue             "cycles"            rainflow matrix and spectrum; a hot spot
+    Study               "results"           results over the cases
+    Tradeoff            "errors"            errors over wall times; ``ax``
+    MomentCurvature     "moment-curvature"  moment of a section over its curvature; ``ax``
+    InteractionDiagram  "interaction"       axial force over moment of a section; ``ax``
+    ==================  ==================  ========================================================
 
     Args:
         shown: Object to draw.

@@ -10,7 +10,7 @@ import numpy as np
 from ufl_beam.errors import ArgumentError
 from ufl_beam.model.sections import Section
 from ufl_beam.plotting import style
-from ufl_beam.plotting.style import BLUE, INK, shade
+from ufl_beam.plotting.style import BLUE, INK, ORANGE, shade, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,25 +36,35 @@ def draw_section(section: Section, *, ax: Axes | None = None) -> Figure:
 
     with style.panel(ax, (6.0, 6.0)) as axes:
         axes.axhline(0.0, color=shade(INK), lw=0.8, ls=(0, (8, 4)), zorder=3)
-        if shape is not None:
-            loops = [MM * loop for loop in shape.outlines()]
+        axis = fibres.axis if fibres is not None else shape.y if shape is not None else 0.0
+        core = fibres.core if fibres is not None else None
+        for number, (of, color) in enumerate(((shape, BLUE), (core, ORANGE))):
+            if of is None:
+                continue
+            loops = [MM * (loop - 1j * axis) for loop in of.outlines()]
             paths = [Path(np.column_stack([z.real, z.imag]), closed=True) for z in loops]
-            area = PathPatch(Path.make_compound_path(*paths), fc=BLUE, ec=BLUE, lw=1.5)
-            area.set_facecolor((*area.get_facecolor()[:3], 0.2))
+            area = PathPatch(Path.make_compound_path(*paths), fc=(color, 0.2), ec=color, lw=1.5)
             axes.add_patch(area)
             if fibres is not None:
+                # The cover comes after the bars, the core is last.
+                last = len(fibres.fibres) - (core is not None)
+                layers = fibres.y[fibres.bars :][fibres.material[fibres.bars :] == last - 1 + number]
                 x = loops[0].real
-                lines = axes.hlines(MM * fibres.y, x.min(), x.max(), color=BLUE, lw=1.0)
+                lines = axes.hlines(MM * layers, x.min(), x.max(), color=color, lw=1.0)
                 lines.set_clip_path(area)
-            if ax is None:
-                axes.set_title(
+        discs = np.arange(len(fibres.y) if shape is None else fibres.bars) if fibres else []
+        for i in discs:
+            r = MM * np.sqrt(fibres.A[i] / np.pi)
+            axes.add_patch(Circle((0.0, MM * fibres.y[i]), r, color=INK, lw=0, zorder=4))
+        if ax is None:
+            if shape is not None and axis == shape.y:
+                title = (
                     f"A = {1e4 * shape.A:.4g} cm², I = {1e8 * shape.I:.4g} cm⁴, "
-                    f"Wpl = {1e6 * shape.Wpl:.4g} cm³",
-                    loc="left", fontsize=style.font_size(11.0),
-                )  # fmt: skip
-        elif fibres is not None:
-            for y, A in zip(fibres.y, fibres.A, strict=True):
-                axes.add_patch(Circle((0.0, MM * y), MM * np.sqrt(A / np.pi), color=BLUE, lw=0))
+                    f"Wpl = {1e6 * shape.Wpl:.4g} cm³"
+                )
+            else:
+                title = f"EA = {with_unit(section.EA, 'N')}, EI = {with_unit(section.EI, 'N m²')}"
+            axes.set_title(title, loc="left", fontsize=style.font_size(11.0))
         axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
         axes.autoscale_view()
     return style.parent_figure(axes)

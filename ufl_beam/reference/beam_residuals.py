@@ -123,6 +123,7 @@ class YieldingBeams(CellForce):
         linear = self._b + ufl.dot(self._D, strain(element.q1, element.axis))
         work, around = (virtual_work(r, w_e) * element.dx(1) for r in (self._r, linear))
         super().__init__(cells, work, setting, around=around)
+        self._rows = cells.cell_indices + section_points.number * len(numbering.cells)
         self._names = [numbering.describe_cell(number) for number in cells.cell_indices]
         self.points = MaterialPoints(
             section_points, numbering.keys(cells.cell_indices), cells.lengths, setting
@@ -157,13 +158,13 @@ class YieldingBeams(CellForce):
 
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the internal variables of all points."""
-        self.points.state(archive.rows("cells", self.cells.cell_indices, self.points.state()))
+        self.points.state(archive.rows("cells", self._rows, self.points.state()))
 
     def material(self) -> Array:
-        """Return the number of each cell and its six values "material"; (num_cells, 7)."""
+        """Return the six values "material" of each cell; (num_cells, 6)."""
         data = self.points.recorded.copy()
         data[:, 3] *= self._hinges  # zero without a hinge: jumps of fibres are no rotations
-        return np.column_stack([self.cells.cell_indices, data])
+        return data
 
 
 # -- inertia and damping -------------------------------------------------------------------------

@@ -224,10 +224,12 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     length = np.linalg.norm(d, axis=1)
     along, shear = (np.sum(apart * axis, axis=1) / length for axis in (d, across))
     strains = np.column_stack([along, shear, change[:, 2]])
-    left_in_cells = np.ones(len(numbering.cells))
+    works = np.zeros((2, len(numbering.cells)))  # of the tangent, and of the elastic stiffness
     for beams in equation.inelastic:
         cells, _ = beams.recorded()
-        left_in_cells[cells] = beams.points.remaining(strains[cells])
+        works[:, cells] += beams.points.works(strains[cells])
+    now, elastic = works
+    left_in_cells = np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0)
     if subdomain.comm.size > 1:
         subdomain.comm.Allreduce(MPI.IN_PLACE, connectors)
         subdomain.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)
@@ -263,15 +265,12 @@ def _describe(
     if ways:
         verb = "gives way" if len(ways) == 1 else "give way together"
         said += f"; {_list(ways)} {verb} at no further force"
-    layouts = (
-        numbering.scene.beams[numbering.beam_of_cell[i]].section.section_points(None)
-        for i in cells.soft
-    )
+    sections = (numbering.scene.beams[numbering.beam_of_cell[i]].section for i in cells.soft)
     laws = (
         law
-        for section_points in layouts
-        if section_points is not None
-        for law, _ in section_points.laws
+        for section in sections
+        for points in section.section_points(None)
+        for law, _ in points.laws
     )
     perfect = any(isinstance(law, ElastoPlastic) and law.bounded and law.opens for law in laws)
     if len(cells.soft) > 1 and perfect:
@@ -330,9 +329,9 @@ class LedgerWatch:
         self._numbering, self._tolerance = numbering, tolerance
         connectors, laws = numbering.scene.all_connectors, list[MaterialLaw]()
         for beam in numbering.scene.beams:
-            section_points = beam.section.section_points(beam.section.hinge)
-            if section_points is not None and not section_points.elastic:
-                laws += [law for law, _ in section_points.laws]
+            points = beam.section.section_points(beam.section.hinge)
+            if not all(of_class.elastic for of_class in points):
+                laws += [law for of_class in points for law, _ in of_class.laws]
         springs = [
             connector.law.law for connector in connectors if isinstance(connector.law, Spring)
         ]

@@ -355,7 +355,13 @@ class Opened:
         numbering, times = self._numbering, self._times
         for beam in numbering.scene.beams:
             cells, laws = numbering.cells_of(beam), numbering.hinges(beam)
-            fall = {law: _fall(beam.section.section_points(law), scheme) for law in set(laws)}
+            fall = {
+                law: max(
+                    (_fall(points, scheme) for points in beam.section.section_points(law)),
+                    default=(0.0, 0.0),
+                )
+                for law in set(laws)
+            }
             falls, energies = np.array([fall[law] for law in laws]).T
             opened = (self.first[cells] > 0) & (self.dissipated[cells] >= energies)
             lengths = numbering.lengths(cells)
@@ -394,14 +400,14 @@ def _percent(fraction: float) -> str:
     return f"{100 * fraction:.2g} %" if fraction <= 1 else "more than 100 %"
 
 
-def _fall(section_points: SectionPoints | None, scheme: Scheme) -> tuple[float, float]:
+def _fall(section_points: SectionPoints, scheme: Scheme) -> tuple[float, float]:
     """Return the steepest softening slope, divided by θ times a stiffness (1/m), and an energy (J).
 
     The stiffness is the least stiffness of points that can break.  The energy is the least energy
     that a cell dissipates up to the steepest slope.  Both results are zero without softening.
     """
-    law = None if section_points is None else section_points.softening
-    if section_points is None or law is None or law.limit == 0:
+    law = section_points.softening
+    if law is None or law.limit == 0:
         return 0.0, 0.0
     growth, begins = INCREMENT * law.fracture_energy / law.limit, np.array([law.steepest[1]])
     after = scheme.resistance(law, begins, np.array([growth]))
@@ -418,7 +424,7 @@ def _fall(section_points: SectionPoints | None, scheme: Scheme) -> tuple[float, 
 
 # -- text in the file ------------------------------------------------------------------------------
 
-FORMAT = "solution of ufl_beam, 5"
+FORMAT = "solution of ufl_beam, 6"
 """Format of the file; its number is increased by each incompatible change of the format."""
 
 NAMED = {

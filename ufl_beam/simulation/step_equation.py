@@ -95,9 +95,9 @@ class StepEquation:
                 subset = Fields(subdomain, indices)
                 self.inelastic.append(InelasticBeams(subset, section_points, *setting, search))
         self.beams: list[Cells] = [*self.inelastic]
-        if (scheme.alpha or scheme.lost_fraction) and sum(
-            len(cells) for _, cells in subdomain.numbering.inelastic
-        ) < len(subdomain.numbering.cells):
+        numbering = subdomain.numbering
+        some_elastic = len(numbering.inelastic_cells) < len(numbering.cells)
+        if (scheme.alpha or scheme.lost_fraction) and some_elastic:
             ledger.lost["numerical"] += 0.0
         others: list[Term] = []
         if elastic.any():

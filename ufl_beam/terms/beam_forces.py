@@ -284,6 +284,8 @@ class InelasticBeams(Cells):
         self.recorded_factors = np.ones(6) if section_points.hinges else WITHOUT_JUMP
         self.predicted = None if has_inertia(scheme) else predicted_strains(fields)
         self._cells = fields.subdomain.cells[fields.order]
+        # Rows of saved states: other points of the same cells have other rows.
+        self._rows = self._cells + section_points.number * len(fields.subdomain.numbering.cells)
         self._strains = Strains(fields)
         subdomain, lengths = fields.subdomain, fields.subdomain.numbering.lengths(self._cells)
         keys = subdomain.numbering.keys(self._cells)
@@ -373,7 +375,7 @@ class InelasticBeams(Cells):
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the internal variables."""
-        self.points.restore(archive.rows("cells", self._cells, self.points.state()))
+        self.points.restore(archive.rows("cells", self._rows, self.points.state()))
 
     def recorded(self) -> tuple[Index, Array]:
         """Return cells (scene numbers), and their :attr:`Points.recorded`; (num_cells, 6)."""
