@@ -355,6 +355,8 @@ class Section(Record):
             b, h, material = h, b, material | {"axis": "strong"}
         if 2 * t >= min(b, h):
             raise ModelError(f"Section.box: two walls do not fit: b = {b}, h = {h}, t = {t} m")
+        if 2 * r > min(b, h):
+            raise ModelError(f"Section.box: r = {r} m does not fit: b = {b}, h = {h} m")
         return cls._thin_walled(rounded_rectangle(b, h, r, t), box_walls(b, h, t), material)
 
     @classmethod
@@ -407,6 +409,9 @@ class Section(Record):
                 f"Section.{name}: web and flanges do not fit: h = {h}, b = {b}, tw = {tw}, "
                 f"tf = {tf} m"
             )
+        room = (b - tw) / (2 if kind != "C" else 1), (h - 2 * tf) / 2 if kind != "T" else h - tf
+        if r > min(room):
+            raise ModelError(f"Section.{name}: r = {r} m; fillets have at most {min(room):.4g} m")
         return flanged(kind, h, b, tw, tf, r)
 
     @classmethod
@@ -445,7 +450,7 @@ class Section(Record):
         if name not in table:
             similar = ", ".join(get_close_matches(name, table, n=5, cutoff=0.0))
             raise ModelError(
-                f"Section.steel: {designation!r} is not in the table of IPE, HEA, HEB, HEM, UPE, W "
+                f"Section.steel: designation {designation!r} is not in the table of IPE, HEA, HEB, HEM, UPE, W "
                 f"and HSS; similar designations are {similar}"
             )
         kind, sizes = table[name]
@@ -477,8 +482,8 @@ class Section(Record):
         what = "Section.of_sectionproperties"
         if not type(analysed).__module__.startswith("sectionproperties."):
             raise ModelError(
-                f"{what}: {shorten(analysed)} must be a Section of the package sectionproperties "
-                "(pip install sectionproperties)"
+                f"{what}: analysed = {shorten(analysed)} must be a Section of the package "
+                "sectionproperties (pip install sectionproperties)"
             )
         if axis not in ("x", "y"):
             raise ModelError(f'{what}: axis = {axis!r} must be "x" or "y"')

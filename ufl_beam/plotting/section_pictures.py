@@ -48,7 +48,9 @@ def draw_section(section: Section, *, ax: Axes | None = None) -> Figure:
             if fibres is not None:
                 # The cover comes after the bars, the core is last.
                 last = len(fibres.fibres) - (core is not None)
-                layers = fibres.y[fibres.bars :][fibres.material[fibres.bars :] == last - 1 + number]
+                layers = fibres.y[fibres.bars :][
+                    fibres.material[fibres.bars :] == last - 1 + number
+                ]
                 x = loops[0].real
                 lines = axes.hlines(MM * layers, x.min(), x.max(), color=color, lw=1.0)
                 lines.set_clip_path(area)
