@@ -409,9 +409,12 @@ class Section(Record):
                 f"Section.{name}: web and flanges do not fit: h = {h}, b = {b}, tw = {tw}, "
                 f"tf = {tf} m"
             )
-        room = (b - tw) / (2 if kind != "C" else 1), (h - 2 * tf) / 2 if kind != "T" else h - tf
-        if r > min(room):
-            raise ModelError(f"Section.{name}: r = {r} m; fillets have at most {min(room):.4g} m")
+        across = b - tw if kind == "C" else (b - tw) / 2
+        along = h - tf if kind == "T" else h / 2 - tf
+        if r > min(across, along):
+            raise ModelError(
+                f"Section.{name}: r = {r} m; the fillets have room for {min(across, along):.4g} m"
+            )
         return flanged(kind, h, b, tw, tf, r)
 
     @classmethod
@@ -450,8 +453,8 @@ class Section(Record):
         if name not in table:
             similar = ", ".join(get_close_matches(name, table, n=5, cutoff=0.0))
             raise ModelError(
-                f"Section.steel: designation {designation!r} is not in the table of IPE, HEA, HEB, HEM, UPE, W "
-                f"and HSS; similar designations are {similar}"
+                f"Section.steel: designation {designation!r} is not in the table of IPE, HEA, HEB, "
+                f"HEM, UPE, W and HSS; similar designations are {similar}"
             )
         kind, sizes = table[name]
         material = {"E": 210e9, "nu": 0.3, "rho": 7850.0} | material

@@ -125,8 +125,8 @@ class Shape(Record):
             radii = np.maximum(radii - distance * np.sign(turn.imag), 0.0)
             if not (((np.roll(z, -1) - z) / ahead).real > 0).all():
                 raise ModelError(f"Shape.inset: sides vanish at {distance:g} m from {self!r}")
-            loops.append(np.column_stack([z.real, z.imag, radii]))
-        return Shape(loops[0], loops[1:])  # type: ignore[arg-type]
+            loops.append([(w.real, w.imag, r) for w, r in zip(z, radii, strict=True)])
+        return Shape(loops[0], loops[1:])
 
     def outlines(self) -> list[Complex]:
         """Return the outline and holes as closed polygons x + iy, m, with arcs as chords."""
@@ -144,13 +144,13 @@ class Shape(Record):
     # -- integrals -----------------------------------------------------------------------------
 
     @cached_property
-    def _loops(self) -> list[Loop]:
+    def _loops(self) -> list[Sequence[Sequence[float]]]:
         """Corners of the outline, counterclockwise, and of holes, clockwise."""
-        loops: list[Loop] = []
+        loops: list[Sequence[Sequence[float]]] = []
         for loop in (self.corners, *self.holes):
             x, y, _ = np.transpose(loop)
             clockwise = float(np.roll(x, 1) @ y - np.roll(y, 1) @ x) < 0
-            loops.append(tuple(loop if clockwise == bool(loops) else loop[::-1]))
+            loops.append(loop if clockwise == bool(loops) else loop[::-1])
         return loops
 
     @cached_property

@@ -22,8 +22,8 @@ MM = 1e3
 def draw_section(section: Section, *, ax: Axes | None = None) -> Figure:
     """Draw the outline of a section to scale, with a line at the middle of each layer of fibres.
 
-    Axes begin at the centroid; y points to the left of the direction of the beam.  Fibres of a
-    section without a shape are discs of their areas.
+    Axes begin at the axis of the beam; y points to its left.  A core is orange.  Rows of bars, and
+    fibres of a section without a shape, are discs of their areas.
     """
     shape, fibres = section.shape, section.fibres
     if shape is None and fibres is None:
@@ -38,34 +38,29 @@ def draw_section(section: Section, *, ax: Axes | None = None) -> Figure:
         axes.axhline(0.0, color=shade(INK), lw=0.8, ls=(0, (8, 4)), zorder=3)
         axis = fibres.axis if fibres is not None else shape.y if shape is not None else 0.0
         core = fibres.core if fibres is not None else None
-        for number, (of, color) in enumerate(((shape, BLUE), (core, ORANGE))):
-            if of is None:
-                continue
+        outer = [of for of in (shape, core) if of is not None]
+        for number, (of, color) in enumerate(zip(outer, (BLUE, ORANGE), strict=False)):
             loops = [MM * (loop - 1j * axis) for loop in of.outlines()]
             paths = [Path(np.column_stack([z.real, z.imag]), closed=True) for z in loops]
             area = PathPatch(Path.make_compound_path(*paths), fc=(color, 0.2), ec=color, lw=1.5)
             axes.add_patch(area)
-            if fibres is not None:
-                # The cover comes after the bars, the core is last.
-                last = len(fibres.fibres) - (core is not None)
-                layers = fibres.y[fibres.bars :][
-                    fibres.material[fibres.bars :] == last - 1 + number
-                ]
-                x = loops[0].real
-                lines = axes.hlines(MM * layers, x.min(), x.max(), color=color, lw=1.0)
+            if fibres is not None:  # the last materials are those of the shape and its core
+                material = len(fibres.fibres) - len(outer) + number
+                y, x = MM * fibres.y[fibres.material == material], loops[0].real
+                lines = axes.hlines(y, x.min(), x.max(), color=color, lw=1.0)
                 lines.set_clip_path(area)
-        discs = np.arange(len(fibres.y) if shape is None else fibres.bars) if fibres else []
-        for i in discs:
-            r = MM * np.sqrt(fibres.A[i] / np.pi)
-            axes.add_patch(Circle((0.0, MM * fibres.y[i]), r, color=INK, lw=0, zorder=4))
+        if fibres is not None:
+            discs = slice(None if shape is None else fibres.bars)
+            for y, A in zip(fibres.y[discs], fibres.A[discs], strict=True):
+                r = MM * np.sqrt(A / np.pi)
+                axes.add_patch(Circle((0.0, MM * y), r, fc=shade(INK), lw=0, zorder=4))
         if ax is None:
-            if shape is not None and axis == shape.y:
+            title = f"EA = {with_unit(section.EA, 'N')}, EI = {with_unit(section.EI, 'N m²')}"
+            if shape is not None and (fibres is None or not fibres.bars):
                 title = (
                     f"A = {1e4 * shape.A:.4g} cm², I = {1e8 * shape.I:.4g} cm⁴, "
                     f"Wpl = {1e6 * shape.Wpl:.4g} cm³"
                 )
-            else:
-                title = f"EA = {with_unit(section.EA, 'N')}, EI = {with_unit(section.EI, 'N m²')}"
             axes.set_title(title, loc="left", fontsize=style.font_size(11.0))
         axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
         axes.autoscale_view()
