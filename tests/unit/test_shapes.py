@@ -375,6 +375,6 @@ def test_the_package_sectionproperties():
     analysed.calculate_geometric_properties()
     analysed.calculate_warping_properties()
     section = ub.Section.of_sectionproperties(analysed)
-    for name in ("EA", "EI", "rhoA", "rhoI"):  # arcs are 12 chords
+    for name in ("EA", "EI", "rhoA", "rhoI"):  # arcs are 24 chords
         assert getattr(section, name) == pytest.approx(getattr(ipe, name), rel=1e-3)
     assert pytest.approx(ipe.GA, rel=0.05) == section.GA

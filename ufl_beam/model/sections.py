@@ -274,9 +274,9 @@ class Section(Record):
         """Return the section with bars of areas ``A`` (m²) at coordinates ``y`` (m).
 
         The section has fibres, of which the bars displace their areas.  The coordinate y is
-        measured from mid-depth of a shape, or as in :meth:`of_fibres`.  The axis moves to the
-        centroid of the stiffness EA, at y = ``fibres.axis`` of the new section.  GA and mass do not
-        change: the density of reinforced concrete includes the bars.
+        measured from mid-depth, or as the corners of a :class:`Shape` and in :meth:`of_fibres`.
+        The axis moves to the centroid of the stiffness EA, at y = ``fibres.axis`` of the new
+        section.  GA and mass do not change: the density of reinforced concrete includes the bars.
 
         Args:
             y: Coordinates of the bars, or of rows of bars; m.
