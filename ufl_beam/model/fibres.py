@@ -18,7 +18,6 @@ import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.display import compact_repr
 from ufl_beam.errors import ModelError
 from ufl_beam.model.checks import require_count, require_kind, require_number
 from ufl_beam.model.functions import Point
@@ -163,7 +162,8 @@ class PlacedFibres:
     bars: int = 0  # number of bars, which are the first fibres
     core: Shape | None = None  # shape of the core
 
-    __repr__ = compact_repr
+    def __repr__(self) -> str:
+        return f"<{len(self.y)} fibres of {', '.join(type(f.law).__name__ for f in self.fibres)}>"
 
     @classmethod
     def about_centroid(
