@@ -138,6 +138,7 @@ from ufl_beam.model.material_laws import (
 )
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.sections import Section
+from ufl_beam.model.shapes import Shape
 from ufl_beam.model.softening_laws import LinearSoftening, Softening, SofteningLaw
 from ufl_beam.model.steel_laws import MenegottoPinto
 from ufl_beam.model.supports import Clamped, Pinned, PrescribedDisplacement, Roller, Support
@@ -276,6 +277,7 @@ __all__ = [
     "Scene",
     "Scheme",
     "Section",
+    "Shape",
     "Simulation",
     "Slide",
     "Softening",

@@ -78,6 +78,13 @@ def shape(d):
         f"ub.Section.circle(0.05, E={3 * E}, nu=0.3, rho={rho / 24:.6g})",
         f"ub.Section.tube(0.08, 0.005, E={E / 2}, nu=0.3, rho={rho / 15:.6g})",
         f"ub.Section.i_shape(0.08, 0.05, 0.004, 0.006, E={E / 4}, nu=0.3, rho={rho / 12:.6g})",
+        f"ub.Section.box(0.06, 0.08, 0.003, 0.006, E={E}, nu=0.3, rho={rho / 9:.6g})",
+        f"ub.Section.channel(0.1, 0.06, 0.004, 0.006, 0.005, E={3 * E}, nu=0.3, "
+        f"rho={rho / 12:.6g}, axis='weak')",
+        f"ub.Section.t_shape(0.08, 0.05, 0.004, 0.006, E={2 * E}, nu=0.3, rho={rho / 7:.6g})",
+        f"ub.Section.steel('IPE 80', E={E}, rho={rho / 9:.6g})",
+        "ub.Section.of_shape(ub.Shape([(-0.01, 0), (0.01, 0), (0.005, 0.1), (-0.005, 0.1)]), "
+        f"shear_factor=0.8, E={E}, nu=0.3, rho={rho / 18:.6g})",
     ]))  # fmt: skip
 
 
@@ -160,6 +167,9 @@ def fibres(d):
         f"core=ub.Fibres(ub.RambergOsgood({mean:.5g}, 1e-4, 3.0), softening=ub.LinearSoftening("
         f"{2 * mean:.5g}, {mean / 300:.5g}))).reinforced([-0.04, 0.04], [1e-5, 2e-5], E=8e8, "
         f"fibres=ub.Fibres(ub.ArmstrongFrederick({3 * mean:.5g}, 1e8, 100.0)))",
+        f"ub.Section.t_shape(0.1, 0.03, 0.008, 0.02, E=1.2e8, nu=0.3, rho=1e3, fibres={law}, "
+        f"cover=0.002, core=ub.Fibres(ub.ElastoPlastic({2 * mean:.5g}))).reinforced([-0.04], "
+        f"[1e-5], E=8e8, fibres=ub.Fibres(ub.RambergOsgood({3 * mean:.5g}, 1e-4, 3.0)))",
     ]
     d.section(0, d.one(shapes))
 

@@ -22,6 +22,10 @@ SHAPES = {
     "i_shape": lambda **more: ub.Section.i_shape(
         h=0.30, b=0.15, tw=0.008, tf=0.012, **STEEL, **more
     ),
+    "fillets": lambda **more: ub.Section.steel("HEB 200", **STEEL, **more),
+    "channel": lambda **more: ub.Section.steel("UPE 200", **STEEL, **more),
+    "box": lambda **more: ub.Section.box(0.10, 0.20, 0.01, 0.02, **STEEL, **more),
+    "weak": lambda **more: ub.Section.steel("HEB 200", axis="weak", **STEEL, **more),
 }
 NUMBERS = [7, 20, 80]
 

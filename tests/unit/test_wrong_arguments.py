@@ -38,6 +38,13 @@ BACKBONE = ub.Backbone(1.0, 1.0)
 JOINT = ub.Revolute(BEAM.end, OTHER.start, multipliers=True)
 MOTION = ub.GroundMotion(0.1, [0.0, 1.0, 0.5, 0.0])
 
+
+class Analysed:
+    """An analysed section in place of one of sectionproperties."""
+
+    __module__ = "sectionproperties.analysis.section"
+
+
 # -- kinds of parameters: what each of them must refuse ------------------------------------------
 
 NONE = [None]
@@ -111,8 +118,17 @@ SHAPE = {
     "rho": V(1.0, optional(FROM_ZERO)),
     "shear_factor": V(0.8, POSITIVE),
     "fibres": V(None, optional(NO_LAW)),
+    "axis": V("weak", [*TEXT, "x"]),
+    "core": V(None, optional(NO_LAW)),
+    "cover": V(0.0, [*NUMBER, -1.0, 0.2]),
 }
-CORE = {"core": V(None, optional(NO_LAW)), "cover": V(0.0, [*NUMBER, -1.0, 0.2])}
+FLANGED = {
+    "h": V(0.4, POSITIVE),
+    "b": V(0.2, POSITIVE),
+    "tw": V(0.01, [*POSITIVE, 0.21]),
+    "tf": V(0.02, [*POSITIVE, 0.4]),
+    "r": V(0.02, [*FROM_ZERO, 0.4]),
+}
 SOFTENING = {"limit": V(1.0, LIMIT), "fracture_energy": V(1.0, POSITIVE)}
 NORMAL = {"mean": V(1.0, POSITIVE), "deviation": V(0.1, POSITIVE), "seed": V(1, SEED)}
 MESH = {"mesh": V(None, optional(OBJECT))}
@@ -141,21 +157,35 @@ TABLE = {
         depth=V(0.0, FROM_ZERO), axial=V(None, optional(NO_LAW)),
         shear=V(None, optional(NO_LAW)), bending=V(None, optional(NO_LAW)),
         hinge=V(None, optional(NO_SOFTENING)), fibres=V(None, optional(NO_LAW)),
-        interaction=V(None, optional(OBJECT)),
+        interaction=V(None, optional(OBJECT)), shape=V(None, optional(OBJECT)),
+    ),
+    "Shape": call(
+        ub.Shape,
+        corners=V([(0, 0), (1, 0, 0.1), (1, 1)], [
+            None, 1.0, "ab", [], [1.0], [(0, 0), (1, 0)], [(0, 0), (1, 0), (1,)],
+            [(0, 0), (1, 0), (1, NAN)], [(0, 0), (1, 0), (1, "1")], [(0, 0), (1, 0), (1, 1, -0.1)],
+        ]),
+        holes=V([], [None, 1.0, "ab", [None], [1.0], [[(0, 0), (1, 0)]]]),
     ),
     "Section.of_shape": call(
         ub.Section.of_shape,
-        A=V(1.0, POSITIVE), I=V(1.0, POSITIVE), depth=V(1.0, FROM_ZERO), **SHAPE,
+        shape=V(ub.Shape([(-1, 0), (1, 0), (0, 1)]), OBJECT), **SHAPE,
     ),
     "Section.rectangle": call(
-        ub.Section.rectangle, b=V(1.0, POSITIVE), h=V(1.0, POSITIVE), **SHAPE, **CORE
+        ub.Section.rectangle, b=V(1.0, POSITIVE), h=V(1.0, POSITIVE), **SHAPE
     ),
-    "Section.circle": call(ub.Section.circle, d=V(1.0, POSITIVE), **SHAPE, **CORE),
-    "Section.tube": call(ub.Section.tube, d=V(1.0, POSITIVE), t=V(0.1, POSITIVE), **SHAPE),
-    "Section.i_shape": call(
-        ub.Section.i_shape,
-        h=V(0.4, POSITIVE), b=V(0.2, POSITIVE), tw=V(0.01, POSITIVE), tf=V(0.02, POSITIVE),
-        **{name: kind for name, kind in SHAPE.items() if name != "shear_factor"},
+    "Section.circle": call(ub.Section.circle, d=V(1.0, POSITIVE), **SHAPE),
+    "Section.tube": call(ub.Section.tube, d=V(1.0, POSITIVE), t=V(0.1, [*POSITIVE, 0.6]), **SHAPE),
+    "Section.box": call(
+        ub.Section.box, b=V(0.2, POSITIVE), h=V(0.3, POSITIVE), t=V(0.02, [*POSITIVE, 0.1]),
+        r=V(0.02, [*FROM_ZERO, 0.2]), **SHAPE,
+    ),
+    "Section.i_shape": call(ub.Section.i_shape, **FLANGED, **SHAPE),
+    "Section.channel": call(ub.Section.channel, **FLANGED, **SHAPE),
+    "Section.t_shape": call(ub.Section.t_shape, **FLANGED, **SHAPE),
+    "Section.steel": call(ub.Section.steel, designation=V("IPE 80", [*TEXT, "IPE 81"]), **SHAPE),
+    "Section.of_sectionproperties": call(
+        ub.Section.of_sectionproperties, analysed=V(Analysed(), OBJECT), axis=V("y", [*TEXT, "z"])
     ),
     "Section.of_fibres": call(
         ub.Section.of_fibres,

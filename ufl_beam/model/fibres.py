@@ -7,8 +7,8 @@ import math
 import struct
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import KW_ONLY, dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property, partial
 from typing import Annotated, Any, NamedTuple
 from zlib import crc32
@@ -18,17 +18,14 @@ import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.display import compact_repr
 from ufl_beam.errors import ModelError
-from ufl_beam.model.checks import require_count, require_kind
+from ufl_beam.model.checks import require_count, require_kind, require_number
 from ufl_beam.model.functions import Point
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import MaterialLaw, require_law, uniform
 from ufl_beam.model.records import Positive, Record
+from ufl_beam.model.shapes import Shape
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
-
-Below = Callable[[Array], Array]
-"""Function of y: area up to y and its first moment, each up to a constant; (2, n); m², m³."""
 
 
 class Kind(NamedTuple):
@@ -176,8 +173,11 @@ class PlacedFibres:
     A: Array  # areas; (n,); m²
     axis: float  # coordinate y of the axis as the user measures it; m
     ends: tuple[float, float]  # least and largest y of the section as the user measures it; m
+    bars: int = 0  # number of bars, which are the first fibres
+    core: Shape | None = None  # shape of the core
 
-    __repr__ = compact_repr
+    def __repr__(self) -> str:
+        return f"<{len(self.y)} fibres of {', '.join(type(f.law).__name__ for f in self.fibres)}>"
 
     @classmethod
     def about_centroid(
@@ -191,31 +191,53 @@ class PlacedFibres:
 
     @classmethod
     def layers(
-        cls, fibres: Fibres | None, E: float, h: float, below: Below, edges: Sequence[float] = (),
-        *, core: Fibres | None = None, below_in_core: Below | None = None,
-    ) -> PlacedFibres | None:  # fmt: skip
-        """Create layers of equal thickness over the depth ``h`` (m), with cuts at ``edges`` (m).
+        cls, fibres: Fibres | None, E: float, shape: Shape, core: Fibres | None, cover: float
+    ) -> PlacedFibres | None:
+        """Create layers of equal thickness over the depth of a shape, with cuts at its corners.
 
-        With ``core``, the part of a layer that lies in the core is a fibre of its own.
+        With ``core``, the part of a layer farther than ``cover`` (m) from the surface is a fibre of
+        its own.
         """
+        require_kind(fibres, (Fibres, type(None)), "Section: fibres")
+        require_kind(core, (Fibres, type(None)), "Section: core")
+        require_number(cover, "Section: cover", at_least=0.0)
+        if (core is None) != (cover == 0.0):
+            raise ModelError(
+                "Section: cover without core; give the law of the core, too" if core is None else
+                "Section: core without cover; give the distance of the core from the surface, too"
+            )  # fmt: skip
         if fibres is None:
             if core is not None:
                 raise ModelError("Section: core without fibres; give the law of the cover, too")
             return None
-        require_kind(fibres, Fibres, "Section: fibres")
         if fibres.number < 2:
             raise ModelError("Fibres: number = 1 has no bending stiffness; use 2 or more")
-        cuts = np.union1d(np.linspace(-h / 2, h / 2, fibres.number + 1), np.array(edges))
-        cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * h, 0, True)]
-        layers, laws = np.diff(below(cuts)), [fibres]
+        low, high, shapes = shape.bottom, shape.top, [shape]
+        if core is not None:
+            try:
+                shapes.append(shape.inset(cover))
+            except ModelError as error:
+                raise ModelError(f"Section: cover = {cover} m leaves no core: {error}") from None
+        corners = [
+            y - shape.y for of in shapes for loop in (of.corners, *of.holes) for _, y, *_ in loop
+        ]
+        cuts = np.union1d(np.linspace(low, high, fibres.number + 1), np.clip(corners, low, high))
+        cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * (high - low), 0, True)]
+        layers, laws = np.diff(shape.below(cuts))[:2], [fibres]
         material: Index = np.zeros(layers.shape[1], dtype=np.int64)
-        if core is not None and below_in_core is not None:
-            within = np.diff(below_in_core(cuts))
+        if core is not None:
+            shift = shapes[1].y - shape.y
+            within = np.diff(shapes[1].below(cuts - shift))[:2]
+            within[1] += shift * within[0]
             inside = within[0] > 1e-9 * layers[0]
             layers, laws = np.hstack([layers - within, within[:, inside]]), [fibres, core]
             material = np.repeat([0, 1], [len(inside), inside.sum()])
         A, S = layers
-        return cls(tuple(laws), material, np.full(len(A), E), S / A, A, 0.0, (-h / 2, h / 2))
+        ends = low + shape.y, high + shape.y
+        within_cover = shapes[1] if core is not None else None
+        return cls(
+            tuple(laws), material, np.full(len(A), E), S / A, A, shape.y, ends, core=within_cover
+        )
 
     def with_bars(self, bars: Fibres, E: float, y: Array, A: Array) -> PlacedFibres:
         """Add bars of areas ``A`` (m²) at ``y`` (m) instead of other fibres, those of a core first.
@@ -252,8 +274,10 @@ class PlacedFibres:
             areas[of] -= removed
         material = np.concatenate([np.zeros(len(y), dtype=np.int64), self.material + 1])
         moduli = np.concatenate([np.full(len(y), E), self.E])
+        number = self.bars + len(y)
         y, A = np.concatenate([y, at]), np.concatenate([A, areas])
-        return self.about_centroid((bars, *self.fibres), material, moduli, y, A, self.ends)
+        placed = self.about_centroid((bars, *self.fibres), material, moduli, y, A, self.ends)
+        return replace(placed, bars=number, core=self.core)
 
     @property
     def EA(self) -> float:

@@ -7,20 +7,38 @@ Units are SI: N, N m², kg/m, kg m.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import KW_ONLY, dataclass, field, replace
-from functools import partial
+from difflib import get_close_matches
+from functools import cache, partial
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ModelError
-from ufl_beam.model.checks import require_all, require_array, require_kind, require_number
+from ufl_beam.errors import ModelError, shorten
+from ufl_beam.model.checks import (
+    require_all,
+    require_array,
+    require_kind,
+    require_number,
+    require_text,
+)
 from ufl_beam.model.fibres import Fibres, PlacedFibres, SectionPoints, by_class
 from ufl_beam.model.material_law import MaterialLaw, require_law
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
+from ufl_beam.model.shapes import (
+    Shape,
+    Walls,
+    box_walls,
+    flanged,
+    rounded_rectangle,
+    thin_walled_shear_area,
+)
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
 ResultantLaw = Annotated[MaterialLaw | None, require_law]
@@ -46,6 +64,8 @@ class Section(Record):
             law; N m, J.  For hinges at chosen places see :class:`Beam`.
         fibres: Fibres with their positions, instead of laws of resultants and of the hinge.  They
             come from :meth:`of_fibres`, or from shapes such as :meth:`rectangle`.
+        shape: Shape of a homogeneous section, with its area and moduli, such as ``shape.Wpl``.  It
+            comes from constructors such as :meth:`steel`.
         interaction: Law of N and M together, such as :class:`AxialBending`, instead of laws of
             single resultants, the hinge and fibres.
 
@@ -57,8 +77,9 @@ class Section(Record):
         >>> plate = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
         >>> pipe = ub.Section.tube(d=0.2, t=0.01, E=210e9, nu=0.3, rho=7850.0)
         >>> own = ub.Section(EA=4.2e9, GA=1.3e9, EI=1.4e7, rhoA=157.0, rhoI=0.5)
-        >>> print(f"{plate.EI:.3g} {pipe.EI:.3g} {own.EI:.3g}")  # N m²
-        1.4e+07 5.67e+06 1.4e+07
+        >>> column = ub.Section.steel("HEB 200")
+        >>> print(f"{plate.EI:.3g} {pipe.EI:.3g} {own.EI:.3g} {column.EI:.3g}")  # N m²
+        1.4e+07 5.67e+06 1.4e+07 1.2e+07
     """
 
     EA: Positive
@@ -74,6 +95,7 @@ class Section(Record):
     hinge: Annotated[SofteningLaw | None, require_softening] = None
     fibres: Instance[PlacedFibres | None] = None
     interaction: Annotated[MaterialLaw | None, partial(require_law, interaction=True)] = None
+    shape: Instance[Shape | None] = None
     massless_by_default: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -127,36 +149,64 @@ class Section(Record):
         return by_class(points, np.where(inelastic, 0.0, stiffness))
 
     @classmethod
-    def of_shape(
-        cls, *, A: float, I: float, E: float, nu: float, rho: float | None, shear_factor: float,
-        depth: float, fibres: PlacedFibres | None = None, **laws: Any,
+    def _of_material(
+        cls, A: float, I: float, E: float, nu: float, rho: float | None, shear_factor: float,
+        *, fibres: PlacedFibres | None, **more: Any,
     ) -> Section:  # fmt: skip
-        """Create a homogeneous isotropic section of a given shape.
+        require_number(shear_factor, "Section: shear_factor", positive=True)
+        if rho is not None:
+            require_number(rho, "Section: rho", at_least=0.0)
+            more |= {"rhoA": rho * A, "rhoI": rho * I}
+        if not -1.0 < require_number(nu, "Section: nu") <= 0.5:
+            raise ModelError(f"Section: nu = {nu} must lie in (-1, 0.5]")
+        GA = shear_factor * A * E / (2 * (1 + nu))
+        EA, EI = (E * A, E * I) if fibres is None else (fibres.EA, fibres.EI)
+        return cls(EA=EA, GA=GA, EI=EI, fibres=fibres, **more)
+
+    @classmethod
+    def of_shape(
+        cls, shape: Shape, *, E: float, nu: float, rho: float | None = None, shear_factor: float,
+        axis: str = "strong", fibres: Fibres | None = None, core: Fibres | None = None,
+        cover: float = 0.0, **laws: Any,
+    ) -> Section:  # fmt: skip
+        """Create a section of an isotropic material.
+
+        The other constructors of shapes pass these arguments on, with ``shear_factor`` by default.
+        The axis of the beam runs through the centroid.
 
         Args:
-            A: Area; m².
-            I: Second moment of area about the axis of bending; m⁴.
+            shape: Shape that bends in the plane of its y.
             E: Young's modulus; Pa.
             nu: Poisson's ratio.
             rho: Density; kg/m³.
-            shear_factor: Shear area divided by A.
-            depth: Depth in the plane of motion; m.
-            fibres: Fibres with positions; EA and EI are then sums over the fibres.
+            shear_factor: Shear area divided by the area, for GA.
+            axis: "strong", or "weak" for the shape turned by 90°: its x becomes y, positive to the
+                left of the direction of the beam.
+            fibres: Law and number of layers across y.
+            core: Law of the fibres farther than ``cover`` from the surface; for confined concrete.
+            cover: Distance of the core from the surface; m.
             laws: ``axial``, ``shear``, ``bending``, ``hinge``, ``interaction`` of :class:`Section`.
+
+        Raises:
+            ModelError: An argument is wrong, or the section would bend sideways, because its axes
+                are not principal axes.
         """
-        _require_positive("Section", A=A, I=I, E=E, shear_factor=shear_factor)
-        require_number(depth, "Section: depth", at_least=0.0)
-        if rho is not None:
-            require_number(rho, "Section: rho", at_least=0.0)
-        if not -1.0 < require_number(nu, "Section: nu") <= 0.5:
-            raise ModelError(f"Section: nu = {nu} must lie in (-1, 0.5]")
-        if fibres is not None:
-            require_kind(fibres, PlacedFibres, "Section: fibres")
-        GA = shear_factor * A * E / (2 * (1 + nu))
-        EA, EI = (E * A, E * I) if fibres is None else (fibres.EA, fibres.EI)
-        if rho is not None:
-            laws |= {"rhoA": rho * A, "rhoI": rho * I}
-        return cls(EA=EA, GA=GA, EI=EI, depth=depth, fibres=fibres, **laws)
+        require_kind(shape, Shape, "Section.of_shape: shape")
+        require_number(E, "Section: E", positive=True)
+        if axis not in ("strong", "weak"):
+            raise ModelError(f'Section: axis = {axis!r} must be "strong" or "weak"')
+        if abs(shape.obliquity) > 1e-6:
+            raise ModelError(
+                f"Section.of_shape: bending would move the beam out of the plane: ∫ x y dA is "
+                f"{shape.obliquity:.2g} ∫ y² dA, not 0; turn the shape to its principal axes, or "
+                "give Section(EA=, GA=, EI=) of a beam that is held in the plane"
+            )
+        # Files compare objects that are one with such that are equal: each section has its own.
+        shape = copy(shape) if axis == "strong" else shape.turned()
+        return cls._of_material(
+            shape.A, shape.I, E, nu, rho, shear_factor, depth=shape.top - shape.bottom,
+            fibres=PlacedFibres.layers(fibres, E, shape, core, cover), shape=shape, **laws,
+        )  # fmt: skip
 
     @classmethod
     def of_fibres(
@@ -212,8 +262,8 @@ class Section(Record):
         placed = PlacedFibres.about_centroid(laws, material, moduli, at, areas)
         mass = density * areas
         mean, total = placed.EA / float(areas.sum()), float(areas.sum())
-        return cls.of_shape(
-            A=total, I=placed.EI / mean, E=mean, nu=nu, rho=None, shear_factor=shear_factor,
+        return cls._of_material(
+            total, placed.EI / mean, mean, nu, None, shear_factor,
             depth=float(np.ptp(at)), fibres=placed,
             **({} if rho is None else {"rhoA": mass.sum(), "rhoI": mass @ placed.y**2}),
         )  # fmt: skip
@@ -224,9 +274,9 @@ class Section(Record):
         """Return the section with bars of areas ``A`` (m²) at coordinates ``y`` (m).
 
         The section has fibres, of which the bars displace their areas.  The coordinate y is
-        measured from mid-depth of a shape, or as in :meth:`of_fibres`.  The axis moves to the
-        centroid of the stiffness EA, at y = ``fibres.axis`` of the new section.  GA and mass do not
-        change: the density of reinforced concrete includes the bars.
+        measured from mid-depth, or as the corners of a :class:`Shape` and in :meth:`of_fibres`.
+        The axis moves to the centroid of the stiffness EA, at y = ``fibres.axis`` of the new
+        section.  GA and mass do not change: the density of reinforced concrete includes the bars.
 
         Args:
             y: Coordinates of the bars, or of rows of bars; m.
@@ -261,128 +311,217 @@ class Section(Record):
         return replace(self, EA=placed.EA, EI=placed.EI, rhoA=rhoA, fibres=placed)
 
     @classmethod
-    def rectangle(
-        cls, b: float, h: float, *, E: float, nu: float, rho: float | None = None,
-        shear_factor: float = 5 / 6, fibres: Fibres | None = None, core: Fibres | None = None,
-        cover: float = 0.0, **laws: Any,
-    ) -> Section:  # fmt: skip
+    def rectangle(cls, b: float, h: float, **material: Any) -> Section:
         """Create a rectangle of width ``b`` and depth ``h``, the size in the plane of motion; m.
 
-        With ``core``, the fibres farther than ``cover`` (m) from the surface have this law.
+        ``material`` are arguments of :meth:`of_shape`; the shear factor is 5/6 by default.
         """
         _require_positive("Section.rectangle", b=b, h=h)
-        _require_cover("Section.rectangle", core, cover, min(b, h))
-        placed = PlacedFibres.layers(
-            fibres, E, h, lambda y: _below_in_rectangle(y, b, h), core=core,
-            below_in_core=lambda y: _below_in_rectangle(y, b - 2 * cover, h - 2 * cover),
-            edges=(cover - h / 2, h / 2 - cover),
-        )  # fmt: skip
-        return cls.of_shape(
-            A=b * h, I=b * h**3 / 12, E=E, nu=nu, rho=rho,
-            shear_factor=shear_factor, depth=h, fibres=placed, **laws,
-        )  # fmt: skip
+        return cls.of_shape(rounded_rectangle(b, h, 0.0), **{"shear_factor": 5 / 6} | material)
 
     @classmethod
-    def circle(
-        cls, d: float, *, E: float, nu: float, rho: float | None = None,
-        shear_factor: float = 9 / 10, fibres: Fibres | None = None, core: Fibres | None = None,
-        cover: float = 0.0, **laws: Any,
-    ) -> Section:  # fmt: skip
+    def circle(cls, d: float, **material: Any) -> Section:
         """Create a solid circle of diameter ``d``; m.
 
-        With ``core``, the fibres farther than ``cover`` (m) from the surface have this law.
+        ``material`` are arguments of :meth:`of_shape`; the shear factor is 9/10 by default.
         """
         _require_positive("Section.circle", d=d)
-        _require_cover("Section.circle", core, cover, d)
-        placed = PlacedFibres.layers(
-            fibres, E, d, lambda y: _below_in_circle(y, d), core=core,
-            below_in_core=lambda y: _below_in_circle(y, d - 2 * cover),
-            edges=(cover - d / 2, d / 2 - cover),
-        )  # fmt: skip
-        return cls.of_shape(
-            A=math.pi * d**2 / 4, I=math.pi * d**4 / 64, E=E, nu=nu, rho=rho,
-            shear_factor=shear_factor, depth=d, fibres=placed, **laws,
-        )  # fmt: skip
+        return cls.of_shape(rounded_rectangle(d, d, d / 2), **{"shear_factor": 9 / 10} | material)
 
     @classmethod
-    def tube(
-        cls, d: float, t: float, *, E: float, nu: float, rho: float | None = None,
-        shear_factor: float = 1 / 2, fibres: Fibres | None = None, **laws: Any,
-    ) -> Section:  # fmt: skip
-        """Create a circular tube of outer diameter ``d`` and wall thickness ``t``; m."""
+    def tube(cls, d: float, t: float, **material: Any) -> Section:
+        """Create a circular tube of outer diameter ``d`` and wall thickness ``t``; m.
+
+        ``material`` are arguments of :meth:`of_shape`; the shear factor is 1/2 by default, by
+        Cowper (1966) for thin walls and Poisson's ratio 0.
+        """
         _require_positive("Section.tube", d=d, t=t)
         if 2 * t > d:
             raise ModelError(
                 f"Section.tube: wall t = {t} m is thicker than the radius of d = {d} m"
             )
-        inner = d - 2 * t
-        edges = (-inner / 2, inner / 2)
-        placed = PlacedFibres.layers(
-            fibres, E, d, lambda y: _below_in_circle(y, d) - _below_in_circle(y, inner), edges
-        )
-        return cls.of_shape(
-            A=math.pi * (d**2 - inner**2) / 4, I=math.pi * (d**4 - inner**4) / 64,
-            E=E, nu=nu, rho=rho, shear_factor=shear_factor, depth=d, fibres=placed, **laws,
-        )  # fmt: skip
+        return cls.of_shape(rounded_rectangle(d, d, d / 2, t), **{"shear_factor": 1 / 2} | material)
+
+    @classmethod
+    def box(cls, b: float, h: float, t: float, r: float = 0.0, **material: Any) -> Section:
+        """Create a rectangular hollow section: width b, depth h, wall t, outer corner radius r; m.
+
+        The inner radius is r - t, or 0.  ``material`` are arguments of :meth:`of_shape`; the shear
+        factor is by default that of Cowper (1966) for thin walls and Poisson's ratio 0.
+        """
+        _require_positive("Section.box", b=b, h=h, t=t)
+        require_number(r, "Section.box: r", at_least=0.0)
+        if material.get("axis") == "weak":
+            b, h, material = h, b, material | {"axis": "strong"}
+        if 2 * t >= min(b, h):
+            raise ModelError(f"Section.box: two walls do not fit: b = {b}, h = {h}, t = {t} m")
+        if 2 * r > min(b, h):
+            raise ModelError(f"Section.box: r = {r} m does not fit: b = {b}, h = {h} m")
+        return cls._thin_walled(rounded_rectangle(b, h, r, t), box_walls(b, h, t), material)
 
     @classmethod
     def i_shape(
-        cls, h: float, b: float, tw: float, tf: float, *, E: float, nu: float,
-        rho: float | None = None, fibres: Fibres | None = None, **laws: Any,
-    ) -> Section:  # fmt: skip
+        cls, h: float, b: float, tw: float, tf: float, r: float = 0.0, **material: Any
+    ) -> Section:
         """Create a symmetric I: depth h, width b, thickness tw of the web and tf of the flanges; m.
 
-        The section bends about the strong axis.  The shear area is ``tw (h - tf)``.
+        ``r`` is the radius of the fillets between web and flanges; m.  ``material`` are arguments
+        of :meth:`of_shape`.  By default the shear area is ``tw (h - tf)``, the web, or
+        ``5/3 b tf``, the flanges, about the weak axis.
         """
-        _require_positive("Section.i_shape", h=h, b=b, tw=tw, tf=tf)
-        if 2 * tf >= h or tw > b:
+        shape, _ = cls._flanged("I", h, b, tw, tf, r)
+        area = 5 / 3 * b * tf if material.get("axis") == "weak" else tw * (h - tf)
+        return cls.of_shape(shape, **{"shear_factor": area / shape.A} | material)
+
+    @classmethod
+    def channel(
+        cls, h: float, b: float, tw: float, tf: float, r: float = 0.0, **material: Any
+    ) -> Section:
+        """Create a channel with parallel flanges, with the dimensions of :meth:`i_shape`.
+
+        About the weak axis, the web is to the right of the direction of the beam.  ``material`` are
+        arguments of :meth:`of_shape`; the shear factor is by default that of Cowper (1966) for thin
+        walls and Poisson's ratio 0.
+        """
+        return cls._thin_walled(*cls._flanged("C", h, b, tw, tf, r), material)
+
+    @classmethod
+    def t_shape(
+        cls, h: float, b: float, tw: float, tf: float, r: float = 0.0, **material: Any
+    ) -> Section:
+        """Create a T: depth h with the flange of width b and thickness tf, thickness tw of the web.
+
+        The flange is to the left of the direction of the beam; ``r`` is the radius of the fillets;
+        m.  ``material`` are arguments of :meth:`of_shape`; the shear factor is by default that of
+        Cowper (1966) for thin walls and Poisson's ratio 0.
+        """
+        return cls._thin_walled(*cls._flanged("T", h, b, tw, tf, r), material)
+
+    @classmethod
+    def _flanged(
+        cls, kind: str, h: float, b: float, tw: float, tf: float, r: float
+    ) -> tuple[Shape, Walls]:
+        name = {"I": "i_shape", "C": "channel", "T": "t_shape"}[kind]
+        _require_positive(f"Section.{name}", h=h, b=b, tw=tw, tf=tf)
+        require_number(r, f"Section.{name}: r", at_least=0.0)
+        if (2 * tf if kind != "T" else tf) >= h or tw > b:
             raise ModelError(
-                f"Section.i_shape: web and flanges do not fit: h = {h}, b = {b}, tw = {tw}, "
+                f"Section.{name}: web and flanges do not fit: h = {h}, b = {b}, tw = {tw}, "
                 f"tf = {tf} m"
             )
-        web = h - 2 * tf
-        A = 2 * b * tf + tw * web
-        placed = PlacedFibres.layers(
-            fibres, E, h,
-            lambda y: _below_in_rectangle(y, b, h) - _below_in_rectangle(y, b - tw, web),
-            edges=(-web / 2, web / 2),
+        across = b - tw if kind == "C" else (b - tw) / 2
+        along = h - tf if kind == "T" else h / 2 - tf
+        if r > min(across, along):
+            raise ModelError(
+                f"Section.{name}: r = {r} m; the fillets have room for {min(across, along):.4g} m"
+            )
+        return flanged(kind, h, b, tw, tf, r)
+
+    @classmethod
+    def _thin_walled(cls, shape: Shape, walls: Walls, material: dict[str, Any]) -> Section:
+        if material.get("axis") == "weak":
+            walls = [(1j * start, 1j * end, t) for start, end, t in walls]
+        factor = thin_walled_shear_area(walls) / shape.A
+        return cls.of_shape(shape, **{"shear_factor": factor} | material)
+
+    @classmethod
+    def steel(cls, designation: str, **material: Any) -> Section:
+        """Create a rolled or hollow steel section of a standard series from its designation.
+
+        The series are IPE, HEA, HEB, HEM, UPE and the American W and HSS; upper or lower case and
+        spaces do not matter, and "HE 200 B" is "HEB 200".  The constructor is :meth:`i_shape`,
+        :meth:`channel`, :meth:`box` or :meth:`tube`, with root and corner radii.
+
+        Args:
+            designation: Designation, such as "IPE 300", "W14X90" or "HSS8X4X1/4".
+            material: Arguments of :meth:`of_shape`.  By default E = 210e9 Pa and nu = 0.3 (EN
+                1993-1-1, 3.2.6), and rho = 7850 kg/m³.
+
+        Raises:
+            ModelError: The designation is unknown; the message lists similar ones.
+
+        Example:
+            >>> ipe = ub.Section.steel("IPE 300").shape
+            >>> print(f"{1e4 * ipe.A:.2f} cm², {1e8 * ipe.I:.0f} cm⁴, {1e6 * ipe.Wpl:.1f} cm³")
+            53.81 cm², 8356 cm⁴, 628.4 cm³
+            >>> girder = ub.Section.steel("W14X90", axis="weak", E=200e9)
+        """
+        require_text(designation, "Section.steel: designation")
+        name = "".join(designation.upper().replace("×", "X").split())
+        name = re.sub(r"^HE(\d+)([ABM])$", r"HE\2\1", name)
+        table = _steel_table()
+        if name not in table:
+            similar = ", ".join(get_close_matches(name, table, n=5, cutoff=0.0))
+            raise ModelError(
+                f"Section.steel: designation {designation!r} is not in the table of IPE, HEA, HEB, "
+                f"HEM, UPE, W and HSS; similar designations are {similar}"
+            )
+        kind, sizes = table[name]
+        material = {"E": 210e9, "nu": 0.3, "rho": 7850.0} | material
+        if kind == "box":
+            return cls.box(*sizes, **material)
+        if kind == "tube":
+            return cls.tube(*sizes, **material)
+        return (cls.i_shape if kind == "I" else cls.channel)(*sizes, **material)
+
+    @classmethod
+    def of_sectionproperties(cls, analysed: Any, *, axis: str = "x", **laws: Any) -> Section:
+        """Create a section from a cross-section of any shape, analysed by sectionproperties.
+
+        Its results give EA, EI, GA and the mass.  GA is E A_s / (2 (1 + ν)), with the mean ν of
+        several materials; the rotary inertia is the mass times EI/EA.
+
+        Args:
+            analysed: ``Section`` of the package sectionproperties with materials, after
+                ``calculate_geometric_properties`` and ``calculate_warping_properties``.  Its
+                coordinates are in m, moduli in Pa, densities in kg/m³.
+            axis: Axis of bending: "x" for a plane of motion along its y, "y" for one along its x.
+            laws: ``axial``, ``shear``, ``bending``, ``hinge``, ``interaction`` of :class:`Section`.
+
+        Raises:
+            ModelError: The cross-section is not analysed or has no materials, or its x and y are
+                not principal axes.
+        """
+        what = "Section.of_sectionproperties"
+        if not type(analysed).__module__.startswith("sectionproperties."):
+            raise ModelError(
+                f"{what}: analysed = {shorten(analysed)} must be a Section of the package "
+                "sectionproperties (pip install sectionproperties)"
+            )
+        if axis not in ("x", "y"):
+            raise ModelError(f'{what}: axis = {axis!r} must be "x" or "y"')
+        try:
+            EA, EI, mass = analysed.get_ea(), analysed.get_eic(), analysed.get_mass()
+            EA_s, nu = analysed.get_eas(), analysed.get_nu_eff()
+        except (AttributeError, RuntimeError) as error:
+            raise ModelError(
+                f"{what}: give the geometry materials, and calculate geometric and warping "
+                f"properties: {error}"
+            ) from None
+        if abs(EI[2]) > 1e-6 * max(EI[:2]):
+            raise ModelError(f"{what}: x and y are not principal axes; rotate the geometry to them")
+        x0, x1, y0, y1 = analysed.geometry.calculate_extents()
+        own, depth, shear = (EI[0], y1 - y0, EA_s[1]) if axis == "x" else (EI[1], x1 - x0, EA_s[0])
+        return cls(
+            EA=EA, GA=shear / (2 * (1 + nu)), EI=own, rhoA=mass, rhoI=mass * own / EA,
+            depth=depth, **laws,
         )  # fmt: skip
-        return cls.of_shape(
-            A=A, I=(b * h**3 - (b - tw) * web**3) / 12, E=E, nu=nu, rho=rho,
-            shear_factor=tw * (h - tf) / A, depth=h, fibres=placed, **laws,
-        )  # fmt: skip
 
 
-def _below_in_rectangle(y: Array, b: float, h: float) -> Array:
-    """Return the area up to y and its first moment, each up to a constant; (2, n); m², m³."""
-    y = np.clip(y, -h / 2, h / 2)
-    return np.array([b * y, b * y**2 / 2])
-
-
-def _below_in_circle(y: Array, d: float) -> Array:
-    """Return the area up to y and its first moment, each up to a constant; (2, n); m², m³."""
-    r = d / 2
-    y = np.clip(y, -r, r)
-    half_chord = np.sqrt((r - y) * (r + y))  # this product is never negative
-    area = y * half_chord + (r**2 * np.arcsin(y / r) if r else 0.0)
-    return np.array([area, -2 / 3 * half_chord**3])
+@cache
+def _steel_table() -> dict[str, tuple[str, tuple[float, ...]]]:
+    """Return the kind and the dimensions (m) of each designation."""
+    rows = [
+        line.split(",")
+        for line in Path(__file__).with_name("steel_shapes.csv").read_text("utf-8").splitlines()
+        if not line.startswith("#")
+    ]
+    return {name: (kind, tuple(float(mm) / 1000 for mm in sizes)) for name, kind, *sizes in rows}
 
 
 def _require_positive(owner: str, **sizes: float) -> None:
     for name, value in sizes.items():
         require_number(value, f"{owner}: {name}", positive=True)
-
-
-def _require_cover(owner: str, core: object, cover: float, size: float) -> None:
-    """Raise :class:`ModelError` unless ``core`` and ``cover`` fit a section of this size (m)."""
-    require_kind(core, (Fibres, type(None)), f"{owner}: core")
-    require_number(cover, f"{owner}: cover", at_least=0.0)
-    if core is None and cover > 0.0:
-        raise ModelError(f"{owner}: cover without core; give the law of the core, too")
-    if core is not None and not 0.0 < 2 * cover < size:
-        raise ModelError(
-            f"{owner}: cover = {cover} m leaves no core, or no cover, in a section of {size} m"
-        )
 
 
 def _each(values: float | Sequence[float], n: int, what: str) -> Array:

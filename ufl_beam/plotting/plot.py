@@ -16,6 +16,7 @@ from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.model.ground_motion import GroundMotion
 from ufl_beam.model.scene import Scene
+from ufl_beam.model.sections import Section
 from ufl_beam.output.engineering_results import Storeys
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
@@ -42,6 +43,7 @@ from ufl_beam.plotting.inelastic_pictures import (
     draw_section_moments,
 )
 from ufl_beam.plotting.model import draw_model
+from ufl_beam.plotting.section_pictures import draw_section
 from ufl_beam.plotting.style import RESULTANTS
 from ufl_beam.simulation.solution import Solution
 
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
 
 PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Scene: {"model": draw_model},
+    Section: {"section": draw_section},
     Solution: {
         "shape": draw_shape,
         **{name: partial(draw_shape, quantity=name) for name in RESULTANTS},
@@ -84,6 +87,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     shown               quantity            picture and further arguments
     ==================  ==================  ========================================================
     Scene               "model"             the whole model, before any run; ``ax``
+    Section             "section"           outline and fibres of a cross-section; ``ax``
     Solution            "shape"             the frame at one time; ``n``, ``magnify``, ``ax``
     Solution            "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
     Solution            "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
@@ -130,8 +134,8 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     pictures = next((PICTURES[kind] for kind in PICTURES if isinstance(shown, kind)), None)
     if pictures is None:
         raise ArgumentError(
-            f"plot: {shown!r} is a {type(shown).__name__}; give a Scene, the Solution of a run, or "
-            "the result of an analysis"
+            f"plot: {shown!r} is a {type(shown).__name__}; give a Scene, a Section, the "
+            "Solution of a run, or the result of an analysis"
         )
     if quantity and quantity not in pictures:
         hint = "; a scene has none before a run" if isinstance(shown, Scene) else ""

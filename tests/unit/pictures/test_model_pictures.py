@@ -239,10 +239,40 @@ def test_the_axes_hold_a_single_body_also_far_away():
         assert np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all()
 
 
+def test_a_section_is_drawn_to_scale():
+    """Outline and hole, core, layers and bars; mm from the axis of the beam."""
+    cover, core, steel = (ub.Fibres(ub.ElastoPlastic(x), number=8) for x in (3e7, 4e7, 5e8))
+    concrete = {"E": 30e9, "nu": 0.2, "fibres": cover, "core": core, "cover": 0.02}
+    plain = ub.Section.box(0.4, 0.6, 0.1, **concrete)
+    section = plain.reinforced([-0.25, 0.25], [2e-3, 1e-3], E=200e9, fibres=steel)
+    axes = ub.plot(section).axes[0]
+    outline, inset, *bars = axes.patches
+    axis = section.fibres.axis * 1e3
+    assert abs(axis) > 1
+    for patch, sides in ((outline, (400, 600, 200, 400)), (inset, (360, 560, 240, 440))):
+        outer, hole = (points for points in patch.get_path().to_polygons())
+        assert [*np.ptp(outer, axis=0), *np.ptp(hole, axis=0)] == pytest.approx(sides)
+        assert [x.mean() for x in (outer[:-1, 1], hole[:-1, 1])] == pytest.approx([-axis, -axis])
+    assert [bar.center[1] for bar in bars] == pytest.approx([-250 - axis, 250 - axis])
+    assert [np.pi * bar.radius**2 for bar in bars] == pytest.approx([2e3, 1e3])
+    layers = [len(lines.get_segments()) for lines in axes.collections]
+    assert layers == [(section.fibres.material == k).sum() for k in (1, 2)]
+    assert axes.get_aspect() == 1.0
+    discs = ub.Section.of_fibres([0, 0.1], [1e-4, 2e-4], E=1e9, nu=0.3, fibres=steel)
+    assert len(ub.plot(discs).axes[0].patches) == 2
+    ipe = ub.plot(ub.Section.steel("IPE 300")).axes[0]
+    assert ipe.get_title(loc="left") == "A = 53.81 cm², I = 8356 cm⁴, Wpl = 628.4 cm³"
+    with pytest.raises(ub.ArgumentError, match="this Section has stiffnesses only"):
+        ub.plot(ub.Section(EA=1.0, GA=1.0, EI=1.0))
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda s: ub.plot(3), "plot: 3 is a int; give a Scene, the Solution of a run, or"),
+        (
+            lambda s: ub.plot(3),
+            "plot: 3 is a int; give a Scene, a Section, the Solution of a",
+        ),
         (lambda s: ub.plot([s]), "is a list; give a Scene"),
         (
             lambda s: ub.plot(s, "M"),

