@@ -354,6 +354,7 @@ def ends(hinges, run):
     return [(float(x.force[-1]), float(x.dissipated[-1])) for x in found]
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @needs_mpirun
 def test_two_processes_share_a_frame():
