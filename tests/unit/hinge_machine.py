@@ -27,9 +27,7 @@ class Machine:
         capacities = strength, softening, unloading, reloading
         self.energies = [x * backbones[0].yield_limit for x in capacities]
         self.kappas, self.path, self.target, self.steepest = kappas, [], 0.0, 0.0
-        self.peaks = {
-            way: b.yield_limit / stiffness for way, b in zip((1, -1), backbones, strict=True)
-        }
+        self.peaks = {}
         self.lines, self.tops = {}, {}
         for way, b in zip((1, -1), backbones, strict=True):
             yields, top = b.yield_limit / stiffness, b.overstrength * b.yield_limit
@@ -40,7 +38,7 @@ class Machine:
                 top / b.post_capping,
                 b.residual * b.yield_limit,
             )
-            self.tops[way] = top
+            self.tops[way], self.peaks[way] = top, yields
             self.lines[way] = {
                 "hardening": [b.yield_limit - slope * yields, slope],
                 "falling": [top + falls * caps, -falls],

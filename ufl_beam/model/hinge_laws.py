@@ -439,8 +439,8 @@ class PinchingHinge(_DeterioratingHinge):
     and at ``kappa_F`` times the moment of the straight path; if x0 is beyond this rotation, the
     path is straight.  At each change of the sign the target rotation is multiplied by 1 + β with
     Λ = ``reloading``.  The unloading stiffness remains at least 1.1 times the slope of the path
-    where this slope is less than the stiffness before.  The hinge corresponds to IMKPinching and
-    IMKPeakOriented of OpenSees.
+    where this slope is less than the stiffness before.  After Ibarra, Medina and Krawinkler,
+    Earthquake Eng. Struct. Dyn. 34 (2005); IMKPinching and IMKPeakOriented in OpenSees.
 
     Args:
         stiffness: Elastic stiffness; N m/rad or N/m.
