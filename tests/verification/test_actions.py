@@ -112,7 +112,7 @@ def test_moving_mass():
     """[calc] Nine sine modes with the mass and its convective acceleration, integrated by SciPy.
 
     w_tt + 2 c w_xt + c² w_xx at the place c t, with a mass of 30 % of the bridge.  The error is
-    4.6e-4 with these steps, 1.9e-4 with half of them, and tends to 1e-4 of the modal truncation.
+    1.5e-3, 5.6e-4 and 2.7e-4 with 200, 400 and 800 steps; it tends to that of nine modes.
     """
     c, m, number = 0.3 * math.pi / L * math.sqrt(EI / MU), 0.3 * MU * L, 9
     k = np.arange(1, number + 1) * math.pi / L

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from itertools import pairwise
 
 import numpy as np
 import scipy  # its subpackages are loaded when they are used
@@ -172,12 +173,12 @@ class PressureForce(LoadForce):
         order = [start, end, *inner]  # of the nodes of cells
         forces: Array = np.zeros((len(cells), 2 * len(order), 2 * len(order)))
         turned = np.array([[load.tangential, -load.normal], [load.normal, load.tangential]])
-        for matrix, s0, s1 in zip(forces, s[:-1], s[1:], strict=True):
+        for k, (s0, s1) in enumerate(pairwise(s)):
             for point, weight in zip(*np.polynomial.legendre.leggauss(5), strict=True):
                 at = (1 + point) / 2
                 factor = load.factors(np.array([s0 + at * (s1 - s0)]))[0] * weight / 2
                 pair = np.outer(mesh.weights(at)[order], mesh.slopes(at)[order])
-                matrix += np.kron(turned, factor * pair)
+                forces[k] += np.kron(turned, factor * pair)
         self._cells, self._matrices = cells, forces
         dofs = numbering.dofs[nodes][:, :, :2].transpose(0, 2, 1).reshape(len(cells), -1)
         self._places = numbering.points[nodes].transpose(0, 2, 1).reshape(dofs.shape)
@@ -233,7 +234,7 @@ class MovingForce(LoadForce):
         cell, dofs, shapes, _ = at
         on_nodes = np.zeros((1, 3, len(shapes)))
         on_nodes[0, :2] = np.outer(force, shapes)
-        np.add.at(vector, dofs[:2], on_nodes[0, :2])
+        vector[dofs[:2]] += on_nodes[0, :2]
         return vector, end_forces(self._numbering, "density", np.array([cell]), -on_nodes)
 
     def _forces_at(self, t: float) -> tuple[Array, Array]:
@@ -307,7 +308,8 @@ class MovingForce(LoadForce):
         """Return minus the forces, and their derivative, which is zero."""
         wanted = self._forces_at(step.load_time)
         pairs = list(zip(self._reached_forces, wanted, strict=True))
-        self._end_forces = [a + step.fraction * (b - a) for a, b in pairs]
+        force, on_cells = (a + step.fraction * (b - a) for a, b in pairs)
+        self._end_forces = force, on_cells
         self.force, self.on_nodes = (a + step.at * step.fraction * (b - a) for a, b in pairs)
         force, on_nodes, slope = self._of_mass(step, q1)
         self.force, self.on_nodes = self.force + force, self.on_nodes + on_nodes
@@ -330,6 +332,12 @@ class MovingForce(LoadForce):
         if self._inertia is not None and v is not None:
             self.stored = {"kinetic": self._kinetic(t, q, v)}
         return self.force
+
+    def save_or_restore(self, archive: Archive) -> None:
+        """Save or restore the forces in the last step, if the next work uses those of a mass."""
+        if self._inertia is not None and self.scheme.weight_of_before:
+            number = self._numbering.scene.loads.index(self._moving)
+            self._before = archive.vector(f"moving mass {number}", self._before)
 
 
 class FrameForce(LoadForce):

@@ -434,8 +434,10 @@ class MovingLoads(_AtDofs):
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return the loops that begin and accept a step."""
         self._callbacks = callbacks
-        factor, position = map(callbacks.time_functions, (self._in_time, self._positions))
-        c = fill(self._c, factor=factor, position=position)
+        c = fill(
+            self._c, factor=callbacks.time_functions(self._in_time),
+            position=callbacks.time_functions(self._positions),
+        )  # fmt: skip
         c.work = self._ledger.supplied.pointer("loads")
         energies = []
         if self._heavy:
@@ -446,7 +448,7 @@ class MovingLoads(_AtDofs):
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them.
 
-        These are the forces only: masses have no acceleration before the first step.
+        Masses have no acceleration before the first step, if there is no ``past``.
         """
         step = struct("time_step", load_time=t, fraction=1.0, at=1.0, dt=1.0)
         rates, self._c.rates = self._c.rates, ffi.NULL
@@ -458,7 +460,14 @@ class MovingLoads(_AtDofs):
         self.add_residual(q, np.zeros(self._size))
         self._c.rates = rates
         self._forces[1] = self._forces[0]
+        if past is not None and past.has("moving masses"):
+            self._forces[1] = past.added("moving masses", self._whole(self._forces[1]))[self.dofs]
         return self._whole(self._forces[0])
+
+    def pass_on(self, archive: Archive) -> None:
+        """Save the forces of the last step, if masses add to them and the next work uses them."""
+        if self._heavy and self._c.weight_of_before:
+            archive.added("moving masses", self._whole(self._forces[1]))
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the forces in the equation of the last step, and at its end."""

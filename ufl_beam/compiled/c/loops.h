@@ -708,6 +708,47 @@ typedef struct {
 /* Imposed strains of the cells of a term, see CellStrains: elastic cells, whose forms have the strains
  * as a coefficient, or cells with material points. */
 typedef struct {
+  int cells, points;
+  const double *const *field; /* for each function of time: strains for a factor of 1; cells * points * 3 */
+  double *strains;            /* cells * points * 6: strains at the beginning and at the end of a step */
+  int forms;
+  const form_of_step *form;
+  const cells *work; /* of elastic resultants on the change of imposed strains */
+  const inelastic *inelastic;
+  double *before; /* with material points: resultants in the accepted state; cells * 3 */
+} imposed_cells;
+
+typedef struct {
+  int functions, groups;
+  const time_function *factor;
+  double *factors, *factors_at_end; /* at the beginning and at the end of the step */
+  imposed_cells *const *group;
+  double weight_of_before, *supplied;
+} imposed_strains;
+
+/* Forces along beams that turn with the deformed axis, see Pressures. Displacements of a cell are x
+ * of all nodes, then y. */
+typedef struct {
+  int loads, cells, nodes, size; /* nodes: of a cell; size: of `dof` */
+  const int32_t *dof;      /* degrees of freedom that are loaded */
+  const int32_t *load, *at; /* load of each cell; index in `dof` of each displacement of a cell */
+  const double *share;     /* cells x nodes x nodes: force on a node by the position of a node */
+  const double *place;     /* positions of the nodes of the undeformed cells */
+  const double *q0;        /* configuration at the beginning of the step */
+  double part;             /* fraction of the increment at which the loads act */
+  const double *tangential, *normal; /* of each load, for the factor 1 */
+  const time_function *factor;
+  double *now, *end, *before; /* factors in the equation, at the end of the step, at the end of the last step */
+  const int32_t *entry;    /* entries of the tangent: 2 nodes x 2 nodes of each cell */
+  double **each;           /* minus the forces on the nodes of cells in the latest residual: x, y, moments */
+  double *force, *force_before; /* in the latest residual, in the last step; size */
+  double weight_of_before, *work;
+} pressures;
+
+/* Forces and masses that move along beams, see MovingLoads. Forces on a cell are x of its nodes, then
+ * y. */
+typedef struct rates rates;
+typedef struct {
   int loads, cells, nodes, size; /* nodes: of a cell; size: of `dof` */
   const int32_t *dof;       /* degrees of freedom that may be loaded */
   const int32_t *at;        /* index in `dof` of each displacement of a cell */
@@ -719,34 +760,6 @@ typedef struct {
   const time_function *factor, *position;
   double *now, *end, *before; /* on cells: in the equation, at the end of the step, at the end of the last step */
   double **each;            /* minus the forces on the nodes of cells in the latest residual: x, y, moments */
-  int loads, cells, nodes, size; /* nodes: of a cell; size: of `dof` */
-  const int32_t *dof;      /* degrees of freedom that are loaded */
-  const int32_t *load, *at; /* load of each cell; index in `dof` of each displacement of a cell */
-  const double *share;     /* cells x nodes x nodes: force on a node by the position of a node */
-  const double *place;     /* positions of the nodes of the undeformed cells */
-  const double *q0;        /* configuration at the beginning of the step */
-  double part;             /* fraction of the increment at which the loads act */
-  const double *tangential, *normal; /* of each load, for the factor 1 */
-  int cells, points;
-  const double *const *field; /* for each function of time: strains for a factor of 1; cells * points * 3 */
-  double *strains;            /* cells * points * 6: strains at the beginning and at the end of a step */
-  int forms;
-  const form_of_step *form;
-  const cells *work; /* of elastic resultants on the change of imposed strains */
-  const inelastic *inelastic;
-  double *before; /* with material points: resultants in the accepted state; cells * 3 */
-} imposed_cells;
-
-void start_moving_masses(const moving_loads *m, double t, const double *q, const double *v);
-/* Forces and masses that move along beams, see MovingLoads. Forces on a cell are x of its nodes, then
- * y. */
-typedef struct rates rates;
-typedef struct {
-  int functions, groups;
-  const time_function *factor;
-  double *now, *end, *before; /* factors in the equation, at the end of the step, at the end of the last step */
-  const int32_t *entry;    /* entries of the tangent: 2 nodes x 2 nodes of each cell */
-  double **each;           /* minus the forces on the nodes of cells in the latest residual: x, y, moments */
   double *force, *force_before; /* in the latest residual, in the last step; size */
   double weight_of_before, *work;
   /* If a load has a mass in dynamics; otherwise none: */
@@ -762,16 +775,9 @@ typedef struct {
   double part;              /* fraction of the increment at which loads act */
   int half_tangents;        /* whether rotations have the nodal step 2 tan(change / 2) */
 } moving_loads;
-  double *force, *force_before; /* in the latest residual, in the last step; size */
-  double weight_of_before, *work;
-} pressures;
-  double *factors, *factors_at_end; /* at the beginning and at the end of the step */
-  imposed_cells *const *group;
-  double weight_of_before, *supplied;
-} imposed_strains;
 
-/* Forces along beams that turn with the deformed axis, see Pressures. Displacements of a cell are x
- * of all nodes, then y. */
+void start_moving_masses(const moving_loads *m, double t, const double *q, const double *v);
+
 /* Vectors of loads at some degrees of freedom times functions of time, see DeadLoads. */
 typedef struct {
   int size, vectors;
