@@ -231,22 +231,12 @@ class DofNumbering:
 
     @cached_property
     def inelastic(self) -> list[tuple[SectionPoints, Index]]:
-        """Material points of cells that can yield or break, with the cells that have these points.
-
-        Raises:
-            ModelError: There are such cells, and the degree of the mesh is above 1.
-        """
+        """Material points of cells that can yield or break, with the cells that have these points."""
         groups = dict[SectionPoints, list[int]]()
         sections, beam_sections = self.sections
         for number, section in enumerate(sections):
             section_points = section.section_points(section.hinge)
             if section_points is not None and not section_points.elastic:
-                if self.mesh.degree > 1:
-                    beam = self.scene.beams[int(np.argmax(beam_sections == number))]
-                    raise ModelError(
-                        f"Mesh: degree = {self.mesh.degree} is for elastic beams, and {beam.name} "
-                        "may yield or break; use degree=1 with more cells, or an elastic section"
-                    )
                 groups.setdefault(section_points, []).append(number)
         cell_sections = beam_sections[self.beam_of_cell]
         return [
@@ -260,6 +250,10 @@ class DofNumbering:
         groups = [cells for _, cells in self.inelastic]
         return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups]))
 
+    def section_lengths(self, cells: Index) -> Array:
+        """Compute lengths of cells times weights of integration points; (len(cells) * degree,)."""
+        return np.outer(self.lengths(cells), self.mesh.point_weights).ravel()
+
     def lengths(self, cells: Index) -> Array:
         """Compute lengths of cells; (len(cells),); m."""
         start, end = self.cells[cells].T
@@ -267,21 +261,22 @@ class DofNumbering:
         return np.asarray(np.sqrt(x * x + y * y))
 
     def hinges(self, beam: Member) -> list[SofteningLaw | None]:
-        """Return the law of the hinge in the middle of each cell of a beam, or None."""
+        """Return the law of hinges at the integration points of each cell of a beam, or None."""
         return [beam.section.hinge] * len(self.cells_of(beam))
 
     def keys(self, cells: Index) -> list[tuple[int, ...]]:
-        """Return for each cell the key of its stream of random values, see :func:`stream_keys`.
+        """Return for each integration point the key of its random values, see :func:`stream_keys`.
 
-        It consists of a checksum of the ends of the beam, the number of the cell in the beam, and,
+        It consists of a checksum of the ends of the beam, the number of the point in the beam, and,
         for the further beams between the same ends, their number.
         """
-        beams = self.beam_of_cell[cells]
+        beams, p = self.beam_of_cell[cells], self.mesh.degree
         keys = stream_keys(beam.ends for beam in self.scene.beams)
-        in_beam = cells - self._first_cells[beams]
+        in_beam = p * (cells - self._first_cells[beams])
         return [
-            (keys[b][0], int(c), *keys[b][1:] * bool(keys[b][1]))
+            (keys[b][0], int(c) + i, *keys[b][1:] * bool(keys[b][1]))
             for b, c in zip(beams, in_beam, strict=True)
+            for i in range(p)
         ]
 
     # -- places ----------------------------------------------------------------------------------

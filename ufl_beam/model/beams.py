@@ -241,6 +241,11 @@ class Mesh:
         return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
 
     @property
+    def points(self) -> Array:
+        """Gauss points of a cell, ascending from 0 to 1; (p,)."""
+        return np.asarray((1 + np.polynomial.legendre.leggauss(self.degree)[0]) / 2)
+
+    @property
     def point_weights(self) -> Array:
         """Weights of the Gauss points of a cell, with the sum 1; (p,)."""
         return np.asarray(np.polynomial.legendre.leggauss(self.degree)[1] / 2)

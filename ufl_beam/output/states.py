@@ -457,10 +457,16 @@ class States:
         return Material(chosen[:3].T, *chosen[3:])
 
     def cells_of(self, n: int, forces: Array | float = 0.0) -> Array:
-        """Return "material" of all cells, in elastic cells ``forces`` and zeros; (num_cells, 6)."""
-        everything = np.zeros((len(self.numbering.cells), self.row(n)[0].shapes["material"][1]))
+        """Return "material" of all cells, in elastic cells ``forces`` and zeros; (num_cells, 6).
+
+        Forces are means over a cell; jumps and energies are sums over its integration points.
+        """
+        weights, rows = self.numbering.mesh.point_weights, self._row("material", n)
+        in_cells = rows.reshape(-1, len(weights), rows.shape[1])
+        everything = np.zeros((len(self.numbering.cells), rows.shape[1]))
         everything[:, :3] = forces
-        everything[self.numbering.inelastic_cells] = self._row("material", n)
+        everything[self.numbering.inelastic_cells] = in_cells.sum(axis=1)
+        everything[self.numbering.inelastic_cells, :3] = weights @ in_cells[:, :, :3]
         return everything
 
     def material_at(self, place: Place) -> Material:

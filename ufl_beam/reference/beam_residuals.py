@@ -123,15 +123,19 @@ class YieldingBeams(CellForce):
         linear = self._b + ufl.dot(self._D, strain(element.q1, element.axis))
         work, around = (virtual_work(r, w_e) * element.dx(1) for r in (self._r, linear))
         super().__init__(cells, work, setting, around=around)
-        self._names = [numbering.describe_cell(number) for number in cells.cell_indices]
+        self._degree = numbering.mesh.degree
+        self._names = [
+            numbering.describe_cell(number) for number in cells.cell_indices.repeat(self._degree)
+        ]
         self.points = MaterialPoints(
-            section_points, numbering.keys(cells.cell_indices), cells.lengths, setting
-        )
+            section_points, numbering.keys(cells.cell_indices),
+            numbering.section_lengths(cells.cell_indices), setting,
+        )  # fmt: skip
 
     def response(self, step: Step, q1: Array) -> Response:
         """Return the virtual work after a return map, and its consistent tangent."""
         points = self.points
-        points.return_map(self.cells.strains(q1)[:, 0], step.dt)
+        points.return_map(self.cells.strains(q1).reshape(-1, 3), step.dt)
         put(self._r, points.r)
         put(self._b, points.r - np.einsum("kij,kj->ki", points.D, points.strains))
         put(self._D, points.D)
@@ -148,7 +152,7 @@ class YieldingBeams(CellForce):
 
     def start(self, q: Array) -> None:
         """Compute the accepted state of the points at the strains of a configuration."""
-        self.points.start(self.cells.strains(q)[:, 0])
+        self.points.start(self.cells.strains(q).reshape(-1, 3))
 
     @property
     def stored(self) -> Mapping[str, float]:  # type: ignore[override]
@@ -157,13 +161,16 @@ class YieldingBeams(CellForce):
 
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the internal variables of all points."""
-        self.points.state(archive.rows("cells", self.cells.cell_indices, self.points.state()))
+        indices, state = self.cells.cell_indices, self.points.state()
+        rows = archive.rows("cells", indices, state.reshape(len(indices), -1))
+        self.points.state(rows.reshape(state.shape))
 
     def material(self) -> Array:
-        """Return the number of each cell and its six values "material"; (num_cells, 7)."""
-        data = self.points.recorded.copy()
+        """Return the number of each integration point and its six values "material"; (n, 7)."""
+        data, points = self.points.recorded.copy(), np.arange(self._degree)
         data[:, 3] *= self._hinges  # zero without a hinge: jumps of fibres are no rotations
-        return np.column_stack([self.cells.cell_indices, data])
+        numbers = self._degree * self.cells.cell_indices[:, None] + points
+        return np.column_stack([numbers.ravel(), data])
 
 
 # -- inertia and damping -------------------------------------------------------------------------

@@ -226,8 +226,9 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     strains = np.column_stack([along, shear, change[:, 2]])
     left_in_cells = np.ones(len(numbering.cells))
     for beams in equation.inelastic:
-        cells, _ = beams.recorded()
-        left_in_cells[cells] = beams.points.remaining(strains[cells])
+        cells, p = beams.recorded()[0], numbering.mesh.degree
+        remaining = beams.points.remaining(strains[cells].repeat(p, axis=0))
+        left_in_cells[cells] = remaining.reshape(-1, p).min(axis=1)
     if subdomain.comm.size > 1:
         subdomain.comm.Allreduce(MPI.IN_PLACE, connectors)
         subdomain.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)
