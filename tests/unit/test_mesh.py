@@ -277,7 +277,10 @@ def test_cells_that_yield_take_a_higher_degree(kind, mesh, shared_path):
 
     whole = run(record=extremes)
     assert whole.energy.worst < 1e-9
-    lost, last = whole.energy.lost["hinges" if kind == "softens" else "plastic"], whole.material(beam)
+    lost, last = (
+        whole.energy.lost["hinges" if kind == "softens" else "plastic"],
+        whole.material(beam),
+    )
     assert lost[-1] > 0.1 * whole.energy.energy_transferred
     assert np.sum(last.plastic + last.hinge) == pytest.approx(lost[-1], rel=1e-12)
     moments = [whole.diagram(beam, n, points=9).M for n in range(len(whole))]

@@ -231,7 +231,7 @@ class DofNumbering:
 
     @cached_property
     def inelastic(self) -> list[tuple[SectionPoints, Index]]:
-        """Material points of cells that can yield or break, with the cells that have these points."""
+        """Material points of cells that can yield or break, with the cells that have them."""
         groups = dict[SectionPoints, list[int]]()
         sections, beam_sections = self.sections
         for number, section in enumerate(sections):

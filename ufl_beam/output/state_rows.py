@@ -121,8 +121,10 @@ class Columns:
             "t": (),  # time, s; or the load factor of a path
             "reactions": (len(scene.supports), 3),  # forces of supports, in their axes
             "connectors": (len(scene.all_connectors), len(Connection._fields)),
-            # `Points.recorded` at the integration points of inelastic cells, one cell after the other
-            "material": (len(numbering.inelastic_cells) * numbering.mesh.degree, int(lib.POINT_KEPT)),
+            # `Points.recorded`, Gauss point after Gauss point of cells that can yield or break
+            "material": (
+                len(numbering.inelastic_cells) * numbering.mesh.degree, int(lib.POINT_KEPT),
+            ),
             **dict.fromkeys(ledger, ()),  # J
             "q": (size,),  # configuration, all degrees of freedom in the order of the numbering
             **({"v": (size,)} if moving else {}),  # velocities

@@ -316,7 +316,8 @@ class Opened:
         self._numbering, self._times = states.numbering, states.times
         numbering, p = states.numbering, states.numbering.mesh.degree
         shape = len(numbering.cells), p
-        self.first, self.shear, self.dissipated = np.full(shape, -1), np.zeros(shape), np.zeros(shape)
+        self.first = np.full(shape, -1)
+        self.shear, self.dissipated = np.zeros((2, *shape))
         if not len(states):
             return
         columns, row = states.row(-1)
@@ -365,7 +366,8 @@ class Opened:
             fall = {law: _fall(beam.section.section_points(law), scheme) for law in set(laws)}
             falls, energies = np.array([fall[law] for law in laws]).T[:, :, None]
             opened = (self.first[cells] > 0) & (self.dissipated[cells] >= energies)
-            ratios = np.where(opened, numbering.section_lengths(cells).reshape(opened.shape), 0.0) * falls
+            lengths = numbering.section_lengths(cells).reshape(opened.shape)
+            ratios = np.where(opened, lengths, 0.0) * falls
             worst, point = divmod(int(np.argmax(ratios)), ratios.shape[1])
             ratio, length = ratios[worst, point], numbering.lengths(cells[[worst]])[0]
             t = times[self.first[cells[worst], point]]
@@ -381,11 +383,14 @@ class Opened:
                 )
         for member, number, error, place in self.hinges():
             if error > WARNED_SHIFT:
+                where, there = (
+                    ("in the middle", "in its middle") if middle else ("at a Gauss point", "there")
+                )
                 warn(
                     f"{member.name}: the hinge of the section opened in {_cells_in_words(number)}, "
-                    f"{'in the middle' if middle else 'at an integration point'} of a cell. At the "
-                    f"ends of the cell at s = {place.s:.3g} the moment differs from the moment "
-                    f"{'in its middle' if middle else 'there'} by {_percent(error)} of the limit, so the load at which the hinge opens has the "
+                    f"{where} of a cell. At the ends of the cell at "
+                    f"s = {place.s:.3g} the moment differs from the moment {there} by "
+                    f"{_percent(error)} of the limit, so the load at which the hinge opens has the "
                     "same uncertainty. Put a hinge exactly where it belongs, "
                     "Beam(hinges={s: law}), or use shorter cells"
                 )

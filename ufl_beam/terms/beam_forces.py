@@ -266,9 +266,9 @@ def inelastic_forms(element: Element, scheme: Scheme) -> InelasticForms:
 class InelasticBeams(Cells):
     """Virtual work of the resultants of cells with material points, P(34).
 
-    The points map the strains of an iterate to resultants r and their derivatives D.  UFL derives
-    the material and the geometric tangent from b + D e, the resultants linearized in the strains e
-    about the iterate.  C evaluates points and forms.
+    At each Gauss point, the points map strains of an iterate to resultants r and their derivatives
+    D.  UFL derives the material and the geometric tangent from b + D e, the resultants linearized
+    in the strains e about the iterate.  C evaluates points and forms.
 
     Attributes:
         recorded_factors: Factors of :attr:`Points.recorded` in :meth:`recorded`; (6,).
@@ -302,8 +302,9 @@ class InelasticBeams(Cells):
         self._in_c = struct(
             "inelastic", size=subdomain.size, latest=self._latest, points=self.points.c,
             scene=numbering.scene.size, in_cell=numbering.mesh.degree,
-            weight=numbering.mesh.point_weights, strains=self._strains.kernel.cells, force=self._force.cells,
-            tangent=self._tangent.cells, at_r=self._force.position(forms.r),
+            weight=numbering.mesh.point_weights, strains=self._strains.kernel.cells,
+            force=self._force.cells, tangent=self._tangent.cells,
+            at_r=self._force.position(forms.r),
             at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
         )  # fmt: skip
         if self.predicted is not None:
