@@ -278,3 +278,26 @@ def test_hinges_in_cells_are_at_gauss_points(degree):
     # |V| before the opening, times the distance from the end of the cell
     shift = at * found.reaction(lift)[np.argmax(lost > 0) - 1, 1] / law.limit
     assert found.hinge_place_error() == {beam: pytest.approx(shift, rel=1e-9)}
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_a_cell_is_a_mixed_member(degree):
+    """[closed] N and V are constant and M is linear in a cell without loads, though fibres yield.
+
+    Differences are those of the rotation, below 2e-5, which turns the forces.
+    """
+    law = ub.Fibres(ub.ElastoPlastic(0.1, isotropic=5e4), number=6)
+    section = ub.Section.rectangle(0.1, 0.1, E=1e6, nu=0.2, fibres=law)  # yields at 1e-7
+    force = np.array([2e-4, 4e-5])
+    scene = cantilever(section, cells=1, force=tuple(force))
+    solution = ub.simulate(
+        scene, ub.Static(), t=(0, 1), dt=0.25, mesh=ub.Mesh(degree=degree), newton=TIGHT
+    )
+    N, V, M, _, plastic, _ = solution.column("material")[-1:, :][0].T
+    arm = 1 - (1 + np.polynomial.legendre.leggauss(degree)[0]) / 2
+    most = 2e-5 * force.max()
+    assert (plastic > 0).any()
+    assert abs(solution.displacement(scene.beams[0].end)[-1, 2]) < 2e-5
+    np.testing.assert_allclose(N, force[0], rtol=0, atol=most)
+    np.testing.assert_allclose(V, force[1], rtol=0, atol=most)
+    np.testing.assert_allclose(M, force[1] * arm, rtol=0, atol=most)

@@ -252,7 +252,7 @@ class DofNumbering:
 
     def section_lengths(self, cells: Index) -> Array:
         """Compute lengths of cells times weights of integration points; (len(cells) * degree,)."""
-        return np.outer(self.lengths(cells), self.mesh.point_weights).ravel()
+        return np.asarray(np.outer(self.lengths(cells), self.mesh.point_weights).ravel())
 
     def lengths(self, cells: Index) -> Array:
         """Compute lengths of cells; (len(cells),); m."""

@@ -340,8 +340,8 @@ class Opened:
         for beam in numbering.scene.beams:
             law = beam.section.hinge
             cells, laws = numbering.cells_of(beam), numbering.hinges(beam)
-            opened = (self.first[cells] > 0).any(axis=1)
-            cells = cells[[other_law is law for other_law in laws] & opened]
+            opened = np.any(self.first[cells] > 0, axis=1)
+            cells = cells[np.array([other_law is law for other_law in laws]) & opened]
             if law is None or not len(cells) or law.limit == 0:
                 continue
             to_ends = numbering.lengths(cells) * numbering.mesh.points[0]
