@@ -288,10 +288,12 @@ def test_cells_that_yield_take_a_higher_degree(kind, mesh, shared_path):
     np.testing.assert_allclose(lowest, np.min(moments, axis=0), rtol=0, atol=1e-12)
 
     file = ub.Checkpoint(shared_path / f"{kind}.checkpoint", every=5)
-    half, reference = run((0, 0.4), checkpoint=file), run((0, 0.4), solver=True)
-    np.testing.assert_allclose(half.q, reference.q, rtol=0, atol=1e-9)
-    for mine, other in zip(half.material(beam), reference.material(beam), strict=True):
-        np.testing.assert_allclose(mine, other, rtol=0, atol=1e-9)
+    half = run((0, 0.4), checkpoint=file)
+    if MPI.COMM_WORLD.size == 1:
+        reference = run((0, 0.4), solver=True)
+        np.testing.assert_allclose(half.q, reference.q, rtol=0, atol=1e-9)
+        for mine, other in zip(half.material(beam), reference.material(beam), strict=True):
+            np.testing.assert_allclose(mine, other, rtol=0, atol=1e-9)
     assert np.array_equal(run(checkpoint=file).q, whole.q)
     later = run((0.4, 0.8), start=half, mesh=None)
     np.testing.assert_allclose(later.q[-1], whole.q[-1], rtol=0, atol=1e-9)
