@@ -15,6 +15,7 @@ from convergence.study import orders
 from scenes import cantilever, clamped, flying_beam
 
 import ufl_beam as ub
+from ufl_beam.plotting.inelastic_pictures import open_hinges
 
 TIGHT = ub.Newton(rtol=1e-13)
 MESHES = {1: (8, 16, 32), 2: (4, 8, 16), 3: (2, 4, 8)}
@@ -275,6 +276,9 @@ def test_hinges_in_cells_are_at_gauss_points(degree):
     lost = expected.energy.lost["hinges"]
     np.testing.assert_allclose(found.energy.lost["hinges"], lost, rtol=0, atol=1e-8 * lost[-1])
     assert lost[-1] > 0.1 * law.fracture_energy
+    (mark,) = open_hinges(found, -1, found.numbering.points)
+    np.testing.assert_allclose(mark.at, [at, 0.0], rtol=0, atol=1e-15)
+    assert mark.fraction == pytest.approx(lost[-1] / law.fracture_energy, rel=1e-8)
     # |V| before the opening, times the distance from the end of the cell
     shift = at * found.reaction(lift)[np.argmax(lost > 0) - 1, 1] / law.limit
     assert found.hinge_place_error() == {beam: pytest.approx(shift, rel=1e-9)}

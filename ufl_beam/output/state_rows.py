@@ -80,7 +80,7 @@ FORCE, WORK, DISSIPATED = map(Connection._fields.index, ("force", "work", "dissi
 """Indices of fields of :class:`Connection`, and so of numbers of the column "connectors"."""
 
 
-PLASTIC, HINGE = 4, 5
+JUMP, PLASTIC, HINGE = 3, 4, 5
 """Indices of fields in the column "material": (N, V, M), jump, plastic, hinge of
 :class:`Material`."""
 

@@ -29,6 +29,7 @@ from ufl_beam.output.state_rows import (
     FORCE,
     FORCES,
     HINGE,
+    JUMP,
     LEDGER,
     PLASTIC,
     RECORD,
@@ -461,12 +462,17 @@ class States:
 
         Forces are means over a cell; jumps and energies are sums over its integration points.
         """
-        weights, rows = self.numbering.mesh.point_weights, self._row("material", n)
-        in_cells = rows.reshape(-1, len(weights), rows.shape[1])
-        everything = np.zeros((len(self.numbering.cells), rows.shape[1]))
+        at_points = self.points_of(n)
+        everything, inelastic = at_points.sum(axis=1), self.numbering.inelastic_cells
         everything[:, :3] = forces
-        everything[self.numbering.inelastic_cells] = in_cells.sum(axis=1)
-        everything[self.numbering.inelastic_cells, :3] = weights @ in_cells[:, :, :3]
+        everything[inelastic, :3] = self.numbering.mesh.point_weights @ at_points[inelastic, :, :3]
+        return everything
+
+    def points_of(self, n: int) -> Array:
+        """Return "material" at Gauss points of all cells, or zeros; (num_cells, degree, 6)."""
+        rows, p = self._row("material", n), self.numbering.mesh.degree
+        everything = np.zeros((len(self.numbering.cells), p, rows.shape[1]))
+        everything[self.numbering.inelastic_cells] = rows.reshape(-1, p, rows.shape[1])
         return everything
 
     def material_at(self, place: Place) -> Material:
@@ -495,7 +501,7 @@ class States:
         the largest magnitude is returned.
         """
         states = self.cells_of(n)
-        jump, dissipated = states[:, 3].copy(), states[:, PLASTIC] + states[:, HINGE]
+        jump, dissipated = states[:, JUMP].copy(), states[:, PLASTIC] + states[:, HINGE]
         if self.scene.hinges:
             hinges = Connection(*self._row("connectors", n)[-len(self.scene.hinges) :].T)
             np.add.at(dissipated, self.numbering.cells_at_hinges, hinges.dissipated)

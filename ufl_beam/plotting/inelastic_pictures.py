@@ -14,6 +14,7 @@ from ufl_beam.errors import ArgumentError
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_laws import HingeLaw
 from ufl_beam.model.connectors import law_of, place_of
+from ufl_beam.output.state_rows import HINGE, JUMP
 from ufl_beam.plotting import style
 from ufl_beam.plotting.style import BLUE, GREY, INK, ORANGE, RED, WHITE, shade, with_unit
 from ufl_beam.simulation.solution import Solution
@@ -38,17 +39,20 @@ class OpenHinge(NamedTuple):
 
 def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
     """Find open hinges in cells and at vertices; ``points`` are drawn positions of nodes, m."""
-    numbering = solution.numbering
+    numbering, s = solution.numbering, solution.numbering.mesh.points
     hinges: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
     for beam in solution.scene.beams:
         laws = numbering.hinges(beam)
         if all(law is None or math.isinf(law.limit) for law in laws):
             continue
-        state = solution.material(beam, n)
-        rows = zip(numbering.cells_of(beam), laws, state.jump, state.hinge, strict=True)
-        for cell, law, jump, lost in rows:
-            if law is not None and (jump != 0.0 or lost > 0.0):
-                hinges.append((beam, points[numbering.cells[cell]].mean(axis=0), law, float(lost)))
+        cells = numbering.cells_of(beam)
+        at_points = solution.points_of(n)[cells]
+        opened = (at_points[:, :, JUMP] != 0.0) | (at_points[:, :, HINGE] > 0.0)
+        for cell, point in np.argwhere(opened):
+            if (law := laws[cell]) is not None:
+                first, last = points[numbering.cells[cells[cell]]]
+                at, lost = (1 - s[point]) * first + s[point] * last, at_points[cell, point, HINGE]
+                hinges.append((beam, at, law, float(lost)))
     for hinge, vertex in zip(solution.scene.hinges, numbering.vertices_at_hinges, strict=True):
         history = solution.connector(hinge)
         if history.motion[n] != 0.0 or history.dissipated[n] > 0.0:
@@ -121,12 +125,16 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
     plastic hinge, the hinge of the cell before the vertex is drawn.
     """
     history, numbering = solution.material_at(place), solution.numbering
-    hinge = numbering.hinge_at(place)
-    number = numbering.cell(place) - int(numbering.cells_of(place.beam)[0])
+    hinge, cell = numbering.hinge_at(place), numbering.cell(place)
+    number = cell - int(numbering.cells_of(place.beam)[0])
     law = numbering.hinges(place.beam)[number] if hinge is None else law_of(hinge)
     if law is None or np.isinf(law.limit):
         raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
     M, jump, lost = history.forces[:, 2], history.jump, float(history.hinge[-1])
+    if hinge is None:  # of the Gauss points, the one that opened most
+        states = np.array([solution.points_of(n)[cell] for n in range(len(solution))])
+        M, jump, losses = states[:, np.abs(states[-1, :, JUMP]).argmax(), [2, JUMP, HINGE]].T
+        lost = float(losses[-1])
     with style.panel(ax, (8.0, 5.4)) as axes:
         # Intervals in which the jump only grows or only falls; adjacent intervals share a point.
         moves = np.flatnonzero(np.diff(jump))
