@@ -212,10 +212,15 @@ class DofNumbering:
         return np.append(np.column_stack([vertices[:-1], inner]), vertices[-1])
 
     @property
+    def nodes_along_cells(self) -> Index:
+        """Nodes of each cell from its start to its end; (num_cells, degree + 1)."""
+        start, end, *between = self.nodes_of_cells.T
+        return np.column_stack([start, *between, end])
+
+    @property
     def pieces(self) -> Index:
         """Pairs of neighbouring nodes along each cell; (num_cells * degree, 2)."""
-        start, end, *between = self.nodes_of_cells.T
-        along = np.column_stack([start, *between, end])
+        along = self.nodes_along_cells
         return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2)
 
     @cached_property

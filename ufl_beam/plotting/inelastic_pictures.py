@@ -39,7 +39,8 @@ class OpenHinge(NamedTuple):
 
 def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
     """Find open hinges in cells and at vertices; ``points`` are drawn positions of nodes, m."""
-    numbering, s = solution.numbering, solution.numbering.mesh.points
+    numbering, mesh = solution.numbering, solution.numbering.mesh
+    nodes = numbering.nodes_along_cells
     hinges: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
     for beam in solution.scene.beams:
         laws = numbering.hinges(beam)
@@ -50,8 +51,8 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
         opened = (at_points[:, :, JUMP] != 0.0) | (at_points[:, :, HINGE] > 0.0)
         for cell, point in np.argwhere(opened):
             if (law := laws[cell]) is not None:
-                first, last = points[numbering.cells[cells[cell]]]
-                at, lost = (1 - s[point]) * first + s[point] * last, at_points[cell, point, HINGE]
+                drawn, lost = points[nodes[cells[cell]]].T, at_points[cell, point, HINGE]
+                at = np.array([np.interp(mesh.points[point], mesh.nodes, x) for x in drawn])
                 hinges.append((beam, at, law, float(lost)))
     for hinge, vertex in zip(solution.scene.hinges, numbering.vertices_at_hinges, strict=True):
         history = solution.connector(hinge)
@@ -91,8 +92,10 @@ def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[st
     """Mark yielded cells and open hinges on the beams; return marks by their names in a legend."""
     named: dict[str, Artist] = {}
     yielded = np.flatnonzero(dissipated_per_length(solution, n))
-    for ends in nodes[solution.numbering.cells[yielded]]:
-        (zone,) = axes.plot(*ends.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8)
+    for drawn in nodes[solution.numbering.nodes_along_cells[yielded]]:
+        (zone,) = axes.plot(
+            *drawn.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8
+        )
         named["yielded or cracked"] = zone
     for hinge in open_hinges(solution, n, nodes):
         (mark,) = axes.plot(*hinge.at, **circle(hinge.fraction))
