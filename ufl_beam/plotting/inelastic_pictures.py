@@ -92,7 +92,7 @@ def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[st
     """Mark yielded cells and open hinges on the beams; return marks by their names in a legend."""
     named: dict[str, Artist] = {}
     yielded = np.flatnonzero(dissipated_per_length(solution, n))
-    for drawn in nodes[solution.numbering.nodes_along_cells[yielded]]:
+    for line in nodes[solution.numbering.nodes_along_cells[yielded]]:
         (zone,) = axes.plot(
             *drawn.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8
         )
