@@ -93,9 +93,7 @@ def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[st
     named: dict[str, Artist] = {}
     yielded = np.flatnonzero(dissipated_per_length(solution, n))
     for line in nodes[solution.numbering.nodes_along_cells[yielded]]:
-        (zone,) = axes.plot(
-            *drawn.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8
-        )
+        (zone,) = axes.plot(*line.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8)
         named["yielded or cracked"] = zone
     for hinge in open_hinges(solution, n, nodes):
         (mark,) = axes.plot(*hinge.at, **circle(hinge.fraction))
