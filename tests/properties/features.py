@@ -13,7 +13,7 @@ EA, GA, EI = 1e4, 4e3, 100.0
 PLAIN = "EA=1e4, GA=4e3, EI=100.0, rhoA=1.0, rhoI=0.01"
 
 SECTION = ("section",)
-"""Slot of a section that yields or breaks; degrees above 1 exclude it."""
+"""Slot of a section that yields or breaks."""
 
 
 @dataclass(frozen=True)

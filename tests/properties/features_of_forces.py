@@ -305,7 +305,7 @@ def kelvin_voigt(d):
 # -- discretization, solver, steps -------------------------------------------------------------
 
 
-@feature("section", "hinges", "mesh")
+@feature("mesh")
 def degree(d):
     d.mesh = f"ub.Mesh(degree={d.one([2, 3])}{d.one(['', ', lumped=True'])})"
 

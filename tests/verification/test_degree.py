@@ -3,7 +3,7 @@
 
 With p points a cell, displacements and rotations at vertices converge with h^2p, and frequencies
 alike.  The problems are those of `test_roll_up.py`, `test_mattiasson_1981.py`,
-`test_frequencies.py`, `test_flying_beam.py`.
+`test_frequencies.py`, `test_flying_beam.py`, and cantilevers that yield.
 """
 
 import math
@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from closed_forms import elastica
 from convergence.study import orders
-from scenes import cantilever, flying_beam
+from scenes import cantilever, clamped, flying_beam
 
 import ufl_beam as ub
+from ufl_beam.plotting.inelastic_pictures import open_hinges
 
 TIGHT = ub.Newton(rtol=1e-13)
 MESHES = {1: (8, 16, 32), 2: (4, 8, 16), 3: (2, 4, 8)}
@@ -185,3 +186,132 @@ def test_a_decaying_scheme_knows_what_it_takes(degree):
     lost = first.energy.lost["numerical"]
     assert first.energy.worst <= 1e-10
     assert 0 < lost[-1] < 0.1 * first.energy.total[-1]
+
+
+# -- cells that yield ------------------------------------------------------------------------------
+
+FORCE, YIELD = 2e-6, 1e-6  # N, N m; a length of 1 m and EI = 1 N m2: displacements are small
+POWER = ub.RambergOsgood(YIELD, YIELD, 5)
+PLASTIC = {
+    "front": (ub.ElastoPlastic(YIELD, isotropic=0.25), lambda M: np.maximum(M - YIELD, 0) / 0.25),
+    "power": (POWER, lambda M: YIELD * (M / YIELD) ** 5),
+}
+"""Laws of bending, and their plastic curvatures as functions of the moment."""
+
+
+def yielding_tip(law, mesh):
+    """Displacement of the end by curvature alone, under FORCE."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=1.0, bending=law)
+    scene = cantilever(section, cells=1, force=(0.0, FORCE))
+    return tip(scene, mesh)[1] - FORCE / section.GA
+
+
+@pytest.mark.parametrize("kind", PLASTIC)
+@pytest.mark.parametrize("degree", MESHES)
+def test_curvatures_are_exact_at_gauss_points(degree, kind):
+    """[calc] One displacement is a quadrature of curvature times lever arm, also by three cells.
+
+    Moments of a cantilever are known, and virtual works of linear moments are integrated exactly.
+    Squares of rotations are below 1e-11.
+    """
+    law, plastic = PLASTIC[kind]
+    points, weights = np.polynomial.legendre.leggauss(degree)
+    arm = 1 - (np.arange(3)[:, None] + (1 + points) / 2) / 3
+    expected = np.sum(weights / 6 * arm * (FORCE * arm + plastic(FORCE * arm)))
+    assert yielding_tip(law, ub.Mesh(3, degree=degree)) == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("degree", MESHES)
+def test_orders_of_a_power_law(degree):
+    """[closed] The curvature is a polynomial of degree 5, so that three cells suffice."""
+    exact = FORCE / 3 + YIELD * (FORCE / YIELD) ** 5 / 7
+    measured, errors = convergence(degree, lambda mesh: abs(yielding_tip(POWER, mesh) / exact - 1))
+    np.testing.assert_allclose(measured, 2 * degree, atol=0.1)
+    assert errors[0] < 0.03
+
+
+@pytest.mark.parametrize(("degree", "cells"), [(1, 8), (2, 8), (3, 4)])
+def test_orders_of_a_viscoplastic_beam(degree, cells):
+    """A standard linear solid, bent by 0.7 rad: against 16 cells of degree 3, equal steps.
+
+    The displacements of the end, and the energy that the beam has dissipated.
+    """
+    law = ub.ElastoPlastic(0.0, kinematic=25.0, viscosity=ub.Perzyna(2.5))
+    scene = cantilever(
+        ub.Section(EA=1e4, GA=1e4, EI=25.0, bending=law), cells=1, force=(0.0, 25.0),
+        time=lambda t: math.sin(4 * t) ** 4,
+    )  # fmt: skip
+
+    def end(mesh):
+        solution = ub.simulate(scene, ub.Static(), t=(0, 0.4), dt=0.02, mesh=mesh, newton=TIGHT)
+        moved = solution.displacement(scene.beams[0].end)[-1]
+        return np.append(moved, solution.energy.lost["plastic"][-1])
+
+    exact = end(ub.Mesh(16, degree=3))
+    errors = [np.abs(end(ub.Mesh(n, degree=degree)) / exact - 1) for n in (cells, 2 * cells)]
+    np.testing.assert_allclose(orders(errors), 2 * degree, atol=0.15)
+
+
+@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")  # of the place in a long cell
+@pytest.mark.parametrize("degree", [2, 3])
+def test_hinges_in_cells_are_at_gauss_points(degree):
+    """The first Gauss point opens, as a hinge of zero length there; displacements are small."""
+    law = ub.Softening(1e-6, 4e-12)  # N m, J; within 4e-6 rad
+    elastic = {"EA": 1e6, "GA": 1e6, "EI": 1.0}
+    at = (1 + np.polynomial.legendre.leggauss(degree)[0][0]) / 2
+    mesh = ub.Mesh(degree=degree)
+
+    def run(hinges, **more):
+        beam = ub.Beam((0, 0), (1, 0), ub.Section(**elastic, **more), cells=1, hinges=hinges)
+        lift = ub.PrescribedDisplacement(beam.end, v=lambda t: 2e-6 * t)
+        scene = clamped(beam, lift)
+        solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.05, mesh=mesh, newton=TIGHT)
+        return beam, solution, scene.supports[-1]
+
+    beam, found, lift = run({0.0: None, 1.0: None}, hinge=law)
+    _, expected, other = run({at: law})
+    np.testing.assert_allclose(
+        found.reaction(lift)[:, 1], expected.reaction(other)[:, 1], rtol=0, atol=1e-8 * law.limit
+    )
+    lost = expected.energy.lost["hinges"]
+    np.testing.assert_allclose(found.energy.lost["hinges"], lost, rtol=0, atol=1e-8 * lost[-1])
+    assert lost[-1] > 0.1 * law.fracture_energy
+    (mark,) = open_hinges(found, -1, found.numbering.points)
+    np.testing.assert_allclose(mark.at, [at, 0.0], rtol=0, atol=1e-15)
+    assert mark.fraction == pytest.approx(lost[-1] / law.fracture_energy, rel=1e-8)
+    # |V| before the opening, times the distance from the end of the cell
+    shift = at * found.reaction(lift)[np.argmax(lost > 0) - 1, 1] / law.limit
+    assert found.hinge_place_error() == {beam: pytest.approx(shift, rel=1e-9)}
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_a_cell_is_a_mixed_member(degree):
+    """[closed] N and V are constant and M is linear in a cell without loads, though fibres yield.
+
+    Differences are those of the rotation, below 2e-5, which turns the forces.
+    """
+    law = ub.Fibres(ub.ElastoPlastic(0.1, isotropic=5e4), number=6)
+    section = ub.Section.rectangle(0.1, 0.1, E=1e6, nu=0.2, fibres=law)  # yields at 1e-7
+    force = np.array([2e-4, 4e-5])
+    scene = cantilever(section, cells=1, force=tuple(force))
+    solution = ub.simulate(
+        scene, ub.Static(), t=(0, 1), dt=0.25, mesh=ub.Mesh(degree=degree), newton=TIGHT
+    )
+    N, V, M, _, plastic, _ = solution.column("material")[-1:, :][0].T
+    arm = 1 - (1 + np.polynomial.legendre.leggauss(degree)[0]) / 2
+    most = 2e-5 * force.max()
+    assert (plastic > 0).any()
+    assert abs(solution.displacement(scene.beams[0].end)[-1, 2]) < 2e-5
+    np.testing.assert_allclose(N, force[0], rtol=0, atol=most)
+    np.testing.assert_allclose(V, force[1], rtol=0, atol=most)
+    np.testing.assert_allclose(M, force[1] * arm, rtol=0, atol=most)
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_buckling_of_one_and_two_cells(degree):
+    """[closed] π²/4 of a cantilever; deformations before buckling change it by 2.5e-8."""
+    scene = cantilever(ub.Section(EA=1e8, GA=1e8, EI=1.0), cells=1, force=(-1.0, 0.0))
+    loads = [ub.buckling(scene, 1, mesh=ub.Mesh(n, degree=degree)).factors[0] for n in (1, 2)]
+    errors = np.array(loads) / (math.pi**2 / 4) - 1
+    assert 0 < errors[0] < {2: 0.016, 3: 0.0003}[degree]  # as docs/mesh.md says
+    np.testing.assert_allclose(orders(errors), 2 * degree, atol=0.15)

@@ -212,10 +212,15 @@ class DofNumbering:
         return np.append(np.column_stack([vertices[:-1], inner]), vertices[-1])
 
     @property
+    def nodes_along_cells(self) -> Index:
+        """Nodes of each cell from its start to its end; (num_cells, degree + 1)."""
+        start, end, *between = self.nodes_of_cells.T
+        return np.column_stack([start, *between, end])
+
+    @property
     def pieces(self) -> Index:
         """Pairs of neighbouring nodes along each cell; (num_cells * degree, 2)."""
-        start, end, *between = self.nodes_of_cells.T
-        along = np.column_stack([start, *between, end])
+        along = self.nodes_along_cells
         return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2)
 
     @cached_property
@@ -236,20 +241,13 @@ class DofNumbering:
         Cells whose laws are of several classes occur once for each class.
 
         Raises:
-            ModelError: There are such cells, and the degree of the mesh is above 1, or a cell is
-                too long for a law.
+            ModelError: A cell is too long for a law.
         """
         groups = dict[SectionPoints, list[int]]()
         sections, beam_sections = self.sections
         for number, section in enumerate(sections):
             points = section.section_points(section.hinge)
             if not all(of_class.elastic for of_class in points):
-                if self.mesh.degree > 1:
-                    beam = self.scene.beams[int(np.argmax(beam_sections == number))]
-                    raise ModelError(
-                        f"Mesh: degree = {self.mesh.degree} is for elastic beams, and {beam.name} "
-                        "may yield or break; use degree=1 with more cells, or an elastic section"
-                    )
                 for of_class in points:
                     groups.setdefault(of_class, []).append(number)
         cell_sections = beam_sections[self.beam_of_cell]
@@ -268,6 +266,10 @@ class DofNumbering:
         """Cells that can yield or break, ascending; (m,)."""
         groups = [cells for _, cells in self.inelastic]
         return np.asarray(np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *groups])))
+
+    def section_lengths(self, cells: Index) -> Array:
+        """Compute lengths of cells times weights of integration points; (len(cells) * degree,)."""
+        return np.asarray(np.outer(self.lengths(cells), self.mesh.point_weights).ravel())
 
     def lengths(self, cells: Index) -> Array:
         """Compute lengths of cells; (len(cells),); m."""
@@ -293,21 +295,22 @@ class DofNumbering:
         return np.asarray(chords[:, None] + np.nan_to_num(np.column_stack(both)))
 
     def hinges(self, beam: Member) -> list[SofteningLaw | None]:
-        """Return the law of the hinge in the middle of each cell of a beam, or None."""
+        """Return the law of hinges at the integration points of each cell of a beam, or None."""
         return [beam.section.hinge] * len(self.cells_of(beam))
 
     def keys(self, cells: Index) -> list[tuple[int, ...]]:
-        """Return for each cell the key of its stream of random values, see :func:`stream_keys`.
+        """Return for each integration point the key of its random values, see :func:`stream_keys`.
 
-        It consists of a checksum of the ends of the beam, the number of the cell in the beam, and,
+        It consists of a checksum of the ends of the beam, the number of the point in the beam, and,
         for the further beams between the same ends, their number.
         """
-        beams = self.beam_of_cell[cells]
+        beams, p = self.beam_of_cell[cells], self.mesh.degree
         keys = stream_keys(beam.ends for beam in self.scene.beams)
-        in_beam = cells - self._first_cells[beams]
+        in_beam = p * (cells - self._first_cells[beams])
         return [
-            (keys[b][0], int(c), *keys[b][1:] * bool(keys[b][1]))
+            (keys[b][0], int(c) + i, *keys[b][1:] * bool(keys[b][1]))
             for b, c in zip(beams, in_beam, strict=True)
+            for i in range(p)
         ]
 
     # -- places ----------------------------------------------------------------------------------

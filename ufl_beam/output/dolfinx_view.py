@@ -272,7 +272,9 @@ class DolfinxView:
         forms = self._forms
         for function in (forms.q0, forms.q1):
             put_in_cells(function, self._view.q[self._fields.cell_dofs])
-        tables = [np.zeros((len(self._view.subdomain.numbering.cells), k)) for k in (3, 9)]
+        numbering = self._view.subdomain.numbering
+        sizes = (numbering.mesh.degree * k for k in (3, 9))
+        tables = [np.zeros((len(numbering.cells), size)) for size in sizes]
         for cells, *values in (beams.about_state() for beams in self._view.inelastic):
             for table, rows in zip(tables, values, strict=True):
                 table[cells] += rows

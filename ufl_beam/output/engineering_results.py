@@ -26,7 +26,7 @@ from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector, place_of
 from ufl_beam.model.scene import Scene, attachment_points
-from ufl_beam.output.state_rows import HINGE, PLASTIC, Columns
+from ufl_beam.output.state_rows import HINGE, JUMP, PLASTIC, Columns
 from ufl_beam.output.states import States
 
 # -- storeys ---------------------------------------------------------------------------------------
@@ -323,7 +323,10 @@ def _add_cells(states: States, beam: Member, add: Any) -> None:
     rows = np.searchsorted(numbering.inelastic_cells, cells)
     if not len(cells):
         return
-    jump, plastic, broken = (states.column("material")[:, rows, k] for k in (3, PLASTIC, HINGE))
+    material, p = states.column("material"), numbering.mesh.degree
+    # Sums over the integration points of cells
+    at_points = material.reshape(len(material), -1, p, material.shape[-1])[:, rows].sum(axis=2)
+    jump, plastic, broken = (at_points[:, :, k] for k in (JUMP, PLASTIC, HINGE))
     if beam.section.fibres is not None:  # cracks are no rotations
         plastic, broken = plastic + broken, 0 * broken
     for i in np.flatnonzero(broken.any(axis=0)):

@@ -334,7 +334,7 @@ class Events(Restartable):
 
     def _look(self, simulation: StateView) -> tuple[Flags, Flags]:
         """Return flags of events in cells and hinges, (n, 3), and of contact or sliding, (m,)."""
-        plastic, broken = simulation.now.cells_of(0)[:, [PLASTIC, HINGE]].T
+        plastic, broken = np.max(simulation.now.points_of(0)[:, :, [PLASTIC, HINGE]], axis=1).T
         if hinges := len(simulation.scene.hinges):
             lost, breaks = simulation.connections()[-hinges:, DISSIPATED], self._breaks[-hinges:]
             plastic = np.append(plastic, np.where(breaks, 0.0, lost))

@@ -80,7 +80,7 @@ FORCE, WORK, DISSIPATED = map(Connection._fields.index, ("force", "work", "dissi
 """Indices of fields of :class:`Connection`, and so of numbers of the column "connectors"."""
 
 
-PLASTIC, HINGE = 4, 5
+JUMP, PLASTIC, HINGE = 3, 4, 5
 """Indices of fields in the column "material": (N, V, M), jump, plastic, hinge of
 :class:`Material`."""
 
@@ -121,7 +121,10 @@ class Columns:
             "t": (),  # time, s; or the load factor of a path
             "reactions": (len(scene.supports), 3),  # forces of supports, in their axes
             "connectors": (len(scene.all_connectors), len(Connection._fields)),
-            "material": (len(numbering.inelastic_cells), int(lib.POINT_KEPT)),  # `Points.recorded`
+            # `Points.recorded`, Gauss point after Gauss point of cells that can yield or break
+            "material": (
+                len(numbering.inelastic_cells) * numbering.mesh.degree, int(lib.POINT_KEPT),
+            ),
             **dict.fromkeys(ledger, ()),  # J
             "q": (size,),  # configuration, all degrees of freedom in the order of the numbering
             **({"v": (size,)} if moving else {}),  # velocities
@@ -245,10 +248,11 @@ class StateWriter:
         mine = np.searchsorted(supports.dofs, subdomain.local(dofs))
         self._add(self._place(supports.reactions), mine, to)
         for term in inelastic:
-            mine, k = term.recorded()[0], np.flatnonzero(term.recorded_factors)
-            width = columns.shapes["material"][1]
-            rows = at["material"].start + width * np.searchsorted(numbering.inelastic_cells, mine)
-            first = width * np.arange(len(mine))
+            (mine, recorded), p = term.recorded(), numbering.mesh.degree
+            k, width = np.flatnonzero(term.recorded_factors), recorded.shape[-1]
+            sections = p * np.searchsorted(numbering.inelastic_cells, mine)[:, None] + np.arange(p)
+            rows = at["material"].start + width * sections.ravel()
+            first = width * np.arange(len(rows))
             self._add(self._place(term.points.recorded), first[:, None] + k, rows[:, None] + k)
         for connector in connector_terms:
             rows = at["connectors"].start + columns.shapes["connectors"][1] * connector.indices

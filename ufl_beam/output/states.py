@@ -29,6 +29,7 @@ from ufl_beam.output.state_rows import (
     FORCE,
     FORCES,
     HINGE,
+    JUMP,
     LEDGER,
     PLASTIC,
     RECORD,
@@ -471,10 +472,21 @@ class States:
         return Material(chosen[:3].T, *chosen[3:])
 
     def cells_of(self, n: int, forces: Array | float = 0.0) -> Array:
-        """Return "material" of all cells, in elastic cells ``forces`` and zeros; (num_cells, 6)."""
-        everything = np.zeros((len(self.numbering.cells), self.row(n)[0].shapes["material"][1]))
+        """Return "material" of all cells, in elastic cells ``forces`` and zeros; (num_cells, 6).
+
+        Forces are means over a cell; jumps and energies are sums over its integration points.
+        """
+        at_points = self.points_of(n)
+        everything, inelastic = at_points.sum(axis=1), self.numbering.inelastic_cells
         everything[:, :3] = forces
-        everything[self.numbering.inelastic_cells] = self._row("material", n)
+        everything[inelastic, :3] = self.numbering.mesh.point_weights @ at_points[inelastic, :, :3]
+        return everything
+
+    def points_of(self, n: int) -> Array:
+        """Return "material" at Gauss points of all cells, or zeros; (num_cells, degree, 6)."""
+        rows, p = self._row("material", n), self.numbering.mesh.degree
+        everything = np.zeros((len(self.numbering.cells), p, rows.shape[1]))
+        everything[self.numbering.inelastic_cells] = rows.reshape(-1, p, rows.shape[1])
         return everything
 
     def material_at(self, place: Place) -> Material:
@@ -503,7 +515,7 @@ class States:
         the largest magnitude is returned.
         """
         states = self.cells_of(n)
-        jump, dissipated = states[:, 3].copy(), states[:, PLASTIC] + states[:, HINGE]
+        jump, dissipated = states[:, JUMP].copy(), states[:, PLASTIC] + states[:, HINGE]
         if self.scene.hinges:
             hinges = Connection(*self._row("connectors", n)[-len(self.scene.hinges) :].T)
             np.add.at(dissipated, self.numbering.cells_at_hinges, hinges.dissipated)

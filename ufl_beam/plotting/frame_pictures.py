@@ -252,8 +252,7 @@ def _along(
     ``diagram`` has the number of each cell's diagram, ``points`` is the number of points of a cell.
     """
     mesh, fractions = solution.numbering.mesh, np.linspace(0.0, 1.0, points)
-    start, end, *between = solution.numbering.nodes_of_cells[cells].T
-    lines = nodes[np.column_stack([start, *between, end])]
+    lines = nodes[solution.numbering.nodes_along_cells[cells]]
     ahead = unit_vectors(mesh.slopes(fractions) @ lines)
     # Ordinates at corners between cells of a beam bisect the angle; ordinates near a corner lean
     # towards the bisector.
@@ -328,7 +327,7 @@ def draw_damage_state(
             unit, prefix = style.decimal_prefix(float(density.max()))
             colors = style.scale("YlOrRd", 0.2, 1.0, 0.0, float(density.max()) / unit)
             zones = LineCollection(
-                list(shape.nodes[numbering.cells[yielded]]),
+                list(shape.nodes[numbering.nodes_along_cells[yielded]]),
                 colors=colors.to_rgba(density[yielded] / unit),
                 linewidths=11.0, capstyle="butt", zorder=3, gid="yielded",
             )  # fmt: skip

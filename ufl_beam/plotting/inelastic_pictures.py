@@ -15,6 +15,7 @@ from ufl_beam.errors import ArgumentError
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_laws import HingeLaw
 from ufl_beam.model.connectors import law_of, place_of
+from ufl_beam.output.state_rows import HINGE, JUMP
 from ufl_beam.plotting import style
 from ufl_beam.plotting.style import BLUE, GREY, INK, ORANGE, RED, WHITE, shade, with_unit
 from ufl_beam.simulation.solution import Solution
@@ -39,17 +40,21 @@ class OpenHinge(NamedTuple):
 
 def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
     """Find open hinges in cells and at vertices; ``points`` are drawn positions of nodes, m."""
-    numbering = solution.numbering
+    numbering, mesh = solution.numbering, solution.numbering.mesh
+    nodes = numbering.nodes_along_cells
     hinges: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
     for beam in solution.scene.beams:
         laws = numbering.hinges(beam)
         if all(law is None or math.isinf(law.limit) for law in laws):
             continue
-        state = solution.material(beam, n)
-        rows = zip(numbering.cells_of(beam), laws, state.jump, state.hinge, strict=True)
-        for cell, law, jump, lost in rows:
-            if law is not None and (jump != 0.0 or lost > 0.0):
-                hinges.append((beam, points[numbering.cells[cell]].mean(axis=0), law, float(lost)))
+        cells = numbering.cells_of(beam)
+        at_points = solution.points_of(n)[cells]
+        opened = (at_points[:, :, JUMP] != 0.0) | (at_points[:, :, HINGE] > 0.0)
+        for cell, point in np.argwhere(opened):
+            if (law := laws[cell]) is not None:
+                drawn, lost = points[nodes[cells[cell]]].T, at_points[cell, point, HINGE]
+                at = np.array([np.interp(mesh.points[point], mesh.nodes, x) for x in drawn])
+                hinges.append((beam, at, law, float(lost)))
     for hinge, vertex in zip(solution.scene.hinges, numbering.vertices_at_hinges, strict=True):
         history = solution.connector(hinge)
         if history.motion[n] != 0.0 or history.dissipated[n] > 0.0:
@@ -87,8 +92,8 @@ def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[st
     """Mark yielded cells and open hinges on the beams; return marks by their names in a legend."""
     named: dict[str, Artist] = {}
     yielded = np.flatnonzero(dissipated_per_length(solution, n))
-    for ends in nodes[solution.numbering.cells[yielded]]:
-        (zone,) = axes.plot(*ends.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8)
+    for line in nodes[solution.numbering.nodes_along_cells[yielded]]:
+        (zone,) = axes.plot(*line.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8)
         named["yielded or cracked"] = zone
     for hinge in open_hinges(solution, n, nodes):
         (mark,) = axes.plot(*hinge.at, **circle(hinge.fraction))
@@ -150,12 +155,16 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
     plastic hinge, the hinge of the cell before the vertex is drawn.
     """
     history, numbering = solution.material_at(place), solution.numbering
-    hinge = numbering.hinge_at(place)
-    number = numbering.cell(place) - int(numbering.cells_of(place.beam)[0])
+    hinge, cell = numbering.hinge_at(place), numbering.cell(place)
+    number = cell - int(numbering.cells_of(place.beam)[0])
     law = numbering.hinges(place.beam)[number] if hinge is None else law_of(hinge)
     if law is None or np.isinf(law.limit):
         raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
     M, jump, lost = history.forces[:, 2], history.jump, float(history.hinge[-1])
+    if hinge is None:  # of the Gauss points, the one that opened most
+        states = np.array([solution.points_of(n)[cell] for n in range(len(solution))])
+        M, jump, losses = states[:, np.abs(states[-1, :, JUMP]).argmax(), [2, JUMP, HINGE]].T
+        lost = float(losses[-1])
     with style.panel(ax, (8.0, 5.4)) as axes:
         # Intervals in which the jump only grows or only falls; adjacent intervals share a point.
         moves = np.flatnonzero(np.diff(jump))

@@ -142,16 +142,21 @@ class YieldingBeams(CellForce):
         work, around = (virtual_work(r, w_e) * element.dx(1) for r in (self._r, linear))
         super().__init__(cells, work, setting, around=around)
         self._rows = cells.cell_indices + section_points.number * len(numbering.cells)
-        self._names = [numbering.describe_cell(number) for number in cells.cell_indices]
+        self._degree = numbering.mesh.degree
+        self._names = [
+            numbering.describe_cell(number) for number in cells.cell_indices.repeat(self._degree)
+        ]
+        self._lengths = numbering.section_lengths(cells.cell_indices)
         self.points = MaterialPoints(
-            section_points, numbering.keys(cells.cell_indices), cells.lengths, setting
-        )
+            section_points, numbering.keys(cells.cell_indices),
+            self._lengths, setting,
+        )  # fmt: skip
 
     def response(self, step: Step, q1: Array) -> Response:
         """Return the virtual work after a return map, and its consistent tangent."""
-        points, whole = self.points, self.cells.strains(q1)[:, 0]
+        points, whole = self.points, self.cells.strains(q1).reshape(-1, 3)
         self.imposed.begin(step)
-        points.return_map(whole - self.imposed.values[:, 0], step.dt)
+        points.return_map(whole - self.imposed.values.reshape(-1, 3), step.dt)
         put(self._r, points.r)
         put(self._b, points.r - np.einsum("kij,kj->ki", points.D, whole))
         put(self._D, points.D)
@@ -166,8 +171,8 @@ class YieldingBeams(CellForce):
         """Return the work of the resultants on the change of imposed strains in the step; J."""
         before, w = self.points.recorded[:, :3], self._weight
         acting = w * before + (1 - w) * self.points.r
-        change = self.imposed.change[:, 0]
-        return float(self.cells.lengths @ np.einsum("ki,ki->k", acting, change))
+        change = self.imposed.change.reshape(-1, 3)
+        return float(self._lengths @ np.einsum("ki,ki->k", acting, change))
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Accept the internal variables at the end of the step."""
@@ -178,7 +183,7 @@ class YieldingBeams(CellForce):
 
     def start(self, q: Array) -> None:
         """Compute the accepted state of the points at the strains of a configuration."""
-        self.points.start(self.cells.strains(q)[:, 0] - self.imposed.values[:, 0])
+        self.points.start(self.cells.strains(q).reshape(-1, 3) - self.imposed.values.reshape(-1, 3))
 
     @property
     def stored(self) -> Mapping[str, float]:  # type: ignore[override]
@@ -187,13 +192,15 @@ class YieldingBeams(CellForce):
 
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the internal variables of all points."""
-        self.points.state(archive.rows("cells", self._rows, self.points.state()))
+        state = self.points.state()
+        rows = archive.rows("cells", self._rows, state.reshape(len(self._rows), -1))
+        self.points.state(rows.reshape(state.shape))
 
     def material(self) -> Array:
-        """Return the six values "material" of each cell; (num_cells, 6)."""
+        """Return the six values "material" at the points of cells; (num_cells, degree, 6)."""
         data = self.points.recorded.copy()
         data[:, 3] *= self._hinges  # zero without a hinge: jumps of fibres are no rotations
-        return data
+        return data.reshape(-1, self._degree, 6)
 
 
 # -- inertia and damping -------------------------------------------------------------------------

@@ -592,17 +592,17 @@ class Solver(PresentState):
         reactions = np.array(self.supports.forces())
         for k, support in enumerate(self.scene.supports):  # in the axes of the support
             reactions[k, :2] = turned(reactions[k, :2], np.full(1, -support.angle))[0]
-        material = np.zeros((len(self.numbering.inelastic_cells), 6))
+        p, inelastic = self.numbering.mesh.degree, self.numbering.inelastic_cells
+        material = np.zeros((len(inelastic), p, 6))
         for beams in self.yielding:
-            rows = np.searchsorted(self.numbering.inelastic_cells, beams.cells.cell_indices)
-            material[rows] += beams.material()
+            material[np.searchsorted(inelastic, beams.cells.cell_indices)] += beams.material()
         state = {"t": np.array(self.t), "q": self.q, "reactions": reactions}
         if self.inertia is not None:
             state["v"] = self.inertia.v
         for account, energies in vars(self.ledger).items():
             state |= {f"{account}: {name}": np.array(value) for name, value in energies.items()}
         state |= {
-            "connectors": self.connections(), "material": material,
+            "connectors": self.connections(), "material": material.reshape(-1, 6),
             FORCES: np.zeros((9, len(self.numbering.cells))) + self.on_nodes,
         }  # fmt: skip
         between = float(self.scheme.average(0.0, 1.0))

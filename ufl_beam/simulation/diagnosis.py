@@ -226,10 +226,12 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     strains = np.column_stack([along, shear, change[:, 2]])
     works = np.zeros((2, len(numbering.cells)))  # of the tangent, and of the elastic stiffness
     for beams in equation.inelastic:
-        cells, _ = beams.recorded()
-        works[:, cells] += beams.points.works(strains[cells])
+        cells, p = beams.recorded()[0], numbering.mesh.degree
+        work = beams.points.works(strains[cells].repeat(p, axis=0))
+        works[:, cells] += work.reshape(2, -1, p)
     now, elastic = works
-    left_in_cells = np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0)
+    in_points = np.divide(now, elastic, out=np.ones(now.shape), where=elastic > 0)
+    left_in_cells = in_points.min(axis=1)
     if subdomain.comm.size > 1:
         subdomain.comm.Allreduce(MPI.IN_PLACE, connectors)
         subdomain.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)

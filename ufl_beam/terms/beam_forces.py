@@ -295,9 +295,9 @@ def inelastic_forms(element: Element, scheme: Scheme) -> InelasticForms:
 class InelasticBeams(Cells):
     """Virtual work of the resultants of cells with material points, P(34).
 
-    The points map the strains of an iterate to resultants r and their derivatives D.  UFL derives
-    the material and the geometric tangent from b + D e, the resultants linearized in the strains e
-    about the iterate.  C evaluates points and forms.
+    At each Gauss point, the points map strains of an iterate to resultants r and their derivatives
+    D.  UFL derives the material and the geometric tangent from b + D e, the resultants linearized
+    in the strains e about the iterate.  C evaluates points and forms.
 
     Attributes:
         recorded_factors: Factors of :attr:`Points.recorded` in :meth:`recorded`; (6,).
@@ -316,8 +316,8 @@ class InelasticBeams(Cells):
         # Rows of saved states: other points of the same cells have other rows.
         self._rows = self._cells + section_points.number * len(fields.subdomain.numbering.cells)
         self._strains = Strains(fields)
-        subdomain, lengths = fields.subdomain, fields.subdomain.numbering.lengths(self._cells)
-        keys = subdomain.numbering.keys(self._cells)
+        subdomain, numbering = fields.subdomain, fields.subdomain.numbering
+        lengths, keys = numbering.section_lengths(self._cells), numbering.keys(self._cells)
         self.points = Points(section_points, keys, lengths, scheme, search, predicts=True)
 
         forms = inelastic_forms(fields.element, scheme)
@@ -332,9 +332,10 @@ class InelasticBeams(Cells):
         self._latest: Array = np.full(subdomain.size, np.nan)
         self._in_c = struct(
             "inelastic", size=subdomain.size, latest=self._latest, points=self.points.c,
-            scene=subdomain.numbering.scene.size,
-            strains=self._strains.kernel.cells, force=self._force.cells,
-            tangent=self._tangent.cells, at_r=self._force.position(forms.r),
+            scene=numbering.scene.size, in_cell=numbering.mesh.degree,
+            weight=numbering.mesh.point_weights, strains=self._strains.kernel.cells,
+            force=self._force.cells, tangent=self._tangent.cells,
+            at_r=self._force.position(forms.r),
             at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
         )  # fmt: skip
         if self.predicted is not None:
@@ -381,7 +382,9 @@ class InelasticBeams(Cells):
         """Raise :class:`StepFailed` if a point generates energy in the step to ``q1``."""
         lib.respond_at(self._in_c, doubles(q1))
         numbering = self._fields.subdomain.numbering
-        self.points.require_dissipation(lambda cell: numbering.describe_cell(self._cells[cell]))
+        self.points.require_dissipation(
+            lambda i: numbering.describe_cell(self._cells[i // numbering.mesh.degree])
+        )
 
     def dissipation(self, q1: Array) -> float:
         """Return the energy that cells of this process dissipate in the step to ``q1``; J."""
@@ -392,31 +395,37 @@ class InelasticBeams(Cells):
         """Return b and D about ``q1``; this replaces the latest response of the points."""
         r, D = self.points.return_map(self._elastic_strains(q1))
         self._latest.fill(np.nan)  # the latest response belongs to other unknowns
-        around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), self._strains(q1))
-        return {self._b: around, self._D: D}
+        around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), self._strains(q1).reshape(-1, 3))
+        n = len(self._cells)
+        return {self._b: around.reshape(n, -1), self._D: D.reshape(n, -1)}
 
     def _elastic_strains(self, q: Array) -> Array:
         """Return the strains at ``q`` minus the imposed strains at the end of the step."""
-        strains = self._strains(q)
+        strains = self._strains(q).reshape(-1, 3)
         return strains if self.imposed is None else strains - self.imposed.now
 
     def about_state(self) -> tuple[Index, Array, Array]:
         """Return cells (numbers of the scene), and b and D of b + D e about the accepted state.
 
-        b is (num_cells, 3), D (num_cells, 9).  D is for a step with the length of the last step.
+        b is (num_cells, 3 p), D (num_cells, 9 p), at p integration points.  D is for a step with
+        the length of the last step.
         """
         strains, D = self.points.tangent()
         if self.imposed is not None:
             strains += self.imposed.now
         elastic = np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
-        return self._cells, self.points.recorded[:, :3] - elastic, D
+        b, n = self.points.recorded[:, :3] - elastic, len(self._cells)
+        return self._cells, b.reshape(n, -1), D.reshape(n, -1)
 
     # -- the state -----------------------------------------------------------------------------
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the internal variables."""
-        self.points.restore(archive.rows("cells", self._rows, self.points.state()))
+        state = self.points.state()
+        rows = archive.rows("cells", self._rows, state.reshape(len(self._cells), -1))
+        self.points.restore(rows.reshape(state.shape))
 
     def recorded(self) -> tuple[Index, Array]:
-        """Return cells (scene numbers), and their :attr:`Points.recorded`; (num_cells, 6)."""
-        return self._cells, self.points.recorded * self.recorded_factors
+        """Return cells (scene numbers), and :attr:`Points.recorded`; (num_cells, degree, 6)."""
+        recorded = self.points.recorded * self.recorded_factors
+        return self._cells, recorded.reshape(len(self._cells), -1, recorded.shape[1])

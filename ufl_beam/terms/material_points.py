@@ -162,6 +162,9 @@ _point_forms = cached_forms(PointForms)
 class Points:
     """Points with the same layout in many cells.
 
+    Here a cell of degree p counts as p cells, one for each Gauss point, with its weight times the
+    length of the cell.
+
     Args:
         section_points: The points of a cell.
         keys: Keys of the cells for random values, see :meth:`SectionPoints.parameters`.

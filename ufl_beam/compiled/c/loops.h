@@ -210,7 +210,7 @@ enum point_output {
 
 enum { MOST_VARIABLES = 16, MOST_CORRECTIONS = 100 }; /* of a law */
 
-enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell in `kept`, numbers in `sum`, see commit */
+enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a section in `kept`, numbers in `sum`, see commit */
 
 extern const double NO_ENERGY; /* relative size below which dissipation counts as zero */
 
@@ -221,7 +221,9 @@ enum { LINE = 3 }; /* strain, stress and slope of the tangent line of a point */
  * HOLD: points that do not flow stay closed. OVER: a held point has borne more than its limit. */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 
-/* Points in cells, `of_cell` in each, with `width` numbers of each in w; see material_points.py. */
+/* Points in cross-sections, `of_cell` in each of `cells` sections, with `width` numbers of each point
+ * in w; see material_points.py. The sections are at the integration points of cells, one cell after
+ * the other; a spring has one section. */
 typedef struct {
   int32_t *search;
   /* law: stresses and their derivatives by strains; if `solves`, also residuals and their
@@ -240,14 +242,17 @@ typedef struct {
    * `predicts` says that there is one in this step; see follow_prediction. */
   double *line, *predicted;
   int predicts;
-  const double *linear; /* strains of cells that a static iteration predicts; or none */
+  const double *linear; /* strains of sections that a static iteration predicts; or none */
   double *unlike; /* largest (N, V, M) by which a point's answer differs from the stress of its strain */
 } points;
 
-/* Cells with points: forms of the strains, of the forces with the resultants r, and of their
- * tangent with the resultants as affine functions b + D e of the strains. */
+/* Cells with points in `in_cell` sections each: forms of the strains times the `weight` of each
+ * section, of the forces with the resultants r, and of their tangent with the resultants as affine
+ * functions b + D e of the strains. */
 typedef struct {
   points *points;
+  int in_cell;
+  const double *weight;
   const cells *strains, *force, *tangent;
   int at_r, at_b, at_D; /* positions of r, b and D in the coefficients of `force` and `tangent` */
   predicted_strains *predicted; /* in statics; or none */
@@ -715,7 +720,7 @@ typedef struct {
   const form_of_step *form;
   const cells *work; /* of elastic resultants on the change of imposed strains */
   const inelastic *inelastic;
-  double *before; /* with material points: resultants in the accepted state; cells * 3 */
+  double *before; /* with material points: resultants in the accepted state; cells * points * 3 */
 } imposed_cells;
 
 typedef struct {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Return map of material points in cells, see material_points.py. */
+/* Return map of material points in cross-sections, see material_points.py. */
 
-/* Strains of a point from the strains e of its cell; b are its d rows of B. */
+/* Strains of a point from the strains e of its section; b are its d rows of B. */
 static inline void find_strains(int d, const double *b, const double *e, double *strain)
 {
   for (int a = 0; a < d; ++a)
@@ -9,7 +9,7 @@ static inline void find_strains(int d, const double *b, const double *e, double 
 }
 
 /* Add stresses s of a point, and the derivatives that follow them in s, to the resultants of its
- * cell. */
+ * section. */
 static inline void add_answer(int d, const double *b, double weight, const double *s, double *r,
                               double *D)
 {
@@ -76,7 +76,7 @@ static double follow_prediction(const points *p, double *w, double linear, const
   return fabs(unlike);
 }
 
-/* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D.
+/* Resultants r of sections whose strains grow from e0 to e1, and their derivatives D.
  *
  * `search` records that a point opens, and may request stiff points: points that do not open then
  * answer with their elastic stiffness. Points around one that opens unload, which their own
@@ -145,13 +145,14 @@ static void linearize(const inelastic *m, const double *forces)
 {
   const points *p = m->points;
   const double *e = p->e1, *D = p->D, *imposed = m->imposed;
-  for (int c = 0; c < p->cells; ++c, e += 3, forces += 3, D += 9) {
-    double b[3] = {forces[0], forces[1], forces[2]};
-    subtract(D, e, b);
-    if (imposed) subtract(D, imposed + 6 * c + 3, b); /* the form adds D times the whole strains */
-    put_in_cell(m->tangent, c, m->at_b, 3, b);
-    put_in_cell(m->tangent, c, m->at_D, 9, D);
-  }
+  for (int c = 0; c < m->tangent->number; ++c)
+    for (int i = 0; i < m->in_cell; ++i, e += 3, forces += 3, D += 9) {
+      double b[3] = {forces[0], forces[1], forces[2]};
+      subtract(D, e, b);
+      if (imposed) subtract(D, imposed + 6 * (m->in_cell * c + i) + 3, b); /* the form adds D times the whole strains */
+      put_in_cell(m->tangent, c, m->at_b + 3 * i, 3, b);
+      put_in_cell(m->tangent, c, m->at_D + 9 * i, 9, D);
+    }
 }
 
 /* Store the response as the latest tangent. */
@@ -196,6 +197,7 @@ void respond_at(const inelastic *m, const double *q)
   memcpy(m->latest, q, m->size * sizeof *q);
   memset(p->e1, 0, 3 * p->cells * sizeof *p->e1);
   add_cells((void *)m->strains, q, p->e1);
+  for (int k = 0; m->in_cell > 1 && k < 3 * p->cells; ++k) p->e1[k] /= m->weight[k / 3 % m->in_cell];
   for (int k = 0; m->imposed && k < 3 * p->cells; ++k) p->e1[k] -= m->imposed[k / 3 * 6 + 3 + k % 3];
   p->linear = 0;
   if (m->predicted && p->line && !m->predicted->exact) {
@@ -203,7 +205,8 @@ void respond_at(const inelastic *m, const double *q)
     p->linear = m->predicted->e;
   }
   respond(p);
-  for (int c = 0; c < p->cells; ++c) put_in_cell(m->force, c, m->at_r, 3, p->r + 3 * c);
+  const int n = 3 * m->in_cell;
+  for (int c = 0; c < m->force->number; ++c) put_in_cell(m->force, c, m->at_r, n, p->r + n * c);
 }
 
 void add_inelastic_force(void *self, const double *q, double *r)
@@ -244,8 +247,8 @@ double missed_by_points(void *self, const double *q, const double *r, double sca
 
 /* Accept the end of the step as the new state.
  *
- * `kept` of a cell has its resultants (3), the jump of its last point, and the dissipation by
- * plastic strains and by discontinuities. `sum` gets, over all cells: these dissipations in the
+ * `kept` of a section has its resultants (3), the jump of its last point, and the dissipation by
+ * plastic strains and by discontinuities. `sum` gets, over all sections: these dissipations in the
  * step; the numerical loss at theta = 1; the elastic energy and the energy stored by hardening; the
  * energy released by breaking points and the error of steps for nonlinear elasticity; the excess of
  * the work of mean stresses on plastic strains over that of smaller end stresses.
