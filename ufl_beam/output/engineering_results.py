@@ -323,10 +323,12 @@ def _add_cells(states: States, beam: Member, add: Any) -> None:
     rows = np.searchsorted(numbering.inelastic_cells, cells)
     if not len(cells):
         return
-    material, p = states.column("material"), numbering.mesh.degree
-    # Sums over the integration points of cells
-    at_points = material.reshape(len(material), -1, p, material.shape[-1])[:, rows].sum(axis=2)
-    jump, plastic, broken = (at_points[:, :, k] for k in (JUMP, PLASTIC, HINGE))
+    p = numbering.mesh.degree
+    points = (p * rows[:, None] + np.arange(p)).ravel()
+    jump, plastic, broken = (  # sums over the integration points of cells
+        states.column("material")[:, points, k].reshape(len(states), -1, p).sum(axis=2)
+        for k in (JUMP, PLASTIC, HINGE)
+    )
     if beam.section.fibres is not None:  # cracks are no rotations
         plastic, broken = plastic + broken, 0 * broken
     for i in np.flatnonzero(broken.any(axis=0)):

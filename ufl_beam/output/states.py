@@ -485,7 +485,7 @@ class States:
     def points_of(self, n: int) -> Array:
         """Return "material" at Gauss points of all cells, or zeros; (num_cells, degree, 6)."""
         rows, p = self._row("material", n), self.numbering.mesh.degree
-        everything = np.zeros((len(self.numbering.cells), p, rows.shape[1]))
+        everything: Array = np.zeros((len(self.numbering.cells), p, rows.shape[1]))
         everything[self.numbering.inelastic_cells] = rows.reshape(-1, p, rows.shape[1])
         return everything
 
