@@ -463,7 +463,8 @@ class States:
         Forces are means over a cell; jumps and energies are sums over its integration points.
         """
         at_points = self.points_of(n)
-        everything, inelastic = at_points.sum(axis=1), self.numbering.inelastic_cells
+        everything: Array = at_points.sum(axis=1)
+        inelastic = self.numbering.inelastic_cells
         everything[:, :3] = forces
         everything[inelastic, :3] = self.numbering.mesh.point_weights @ at_points[inelastic, :, :3]
         return everything
