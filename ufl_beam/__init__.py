@@ -52,6 +52,9 @@ from ufl_beam.analysis.path_controls import (
 )
 from ufl_beam.analysis.path_following import Path as Path
 from ufl_beam.analysis.path_following import follow
+from ufl_beam.analysis.section_analysis import InteractionDiagram as InteractionDiagram
+from ufl_beam.analysis.section_analysis import MomentCurvature as MomentCurvature
+from ufl_beam.analysis.section_analysis import interaction_diagram, moment_curvature
 from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff as Tradeoff
 from ufl_beam.errors import (
@@ -95,6 +98,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
+from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import (
     Guided,
     Joint,
@@ -130,6 +134,8 @@ from ufl_beam.model.softening_laws import LinearSoftening, Softening, SofteningL
 from ufl_beam.model.supports import Clamped, Pinned, PrescribedDisplacement, Roller, Support
 from ufl_beam.model.works import Potential, VirtualWork
 from ufl_beam.output.dolfinx_view import DolfinxView as DolfinxView
+from ufl_beam.output.engineering_results import HingeTable as HingeTable
+from ufl_beam.output.engineering_results import Storeys as Storeys
 from ufl_beam.output.extremes import Extent as Extent
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import (
@@ -212,6 +218,7 @@ __all__ = [
     "Guided",
     "History",
     "HotSpot",
+    "ImposedStrain",
     "Joint",
     "KelvinVoigt",
     "LineLoad",
@@ -276,9 +283,11 @@ __all__ = [
     "fit_decay",
     "follow",
     "ground",
+    "interaction_diagram",
     "law_functions",
     "logarithmic_decrement",
     "modes",
+    "moment_curvature",
     "peaks",
     "picture",
     "plot",
@@ -293,7 +302,8 @@ __all__ = [
 
 RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
-    "Energy", "Envelope", "Event", "Extent", "Film", "Modes", "Path", "Place", "Tradeoff",
+    "Energy", "Envelope", "Event", "Extent", "Film", "HingeTable", "InteractionDiagram", "Modes",
+    "MomentCurvature", "Path", "Place", "Storeys", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 

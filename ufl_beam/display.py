@@ -7,7 +7,9 @@ Models and results do not import plotting: modules that draw them register funct
 from __future__ import annotations
 
 import html
+import math
 import reprlib
+from abc import ABC, abstractmethod
 from fractions import Fraction
 from functools import singledispatch
 from inspect import signature
@@ -79,6 +81,48 @@ class Rich:
 
     def _repr_html_(self) -> str:
         return html_page(self)
+
+
+class Tabular(Rich, ABC):
+    """Base of results in columns: aligned text, HTML in notebooks, and a frame of pandas."""
+
+    @abstractmethod
+    def columns(self) -> dict[str, list[Any]]:
+        """Return the columns by name and unit."""
+
+    def texts(self) -> list[list[str]]:
+        """Return the names of the columns, and rows of texts; NaN is a dash."""
+        columns = self.columns()
+        rows = zip(*columns.values(), strict=True)
+        return [[*columns], *([_cell(value) for value in row] for row in rows)]
+
+    def __str__(self) -> str:
+        rows = self.texts()
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = ([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])] for row in rows)
+        return "\n".join("  ".join(line) for line in lines)
+
+    def frame(self) -> Any:
+        """Return the table as a ``DataFrame`` of pandas, which is an optional package.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError:
+            raise ImportError(
+                f"{type(self).__name__}.frame needs pandas, which is not installed; run "
+                "pip install pandas, or use .columns(), a dictionary of lists"
+            ) from None
+        return pd.DataFrame(self.columns())
+
+
+def _cell(value: Any) -> str:
+    """Write a value of a table: numbers with four digits, NaN as a dash."""
+    if isinstance(value, float):
+        return "-" if math.isnan(value) else f"{value:.4g}"
+    return str(value)
 
 
 # -- the parameter of a solution -----------------------------------------------------------------

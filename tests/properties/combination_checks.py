@@ -187,6 +187,29 @@ def recorders(case):
             assert difference(found.low, states.min(axis=0), size) < 1e-12
 
 
+@check
+def engineering(case):
+    """Hinges of beams dissipate what their cells do; accelerations add up to velocities.
+
+    The sums are taken in another order.  Drifts are differences of displacements.
+    """
+    solution, scene = case.whole.solution, case.whole.names["scene"]
+    rows, (_, lost) = solution.hinges(of=scene.beams).rows, solution.damage()
+    assert difference(sum(row.dissipated for row in rows), lost.sum(), lost.sum() or 1.0) < 1e-12
+    assert all(row.n < 0 or row.time == solution.times[row.n] for row in rows)
+    for beam in scene.beams if len(solution.v) else ():
+        v, steps = solution.velocity(beam.end), np.diff(solution.times)[:, None]
+        gained = np.cumsum(steps * solution.acceleration(beam.end)[1:], axis=0)
+        assert difference(v[1:], v[0] + gained, np.abs(v).max() or 1.0) < 1e-12
+    low, high = sorted((scene.beams[0].start, scene.beams[0].end), key=lambda x: x.point[1])
+    only(high.point[1] - low.point[1] > 0.1, "the first beam is horizontal")
+    only(not scene.bodies, "a level may cut a body")
+    storeys = solution.storeys([low, high])
+    moved = solution.displacement(high) - solution.displacement(low)
+    assert (storeys.drift[:, 0] == moved[:, 0]).all()
+    assert np.isfinite(storeys.shear).all()
+
+
 def recorders_of(case, names, folder):
     """New recorders of all kinds, which write to a folder of the case."""
     path, seed = case.folder / folder, case.combination.seed

@@ -106,7 +106,9 @@ def duvaut_lions(d):
 @feature("section", "any section", elastic=False)
 def hysteresis(d):
     M = d.some(4, 10)
-    d.yields(0, "bending=" + d.one([
+    # with or without an axial law of another class
+    axial = f"axial=ub.ElastoPlastic({4 * M:.4g}, isotropic={EA / 20:.4g}), "
+    d.yields(0, d.one(["", axial]) + "bending=" + d.one([
         f"ub.RambergOsgood({M:.4g}, {d.some(0.02, 0.1):.4g}, {d.some(2, 6):.3g})",
         f"ub.ArmstrongFrederick({M:.4g}, {d.some(5, 20):.4g}, {d.some(0.5, 4):.4g})",
         f"ub.BoucWen({M:.4g}, {d.some(0.02, 0.3):.3g}, {d.some(1, 4):.3g})",
@@ -153,6 +155,11 @@ def fibres(d):
         f"ub.Section.rectangle(0.01, 0.1, E=1.2e8, nu=0.3, rho=1e3, fibres={law})",
         f"ub.Section.of_fibres([-0.05, 0.0, 0.03, 0.06], [2e-4, 3e-4, 3e-4, 2e-4], E=8e7, "
         f"nu=0.3, rho=1e3, fibres={law.replace(', number=4', '')})",
+        # laws of several classes: two with cracks at different limits, and bars
+        f"ub.Section.rectangle(0.01, 0.1, E=1.2e8, nu=0.3, rho=1e3, fibres={law}, cover=0.002, "
+        f"core=ub.Fibres(ub.RambergOsgood({mean:.5g}, 1e-4, 3.0), softening=ub.LinearSoftening("
+        f"{2 * mean:.5g}, {mean / 300:.5g}))).reinforced([-0.04, 0.04], [1e-5, 2e-5], E=8e8, "
+        f"fibres=ub.Fibres(ub.ArmstrongFrederick({3 * mean:.5g}, 1e8, 100.0)))",
     ]
     d.section(0, d.one(shapes))
 

@@ -200,6 +200,16 @@ def line_load(d):
 
 
 @feature()
+def imposed_strain(d):
+    kinds = [
+        f"axial={d.some(-1e-3, 1e-3):.3e}, span=(0.25, 0.75)",
+        f"axial=(0.0, {d.some(-1e-3, 1e-3):.3e}), curvature={d.some(-5e-2, 5e-2):.3e}",
+        f"curvature=lambda s: {d.some(-5e-2, 5e-2):.3e} * (1 - s**2), shear=1e-4",
+    ]
+    d.loads.append(f"ub.ImposedStrain(b0, {d.one(kinds)}, amplitude={d.time()})")
+
+
+@feature()
 def gravity(d):
     d.loads.append(f"ub.Gravity(({d.some(-5, 5):.3f}, -9.81), amplitude={d.time()})")
 

@@ -59,7 +59,9 @@ def jumps(case):
     scene, solution = case.exact.names["scene"], case.exact.solution
     attached, supports = {}, {}
     for owner, place in scene.attachments():
-        if isinstance(place, ub.Place) and not isinstance(owner, ub.LineLoad | ub.VirtualWork):
+        if isinstance(place, ub.Place) and not isinstance(
+            owner, ub.LineLoad | ub.ImposedStrain | ub.VirtualWork
+        ):
             attached.setdefault((place.beam, round(place.s, 9)), []).append(owner)
     for support in scene.supports:
         supports[support.place.beam, round(support.place.s, 9)] = support
@@ -118,7 +120,7 @@ def momentum(case):
             add(factor * mass * np.array(load.acceleration))
         elif isinstance(load, ub.LineLoad):
             add(factor * _loaded_length(solution, load) * np.array(load.force))
-        else:
+        elif not isinstance(load, ub.ImposedStrain):
             turn = solution.displacement(load.place)[:, 2]
             mean = (turn[1:] + turn[:-1]) / 2 * isinstance(load, ub.FollowerLoad)
             add(factor * (_turned(mean) @ np.array(load.force)))
@@ -303,7 +305,7 @@ def pictures_of(case):
         "energy": lambda: ub.plot(solution, "energy"),
         "history": lambda: ub.plot(solution, "history", [beam.end]),
     }  # fmt: skip
-    if case.combination.has("bending=", "axial=", "fibres=", "hinge=", "interaction="):
+    if case.combination.has("bending=", "axial=ub.", "fibres=", "hinge=", "interaction="):
         drawn["dissipation"] = lambda: ub.plot(solution, "dissipation")
         drawn["curvature"] = lambda: ub.plot(solution, "moment-curvature", beam.at(0.3))
     if case.combination.seed % 12 == 5:  # these take seconds

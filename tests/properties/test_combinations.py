@@ -42,6 +42,7 @@ MADE = {
 """What others return; nobody makes them."""
 
 ELSEWHERE = {
+    "analyses of sections": {"interaction_diagram", "moment_curvature"},
     "analyses of histories": {
         "damping", "damping_ratio", "fit_decay", "logarithmic_decrement",
         "peaks", "rainflow",

@@ -32,16 +32,16 @@ SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, bending=ub.ElastoPlastic(1.0))
 def test_inputs_of_points_are_where_c_has_them():
     """Python takes their order from loops.h."""
     for inputs, enum, prefix in (
-        (inputs_of_points(SECTION.section_points(None)), "point_input", ""),
+        (inputs_of_points(SECTION.section_points(None)[0]), "point_input", ""),
         (connector_rows.INPUTS, "slip_input", "slip_"),
     ):
         of_c = names(enum, prefix)
         assert inputs[: len(of_c)] == of_c
         assert len(set(inputs)) == len(inputs)
     for name in names("point_input"):
-        assert getattr(lib, name.upper()) == inputs_of_points(SECTION.section_points(None)).index(
-            name
-        )
+        assert getattr(lib, name.upper()) == inputs_of_points(
+            SECTION.section_points(None)[0]
+        ).index(name)
     assert len(names("point_input")) == lib.POINT_INPUTS
 
 

@@ -36,7 +36,7 @@ def run(*, until=0.5, **more):
 class Solutions:
     """A saved solution; ``read`` gives what decides whether another one is the same."""
 
-    format = "solution of ufl_beam, 5"
+    format = "solution of ufl_beam, 6"
     advice = "Take another copy of the file, or save the solution again"
 
     def write(self, path):

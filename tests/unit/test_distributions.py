@@ -114,7 +114,7 @@ def limits(beams, comm=MPI.COMM_SELF, joints=()):
     """Limits of all fibres that a process has, by number of the cell."""
     scene = ub.Scene(beams, joints=joints)
     subdomain = Subdomain(DofNumbering(scene), comm)
-    section_points = beams[0].section.section_points(None)
+    section_points = beams[0].section.section_points(None)[0]
     drawn = section_points.parameters(subdomain.numbering.keys(subdomain.cells))["yield_limit"]
     return dict(zip(subdomain.cells.tolist(), drawn, strict=True))
 
@@ -198,6 +198,6 @@ def test_resultants_may_be_random_too():
     section = ub.Section(
         EA=1.0, GA=1.0, EI=1.0, bending=ub.ElastoPlastic(ub.Weibull(10.0, 5.0, seed=2))
     )
-    limit = section.section_points(None).parameters([(0, k) for k in range(50)])["yield_limit"]
+    limit = section.section_points(None)[0].parameters([(0, k) for k in range(50)])["yield_limit"]
     assert limit.shape == (50, 1)
     assert len(np.unique(limit)) == 50

@@ -22,7 +22,7 @@ class Cells:
     """Cells of the section whose strains are given."""
 
     def __init__(self, n, scheme):
-        section_points = section(interaction=LAW).section_points(None)
+        section_points = section(interaction=LAW).section_points(None)[0]
         assert isinstance(section_points, SectionPoints)
         self.points = Points(section_points, [(0, k) for k in range(n)], np.full(n, 0.5), scheme)
         self.strain = np.zeros((n, 3))

@@ -394,7 +394,7 @@ def test_wrong_calls_are_refused():
         ),
         (
             lambda: ub.buckling(cantilever(loads=[ub.RotatingFrame(1.0)]), 1),
-            "a RotatingFrame has a stiffness of its own",
+            "the RotatingFrame has a stiffness of its own",
         ),
         (lambda: ub.RotatingFrame(math.inf), "RotatingFrame: rate = inf is not finite"),
     ):

@@ -133,7 +133,7 @@ def needed(law, scheme, cells):
 )
 def test_what_a_cell_can_follow(law, scheme):
     """[closed] To 1e-6, the part of the opening over which the slope is taken."""
-    section_points = ub.Section(EA=1e6, GA=1e6, EI=EI).section_points(law(LIMIT, 3.0))
+    section_points = ub.Section(EA=1e6, GA=1e6, EI=EI).section_points(law(LIMIT, 3.0))[0]
     assert _fall(section_points, scheme)[0] * 0.25 == pytest.approx(
         needed(law, scheme, 8) / 3.0, rel=2e-6
     )

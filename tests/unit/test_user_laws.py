@@ -312,18 +312,3 @@ def test_hinges_of_zero_length_have_no_elastic_stiffness():
         ub.Beam((0, 0), (1, 0), section(), hinges={0.5: LAW})
     with pytest.raises(ub.ArgumentError, match="PowerLaw is the law of an elastic stiffness"):
         ub.RigidPlastic(LAW)
-
-
-@pytest.mark.parametrize(
-    ("axial", "said"),
-    [
-        (ub.ElastoPlastic(1.0), r"of one class, not ElastoPlastic\(.*\) and PowerLaw\("),
-        (PowerLaw(1.0, 1.0, 2.0), None),
-    ],
-)
-def test_laws_of_one_section_are_of_one_class(axial, said):
-    if said is None:
-        assert section(axial=axial, bending=LAW).axial is axial
-    else:
-        with pytest.raises(ub.ArgumentError, match=said):
-            section(axial=axial, bending=LAW)

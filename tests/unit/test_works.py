@@ -236,7 +236,7 @@ def test_buckling_by_a_field():
 def test_buckling_refuses_works_without_potential():
     beam, held, _ = column(1.0)
     scene = ub.Scene([beam], supports=held, works=[ub.VirtualWork("air", lambda v, w: v[1] * w[1])])
-    with pytest.raises(ub.ArgumentError, match="a VirtualWork has a stiffness of its own"):
+    with pytest.raises(ub.ArgumentError, match="the VirtualWork has a stiffness of its own"):
         ub.buckling(scene, 1)
 
 

@@ -65,6 +65,7 @@ HINGES = [
     None, 1.0, "x", [], [BREAKS], {0.5: 1}, {0.5: None}, {1.5: LAW}, {-0.1: LAW}, {NAN: LAW},
     {"end": LAW},
 ]  # fmt: skip
+OF_EACH = ["ab", [], [1.0], [0.0, NAN], [0.0, 1j], [0.0, "1"], [1.0, -1.0], -1.0, NAN, INF, HUGE]
 FIBRES = [None, 1.0, "ab", [], [1.0], [0.0, NAN], [0.0, 1j], [0.0, "1"]]
 SWITCH = [None, "yes", 2, 1.5, [], ARRAY]
 PATH = [None, 1.0, "", b"x", ["x"], object()]
@@ -105,6 +106,7 @@ SHAPE = {
     "shear_factor": V(0.8, POSITIVE),
     "fibres": V(None, optional(NO_LAW)),
 }
+CORE = {"core": V(None, optional(NO_LAW)), "cover": V(0.0, [*NUMBER, -1.0, 0.2])}
 SOFTENING = {"limit": V(1.0, LIMIT), "fracture_energy": V(1.0, POSITIVE)}
 NORMAL = {"mean": V(1.0, POSITIVE), "deviation": V(0.1, POSITIVE), "seed": V(1, SEED)}
 MESH = {"mesh": V(None, optional(OBJECT))}
@@ -134,9 +136,9 @@ TABLE = {
         A=V(1.0, POSITIVE), I=V(1.0, POSITIVE), depth=V(1.0, FROM_ZERO), **SHAPE,
     ),
     "Section.rectangle": call(
-        ub.Section.rectangle, b=V(1.0, POSITIVE), h=V(1.0, POSITIVE), **SHAPE
+        ub.Section.rectangle, b=V(1.0, POSITIVE), h=V(1.0, POSITIVE), **SHAPE, **CORE
     ),
-    "Section.circle": call(ub.Section.circle, d=V(1.0, POSITIVE), **SHAPE),
+    "Section.circle": call(ub.Section.circle, d=V(1.0, POSITIVE), **SHAPE, **CORE),
     "Section.tube": call(ub.Section.tube, d=V(1.0, POSITIVE), t=V(0.1, POSITIVE), **SHAPE),
     "Section.i_shape": call(
         ub.Section.i_shape,
@@ -147,8 +149,16 @@ TABLE = {
         ub.Section.of_fibres,
         y=V([0.0, 1.0], [*FIBRES, [0.0, 0.0], [0.0, HUGE]]),
         A=V([1.0, 1.0], [*FIBRES, [1.0, -1.0], [1.0, 0.0]]),
-        E=V(1.0, POSITIVE), nu=V(0.3, [*NUMBER, 0.6]), rho=V(0.0, optional(FROM_ZERO)),
-        shear_factor=V(0.8, POSITIVE), fibres=V(ub.Fibres(LAW), NO_LAW),
+        E=V([1.0, 1.0], [*OF_EACH, None, 0.0]), nu=V(0.3, [*NUMBER, 0.6]),
+        rho=V(0.0, OF_EACH),
+        shear_factor=V(0.8, POSITIVE),
+        fibres=V([ub.Fibres(LAW)] * 2, [*NO_LAW, [ub.Fibres(LAW)], [ub.Fibres(LAW), LAW]]),
+    ),
+    "Section.reinforced": call(
+        ub.Section.rectangle(1.0, 1.0, **STEEL, fibres=ub.Fibres(LAW, number=4)).reinforced,
+        y=V([-0.3, 0.3], [*FIBRES, 0.3, [0.0, 0.6], [0.0]]),
+        A=V([0.01, 0.01], [*FIBRES, [0.01, 0.0], [0.01, 1.0]]),
+        E=V(1.0, POSITIVE), fibres=V(ub.Fibres(LAW), NO_LAW),
     ),
     "Fibres": call(
         ub.Fibres,
@@ -305,6 +315,15 @@ TABLE = {
         span=V((0.2, 0.6), [*VECTOR, (0.6, 0.2), (0.2, 0.2), (-0.1, 0.5), (0.5, 1.1)]),
         profile=V((0.0, 1.0), [*VECTOR, *(f for f in TIME if f is not ARRAY)]),
     ),
+    "ImposedStrain": call(
+        ub.ImposedStrain, beam=V(BEAM, NO_BEAM),
+        **{
+            name: V((0.0, 1e-4), ["x", *VECTOR[3:], *TIME[3:]])
+            for name in ("axial", "curvature", "shear")
+        },
+        span=V((0.2, 0.6), [*VECTOR, (0.6, 0.2), (0.2, 0.2), (-0.1, 0.5), (0.5, 1.1)]),
+        amplitude=V(lambda t: t, [*TIME, None]),
+    ),
     "Gravity": call(
         ub.Gravity, acceleration=V((0, -9.81), VECTOR), amplitude=V(lambda t: t, [*TIME, None])
     ),
@@ -449,9 +468,10 @@ TABLE = {
     ),
     "History": call(
         ub.History,
-        path=V("run.csv", PATH), places=V((), LIST), connectors=V((), LIST), every=V(1, COUNT),
-        max_rows=V(10, COUNT),
+        path=V("run.csv", PATH), places=V((), LIST), connectors=V((), LIST),
+        accelerations=V((), LIST), every=V(1, COUNT), max_rows=V(10, COUNT),
     ),
+    "Extremes": call(ub.Extremes, points=V(2, [*NUMBER, 1]), accelerations=V(False, SWITCH)),
     "Checkpoint": call(
         ub.Checkpoint,
         path=V("run.h5", PATH), every=V(1, optional(COUNT)), minutes=V(None, optional(FROM_ZERO)),
@@ -481,6 +501,23 @@ TABLE = {
     "Gerber": call(ub.Gerber, ultimate=V(1.0, POSITIVE)),
 }  # fmt: skip
 
+OF_FIBRES = ub.Section.rectangle(1.0, 1.0, **STEEL, fibres=ub.Fibres(LAW, number=4))
+TABLE |= {
+    "moment_curvature": call(
+        ub.moment_curvature,
+        section=V(OF_FIBRES, OBJECT),
+        curvature=V([0.0, 0.0], [x for x in FIBRES if x != [1.0]]),
+        N=V([0.0, 0.0], [x for x in FIBRES if x != 1.0]),
+        length=V(None, optional(POSITIVE)), dt=V(1.0, POSITIVE),
+    ),
+    "interaction_diagram": call(
+        ub.interaction_diagram,
+        section=V(OF_FIBRES, OBJECT),
+        limits=V((0.01, 0.02), [None, 1.0, "ab", (0.01,), (0.01, 0.0), {BEAM: (1, 1)}, (1, NAN)]),
+        points=V(8, COUNT), steps=V(1, COUNT), length=V(None, optional(POSITIVE)),
+    ),
+}  # fmt: skip
+
 SERIES = [None, "ab", 1.0, ["1", "2", "3"], [0.0, NAN, 1.0], [0, 1j, 2], [[0.0, 1.0]], [0, HUGE]]
 T, X = np.linspace(0, 10, 400), np.exp(-0.05 * np.linspace(0, 10, 400))
 X = X * np.cos(6 * T)
@@ -505,13 +542,14 @@ TABLE |= {
 
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
-    "Event", "Extent", "Joint", "Modes", "Path", "Solution", "Study", "Support", "Tradeoff",
-    "Coefficients", "Diagram", "DolfinxView", "Film", "Step",
+    "Event", "Extent", "InteractionDiagram", "Joint", "Modes", "MomentCurvature", "Path",
+    "Solution", "Study", "Support", "Tradeoff", "Coefficients", "Diagram", "DolfinxView", "Film",
+    "Step",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""
 
 WITHOUT_PARAMETERS = {
-    "Static", "EnergyMomentumPrinted", "Extremes", "Recorder", "print_once", "Scheme",
+    "Static", "EnergyMomentumPrinted", "Recorder", "print_once", "Scheme",
     "DynamicScheme", "ConnectorLaw", "EnergyMomentumBase", "MidpointDynamics", "MaterialLaw",
     "SofteningLaw", "law_functions",
 }  # fmt: skip
@@ -555,7 +593,7 @@ WORDS = {
 }
 """Words in the place of a parameter's name."""
 
-PLACES = {"places", "place", "follow"}
+PLACES = {"accelerations", "places", "place", "follow"}
 """Of recorders and cameras; errors of places are a `ModelError`."""
 
 
@@ -623,6 +661,7 @@ OWNERS = {
         "loads": [ub.FollowerLoad(BEAM.end, force=(1, 0), amplitude=f)]
     },
     "LineLoad on girder": lambda f: {"loads": [ub.LineLoad(BEAM, force=(1, 0), amplitude=f)]},
+    "ImposedStrain of girder": lambda f: {"loads": [ub.ImposedStrain(BEAM, 1e-4, amplitude=f)]},
     "Gravity": lambda f: {"loads": [ub.Gravity(amplitude=f)]},
     "PrescribedDisplacement at girder.start": lambda f: {
         "supports": [ub.PrescribedDisplacement(BEAM.start, u=0, v=f, psi=0)]

@@ -355,7 +355,8 @@ def buckling(
 
     Raises:
         ArgumentError: The call is wrong; the scene is free to move; nothing acts on it; or it has a
-            :class:`FollowerLoad`, :class:`RotatingFrame` or :class:`VirtualWork`.
+            :class:`FollowerLoad`, :class:`RotatingFrame`, :class:`ImposedStrain` or
+            :class:`VirtualWork`.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-1.0, 0))
@@ -369,7 +370,7 @@ def buckling(
     for load in (*scene.loads, *scene.works):
         if isinstance(load, VirtualWork) or (isinstance(load, Load) and not load.dead):
             raise ArgumentError(
-                f"buckling: a {type(load).__name__} has a stiffness of its own; use "
+                f"buckling: the {type(load).__name__} has a stiffness of its own; use "
                 "modes(..., at=) about states with an increasing load, and find where a frequency "
                 "vanishes or a damping ratio becomes negative"
             )

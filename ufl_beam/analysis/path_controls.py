@@ -75,6 +75,8 @@ class PathCorrector:
         self.dissipates = False
         self.crossing: Crossing | None = None
         self._loading: list[Term] = [*simulation.loads, *simulation.connector_terms]
+        # The forces of these cells depend on the load factor, too.
+        self._imposed = [beams for beams in simulation.beams if beams.imposed is not None]
         self.direction = self.predicted_step = 0.0 * self.weights
 
     @property
@@ -185,7 +187,7 @@ class PathCorrector:
         for δ, weight in ((ε, 0.5 / ε), (-ε, -0.5 / ε), (0.0, 0.0)):  # last: at the factor t
             simulation.equation.begin(self.step_at(t + δ), self._loading)
             forces = np.zeros(self.subdomain.size)
-            for term in self._loading:
+            for term in (*self._loading, *self._imposed):
                 term.add_residual(q, forces)
             r += weight * forces
         simulation.supports.into_axes(r)

@@ -236,13 +236,17 @@ class DofNumbering:
 
     @cached_property
     def inelastic(self) -> list[tuple[SectionPoints, Index]]:
-        """Material points of cells that can yield or break, with the cells that have them."""
+        """Material points of cells that can yield or break, with the cells that have them.
+
+        Cells whose laws are of several classes occur once for each class.
+        """
         groups = dict[SectionPoints, list[int]]()
         sections, beam_sections = self.sections
         for number, section in enumerate(sections):
-            section_points = section.section_points(section.hinge)
-            if section_points is not None and not section_points.elastic:
-                groups.setdefault(section_points, []).append(number)
+            points = section.section_points(section.hinge)
+            if not all(of_class.elastic for of_class in points):
+                for of_class in points:
+                    groups.setdefault(of_class, []).append(number)
         cell_sections = beam_sections[self.beam_of_cell]
         return [
             (section_points, np.flatnonzero(np.isin(cell_sections, group)))
@@ -253,7 +257,7 @@ class DofNumbering:
     def inelastic_cells(self) -> Index:
         """Cells that can yield or break, ascending; (m,)."""
         groups = [cells for _, cells in self.inelastic]
-        return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups]))
+        return np.asarray(np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *groups])))
 
     def section_lengths(self, cells: Index) -> Array:
         """Compute lengths of cells times weights of integration points; (len(cells) * degree,)."""

@@ -352,7 +352,7 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
             if law.law.stressed((np.float64(law.stiffness),), (moved,)):
                 wrong.append((connector, law.law, "a stress at no strain"))
     for beam in scene.beams:
-        if (points := beam.section.section_points(None)) is not None:
+        for points in beam.section.section_points(None):
             strains = LAST_DIGITS * np.abs(points.strains) @ [1.0, 1.0, 1.0 / scene.size]
             by_point = np.stack([points.stiffness, strains], axis=1)
             by_point = by_point.reshape(len(points.weights), -1, 2)

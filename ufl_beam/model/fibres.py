@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from abc import ABC, abstractmethod
 from collections import Counter
@@ -16,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.display import compact_repr
 from ufl_beam.errors import ModelError
 from ufl_beam.model.checks import require_count, require_kind
@@ -39,10 +40,11 @@ class Kind(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SectionPoints:
-    """Material points of a cross-section, with their strains, weights and laws.
+    """Material points of a cross-section with laws of one class: strains, weights and laws.
 
-    The resultants of the section are sums over all points of weight times stress times ``strains``,
-    plus ``rest`` times the strains of the section.
+    A section with laws of several classes has one object for each class.  The resultants of the
+    section are sums over all points of weight times stress times ``strains``, plus ``rest`` times
+    the strains of the section.
     """
 
     strains: Values  # derivatives of strains of points with respect to (Σ, Γ, K); (n, 3)
@@ -50,12 +52,10 @@ class SectionPoints:
     stiffness: Values  # elastic stiffness, also of each interacting resultant; (n,)
     laws: tuple[tuple[MaterialLaw, int], ...]  # (law, number of successive points)
     rest: Values  # EA, GA, EI of resultants that have no points, otherwise 0; (3,)
-    softening: SofteningLaw | None  # law of hinge or cracks, if points can break
-    breaking: slice  # points that can break
+    softening: SofteningLaw | None = None  # law of hinge or cracks, if points can break
+    breaking: slice = slice(None)  # points that can break
     hinges: bool = False  # True if the breaking point is a hinge, with a jump of rotation
-
-    def __post_init__(self) -> None:
-        _ = self.kind  # raises if the laws are of several classes
+    number: int = 0  # number of this object in its section
 
     @property
     def elastic(self) -> bool:
@@ -70,23 +70,9 @@ class SectionPoints:
     @cached_property
     def kind(self) -> Kind:
         """Law of all points, without the parameters, which differ between points."""
-        laws = [law for law, _ in self.laws if not law.elastic] or [self.laws[0][0]]
-        kinds: dict[Kind, MaterialLaw] = {}
-        for law in laws:
-            C = uniform(law, np.ones(()))
-            names = tuple(law.parameters(C))
-            kinds[Kind(law.with_parameters(1.0, dict.fromkeys(names, 1.0)), names)] = law
-        if len(kinds) > 1:
-            different = " and ".join(map(repr, kinds.values()))
-            raise ModelError(f"Section: its laws must be of one class, not {different}")
-        kind = next(iter(kinds))
-        for law, _ in self.laws:
-            if type(law) is not type(kind.law):
-                raise ModelError(
-                    f"Section: beside {type(kind.law).__name__}, a resultant with a law or a hinge "
-                    "needs a law of the same class, with parameters at which it stays elastic"
-                )
-        return kind
+        law = next((law for law, _ in self.laws if not law.elastic), self.laws[0][0])
+        names = tuple(law.parameters(uniform(law, np.ones(()))))
+        return Kind(law.with_parameters(1.0, dict.fromkeys(names, 1.0)), names)
 
     def parameters(self, keys: Sequence[tuple[int, ...]]) -> dict[str, Values]:
         """Return the parameters of the laws at the points of cells by name, each (cells, n).
@@ -104,6 +90,38 @@ class SectionPoints:
                 columns[name][:, at] = [value.draw(n, k) for k in keys] if drawn else value
             first += n
         return columns
+
+
+def by_class(points: Sequence[SectionPoints], rest: Array) -> tuple[SectionPoints, ...]:
+    """Join points, each with one law, that C can compute together; the first get ``rest``.
+
+    Their laws are of one class, and at most one softening law is among them.  Points without a
+    softening law come first.
+    """
+    yielding = {type(p.laws[0][0]): p.kind for p in points if p.yields}
+    groups = list[tuple[Kind, list[SectionPoints]]]()
+    for p in sorted(points, key=lambda p: p.softening is not None):
+        # Elastic points join others of their class, whose equations hold for them, too.
+        kind = p.kind if p.yields else yielding.get(type(p.laws[0][0]), p.kind)
+        alike = (of for k, of in groups if k == kind and of[-1].softening in (None, p.softening))
+        if (group := next(alike, None)) is None:
+            groups.append((kind, group := []))
+        group.append(p)
+    return tuple(
+        SectionPoints(
+            **{
+                name: np.concatenate([getattr(p, name) for p in group])
+                for name in ("strains", "weights", "stiffness")
+            },
+            laws=tuple(law for p in group for law in p.laws),
+            rest=rest if number == 0 else np.zeros(3),
+            softening=group[-1].softening,
+            breaking=slice(sum(len(p.weights) for p in group if p.softening is None), None),
+            hinges=group[-1].hinges,
+            number=number,
+        )
+        for number, (_, group) in enumerate(groups)
+    )
 
 
 @dataclass(frozen=True, repr=False)
@@ -135,52 +153,120 @@ class Fibres(Record):
 
 @dataclass(frozen=True, eq=False)
 class PlacedFibres:
-    """Fibres with their positions and areas in a section."""
+    """Fibres of one or several materials, with their positions and areas in a section."""
 
-    fibres: Fibres
-    E: float  # Young's modulus; Pa
+    fibres: tuple[Fibres, ...]  # laws of the materials
+    material: Index  # index in ``fibres`` of the material of each fibre; (n,)
+    E: Array  # Young's moduli; (n,); Pa
     y: Array  # distances from the axis, positive to the left of its direction; (n,); m
     A: Array  # areas; (n,); m²
+    axis: float  # coordinate y of the axis as the user measures it; m
+    ends: tuple[float, float]  # least and largest y of the section as the user measures it; m
 
     __repr__ = compact_repr
 
     @classmethod
+    def about_centroid(
+        cls, fibres: tuple[Fibres, ...], material: Index, E: Array, y: Array, A: Array,
+        ends: tuple[float, float] | None = None,
+    ) -> PlacedFibres:  # fmt: skip
+        """Create fibres at ``y`` (m), with the axis through the centroid of their stiffness EA."""
+        axis = float((E * A) @ y / (E @ A))
+        ends = ends or (float(y.min()), float(y.max()))
+        return cls(fibres, material, E, y - axis, A, axis, ends)
+
+    @classmethod
     def layers(
-        cls, fibres: Fibres | None, E: float, h: float, below: Below, edges: Sequence[float] = ()
-    ) -> PlacedFibres | None:
-        """Create layers of equal thickness over the depth ``h`` (m), with cuts at ``edges`` (m)."""
+        cls, fibres: Fibres | None, E: float, h: float, below: Below, edges: Sequence[float] = (),
+        *, core: Fibres | None = None, below_in_core: Below | None = None,
+    ) -> PlacedFibres | None:  # fmt: skip
+        """Create layers of equal thickness over the depth ``h`` (m), with cuts at ``edges`` (m).
+
+        With ``core``, the part of a layer that lies in the core is a fibre of its own.
+        """
         if fibres is None:
+            if core is not None:
+                raise ModelError("Section: core without fibres; give the law of the cover, too")
             return None
         require_kind(fibres, Fibres, "Section: fibres")
         if fibres.number < 2:
             raise ModelError("Fibres: number = 1 has no bending stiffness; use 2 or more")
         cuts = np.union1d(np.linspace(-h / 2, h / 2, fibres.number + 1), np.array(edges))
         cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * h, 0, True)]
-        A, S = np.diff(below(cuts))
-        return cls(fibres, E, S / A, A)
+        layers, laws = np.diff(below(cuts)), [fibres]
+        material: Index = np.zeros(layers.shape[1], dtype=np.int64)
+        if core is not None and below_in_core is not None:
+            within = np.diff(below_in_core(cuts))
+            inside = within[0] > 1e-9 * layers[0]
+            layers, laws = np.hstack([layers - within, within[:, inside]]), [fibres, core]
+            material = np.repeat([0, 1], [len(inside), inside.sum()])
+        A, S = layers
+        return cls(tuple(laws), material, np.full(len(A), E), S / A, A, 0.0, (-h / 2, h / 2))
+
+    def with_bars(self, bars: Fibres, E: float, y: Array, A: Array) -> PlacedFibres:
+        """Add bars of areas ``A`` (m²) at ``y`` (m) instead of other fibres, those of a core first.
+
+        Each bar displaces the nearest fibres of the last material that reaches to it.
+        """
+        at, areas, (low, high) = self.y + self.axis, self.A.copy(), self.ends
+        for bar, area in zip(y, A, strict=True):
+            if not low <= bar <= high:
+                raise ModelError(
+                    f"Section.reinforced: a bar at y = {bar:g} m lies outside the section, from "
+                    f"{low:g} to {high:g} m"
+                )
+            # Materials of earlier bars come first, the core last.
+            for number in reversed(range(len(self.fibres))):
+                of = np.flatnonzero(self.material == number)
+                gap = float(np.diff(np.unique(at[of])).max(initial=0.0))
+                if at[of].min() - gap / 2 <= bar <= at[of].max() + gap / 2:
+                    break
+            width, away = gap or 1.0, at[of] - bar
+            removed = np.full(len(of), math.inf)
+            while not ((removed >= 0) & (removed < areas[of])).all():
+                if width > 2 * (high - low + gap):
+                    raise ModelError(
+                        f"Section.reinforced: bars of A = {area:g} m² at y = {bar:g} m displace "
+                        "more than the fibres of the section there"
+                    )
+                # Near fibres lose the area, if possible with its centroid at the bar.
+                near = areas[of] * np.maximum(1 - np.abs(away) / width, 0.0)
+                removed, width = near * (area / near.sum()), 2 * width
+                if away[near > 0].min() < 0 < away[near > 0].max():
+                    m0, m1, m2 = near.sum(), near @ away, near @ away**2
+                    removed = near * area * (m2 - m1 * away) / (m0 * m2 - m1**2)
+            areas[of] -= removed
+        material = np.concatenate([np.zeros(len(y), dtype=np.int64), self.material + 1])
+        moduli = np.concatenate([np.full(len(y), E), self.E])
+        y, A = np.concatenate([y, at]), np.concatenate([A, areas])
+        return self.about_centroid((bars, *self.fibres), material, moduli, y, A, self.ends)
 
     @property
     def EA(self) -> float:
         """Axial stiffness EA; N."""
-        return float(self.E * self.A.sum())
+        return float(self.E @ self.A)
 
     @property
     def EI(self) -> float:
         """Bending stiffness; N m²."""
         return float(self.E * self.A @ self.y**2)
 
-    def section_points(self, GA: float) -> SectionPoints:
+    def section_points(self, GA: float) -> tuple[SectionPoints, ...]:
         """Return one material point for each fibre, with the elastic shear stiffness ``GA`` (N)."""
-        n, softening = len(self.y), self.fibres.softening
-        return SectionPoints(
-            strains=np.column_stack([np.ones(n), np.zeros(n), -self.y]),
-            weights=self.A,
-            stiffness=np.full(n, self.E),
-            laws=((self.fibres.law, n),),
-            rest=np.array([0.0, GA, 0.0]),
-            softening=softening if softening is not None and softening.opens else None,
-            breaking=slice(None),
-        )
+        points = []
+        for number, (law, softening) in enumerate((f.law, f.softening) for f in self.fibres):
+            at = np.flatnonzero(self.material == number)
+            points.append(
+                SectionPoints(
+                    strains=np.column_stack([np.ones(len(at)), np.zeros(len(at)), -self.y[at]]),
+                    weights=self.A[at],
+                    stiffness=self.E[at],
+                    laws=((law, len(at)),),
+                    rest=np.zeros(3),
+                    softening=softening if softening is not None and softening.opens else None,
+                )
+            )
+        return by_class(points, np.array([0.0, GA, 0.0]))
 
 
 # -- distributions of yield stresses ------------------------------------------------------------

@@ -137,6 +137,28 @@ def require_profile(profile: object, what: str) -> Profile:
     return profile if callable(profile) else require_vector(profile, what)
 
 
+def profile_at(s: Array, profile: Profile, span: tuple[float, float], what: str) -> Array:
+    """Return the values of a profile at parameters ``s``; they are zero outside of the span.
+
+    Raises:
+        ModelError: The profile, named ``what``, is not a finite number at one of them.
+    """
+    first, last = span
+    if not callable(profile):
+        return np.where((s < first) | (s > last), 0.0, np.interp(s, span, profile))
+    values = np.zeros(s.shape)
+    for index, at in np.ndenumerate(s):
+        if first <= at <= last:
+            name, where = what.rsplit(maxsplit=1)[-1], f"s = {at:.9g}"
+            try:
+                values[index] = require_returned(profile(float(at)), name, where, finite=True)
+            except ArgumentError as error:
+                raise ModelError(f"{what.removesuffix(name)}{error}") from None
+            except Exception as error:
+                raise ModelError(f"{what} fails at {where}: {shorten(error)}") from error
+    return values
+
+
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
 class LineLoad(Load):
@@ -194,24 +216,7 @@ class LineLoad(Load):
         Raises:
             ModelError: The profile is not a finite number at one of them.
         """
-        first, last = self.span
-        if not callable(self.profile):
-            start, end = self.profile
-            return np.where((s < first) | (s > last), 0.0, np.interp(s, self.span, (start, end)))
-        factors = np.zeros(s.shape)
-        for index, at in np.ndenumerate(s):
-            if first <= at <= last:
-                where = f"s = {at:.9g}"
-                try:
-                    value = self.profile(float(at))
-                    factors[index] = require_returned(value, "profile", where, finite=True)
-                except ArgumentError as error:
-                    raise ModelError(f"{self}: {error}") from None
-                except Exception as error:
-                    raise ModelError(
-                        f"{self}: profile fails at {where}: {shorten(error)}"
-                    ) from error
-        return factors
+        return profile_at(s, self.profile, self.span, f"{self}: profile")
 
 
 @closed(OWN_LOAD)

@@ -40,6 +40,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Component, Connector, plastic_hinges
 from ufl_beam.model.fibres import stream_keys
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along
+from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import (
     LOADS,
@@ -72,6 +73,7 @@ class Scene(Record, Rich):
         supports: :class:`Clamped`, :class:`Pinned`, :class:`Roller`,
             :class:`PrescribedDisplacement`.
         loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`,
+            :class:`ImposedStrain`,
             :class:`RotatingFrame`.
         masses: :class:`PointMass`.
         initial: :class:`Velocity`; by default the scene is at rest.
@@ -93,7 +95,7 @@ class Scene(Record, Rich):
     _: KW_ONLY
     joints: Annotated[Sequence[Joint], _all(Joint)] = ()
     supports: Annotated[Sequence[Support], _all(Support)] = ()
-    loads: Annotated[Sequence[Load], _all(*LOADS)] = ()
+    loads: Annotated[Sequence[Load], _all(*LOADS, ImposedStrain)] = ()
     masses: Annotated[Sequence[PointMass], _all(PointMass)] = ()
     initial: Annotated[Sequence[Velocity], _all(Velocity)] = ()
     damping: Annotated[Sequence[Damping], _all(*Damping.__args__)] = ()
@@ -249,7 +251,7 @@ class Scene(Record, Rich):
         for load in self.loads:
             if isinstance(load, LoadAtPlace):
                 yield load, load.place
-            elif isinstance(load, LineLoad):
+            elif isinstance(load, LineLoad | ImposedStrain):
                 yield from ((load, load.beam.at(s)) for s in load.span)
         for velocity in self.initial:
             for member in velocity.beams:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import partial
 from typing import Annotated, Any
 
@@ -16,8 +16,8 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError
-from ufl_beam.model.checks import require_array, require_kind, require_number
-from ufl_beam.model.fibres import Fibres, PlacedFibres, SectionPoints
+from ufl_beam.model.checks import require_all, require_array, require_kind, require_number
+from ufl_beam.model.fibres import Fibres, PlacedFibres, SectionPoints, by_class
 from ufl_beam.model.material_law import MaterialLaw, require_law
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
@@ -96,8 +96,11 @@ class Section(Record):
             )
         self.section_points(self.hinge)  # raises an error if the laws cannot be combined
 
-    def section_points(self, hinge: SofteningLaw | None) -> SectionPoints | None:
-        """Return the material points of a cell with a hinge law; None if the cell is elastic."""
+    def section_points(self, hinge: SofteningLaw | None) -> tuple[SectionPoints, ...]:
+        """Return the material points of a cell with a hinge law, by class of their laws.
+
+        The result is empty if no resultant has a law.
+        """
         if self.fibres is not None:
             return self.fibres.section_points(self.GA)
         if hinge is not None and not hinge.opens:
@@ -107,24 +110,21 @@ class Section(Record):
             if hinge is not None:
                 raise ModelError("Section: a hinge beside interaction of N and M; leave one out")
             inelastic = np.array([name in self.interaction.resultants for name in "NVM"])
-            laws = [(self.interaction, 1)]
+            chosen, laws = [inelastic], [self.interaction]
         else:
             if hinge is not None and bending is None:
                 bending = ElastoPlastic(yield_limit=math.inf)
-            inelastic = np.array([law is not None for law in (self.axial, self.shear, bending)])
-            laws = [(law, 1) for law in (self.axial, self.shear, bending) if law is not None]
-        if not laws:
-            return None
-        return SectionPoints(
-            strains=np.eye(3)[inelastic],
-            weights=np.ones(len(laws)),
-            stiffness=stiffness[inelastic],
-            laws=tuple(laws),
-            rest=np.where(inelastic, 0.0, stiffness),
-            softening=hinge,
-            breaking=slice(len(laws) - 1, None),
-            hinges=hinge is not None,
-        )
+            resultants = self.axial, self.shear, bending
+            inelastic = np.array([law is not None for law in resultants])
+            chosen = [row == 1.0 for row in np.eye(3)[inelastic]]
+            laws = [law for law in resultants if law is not None]
+        points = [
+            SectionPoints(np.eye(3)[at], np.ones(1), stiffness[at], ((law, 1),), np.zeros(3))
+            for at, law in zip(chosen, laws, strict=True)
+        ]
+        if hinge is not None:
+            points[-1] = replace(points[-1], softening=hinge, hinges=True)
+        return by_class(points, np.where(inelastic, 0.0, stiffness))
 
     @classmethod
     def of_shape(
@@ -160,49 +160,123 @@ class Section(Record):
 
     @classmethod
     def of_fibres(
-        cls, y: Sequence[float], A: Sequence[float], *, E: float, nu: float, fibres: Fibres,
-        rho: float | None = None, shear_factor: float = 5 / 6,
+        cls, y: Sequence[float], A: Sequence[float], *, E: float | Sequence[float], nu: float,
+        fibres: Fibres | Sequence[Fibres], rho: float | Sequence[float] | None = None,
+        shear_factor: float = 5 / 6,
     ) -> Section:  # fmt: skip
         """Create a section of fibres with areas ``A`` (m²) at coordinates ``y`` (m).
 
-        The coordinate y points to the left of the direction of the beam; its origin is arbitrary.
-        The axis of the beam runs through the centroid of the fibres.
+        ``E`` (Pa), ``fibres`` and ``rho`` (kg/m³) are equal for all fibres, or sequences with a
+        value for each fibre.  The laws of fibres may be of different classes.  The coordinate y
+        points to the left of the direction of the beam; its origin is arbitrary.  The axis of the
+        beam runs through the centroid of the stiffness EA, at y = ``section.fibres.axis``, so that
+        N and M are uncoupled in elastic fibres.  The mass acts at the axis.  GA is
+        ``shear_factor EA / (2 (1 + nu))``.
 
         Raises:
-            ModelError: The lengths of ``y`` and ``A`` differ, an area is not positive, or all
+            ModelError: The sequences differ in length, an area or modulus is not positive, or all
                 fibres lie at one y.
+
+        Example:
+            >>> timber, steel = (ub.Fibres(ub.ElastoPlastic(limit)) for limit in (30e6, 355e6))
+            >>> plated = ub.Section.of_fibres(
+            ...     [-0.105, -0.075, -0.025, 0.025, 0.075], [1e-3, 5e-3, 5e-3, 5e-3, 5e-3], nu=0.3,
+            ...     E=[210e9, 11e9, 11e9, 11e9, 11e9], fibres=[steel] + 4 * [timber],
+            ... )  # fmt: skip
+            >>> print(f"axis at y = {plated.fibres.axis:.4f} m, EA = {plated.EA:.3g} N")
+            axis at y = -0.0513 m, EA = 4.3e+08 N
         """
-        require_kind(fibres, Fibres, "Section.of_fibres: fibres")
-        require_number(E, "Section: E", positive=True)
-        at, areas = (
-            require_array(x, f"Section.of_fibres: {name}") for name, x in (("y", y), ("A", A))
-        )
+        what = "Section.of_fibres"
+        at, areas = (require_array(x, f"{what}: {name}") for name, x in (("y", y), ("A", A)))
         if at.ndim != 1 or at.shape != areas.shape or not len(at):
             raise ModelError(
-                f"Section.of_fibres: y and A must be lists of equal length, not {at.shape} and "
-                f"{areas.shape}"
+                f"{what}: y and A must be lists of equal length, not {at.shape} and {areas.shape}"
             )
         if not (areas > 0).all():
-            raise ModelError("Section.of_fibres: all areas A must be positive")
-        total, depth = float(areas.sum()), float(np.ptp(at))
-        if depth == 0.0:
-            raise ModelError(
-                "Section.of_fibres: all fibres at one y have no bending stiffness; spread them"
-            )
-        placed = PlacedFibres(fibres, E, at - (areas @ at) / total, areas)
+            raise ModelError(f"{what}: all areas A must be positive")
+        if np.ptp(at) == 0.0:
+            raise ModelError(f"{what}: all fibres at one y have no bending stiffness; spread them")
+        if isinstance(fibres, list | tuple):
+            each = require_all(fibres, f"{what}: fibres", Fibres)
+        else:
+            require_kind(fibres, Fibres, f"{what}: fibres")
+            each = (fibres,) * len(at)
+        laws = tuple({id(law): law for law in each}.values())
+        if len(each) != len(at):
+            raise ModelError(f"{what}: {len(each)} fibres for {len(at)} areas; give one for each")
+        material = np.array([next(i for i, x in enumerate(laws) if x is law) for law in each])
+        moduli = _each(E, len(at), f"{what}: E")
+        density = _each(0.0 if rho is None else rho, len(at), f"{what}: rho")
+        if not (moduli > 0).all() or not (density >= 0).all():
+            raise ModelError(f"{what}: E must be positive, and rho must not be negative")
+        placed = PlacedFibres.about_centroid(laws, material, moduli, at, areas)
+        mass = density * areas
+        mean, total = placed.EA / float(areas.sum()), float(areas.sum())
         return cls.of_shape(
-            A=total, I=placed.EI / E, E=E, nu=nu, rho=rho,
-            shear_factor=shear_factor, depth=depth, fibres=placed,
+            A=total, I=placed.EI / mean, E=mean, nu=nu, rho=None, shear_factor=shear_factor,
+            depth=float(np.ptp(at)), fibres=placed,
+            **({} if rho is None else {"rhoA": mass.sum(), "rhoI": mass @ placed.y**2}),
         )  # fmt: skip
+
+    def reinforced(
+        self, y: Sequence[float], A: Sequence[float], *, E: float, fibres: Fibres
+    ) -> Section:
+        """Return the section with bars of areas ``A`` (m²) at coordinates ``y`` (m).
+
+        The section has fibres, of which the bars displace their areas.  The coordinate y is
+        measured from mid-depth of a shape, or as in :meth:`of_fibres`.  The axis moves to the
+        centroid of the stiffness EA, at y = ``fibres.axis`` of the new section.  GA and mass do not
+        change: the density of reinforced concrete includes the bars.
+
+        Args:
+            y: Coordinates of the bars, or of rows of bars; m.
+            A: Area of each bar or row; m².
+            E: Young's modulus of the bars; Pa.
+            fibres: Law of the bars; its ``number`` has no meaning.
+
+        Raises:
+            ModelError: The section has no fibres, the lengths of ``y`` and ``A`` differ, an area is
+                not positive, a bar lies outside the section, or bars displace more than there is.
+
+        Example:
+            >>> cover, core, steel = (ub.Fibres(ub.ElastoPlastic(x)) for x in (30e6, 40e6, 5e8))
+            >>> column = ub.Section.rectangle(
+            ...     b=0.3, h=0.4, E=30e9, nu=0.2, rho=2500.0, fibres=cover, core=core, cover=0.03
+            ... ).reinforced(y=[-0.15, 0.15], A=[1e-3, 1e-3], E=200e9, fibres=steel)
+            >>> print(f"{column.EA:.3g} {column.EI:.3g}")  # N, N m²
+            3.94e+09 5.55e+07
+        """
+        what = "Section.reinforced"
+        if self.fibres is None:
+            raise ModelError(
+                f"{what}: the section has no fibres; create it with fibres=Fibres(law)"
+            )
+        require_kind(fibres, Fibres, f"{what}: fibres")
+        require_number(E, f"{what}: E", positive=True)
+        at, areas = (require_array(x, f"{what}: {name}") for name, x in (("y", y), ("A", A)))
+        if at.ndim != 1 or at.shape != areas.shape or not (areas > 0).all():
+            raise ModelError(f"{what}: y and A must be lists of equal length, with positive areas")
+        placed = self.fibres.with_bars(fibres, E, at, areas)
+        rhoA: Any = None if self.massless_by_default else self.rhoA
+        return replace(self, EA=placed.EA, EI=placed.EI, rhoA=rhoA, fibres=placed)
 
     @classmethod
     def rectangle(
         cls, b: float, h: float, *, E: float, nu: float, rho: float | None = None,
-        shear_factor: float = 5 / 6, fibres: Fibres | None = None, **laws: Any,
+        shear_factor: float = 5 / 6, fibres: Fibres | None = None, core: Fibres | None = None,
+        cover: float = 0.0, **laws: Any,
     ) -> Section:  # fmt: skip
-        """Create a rectangle of width ``b`` and depth ``h``, the size in the plane of motion; m."""
+        """Create a rectangle of width ``b`` and depth ``h``, the size in the plane of motion; m.
+
+        With ``core``, the fibres farther than ``cover`` (m) from the surface have this law.
+        """
         _require_positive("Section.rectangle", b=b, h=h)
-        placed = PlacedFibres.layers(fibres, E, h, lambda y: _below_in_rectangle(y, b, h))
+        _require_cover("Section.rectangle", core, cover, min(b, h))
+        placed = PlacedFibres.layers(
+            fibres, E, h, lambda y: _below_in_rectangle(y, b, h), core=core,
+            below_in_core=lambda y: _below_in_rectangle(y, b - 2 * cover, h - 2 * cover),
+            edges=(cover - h / 2, h / 2 - cover),
+        )  # fmt: skip
         return cls.of_shape(
             A=b * h, I=b * h**3 / 12, E=E, nu=nu, rho=rho,
             shear_factor=shear_factor, depth=h, fibres=placed, **laws,
@@ -211,11 +285,20 @@ class Section(Record):
     @classmethod
     def circle(
         cls, d: float, *, E: float, nu: float, rho: float | None = None,
-        shear_factor: float = 9 / 10, fibres: Fibres | None = None, **laws: Any,
+        shear_factor: float = 9 / 10, fibres: Fibres | None = None, core: Fibres | None = None,
+        cover: float = 0.0, **laws: Any,
     ) -> Section:  # fmt: skip
-        """Create a solid circle of diameter ``d``; m."""
+        """Create a solid circle of diameter ``d``; m.
+
+        With ``core``, the fibres farther than ``cover`` (m) from the surface have this law.
+        """
         _require_positive("Section.circle", d=d)
-        placed = PlacedFibres.layers(fibres, E, d, lambda y: _below_in_circle(y, d))
+        _require_cover("Section.circle", core, cover, d)
+        placed = PlacedFibres.layers(
+            fibres, E, d, lambda y: _below_in_circle(y, d), core=core,
+            below_in_core=lambda y: _below_in_circle(y, d - 2 * cover),
+            edges=(cover - d / 2, d / 2 - cover),
+        )  # fmt: skip
         return cls.of_shape(
             A=math.pi * d**2 / 4, I=math.pi * d**4 / 64, E=E, nu=nu, rho=rho,
             shear_factor=shear_factor, depth=d, fibres=placed, **laws,
@@ -288,3 +371,23 @@ def _below_in_circle(y: Array, d: float) -> Array:
 def _require_positive(owner: str, **sizes: float) -> None:
     for name, value in sizes.items():
         require_number(value, f"{owner}: {name}", positive=True)
+
+
+def _require_cover(owner: str, core: object, cover: float, size: float) -> None:
+    """Raise :class:`ModelError` unless ``core`` and ``cover`` fit a section of this size (m)."""
+    require_kind(core, (Fibres, type(None)), f"{owner}: core")
+    require_number(cover, f"{owner}: cover", at_least=0.0)
+    if core is None and cover > 0.0:
+        raise ModelError(f"{owner}: cover without core; give the law of the core, too")
+    if core is not None and not 0.0 < 2 * cover < size:
+        raise ModelError(
+            f"{owner}: cover = {cover} m leaves no core, or no cover, in a section of {size} m"
+        )
+
+
+def _each(values: float | Sequence[float], n: int, what: str) -> Array:
+    """Return a value for each of n fibres, from one number or from n numbers."""
+    numbers = require_array(values, what)
+    if numbers.ndim and numbers.shape != (n,):
+        raise ModelError(f"{what} has shape {numbers.shape}; give a number, or {n} numbers")
+    return np.array(np.broadcast_to(numbers, n))

@@ -277,7 +277,7 @@ class DolfinxView:
         tables = [np.zeros((len(numbering.cells), size)) for size in sizes]
         for cells, *values in (beams.about_state() for beams in self._view.inelastic):
             for table, rows in zip(tables, values, strict=True):
-                table[cells] = rows
+                table[cells] += rows
         for function, table in zip(self._around, tables, strict=False):  # none in elastic scenes
             put_in_cells(function, table[self.cells])
         return forms

@@ -17,7 +17,8 @@ from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.display import in_one_line
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.errors import ArgumentError, require_number
+from ufl_beam.errors import ArgumentError, require_number, require_switch
+from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import Body, Member
 from ufl_beam.output.output_files import require_arrays
@@ -179,9 +180,12 @@ class Extremes(Restartable):
 
     Args:
         points: Number of points of a cell, at least 2.
+        accelerations: Record extremes of the accelerations of all nodes, which Python then updates
+            after each step.
 
     Raises:
-        ArgumentError: ``points`` is no number of at least 2.
+        ArgumentError: ``points`` is no number of at least 2.  A run raises it if it is static and
+            ``accelerations`` is true.
 
     Example:
         >>> extremes = ub.Extremes()
@@ -191,8 +195,10 @@ class Extremes(Restartable):
         [-195000. -146000. -146000.  -98000.  -98000.  -49000.]
     """
 
-    def __init__(self, points: int = 2) -> None:
+    def __init__(self, points: int = 2, *, accelerations: bool = False) -> None:
         require_number(points, "Extremes: points", at_least=2)
+        require_switch(accelerations, "Extremes: accelerations")
+        self._accelerated = bool(accelerations)
         self._fractions = np.arange(int(points)) / (int(points) - 1)
         self._in_c: ExtremesInC | None = None
         self._taken: list[Extent] = []
@@ -201,11 +207,14 @@ class Extremes(Restartable):
         """Begin with the initial state, or continue from a :meth:`state`."""
         self._numbering: DofNumbering = simulation.numbering
         self._solution = simulation.solution
+        if self._accelerated and not has_inertia(simulation.scheme):
+            raise ArgumentError("Extremes: accelerations: the run is static; there are none")
         self._in_c = simulation.watch(self._fractions)
-        self.by_itself = self._in_c is not None
-        shapes = (len(self._numbering.cells), len(self._fractions), 3), (self._numbering.size,)
+        self.by_itself = self._in_c is not None and not self._accelerated
+        size = self._numbering.size
+        shapes = (len(self._numbering.cells), len(self._fractions), 3), (size,), (size,)
         self._taken = []
-        for what, shape in zip(("forces", "q"), shapes, strict=True):
+        for what, shape in zip(self._names, shapes, strict=False):
             extent = Extent(*(np.full(shape, x) for x in (np.inf, -np.inf, 0.0, 0.0)))
             if state is not None:
                 names = [f"{what} {name}" for name in Extent._fields]
@@ -213,18 +222,35 @@ class Extremes(Restartable):
                 extent = Extent(*(state[name].copy() for name in names))
             self._taken.append(extent)
         if self._in_c is not None:
-            self._in_c.begin(-1 if state is None else simulation.substeps, *self._taken)
+            self._in_c.begin(-1 if state is None else simulation.substeps, *self._taken[:2])
+        self._before: Array = np.full((1 + size) * self._accelerated, np.nan)
         if state is None:
             self.write(simulation)
+        elif self._accelerated:
+            require_arrays(state, {"before": self._before.shape})
+            self._before = state["before"].copy()
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        """Names of the recorded quantities in a :meth:`state`."""
+        return ("forces", "q", *(("a",) if self._accelerated else ()))
 
     def write(self, simulation: StateView) -> None:
         """Include the state of a step."""
+        found = list[tuple[Extent, Array]]()
         if self._in_c is not None:
             self._in_c.add(simulation.substeps, simulation.t, simulation.q, simulation.q_before)
-            return
-        forces = simulation.now.cell_forces(0, self._fractions)
-        q = simulation.subdomain.gather(simulation.q)  # the same on every process
-        for extent, values in zip(self._taken, (forces, q), strict=True):
+        else:
+            forces = simulation.now.cell_forces(0, self._fractions)
+            q = simulation.subdomain.gather(simulation.q)  # the same on every process
+            found += zip(self._taken, (forces, q), strict=False)
+        if self._accelerated:
+            v = simulation.subdomain.gather(simulation.velocities()[0])
+            now = np.append(simulation.t, v)
+            change = now - self._before
+            found.append((self._taken[2], change[1:] / change[0]))
+            self._before[:] = now
+        for extent, values in found:
             for reached, when, beyond in (
                 (extent.low, extent.time_low, values < extent.low),
                 (extent.high, extent.time_high, values > extent.high),
@@ -239,13 +265,16 @@ class Extremes(Restartable):
 
     @property
     def _extents(self) -> list[Extent]:
-        """Extremes of forces and of motions."""
-        return self._taken if self._in_c is None else self._in_c.extents()
+        """Extremes of forces, of motions and, if they are recorded, of accelerations."""
+        return self._taken if self._in_c is None else [*self._in_c.extents(), *self._taken[2:]]
 
     def state(self) -> State:
         """Return the extremes so far, by name."""
-        extents = zip(("forces", "q"), self._extents, strict=True)
-        return {f"{k} {name}": x for k, extent in extents for name, x in extent._asdict().items()}
+        extents = zip(self._names, self._extents, strict=True)
+        more = {"before": self._before} if self._accelerated else {}
+        return more | {
+            f"{k} {name}": x for k, extent in extents for name, x in extent._asdict().items()
+        }
 
     @property
     def numbering(self) -> DofNumbering:
@@ -288,6 +317,34 @@ class Extremes(Restartable):
         Raises:
             ArgumentError: The object is not in the scene, or nothing was run.
         """
+        return self._at_nodes(1, owner)
+
+    def acceleration(self, owner: Member | Body) -> Extent:
+        """Return extremes of mean accelerations of steps; (n, 3); m/s², m/s², rad/s².
+
+        The rows are those of :meth:`displacement`, the values those of
+        :meth:`Solution.acceleration` if each step is stored.
+
+        Raises:
+            ArgumentError: Accelerations are not recorded, the object is not in the scene, or
+                nothing was run.
+
+        Example:
+            >>> floors = ub.Extremes(accelerations=True)
+            >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=floors)
+            >>> tip = floors.acceleration(beam).subset((-1, 1))
+            >>> bool(tip.high == np.nanmax(run.acceleration(beam.end)[:, 1]))
+            True
+        """
+        if not self._accelerated:
+            raise ArgumentError(
+                "Extremes: accelerations are not recorded; use Extremes(accelerations=True)"
+            )
+        return self._at_nodes(2, owner)
+
+    def _at_nodes(self, quantity: int, owner: Member | Body) -> Extent:
+        """Return the extremes of a quantity at the nodes of a beam or body; (n, 3)."""
+        numbering = self.numbering
         if isinstance(owner, Body):
-            return self._extents[1].subset(self.numbering.node(owner.middle).reshape(1, 3))
-        return self._extents[1].subset(self.numbering.dofs[self.numbering.nodes_along(owner)])
+            return self._extents[quantity].subset(numbering.node(owner.middle).reshape(1, 3))
+        return self._extents[quantity].subset(numbering.dofs[numbering.nodes_along(owner)])

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.arrays import State
+from ufl_beam.arrays import Array, State
 from ufl_beam.display import TIME, Parameter, bracketed
 from ufl_beam.errors import (
     ArgumentError,
@@ -22,12 +22,13 @@ from ufl_beam.errors import (
     require_function,
     require_sequence,
 )
+from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.bodies import AttachmentPoint, Place, require_place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
+from ufl_beam.output.output_files import OutputFile, beside, changed, require_arrays, require_path
 from ufl_beam.output.recorder import Restartable, StateView
 from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC, connector_indices
 from ufl_beam.parallel import on_first
@@ -35,6 +36,7 @@ from ufl_beam.parallel import on_first
 # -- table -----------------------------------------------------------------------------------------
 
 MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))  # columns of a place, and their units
+ACCELERATION = (("d2u/dt2", "m/s2"), ("d2v/dt2", "m/s2"), ("d2psi/dt2", "rad/s2"))
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of formulas in spreadsheets
 COMPONENTS = ("along", "across", "turn")  # motions of a bushing
 CONNECTOR = ("motion", "force", "work")  # columns of a connector
@@ -43,20 +45,24 @@ CONNECTOR = ("motion", "force", "work")  # columns of a connector
 class History(Restartable):
     """Recorder of motions, connectors and energies in a CSV file that is valid after a crash.
 
-    The columns are the time or load factor; u, v, psi of each place; motion, force, work of each
-    connector; and the entries of the energy ledger.  The names of the columns end in their units.
+    The columns are the time or load factor; u, v, psi of each place; accelerations; motion, force,
+    work of each connector; and the entries of the energy ledger.  The names of the columns end in
+    their units.  Accelerations are means since the previous row, as in
+    :meth:`Solution.acceleration`; in the first row they are NaN.
 
     Args:
         path: File, ending in ``.csv``.
         places: Places to follow, on beams and bodies.
         connectors: Connectors to follow, see
             :class:`~ufl_beam.output.state_rows.Connection`; a joint has several connectors.
+        accelerations: Places whose accelerations are recorded, in dynamics.
         every: Number of steps between rows.
         max_rows: Largest number of rows after the initial row.  If it would be exceeded, every
             other row is deleted and ``every`` is doubled.
 
     Raises:
         ArgumentError: An argument has a wrong type, or ``every`` or ``max_rows`` is not positive.
+            A run raises it if it is static and has places in ``accelerations``.
 
     Example:
         >>> table = ub.History("tip.csv", [beam.end])
@@ -71,6 +77,7 @@ class History(Restartable):
         places: Sequence[AttachmentPoint] = (),
         connectors: Sequence[Connector | Joint] = (),
         *,
+        accelerations: Sequence[AttachmentPoint] = (),
         every: int = 1,
         max_rows: int = sys.maxsize,
     ) -> None:
@@ -81,8 +88,11 @@ class History(Restartable):
         self._temporary = beside(self._path)  # replaces the file when rows are deleted
         self.files = (self._path,) if max_rows == sys.maxsize else (self._path, self._temporary)
         self._places = require_sequence(places, f"History {path}: places")
-        for i, place in enumerate(self._places):
-            require_place(place, f"History {path}: places[{i}]")
+        self._accelerated = require_sequence(accelerations, f"History {path}: accelerations")
+        for what, some in (("places", self._places), ("accelerations", self._accelerated)):
+            for i, place in enumerate(some):
+                require_place(place, f"History {path}: {what}[{i}]")
+        self._before: Array = np.zeros((0, 4))  # time and velocity of each in the previous row
         what = f"History {path}: connectors"
         self._connectors = require_all(connectors, what, (Connector, Joint))
         self._open: list[OutputFile] = []
@@ -96,6 +106,11 @@ class History(Restartable):
             for connector, name in _named_components(simulation.scene, followed)
         }
         names = [f"{c} {place} [{unit}]" for place in self._places for c, unit in MOTION]
+        names += [f"{c} {x} [{unit}]" for x in self._accelerated for c, unit in ACCELERATION]
+        if self._accelerated and not has_inertia(simulation.scheme):
+            raise ArgumentError(
+                f"History {self._path}: accelerations: the run is static; there are none"
+            )
         for connector, name in self._followed.items():
             is_rotation = simulation.scene.all_connectors[connector].is_rotation
             units = ("rad", "N m", "J") if is_rotation else ("m", "N", "J")
@@ -110,10 +125,14 @@ class History(Restartable):
         # Spreadsheets read such names as formulas, which may run programs
         self._header = _line([f"'{c}" if c.startswith(FORMULA) else c for c in columns])
         if state is None:
+            self._before = np.full((len(self._accelerated), 4), np.nan)
             row = self._row(simulation)
             self._every, self._steps = self._first_every, 0
             on_first(self._comm, lambda: self._write_anew(self._path, self._header + row))
         else:
+            if self._accelerated:
+                require_arrays(state, {"before": (len(self._accelerated), 4)})
+                self._before = state["before"].copy()
             self._every, self._steps, _, length = map(int, state["counts"])
             content, digest = (state[name].tobytes() for name in ("content", "digest"))
             on_first(self._comm, lambda: self._go_on(content, digest, length))
@@ -146,6 +165,11 @@ class History(Restartable):
 
     def _row(self, simulation: StateView) -> bytes:
         motion = [simulation.displacement(place) for place in self._places]
+        for i, place in enumerate(self._accelerated):
+            now = np.append(simulation.t, simulation.velocity(place))
+            change = now - self._before[i]
+            motion.append(change[1:] / change[0])
+            self._before[i] = now
         connectors = list(self._followed)
         connections = simulation.connections()[connectors, :3] if connectors else ()
         energies = [energy for group in simulation.entries() for energy in group.values()]
@@ -170,7 +194,10 @@ class History(Restartable):
 
         on_first(self._comm, sync)
         texts = {"content": content, "digest": digest}
-        return {"counts": counts, **{n: np.frombuffer(x, dtype=np.uint8) for n, x in texts.items()}}
+        numbers = {"counts": counts}
+        if self._accelerated:
+            numbers["before"] = self._before.copy()
+        return {**numbers, **{n: np.frombuffer(x, dtype=np.uint8) for n, x in texts.items()}}
 
     def _go_on(self, content: bytes, digest: bytes, length: int) -> None:
         """Open the file, or write its ``content`` anew, and cut off rows beyond ``length``."""

@@ -142,7 +142,13 @@ class ForcesAlongCells:
         self.angles: Array = chords[:, None] + np.nan_to_num(np.column_stack(both))
 
     def __call__(
-        self, cells: Index | slice, fractions: Array, resultants: Array, q: Array
+        self,
+        cells: Index | slice,
+        fractions: Array,
+        resultants: Array,
+        q: Array,
+        *,
+        in_plane: bool = False,
     ) -> Array:
         """Compute section forces at fractions of cells; N, N, N m.
 
@@ -152,9 +158,10 @@ class ForcesAlongCells:
             resultants: Resultants ``cell_number`` of loops.h of the cells; (9, num_cells).
             q: Configurations (u, v, ψ) of the nodes in which the forces are in equilibrium;
                 (num_cells, 3, degree + 1).
+            in_plane: Return forces along x and y instead of N and V.
 
         Returns:
-            (N, V, M); (num_cells, points, 3).
+            (N, V, M), or (F_x, F_y, M) with ``in_plane``; (num_cells, points, 3).
         """
         u, v, ψ = q[:, :, self._along].transpose(1, 0, 2)
         x, y = self._places[:, cells] + (u, v)
@@ -166,5 +173,6 @@ class ForcesAlongCells:
 
         angle = np.outer(start, 1 - fractions) + np.outer(end, fractions)
         angle += ψ @ mesh.weights(fractions).T
-        at = section_force(resultants[:, :, None], tangent, works=self._works)
-        return np.stack(in_section(at(fractions), np.cos(angle), np.sin(angle)), axis=2)
+        at = section_force(resultants[:, :, None], tangent, works=self._works)(fractions)
+        forces = at if in_plane else in_section(at, np.cos(angle), np.sin(angle))
+        return np.stack(forces, axis=2)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 from mpi4py import MPI
@@ -396,14 +396,28 @@ class States:
             ArgumentError: The beam of the place is not in the scene.
         """
         cell, fraction = self.numbering.cell_and_fraction(place)
-        n, dofs = range(len(self)), self.cells.along.dofs[cell]
+        return np.asarray(self.forces_in_cells([cell], [fraction])[:, 0])
+
+    def forces_in_cells(
+        self, cells: Sequence[int], fractions: Sequence[float], *, in_plane: bool = False
+    ) -> Array:
+        """Return (N, V, M) of :meth:`diagram` at a fraction of each of some cells; (n+1, m, 3).
+
+        With ``in_plane`` forces along x and y are returned instead of N and V.
+        """
+        n, chosen = range(len(self)), np.array(cells, dtype=np.int64)
+        dofs, forces = self.cells.along.dofs[chosen], np.zeros((len(n), len(chosen), 3))
         q = self.column("q")[:, dofs]
         if self.equilibrium_fraction < 1:
             before = np.array([self.before(k)[dofs] for k in n])
             q = (1 - self.equilibrium_fraction) * before + self.equilibrium_fraction * q
-        resultants = np.array([self.cell_resultants(k)[:, cell] for k in n]).T
-        forces = self.cells.along(np.full(len(n), cell), np.array([fraction]), resultants, q)
-        return np.asarray(forces[:, 0])
+        resultants = np.array([self.cell_resultants(k)[:, chosen] for k in n])
+        for i, (cell, at) in enumerate(zip(cells, fractions, strict=True)):
+            forces[:, i] = self.cells.along(
+                np.full(len(n), cell), np.full(1, at), resultants[:, :, i].T, q[:, i],
+                in_plane=in_plane,
+            )[:, 0]  # fmt: skip
+        return forces
 
     def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
         """Return section forces along a beam, by equilibrium of cells, at the n-th time.

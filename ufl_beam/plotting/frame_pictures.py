@@ -333,7 +333,7 @@ def draw_damage_state(
             )  # fmt: skip
             axes.add_collection(zones)
             placed = [beam.section.fibres for beam in solution.scene.beams]
-            cracks = any(p is not None and p.fibres.softening is not None for p in placed)
+            cracks = any(f.softening is not None for p in placed if p is not None for f in p.fibres)
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
             style.draw_bar(axes, colors, f"{title} ({prefix}J/m)")
         if hinges := open_hinges(solution, n, shape.nodes):

@@ -16,6 +16,7 @@ from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.display import html_page
 from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.bodies import AttachmentPoint
+from ufl_beam.output.engineering_results import Storeys
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
 from ufl_beam.plotting import notebook, style, symbols
@@ -39,6 +40,8 @@ COMPONENTS = {
     "u": ("displacement", "m"), "v": ("displacement", "m"), "psi": ("rotation", "rad"),
     "du/dt": ("velocity", "m/s"), "dv/dt": ("velocity", "m/s"),
     "dpsi/dt": ("angular velocity", "rad/s"),
+    "d2u/dt2": ("acceleration", "m/s²"), "d2v/dt2": ("acceleration", "m/s²"),
+    "d2psi/dt2": ("angular acceleration", "rad/s²"),
 }  # fmt: skip
 
 MOST_MODES, NUM_SHAPES = 6, 5  # numbers of modes, and of shapes of a solution, in a notebook
@@ -115,7 +118,7 @@ def draw_history(
     style.require_option(component, COMPONENTS, "plot: component")
     followed = (places,) if isinstance(places, AttachmentPoint) else tuple(places)
     number = list(COMPONENTS).index(component)
-    motion = solution.displacement if number < 3 else solution.velocity
+    motion = (solution.displacement, solution.velocity, solution.acceleration)[number // 3]
     quantity, unit = COMPONENTS[component]
     with style.panel(ax, (8.0, 4.2)) as axes:
         style.time_axes(axes)
@@ -267,6 +270,25 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
     title = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}", until
     shape = plane_canvas(solution, [], 1.0, ax, MOST)[0].undeformed
     return draw_frame(ax, solution, -1, shape, title, quantity, diagrams)
+
+
+def draw_storeys(storeys: Storeys, *, quantity: str = "drift", ax: Axes | None = None) -> Figure:
+    """Draw the largest and least drift ratio or shear of each storey over the height."""
+    factor, prefix = style.decimal_prefix(float(np.nanmax(np.abs(storeys.shear))))
+    drift = quantity == "drift"
+    values = np.asarray(100 * storeys.ratio if drift else storeys.shear / factor)
+    label = "drift ratio (%)" if drift else f"storey shear ({prefix}N)"
+    edges = [place.point[1] for place in storeys.levels]
+    with style.panel(ax, (5.0, 6.0)) as axes:
+        axes.axvline(0.0, color=GREY, linewidth=1.0, zorder=1)
+        for name, extreme, color in (("largest", np.nanmax, RED), ("least", np.nanmin, BLUE)):
+            profile = np.repeat(extreme(values, axis=0), 2)
+            axes.plot(profile, np.repeat(edges, 2)[1:-1], color=color, label=name)
+        axes.set_yticks(edges)
+        axes.grid(axis="y", linewidth=0.8)
+        axes.set(xlabel=label, ylabel="y (m)")
+        style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
+    return style.parent_figure(axes)
 
 
 def draw_study(study: Study) -> Figure:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ufl_beam.analysis.section_analysis import InteractionDiagram, MomentCurvature
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError
 from ufl_beam.model.bodies import Member, Place
@@ -71,8 +72,7 @@ def dissipated_per_length(solution: Solution, n: int) -> Array:
     numbering = solution.numbering
     energy = np.zeros(len(numbering.cells))
     for beam in solution.scene.beams:
-        section_points = beam.section.section_points(None)
-        if section_points is not None and not section_points.elastic:
+        if not all(points.elastic for points in beam.section.section_points(None)):
             state = solution.material(beam, n)
             cracks = state.hinge if beam.section.fibres is not None else 0.0
             energy[numbering.cells_of(beam)] = state.plastic + cracks
@@ -115,6 +115,35 @@ def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
         _draw_path(axes, ax, solution, K, M)
         axes.set_xlabel("curvature K (1/m)")
         axes.set_title(f"cell at {place}", loc="left")
+    return style.parent_figure(axes)
+
+
+def draw_section_moments(result: MomentCurvature, *, ax: Axes | None = None) -> Figure:
+    """Draw moments (N m) of a section against curvatures (1/m); a dot marks the last state."""
+    with style.panel(ax, (8.0, 5.4)) as axes:
+        for at_zero in (axes.axhline, axes.axvline):
+            at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
+        axes.plot(result.curvature, result.moment, color=BLUE)
+        axes.plot(result.curvature[-1], result.moment[-1], "o", color=BLUE)
+        axes.set_xlabel("curvature K (1/m)")
+        _label_axis(axes.yaxis, result.moment, "bending moment M", "N m")
+        forces = [with_unit(N, "N") for N in (result.N.min(), result.N.max())]
+        axes.set_title(f"axial force {' to '.join(dict.fromkeys(forces))}", loc="left")
+    return style.parent_figure(axes)
+
+
+def draw_interaction(diagram: InteractionDiagram, *, ax: Axes | None = None) -> Figure:
+    """Draw axial forces (N) against moments (N m) at limit strains; compression is at the top."""
+    with style.panel(ax, (7.0, 6.0)) as axes:
+        for at_zero in (axes.axhline, axes.axvline):
+            at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
+        axes.plot(diagram.M, diagram.N, color=BLUE)
+        axes.fill(diagram.M, diagram.N, facecolor=(BLUE, 0.08), linewidth=0.0, zorder=0)
+        axes.yaxis.set_inverted(True)
+        _label_axis(axes.xaxis, diagram.M, "bending moment M", "N m")
+        _label_axis(axes.yaxis, diagram.N, "axial force N", "N")
+        ends = (with_unit(N, "N") for N in (diagram.N.min(), diagram.N.max()))
+        axes.set_title(f"axial force from {' to '.join(ends)}", loc="left")
     return style.parent_figure(axes)
 
 

@@ -13,12 +13,13 @@ from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import AttachmentPoint, Body, Member, Place, Velocity
 from ufl_beam.model.connectors import law_of, place_of
 from ufl_beam.model.functions import TimeFunction, steady
+from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.loads import FollowerLoad, LineLoad, LoadAtPlace
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.plotting import positions, symbols
 from ufl_beam.plotting.positions import Candidate, directions, normal, points_along, unit_vectors
-from ufl_beam.plotting.style import GREEN, INK, RED, TEXT, WHITE, number, with_unit
+from ufl_beam.plotting.style import BLUE, GREEN, INK, RED, TEXT, WHITE, number, with_unit
 from ufl_beam.plotting.symbols import FRONT, Stroke, disc
 
 LOAD_LABELS, MOTIONS, CAPTIONS, NAMES = range(
@@ -67,17 +68,19 @@ class Subject:
         ends = [(x[0], x[1], x[-1], x[-2]) for x in self.axes.values()]
         self._ends: Array = np.reshape(ends, (-1, 2, 2))
 
-    def line(self, load: LineLoad) -> tuple[Array, Array]:
-        """Return points of the axis in the span of a load, (n, 2); m, and factors of its profile.
+    def line(self, load: LineLoad | ImposedStrain) -> tuple[Array, Array]:
+        """Return points of the axis in the span of a load, (n, 2); m, and its factors or strains.
 
-        The points are the vertices and, with a profile that varies, 99 points between the ends.
+        The points are the vertices and, if factors or strains vary, 99 points between the ends.
         """
         s = np.array(load.beam.vertices(self.scene.attached[load.beam]))
         low, high = (np.abs(s - end).argmin() for end in load.span)
         s = s[low : high + 1]
-        if callable(load.profile) or load.profile[0] != load.profile[1]:
+        profile = load.profile if isinstance(load, LineLoad) else load.strains
+        if callable(profile) or profile[0] != profile[1]:
             s = np.union1d(s, np.linspace(s[0], s[-1], 101))
-        return np.array([load.beam.curve(x) for x in s], float), load.factors(s)
+        axis = np.array([load.beam.curve(x) for x in s], float)
+        return axis, load.strains(s) if isinstance(load, ImposedStrain) else load.factors(s)
 
     def directions_at(self, place: AttachmentPoint) -> Array:
         """Return the directions in which beams leave a place; (n, 2)."""
@@ -166,6 +169,8 @@ def draw(subject: Subject, scale: float) -> Drawing:
     for load in sorted(scene.loads, key=lambda load: not isinstance(load, LineLoad)):
         if isinstance(load, LineLoad):
             _draw_line_load(drawing, load)
+        elif isinstance(load, ImposedStrain):
+            _draw_imposed_strain(drawing, load)
         elif isinstance(load, LoadAtPlace):
             _draw_point_load(drawing, load)
     for velocity in scene.initial:
@@ -359,6 +364,24 @@ def _draw_line_load(drawing: Drawing, load: LineLoad) -> None:
         drawing.write(text, RED, LOAD_LABELS, _along(axis, 0.9 * unit))
     if not size and not moment:
         drawing.write("0 N/m", RED, LOAD_LABELS, _along(axis, 0.0))
+
+
+def _draw_imposed_strain(drawing: Drawing, load: ImposedStrain) -> None:
+    """Draw lines on both sides of a beam, red where it becomes longer, blue where shorter."""
+    (axis, strains), unit = drawing.subject.line(load), drawing.outside
+    middle = (strains[1:] + strains[:-1]) / 2
+    left, depth = normal(unit_vectors(np.diff(axis, axis=0))), load.beam.section.depth
+    apart = 0.5 * unit + drawing.stack((load.beam, "strain"), 0.3 * unit)
+    for side in (1.0, -1.0):
+        fibre = middle[:, 0] - side * middle[:, 2] * depth / 2
+        for k in np.flatnonzero(fibre):
+            line = axis[k : k + 2] + side * apart * left[k]
+            drawing.strokes["loads"] += [Stroke(line, RED if fibre[k] > 0 else BLUE, 1.6)]
+    largest = strains[np.abs(strains).argmax(axis=0), range(3)]
+    sizes = zip(("ε", "γ", "κ"), largest, ("", "", " 1/m"), strict=True)
+    text = ", ".join(f"{x} = {number(size)}{unit_of}" for x, size, unit_of in sizes if size)
+    spots = _along(axis, apart + 0.3 * unit)
+    drawing.write(in_time(text or "ε = 0", load.amplitude), RED, LOAD_LABELS, spots)
 
 
 # -- motions -----------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from ufl_beam.analysis.parameter_study import Study
-from ufl_beam.display import html_page
+from ufl_beam.display import Tabular, html_page
 from ufl_beam.plotting.style import png
 from ufl_beam.terms.energy_ledger import Energy
 
@@ -39,6 +39,13 @@ def study_page(results: Study) -> str:
     ]
     more = f"and {len(results) - ROWS} more cases" if len(results) > ROWS else ""
     return lines(title) + table((*names, *scalars), rows) + lines(more, *arrays, *failed)
+
+
+@html_page.register
+def tabular_page(shown: Tabular) -> str:
+    """Write a result in columns as a table in HTML."""
+    head, *rows = shown.texts()
+    return table(head, rows)
 
 
 def lines(*texts: str) -> str:

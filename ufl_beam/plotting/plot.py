@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
+from ufl_beam.analysis.section_analysis import InteractionDiagram, MomentCurvature
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.engineering_results import Storeys
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
 from ufl_beam.plotting.frame_pictures import draw_damage_state, draw_shape
@@ -23,10 +25,17 @@ from ufl_beam.plotting.history_pictures import (
     draw_history,
     draw_modes,
     draw_shapes,
+    draw_storeys,
     draw_study,
     draw_tradeoff,
 )
-from ufl_beam.plotting.inelastic_pictures import draw_dissipation, draw_hinge, draw_moment_curvature
+from ufl_beam.plotting.inelastic_pictures import (
+    draw_dissipation,
+    draw_hinge,
+    draw_interaction,
+    draw_moment_curvature,
+    draw_section_moments,
+)
 from ufl_beam.plotting.model import draw_model
 from ufl_beam.plotting.style import RESULTANTS
 from ufl_beam.simulation.solution import Solution
@@ -49,9 +58,12 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     },
     Shapes: {"modes": draw_modes},
     Extremes: {name: partial(draw_extremes, quantity=name) for name in ("M", "N", "V")},
+    Storeys: {name: partial(draw_storeys, quantity=name) for name in ("drift", "shear")},
     Fatigue: {"cycles": draw_cycles},
     Study: {"results": draw_study},
     Tradeoff: {"errors": draw_tradeoff},
+    MomentCurvature: {"moment-curvature": draw_section_moments},
+    InteractionDiagram: {"interaction": draw_interaction},
 }
 """Pictures by class and quantity; the first one of a class is drawn by default."""
 
@@ -61,25 +73,28 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
 
     By default, the first quantity of the class is drawn.  A ``Path`` is a ``Solution``.
 
-    ===============  ==================  ========================================================
-    shown            quantity            picture and further arguments
-    ===============  ==================  ========================================================
-    Scene            "model"             the whole model, before any run; ``ax``
-    Solution         "shape"             the frame at one time; ``n``, ``magnify``, ``ax``
-    Solution         "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
-    Solution         "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
-    Solution         "shapes"            several shapes; ``times`` or ``count``, ``magnify``, ``ax``
-    Solution         "history"           motion over time; places, ``component``, ``ax``
-    Solution         "energy"            the energy ledger over time
-    Solution         "dissipation"       energy losses over time; ``ax``
-    Solution         "hinge"             moment of a hinge over its jump; a place, ``ax``
-    Solution         "moment-curvature"  moment of a cell; a place, ``ax``
-    Modes, Buckling  "modes"             shapes side by side; ``numbers``, ``amplitude``
-    Extremes         "M", "N", "V"       envelope of a section force; ``ax``
-    Fatigue          "cycles"            rainflow matrix and spectrum; a hot spot
-    Study            "results"           results over the cases
-    Tradeoff         "errors"            errors over wall times; ``ax``
-    ===============  ==================  ========================================================
+    ==================  ==================  ========================================================
+    shown               quantity            picture and further arguments
+    ==================  ==================  ========================================================
+    Scene               "model"             the whole model, before any run; ``ax``
+    Solution            "shape"             the frame at one time; ``n``, ``magnify``, ``ax``
+    Solution            "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
+    Solution            "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
+    Solution            "shapes"            shapes; ``times`` or ``count``, ``magnify``, ``ax``
+    Solution            "history"           motion over time; places, ``component``, ``ax``
+    Solution            "energy"            the energy ledger over time
+    Solution            "dissipation"       energy losses over time; ``ax``
+    Solution            "hinge"             moment of a hinge over its jump; a place, ``ax``
+    Solution            "moment-curvature"  moment of a cell; a place, ``ax``
+    Modes, Buckling     "modes"             shapes side by side; ``numbers``, ``amplitude``
+    Extremes            "M", "N", "V"       envelope of a section force; ``ax``
+    Storeys             "drift", "shear"    extremes over the height; ``ax``
+    Fatigue             "cycles"            rainflow matrix and spectrum; a hot spot
+    Study               "results"           results over the cases
+    Tradeoff            "errors"            errors over wall times; ``ax``
+    MomentCurvature     "moment-curvature"  moment of a section over its curvature; ``ax``
+    InteractionDiagram  "interaction"       axial force over moment of a section; ``ax``
+    ==================  ==================  ========================================================
 
     Args:
         shown: Object to draw.
@@ -88,10 +103,10 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             hot spot of "cycles".
         options: ``n`` is the index of a recorded time, negative from the end.  ``magnify`` is a
             factor on displacements.  ``times`` (s) are replaced by the nearest recorded times;
-            ``count`` is a number of shapes.  ``component`` is "u", "v", "psi", "du/dt", "dv/dt" or
-            "dpsi/dt".  ``numbers`` are indices of modes, all by default.  ``amplitude`` is their
-            largest displacement, as a fraction of the size of the scene.  ``ax`` are axes to draw
-            in, instead of a new figure.
+            ``count`` is a number of shapes.  ``component`` is "u", "v" or "psi", or a rate of one
+            of them, such as "du/dt" or "d2u/dt2".  ``numbers`` are indices of modes, all by
+            default.  ``amplitude`` is their largest displacement, as a fraction of the size of the
+            scene.  ``ax`` are axes to draw in, instead of a new figure.
 
     Raises:
         ArgumentError: There is no such picture, or one of its arguments is wrong; the message says

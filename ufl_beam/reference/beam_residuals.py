@@ -37,20 +37,19 @@ from ufl_beam.reference.cell_forms import (
     point_masses,
     put,
 )
+from ufl_beam.reference.imposed_strains import ImposedStrains
 from ufl_beam.reference.return_map import MaterialPoints
 
 
 class ElasticBeams(CellForce):
     """Elastic cells, with resultants and virtual strains of the time scheme."""
 
-    def __init__(self, indices: Index, setting: Setting) -> None:
+    def __init__(self, indices: Index, setting: Setting, t0: float) -> None:
         cells, scheme = Cells(setting.numbering, indices), setting.scheme
-        element = cells.element
-        C, e0, e1 = (
-            element.stiffness,
-            strain(element.q0, element.axis),
-            strain(element.q1, element.axis),
-        )
+        element, self.imposed = cells.element, ImposedStrains(cells, setting, t0)
+        imposed, C = self.imposed, element.stiffness
+        e0 = strain(element.q0, element.axis) - imposed.before
+        e1 = strain(element.q1, element.axis) - imposed.now
         r, losses = scheme.resultants(C, e0, e1, element.constant), []
         if scheme.alpha:
             losses.append(2 * element.constant(scheme.alpha) * elastic_energy(e1 - e0, C))
@@ -58,13 +57,20 @@ class ElasticBeams(CellForce):
             bool(scheme.lost_fraction),
             element.at_points(3),
         )
+        acting = (
+            scheme.weight_of_before * scheme.resultants(C, e0, e0, element.constant)
+            + (1 - scheme.weight_of_before) * r
+        )
+        change = ufl.dot(acting, imposed.now - imposed.before) * element.dx(1)
+        self._work_on_imposed, self._supplied = cells.form(change), setting.ledger.supplied
         if scheme.lost_fraction:
             # c C (Δe - r Δe') with Δe' of the last step and r = min(1, dt / length of last step)
+            whole = strain(element.q1, element.axis) - strain(element.q0, element.axis)
             damped = element.constant(scheme.lost_fraction) * resultants(
-                e1 - e0 - self._change_before, C
+                whole - self._change_before, C
             )
             r = r + damped
-            losses.append(virtual_work(damped, e1 - e0))
+            losses.append(virtual_work(damped, whole))
         w_e = scheme.virtual_strain(element.q0, element.q1, element.w, element.axis)
         energy = elastic_energy(e1, C) * element.dx(1), "stored"
         lost = (sum(losses) * element.dx(1), "numerical") if losses else None
@@ -78,15 +84,23 @@ class ElasticBeams(CellForce):
     def response(self, step: Step, q1: Array) -> Response:
         """Return the virtual work, and its derivative; both may depend on the last step."""
         put(self._change_before, min(1.0, step.dt / self._last_dt) * self._last_change)
+        self.imposed.begin(step)
         return super().response(step, q1)
 
     def change(self, step: Step, q1: Array) -> float:
-        """Return the energy stored in the step to ``q1``; J."""
-        return self.energy(q1) - self.stored["stored"]
+        """Return the energy stored in the step, and the work on imposed strains; J."""
+        return self.energy(q1) - self.stored["stored"] + self.work_on_imposed()
+
+    def work_on_imposed(self) -> float:
+        """Return the work of the resultants on the change of imposed strains in the step; J."""
+        return float(self._work_on_imposed.assembled())
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Accept the end of the step; store the changes of the strains if the scheme uses them."""
         super().accept(step, q1, s)
+        if self.imposed.change.any():
+            self._supplied["loads"] -= self.work_on_imposed()
+        self.imposed.accept()
         if self._decays:
             self._last_change = self.cells.strains(q1) - self.cells.strains(step.q0)
             self._last_dt = step.dt
@@ -111,9 +125,13 @@ class YieldingBeams(CellForce):
     material and a geometric part.
     """
 
-    def __init__(self, indices: Index, section_points: SectionPoints, setting: Setting) -> None:
+    def __init__(
+        self, indices: Index, section_points: SectionPoints, setting: Setting, t0: float
+    ) -> None:
         cells, numbering = Cells(setting.numbering, indices), setting.numbering
         element, self._hinges = cells.element, section_points.hinges
+        self.imposed, self._supplied = ImposedStrains(cells, setting, t0), setting.ledger.supplied
+        self._weight = setting.scheme.weight_of_before
         self._r, self._b, self._D = (
             element.at_points(3),
             element.at_points(3),
@@ -124,6 +142,7 @@ class YieldingBeams(CellForce):
         work, around = (virtual_work(r, w_e) * element.dx(1) for r in (self._r, linear))
         super().__init__(cells, work, setting, around=around)
         self._degree = numbering.mesh.degree
+        self._rows = cells.cell_indices + section_points.number * len(numbering.cells)
         self._names = [
             numbering.describe_cell(number) for number in cells.cell_indices.repeat(self._degree)
         ]
@@ -134,25 +153,38 @@ class YieldingBeams(CellForce):
 
     def response(self, step: Step, q1: Array) -> Response:
         """Return the virtual work after a return map, and its consistent tangent."""
-        points = self.points
-        points.return_map(self.cells.strains(q1).reshape(-1, 3), step.dt)
+        points, whole = self.points, self.cells.strains(q1).reshape(-1, 3)
+        self.imposed.begin(step)
+        points.return_map(whole - self.imposed.values.reshape(-1, 3), step.dt)
         put(self._r, points.r)
-        put(self._b, points.r - np.einsum("kij,kj->ki", points.D, points.strains))
+        put(self._b, points.r - np.einsum("kij,kj->ki", points.D, whole))
         put(self._D, points.D)
         return super().response(step, q1)
 
     def change(self, step: Step, q1: Array) -> float:
-        """Return the energy stored and dissipated in the step of the latest response; J."""
+        """Return the energy stored and dissipated in the step, and the work on imposed strains."""
         self.points.require_dissipation(self._names)
-        return self.points.change()
+        return self.points.change() + self.work_on_imposed()
+
+    def work_on_imposed(self) -> float:
+        """Return the work of the resultants on the change of imposed strains in the step; J."""
+        before, w = self.points.recorded[:, :3], self._weight
+        acting = w * before + (1 - w) * self.points.r
+        change = self.imposed.change.reshape(-1, 3)
+        lengths = np.outer(self.cells.lengths, self.cells.weights).ravel()
+        return float(lengths @ np.einsum("ki,ki->k", acting, change))
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Accept the internal variables at the end of the step."""
+        if self.imposed.change.any():
+            self._supplied["loads"] -= self.work_on_imposed()
+        self.imposed.accept()
         self.points.accept()
 
     def start(self, q: Array) -> None:
         """Compute the accepted state of the points at the strains of a configuration."""
-        self.points.start(self.cells.strains(q).reshape(-1, 3))
+        strains = self.cells.strains(q) - self.imposed.values
+        self.points.start(strains.reshape(-1, 3))
 
     @property
     def stored(self) -> Mapping[str, float]:  # type: ignore[override]
@@ -161,16 +193,15 @@ class YieldingBeams(CellForce):
 
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the internal variables of all points."""
-        indices, state = self.cells.cell_indices, self.points.state()
-        rows = archive.rows("cells", indices, state.reshape(len(indices), -1))
+        state = self.points.state()
+        rows = archive.rows("cells", self._rows, state.reshape(len(self._rows), -1))
         self.points.state(rows.reshape(state.shape))
 
     def material(self) -> Array:
-        """Return the number of each integration point and its six values "material"; (n, 7)."""
-        data, points = self.points.recorded.copy(), np.arange(self._degree)
+        """Return the six values "material" at each Gauss point; (num_cells, degree, 6)."""
+        data = self.points.recorded.copy()
         data[:, 3] *= self._hinges  # zero without a hinge: jumps of fibres are no rotations
-        numbers = self._degree * self.cells.cell_indices[:, None] + points
-        return np.column_stack([numbers.ravel(), data])
+        return data.reshape(-1, self._degree, 6)
 
 
 # -- inertia and damping -------------------------------------------------------------------------

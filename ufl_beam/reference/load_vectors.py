@@ -17,6 +17,7 @@ from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import Step, acting, has_inertia
 from ufl_beam.model.bodies import GROUND, moves_with_node
 from ufl_beam.model.functions import value_at
+from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.works import Potential, Work
 from ufl_beam.reference.beam_residuals import Mass
@@ -287,6 +288,8 @@ def all_loads(setting: Setting, mass: Mass | None, t0: float) -> list[LoadForce 
             loads.append(FrameForce(load, setting, mass or Mass(setting.numbering)))
         elif isinstance(load, FollowerLoad):
             loads.append(Follower(load, setting))
+        elif isinstance(load, ImposedStrain):  # see imposed_strains.py
+            setting.ledger.supplied["loads"] += 0.0
         else:
             loads.append(DeadLoad(load, setting))
     return [*loads, *(WorkForce(work, setting, t0) for work in setting.numbering.scene.works)]

@@ -135,10 +135,10 @@ class Solver(PresentState):
         rest = np.arange(len(numbering.cells))
         self.yielding: list[YieldingBeams] = []
         for section_points, cells in numbering.inelastic:
-            self.yielding.append(YieldingBeams(cells, section_points, setting))
+            self.yielding.append(YieldingBeams(cells, section_points, setting, t))
             rest = np.setdiff1d(rest, cells)
-        elastic = [ElasticBeams(rest, setting)] if len(rest) else []
-        self.beams = [*self.yielding, *elastic]
+        elastic = [ElasticBeams(rest, setting, t)] if len(rest) else []
+        self.beams: list[ElasticBeams | YieldingBeams] = [*self.yielding, *elastic]
         self.connectors = all_connectors(setting)
         self.inertia = None
         if has_inertia(scheme):
@@ -178,6 +178,8 @@ class Solver(PresentState):
         loads: Array = np.zeros(self.numbering.size)
         if self._continues or (has_inertia(scheme) and scheme.further_rates):
             loads = sum((load.equilibrium(self.t, self.q, v) for load in self.loads), loads)
+            for beam in self.beams:
+                beam.imposed.start(self.t)
         known = same and "reactions" in variables
         if not same:  # rates and forces of the last step belong to the forces before the jump
             lasting = (n for n, x in variables.items() if x.ndim == 2 or n == "reactions")
@@ -325,6 +327,7 @@ class Solver(PresentState):
         work = float(acting(self.scheme, self._inner_before, self._inner) @ s)
         size = abs(work) + abs(in_beams)
         size += sum(float(np.abs(group.taken(q1)).sum()) for group in self._groups)
+        size += sum((abs(beam.work_on_imposed()) for beam in self.beams), 0.0)
         energies = (abs(x) for account in vars(self.ledger).values() for x in account.values())
         slack = self.scheme.slack * size + KINK_WORK * sum(energies) + sys.float_info.min
         slack += float(self._round_off(self.supports.axes @ q1) @ np.abs(s))
@@ -590,14 +593,18 @@ class Solver(PresentState):
         reactions = np.array(self.supports.forces())
         for k, support in enumerate(self.scene.supports):  # in the axes of the support
             reactions[k, :2] = turned(reactions[k, :2], np.full(1, -support.angle))[0]
-        rows = np.concatenate([np.zeros((0, 7)), *(beams.material() for beams in self.yielding)])
+        degree = self.numbering.mesh.degree
+        material = np.zeros((len(self.numbering.inelastic_cells), degree, 6))
+        for beams in self.yielding:
+            rows = np.searchsorted(self.numbering.inelastic_cells, beams.cells.cell_indices)
+            material[rows] += beams.material()
         state = {"t": np.array(self.t), "q": self.q, "reactions": reactions}
         if self.inertia is not None:
             state["v"] = self.inertia.v
         for account, energies in vars(self.ledger).items():
             state |= {f"{account}: {name}": np.array(value) for name, value in energies.items()}
         state |= {
-            "connectors": self.connections(), "material": rows[np.argsort(rows[:, 0]), 1:],
+            "connectors": self.connections(), "material": material.reshape(-1, 6),
             FORCES: np.zeros((9, len(self.numbering.cells))) + self.on_nodes,
         }  # fmt: skip
         between = float(self.scheme.average(0.0, 1.0))

@@ -224,11 +224,14 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     length = np.linalg.norm(d, axis=1)
     along, shear = (np.sum(apart * axis, axis=1) / length for axis in (d, across))
     strains = np.column_stack([along, shear, change[:, 2]])
-    left_in_cells = np.ones(len(numbering.cells))
+    # Works of the tangent, and of the elastic stiffness, at the Gauss points
+    works = np.zeros((2, len(numbering.cells), numbering.mesh.degree))
     for beams in equation.inelastic:
         cells, p = beams.recorded()[0], numbering.mesh.degree
-        remaining = beams.points.remaining(strains[cells].repeat(p, axis=0))
-        left_in_cells[cells] = remaining.reshape(-1, p).min(axis=1)
+        in_points = beams.points.works(strains[cells].repeat(p, axis=0))
+        works[:, cells] += in_points.reshape(2, -1, p)
+    now, elastic = works
+    left_in_cells = np.divide(now, elastic, out=np.ones_like(now), where=elastic > 0).min(axis=1)
     if subdomain.comm.size > 1:
         subdomain.comm.Allreduce(MPI.IN_PLACE, connectors)
         subdomain.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)
@@ -264,15 +267,12 @@ def _describe(
     if ways:
         verb = "gives way" if len(ways) == 1 else "give way together"
         said += f"; {_list(ways)} {verb} at no further force"
-    layouts = (
-        numbering.scene.beams[numbering.beam_of_cell[i]].section.section_points(None)
-        for i in cells.soft
-    )
+    sections = (numbering.scene.beams[numbering.beam_of_cell[i]].section for i in cells.soft)
     laws = (
         law
-        for section_points in layouts
-        if section_points is not None
-        for law, _ in section_points.laws
+        for section in sections
+        for points in section.section_points(None)
+        for law, _ in points.laws
     )
     perfect = any(isinstance(law, ElastoPlastic) and law.bounded and law.opens for law in laws)
     if len(cells.soft) > 1 and perfect:
@@ -331,9 +331,9 @@ class LedgerWatch:
         self._numbering, self._tolerance = numbering, tolerance
         connectors, laws = numbering.scene.all_connectors, list[MaterialLaw]()
         for beam in numbering.scene.beams:
-            section_points = beam.section.section_points(beam.section.hinge)
-            if section_points is not None and not section_points.elastic:
-                laws += [law for law, _ in section_points.laws]
+            points = beam.section.section_points(beam.section.hinge)
+            if not all(of_class.elastic for of_class in points):
+                laws += [law for of_class in points for law, _ in of_class.laws]
         springs = [
             connector.law.law for connector in connectors if isinstance(connector.law, Spring)
         ]

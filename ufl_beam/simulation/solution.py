@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,14 +18,17 @@ from ufl_beam.discretization.state_io import State
 from ufl_beam.display import TIME, Rich
 from ufl_beam.errors import ArgumentError, require_kind, warn
 from ufl_beam.mechanics.time_scheme import Scheme
-from ufl_beam.model.bodies import Member, Place
+from ufl_beam.model.bodies import AttachmentPoint, Member, Place
 from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import Curve, Table, nearest, parameter_step
+from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import START_INTERVAL
-from ufl_beam.model.loads import LineLoad
+from ufl_beam.model.loads import LineLoad, profile_at
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.engineering_results import HingeTable, Storeys, hinges_of, storeys_of
 from ufl_beam.output.output_files import (
     Content,
     WrongReader,
@@ -173,11 +178,12 @@ class Solution(States, Rich):
                 return SavedCurve.sampled(function, 0.0, 1.0, numbering.parameters(owner))
             if field == "curve":
                 return _used_curve(self, function)
-            if isinstance(owner, LineLoad) and field == "profile":
+            if isinstance(owner, LineLoad | ImposedStrain) and field != "amplitude":
                 even = np.linspace(*owner.span, SAMPLES + 1)
                 s = np.union1d(numbering.gauss_parameters(owner.beam), even)
                 s = s[(s >= owner.span[0]) & (s <= owner.span[1])]
-                return Table(tuple(map(float, s)), tuple(map(float, owner.factors(s))))
+                values = profile_at(s, function, owner.span, f"{owner}: {field}")
+                return Table(tuple(map(float, s)), tuple(map(float, values)))
             if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):
                 return SavedFunction.sampled(function, map(float, self.times))
             return None
@@ -213,6 +219,80 @@ class Solution(States, Rich):
     def progress(self) -> Array:
         """Increasing abscissa of the stored states, here the time; (n+1,); s."""
         return self.times
+
+    def acceleration(self, place: AttachmentPoint) -> Array:
+        """Return the mean acceleration of a place in each step; (n+1, 3); m/s², m/s², rad/s².
+
+        It is the change of the velocity since the previous stored time, divided by the time between
+        both, and is exact to second order in the middle of this interval.  In midpoint schemes
+        :meth:`reaction` and section forces of the same row are in equilibrium with it.  The first
+        row is NaN.  See docs/results.md for values at the stored times, and for moving supports.
+
+        Raises:
+            ArgumentError: The run was static, or the beam or body is not in the scene.
+
+        Example:
+            >>> a = solution.acceleration(beam.end)[:, 1]
+            >>> np.allclose(np.diff(solution.times) @ a[1:], solution.velocity(beam.end)[-1, 1])
+            True
+        """
+        if not len(self.column("v")):
+            raise ArgumentError("acceleration: the run was static; there is none")
+        change = np.diff(self.velocity(place), axis=0) / np.diff(self.times)[:, None]
+        return np.concatenate([np.full((1, 3), math.nan), change])
+
+    def storeys(self, levels: Sequence[AttachmentPoint]) -> Storeys:
+        """Return drifts and shears of the storeys between levels; y points upwards.
+
+        The drift of a storey is the difference of the horizontal displacements of its two levels.
+        Its shear is the sum of the horizontal forces in beams, links and connectors that a
+        horizontal cut just above its lower level meets.  A cut through the feet of all columns
+        bears the base shear.
+
+        Args:
+            levels: A place at each level, from the feet of the columns to the roof.
+
+        Raises:
+            ArgumentError: A level is not above the one before it, nothing is cut above a level, or
+                a body is cut.
+
+        Example:
+            >>> mast = ub.Beam((0, 0), (0, 3), section)
+            >>> wind = ub.LineLoad(mast, force=(500, 0))  # N/m
+            >>> tower = ub.Scene([mast], supports=[ub.Clamped(mast.start)], loads=[wind])
+            >>> run = ub.simulate(tower, ub.Static(), t=(0, 1), dt=1.0)
+            >>> print(run.storeys([mast.start, mast.at(0.5), mast.end]).shear[-1].round(6))  # N
+            [1500.  750.]
+        """
+        return storeys_of(self, levels, self.parameter)
+
+    def hinges(
+        self,
+        limits: Mapping[str, float] = MappingProxyType({}),
+        *,
+        of: Sequence[Member | Connector] | None = None,
+    ) -> HingeTable:
+        """Return rotations, ductility and dissipated energy of all hinges, as a table.
+
+        The rows are in the order of first yielding.  They are all hinges of zero length, open
+        hinges of cells, rotational connectors that may yield or soften, and beams with yielding or
+        cracking cells, of which only the energy is known.  See docs/results.md.
+
+        Args:
+            limits: Acceptance limits of the plastic rotation by name, in increasing order, as in
+                ``{"IO": 0.01, "LS": 0.025, "CP": 0.04}``; rad.
+            of: Beams and connectors whose hinges are listed; all by default.
+
+        Raises:
+            ArgumentError: A limit is not positive or not above the limit before it, or a beam or
+                connector is not in the scene.
+
+        Example:
+            >>> (row,) = broken.hinges({"IO": 0.01, "LS": 0.1}).rows
+            >>> print(row.where, row.state)
+            beam.start (0, 0) LS
+        """
+        return hinges_of(self, limits, of, self.parameter)
 
     def hinge_place_error(self) -> dict[Member, float]:
         """Return the largest relative error of the hinge limit, by beam with open embedded hinges.
@@ -363,7 +443,13 @@ class Opened:
         middle = numbering.mesh.degree == 1
         for beam in numbering.scene.beams:
             cells, laws = numbering.cells_of(beam), numbering.hinges(beam)
-            fall = {law: _fall(beam.section.section_points(law), scheme) for law in set(laws)}
+            fall = {
+                law: max(
+                    (_fall(points, scheme) for points in beam.section.section_points(law)),
+                    default=(0.0, 0.0),
+                )
+                for law in set(laws)
+            }
             falls, energies = np.array([fall[law] for law in laws]).T[:, :, None]
             opened = (self.first[cells] > 0) & (self.dissipated[cells] >= energies)
             lengths = numbering.section_lengths(cells).reshape(opened.shape)
@@ -406,14 +492,14 @@ def _percent(fraction: float) -> str:
     return f"{100 * fraction:.2g} %" if fraction <= 1 else "more than 100 %"
 
 
-def _fall(section_points: SectionPoints | None, scheme: Scheme) -> tuple[float, float]:
+def _fall(section_points: SectionPoints, scheme: Scheme) -> tuple[float, float]:
     """Return the steepest softening slope, divided by θ times a stiffness (1/m), and an energy (J).
 
     The stiffness is the least stiffness of points that can break.  The energy is the least energy
     that a cell dissipates up to the steepest slope.  Both results are zero without softening.
     """
-    law = None if section_points is None else section_points.softening
-    if section_points is None or law is None or law.limit == 0:
+    law = section_points.softening
+    if law is None or law.limit == 0:
         return 0.0, 0.0
     growth, begins = INCREMENT * law.fracture_energy / law.limit, np.array([law.steepest[1]])
     after = scheme.resistance(law, begins, np.array([growth]))
@@ -430,7 +516,7 @@ def _fall(section_points: SectionPoints | None, scheme: Scheme) -> tuple[float, 
 
 # -- text in the file ------------------------------------------------------------------------------
 
-FORMAT = "solution of ufl_beam, 5"
+FORMAT = "solution of ufl_beam, 6"
 """Format of the file; its number is increased by each incompatible change of the format."""
 
 NAMED = {

@@ -24,6 +24,7 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_scheme import Scheme, Step, has_inertia
 from ufl_beam.model.connector_laws import has_friction
 from ufl_beam.model.constraint_checks import friction_repeats
+from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.terms.beam_forces import Cells, ElasticBeams, InelasticBeams
@@ -32,6 +33,7 @@ from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.connector_forces import connector_terms
 from ufl_beam.terms.connector_rows import Setting
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.imposed_strains import CellStrains, ImposedStrains
 from ufl_beam.terms.inertia_and_damping import (
     BEFORE,
     Inertia,
@@ -83,6 +85,11 @@ class StepEquation:
         self.ledger, self.fields = ledger, fields = Ledger(), Fields(subdomain)
         self.A = A = fields.matrix()
         setting = (scheme, A, ledger)
+        strains = [load for load in scene.loads if isinstance(load, ImposedStrain)]
+        imposed = ImposedStrains(strains, subdomain, scheme, ledger, t0) if strains else None
+
+        def imposed_on(some: Fields) -> CellStrains | None:
+            return None if imposed is None else imposed.of_cells(some)
 
         # Terms create their ledger entries in the order of the columns of tables.  All processes
         # create the same entries, even without cells or connectors of a kind.
@@ -93,16 +100,18 @@ class StepEquation:
             if len(indices):
                 elastic[indices] = False
                 subset = Fields(subdomain, indices)
-                self.inelastic.append(InelasticBeams(subset, section_points, *setting, search))
+                self.inelastic.append(
+                    InelasticBeams(subset, section_points, *setting, search, imposed_on(subset))
+                )
         self.beams: list[Cells] = [*self.inelastic]
-        if (scheme.alpha or scheme.lost_fraction) and sum(
-            len(cells) for _, cells in subdomain.numbering.inelastic
-        ) < len(subdomain.numbering.cells):
+        numbering = subdomain.numbering
+        some_elastic = len(numbering.inelastic_cells) < len(numbering.cells)
+        if (scheme.alpha or scheme.lost_fraction) and some_elastic:
             ledger.lost["numerical"] += 0.0
         others: list[Term] = []
         if elastic.any():
             subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
-            self.beams.append(ElasticBeams(subset, *setting))
+            self.beams.append(ElasticBeams(subset, *setting, imposed_on(subset)))
             if scheme.lost_fraction:
                 others.append(SecondDifferences(scheme, subset, A, ledger))
 
@@ -116,6 +125,8 @@ class StepEquation:
         self.connector_terms = together(connector_terms, subdomain, connectors, A)
 
         self.loads: list[LoadTerm] = load_terms(fields, scheme, ledger, A)
+        if imposed is not None:
+            self.loads.append(imposed)
         if scene.works:
             self.loads.append(together(Works, fields, scheme, ledger, A, t0))
         self.supports = Supports(subdomain, scheme, ledger, A)

@@ -27,6 +27,12 @@ from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.imposed_strains import (
+    CellStrains,
+    elastic_strains,
+    imposed_at_points,
+    work_on_imposed_strains,
+)
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, beginning, entering
 
@@ -129,6 +135,8 @@ class Cells(Term):
     _fields: Fields
     predicted: Any = None
     """In statics, the :func:`predicted_strains` whose forces are in the tangent; else None."""
+    imposed: CellStrains | None = None
+    """Imposed strains of the cells; None if there are none."""
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
         """Return the values in cells, at ``q1``, of further functions in the virtual work."""
@@ -176,10 +184,10 @@ class ElasticForms(NamedTuple):
 
 
 @cached_forms
-def elastic_forms(element: Element, scheme: Scheme) -> ElasticForms:
+def elastic_forms(element: Element, scheme: Scheme, *, imposed: bool = False) -> ElasticForms:
     """Return the forms of elastic cells in a step of a time scheme."""
     q0, q1, w, C, dx = element.q0, element.q1, element.w, element.stiffness, element.dx(1)
-    e0, e1 = strain(q0, element.axis), strain(q1, element.axis)
+    e0, e1 = elastic_strains(element, imposed=imposed)
     r = scheme.resultants(C, e0, e1, element.constant)
     w_e = scheme.virtual_strain(q0, q1, w, element.axis)
     stored = elastic_energy(e1, C) * dx
@@ -188,10 +196,12 @@ def elastic_forms(element: Element, scheme: Scheme) -> ElasticForms:
 
 
 @cached_forms
-def _static_tangent(element: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function]:
+def _static_tangent(
+    element: Element, scheme: Scheme, *, imposed: bool
+) -> tuple[ufl.Form, fem.Function]:
     """Return the tangent of elastic cells for forces of given strains, and these strains."""
     q0, q1, C = element.q0, element.q1, element.stiffness
-    e0, e1, e = strain(q0, element.axis), strain(q1, element.axis), element.at_points(3)
+    (e0, e1), e = elastic_strains(element, imposed=imposed), element.at_points(3)
     w_e = scheme.virtual_strain(q0, q1, element.w, element.axis)
     acting = partial(scheme.resultants, C, e0, constant=element.constant)
     change = ufl.TrialFunction(element.space)
@@ -208,10 +218,15 @@ class ElasticBeams(FormForces, Cells):
 
     kind, _entry = "beams", "numerical"
 
-    def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
-        forms, q1, tangent = elastic_forms(fields.element, scheme), fields.element.q1, None
+    def __init__(
+        self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
+        imposed: CellStrains | None = None,
+    ) -> None:  # fmt: skip
+        element, self.imposed = fields.element, imposed
+        forms = elastic_forms(element, scheme, imposed=imposed is not None)
+        q1, tangent = element.q1, None
         if not has_inertia(scheme):
-            form, e = _static_tangent(fields.element, scheme)
+            form, e = _static_tangent(element, scheme, imposed=imposed is not None)
             tangent, self.predicted = fields.kernel(form, q1), predicted_strains(fields)
             tangent.place(A)
             self._static = struct(
@@ -224,8 +239,22 @@ class ElasticBeams(FormForces, Cells):
         if tangent is not None:
             self._step_kernels.append(tangent)
             self.loops = self.loops[0], loop("add_static_tangent", self._static)
-        # The configurations at both ends of a step determine the forces.
-        self.in_cells = [forces._replace(q0=self._q0) for forces in self.in_cells]
+        if imposed is None:
+            # The configurations at both ends of a step determine the forces.
+            self.in_cells = [forces._replace(q0=self._q0) for forces in self.in_cells]
+            return
+        work = fields.kernel(work_on_imposed_strains(element, scheme), q1)
+        self._step_kernels.append(work)
+        kernels = [*self._step_kernels[:-1], self._stored]
+        imposed.of_elastic(kernels, work, imposed_at_points(element))
+        if self.predicted is not None:
+            fill(self.predicted, imposed=imposed.strains)
+
+    def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
+        if self.imposed is None:
+            return {}
+        strains = self.imposed.strains
+        return {imposed_at_points(self._fields.element): strains.reshape(len(strains), -1)}
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the cells that begin and accept a step, and enter the stored energy."""
@@ -278,12 +307,14 @@ class InelasticBeams(Cells):
 
     def __init__(
         self, fields: Fields, section_points: SectionPoints, scheme: Scheme, A: Csr, ledger: Ledger,
-        search: Index,
+        search: Index, imposed: CellStrains | None = None,
     ) -> None:  # fmt: skip
-        self._A, self._ledger = A, ledger
+        self._A, self._ledger, self.imposed = A, ledger, imposed
         self.recorded_factors = np.ones(6) if section_points.hinges else WITHOUT_JUMP
         self.predicted = None if has_inertia(scheme) else predicted_strains(fields)
         self._cells = fields.subdomain.cells[fields.order]
+        # Rows of saved states: other points of the same cells have other rows.
+        self._rows = self._cells + section_points.number * len(fields.subdomain.numbering.cells)
         self._strains = Strains(fields)
         subdomain, numbering = fields.subdomain, fields.subdomain.numbering
         lengths, keys = numbering.section_lengths(self._cells), numbering.keys(self._cells)
@@ -311,6 +342,11 @@ class InelasticBeams(Cells):
             forces, last_b, last_D = np.zeros((3, len(lengths), 9))
             tangents = {"forces": forces, "last_b": last_b, "last_D": last_D}
             fill(self._in_c, predicted=self.predicted, **tangents)
+        if imposed is not None:
+            imposed.of_points(self._in_c)
+            fill(self._in_c, imposed=imposed.strains)
+            if self.predicted is not None:
+                fill(self.predicted, imposed=imposed.strains)
         names, force = ("add_inelastic_force", "add_inelastic_tangent"), self._force
         self.loops = loop(names[0], self._in_c), loop(names[1], self._in_c)
         self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order)]
@@ -338,7 +374,7 @@ class InelasticBeams(Cells):
 
     def start(self, q: Array) -> None:
         """Set the accepted strains of the points to the strains at ``q``, without a step."""
-        strains = self._strains(q).reshape(-1, 3)
+        strains = self._elastic_strains(q)
         self.points.start(strains)
         self.points.refresh(strains)
 
@@ -357,12 +393,17 @@ class InelasticBeams(Cells):
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
         """Return b and D about ``q1``; this replaces the latest response of the points."""
-        strains = self._strains(q1).reshape(-1, 3)
-        r, D = self.points.return_map(strains)
+        r, D = self.points.return_map(self._elastic_strains(q1))
         self._latest.fill(np.nan)  # the latest response belongs to other unknowns
-        around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
+        whole = self._strains(q1).reshape(-1, 3)
+        around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), whole)
         n = len(self._cells)
         return {self._b: around.reshape(n, -1), self._D: D.reshape(n, -1)}
+
+    def _elastic_strains(self, q: Array) -> Array:
+        """Return the strains at ``q`` minus the imposed strains at the end of the step; (n, 3)."""
+        strains = self._strains(q).reshape(-1, 3)
+        return strains if self.imposed is None else strains - self.imposed.now
 
     def about_state(self) -> tuple[Index, Array, Array]:
         """Return cells (numbers of the scene), and b and D of b + D e about the accepted state.
@@ -371,6 +412,8 @@ class InelasticBeams(Cells):
         the length of the last step.
         """
         strains, D = self.points.tangent()
+        if self.imposed is not None:
+            strains += self.imposed.now
         elastic = np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
         b, n = self.points.recorded[:, :3] - elastic, len(self._cells)
         return self._cells, b.reshape(n, -1), D.reshape(n, -1)
@@ -380,7 +423,7 @@ class InelasticBeams(Cells):
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the internal variables."""
         state = self.points.state()
-        rows = archive.rows("cells", self._cells, state.reshape(len(self._cells), -1))
+        rows = archive.rows("cells", self._rows, state.reshape(len(self._rows), -1))
         self.points.restore(rows.reshape(state.shape))
 
     def recorded(self) -> tuple[Index, Array]:

@@ -297,7 +297,9 @@ class Springs(Response):
 
     def remaining(self) -> Array:
         """Return the remaining fraction of elastic stiffness in the iterate; (num_connectors,)."""
-        return self.points.remaining(np.eye(1, 3).repeat(len(self._strains), axis=0))
+        now, elastic = self.points.works(np.eye(1, 3).repeat(len(self._strains), axis=0))
+        left = np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0)
+        return np.asarray(left)
 
     def state(self) -> Array:
         """Return the internal variables of the points."""

@@ -29,6 +29,7 @@ from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.functions import value_at
+from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term
@@ -41,7 +42,8 @@ def load_terms(fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> list[L
         ledger.supplied["loads"] += 0.0
     followers = [load for load in loads if isinstance(load, FollowerLoad)]
     frames = [load for load in loads if isinstance(load, RotatingFrame)]
-    dead = [load for load in loads if load not in (*followers, *frames)]
+    strains = [load for load in loads if isinstance(load, ImposedStrain)]  # see imposed_strains.py
+    dead = [load for load in loads if load not in (*followers, *frames, *strains)]
     terms: list[LoadTerm] = [FrameForces(x, fields, scheme, ledger, A) for x in frames]
     if dead:
         terms.append(DeadLoads(dead, subdomain, scheme, ledger))

@@ -320,17 +320,17 @@ class Points:
             for array, values in zip(arrays, before, strict=True):
                 array[:] = values
 
-    def remaining(self, change: Array) -> Array:
-        """Return the remaining fraction of elastic stiffness for strains ``change``; (cells,).
+    def works(self, change: Array) -> Array:
+        """Return works of the tangent and of the elastic stiffness on strains; (2, cells).
 
-        The stiffness is the tangent of the latest response.  ``change`` has the shape (cells, 3).
+        The tangent is the one of the latest response.  ``change`` has the shape (cells, 3).
         """
         section_points, theta = self._section_points, self["theta"][0, 0]
         elastic = theta * change**2 @ section_points.rest
         for name, by_point in zip(self._rows("stiffness"), self._at_points(change), strict=True):
             elastic += (theta * self[name] * by_point**2) @ section_points.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
-        return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
+        return np.array([now, elastic])
 
     def require_dissipation(self, describe: Callable[[int], str]) -> None:
         """Raise :class:`StepFailed` if a point generates energy; ``describe`` names its cell.

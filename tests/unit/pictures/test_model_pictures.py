@@ -50,6 +50,8 @@ OBJECTS = {
     "line load": ("loads", lambda c, g, r: ub.LineLoad(g, force=(0, -1e4))),
     "along": ("loads", lambda c, g, r: ub.LineLoad(c, force=(0, -1e4))),
     "line moment": ("loads", lambda c, g, r: ub.LineLoad(c, moment=1e3)),
+    "strain": ("loads", lambda c, g, r: ub.ImposedStrain(g, 1e-4, (0.0, 1e-4), span=(0.2, 1.0))),
+    "no strain": ("loads", lambda c, g, r: ub.ImposedStrain(g)),
     "no line load": ("loads", lambda c, g, r: ub.LineLoad(c)),
     "gravity": ("loads", lambda c, g, r: ub.Gravity()),
     "turning frame": ("loads", lambda c, g, r: ub.RotatingFrame(-2.0)),

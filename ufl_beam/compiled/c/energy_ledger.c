@@ -51,6 +51,41 @@ void accept_second_differences(void *self, const time_step *step, const double *
   *d->last_dt = step->dt;
 }
 
+/* Work of the resultants in a step to q1 on the change of imposed strains; points have their response
+ * to q1. */
+static double work_on_imposed_strains(const imposed_strains *all, const double *q1)
+{
+  double work = 0;
+  for (int g = 0; g < all->groups; ++g) {
+    const imposed_cells *x = all->group[g];
+    if (!x->inelastic) {
+      work += value_of_cells(x->work, q1);
+      continue;
+    }
+    const points *p = x->inelastic->points;
+    const double a = all->weight_of_before, *e = x->strains;
+    for (int c = 0; c < p->cells; ++c, e += 6)
+      for (int k = 0; k < 3; ++k)
+        work += p->length[c] * (a * x->before[3 * c + k] + (1 - a) * p->r[3 * c + k]) * (e[3 + k] - e[k]);
+  }
+  return work;
+}
+
+/* Internal forces do this work in addition to the energy that cells store and dissipate. */
+void change_of_imposed_strains(void *self, const double *q1, energy_change *sum)
+{
+  const double work = work_on_imposed_strains(self, q1);
+  sum->in_beams += work;
+  sum->effort += fabs(work);
+}
+
+void accept_imposed_strains(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const imposed_strains *all = self;
+  *all->supplied -= work_on_imposed_strains(all, q1);
+  memcpy(all->factors, all->factors_at_end, all->functions * sizeof *all->factors);
+}
+
 void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
 {
   dead_loads *l = self;

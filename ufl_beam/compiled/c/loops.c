@@ -24,6 +24,17 @@ static void predict_strains(predicted_strains *p, const double *q)
   add_linear_strains(p, p->begins ? p->q0 : p->about, -p->ratio / factor);
   for (int cell = 0; cell < p->strains->number; ++cell, e += p->of_cell)
     for (int i = 0; i < p->of_cell; ++i) e[i] *= factor / p->weight[i];
+  if (p->imposed) {
+    /* At the beginning imposed strains are extrapolated as well, so without an extrapolation the
+     * tangent has the forces before the step. */
+    const double part = p->begins ? p->ratio : 1;
+    const double *x = p->imposed;
+    e = p->e;
+    for (int k = 0; k < p->strains->number * p->of_cell; ++k) {
+      const int i = k / 3 * 6 + k % 3;
+      e[k] -= x[i] + part * (x[i + 3] - x[i]);
+    }
+  }
   p->stale = 0;
 }
 

@@ -63,6 +63,7 @@ typedef struct {
   int begins, exact;              /* begins: the next strains are extrapolated; exact: later strains
                                    * are strains at the iterate, not predicted */
   double *about, *change, *e;     /* configuration of the latest tangent; space; strains */
+  const double *imposed;          /* strains of imposed_cells, which are subtracted; or none */
   int stale;                      /* whether a tangent has been computed since the strains */
 } predicted_strains;
 
@@ -259,6 +260,7 @@ typedef struct {
   int size;
   double scene;   /* size of the scene */
   double *latest; /* unknowns of the latest response */
+  const double *imposed; /* strains of imposed_cells; or none */
 } inelastic;
 
 /* First inputs of the law of a rigid-plastic connector, and its outputs at the end of a step. */
@@ -708,6 +710,27 @@ typedef struct {
   double weight_of_before, *work;
 } follower_loads;
 
+/* Imposed strains of the cells of a term, see CellStrains: elastic cells, whose forms have the strains
+ * as a coefficient, or cells with material points. */
+typedef struct {
+  int cells, points;
+  const double *const *field; /* for each function of time: strains for a factor of 1; cells * points * 3 */
+  double *strains;            /* cells * points * 6: strains at the beginning and at the end of a step */
+  int forms;
+  const form_of_step *form;
+  const cells *work; /* of elastic resultants on the change of imposed strains */
+  const inelastic *inelastic;
+  double *before; /* with material points: resultants in the accepted state; cells * points * 3 */
+} imposed_cells;
+
+typedef struct {
+  int functions, groups;
+  const time_function *factor;
+  double *factors, *factors_at_end; /* at the beginning and at the end of the step */
+  imposed_cells *const *group;
+  double weight_of_before, *supplied;
+} imposed_strains;
+
 /* Vectors of loads at some degrees of freedom times functions of time, see DeadLoads. */
 typedef struct {
   int size, vectors;
@@ -874,7 +897,7 @@ typedef struct {
 } force_watch;
 
 /* Energy stored and dissipated in a step, and the sum of the magnitudes of the works on
- * connectors. */
+ * connectors and on imposed strains. */
 typedef struct { double in_beams, in_connectors, effort; } energy_change;
 
 /* Adds the contribution of a term in a step to q1. */
@@ -968,14 +991,14 @@ typedef struct {
   double begin_of_run, applied_by, applying_turn, short_part;
 } time_loop;
 
-phase begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
+phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
   accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_frame, accept_frame, begin_works,
   accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
   accept_second_differences, begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
   begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,
   begin_connectors_again, accept_connectors, add_energy_of_connectors, begin_guides, accept_guides;
 admission points_dissipate;
-change_of_energy change_of_form, change_of_points, change_of_connectors;
+change_of_energy change_of_form, change_of_points, change_of_connectors, change_of_imposed_strains;
 double value_at(const time_function *f, double t);
 void keep_state(const time_loop *m, double *row);
 int solve_begun_step(time_loop *m, int hold);

@@ -144,11 +144,13 @@ static inline void subtract(const double *A, const double *x, double *y)
 static void linearize(const inelastic *m, const double *forces)
 {
   const points *p = m->points;
-  const double *e = p->e1, *D = p->D;
+  const double *e = p->e1, *D = p->D, *imposed = m->imposed;
   for (int c = 0; c < m->tangent->number; ++c)
     for (int i = 0; i < m->in_cell; ++i, e += 3, forces += 3, D += 9) {
       double b[3] = {forces[0], forces[1], forces[2]};
       subtract(D, e, b);
+      /* The form adds D times the whole strains. */
+      if (imposed) subtract(D, imposed + 6 * (c * m->in_cell + i) + 3, b);
       put_in_cell(m->tangent, c, m->at_b + 3 * i, 3, b);
       put_in_cell(m->tangent, c, m->at_D + 9 * i, 9, D);
     }
@@ -197,6 +199,7 @@ void respond_at(const inelastic *m, const double *q)
   memset(p->e1, 0, 3 * p->cells * sizeof *p->e1);
   add_cells((void *)m->strains, q, p->e1);
   for (int k = 0; m->in_cell > 1 && k < 3 * p->cells; ++k) p->e1[k] /= m->weight[k / 3 % m->in_cell];
+  for (int k = 0; m->imposed && k < 3 * p->cells; ++k) p->e1[k] -= m->imposed[k / 3 * 6 + 3 + k % 3];
   p->linear = 0;
   if (m->predicted && p->line && !m->predicted->exact) {
     predict_strains(m->predicted, q);

@@ -62,6 +62,36 @@ void begin_static_tangent(void *self, const time_step *step, const double *q1, c
   t->predicted->ratio = 0;
 }
 
+/* Imposed strains change between the ends of a step, as prescribed motions do. */
+void begin_imposed_strains(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const imposed_strains *all = self;
+  for (int k = 0; k < all->functions; ++k) {
+    const double wanted = value_at(all->factor + k, step->motion_time), before = all->factors[k];
+    all->factors_at_end[k] = step->fraction == 1 ? wanted : before + step->fraction * (wanted - before);
+  }
+  for (int g = 0; g < all->groups; ++g) {
+    const imposed_cells *x = all->group[g];
+    for (int i = 0; i < x->cells * x->points; ++i)
+      for (int k = 0; k < 3; ++k) {
+        double before = 0, now = 0;
+        for (int f = 0; f < all->functions; ++f) {
+          before += all->factors[f] * x->field[f][3 * i + k];
+          now += all->factors_at_end[f] * x->field[f][3 * i + k];
+        }
+        x->strains[6 * i + k] = before, x->strains[6 * i + 3 + k] = now;
+      }
+    for (int f = 0; f < x->forms; ++f)
+      for (int c = 0; c < x->cells; ++c)
+        put_in_cell(x->form[f].form, c, x->form[f].at, 6 * x->points, x->strains + 6 * x->points * c);
+    if (x->inelastic) {
+      const points *p = x->inelastic->points;
+      x->inelastic->latest[0] = NAN; /* compute the next response in any case */
+      for (int c = 0; c < p->cells; ++c) memcpy(x->before + 3 * c, p->kept + POINT_KEPT * c, 3 * sizeof(double));
+    }
+  }
+}
+
 /* forces = sum of factors times vectors of loads */
 static void sum_loads(const dead_loads *l, const double *factors, double *forces)
 {

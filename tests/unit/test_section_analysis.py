@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: MIT
+"""Moment-curvature and interaction of N and M: closed forms, and beams in runs."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from helpers import raises
+from scenes import clamped
+from user_laws import Dashpot
+
+import ufl_beam as ub
+
+f = ub.law_functions
+
+
+@dataclass(frozen=True)
+class NoTension(ub.MaterialLaw):
+    """Linear in compression; bears no tension."""
+
+    def stress(self, strain, state):
+        return self.C * f.smaller(strain, 0.0)
+
+    def elastic_energy(self, strain, state):
+        return self.C * f.smaller(strain, 0.0) ** 2 / 2
+
+
+E, b, h, LIMIT = 200e9, 0.1, 0.2, 250e6
+K_YIELD, M_PLASTIC, N_PLASTIC = 2 * LIMIT / (E * h), LIMIT * b * h**2 / 4, LIMIT * b * h
+
+
+def rectangle(number=40, law=None, **more):
+    fibres = ub.Fibres(law or ub.ElastoPlastic(LIMIT), number=number, **more)
+    return ub.Section.rectangle(b, h, E=E, nu=0.3, fibres=fibres)
+
+
+def concrete(number, *bars, steel=None):
+    """30 cm by 50 cm without tension, with bars (y, A)."""
+    steel = ub.Fibres(steel or ub.ElastoPlastic(500e6))
+    plain = ub.Section.rectangle(
+        0.3, 0.5, E=30e9, nu=0.2, fibres=ub.Fibres(NoTension(), number=number)
+    )
+    return plain.reinforced(*zip(*bars, strict=True), E=200e9, fibres=steel)
+
+
+# -- moment and curvature --------------------------------------------------------------------------
+
+
+def test_plastic_rectangle():
+    """[closed] M = Mp (1 - (κy/κ)²/3) beyond first yield; layers err by their thickness squared."""
+    κ = K_YIELD * np.array([0.0, 0.5, 1.0, 1.5, 2.0, 5.0, 20.0])
+    exact = np.where(
+        κ > K_YIELD, 1 - (K_YIELD / np.maximum(κ, K_YIELD)) ** 2 / 3, κ / K_YIELD / 1.5
+    )
+    for n in (10, 40, 160):
+        result = ub.moment_curvature(rectangle(n), κ)
+        # A layer has one stress: the yielded depth errs by half a layer at most
+        assert np.abs(result.moment / M_PLASTIC - exact).max() < 1.5 / n**2
+        assert np.abs(result.strain).max() < 1e-15
+        assert result.N.tolist() == [0.0] * len(κ)
+
+
+@pytest.mark.parametrize("N", [-0.5, 0.3, 0.8])
+def test_plastic_moment_under_axial_force(N):
+    """[closed] M = Mp (1 - (N/Np)²); the dissipated energy is the work that is not stored."""
+    κ = K_YIELD * np.linspace(0, 40, 81)
+    result = ub.moment_curvature(rectangle(160), κ, N=N * N_PLASTIC)
+    # At 40 κy the elastic core, 1/40 of the depth, and half a layer lower the moment
+    error = (1 / 40) ** 2 / 3 + 1.5 / 160
+    assert result.moment[-1] / M_PLASTIC == pytest.approx(1 - N**2, abs=error / 4)
+    # Backward Euler, first order in the step; at constant N its work is N times the strain
+    M, ε = result.moment, result.strain
+    work = np.sum((M[1:] + M[:-1]) / 2 * np.diff(κ)) + N * N_PLASTIC * (ε[-1] - ε[0])
+    before = (N * N_PLASTIC) ** 2 / (2 * E * b * h)
+    stored = E * b * h * (LIMIT / E) ** 2 / 2  # all fibres are at their limit, up to the core
+    assert result.dissipated[-1] == pytest.approx(work + before - stored, rel=0.01)
+
+
+def test_cyclic_loops_dissipate_their_area():
+    """[closed] In a closed loop all work is dissipated; trapezoidal rule, second order."""
+    section = rectangle(20, ub.ElastoPlastic(LIMIT, kinematic=E / 20))
+    errors = []
+    for steps in (40, 160):
+        κ = 6 * K_YIELD * np.sin(2 * np.pi * np.arange(3 * steps + 1) / steps)
+        result = ub.moment_curvature(section, κ)
+        last = slice(2 * steps, None)
+        area = np.trapezoid(result.moment[last], κ[last])
+        errors.append(abs(1 - np.ptp(result.dissipated[[2 * steps, -1]]) / area))
+    # The trapezoidal rule errs by the steps in which fibres begin to flow
+    assert errors[1] < min(errors[0] / 4, 0.002)
+
+
+def test_cracked_concrete():
+    """[closed] Depth x of compression: b x²/2 = n As (d - x), with n = Es/Ec."""
+    As, d, n = 1.5e-3, 0.45, 200 / 30
+    x = (-n * As + math.sqrt((n * As) ** 2 + 2 * 0.3 * n * As * d)) / 0.3
+    EI = 30e9 * (0.3 * x**3 / 3 + n * As * (d - x) ** 2)
+    κ = np.linspace(0, 3e-3, 4)
+    for number in (50, 200):
+        # Concrete in tension, which the bar displaces, bears nothing
+        section = concrete(number, (-0.2, As))
+        result = ub.moment_curvature(section, κ)
+        # One layer contains the neutral axis
+        assert result.moment == pytest.approx(EI * κ, rel=1 / number**2 / (x / 0.5) ** 2)
+        neutral = (section.fibres.axis + result.strain / np.maximum(κ, 1e-9))[1:]
+        assert 0.25 - neutral == pytest.approx(np.full(3, x), abs=0.5 / number)
+    assert not result.dissipated.any()
+
+
+def test_a_beam_in_pure_bending():
+    """A cell of a run, given its curvatures, has the same M, axial strain and losses."""
+    steel = ub.ArmstrongFrederick(400e6, 20e9, 100.0)
+    section = concrete(20, (-0.2, 1.5e-3), (0.2, 1.5e-3), steel=steel)
+    member = ub.Beam((0, 0), (1, 0), section, cells=1)
+    turns = 0.02 * np.sin(np.linspace(0, 2 * np.pi, 41))
+    end = ub.PrescribedDisplacement(member.end, psi=ub.Table(range(41), turns))
+    solution = ub.simulate(clamped(member, end), ub.Static(), t=(0, 40), dt=1.0)
+    assert "in 40 steps" in repr(solution)  # none is divided
+    ε, κ = solution.strains_at(member.at(0.5))[:, [0, 2]].T
+    cell = solution.material_at(member.at(0.5))
+    result = ub.moment_curvature(section, κ, N=cell.forces[:, 0])
+    M = cell.forces[:, 2]
+    assert np.abs(M).max() > 1e5
+    assert np.abs(result.moment - M).max() < 1e-10 * np.abs(M).max()
+    assert np.abs(result.strain - ε).max() < 1e-10 * np.abs(ε).max()
+    assert result.dissipated == pytest.approx(cell.plastic, rel=1e-9, abs=1e-9)
+
+
+def test_other_sections():
+    """[closed] Elastic: M = EI κ.  A hinge takes the curvature of its cell; Maxwell creeps."""
+    plain = {"EA": 4e9, "GA": 1e9, "EI": 1.4e7}
+    κ = np.array([0.0, 1e-3, 2e-3])
+    result = ub.moment_curvature(ub.Section(**plain), κ, N=[0.0, 1e6, -1e6])
+    assert result.moment.tolist() == (1.4e7 * κ).tolist()
+    assert result.strain == pytest.approx([0.0, 2.5e-4, -2.5e-4])
+    hinge = ub.Section(**plain, hinge=ub.LinearSoftening(2e4, 400.0))
+    opened = ub.moment_curvature(hinge, [0.0, 1.0], length=0.1)
+    # All of the fracture energy; in a cell of 0.1 m
+    assert (opened.moment[-1], opened.dissipated[-1]) == pytest.approx((0.0, 400.0 / 0.1))
+    creeps = ub.Section(**plain, bending=Dashpot(1.4e9))
+    slow = ub.moment_curvature(creeps, [1e-3, 1e-3], dt=10.0)
+    # Backward Euler: M1 = EI κ / (1 + dt EI/η), M2 = M1 / (1 + dt EI/η)
+    assert slow.moment == pytest.approx([1.4e4 / 1.1, 1.4e4 / 1.1**2])
+
+
+def test_sections_that_cannot_bear_n():
+    with raises("cannot bear N = 5e+06 N at the curvature 0 1/m"):
+        ub.moment_curvature(rectangle(), [0.0, 1e-3], N=1.001 * N_PLASTIC)
+    with raises("the section has cracks or a hinge", "length= (m)"):
+        ub.moment_curvature(rectangle(softening=ub.Softening(1e8, 1e3)), [0.0, 1e-3])
+    # Layers crack one after the other, until too few are left for the tension
+    cracks = rectangle(10, ub.ElastoPlastic(math.inf), softening=ub.Softening(1e8, 1e3))
+    with pytest.warns(ub.ModelWarning, match="cannot bear N = 1e.06 N at the curvature"):
+        result = ub.moment_curvature(cracks, np.linspace(0, 0.05, 51), N=1e6, length=0.01)
+    assert 0 < len(result.moment) < 51
+    assert np.isfinite(result.moment).all()
+
+
+def test_pictures_show_the_results():
+    result = ub.moment_curvature(rectangle(10), K_YIELD * np.linspace(0, 3, 7), N=-1e6)
+    diagram = ub.interaction_diagram(rectangle(10), (0.01, 0.01), points=16)
+    for shown, x, y in ((result, "curvature", "moment"), (diagram, "M", "N")):
+        (axes,) = ub.plot(shown).axes
+        lines = [line.get_xydata() for line in axes.lines if len(line.get_xydata()) > 2]
+        (data,) = lines
+        assert np.array_equal(data, np.column_stack([getattr(shown, x), getattr(shown, y)]))
+    assert axes.yaxis_inverted()  # compression is at the top
+
+
+# -- interaction -----------------------------------------------------------------------------------
+
+
+def test_interaction_of_a_rectangle():
+    """[closed] |M|/Mp = 1 - (N/Np)², as limit strains grow; layers err by 1/n²."""
+    for n in (10, 40):
+        diagram = ub.interaction_diagram(rectangle(n), (1.0, 1.0))
+        exact = 1 - (diagram.N / N_PLASTIC) ** 2
+        assert np.abs(np.abs(diagram.M) / M_PLASTIC - exact).max() < 1.5 / n**2
+        assert (diagram.M[0], diagram.N[0]) == pytest.approx((0.0, N_PLASTIC), abs=1e-9 * N_PLASTIC)
+        assert (diagram.M[-1], diagram.N[-1]) == (diagram.M[0], diagram.N[0])
+    for N in (-0.7, 0.0, 0.4):
+        low, high = diagram.moments(N * N_PLASTIC)
+        assert high / M_PLASTIC == pytest.approx(1 - N**2, abs=1.5 / 40**2)
+        assert low == pytest.approx(-high, rel=1e-9)
+    with raises("moments: N = 5.05e+06 N is beyond the diagram"):
+        diagram.moments(1.01 * N_PLASTIC)
+
+
+def test_interaction_of_reinforced_concrete():
+    """[closed] Pure compression and tension, and the balanced point, by hand."""
+    As, d = 1.5e-3, 0.45
+    section = concrete(100, (-0.2, As), (0.2, As))
+    steel, plain = section.fibres.fibres
+    limits = {plain: (0.001, math.inf), steel: (0.02, 0.0025)}
+    diagram = ub.interaction_diagram(section, limits)
+    # Concrete at 0.001 has 30 MPa, steel 200 MPa; in tension steel has 500 MPa
+    assert diagram.N.min() == pytest.approx(-30e6 * (0.15 - 2 * As) - 200e6 * 2 * As, rel=1e-9)
+    assert diagram.N.max() == pytest.approx(500e6 * 2 * As, rel=1e-9)
+    # Balanced: 0.001 at the upper edge, 0.0025 in the lower bar: x = 2/7 d
+    x = d / 3.5
+    stress = 200e9 * 0.001 * (x - 0.05) / x
+    displaced = 30e9 * 0.001 * (x - 0.05) / x
+    N = -30e6 * 0.3 * x / 2 - (stress - displaced) * As + 500e6 * As
+    M = 30e6 * 0.3 * x / 2 * (0.25 - x / 3) + (stress - displaced) * As * 0.2 + 500e6 * As * 0.2
+    # Limits hold at the centroids of layers of 5 mm, and angles have steps of a degree
+    error = np.hypot((diagram.N - N) / diagram.N.min(), (diagram.M - M) / M)
+    assert error.min() < 0.03
+
+
+def test_paths_of_laws_with_curved_branches():
+    """Strains grow in steps: fewer of them give other stresses, by the first order of the step."""
+    section = rectangle(10, ub.ArmstrongFrederick(LIMIT, 40e9, 300.0))
+    M = [ub.interaction_diagram(section, (0.01, 0.01), steps=n).M.max() for n in (20, 40, 80)]
+    assert (M[1] - M[0]) / (M[2] - M[1]) == pytest.approx(2.0, rel=0.15)
+
+
+def test_limits_that_are_missing():
+    section = concrete(10, (0.2, 1e-3))
+    steel, plain = section.fibres.fibres
+    with raises("no fibre limits the strain in tension"):
+        ub.interaction_diagram(section, {plain: (0.0035, math.inf)})
+    with raises("no fibre limits the strain in compression"):
+        ub.interaction_diagram(section, (math.inf, 0.01))
+    with raises("limits of Fibres(", "which is not in the section"):
+        ub.interaction_diagram(rectangle(), {steel: (0.01, 0.01)})
+    with raises("the section has no fibres"):
+        ub.interaction_diagram(ub.Section(EA=1.0, GA=1.0, EI=1.0), (0.01, 0.01))

@@ -1,0 +1,360 @@
+# SPDX-License-Identifier: MIT
+"""Analyses of cross-sections: moment-curvature, and interaction of axial force and moment.
+
+Both use the compiled material points of beams, so that a section answers as in a beam.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.arrays import Array
+from ufl_beam.errors import (
+    ArgumentError,
+    StepFailed,
+    require_array,
+    require_count,
+    require_kind,
+    require_number,
+    require_row,
+    warn,
+)
+from ufl_beam.mechanics.time_schemes import Static
+from ufl_beam.model.fibres import Fibres
+from ufl_beam.model.sections import Section
+from ufl_beam.terms.material_points import Points
+
+PARTS = 1024
+"""Number of smallest substeps in a step of curvature and axial force."""
+
+TOLERANCE = 1e-13
+"""Error of N, as a fraction of EA times the largest strain so far, up to which N is met."""
+
+MOST_STRAIN = 10.0
+"""Largest axial strain among those that are tried."""
+
+MOST_ITERATIONS = 200
+"""Largest number of corrections of the axial strain in a substep."""
+
+
+class _State:
+    """Material points of a section in several states, with prescribed strains."""
+
+    def __init__(self, section: Section, states: int, length: float | None, what: str) -> None:
+        require_kind(section, Section, f"{what}: section")
+        points = section.section_points(section.hinge)
+        if length is not None:
+            require_number(length, f"{what}: length", positive=True)
+        elif any(of_class.softening is not None for of_class in points):
+            raise ArgumentError(
+                f"{what}: the section has cracks or a hinge, whose openings are strains times a "
+                "length; give the length of a cell, length= (m)"
+            )
+        lengths, keys = np.full(states, length or 1.0), [(0, 0)] * states
+        self._points = [Points(of_class, keys, lengths, Static()) for of_class in points]
+        # Without points the section is elastic; otherwise the points have the elastic resultants.
+        self._rest = np.zeros(3) if points else np.array([section.EA, section.GA, section.EI])
+        self._EA, self._depth, self._strain, self._length = section.EA, section.depth, 0.0, lengths
+        self._largest = 0.0  # strain so far, of the axis or by curvature
+
+    def begin(self, dt: float) -> None:
+        """Begin a step of length ``dt``; s."""
+        for points in self._points:
+            points.begin(dt)
+
+    def response(self, strain: npt.ArrayLike, curvature: npt.ArrayLike) -> tuple[Array, Array]:
+        """Return (N, V, M) and their derivatives in the step; (states, 3), (states, 3, 3)."""
+        e = np.zeros((len(self._length), 3))
+        e[:, 0], e[:, 2] = strain, curvature
+        r, D = self._rest * e, np.tile(np.diag(self._rest), (len(e), 1, 1))
+        for points in self._points:
+            forces, slopes = points.return_map(e)
+            r, D = r + forces, D + slopes.reshape(-1, 3, 3)
+        return r, D
+
+    def accept(self) -> None:
+        """Accept the latest response; raise :class:`StepFailed` if a law generates energy."""
+        for points in self._points:
+            points.require_dissipation(lambda _: "the section")
+        for points in self._points:
+            points.accept()
+
+    def dissipated(self) -> Array:
+        """Return the energies per length that the states have dissipated; (states,); J/m."""
+        lost = sum((p.recorded[:, 4:].sum(axis=1) for p in self._points), np.zeros(1))
+        return np.asarray(lost / self._length)
+
+    def reach(self, curvature: float, N: float, dt: float) -> tuple[float, float] | None:
+        """Step to a curvature and an axial force; return (axial strain, M), or None.
+
+        Newton's method finds the axial strain.  Bisection takes over between strains at which N is
+        too small and too large, because N may be constant over intervals of perfect plasticity.
+        """
+        self.begin(dt)
+        by_curvature = abs(curvature) * self._depth
+        e, low, high, width, last = self._strain, -math.inf, math.inf, 0.0, math.inf
+        for _ in range(MOST_ITERATIONS):
+            r, D = self.response(e, curvature)
+            excess, slope = float(r[0, 0]) - N, float(D[0, 0, 0])
+            if not math.isfinite(excess) or abs(e) > MOST_STRAIN:
+                return None
+            largest = max(self._largest, abs(e) + by_curvature)
+            met = abs(excess) <= TOLERANCE * self._EA * largest
+            if met or high - low <= 4 * np.finfo(float).eps * largest:
+                if not met and abs(excess) > 1e4 * TOLERANCE * self._EA * largest:
+                    return None  # N jumps
+                try:
+                    self.accept()
+                except StepFailed:
+                    return None
+                self._strain, self._largest = e, largest
+                return e, float(r[0, 2])
+            low, high = (e, high) if excess < 0 else (low, e)
+            after = e - excess / slope if slope > 0 else math.nan
+            if not (low < after < high and (abs(excess) < last / 2 or high - low == math.inf)):
+                width = 2 * width or max(by_curvature, abs(excess) / self._EA)
+                after = (
+                    (low + high) / 2 if high - low < math.inf else e - math.copysign(width, excess)
+                )
+            e, last = after, abs(excess)
+        return None
+
+
+# -- moment and curvature --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class MomentCurvature:
+    """Bending moments of a section under a history of curvatures, see :func:`moment_curvature`.
+
+    Moments are about the axis of the section.  The strain of a fibre is ``strain - y curvature``,
+    with y from this axis.
+
+    Attributes:
+        curvature: Curvatures; (n,); 1/m.
+        moment: Bending moments; (n,); N m.
+        N: Axial forces, positive in tension; (n,); N.
+        strain: Axial strains of the axis of the section; (n,).
+        dissipated: Energies per length dissipated since the beginning; (n,); J/m.
+
+    Example:
+        >>> steel = ub.Fibres(ub.ElastoPlastic(235e6), number=40)
+        >>> section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=steel)
+        >>> result = ub.moment_curvature(section, np.linspace(0, 0.1, 21))
+        >>> print(f"{result.moment[-1] / (235e6 * 0.1 * 0.2**2 / 4):.3f}")  # of the plastic moment
+        0.996
+        >>> ub.plot(result).savefig("moment_curvature.png")
+    """
+
+    curvature: Array
+    moment: Array
+    N: Array
+    strain: Array
+    dissipated: Array
+
+    def __repr__(self) -> str:
+        largest = np.abs(self.moment).max(initial=0.0)
+        return f"<MomentCurvature: {len(self.moment)} states, |M| up to {largest:.4g} N m>"
+
+
+def moment_curvature(
+    section: Section, curvature: npt.ArrayLike, N: npt.ArrayLike = 0.0, *,
+    length: float | None = None, dt: float = 1.0,
+) -> MomentCurvature:  # fmt: skip
+    """Compute the bending moment of a section under a history of curvatures and axial forces.
+
+    The material points are those of a cell of a beam in a :class:`Static` run.  The axial strain
+    follows from N.  Before the first curvature, N is applied without curvature.  A step without
+    equilibrium is divided.  If the section cannot bear N even in the smallest substep, the result
+    ends there, with a warning.
+
+    Args:
+        section: Section with fibres or laws of resultants.
+        curvature: Curvatures, one after the other, also cyclic; (n,); 1/m.
+        N: Axial force, positive in tension; a number, or one for each curvature; N.
+        length: Length of the cell, needed for cracks of fibres and hinges of cells; m.
+        dt: Time between two curvatures, for viscous laws; s.
+
+    Raises:
+        ArgumentError: The section cannot bear N at the first curvature, the number of forces and
+            curvatures differs, or ``length`` is missing.
+
+    Example:
+        >>> steel = ub.Fibres(ub.ElastoPlastic(235e6, kinematic=2e9), number=40)
+        >>> section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=steel)
+        >>> cycle = 0.05 * np.sin(np.linspace(0, 2.5 * np.pi, 101))
+        >>> loop = ub.moment_curvature(section, cycle, N=-1e6)
+        >>> print(f"{loop.moment[-1]:.4g} N m, {loop.dissipated[-1]:.4g} J/m")
+        2.298e+05 N m, 3.767e+04 J/m
+    """
+    what = "moment_curvature"
+    K, forces = require_row(curvature, f"{what}: curvature"), require_array(N, f"{what}: N")
+    if not len(K):
+        raise ArgumentError(f"{what}: curvature is empty")
+    if forces.ndim and forces.shape != K.shape:
+        raise ArgumentError(f"{what}: N has the shape {forces.shape}, curvature {K.shape}")
+    require_number(dt, f"{what}: dt", positive=True)
+    state, before, rows = _State(section, 1, length, what), np.zeros(2), list[list[float]]()
+    path = np.column_stack(np.broadcast_arrays(K, forces))
+    loads_first = int(K[0] != 0 and path[0, 1] != 0)
+    for after in [np.array([0.0, path[0, 1]])] * loads_first + list(path):
+        done, part, found = 0, PARTS, None
+        while done < PARTS:
+            target = before + (after - before) * ((done + part) / PARTS)
+            found = state.reach(float(target[0]), float(target[1]), dt * part / PARTS)
+            if found is not None:
+                done += part
+                part = math.gcd(done, PARTS)
+            elif part > 1:
+                part //= 2
+            else:
+                break
+        if found is None:
+            said = (
+                f"{what}: the section cannot bear N = {target[1]:.4g} N at the curvature "
+                f"{target[0]:.4g} 1/m"
+            )
+            if len(rows) <= loads_first:
+                raise ArgumentError(said)
+            warn(f"{said}; the result ends at {rows[-1][0]:.4g} 1/m")
+            break
+        rows.append([*after, *found, float(state.dissipated()[0])])
+        before = after
+    K, forces, strains, moments, lost = np.array(rows)[loads_first:].T
+    return MomentCurvature(K, moments, forces, strains, lost)
+
+
+# -- interaction of axial force and moment ---------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class InteractionDiagram:
+    """Axial forces and moments at limit strains of a section, see :func:`interaction_diagram`.
+
+    The points form a closed curve; the first point is repeated at the end.
+
+    Attributes:
+        N: Axial forces, positive in tension; (n,); N.
+        M: Bending moments about the axis of the section; (n,); N m.
+        strain: Axial strains of the axis of the section; (n,).
+        curvature: Curvatures; (n,); 1/m.
+
+    Example:
+        >>> steel = ub.Fibres(ub.ElastoPlastic(235e6), number=40)
+        >>> section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=steel)
+        >>> diagram = ub.interaction_diagram(section, (0.05, 0.05))
+        >>> low, high = diagram.moments(-0.5 * 235e6 * 0.02)  # at half of the squash load
+        >>> print(f"{high / (235e6 * 0.1 * 0.2**2 / 4):.3f}")  # of the plastic moment
+        0.749
+        >>> ub.plot(diagram).savefig("interaction.png")
+    """
+
+    N: Array
+    M: Array
+    strain: Array
+    curvature: Array
+
+    def __repr__(self) -> str:
+        N, M = ((x.min(), x.max()) for x in (self.N, self.M))
+        return (
+            f"<InteractionDiagram: N from {N[0]:.4g} to {N[1]:.4g} N, "
+            f"M from {M[0]:.4g} to {M[1]:.4g} N m>"
+        )
+
+    def moments(self, N: float) -> tuple[float, float]:
+        """Return the least and the largest moment of the curve at an axial force; N m.
+
+        Raises:
+            ArgumentError: The section cannot bear N.
+        """
+        above = require_number(N, "moments: N") <= self.N
+        at = np.flatnonzero(above[1:] != above[:-1])
+        if not len(at):
+            raise ArgumentError(f"moments: N = {N:g} N is beyond the diagram, {self!r}")
+        along = (N - self.N[at]) / (self.N[at + 1] - self.N[at])
+        M = self.M[at] + along * (self.M[at + 1] - self.M[at])
+        return float(M.min()), float(M.max())
+
+
+Limits = tuple[float, float]
+"""Largest compressive and tensile strains of fibres, both positive; infinite if unlimited."""
+
+
+def interaction_diagram(
+    section: Section, limits: Limits | Mapping[Fibres, Limits], *, points: int = 360,
+    steps: int = 20, length: float | None = None,
+) -> InteractionDiagram:  # fmt: skip
+    """Compute the axial forces and moments at which a fibre of a section reaches a limit strain.
+
+    Each point belongs to a plane of strains, which grows from zero in proportion until the first
+    fibre reaches its limit.  Strains are at the centroids of the fibres.
+
+    Args:
+        section: Section with fibres.
+        limits: Largest compressive and largest tensile strain, both positive, of all fibres; or
+            for each of the :class:`Fibres` of the section, as ``{concrete: (0.0035, math.inf),
+            steel: (0.02, 0.02)}``.  Fibres without an entry have no limit.
+        points: Number of planes, in equal steps of the angle between strain and curvature.
+        steps: Number of equal steps in which strains grow; laws with curved branches need several.
+        length: Length of the cell, needed for cracks of fibres; m.
+
+    Raises:
+        ArgumentError: The section has no fibres, a limit is not positive or belongs to no fibres
+            of the section, or some planes are unlimited.
+
+    Example:
+        >>> concrete, steel = (ub.Fibres(ub.ElastoPlastic(limit)) for limit in (30e6, 500e6))
+        >>> column = ub.Section.rectangle(
+        ...     b=0.3, h=0.4, E=30e9, nu=0.2, fibres=concrete
+        ... ).reinforced([-0.15, 0.15], [1e-3, 1e-3], E=200e9, fibres=steel)
+        >>> limits = {concrete: (0.0035, np.inf), steel: (0.02, 0.02)}
+        >>> diagram = ub.interaction_diagram(column, limits)
+        >>> print(f"{diagram.N.min():.4g}")  # 30e6 (0.12 - 0.002) + 500e6 * 0.002 N
+        -4.54e+06
+    """
+    what = "interaction_diagram"
+    require_count(points, f"{what}: points", at_least=8)
+    require_count(steps, f"{what}: steps")
+    state, placed = _State(section, points, length, what), section.fibres
+    if placed is None:
+        raise ArgumentError(f"{what}: the section has no fibres, whose strains could be limited")
+    if not isinstance(limits, Mapping):
+        limits = dict.fromkeys(placed.fibres, limits)
+    allowed = np.full((2, len(placed.y)), math.inf)
+    for fibres, pair in limits.items():
+        numbers = [number for number, own in enumerate(placed.fibres) if own == fibres]
+        if not numbers:
+            raise ArgumentError(f"{what}: limits of {fibres!r}, which is not in the section")
+        try:
+            compressive, tensile = pair
+        except (TypeError, ValueError):
+            raise ArgumentError(f"{what}: limits = {pair!r} must be two strains") from None
+        for row, limit in zip(allowed, (compressive, tensile), strict=True):
+            row[np.isin(placed.material, numbers)] = require_number(
+                limit, f"{what}: limits", positive=True, infinite=True
+            )
+    angle = 2 * math.pi * np.arange(points) / points
+    strain, curvature = np.cos(angle), 2 / section.depth * np.sin(angle)
+    of_fibres = strain[:, None] - curvature[:, None] * placed.y
+    with np.errstate(divide="ignore"):
+        factors = np.where(of_fibres < 0, allowed[0], allowed[1]) / np.abs(of_fibres)
+    factor = factors.min(axis=1)
+    if not np.isfinite(factor).all():
+        way = "tension" if strain[np.argmax(factor)] > 0 else "compression"
+        raise ArgumentError(
+            f"{what}: no fibre limits the strain in {way}; give some fibres a limit there"
+        )
+    strain, curvature = factor * strain, factor * curvature
+    for step in range(1, steps + 1):
+        state.begin(1.0)
+        r, _ = state.response(strain * step / steps, curvature * step / steps)
+        if not np.isfinite(r).all():
+            raise ArgumentError(f"{what}: a law has no stress in a step; increase steps = {steps}")
+        state.accept()
+    closed = np.append(np.arange(points), 0)
+    return InteractionDiagram(r[closed, 0], r[closed, 2], strain[closed], curvature[closed])

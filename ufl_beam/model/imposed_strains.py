@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: MIT
+"""Imposed strains of beams: temperature, shrinkage, tendons, lack of fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import KW_ONLY, dataclass
+from numbers import Real
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.errors import ModelError, closed
+from ufl_beam.model.beams import Beam
+from ufl_beam.model.bodies import Member
+from ufl_beam.model.checks import require_kind, require_number, require_vector
+from ufl_beam.model.functions import Timed, TimeFunction, steady
+from ufl_beam.model.loads import Load, Profile, profile_at, require_span
+from ufl_beam.model.records import Instance
+
+
+def require_along(value: object, what: str) -> Profile:
+    """Return a pair of numbers (two times a single number) or a function of s, or raise."""
+    if callable(value):
+        return value
+    if isinstance(value, Real):
+        return (require_number(value, what),) * 2
+    return require_vector(value, what)
+
+
+Along = Annotated[Profile | float, require_along]
+
+
+@closed("state other strains in the law of a section")
+@dataclass(frozen=True, eq=False, repr=False)
+class ImposedStrain(Load):
+    """Strains that a beam would have without stress, by temperature, shrinkage or a tendon.
+
+    Stresses follow from the strains of the beam minus the imposed strains.  Section forces,
+    reactions, stored energy, yielding and hinges refer to these stresses.  The strains act on the
+    whole section, also on sections of fibres: the axial strain of a fibre at y is
+    ``axial - y curvature``.  The work of the stresses on imposed strains is in the ledger, in the
+    entry "loads".  A static run applies them in its first step, a dynamic run begins with them.
+
+    Each strain is a number, a pair of values at both ends of the span, or a function of the
+    parameter s of the beam.  In a cell with p integration points, a polynomial of degree p - 1
+    approximates the strains, with equal means; a saved solution has samples of functions.
+
+    Args:
+        beam: The beam.
+        axial: Imposed axial strain, positive in elongation; dimensionless.
+        curvature: Imposed curvature, positive with elongation on the right of the direction of the
+            beam; 1/m.
+        shear: Imposed shear strain; dimensionless.
+        amplitude: Factor on the strains, a function of time t (s).
+        span: Parameters of the beam at both ends of the strains, from 0 to 1.  Both ends become
+            vertices of the mesh.
+
+    Raises:
+        ModelError: The span is not inside the beam, or a strain is no number somewhere.
+
+    Example:
+        >>> fire = ub.ImposedStrain.temperature(beam, 1.2e-5, uniform=100.0)  # 1/K, K
+        >>> held = ub.Scene(
+        ...     [beam], supports=[ub.Clamped(beam.start), ub.Clamped(beam.end)], loads=[fire]
+        ... )
+        >>> run = ub.simulate(held, ub.Static(), t=(0, 1), dt=1.0)
+        >>> print(f"{run.section_forces(beam)[0, 0] / section.EA:.4f}")  # -1.2e-5 * 100
+        -0.0012
+    """
+
+    dead: ClassVar = False  # the stresses change the stiffness of the beam
+
+    beam: Instance[Member]
+    axial: Along = (0.0, 0.0)
+    curvature: Along = (0.0, 0.0)
+    amplitude: Timed = steady
+    _: KW_ONLY
+    shear: Along = (0.0, 0.0)
+    span: Annotated[tuple[float, float], require_span] = (0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.strains(np.array(self.span))
+
+    def __str__(self) -> str:
+        return f"ImposedStrain of {self.beam.name}"
+
+    _label = __str__
+
+    def strains(self, s: Array) -> Array:
+        """Return (axial, shear, curvature) at parameters ``s``; (..., 3); zero out of the span."""
+        names = ("axial", "shear", "curvature")
+        values = [profile_at(s, getattr(self, x), self.span, f"{self}: {x}") for x in names]
+        return np.stack(values, axis=-1)
+
+    @classmethod
+    def temperature(
+        cls, beam: Beam, expansion: float, uniform: float = 0.0, gradient: float = 0.0, *,
+        amplitude: TimeFunction = steady, span: tuple[float, float] = (0.0, 1.0),
+    ) -> ImposedStrain:  # fmt: skip
+        """Create the strains of a change of temperature that is linear over the depth.
+
+        Args:
+            beam: The beam.
+            expansion: Coefficient of thermal expansion; 1/K.
+            uniform: Change of the temperature of the axis; K.
+            gradient: Change of temperature per length to the left of the direction of the beam,
+                (left - right) / depth; K/m.
+            amplitude: Factor on both, a function of time t (s).
+            span: Parameters of the beam at both ends of the heated part.
+        """
+        α = require_number(expansion, "ImposedStrain.temperature: expansion", positive=True)
+        T = require_number(uniform, "ImposedStrain.temperature: uniform")
+        g = require_number(gradient, "ImposedStrain.temperature: gradient")
+        return cls(beam, α * T, -α * g, amplitude, span=span)
+
+    @classmethod
+    def tendon(
+        cls, beam: Beam, force: float, eccentricity: Along = 0.0, *,
+        amplitude: TimeFunction = steady, span: tuple[float, float] = (0.0, 1.0),
+    ) -> ImposedStrain:  # fmt: skip
+        """Create the strains that a tendon with a given force causes in an elastic section.
+
+        Section forces of the scene are those of the section with its tendon.  So the concrete bears
+        ``N - force``, and in a statically determinate beam without other loads N and M vanish.
+
+        Args:
+            beam: The beam.
+            force: Force of the tendon, positive in tension; N.  It has the same value along the
+                beam; its decrease by friction needs several spans.
+            eccentricity: Distance of the tendon from the axis, positive to the left of the
+                direction of the beam; m.  A number, a pair of values at both ends, or a function of
+                s, such as a parabola, or ``ub.Table`` for a polygon.
+            amplitude: Factor on the force, a function of time t (s).
+            span: Parameters of the beam at both ends of the tendon.
+
+        Raises:
+            ModelError: The tendon leaves the depth of the section.
+        """
+        require_kind(beam, Beam, "ImposedStrain.tendon: beam")
+        P = require_number(force, "ImposedStrain.tendon: force")
+        e = require_along(eccentricity, "ImposedStrain.tendon: eccentricity")
+        section, (first, last) = beam.section, require_span(span, "ImposedStrain.tendon: span")
+        s = first + (last - first) * np.arange(101.0) / 100
+        at = profile_at(s, e, (first, last), "ImposedStrain.tendon: eccentricity")
+        far = np.abs(at).argmax()
+        if abs(at[far]) > section.depth / 2:
+            raise ModelError(
+                f"ImposedStrain.tendon: the tendon is {abs(at[far]):.3g} m from the axis of "
+                f"{beam.name} at s = {s[far]:.3g}, outside its section of depth "
+                f"{section.depth:.3g} m"
+            )
+        curvature = _scaled(e, P / section.EI)
+        return cls(beam, -P / section.EA, curvature, amplitude, span=span)
+
+
+def _scaled(profile: Profile, factor: float) -> Profile:
+    """Return a profile times a factor."""
+    if callable(profile):
+        function: Callable[[float], float] = profile
+        return lambda s: factor * function(s)
+    return profile[0] * factor, profile[1] * factor
