@@ -446,7 +446,9 @@ class _Writer(Laws):
     def _mesh(self):
         refine, degree = self._one([1, 1, 1, 2]), self._one([1, 1, 2, 3])
         lumped = self._chance(0.2)
-        self._lines.append(f"mesh = ub.Mesh({refine}, degree={degree}, lumped={lumped})")
+        self._lines.append(
+            f"mesh = ub.Mesh({refine}, degree={degree if self._elastic else 1}, lumped={lumped})"
+        )
 
     # -- the end -------------------------------------------------------------------------------
 

@@ -101,8 +101,8 @@ def tradeoff(
         tolerance: Largest error of each quantity, by name, in its unit; or one number for all
             quantities, as a fraction of their largest magnitudes.
         budget: Largest wall time of one run, instead of a tolerance; s.
-        mesh: Mesh with the coarsest cells, or several meshes; by default cells of degree 1, and
-            cells of degree 2 if the scene allows them.
+        mesh: Mesh with the coarsest cells, or several meshes; by default cells of degree 1
+            and 2.
         newton: Options of Newton's method, or several.  Runs use the first options; a coarse run
             compares the others.  The recommendation uses the fastest options that change the
             quantities little.

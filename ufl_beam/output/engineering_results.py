@@ -26,7 +26,7 @@ from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector, place_of
 from ufl_beam.model.scene import Scene, attachment_points
-from ufl_beam.output.state_rows import HINGE, JUMP, PLASTIC, Columns
+from ufl_beam.output.state_rows import HINGE, PLASTIC, Columns
 from ufl_beam.output.states import States
 
 # -- storeys ---------------------------------------------------------------------------------------
@@ -320,23 +320,22 @@ def _add_cells(states: States, beam: Member, add: Any) -> None:
     """Add open hinges in cells of a beam, and the beam itself if it yields or cracks."""
     numbering = states.numbering
     cells = np.intersect1d(numbering.cells_of(beam), numbering.inelastic_cells)
-    rows = np.searchsorted(numbering.inelastic_cells, cells)
     if not len(cells):
         return
-    p = numbering.mesh.degree
-    points = (p * rows[:, None] + np.arange(p)).ravel()
-    jump, plastic, broken = (  # sums over the integration points of cells
-        states.column("material")[:, points, k].reshape(len(states), -1, p).sum(axis=2)
-        for k in (JUMP, PLASTIC, HINGE)
-    )
+    mesh, s = numbering.mesh, numbering.parameters(beam)
+    start = np.repeat(cells - numbering.cells_of(beam)[0], mesh.degree)
+    x = np.tile(mesh.points, len(cells))  # Gauss points, one cell after the other
+    places = [beam.at((1 - a) * s[i] + a * s[i + 1]) for i, a in zip(start, x, strict=True)]
+    rows = np.searchsorted(numbering.inelastic_cells, cells)[:, None] * mesh.degree
+    rows = (rows + np.arange(mesh.degree)).ravel()
+    jump, plastic, broken = (states.column("material")[:, rows, k] for k in (3, PLASTIC, HINGE))
     if beam.section.fibres is not None:  # cracks are no rotations
         plastic, broken = plastic + broken, 0 * broken
     for i in np.flatnonzero(broken.any(axis=0)):
-        add(numbering.middle(int(cells[i])), jump[:, i], jump[:, i], broken[:, i])
+        add(places[i], jump[:, i], jump[:, i], broken[:, i])
     if plastic.any():
         unknown, most = np.full(len(states), math.nan), int(np.argmax(plastic[-1]))
-        place = numbering.middle(int(cells[most]))
-        add(place, unknown, unknown, plastic.sum(axis=1))
+        add(places[most], unknown, unknown, plastic.sum(axis=1))
 
 
 def _limit(scene: Scene, connector: Connector) -> float:

@@ -141,15 +141,14 @@ class YieldingBeams(CellForce):
         linear = self._b + ufl.dot(self._D, strain(element.q1, element.axis))
         work, around = (virtual_work(r, w_e) * element.dx(1) for r in (self._r, linear))
         super().__init__(cells, work, setting, around=around)
-        self._rows = cells.cell_indices + section_points.number * len(numbering.cells)
         self._degree = numbering.mesh.degree
+        self._rows = cells.cell_indices + section_points.number * len(numbering.cells)
         self._names = [
             numbering.describe_cell(number) for number in cells.cell_indices.repeat(self._degree)
         ]
-        self._lengths = numbering.section_lengths(cells.cell_indices)
         self.points = MaterialPoints(
             section_points, numbering.keys(cells.cell_indices),
-            self._lengths, setting,
+            numbering.section_lengths(cells.cell_indices), setting,
         )  # fmt: skip
 
     def response(self, step: Step, q1: Array) -> Response:
@@ -172,7 +171,8 @@ class YieldingBeams(CellForce):
         before, w = self.points.recorded[:, :3], self._weight
         acting = w * before + (1 - w) * self.points.r
         change = self.imposed.change.reshape(-1, 3)
-        return float(self._lengths @ np.einsum("ki,ki->k", acting, change))
+        lengths = np.outer(self.cells.lengths, self.cells.weights).ravel()
+        return float(lengths @ np.einsum("ki,ki->k", acting, change))
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Accept the internal variables at the end of the step."""
@@ -183,7 +183,8 @@ class YieldingBeams(CellForce):
 
     def start(self, q: Array) -> None:
         """Compute the accepted state of the points at the strains of a configuration."""
-        self.points.start(self.cells.strains(q).reshape(-1, 3) - self.imposed.values.reshape(-1, 3))
+        strains = self.cells.strains(q) - self.imposed.values
+        self.points.start(strains.reshape(-1, 3))
 
     @property
     def stored(self) -> Mapping[str, float]:  # type: ignore[override]
@@ -197,7 +198,7 @@ class YieldingBeams(CellForce):
         self.points.state(rows.reshape(state.shape))
 
     def material(self) -> Array:
-        """Return the six values "material" at the points of cells; (num_cells, degree, 6)."""
+        """Return the six values "material" at each Gauss point; (num_cells, degree, 6)."""
         data = self.points.recorded.copy()
         data[:, 3] *= self._hinges  # zero without a hinge: jumps of fibres are no rotations
         return data.reshape(-1, self._degree, 6)

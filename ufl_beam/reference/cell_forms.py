@@ -212,6 +212,7 @@ class Cells:
         cell_indices: Numbers of the cells in the scene, in the order of the mesh.
         lengths: Lengths of the cells; m.
         element: Finite element, and functions in the forms.
+        weights: Weights of the Gauss points of a cell, with the sum 1.
         at: Index in the scene of each degree of freedom of the mesh.
     """
 
@@ -222,7 +223,7 @@ class Cells:
             numbering.lengths(self.cell_indices),
             Element(numbering.mesh, mesh),
         )
-        element, self._weights = self.element, np.asarray(numbering.mesh.point_weights)
+        element, self.weights = self.element, np.asarray(numbering.mesh.point_weights)
         self._dofs = cell_dofs(element.space)
         scene_dofs = numbering.dofs[
             numbering.nodes_of_cells[self.cell_indices]
@@ -252,7 +253,7 @@ class Cells:
         self.set(self.element.q1, q)
         space = self.element.at_points(3).function_space
         weighted = self._strains.assembled()[cell_dofs(space)]
-        strains = weighted.reshape(len(self.cell_indices), -1, 3) / self._weights.reshape(-1, 1)
+        strains = weighted.reshape(len(self.cell_indices), -1, 3) / self.weights.reshape(-1, 1)
         return np.asarray(strains)
 
     def on_nodes(self, kind: str, values: Array) -> Array:

@@ -592,10 +592,11 @@ class Solver(PresentState):
         reactions = np.array(self.supports.forces())
         for k, support in enumerate(self.scene.supports):  # in the axes of the support
             reactions[k, :2] = turned(reactions[k, :2], np.full(1, -support.angle))[0]
-        p, inelastic = self.numbering.mesh.degree, self.numbering.inelastic_cells
-        material = np.zeros((len(inelastic), p, 6))
+        degree = self.numbering.mesh.degree
+        material = np.zeros((len(self.numbering.inelastic_cells), degree, 6))
         for beams in self.yielding:
-            material[np.searchsorted(inelastic, beams.cells.cell_indices)] += beams.material()
+            rows = np.searchsorted(self.numbering.inelastic_cells, beams.cells.cell_indices)
+            material[rows] += beams.material()
         state = {"t": np.array(self.t), "q": self.q, "reactions": reactions}
         if self.inertia is not None:
             state["v"] = self.inertia.v

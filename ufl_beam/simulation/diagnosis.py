@@ -224,14 +224,14 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     length = np.linalg.norm(d, axis=1)
     along, shear = (np.sum(apart * axis, axis=1) / length for axis in (d, across))
     strains = np.column_stack([along, shear, change[:, 2]])
-    works = np.zeros((2, len(numbering.cells)))  # of the tangent, and of the elastic stiffness
+    # Works of the tangent, and of the elastic stiffness, at the Gauss points
+    works = np.zeros((2, len(numbering.cells), numbering.mesh.degree))
     for beams in equation.inelastic:
         cells, p = beams.recorded()[0], numbering.mesh.degree
-        work = beams.points.works(strains[cells].repeat(p, axis=0))
-        works[:, cells] += work.reshape(2, -1, p)
+        in_points = beams.points.works(strains[cells].repeat(p, axis=0))
+        works[:, cells] += in_points.reshape(2, -1, p)
     now, elastic = works
-    in_points = np.divide(now, elastic, out=np.ones(now.shape), where=elastic > 0)
-    left_in_cells = in_points.min(axis=1)
+    left_in_cells = np.divide(now, elastic, out=np.ones_like(now), where=elastic > 0).min(axis=1)
     if subdomain.comm.size > 1:
         subdomain.comm.Allreduce(MPI.IN_PLACE, connectors)
         subdomain.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)

@@ -395,12 +395,13 @@ class InelasticBeams(Cells):
         """Return b and D about ``q1``; this replaces the latest response of the points."""
         r, D = self.points.return_map(self._elastic_strains(q1))
         self._latest.fill(np.nan)  # the latest response belongs to other unknowns
-        around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), self._strains(q1).reshape(-1, 3))
+        whole = self._strains(q1).reshape(-1, 3)
+        around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), whole)
         n = len(self._cells)
         return {self._b: around.reshape(n, -1), self._D: D.reshape(n, -1)}
 
     def _elastic_strains(self, q: Array) -> Array:
-        """Return the strains at ``q`` minus the imposed strains at the end of the step."""
+        """Return the strains at ``q`` minus the imposed strains at the end of the step; (n, 3)."""
         strains = self._strains(q).reshape(-1, 3)
         return strains if self.imposed is None else strains - self.imposed.now
 
@@ -422,7 +423,7 @@ class InelasticBeams(Cells):
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the internal variables."""
         state = self.points.state()
-        rows = archive.rows("cells", self._rows, state.reshape(len(self._cells), -1))
+        rows = archive.rows("cells", self._rows, state.reshape(len(self._rows), -1))
         self.points.restore(rows.reshape(state.shape))
 
     def recorded(self) -> tuple[Index, Array]:

@@ -84,8 +84,8 @@ class CellStrains:
 
     @property
     def now(self) -> Array:
-        """Imposed strains at the end of the step; (num_cells * points, 3)."""
-        return np.asarray(self.strains[:, :, 1].reshape(-1, 3))
+        """Imposed strains at the end of the step; (num_cells points, 3)."""
+        return self.strains[:, :, 1].reshape(-1, 3)
 
     def of_elastic(self, kernels: Sequence[Kernel], work: Kernel, function: fem.Function) -> None:
         """Write the strains in each step into ``function`` in the kernels of elastic cells."""
@@ -98,7 +98,7 @@ class CellStrains:
 
     def of_points(self, inelastic: Any) -> None:
         """Subtract the strains in each step from the strains of cells with material points."""
-        fill(self.c, inelastic=inelastic, before=np.zeros(self.strains[:, :, 0].size))
+        fill(self.c, inelastic=inelastic, before=np.zeros((self.strains.size // 6, 3)))
 
 
 class ImposedStrains(LoadTerm):

@@ -64,7 +64,7 @@ static double work_on_imposed_strains(const imposed_strains *all, const double *
     }
     const points *p = x->inelastic->points;
     const double a = all->weight_of_before, *e = x->strains;
-    for (int c = 0; c < x->cells * x->points; ++c, e += 6)
+    for (int c = 0; c < p->cells; ++c, e += 6)
       for (int k = 0; k < 3; ++k)
         work += p->length[c] * (a * x->before[3 * c + k] + (1 - a) * p->r[3 * c + k]) * (e[3 + k] - e[k]);
   }

@@ -149,7 +149,8 @@ static void linearize(const inelastic *m, const double *forces)
     for (int i = 0; i < m->in_cell; ++i, e += 3, forces += 3, D += 9) {
       double b[3] = {forces[0], forces[1], forces[2]};
       subtract(D, e, b);
-      if (imposed) subtract(D, imposed + 6 * (m->in_cell * c + i) + 3, b); /* the form adds D times the whole strains */
+      /* The form adds D times the whole strains. */
+      if (imposed) subtract(D, imposed + 6 * (c * m->in_cell + i) + 3, b);
       put_in_cell(m->tangent, c, m->at_b + 3 * i, 3, b);
       put_in_cell(m->tangent, c, m->at_D + 9 * i, 9, D);
     }

@@ -87,7 +87,7 @@ void begin_imposed_strains(void *self, const time_step *step, const double *q1, 
     if (x->inelastic) {
       const points *p = x->inelastic->points;
       x->inelastic->latest[0] = NAN; /* compute the next response in any case */
-      for (int c = 0; c < x->cells * x->points; ++c) memcpy(x->before + 3 * c, p->kept + POINT_KEPT * c, 3 * sizeof(double));
+      for (int c = 0; c < p->cells; ++c) memcpy(x->before + 3 * c, p->kept + POINT_KEPT * c, 3 * sizeof(double));
     }
   }
 }
