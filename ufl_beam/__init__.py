@@ -52,6 +52,10 @@ from ufl_beam.analysis.path_controls import (
 )
 from ufl_beam.analysis.path_following import Path as Path
 from ufl_beam.analysis.path_following import follow
+from ufl_beam.analysis.pushover import pushover
+from ufl_beam.analysis.pushover_result import HingeFormation as HingeFormation
+from ufl_beam.analysis.pushover_result import Pushover as Pushover
+from ufl_beam.analysis.pushover_result import TargetDisplacement as TargetDisplacement
 from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff as Tradeoff
 from ufl_beam.errors import (
@@ -283,6 +287,7 @@ __all__ = [
     "picture",
     "plot",
     "print_once",
+    "pushover",
     "rainflow",
     "ramp",
     "render",
@@ -293,7 +298,8 @@ __all__ = [
 
 RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
-    "Energy", "Envelope", "Event", "Extent", "Film", "Modes", "Path", "Place", "Tradeoff",
+    "Energy", "Envelope", "Event", "Extent", "Film", "HingeFormation", "Modes", "Path", "Place",
+    "Pushover", "TargetDisplacement", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 

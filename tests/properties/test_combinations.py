@@ -47,6 +47,7 @@ ELSEWHERE = {
         "peaks", "rainflow",
     },
     "other controls of paths": {"ArcLength", "DisplacementControl", "DissipationControl"},
+    "analyses of structures, which run several simulations": {"pushover"},
     "many runs": {"Study", "TradeoffError", "study", "tradeoff"},
     "errors and words": {"ConvergenceError", "CopiesDiffer", "ModelWarning", "ArgumentError",
         "ArgumentTypeError", "ModelError", "print_once"},

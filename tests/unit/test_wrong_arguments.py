@@ -503,9 +503,27 @@ TABLE |= {
     "rainflow": call(ub.rainflow, series=V([0.0, 1.0, 0.0], SERIES)),
 }
 
+HEAVY = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], masses=[ub.PointMass(BEAM.end, 1.0)])
+OF_ANALYSES = {
+    "scene": V(HEAVY, OBJECT), **MESH, "newton": V(None, optional(OBJECT)),
+    "progress": V(False, SWITCH),
+}  # fmt: skip
+TABLE |= {
+    "pushover": call(
+        ub.pushover,
+        place=V(BEAM.end, [*OBJECT, BODY.middle]),
+        target=V(0.1, [*NUMBER, 0.0]),
+        pattern=V("uniform", [*LIST, [ub.FollowerLoad(BEAM.end, force=(1, 0))]]),
+        component=V("u", [None, 1.0, "w", "psi", ARRAY]),
+        steps=V(2, COUNT),
+        **OF_ANALYSES,
+    ),
+}
+
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
-    "Event", "Extent", "Joint", "Modes", "Path", "Solution", "Study", "Support", "Tradeoff",
+    "Event", "Extent", "HingeFormation", "Joint", "Modes", "Path", "Pushover", "Solution", "Study",
+    "Support", "TargetDisplacement", "Tradeoff",
     "Coefficients", "Diagram", "DolfinxView", "Film", "Step",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""

@@ -13,6 +13,7 @@ from mpi4py import MPI
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import block_array, csr_array, diags_array, eye_array
+from scipy.sparse.csgraph import structural_rank
 from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array, Complex
@@ -92,8 +93,13 @@ class SmallMotions:
         # Columns: unit motions that supports allow, and unit forces of constraints.
         self._Z = (self._axes @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
         self.K, self.M = self._reduced(T), self._reduced(self._matrix(simulation.inertia.M.data))
-        # Number of modes: a constraint removes its force and one motion; a mode needs mass.
-        self.most = self.K.shape[0] - len(constraints) - int(np.sum(self.M.diagonal() == 0.0))
+        # Number of modes: a constraint removes its force and one motion; a mode needs mass.  A
+        # constraint between motions without mass, as of a hinge, removes one of these.
+        massless = self.M.diagonal() == 0.0
+        rows = np.isin(np.flatnonzero(left), constraints)
+        between = self.K[np.flatnonzero(rows)][:, np.flatnonzero(massless & ~rows)]
+        removed = structural_rank(between) if min(between.shape) else 0
+        self.most = self.K.shape[0] - len(constraints) - int(massless.sum()) + int(removed)
 
     def _matrix(self, data: Array) -> csr_array:
         A: Csr = self._simulation.inertia.M  # all matrices have this sparsity pattern
@@ -214,7 +220,7 @@ class SmallMotions:
         vanish if the stiffness changed linearly.  The error is the stiffness of the shape in the
         configuration q + λ u of the linear path u, divided by its stiffness in the state q.
         """
-        u = self._path()
+        u = self.linear_change("buckling")
         right, left = self._with_laws()
         change = csr_array(
             left @ self._matrix(self._simulation.equation.tangent_change(self.q, u)) @ right
@@ -245,8 +251,11 @@ class SmallMotions:
         left = Z.T - ((Z.T @ T[:, laws]) @ flexibility) @ columns.T
         return csr_array(right), csr_array(left)
 
-    def _path(self) -> Array:
-        """Compute the linear change of the configuration due to loads and prescribed motions."""
+    def linear_change(self, call: str) -> Array:
+        """Compute the linear change of the configuration due to loads and prescribed motions.
+
+        ``call`` is the caller in messages.
+        """
         simulation, supports = self._simulation, self._simulation.supports
         (r, T), Q = self._linearized(self.q), self._axes
         before = supports.in_axes(self.q)
@@ -257,13 +266,13 @@ class SmallMotions:
         rest = Z.T @ (r + T @ g)
         if not rest.any():
             raise ArgumentError(
-                f"buckling: nothing acts on the scene at t = {simulation.t:g} s that does not act "
+                f"{call}: nothing acts on the scene at t = {simulation.t:g} s that does not act "
                 "in the initial state; give the scene loads, or another t"
             )
         try:
             return np.asarray(g - Z @ splu((Z.T @ T @ Z).tocsc()).solve(rest))
         except RuntimeError:
-            raise ArgumentError("buckling: the scene is free to move in its state") from None
+            raise ArgumentError(f"{call}: the scene is free to move in its state") from None
 
     # -- shapes --------------------------------------------------------------------------------
 

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
+from ufl_beam.analysis.pushover_result import Pushover
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
+from ufl_beam.plotting.analysis_pictures import draw_pushover
 from ufl_beam.plotting.frame_pictures import draw_damage_state, draw_shape
 from ufl_beam.plotting.history_pictures import (
     draw_cycles,
@@ -52,6 +54,7 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Fatigue: {"cycles": draw_cycles},
     Study: {"results": draw_study},
     Tradeoff: {"errors": draw_tradeoff},
+    Pushover: {"curve": draw_pushover},
 }
 """Pictures by class and quantity; the first one of a class is drawn by default."""
 
@@ -79,6 +82,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Fatigue          "cycles"            rainflow matrix and spectrum; a hot spot
     Study            "results"           results over the cases
     Tradeoff         "errors"            errors over wall times; ``ax``
+    Pushover         "curve"             capacity curve with its hinges; ``targets``, ``ax``
     ===============  ==================  ========================================================
 
     Args:
@@ -90,8 +94,9 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             factor on displacements.  ``times`` (s) are replaced by the nearest recorded times;
             ``count`` is a number of shapes.  ``component`` is "u", "v", "psi", "du/dt", "dv/dt" or
             "dpsi/dt".  ``numbers`` are indices of modes, all by default.  ``amplitude`` is their
-            largest displacement, as a fraction of the size of the scene.  ``ax`` are axes to draw
-            in, instead of a new figure.
+            largest displacement, as a fraction of the size of the scene.  ``targets`` is one or
+            several of the target displacements of a pushover.  ``ax`` are axes to draw in, instead
+            of a new figure.
 
     Raises:
         ArgumentError: There is no such picture, or one of its arguments is wrong; the message says

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of analyses of structures: their curves and labels."""
+
+import numpy as np
+
+import ufl_beam as ub
+
+
+def test_a_capacity_curve_shows_hinges_and_targets():
+    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+    law = ub.ElastoPlastic(5e4, isotropic=1e5)  # N m, N m/rad
+    column = ub.Beam((0, 0), (0, 2), section, cells=2, hinges={0.0: law}, name="column")
+    scene = ub.Scene(
+        [column], supports=[ub.Clamped(column.start)], masses=[ub.PointMass(column.end, 5e3)]
+    )
+    curve = ub.pushover(scene, column.end, -0.05, steps=10, progress=False)
+    targets = curve.n2(lambda T: 8.0, 0.5), curve.asce41(lambda T: 8.0)
+    figure = ub.plot(curve, targets=targets)
+    axes = figure.axes[0]
+    np.testing.assert_allclose(
+        axes.lines[0].get_xydata(), np.column_stack([curve.displacement, curve.base_shear / 1e3])
+    )
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "1: column.start (0, 0) yields" in labels
+    assert {label.split(":")[0] for label in labels} == {"N2", "ASCE 41", "1"}
+    lines = [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == ":"]
+    np.testing.assert_allclose(lines, [-target.displacement for target in targets])
+    assert axes.get_ylabel() == "base shear (kN)"

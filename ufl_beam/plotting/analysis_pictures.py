@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of analyses of structures: capacity curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ufl_beam.analysis.pushover_result import Pushover, TargetDisplacement
+from ufl_beam.plotting import style
+from ufl_beam.plotting.style import BLUE, COLORS, GREY, ORANGE, RED, shade
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_NAMED = 12  # largest number of events that a legend names
+
+
+def draw_pushover(
+    pushover: Pushover,
+    *,
+    targets: TargetDisplacement | Sequence[TargetDisplacement] = (),
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw the capacity curve with numbered hinges, and the idealised curves of targets.
+
+    Events of the same step share a number.
+    """
+    several = (targets,) if isinstance(targets, TargetDisplacement) else tuple(targets)
+    sign = float(np.sign(pushover.target))
+    unit, prefix = style.decimal_prefix(float(np.abs(pushover.base_shear).max()))
+    with style.panel(ax, (8.0, 5.0)) as axes:
+        style.time_axes(axes)
+        axes.margins(x=0.05)
+        axes.plot(pushover.displacement, pushover.base_shear / unit, color=BLUE, zorder=3)
+        for target, color in zip(several, (RED, *COLORS[2:]), strict=False):
+            d, V = target.yield_displacement, target.yield_shear
+            far, end = max(target.displacement, d), V
+            if target.method != "N2" and target.displacement > d:
+                end = float(
+                    np.interp(far, *(sign * pushover.displacement, sign * pushover.base_shear))
+                )
+            axes.plot(
+                [0.0, sign * d, sign * far], [0.0, sign * V / unit, sign * end / unit], "--",
+                color=color, linewidth=1.4, zorder=2,
+            )  # fmt: skip
+            axes.axvline(
+                sign * target.displacement, color=color, linewidth=1.4, linestyle=":", zorder=2,
+                label=f"{target.method}: {target.displacement:.3g} m",
+            )  # fmt: skip
+        steps = [list(same) for _, same in groupby(pushover.hinges, key=lambda hinge: hinge.n)]
+        for number, same in enumerate(steps, start=1):
+            at = same[0].displacement, same[0].base_shear / unit
+            names = [f"{hinge.where} {hinge.what}" for hinge in same]
+            words = names[0] + (f" and {len(names) - 1} more" if len(names) > 1 else "")
+            label = f"{number}: {words}" if len(steps) <= MOST_NAMED else None
+            axes.plot(*at, "o", color=shade(ORANGE), ms=6.0, zorder=4, label=label)
+            axes.annotate(
+                str(number), at, (-4, 5), textcoords="offset points", ha="right", zorder=5,
+                fontsize=style.font_size(11.0),
+            )  # fmt: skip
+        axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
+        axes.set_xlabel(f"{pushover.component} of {pushover.place} (m)")
+        axes.set_ylabel(f"base shear ({prefix}N)")
+        if steps or several:
+            style.draw_legend(
+                axes, ax, loc="outside upper left", ncols=2, fontsize=style.font_size(10.0)
+            )
+    return style.parent_figure(axes)
