@@ -56,6 +56,8 @@ from ufl_beam.analysis.pushover import pushover
 from ufl_beam.analysis.pushover_result import HingeFormation as HingeFormation
 from ufl_beam.analysis.pushover_result import Pushover as Pushover
 from ufl_beam.analysis.pushover_result import TargetDisplacement as TargetDisplacement
+from ufl_beam.analysis.response_spectrum import SpectralResponse as SpectralResponse
+from ufl_beam.analysis.response_spectrum import response_spectrum_analysis
 from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff as Tradeoff
 from ufl_beam.errors import (
@@ -291,6 +293,7 @@ __all__ = [
     "rainflow",
     "ramp",
     "render",
+    "response_spectrum_analysis",
     "simulate",
     "study",
     "tradeoff",
@@ -299,7 +302,7 @@ __all__ = [
 RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
     "Energy", "Envelope", "Event", "Extent", "Film", "HingeFormation", "Modes", "Path", "Place",
-    "Pushover", "TargetDisplacement", "Tradeoff",
+    "Pushover", "SpectralResponse", "TargetDisplacement", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 

@@ -47,7 +47,9 @@ ELSEWHERE = {
         "peaks", "rainflow",
     },
     "other controls of paths": {"ArcLength", "DisplacementControl", "DissipationControl"},
-    "analyses of structures, which run several simulations": {"pushover"},
+    "analyses of structures, which run several simulations": {
+        "pushover", "response_spectrum_analysis",
+    },
     "many runs": {"Study", "TradeoffError", "study", "tradeoff"},
     "errors and words": {"ConvergenceError", "CopiesDiffer", "ModelWarning", "ArgumentError",
         "ArgumentTypeError", "ModelError", "print_once"},

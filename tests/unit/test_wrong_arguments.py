@@ -503,6 +503,10 @@ TABLE |= {
     "rainflow": call(ub.rainflow, series=V([0.0, 1.0, 0.0], SERIES)),
 }
 
+SPECTRUM = [
+    None, 1.0, "ab", (), ([1.0],), ([1.0], [1.0, 2.0]), ([2.0, 1.0], [1.0, 1.0]),
+    ([0.0, NAN], [1.0, 1.0]), ([0.0, "x"], [1.0, 1.0]), lambda T: None, lambda T: -1.0,
+]  # fmt: skip
 HEAVY = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], masses=[ub.PointMass(BEAM.end, 1.0)])
 OF_ANALYSES = {
     "scene": V(HEAVY, OBJECT), **MESH, "newton": V(None, optional(OBJECT)),
@@ -523,7 +527,7 @@ TABLE |= {
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
     "Event", "Extent", "HingeFormation", "Joint", "Modes", "Path", "Pushover", "Solution", "Study",
-    "Support", "TargetDisplacement", "Tradeoff",
+    "SpectralResponse", "Support", "TargetDisplacement", "Tradeoff",
     "Coefficients", "Diagram", "DolfinxView", "Film", "Step",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""

@@ -92,11 +92,13 @@ class SmallMotions:
         scale[constraints] = abs(T.data).max()  # rows of constraints become as large as stiffnesses
         # Columns: unit motions that supports allow, and unit forces of constraints.
         self._Z = (self._axes @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
-        self.K, self.M = self._reduced(T), self._reduced(self._matrix(simulation.inertia.M.data))
+        masses = self._matrix(simulation.inertia.M.data)
+        self.tangent, self.masses = T, masses  # of all degrees of freedom
+        self.K, self.M = self._reduced(T), self._reduced(masses)
         # Number of modes: a constraint removes its force and one motion; a mode needs mass.  A
         # constraint between motions without mass, as of a hinge, removes one of these.
         massless = self.M.diagonal() == 0.0
-        rows = np.isin(np.flatnonzero(left), constraints)
+        self._constraint_rows = rows = np.isin(np.flatnonzero(left), constraints)
         between = self.K[np.flatnonzero(rows)][:, np.flatnonzero(massless & ~rows)]
         removed = structural_rank(between) if min(between.shape) else 0
         self.most = self.K.shape[0] - len(constraints) - int(massless.sum()) + int(removed)
@@ -119,6 +121,40 @@ class SmallMotions:
             flexibility = diags_array(1 / (T.diagonal()[laws] + (T.diagonal()[laws] == 0.0)))
             T = T - T[:, laws] @ flexibility @ T[laws, :]
         return csr_array(self._Z.T @ T @ self._Z)
+
+    def participation(self, direction: Array) -> tuple[Array, float]:
+        """Return M r for a translation r of all nodes along a unit vector, and the moving mass.
+
+        The shapes are (size,), kg, and ().  The moving mass is the sum of the effective masses of
+        all modes: the mass of the scene without the part that only moves with supports.
+        """
+        r = np.zeros(self.numbering.size)
+        for axis, part in enumerate(direction):
+            for dofs in (self.numbering.dofs, self.numbering.dofs_of_bodies):
+                r[dofs[:, axis]] = part
+        toward = np.asarray(self.masses @ r)
+        massive = self.M.diagonal() > 0.0
+        along = np.asarray(self._Z.T @ toward)[massive]
+        # Constraints that also move degrees of freedom without mass do not restrict the others.
+        rows = self.K[np.flatnonzero(self._constraint_rows)]
+        between = abs(rows[:, np.flatnonzero(~massive)]).sum(axis=1) == 0
+        rows = rows[np.flatnonzero(between)][:, np.flatnonzero(massive)]
+        scales = diags_array(abs(self.M).max() / abs(rows).max(axis=1).toarray().ravel())
+        G, M = scales @ rows, self.M[np.flatnonzero(massive)][:, np.flatnonzero(massive)]
+        A = csr_array(block_array([[M, G.T], [G, None]])) if G.shape[0] else M
+        y = splu(A.tocsc()).solve(np.append(along, np.zeros(G.shape[0])))
+        return toward, float(along @ y[: len(along)])
+
+    def support_forces(self, shapes: Array, omega: Array) -> Array:
+        """Return the forces that supports exert in modes of given frequencies (rad/s); (size, n).
+
+        They are T x - ω² M x; at degrees of freedom without support they vanish.
+        """
+        x, laws = shapes.copy(), self._laws
+        x[laws] = 0.0
+        if len(laws):
+            x[laws] = -(self.tangent[laws] @ x) / self.tangent.diagonal()[laws][:, None]
+        return np.asarray(self.tangent @ x - self.masses @ x * omega**2)
 
     def unbalanced(self) -> str:
         """Return a warning of works, connectors, supports that disturb the equilibrium, or ""."""

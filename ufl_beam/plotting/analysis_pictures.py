@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of analyses of structures: capacity curves."""
+"""Pictures of analyses of structures: capacity curves, responses to spectra."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ufl_beam.analysis.pushover_result import Pushover, TargetDisplacement
+from ufl_beam.analysis.response_spectrum import SpectralResponse
+from ufl_beam.arrays import Array
 from ufl_beam.plotting import style
+from ufl_beam.plotting.frame_pictures import MOST, draw_frame, plane_canvas
 from ufl_beam.plotting.style import BLUE, COLORS, GREY, ORANGE, RED, shade
+from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,3 +75,28 @@ def draw_pushover(
                 axes, ax, loc="outside upper left", ncols=2, fontsize=style.font_size(10.0)
             )
     return style.parent_figure(axes)
+
+
+def draw_response(
+    response: SpectralResponse, *, quantity: str = "M", ax: Axes | None = None
+) -> Figure:
+    """Draw a combined section force on the undeformed frame, with both signs."""
+    diagrams = [
+        (beam, sign * getattr(response.diagram(beam), quantity))
+        for beam in response.scene.beams
+        for sign in (1.0, -1.0)
+    ]
+    title = f"{style.RESULTANTS[quantity][0]} {quantity}", "by response spectrum"
+    return _on_frame(response.modes.motion(0), title, quantity, diagrams, ax)
+
+
+def _on_frame(
+    solution: Solution,
+    title: tuple[str, str],
+    quantity: str,
+    diagrams: Sequence[tuple[Any, Array]],
+    ax: Axes | None,
+) -> Figure:
+    """Draw diagrams of a section force on the undeformed frame of a solution."""
+    shape = plane_canvas(solution, [], 1.0, ax, MOST)[0].undeformed
+    return draw_frame(ax, solution, 0, shape, title, quantity, diagrams)

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.pushover_result import Pushover
+from ufl_beam.analysis.response_spectrum import SpectralResponse
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
-from ufl_beam.plotting.analysis_pictures import draw_pushover
+from ufl_beam.plotting.analysis_pictures import draw_pushover, draw_response
 from ufl_beam.plotting.frame_pictures import draw_damage_state, draw_shape
 from ufl_beam.plotting.history_pictures import (
     draw_cycles,
@@ -55,6 +56,7 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Study: {"results": draw_study},
     Tradeoff: {"errors": draw_tradeoff},
     Pushover: {"curve": draw_pushover},
+    SpectralResponse: {name: partial(draw_response, quantity=name) for name in ("M", "N", "V")},
 }
 """Pictures by class and quantity; the first one of a class is drawn by default."""
 
@@ -83,6 +85,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Study            "results"           results over the cases
     Tradeoff         "errors"            errors over wall times; ``ax``
     Pushover         "curve"             capacity curve with its hinges; ``targets``, ``ax``
+    SpectralResponse "M", "N", "V"       combined section force, with both signs; ``ax``
     ===============  ==================  ========================================================
 
     Args:

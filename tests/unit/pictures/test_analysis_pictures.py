@@ -2,8 +2,10 @@
 """Pictures of analyses of structures: their curves and labels."""
 
 import numpy as np
+from drawn import outlines
 
 import ufl_beam as ub
+from ufl_beam.plotting.style import BLUE, RED
 
 
 def test_a_capacity_curve_shows_hinges_and_targets():
@@ -26,3 +28,14 @@ def test_a_capacity_curve_shows_hinges_and_targets():
     lines = [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == ":"]
     np.testing.assert_allclose(lines, [-target.displacement for target in targets])
     assert axes.get_ylabel() == "base shear (kN)"
+
+
+def test_a_response_to_a_spectrum_has_both_signs():
+    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+    column = ub.Beam((0, 0), (0, 2), section, cells=4, name="column")
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start)])
+    response = ub.response_spectrum_analysis(scene, lambda T: 3.0, n=6)
+    for quantity in ("M", "V"):
+        axes = ub.plot(response, quantity).axes[0]
+        assert len(outlines(axes.figure, RED)) == len(outlines(axes.figure, BLUE)) == 1
+        assert axes.get_title(loc="left").endswith("by response spectrum")
