@@ -505,8 +505,9 @@ TABLE |= {
 
 SPECTRUM = [
     None, 1.0, "ab", (), ([1.0],), ([1.0], [1.0, 2.0]), ([2.0, 1.0], [1.0, 1.0]),
-    ([0.0, NAN], [1.0, 1.0]), ([0.0, "x"], [1.0, 1.0]), lambda T: None, lambda T: -1.0,
+    ([0.0, NAN], [1.0, 1.0]), ([0.0, "x"], [1.0, 1.0]),
 ]  # fmt: skip
+"""In the place of a spectrum; a function is evaluated at the periods of modes, with a mesh."""
 HEAVY = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], masses=[ub.PointMass(BEAM.end, 1.0)])
 OF_ANALYSES = {
     "scene": V(HEAVY, OBJECT), **MESH, "newton": V(None, optional(OBJECT)),
@@ -521,6 +522,17 @@ TABLE |= {
         component=V("u", [None, 1.0, "w", "psi", ARRAY]),
         steps=V(2, COUNT),
         **OF_ANALYSES,
+    ),
+    "response_spectrum_analysis": call(
+        ub.response_spectrum_analysis,
+        scene=V(HEAVY, OBJECT),
+        spectrum=V(([0.0, 9.0], [1.0, 1.0]), SPECTRUM),
+        n=V(2, COUNT),
+        direction=V((1, 0), [*VECTOR, (0.0, 0.0)]),
+        damping=V(0.05, [*POSITIVE, 1.0]),
+        rule=V("CQC", [None, 1.0, "cqc", ARRAY]),
+        at=V(None, optional(OBJECT)),
+        **MESH,
     ),
 }
 

@@ -86,7 +86,7 @@ class SpectralResponse(Rich):
 
     @property
     def scene(self) -> Scene:
-        """The model."""
+        """The model of the modes."""
         return self.modes.scene
 
     @property

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ufl_beam.analysis.pushover_result import Pushover, TargetDisplacement
-from ufl_beam.analysis.response_spectrum import SpectralResponse
 from ufl_beam.arrays import Array
 from ufl_beam.plotting import style
 from ufl_beam.plotting.frame_pictures import MOST, draw_frame, plane_canvas
@@ -77,10 +76,8 @@ def draw_pushover(
     return style.parent_figure(axes)
 
 
-def draw_response(
-    response: SpectralResponse, *, quantity: str = "M", ax: Axes | None = None
-) -> Figure:
-    """Draw a combined section force on the undeformed frame, with both signs."""
+def draw_response(response: Any, *, quantity: str = "M", ax: Axes | None = None) -> Figure:
+    """Draw a section force of a :class:`SpectralResponse` on the frame, with both signs."""
     diagrams = [
         (beam, sign * getattr(response.diagram(beam), quantity))
         for beam in response.scene.beams
