@@ -40,6 +40,9 @@ from ufl_beam.analysis.free_decay import (
     logarithmic_decrement,
     peaks,
 )
+from ufl_beam.analysis.load_combinations import load_combinations
+from ufl_beam.analysis.load_combinations_result import Governing as Governing
+from ufl_beam.analysis.load_combinations_result import LoadCombinations as LoadCombinations
 from ufl_beam.analysis.modes import Buckling as Buckling
 from ufl_beam.analysis.modes import Modes as Modes
 from ufl_beam.analysis.modes import buckling, modes
@@ -283,6 +286,7 @@ __all__ = [
     "follow",
     "ground",
     "law_functions",
+    "load_combinations",
     "logarithmic_decrement",
     "modes",
     "peaks",
@@ -301,8 +305,9 @@ __all__ = [
 
 RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
-    "Energy", "Envelope", "Event", "Extent", "Film", "HingeFormation", "Modes", "Path", "Place",
-    "Pushover", "SpectralResponse", "TargetDisplacement", "Tradeoff",
+    "Energy", "Envelope", "Event", "Extent", "Film", "Governing", "HingeFormation",
+    "LoadCombinations", "Modes", "Path", "Place", "Pushover", "SpectralResponse",
+    "TargetDisplacement", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 

@@ -523,6 +523,19 @@ TABLE |= {
         steps=V(2, COUNT),
         **OF_ANALYSES,
     ),
+    "load_combinations": call(
+        ub.load_combinations,
+        cases=V(
+            {"Q": [ub.PointLoad(BEAM.end, force=(1, 0))]},
+            [*LIST, {}, {1: []}, {"a": [None]}, {"a": [ub.RotatingFrame(rate=1.0)]}],
+        ),
+        combinations=V(
+            {"A": {"Q": 1.5}},
+            [*LIST, {}, {"A": {}}, {"A": {"R": 1.0}}, *({"A": {"Q": x}} for x in NUMBER)],
+        ),
+        steps=V(2, COUNT),
+        **OF_ANALYSES,
+    ),
     "response_spectrum_analysis": call(
         ub.response_spectrum_analysis,
         scene=V(HEAVY, OBJECT),
@@ -538,8 +551,9 @@ TABLE |= {
 
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
-    "Event", "Extent", "HingeFormation", "Joint", "Modes", "Path", "Pushover", "Solution", "Study",
-    "SpectralResponse", "Support", "TargetDisplacement", "Tradeoff",
+    "Event", "Extent", "Governing", "HingeFormation", "Joint", "LoadCombinations", "Modes", "Path",
+    "Pushover", "Solution", "Study", "SpectralResponse", "Support", "TargetDisplacement",
+    "Tradeoff",
     "Coefficients", "Diagram", "DolfinxView", "Film", "Step",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.analysis.pushover_result import Pushover, TargetDisplacement
 from ufl_beam.arrays import Array
 from ufl_beam.plotting import style
@@ -85,6 +86,23 @@ def draw_response(response: Any, *, quantity: str = "M", ax: Axes | None = None)
     ]
     title = f"{style.RESULTANTS[quantity][0]} {quantity}", "by response spectrum"
     return _on_frame(response.modes.motion(0), title, quantity, diagrams, ax)
+
+
+def draw_combinations(
+    combined: LoadCombinations, *, quantity: str = "M", ax: Axes | None = None
+) -> Figure:
+    """Draw the envelope of a section force over load combinations on the undeformed frame."""
+    index, solutions = list(style.RESULTANTS).index(quantity), [*combined.solutions.values()]
+    reached = [(beam, combined.section_forces(beam)) for beam in solutions[0].scene.beams]
+    diagrams = [
+        (beam, values[:, index])
+        for beam, extremes in reached
+        for values in (extremes.high, extremes.low)
+    ]
+    title = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}"
+    return _on_frame(
+        solutions[0], (title, f"of {len(solutions)} load combinations"), quantity, diagrams, ax
+    )
 
 
 def _on_frame(

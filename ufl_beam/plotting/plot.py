@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.pushover_result import Pushover
@@ -17,7 +18,11 @@ from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
-from ufl_beam.plotting.analysis_pictures import draw_pushover, draw_response
+from ufl_beam.plotting.analysis_pictures import (
+    draw_combinations,
+    draw_pushover,
+    draw_response,
+)
 from ufl_beam.plotting.frame_pictures import draw_damage_state, draw_shape
 from ufl_beam.plotting.history_pictures import (
     draw_cycles,
@@ -57,6 +62,7 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Tradeoff: {"errors": draw_tradeoff},
     Pushover: {"curve": draw_pushover},
     SpectralResponse: {name: partial(draw_response, quantity=name) for name in ("M", "N", "V")},
+    LoadCombinations: {name: partial(draw_combinations, quantity=name) for name in ("M", "N", "V")},
 }
 """Pictures by class and quantity; the first one of a class is drawn by default."""
 
@@ -86,6 +92,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Tradeoff         "errors"            errors over wall times; ``ax``
     Pushover         "curve"             capacity curve with its hinges; ``targets``, ``ax``
     SpectralResponse "M", "N", "V"       combined section force, with both signs; ``ax``
+    LoadCombinations "M", "N", "V"       envelope over the combinations; ``ax``
     ===============  ==================  ========================================================
 
     Args:

@@ -35,7 +35,19 @@ def test_a_response_to_a_spectrum_has_both_signs():
     column = ub.Beam((0, 0), (0, 2), section, cells=4, name="column")
     scene = ub.Scene([column], supports=[ub.Clamped(column.start)])
     response = ub.response_spectrum_analysis(scene, lambda T: 3.0, n=6)
-    for quantity in ("M", "V"):
-        axes = ub.plot(response, quantity).axes[0]
-        assert len(outlines(axes.figure, RED)) == len(outlines(axes.figure, BLUE)) == 1
-        assert axes.get_title(loc="left").endswith("by response spectrum")
+    axes = ub.plot(response, "V").axes[0]
+    assert len(outlines(axes.figure, RED)) == len(outlines(axes.figure, BLUE)) == 1
+    assert axes.get_title(loc="left").endswith("by response spectrum")
+
+
+def test_an_envelope_of_combinations_has_both_extremes():
+    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+    column = ub.Beam((0, 0), (0, 2), section, cells=2, name="column")
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start)])
+    cases = {"W": [ub.PointLoad(column.end, force=(1e3, -1e3))]}
+    found = ub.load_combinations(
+        scene, cases, {"left": {"W": 1.5}, "right": {"W": -1.5}}, progress=False
+    )
+    axes = ub.plot(found, "V").axes[0]
+    assert len(outlines(axes.figure, RED)) == len(outlines(axes.figure, BLUE)) == 1
+    assert axes.get_title(loc="left").endswith("of 2 load combinations")
