@@ -59,6 +59,8 @@ from ufl_beam.analysis.pushover import pushover
 from ufl_beam.analysis.pushover_result import HingeFormation as HingeFormation
 from ufl_beam.analysis.pushover_result import Pushover as Pushover
 from ufl_beam.analysis.pushover_result import TargetDisplacement as TargetDisplacement
+from ufl_beam.analysis.response_spectra import ResponseSpectrum as ResponseSpectrum
+from ufl_beam.analysis.response_spectra import response_spectrum
 from ufl_beam.analysis.response_spectrum import SpectralResponse as SpectralResponse
 from ufl_beam.analysis.response_spectrum import response_spectrum_analysis
 from ufl_beam.analysis.tradeoff import tradeoff
@@ -104,6 +106,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.functions import Table, ramp
+from ufl_beam.model.ground_motion import GroundMotion
 from ufl_beam.model.joints import (
     Guided,
     Joint,
@@ -218,6 +221,7 @@ __all__ = [
     "Gerber",
     "Goodman",
     "Gravity",
+    "GroundMotion",
     "Guided",
     "History",
     "HotSpot",
@@ -297,6 +301,7 @@ __all__ = [
     "rainflow",
     "ramp",
     "render",
+    "response_spectrum",
     "response_spectrum_analysis",
     "simulate",
     "study",
@@ -307,7 +312,7 @@ RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
     "Energy", "Envelope", "Event", "Extent", "Film", "Governing", "HingeFormation",
     "LoadCombinations", "Modes", "Path", "Place", "Pushover", "SpectralResponse",
-    "TargetDisplacement", "Tradeoff",
+    "ResponseSpectrum", "TargetDisplacement", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 

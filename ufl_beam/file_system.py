@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""File system: data flushed to the disk, and locks of files between processes.
+"""File system: names of files, data flushed to the disk, and locks of files between processes.
 
 The operating system frees a lock when its process ends.  On a file system without locks, several
 processes can acquire the same lock.
@@ -12,6 +12,15 @@ import os
 import socket
 from pathlib import Path
 from typing import IO
+
+from ufl_beam.errors import ArgumentError, shorten
+
+
+def require_path(path: str | os.PathLike[str], what: str) -> Path:
+    """Return ``path`` as a :class:`Path`, or raise :class:`ArgumentError` naming ``what``."""
+    if not isinstance(path, str | os.PathLike) or not os.fspath(path):
+        raise ArgumentError(f"{what}: path = {shorten(path)} must be the name of a file")
+    return Path(path)
 
 
 def is_at(file: int, path: Path) -> bool:

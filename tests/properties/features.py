@@ -276,6 +276,10 @@ def pinned(d):
 def shaken(d):
     ω = d.some(2, 6) / d.end
     motion = f"lambda t: 0.03 * (1.0 - math.cos({ω:.4g} * t))"
+    if d.one([True, False]):
+        values = ", ".join(f"{d.some(-0.3, 0.3) / d.end**2:.3f}" for _ in range(8))
+        d.lines.append(f"quake = ub.GroundMotion({d.end / 10:.4g}, [0.0, {values}, 0.0])")
+        motion = "quake.displacement"
     d.root = f"ub.PrescribedDisplacement({{place}}, {d.one(['u', 'v', 'psi'])}={motion}, {{rest}})"
 
 

@@ -44,7 +44,7 @@ MADE = {
 ELSEWHERE = {
     "analyses of histories": {
         "damping", "damping_ratio", "fit_decay", "logarithmic_decrement",
-        "peaks", "rainflow",
+        "peaks", "rainflow", "response_spectrum",
     },
     "other controls of paths": {"ArcLength", "DisplacementControl", "DissipationControl"},
     "analyses of structures, which run several simulations": {

@@ -35,6 +35,7 @@ LAW = ub.ElastoPlastic(1.0)
 BREAKS = ub.Softening(10.0, 5.0)
 SPRING = ub.Spring(1.0)
 JOINT = ub.Revolute(BEAM.end, OTHER.start, multipliers=True)
+MOTION = ub.GroundMotion(0.1, [0.0, 1.0, 0.5, 0.0])
 
 # -- kinds of parameters: what each of them must refuse ------------------------------------------
 
@@ -190,6 +191,11 @@ TABLE = {
     "KelvinVoigt": call(
         ub.KelvinVoigt, retardation_time=V(1.0, POSITIVE), beams=V(None, optional(LIST))
     ),
+    "Rayleigh.with_ratios": call(
+        ub.Rayleigh.with_ratios,
+        ratios=V(0.03, [None, "x", NAN, 0.0, -1.0, HUGE, (0.1, NAN), (0.1,), (0.01, 0.9)]),
+        omega=V((1.0, 2.0), [*VECTOR, (0.0, 1.0), (1.0, 1.0)]),
+    ),
     "Rayleigh": call(ub.Rayleigh, mass=V(1.0, FROM_ZERO), stiffness=V(1.0, FROM_ZERO)),
     # beams, bodies, places
     "Beam": call(
@@ -321,6 +327,36 @@ TABLE = {
         values=V([0, 1], [None, 1.0, "01", [0, NAN], [0, "1"], [0, 1j], [0, HUGE], [0]]),
     ),
     "ramp": call(ub.ramp, duration=V(1.0, POSITIVE)),
+    "GroundMotion": call(
+        ub.GroundMotion,
+        dt=V(0.1, POSITIVE),
+        values=V([0, 1], [None, 1.0, "01", [0, NAN], [0, "1"], [0, 1j], [0, HUGE], [0], [[0, 1]]]),
+        name=V("quake", TEXT),
+    ),
+    "GroundMotion.from_history": call(
+        ub.GroundMotion.from_history,
+        times=V([0, 1], [None, 1.0, "01", [1, 0], [0, NAN], [0, "1"], [0, 1j], [0, HUGE], [0]]),
+        values=V([0, 1], [None, 1.0, "01", [0, NAN], [0, "1"], [0, 1j], [0, HUGE], [0]]),
+        dt=V(0.1, optional(POSITIVE)),
+        name=V("floor", TEXT),
+    ),
+    "GroundMotion.read": call(
+        ub.GroundMotion.read,
+        path=V("quake.txt", PATH),
+        unit=V("g", []),  # wrong units and steps need a file: unit/test_ground_motion.py
+        dt=V(0.1, []),
+    ),
+    "GroundMotion.scaled": call(
+        MOTION.scaled,
+        factor=V(None, optional(NUMBER)),
+        peak=V(2.0, POSITIVE),
+    ),
+    "GroundMotion.corrected": call(
+        MOTION.corrected,
+        degree=V(1, [*FROM_ZERO, 1.5, "2"]),
+        highpass=V(None, [*optional(POSITIVE), 5.0]),
+    ),
+    "GroundMotion.resampled": call(MOTION.resampled, dt=V(0.05, POSITIVE)),
     "Clamped": call(ub.Clamped, place=PLACE),
     "Pinned": call(ub.Pinned, place=PLACE),
     "Roller": call(ub.Roller, place=PLACE, along=V((1, 0), [*VECTOR, (0, 0)])),
@@ -501,6 +537,14 @@ TABLE |= {
     ),
     "damping_ratio": call(ub.damping_ratio, decrement=V(0.1, ["x", None, 1j, NAN, HUGE])),
     "rainflow": call(ub.rainflow, series=V([0.0, 1.0, 0.0], SERIES)),
+    "response_spectrum": call(
+        ub.response_spectrum,
+        motion=V(MOTION, OBJECT),
+        periods=V([1.0], [None, "ab", [], ["1"], [NAN], [1j], [[1.0]], [HUGE], [0.0], -1.0]),
+        damping=V(0.05, [*FROM_ZERO, 1.0]),
+        ductility=V(1.0, [*FROM_ZERO, 0.5]),
+        hardening=V(0.0, [*FROM_ZERO, 1.0]),
+    ),
 }
 
 SPECTRUM = [

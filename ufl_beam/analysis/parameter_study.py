@@ -31,6 +31,7 @@ from ufl_beam.errors import (
     require_sequence,
     require_switch,
 )
+from ufl_beam.file_system import require_path
 from ufl_beam.output.output_files import (
     add_prefix,
     beside,
@@ -40,7 +41,6 @@ from ufl_beam.output.output_files import (
     remove_prefix,
     require_apart,
     require_arrays,
-    require_path,
     reserved,
     write,
 )

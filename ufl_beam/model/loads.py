@@ -19,6 +19,7 @@ from ufl_beam.errors import (
     require_vector,
     shorten,
 )
+from ufl_beam.model import checks
 from ufl_beam.model.bodies import Beams, Member, PlaceField, ground, moves_with_node
 from ufl_beam.model.connector_laws import PrescribedForce
 from ufl_beam.model.connectors import Component, Connector
@@ -277,7 +278,9 @@ class Rayleigh(Record):
     """Rayleigh damping (a0 M + a1 K) v with the stiffness K of the undeformed scene, P(92).
 
     The damping ratio of a mode of circular frequency ω is a0/(2ω) + a1 ω/2.  This damping is not
-    objective: it acts on rigid rotations and open hinges.  In large motion use KelvinVoigt.
+    objective: it acts on rigid rotations.  In large motion use KelvinVoigt.  It also acts on
+    yielding cells and on hinges that open in cells, but neither on hinges of zero length nor on
+    springs, see docs/howto_earthquake.md.
 
     Args:
         mass: Factor a0 on the mass matrix; 1/s.
@@ -302,6 +305,41 @@ class Rayleigh(Record):
         super().__post_init__()
         if self.mass == self.stiffness == 0.0:
             raise ModelError("Rayleigh: mass and stiffness are both zero; leave damping out")
+
+    @classmethod
+    def with_ratios(
+        cls, ratios: float | tuple[float, float], omega: tuple[float, float]
+    ) -> Rayleigh:
+        """Build the damping that has given damping ratios at two circular frequencies.
+
+        Args:
+            ratios: Damping ratio at both frequencies, or a pair of damping ratios.
+            omega: Two different circular frequencies, such as ``modes(scene, 2).omega``; rad/s.
+
+        Raises:
+            ModelError: A frequency is not positive, the frequencies are equal, or the ratios would
+                need a negative factor.
+
+        Example:
+            >>> damping = ub.Rayleigh.with_ratios(0.03, ub.modes(scene, 2).omega)
+            >>> damped = ub.Scene([beam], supports=scene.supports, damping=[damping])
+            >>> print(ub.modes(damped, 2).damping.round(6))
+            [0.03 0.03]
+        """
+        what = "Rayleigh.with_ratios"
+        pair = (ratios, ratios) if np.ndim(ratios) == 0 else ratios
+        z1, z2 = checks.require_vector(pair, f"{what}: ratios")
+        w1, w2 = checks.require_vector(omega, f"{what}: omega")
+        if min(w1, w2) <= 0 or w1 == w2:
+            raise ModelError(f"{what}: omega = ({w1:g}, {w2:g}) must be two positive frequencies")
+        mass, stiffness = np.linalg.solve([[0.5 / w1, w1 / 2], [0.5 / w2, w2 / 2]], [z1, z2])
+        if min(z1, z2) <= 0 or min(mass, stiffness) < 0:
+            raise ModelError(
+                f"{what}: ratios = ({z1:g}, {z2:g}) at omega = ({w1:g}, {w2:g}) rad/s need the "
+                f"factors mass = {mass:.3g}, stiffness = {stiffness:.3g}, which must not be "
+                "negative; give positive ratios that differ less than the frequencies"
+            )
+        return cls(mass=mass, stiffness=stiffness)
 
 
 @closed("state other damping as a VirtualWork of v")

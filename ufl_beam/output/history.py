@@ -22,12 +22,13 @@ from ufl_beam.errors import (
     require_function,
     require_sequence,
 )
+from ufl_beam.file_system import require_path
 from ufl_beam.model.bodies import AttachmentPoint, Place, require_place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
+from ufl_beam.output.output_files import OutputFile, beside, changed
 from ufl_beam.output.recorder import Restartable, StateView
 from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC, connector_indices
 from ufl_beam.parallel import on_first

@@ -29,20 +29,13 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.errors import ArgumentError, shorten
+from ufl_beam.errors import ArgumentError
 from ufl_beam.file_system import is_at, sync
 
 Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
 _in_use: list[Output] = []  # of the current runs in this process, outer runs first
 
 BLOCK = 1 << 20  # number of bytes in each read for a checksum
-
-
-def require_path(path: str | Path, what: str) -> Path:
-    """Return ``path`` as a :class:`Path`, or raise :class:`ArgumentError` naming ``what``."""
-    if not isinstance(path, str | os.PathLike) or not os.fspath(path):
-        raise ArgumentError(f"{what}: path = {shorten(path)} must be the name of a file")
-    return Path(path)
 
 
 def require_writable(path: Path) -> None:

@@ -18,10 +18,11 @@ import numpy as np
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.discretization.dof_numbering import turned
 from ufl_beam.errors import ArgumentError, require_count
+from ufl_beam.file_system import require_path
 from ufl_beam.model.bodies import AttachmentPoint, arm
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.scene import Scene, attachment_points
-from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
+from ufl_beam.output.output_files import OutputFile, beside, changed
 from ufl_beam.output.recorder import Restartable, StateView
 from ufl_beam.parallel import on_first
 

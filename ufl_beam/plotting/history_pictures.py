@@ -12,10 +12,12 @@ import numpy as np
 
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
+from ufl_beam.analysis.response_spectra import ResponseSpectrum
 from ufl_beam.analysis.tradeoff_result import Tradeoff
-from ufl_beam.display import html_page
+from ufl_beam.display import TIME, html_page
 from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.bodies import AttachmentPoint
+from ufl_beam.model.ground_motion import GroundMotion
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
 from ufl_beam.plotting import notebook, style, symbols
@@ -45,6 +47,11 @@ MOST_MODES, NUM_SHAPES = 6, 5  # numbers of modes, and of shapes of a solution, 
 VISIBLE = 0.1  # largest magnified displacement in a notebook, as a fraction of the scene's size
 FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # magnifications; more would show round-off
 LEAST_ERROR = 1e-12  # ratio of error to tolerance at which all smaller ratios are drawn
+SPECTRA = {
+    "pseudo_acceleration": " (m/s²)", "acceleration": " (m/s²)", "velocity": " (m/s)",
+    "displacement": " (m)", "ductility": "",
+}  # fmt: skip
+"""Units of the quantities of a response spectrum."""
 CLASSES = 40  # number of bins of stress ranges, and of mean stresses, in pictures of cycles
 
 
@@ -293,6 +300,33 @@ def draw_study(study: Study) -> Figure:
         for axes, name in zip(grid[-1], varied, strict=True):
             axes.set_xlabel(name)
     return figure
+
+
+def draw_motion(motion: GroundMotion) -> Figure:
+    """Draw acceleration, velocity and displacement of a ground motion over time."""
+    times, *histories = motion.histories
+    with picture((8.0, 6.0)) as figure:
+        panels = figure.subplots(3, 1, sharex=True)
+        names = "acceleration\n(m/s²)", "velocity\n(m/s)", "displacement\n(m)"
+        for axes, values, name in zip(panels, histories, names, strict=True):
+            style.time_axes(axes).plot(times, values, linewidth=1.2)
+            axes.set_ylabel(name)
+        panels[0].set_title(motion.name, loc="left")
+        panels[-1].set_xlabel(TIME.name)
+        figure.align_ylabels()
+    return figure
+
+
+def draw_spectrum(spectrum: ResponseSpectrum, quantity: str, ax: Axes | None = None) -> Figure:
+    """Draw one quantity of a response spectrum over the period."""
+    with style.panel(ax, (7.0, 4.2)) as axes:
+        axes.plot(spectrum.periods, getattr(spectrum, quantity))
+        axes.set_xlabel("period (s)")
+        axes.set_ylabel(f"{quantity.replace('_', '-')}{SPECTRA[quantity]}")
+        axes.set_ylim(bottom=0.0)
+        axes.grid(visible=True, linewidth=0.8)
+        axes.set_axisbelow(True)
+    return style.parent_figure(axes)
 
 
 def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:

@@ -12,9 +12,11 @@ from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.pushover_result import Pushover
+from ufl_beam.analysis.response_spectra import ResponseSpectrum
 from ufl_beam.analysis.response_spectrum import SpectralResponse
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ArgumentError, shorten
+from ufl_beam.model.ground_motion import GroundMotion
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
@@ -25,12 +27,15 @@ from ufl_beam.plotting.analysis_pictures import (
 )
 from ufl_beam.plotting.frame_pictures import draw_damage_state, draw_shape
 from ufl_beam.plotting.history_pictures import (
+    SPECTRA,
     draw_cycles,
     draw_energy,
     draw_extremes,
     draw_history,
     draw_modes,
+    draw_motion,
     draw_shapes,
+    draw_spectrum,
     draw_study,
     draw_tradeoff,
 )
@@ -63,6 +68,8 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Pushover: {"curve": draw_pushover},
     SpectralResponse: {name: partial(draw_response, quantity=name) for name in ("M", "N", "V")},
     LoadCombinations: {name: partial(draw_combinations, quantity=name) for name in ("M", "N", "V")},
+    GroundMotion: {"motion": draw_motion},
+    ResponseSpectrum: {name: partial(draw_spectrum, quantity=name) for name in SPECTRA},
 }
 """Pictures by class and quantity; the first one of a class is drawn by default."""
 
@@ -93,6 +100,8 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Pushover         "curve"             capacity curve with its hinges; ``targets``, ``ax``
     SpectralResponse "M", "N", "V"       combined section force, with both signs; ``ax``
     LoadCombinations "M", "N", "V"       envelope over the combinations; ``ax``
+    GroundMotion     "motion"            acceleration, velocity, displacement over time
+    ResponseSpectrum any of its arrays   "pseudo_acceleration" by default, over the period; ``ax``
     ===============  ==================  ========================================================
 
     Args:

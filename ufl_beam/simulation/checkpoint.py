@@ -18,7 +18,7 @@ import numpy as np
 
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ArgumentError, require_count, require_number, require_sequence, shorten
-from ufl_beam.file_system import Lock
+from ufl_beam.file_system import Lock, require_path
 from ufl_beam.output.output_files import (
     ADVICE,
     Content,
@@ -27,7 +27,6 @@ from ufl_beam.output.output_files import (
     decoding,
     read,
     remove_prefix,
-    require_path,
     require_writable,
     write,
 )

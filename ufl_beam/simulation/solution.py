@@ -15,6 +15,7 @@ from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import State
 from ufl_beam.display import TIME, Rich
 from ufl_beam.errors import ArgumentError, require_kind, warn
+from ufl_beam.file_system import require_path
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_law import ForceLaw
@@ -32,7 +33,6 @@ from ufl_beam.output.output_files import (
     read,
     remove_prefix,
     require_arrays,
-    require_path,
     version,
     write,
 )

@@ -339,6 +339,28 @@ def test_the_ledger_is_drawn_with_its_error(swing):
     assert "(J)" in ledger.get_ylabel()
 
 
+def test_a_ground_motion_is_drawn_with_its_integrals():
+    motion = ub.GroundMotion(0.5, [0.0, 2.0, -1.0], "quake")
+    figure = ub.plot(motion)
+    for axes, values in zip(figure.axes, motion.histories[1:], strict=True):
+        np.testing.assert_array_equal(axes.lines[-1].get_ydata(), values)
+    units = [axes.get_ylabel().split()[-1] for axes in figure.axes]
+    assert units == ["(m/s²)", "(m/s)", "(m)"]
+    assert figure.axes[0].get_title("left") == "quake"
+
+
+def test_spectra_share_axes():
+    motion = ub.GroundMotion(0.5, [0.0, 2.0, -1.0])
+    elastic = ub.response_spectrum(motion, [0.5, 1.0])
+    figure = ub.plot(elastic)
+    ub.plot(ub.response_spectrum(motion, [0.5, 1.0], ductility=2.0), ax=figure.axes[0])
+    first, _ = figure.axes[0].lines
+    np.testing.assert_array_equal(first.get_ydata(), elastic.pseudo_acceleration)
+    assert figure.axes[0].get_ylabel() == "pseudo-acceleration (m/s²)"
+    assert ub.plot(elastic, "displacement").axes[0].get_ylabel() == "displacement (m)"
+    assert ub.plot(elastic, "ductility").axes[0].get_ylabel() == "ductility"
+
+
 @pytest.mark.parametrize(
     ("value", "text"),
     [

@@ -978,3 +978,20 @@ int attempt_step(time_loop *m, double t1, double end);
 int accept_step(time_loop *m);
 int step_or_subdivide(time_loop *m, double end);
 int take_steps(time_loop *m, int steps, const double *ends, double seconds, int keeps, double *rows);
+
+/* -- oscillators, see oscillators.c --------------------------------------------------------------- */
+
+/* u'' + 2 damping omega u' + restoring force = load, all per mass.  The state is complex, x = u' - conj(l) u with
+ * l = omega (-damping + i sqrt(1 - damping^2)), and a step is x1 = E x0 + c0 load0 + c1 load1, for a
+ * load that is linear in it.  Arrays have the real and the imaginary part.
+ */
+typedef struct {
+  double omega, damping, hardening; /* hardening: stiffness after yield, divided by omega^2 */
+  double dt;                        /* of a substep */
+  int substeps;                     /* of each step of the load */
+  double E[2], c0[2], c1[2];
+} oscillator;
+
+/* Largest displacement, velocity and acceleration without the load; steps are exact for a plastic
+ * displacement that is linear in them. */
+void oscillator_peaks(const oscillator *o, int number, const double *load, double strength, double *peaks);
