@@ -40,6 +40,9 @@ from ufl_beam.analysis.free_decay import (
     logarithmic_decrement,
     peaks,
 )
+from ufl_beam.analysis.incremental_dynamics import incremental_dynamic_analysis
+from ufl_beam.analysis.incremental_dynamics_result import DemandCurves as DemandCurves
+from ufl_beam.analysis.incremental_dynamics_result import Fragility as Fragility
 from ufl_beam.analysis.load_combinations import load_combinations
 from ufl_beam.analysis.load_combinations_result import Governing as Governing
 from ufl_beam.analysis.load_combinations_result import LoadCombinations as LoadCombinations
@@ -289,6 +292,7 @@ __all__ = [
     "fit_decay",
     "follow",
     "ground",
+    "incremental_dynamic_analysis",
     "law_functions",
     "load_combinations",
     "logarithmic_decrement",
@@ -309,10 +313,10 @@ __all__ = [
 ]  # fmt: skip
 
 RESULTS = [
-    "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView",
-    "Energy", "Envelope", "Event", "Extent", "Film", "Governing", "HingeFormation",
-    "LoadCombinations", "Modes", "Path", "Place", "Pushover", "SpectralResponse",
-    "ResponseSpectrum", "TargetDisplacement", "Tradeoff",
+    "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "DemandCurves",
+    "Diagram", "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film", "Fragility",
+    "Governing", "HingeFormation", "LoadCombinations", "Modes", "Path", "Place", "Pushover",
+    "ResponseSpectrum", "SpectralResponse", "TargetDisplacement", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 

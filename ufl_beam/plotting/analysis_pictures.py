@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ufl_beam.analysis.incremental_dynamics_result import PERCENT, DemandCurves
 from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.analysis.pushover_result import Pushover, TargetDisplacement
 from ufl_beam.arrays import Array
+from ufl_beam.errors import ArgumentError
 from ufl_beam.plotting import style
 from ufl_beam.plotting.frame_pictures import MOST, draw_frame, plane_canvas
 from ufl_beam.plotting.style import BLUE, COLORS, GREY, ORANGE, RED, shade
@@ -103,6 +105,49 @@ def draw_combinations(
     return _on_frame(
         solutions[0], (title, f"of {len(solutions)} load combinations"), quantity, diagrams, ax
     )
+
+
+def draw_dynamics(dynamics: DemandCurves) -> Figure:
+    """Draw intensities over demands, with fractiles, beside the probability of collapse.
+
+    The curve of a motion ends at its first collapse.  The probability is left out if it has no fit.
+    """
+    try:
+        fragility = dynamics.fragility()
+    except ArgumentError:
+        fragility = None
+    im, limit = dynamics.intensities, dynamics.limit
+    with style.picture((11.0 if fragility else 7.0, 5.0)) as figure:
+        axes, *others = figure.subplots(1, 2 if fragility else 1, sharey=True, squeeze=False)[0]
+        rows = np.where(dynamics.collapsed, np.inf, dynamics.demand)
+        for k, demand in enumerate(rows):
+            label = f"{len(rows)} motions" if not k else None
+            _draw_curve(axes, demand, im, limit, color=GREY, lw=0.8, label=label)
+        fractiles = zip(PERCENT, dynamics.fractiles(), ("--", "-", ":"), strict=True)
+        for percent, demand, line in fractiles:
+            label = f"{percent:g} % of the motions"
+            _draw_curve(axes, demand, im, limit, color=BLUE, lw=2.2, ls=line, label=label)
+        axes.set(xlim=(0.0, limit), ylim=(0.0, 1.05 * im[-1]), xlabel="demand", ylabel="intensity")
+        axes.legend(loc="lower right", fontsize=style.font_size(9.0))
+        if fragility:
+            (other,) = others
+            x = np.linspace(0.0, 1.05 * im[-1], 200)[1:]
+            label = f"median {fragility.median:.3g}, dispersion {fragility.dispersion:.2g}"
+            other.plot(fragility(x), x, color=RED, label=label)
+            other.plot(fragility.exceeded / fragility.number, im, "o", color=shade(RED))
+            other.set(xlim=(-0.03, 1.03), xlabel="probability of collapse")
+            other.legend(loc="lower right", fontsize=style.font_size(9.0))
+    return figure
+
+
+def _draw_curve(axes: Axes, demand: Array, im: Array, limit: float, **options: Any) -> None:
+    """Draw intensities over demands from zero on, up to the first infinite demand."""
+    known = np.isfinite(demand)
+    end = len(demand) if known.all() else int(np.argmin(known))
+    x, y = np.append(0.0, demand[:end]), np.append(0.0, im[:end])
+    if end < len(demand) and np.isinf(demand[end]):
+        x, y = np.append(x, limit), np.append(y, im[end])
+    axes.plot(x, y, **options)
 
 
 def _on_frame(

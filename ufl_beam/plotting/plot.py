@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from ufl_beam.analysis.incremental_dynamics_result import DemandCurves
 from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
@@ -22,6 +23,7 @@ from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
 from ufl_beam.plotting.analysis_pictures import (
     draw_combinations,
+    draw_dynamics,
     draw_pushover,
     draw_response,
 )
@@ -68,6 +70,7 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Pushover: {"curve": draw_pushover},
     SpectralResponse: {name: partial(draw_response, quantity=name) for name in ("M", "N", "V")},
     LoadCombinations: {name: partial(draw_combinations, quantity=name) for name in ("M", "N", "V")},
+    DemandCurves: {"curves": draw_dynamics},
     GroundMotion: {"motion": draw_motion},
     ResponseSpectrum: {name: partial(draw_spectrum, quantity=name) for name in SPECTRA},
 }
@@ -79,30 +82,31 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
 
     By default, the first quantity of the class is drawn.  A ``Path`` is a ``Solution``.
 
-    ===============  ==================  ========================================================
-    shown            quantity            picture and further arguments
-    ===============  ==================  ========================================================
-    Scene            "model"             the whole model, before any run; ``ax``
-    Solution         "shape"             the frame at one time; ``n``, ``magnify``, ``ax``
-    Solution         "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
-    Solution         "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
-    Solution         "shapes"            several shapes; ``times`` or ``count``, ``magnify``, ``ax``
-    Solution         "history"           motion over time; places, ``component``, ``ax``
-    Solution         "energy"            the energy ledger over time
-    Solution         "dissipation"       energy losses over time; ``ax``
-    Solution         "hinge"             moment of a hinge over its jump; a place, ``ax``
-    Solution         "moment-curvature"  moment of a cell; a place, ``ax``
-    Modes, Buckling  "modes"             shapes side by side; ``numbers``, ``amplitude``
-    Extremes         "M", "N", "V"       envelope of a section force; ``ax``
-    Fatigue          "cycles"            rainflow matrix and spectrum; a hot spot
-    Study            "results"           results over the cases
-    Tradeoff         "errors"            errors over wall times; ``ax``
-    Pushover         "curve"             capacity curve with its hinges; ``targets``, ``ax``
-    SpectralResponse "M", "N", "V"       combined section force, with both signs; ``ax``
-    LoadCombinations "M", "N", "V"       envelope over the combinations; ``ax``
-    GroundMotion     "motion"            acceleration, velocity, displacement over time
-    ResponseSpectrum any of its arrays   "pseudo_acceleration" by default, over the period; ``ax``
-    ===============  ==================  ========================================================
+    ================  ==================  =======================================================
+    shown             quantity            picture and further arguments
+    ================  ==================  =======================================================
+    Scene             "model"             the whole model, before any run; ``ax``
+    Solution          "shape"             the frame at one time; ``n``, ``magnify``, ``ax``
+    Solution          "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
+    Solution          "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
+    Solution          "shapes"            several shapes; ``times``, ``count``, ``magnify``, ``ax``
+    Solution          "history"           motion over time; places, ``component``, ``ax``
+    Solution          "energy"            the energy ledger over time
+    Solution          "dissipation"       energy losses over time; ``ax``
+    Solution          "hinge"             moment of a hinge over its jump; a place, ``ax``
+    Solution          "moment-curvature"  moment of a cell; a place, ``ax``
+    Modes, Buckling   "modes"             shapes side by side; ``numbers``, ``amplitude``
+    Extremes          "M", "N", "V"       envelope of a section force; ``ax``
+    Fatigue           "cycles"            rainflow matrix and spectrum; a hot spot
+    Study             "results"           results over the cases
+    Tradeoff          "errors"            errors over wall times; ``ax``
+    Pushover          "curve"             capacity curve with its hinges; ``targets``, ``ax``
+    SpectralResponse  "M", "N", "V"       combined section force, with both signs; ``ax``
+    DemandCurves      "curves"            intensity over demand, probability of collapse
+    LoadCombinations  "M", "N", "V"       envelope over the combinations; ``ax``
+    GroundMotion      "motion"            acceleration, velocity, displacement over time
+    ResponseSpectrum  any of its arrays   "pseudo_acceleration" by default, over periods; ``ax``
+    ================  ==================  =======================================================
 
     Args:
         shown: Object to draw.
