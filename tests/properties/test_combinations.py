@@ -48,7 +48,8 @@ ELSEWHERE = {
     },
     "other controls of paths": {"ArcLength", "DisplacementControl", "DissipationControl"},
     "analyses of structures, which run several simulations": {
-        "load_combinations", "pushover", "response_spectrum_analysis",
+        "incremental_dynamic_analysis", "load_combinations", "pushover",
+        "response_spectrum_analysis",
     },
     "many runs": {"Study", "TradeoffError", "study", "tradeoff"},
     "errors and words": {"ConvergenceError", "CopiesDiffer", "ModelWarning", "ArgumentError",

@@ -567,6 +567,33 @@ TABLE |= {
         steps=V(2, COUNT),
         **OF_ANALYSES,
     ),
+    "incremental_dynamic_analysis": call(
+        ub.incremental_dynamic_analysis,
+        build=V(lambda motion: HEAVY, [*FUNCTION, lambda motion: None]),
+        motions=V([ub.GroundMotion(0.1, [1.0, 2.0])], [*LIST, []]),
+        intensities=V([1.0, 2.0], [*SERIES, [2.0, 1.0], [0.0, 1.0], [-1.0]]),
+        measure=V(lambda run: run.displacement(BEAM.end), FUNCTION),
+        limit=V(1.0, POSITIVE),
+        intensity=V(
+            lambda motion: motion.peak,
+            [*FUNCTION[1:], *(lambda motion, x=x: x for x in (None, "x", NAN, 0.0, -1.0))],
+        ),
+        scheme=V(None, [*OBJECT[1:], ub.Static()]),
+        dt=V(None, [x for x in POSITIVE if x is not None]),
+        start=V(None, optional(OBJECT)),
+        newton=V(None, optional(OBJECT)),
+        path=V(None, optional(PATH)),
+        anew=V(False, SWITCH),
+        progress=V(False, SWITCH),
+        comm=V(None, optional(OBJECT)),
+        **MESH,
+    ),
+    "Fragility.fit": call(
+        ub.Fragility.fit,
+        intensities=V([1.0, 2.0], [*SERIES, [0.0, 1.0], [1.0]]),
+        exceeded=V([1, 3], [*SERIES, [-1, 3], [5, 3]]),
+        number=V([4, 4], [*SERIES, [0, 0], [4]]),
+    ),
     "load_combinations": call(
         ub.load_combinations,
         cases=V(
@@ -594,10 +621,10 @@ TABLE |= {
 }
 
 RECORDS_OF_RUNS = {
-    "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
-    "Event", "Extent", "Governing", "HingeFormation", "Joint", "LoadCombinations", "Modes", "Path",
-    "Pushover", "Solution", "Study", "SpectralResponse", "Support", "TargetDisplacement",
-    "Tradeoff",
+    "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "DemandCurves",
+    "Energy", "Envelope", "Event", "Extent", "Governing", "HingeFormation", "Joint",
+    "LoadCombinations", "Modes", "Path", "Pushover", "Solution", "Study", "SpectralResponse",
+    "Support", "TargetDisplacement", "Tradeoff",
     "Coefficients", "Diagram", "DolfinxView", "Film", "Step",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""

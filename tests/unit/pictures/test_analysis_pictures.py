@@ -51,3 +51,24 @@ def test_an_envelope_of_combinations_has_both_extremes():
     axes = ub.plot(found, "V").axes[0]
     assert len(outlines(axes.figure, RED)) == len(outlines(axes.figure, BLUE)) == 1
     assert axes.get_title(loc="left").endswith("of 2 load combinations")
+
+
+def test_demand_curves_end_at_collapse():
+    """Beside the points of the probability of collapse and the fitted curve."""
+    study = ub.Study("none", (), {}, {}, np.zeros(0))
+    demand = np.array([[0.1, 0.2, 0.5], [0.1, 0.6, 0.3], [0.2, 0.3, 0.7]])
+    outcome = (demand > 0.4).astype(float)
+    curves = ub.DemandCurves(
+        ("a", "b", "c"), np.array([1.0, 2.0, 3.0]), 0.4, demand, np.ones((3, 3)), outcome, study
+    )
+    left, right = ub.plot(curves).axes
+    np.testing.assert_array_equal(left.lines[1].get_xydata(), [[0, 0], [0.1, 1], [0.4, 2]])
+    np.testing.assert_array_equal(left.lines[4].get_xydata()[:3], [[0, 0], [0.1, 1], [0.3, 2]])
+    np.testing.assert_allclose(right.lines[1].get_xydata(), [[0, 1], [1 / 3, 2], [2 / 3, 3]])
+    fit = curves.fragility()
+    curve = right.lines[0].get_xydata()
+    np.testing.assert_allclose(curve[:, 0], fit(curve[:, 1]))
+    certain = ub.DemandCurves(
+        curves.motions, curves.intensities, 0.4, demand, curves.end, 0 * outcome, study
+    )
+    assert len(ub.plot(certain).axes) == 1  # nothing collapses
