@@ -95,7 +95,7 @@ def test_elastic_demands_are_the_displacement_spectrum():
 
 
 def test_members_are_runs_of_the_scaled_motion():
-    """To the last bit; a collapse ends the run at one of 20 comparisons with the limit."""
+    """To the last bit; a collapse ends the run at one of 10 comparisons with the limit."""
     record = motion(1)
     found = analysis([record], [2.0, 4.0, 12.0], limit=0.05)
     for k, peak in enumerate((2.0, 4.0)):
@@ -109,7 +109,7 @@ def test_members_are_runs_of_the_scaled_motion():
     assert found.demand[0, 2] > 0.05
     assert found.end[0, :2].tolist() == [record.duration] * 2
     assert found.end[0, 2] < record.duration
-    comparisons = 20 * found.end[0, 2] / record.duration
+    comparisons = 10 * found.end[0, 2] / record.duration
     assert abs(comparisons - round(comparisons)) < 1e-9  # 500 steps
 
 

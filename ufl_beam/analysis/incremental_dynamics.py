@@ -46,7 +46,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_lengths import EqualSteps, step_count
 from ufl_beam.solvers.newton_options import Newton
 
-CHECKS = 20  # number of times in a run at which the demand is compared with the limit
+CHECKS = 10  # number of times in a run at which the demand is compared with the limit
 WHAT = "incremental_dynamic_analysis"
 Measure = Callable[[Solution], npt.ArrayLike]
 
@@ -76,7 +76,7 @@ def incremental_dynamic_analysis(
     ``mpirun``, each on one process, with results in a file from which the analysis continues.
 
     A structure collapses if its demand exceeds ``limit``, which ends the run, or if a step has no
-    equilibrium.  The demand is compared with the limit at 20 times of a run.
+    equilibrium.  The demand is compared with the limit at 10 times of a run.
 
     Args:
         build: Function that returns the scene under a scaled motion.  Its beams are always the

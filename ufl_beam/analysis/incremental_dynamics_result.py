@@ -200,13 +200,10 @@ class DemandCurves(Rich):
 
     def __str__(self) -> str:
         lines = [f"{repr(self)[1:-1]}", " intensity     16 %      50 %      84 %  collapsed"]
-        rows = zip(
-            self.intensities, self.fractiles().T.tolist(), self.collapsed.sum(axis=0), strict=True
-        )
-        lines += [
-            f"{level:10.4g} " + " ".join(f"{x:9.4g}" for x in demands) + f" {number:6d}"
-            for level, demands, number in rows
-        ]
+        fractiles, collapses = self.fractiles(), self.collapsed.sum(axis=0)
+        for k, level in enumerate(self.intensities):
+            demands = " ".join(f"{x:9.4g}" for x in fractiles[:, k])
+            lines.append(f"{level:10.4g} {demands} {collapses[k]:6d}")
         if several := int((self.outcome == NO_EQUILIBRIUM).sum()):
             lines.append(f"  collapses by a step without equilibrium below the limit: {several}")
         return "\n".join(lines)
