@@ -12,6 +12,9 @@ from scipy.linalg import eigh
 import ufl_beam as ub
 from ufl_beam.analysis import response_spectra
 
+# Motions of supports on several processes are in properties/test_combinations.py.
+pytestmark = pytest.mark.serial
+
 
 def made_motion(seed=7, duration=6.0, dt=0.02):
     """A record of filtered noise that begins and ends with zero; m/s²."""
