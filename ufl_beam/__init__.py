@@ -41,6 +41,12 @@ from ufl_beam.analysis.free_decay import (
     peaks,
 )
 from ufl_beam.analysis.imperfections import imperfect
+from ufl_beam.analysis.incremental_dynamics import incremental_dynamic_analysis
+from ufl_beam.analysis.incremental_dynamics_result import DemandCurves as DemandCurves
+from ufl_beam.analysis.incremental_dynamics_result import Fragility as Fragility
+from ufl_beam.analysis.load_combinations import load_combinations
+from ufl_beam.analysis.load_combinations_result import Governing as Governing
+from ufl_beam.analysis.load_combinations_result import LoadCombinations as LoadCombinations
 from ufl_beam.analysis.modes import Buckling as Buckling
 from ufl_beam.analysis.modes import Modes as Modes
 from ufl_beam.analysis.modes import buckling, modes
@@ -53,8 +59,14 @@ from ufl_beam.analysis.path_controls import (
 )
 from ufl_beam.analysis.path_following import Path as Path
 from ufl_beam.analysis.path_following import follow
+from ufl_beam.analysis.pushover import pushover
+from ufl_beam.analysis.pushover_result import HingeFormation as HingeFormation
+from ufl_beam.analysis.pushover_result import Pushover as Pushover
+from ufl_beam.analysis.pushover_result import TargetDisplacement as TargetDisplacement
 from ufl_beam.analysis.response_spectra import ResponseSpectrum as ResponseSpectrum
 from ufl_beam.analysis.response_spectra import response_spectrum
+from ufl_beam.analysis.response_spectrum import SpectralResponse as SpectralResponse
+from ufl_beam.analysis.response_spectrum import response_spectrum_analysis
 from ufl_beam.analysis.section_analysis import InteractionDiagram as InteractionDiagram
 from ufl_beam.analysis.section_analysis import MomentCurvature as MomentCurvature
 from ufl_beam.analysis.section_analysis import interaction_diagram, moment_curvature
@@ -305,8 +317,10 @@ __all__ = [
     "follow",
     "ground",
     "imperfect",
+    "incremental_dynamic_analysis",
     "interaction_diagram",
     "law_functions",
+    "load_combinations",
     "logarithmic_decrement",
     "modes",
     "moment_curvature",
@@ -314,20 +328,23 @@ __all__ = [
     "picture",
     "plot",
     "print_once",
+    "pushover",
     "rainflow",
     "ramp",
     "render",
     "response_spectrum",
+    "response_spectrum_analysis",
     "simulate",
     "study",
     "tradeoff",
 ]  # fmt: skip
 
 RESULTS = [
-    "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram",
-    "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film", "HingeTable",
-    "InteractionDiagram", "Modes", "MomentCurvature", "Path", "Place", "ResponseSpectrum",
-    "Storeys", "Tradeoff",
+    "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "DemandCurves",
+    "Diagram", "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film", "Fragility",
+    "Governing", "HingeFormation", "HingeTable", "InteractionDiagram", "LoadCombinations",
+    "Modes", "MomentCurvature", "Path", "Place", "Pushover", "ResponseSpectrum",
+    "SpectralResponse", "Storeys", "TargetDisplacement", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 

@@ -47,6 +47,10 @@ ELSEWHERE = {
         "peaks", "rainflow", "response_spectrum",
     },
     "other controls of paths": {"ArcLength", "DisplacementControl", "DissipationControl"},
+    "analyses of structures, which run several simulations": {
+        "incremental_dynamic_analysis", "load_combinations", "pushover",
+        "response_spectrum_analysis",
+    },
     "many runs": {"Study", "TradeoffError", "study", "tradeoff"},
     "other geometry of ordinary scenes": {"imperfect"},
     "errors and words": {"ConvergenceError", "CopiesDiffer", "ModelWarning", "ArgumentError",

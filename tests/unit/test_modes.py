@@ -357,7 +357,7 @@ def test_change_of_stiffness_is_its_derivative():
     loaded = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
     small = SmallMotions(scene, loaded, 2.0)
     simulation, random = small._simulation, np.random.default_rng(0)
-    along = small._path()
+    along = small.linear_change("modes")
     for u in (along, random.normal(size=len(along))):
         derived = small._matrix(simulation.equation.tangent_change(small.q, u)).toarray()
         h = 1e-2 / np.abs(u).max()

@@ -684,11 +684,85 @@ TABLE |= {
     ),
 }
 
+SPECTRUM = [
+    None, 1.0, "ab", (), ([1.0],), ([1.0], [1.0, 2.0]), ([2.0, 1.0], [1.0, 1.0]),
+    ([0.0, NAN], [1.0, 1.0]), ([0.0, "x"], [1.0, 1.0]),
+]  # fmt: skip
+"""In the place of a spectrum; a function is evaluated at the periods of modes, with a mesh."""
+HEAVY = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], masses=[ub.PointMass(BEAM.end, 1.0)])
+OF_ANALYSES = {
+    "scene": V(HEAVY, OBJECT), **MESH, "newton": V(None, optional(OBJECT)),
+    "progress": V(False, SWITCH),
+}  # fmt: skip
+TABLE |= {
+    "pushover": call(
+        ub.pushover,
+        place=V(BEAM.end, [*OBJECT, BODY.middle]),
+        target=V(0.1, [*NUMBER, 0.0]),
+        pattern=V("uniform", [*LIST, [ub.FollowerLoad(BEAM.end, force=(1, 0))]]),
+        component=V("u", [None, 1.0, "w", "psi", ARRAY]),
+        steps=V(2, COUNT),
+        **OF_ANALYSES,
+    ),
+    "incremental_dynamic_analysis": call(
+        ub.incremental_dynamic_analysis,
+        build=V(lambda motion: HEAVY, [*FUNCTION, lambda motion: None]),
+        motions=V([ub.GroundMotion(0.1, [1.0, 2.0])], [*LIST, []]),
+        intensities=V([1.0, 2.0], [*SERIES, [2.0, 1.0], [0.0, 1.0], [-1.0]]),
+        measure=V(lambda run: run.displacement(BEAM.end), FUNCTION),
+        limit=V(1.0, POSITIVE),
+        intensity=V(
+            lambda motion: motion.peak,
+            [*FUNCTION[1:], *(lambda motion, x=x: x for x in (None, "x", NAN, 0.0, -1.0))],
+        ),
+        scheme=V(None, [*OBJECT[1:], ub.Static()]),
+        dt=V(None, [x for x in POSITIVE if x is not None]),
+        start=V(None, optional(OBJECT)),
+        newton=V(None, optional(OBJECT)),
+        path=V(None, optional(PATH)),
+        anew=V(False, SWITCH),
+        progress=V(False, SWITCH),
+        comm=V(None, optional(OBJECT)),
+        **MESH,
+    ),
+    "Fragility.fit": call(
+        ub.Fragility.fit,
+        intensities=V([1.0, 2.0], [*SERIES, [0.0, 1.0], [1.0]]),
+        exceeded=V([1, 3], [*SERIES, [-1, 3], [5, 3]]),
+        number=V([4, 4], [*SERIES, [0, 0], [4]]),
+    ),
+    "load_combinations": call(
+        ub.load_combinations,
+        cases=V(
+            {"Q": [ub.PointLoad(BEAM.end, force=(1, 0))]},
+            [*LIST, {}, {1: []}, {"a": [None]}, {"a": [ub.RotatingFrame(rate=1.0)]}],
+        ),
+        combinations=V(
+            {"A": {"Q": 1.5}},
+            [*LIST, {}, {"A": {}}, {"A": {"R": 1.0}}, *({"A": {"Q": x}} for x in NUMBER)],
+        ),
+        steps=V(2, COUNT),
+        **OF_ANALYSES,
+    ),
+    "response_spectrum_analysis": call(
+        ub.response_spectrum_analysis,
+        scene=V(HEAVY, OBJECT),
+        spectrum=V(([0.0, 9.0], [1.0, 1.0]), SPECTRUM),
+        n=V(2, COUNT),
+        direction=V((1, 0), [*VECTOR, (0.0, 0.0)]),
+        damping=V(0.05, [*POSITIVE, 1.0]),
+        rule=V("CQC", [None, 1.0, "cqc", ARRAY]),
+        at=V(None, optional(OBJECT)),
+        **MESH,
+    ),
+}
+
 RECORDS_OF_RUNS = {
-    "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
-    "Event", "Extent", "InteractionDiagram", "Joint", "Modes", "MomentCurvature", "Path",
-    "Solution", "Study", "Support", "Tradeoff", "Coefficients", "Diagram", "DolfinxView", "Film",
-    "Step",
+    "Branch", "Buckling", "Coefficients", "Connector", "CriticalPoint", "Cycles", "Decay",
+    "DemandCurves", "Diagram", "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film",
+    "Governing", "HingeFormation", "InteractionDiagram", "Joint", "LoadCombinations", "Modes",
+    "MomentCurvature", "Path", "Pushover", "Solution", "SpectralResponse", "Step", "Study",
+    "Support", "TargetDisplacement", "Tradeoff",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""
 

@@ -13,6 +13,7 @@ from mpi4py import MPI
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import block_array, csr_array, diags_array, eye_array
+from scipy.sparse.csgraph import structural_rank
 from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array, Complex
@@ -91,9 +92,16 @@ class SmallMotions:
         scale[constraints] = abs(T.data).max()  # rows of constraints become as large as stiffnesses
         # Columns: unit motions that supports allow, and unit forces of constraints.
         self._Z = (self._axes @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
-        self.K, self.M = self._reduced(T), self._reduced(self._matrix(simulation.inertia.M.data))
-        # Number of modes: a constraint removes its force and one motion; a mode needs mass.
-        self.most = self.K.shape[0] - len(constraints) - int(np.sum(self.M.diagonal() == 0.0))
+        masses = self._matrix(simulation.inertia.M.data)
+        self.tangent, self.masses = T, masses  # of all degrees of freedom
+        self.K, self.M = self._reduced(T), self._reduced(masses)
+        # Number of modes: a constraint removes its force and one motion; a mode needs mass.  A
+        # constraint between motions without mass, as of a hinge, removes one of these.
+        massless = self.M.diagonal() == 0.0
+        self._constraint_rows = rows = np.isin(np.flatnonzero(left), constraints)
+        between = self.K[np.flatnonzero(rows)][:, np.flatnonzero(massless & ~rows)]
+        removed = structural_rank(between) if min(between.shape) else 0
+        self.most = self.K.shape[0] - len(constraints) - int(massless.sum()) + int(removed)
 
     def _matrix(self, data: Array) -> csr_array:
         A: Csr = self._simulation.inertia.M  # all matrices have this sparsity pattern
@@ -113,6 +121,40 @@ class SmallMotions:
             flexibility = diags_array(1 / (T.diagonal()[laws] + (T.diagonal()[laws] == 0.0)))
             T = T - T[:, laws] @ flexibility @ T[laws, :]
         return csr_array(self._Z.T @ T @ self._Z)
+
+    def participation(self, direction: Array) -> tuple[Array, float]:
+        """Return M r for a translation r of all nodes along a unit vector, and the moving mass.
+
+        The shapes are (size,), kg, and ().  The moving mass is the sum of the effective masses of
+        all modes: the mass of the scene without the part that only moves with supports.
+        """
+        r = np.zeros(self.numbering.size)
+        for axis, part in enumerate(direction):
+            for dofs in (self.numbering.dofs, self.numbering.dofs_of_bodies):
+                r[dofs[:, axis]] = part
+        toward = np.asarray(self.masses @ r)
+        massive = self.M.diagonal() > 0.0
+        along = np.asarray(self._Z.T @ toward)[massive]
+        # Constraints that also move degrees of freedom without mass do not restrict the others.
+        rows = self.K[np.flatnonzero(self._constraint_rows)]
+        between = abs(rows[:, np.flatnonzero(~massive)]).sum(axis=1) == 0
+        rows = rows[np.flatnonzero(between)][:, np.flatnonzero(massive)]
+        scales = diags_array(abs(self.M).max() / abs(rows).max(axis=1).toarray().ravel())
+        G, M = scales @ rows, self.M[np.flatnonzero(massive)][:, np.flatnonzero(massive)]
+        A = csr_array(block_array([[M, G.T], [G, None]])) if G.shape[0] else M
+        y = splu(A.tocsc()).solve(np.append(along, np.zeros(G.shape[0])))
+        return toward, float(along @ y[: len(along)])
+
+    def support_forces(self, shapes: Array, omega: Array) -> Array:
+        """Return the forces that supports exert in modes of given frequencies (rad/s); (size, n).
+
+        They are T x - ω² M x; at degrees of freedom without support they vanish.
+        """
+        x, laws = shapes.copy(), self._laws
+        x[laws] = 0.0
+        if len(laws):
+            x[laws] = -(self.tangent[laws] @ x) / self.tangent.diagonal()[laws][:, None]
+        return np.asarray(self.tangent @ x - self.masses @ x * omega**2)
 
     def unbalanced(self) -> str:
         """Return a warning of works, connectors, supports that disturb the equilibrium, or ""."""
@@ -214,7 +256,7 @@ class SmallMotions:
         vanish if the stiffness changed linearly.  The error is the stiffness of the shape in the
         configuration q + λ u of the linear path u, divided by its stiffness in the state q.
         """
-        u = self._path()
+        u = self.linear_change("buckling")
         right, left = self._with_laws()
         change = csr_array(
             left @ self._matrix(self._simulation.equation.tangent_change(self.q, u)) @ right
@@ -245,8 +287,11 @@ class SmallMotions:
         left = Z.T - ((Z.T @ T[:, laws]) @ flexibility) @ columns.T
         return csr_array(right), csr_array(left)
 
-    def _path(self) -> Array:
-        """Compute the linear change of the configuration due to loads and prescribed motions."""
+    def linear_change(self, call: str) -> Array:
+        """Compute the linear change of the configuration due to loads and prescribed motions.
+
+        ``call`` is the caller in messages.
+        """
         simulation, supports = self._simulation, self._simulation.supports
         (r, T), Q = self._linearized(self.q), self._axes
         before = supports.in_axes(self.q)
@@ -257,13 +302,13 @@ class SmallMotions:
         rest = Z.T @ (r + T @ g)
         if not rest.any():
             raise ArgumentError(
-                f"buckling: nothing acts on the scene at t = {simulation.t:g} s that does not act "
+                f"{call}: nothing acts on the scene at t = {simulation.t:g} s that does not act "
                 "in the initial state; give the scene loads, or another t"
             )
         try:
             return np.asarray(g - Z @ splu((Z.T @ T @ Z).tocsc()).solve(rest))
         except RuntimeError:
-            raise ArgumentError("buckling: the scene is free to move in its state") from None
+            raise ArgumentError(f"{call}: the scene is free to move in its state") from None
 
     # -- shapes --------------------------------------------------------------------------------
 

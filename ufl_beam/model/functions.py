@@ -260,6 +260,8 @@ class Table:
         for name in ("times", "values"):
             checked = require_sequence(getattr(self, name), f"Table: {name}")
             object.__setattr__(self, name, checked)
+            if all(type(x) is float for x in checked) and np.isfinite(checked).all():
+                continue  # a record has many numbers
             for i, number in enumerate(checked):
                 require_number(number, f"Table: {name}[{i}]")
         if len(self.times) != len(self.values) or len(self.times) < 1:

@@ -8,9 +8,13 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from ufl_beam.analysis.incremental_dynamics_result import DemandCurves
+from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
+from ufl_beam.analysis.pushover_result import Pushover
 from ufl_beam.analysis.response_spectra import ResponseSpectrum
+from ufl_beam.analysis.response_spectrum import SpectralResponse
 from ufl_beam.analysis.section_analysis import InteractionDiagram, MomentCurvature
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ArgumentError, shorten
@@ -20,6 +24,12 @@ from ufl_beam.model.sections import Section
 from ufl_beam.output.engineering_results import Storeys
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
+from ufl_beam.plotting.analysis_pictures import (
+    draw_combinations,
+    draw_dynamics,
+    draw_pushover,
+    draw_response,
+)
 from ufl_beam.plotting.frame_pictures import draw_damage_state, draw_shape
 from ufl_beam.plotting.history_pictures import (
     SPECTRA,
@@ -72,6 +82,10 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Tradeoff: {"errors": draw_tradeoff},
     MomentCurvature: {"moment-curvature": draw_section_moments},
     InteractionDiagram: {"interaction": draw_interaction},
+    Pushover: {"curve": draw_pushover},
+    SpectralResponse: {name: partial(draw_response, quantity=name) for name in ("M", "N", "V")},
+    LoadCombinations: {name: partial(draw_combinations, quantity=name) for name in ("M", "N", "V")},
+    DemandCurves: {"curves": draw_dynamics},
     GroundMotion: {"motion": draw_motion},
     ResponseSpectrum: {name: partial(draw_spectrum, quantity=name) for name in SPECTRA},
 }
@@ -107,6 +121,10 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     InteractionDiagram  "interaction"       axial force over moment of a section; ``ax``
     GroundMotion        "motion"            acceleration, velocity, displacement over time
     ResponseSpectrum    any of its arrays   over the period; "pseudo_acceleration" by default
+    Pushover            "curve"             capacity curve with its hinges; ``targets``, ``ax``
+    SpectralResponse    "M", "N", "V"       combined section force, with both signs; ``ax``
+    DemandCurves        "curves"            intensity over demand, probability of collapse
+    LoadCombinations    "M", "N", "V"       envelope over the combinations; ``ax``
     ==================  ==================  ========================================================
 
     Args:
@@ -119,7 +137,8 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             ``count`` is a number of shapes.  ``component`` is "u", "v" or "psi", or a rate of one
             of them, such as "du/dt" or "d2u/dt2".  ``numbers`` are indices of modes, all by
             default.  ``amplitude`` is their largest displacement, as a fraction of the size of the
-            scene.  ``ax`` are axes to draw in, instead of a new figure.
+            scene.  ``targets`` is one or several of the target displacements of a
+            pushover.  ``ax`` are axes to draw in, instead of a new figure.
 
     Raises:
         ArgumentError: There is no such picture, or one of its arguments is wrong; the message says

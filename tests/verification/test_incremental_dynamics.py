@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: MIT
+"""Incremental dynamic analysis: spectra, single runs, continued files; fragility by hand.
+
+The motions are realizations of the process of Kanai and Tajimi with an envelope in time.
+"""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+from helpers import raises
+from scipy.optimize import minimize
+from scipy.signal import lsim
+from scipy.stats import binom, lognorm, norm
+
+import ufl_beam as ub
+
+SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3)
+H, MASS = 3.0, 5e3  # m, kg
+COLUMN = ub.Beam((0, 0), (0, H), SECTION, cells=1, name="column")
+WEAK = ub.Beam(
+    (0, 0), (0, H), SECTION, cells=1, name="weak",
+    hinges={0.0: ub.Softening(limit=6e4, fracture_energy=2e4)},  # N m, J
+)  # fmt: skip
+
+
+def motion(seed, dt=0.02, duration=10.0):
+    """White noise through the filter of Kanai and Tajimi, 15 rad/s and 0.6; m/s²."""
+    t = np.arange(round(duration / dt) + 1) * dt
+    noise = np.random.default_rng(seed).standard_normal(len(t))
+    a = lsim(([18.0, 225.0], [1.0, 18.0, 225.0]), noise, t)[1]
+    envelope = np.minimum(1.0, (t / 2.0) ** 2) * np.exp(-np.maximum(0.0, t - 6.0) / 2.0)
+    return ub.GroundMotion(dt, a * envelope, f"seed {seed}")
+
+
+def shaken(column, record, *loads):
+    """A column with a mass at its end, in the axes of the ground."""
+    return ub.Scene(
+        [column],
+        supports=[ub.Clamped(column.start)],
+        masses=[ub.PointMass(column.end, MASS)],
+        loads=[*loads, ub.Gravity((-1, 0), amplitude=record.acceleration)],
+    )
+
+
+def drift(run):
+    """Drift of the weak column at each time."""
+    return run.displacement(WEAK.end)[:, 0] / H
+
+
+def analysis(motions, intensities, build=None, measure=drift, limit=0.1, **options):
+    """Of the weak column, without a bar."""
+    build = build or (lambda record: shaken(WEAK, record, ub.Gravity()))
+    return ub.incremental_dynamic_analysis(
+        build, motions, intensities, measure, limit=limit, progress=False, **options
+    )
+
+
+def test_elastic_demands_are_the_displacement_spectrum():
+    """[closed] S_a = ω² S_d: the demand over the spectral acceleration is 1/ω² for all motions.
+
+    The energy-momentum scheme lengthens the period by the fraction (ω dt)²/12 = 2.6e-4, and the
+    spectrum of these motions changes up to ten times as fast as the period.
+    """
+    vibration = ub.modes(shaken(COLUMN, motion(0)), 1)
+    omega, motions = vibration.omega[0], [motion(seed) for seed in range(3)]
+    dt = 0.056 / omega
+
+    def spectral(record):
+        return ub.response_spectrum(record, [2 * np.pi / omega], damping=0.05).pseudo_acceleration[
+            0
+        ]
+
+    def build(record):
+        damped = ub.Rayleigh(mass=2 * 0.05 * omega)
+        scene = shaken(COLUMN, record)
+        return ub.Scene(
+            scene.beams, supports=scene.supports, masses=scene.masses, loads=scene.loads,
+            damping=[damped],
+        )  # fmt: skip
+
+    small = [1e-3, 3e-3]  # m/s²
+    found = analysis(
+        motions, small, build, lambda run: run.displacement(COLUMN.end)[:, 0], 1.0, dt=dt,
+        intensity=spectral,
+    )  # fmt: skip
+    np.testing.assert_allclose(found.demand, np.tile(small, (3, 1)) / omega**2, rtol=2.6e-3)
+    assert not found.collapsed.any()
+
+
+def test_members_are_runs_of_the_scaled_motion():
+    """To the last bit; a collapse ends the run at one of 10 comparisons with the limit."""
+    record = motion(1)
+    found = analysis([record], [2.0, 4.0, 12.0], limit=0.05)
+    for k, peak in enumerate((2.0, 4.0)):
+        scene = shaken(WEAK, record.scaled(peak=peak), ub.Gravity())
+        run = ub.simulate(
+            scene, ub.EnergyMomentum(), t=(0, record.duration), dt=record.dt, progress=False,
+            comm=MPI.COMM_SELF,
+        )  # fmt: skip
+        assert found.demand[0, k] == np.abs(drift(run)).max()
+    assert found.outcome.tolist() == [[0, 0, 1]]
+    assert found.demand[0, 2] > 0.05
+    assert found.end[0, :2].tolist() == [record.duration] * 2
+    assert found.end[0, 2] < record.duration
+    comparisons = 10 * found.end[0, 2] / record.duration
+    assert abs(comparisons - round(comparisons)) < 1e-9  # 500 steps
+
+
+def test_a_step_without_equilibrium_is_a_collapse():
+    found = analysis([motion(1)], [8.0], newton=ub.Newton(max_iterations=1))
+    assert found.outcome == 2
+    assert found.collapsed.all()
+    assert "without equilibrium below the limit: 1" in str(found)
+    assert np.isinf(found.fractiles()).all()
+
+
+def test_an_analysis_goes_on(shared_path):
+    """Also with further motions and intensities; a motion that changed is computed again."""
+    built = []
+
+    def build(record):
+        built.append(record)
+        return shaken(WEAK, record, ub.Gravity())
+
+    def runs(motions, intensities):
+        built.clear()
+        found = analysis(motions, intensities, build, path=shared_path / "ida.h5")
+        return found, MPI.COMM_WORLD.allreduce(len(built) - 1)  # one is built for a check
+
+    one, other = motion(1), motion(2)
+    first, number = runs([one], [1.0, 2.0])
+    assert number == 2
+    again, number = runs([one], [1.0, 2.0])
+    assert number == 0
+    assert (again.demand == first.demand).all()
+    more, number = runs([one, other], [1.0, 2.0, 3.0])
+    assert number == 4
+    assert (more.demand[:1, :2] == first.demand).all()
+    changed = ub.GroundMotion(one.dt, (*one.values[:-1], 0.5), one.name)
+    assert runs([changed], [1.0, 2.0])[1] == 2
+
+
+def test_fractiles_are_demands_of_motions():
+    """[closed] The least demand that 16, 50 or 84 % of five motions do not exceed."""
+    found = analysis([motion(seed) for seed in range(5)], [6.0], limit=0.05)
+    demand = np.sort(np.where(found.collapsed, np.inf, found.demand)[:, 0])
+    assert (found.fractiles()[:, 0] == demand[[0, 2, 4]]).all()
+    assert (found.fractiles([20.0, 21.0, 100.0])[:, 0] == demand[[0, 1, 4]]).all()
+
+
+# -- fragility ------------------------------------------------------------------------------------
+
+
+def test_a_fragility_through_two_fractions():
+    """[closed] Two parameters meet two fractions: the normal quantiles are linear in ln(x)."""
+    fit = ub.Fragility.fit([2.0, 5.0], [3, 16], [20, 20])
+    assert fit([2.0, 5.0]) == pytest.approx([0.15, 0.8], rel=1e-8)
+    low, high = norm.ppf([0.15, 0.8])
+    beta = np.log(2.5) / (high - low)
+    assert fit.dispersion == pytest.approx(beta, rel=1e-8)
+    assert fit.median == pytest.approx(2.0 * np.exp(-low * beta), rel=1e-8)
+
+
+def test_a_fragility_has_the_largest_likelihood():
+    """[calc] By the binomial and lognormal distributions of SciPy; Baker 2015, equation 11."""
+    im, z, n = np.arange(1.0, 9.0), np.array([0, 1, 3, 8, 11, 14, 19, 19]), np.full(8, 20)
+
+    def loss(x):
+        return -binom.logpmf(z, n, lognorm(s=x[1], scale=x[0]).cdf(im)).sum()
+
+    fit = ub.Fragility.fit(im, z, n)
+    by_scipy = minimize(
+        loss, (4.0, 0.5), method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-12}
+    )
+    assert (fit.median, fit.dispersion) == pytest.approx(by_scipy.x, rel=1e-6)
+    assert fit(fit.median) == 0.5
+
+
+def test_a_known_fragility_is_found():
+    """[estimate] 10^5 motions at each intensity: the error of a fraction is at most 0.0016."""
+    im, n = np.linspace(2.0, 8.0, 7), 100_000
+    z = np.random.default_rng(0).binomial(n, lognorm(s=0.4, scale=4.0).cdf(im))
+    fit = ub.Fragility.fit(im, z, np.full(7, n))
+    assert fit.median == pytest.approx(4.0, rel=0.0016 * 0.4 * np.sqrt(2 * np.pi) * 3)
+    assert fit.dispersion == pytest.approx(0.4, rel=3 * 0.0016 * np.sqrt(2 * np.pi))
+
+
+@pytest.mark.parametrize(
+    ("counts", "words"),
+    [
+        ([0, 0, 0], "no motion exceeds the limit up to the intensity 3"),
+        ([9, 9, 9], "all motions exceed the limit from the intensity 1 on"),
+        ([0, 4, 9], "no motion exceeds the limit below the intensity 2, and all do above 2"),
+        ([5, 4, 3], "does not grow with the intensity"),
+        ([0, 4, 10], "exceeded must be from 0 to number"),
+    ],
+)
+def test_counts_without_a_fit_are_refused(counts, words):
+    with raises(words):
+        ub.Fragility.fit([1.0, 2.0, 3.0], counts, [9, 9, 9])
+
+
+def test_a_limit_below_collapse():
+    motions = [motion(seed) for seed in range(5)]
+    found = analysis(motions, [3.5, 4.0, 4.5], limit=0.05)
+    assert (found.fragility(0.0099).exceeded == (found.demand > 0.0099).sum(axis=0)).all()
+    with raises("fragility: limit = 0.1 is above the limit of collapse, 0.05"):
+        found.fragility(0.1)
+
+
+# -- mistakes and kills ---------------------------------------------------------------------------
+
+
+def test_mistakes_are_named():
+    with raises("motions: the same motion occurs twice"):
+        analysis([motion(1), motion(1)], [1.0])
+    with raises("scheme = Static() is static"):
+        analysis([motion(1)], [1.0], scheme=ub.Static())
+    with raises("intensity of seed 1 = 0 must be positive"):
+        analysis([motion(1)], [1.0], intensity=lambda record: 0.0)
+    with pytest.raises(RuntimeError, match="measure returned None, not finite numbers"):
+        analysis([motion(1)], [1.0], measure=lambda run: None)
+
+
+def main(path):
+    """Analyse 20 motions at 4 intensities."""
+    found = analysis([motion(seed) for seed in range(20)], [4.0, 6.0, 8.0, 10.0], path=path)
+    ub.print_once(found.demand.tobytes().hex(), found.fragility())
+
+
+@pytest.mark.slow
+@pytest.mark.serial
+def test_twenty_motions_on_one_and_two_processes_after_a_kill(tmp_path):
+    """The results agree to the last bit, and after the kill only missing runs are computed."""
+    command = [sys.executable, __file__]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+
+    def start(number, path):
+        mpi = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", str(number)]
+        return subprocess.Popen(
+            [*(mpi if number > 1 else []), *command, str(path)], env=environment,
+            stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+
+    whole = start(1, tmp_path / "whole.h5").communicate()[0]
+    killed = start(2, tmp_path / "killed.h5")
+    while not (tmp_path / "killed.h5").exists() or len(_done(tmp_path / "killed.h5")) < 20:
+        assert killed.poll() is None
+        time.sleep(0.05)
+    killed.kill()
+    killed.communicate()
+    time.sleep(1.0)  # until the processes of mpirun have ended
+    before = _done(tmp_path / "killed.h5")
+    assert len(before) < 80
+    assert start(2, tmp_path / "killed.h5").communicate()[0] == whole
+    after = _done(tmp_path / "killed.h5")
+    assert len(after) == 80
+    assert before.items() <= after.items()  # with their wall times: not computed again
+
+
+def _done(path):
+    """Wall times of the members in a file, by their cases."""
+    found = ub.Study.load(path)
+    return {tuple(case.values()): s for case, s in zip(found.cases, found.seconds, strict=True)}
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""Load combinations: closed forms of a cantilever, runs of the scene, combinations that fail."""
+
+import numpy as np
+import pytest
+from helpers import raises, run
+
+import ufl_beam as ub
+
+SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+L = 2.0  # m
+BEAM = ub.Beam((0, 0), (L, 0), SECTION, cells=2, name="cantilever")
+CLAMPED = ub.Clamped(BEAM.start)
+SCENE = ub.Scene([BEAM], supports=[CLAMPED])
+CASES = {
+    "dead": [ub.LineLoad(BEAM, force=(0, -1.0))],  # N/m: so small that the beam stays straight
+    "live": [ub.PointLoad(BEAM.end, force=(0, -2.0), amplitude=lambda t: 0.5 * t)],  # 1 N at 1 s
+    "wind": [ub.PointLoad(BEAM.end, force=(3.0, 4.0))],
+}
+COMBINATIONS = {
+    "ULS 1": {"dead": 1.35, "live": 1.5},
+    "ULS 2": {"dead": 1.0, "wind": 1.5},
+    "SLS": {"dead": 1.0, "live": 1.0, "wind": 0.1},
+}
+
+
+def by_hand(x, dead, live=0.0, wind=0.0):
+    """N, V, M of the cantilever at x by statics."""
+    down, arm = live - 4.0 * wind, L - x
+    return 3.0 * wind, -dead * arm - down, -dead * arm**2 / 2 - down * arm
+
+
+def test_the_envelope_of_a_cantilever():
+    """[closed] Deflections are 1e-7 of the length, so forces agree to 1e-6 of the largest, 15."""
+    found = ub.load_combinations(SCENE, CASES, COMBINATIONS, progress=False)
+    assert ([*found.solutions], found.failed) == ([*COMBINATIONS], {})
+    names, reached = np.array([*COMBINATIONS]), found.section_forces(BEAM, points=3)
+    for row, x in ((0, 0.0), (1, L / 4), (5, L)):  # two cells with three points each
+        table = np.array([by_hand(x, **factors) for factors in COMBINATIONS.values()])
+        np.testing.assert_allclose(reached.low[row], table.min(axis=0), rtol=1e-6, atol=1.5e-5)
+        np.testing.assert_allclose(reached.high[row], table.max(axis=0), rtol=1e-6, atol=1.5e-5)
+        if x < L:  # at the end moments of all combinations are zero
+            assert (reached.low_by[row] == names[table.argmin(axis=0)]).all()
+            assert (reached.high_by[row] == names[table.argmax(axis=0)]).all()
+    support = found.reaction(CLAMPED)
+    np.testing.assert_allclose(support.high[1], 2 * 1.35 + 1.5, rtol=1e-6)
+    assert (support.high_by[1], support.low_by[0]) == ("ULS 1", "ULS 2")
+    assert found.displacement(BEAM.end).high_by[1] == "ULS 2"
+    assert str(found).splitlines()[3].split() == (
+        ["cantilever", "M", "-0.01", "kN", "m", "ULS", "1", "0.01", "kN", "m", "ULS", "2"]
+    )
+
+
+def test_combinations_are_runs_of_the_scene():
+    """A plastic hinge: results cannot be superposed; loads of the scene act in each combination."""
+    hinged = ub.Beam((0, 0), (L, 0), SECTION, hinges={0.0: ub.ElastoPlastic(1e5, isotropic=1e6)})
+    tip = [ub.PointLoad(hinged.end, force=(0, -6e4))]
+    scene = ub.Scene([hinged], supports=[ub.Clamped(hinged.start)], loads=[ub.Gravity()])
+    found = ub.load_combinations(
+        scene, {"tip": tip}, {"half": {"tip": 0.5}, "all": {"tip": 1.0}}, steps=5, progress=False
+    )
+    for name, factor in (("half", 0.5), ("all", 1.0)):
+        load = ub.PointLoad(hinged.end, (0, -6e4), amplitude=ub.Table((0, 1), (0, factor)))
+        alone = ub.Scene([hinged], supports=scene.supports, loads=[ub.Gravity(), load])
+        same = run(alone, ub.Static(), dt=0.2, progress=False)
+        np.testing.assert_array_equal(found.solutions[name].q[-1], same.q[-1])
+    drop = found.envelope(lambda one: one.displacement(hinged.end)[-1, 1])
+    assert drop.low_by == "all"
+    assert drop.low < 2.5 * drop.high  # elastic: 2
+
+
+def test_a_combination_without_equilibrium_is_named_and_left_out():
+    """The hinge bears 1e5 N m, so that the tip bears 5e4 N."""
+    hinge = ub.Softening(limit=1e5, fracture_energy=1e3)  # N m, J
+    weak = ub.Beam((0, 0), (L, 0), SECTION, hinges={0.0: hinge})
+    scene = ub.Scene([weak], supports=[ub.Clamped(weak.start)])
+    cases = {"P": [ub.PointLoad(weak.end, force=(0, -1e5))]}
+    with pytest.warns(
+        ub.ModelWarning, match=r"load_combinations: much: no equilibrium beyond 0\.5"
+    ):
+        found = ub.load_combinations(
+            scene, cases, {"much": {"P": 1.0}, "little": {"P": 0.4}}, progress=False
+        )
+    assert ([*found.solutions], [*found.failed]) == (["little"], ["much"])
+    assert "much: no equilibrium" in str(found)
+    with raises("much: no equilibrium", kind=ub.ConvergenceError):
+        ub.load_combinations(scene, cases, {"much": {"P": 1.0}}, progress=False)
+
+
+def test_mistakes_are_named():
+    with raises("combinations['A']: 'wnd' is not a case; cases: dead, live, wind"):
+        ub.load_combinations(SCENE, CASES, {"A": {"wnd": 1.0}})
+    with raises("cases['spin']: forces of a RotatingFrame have no factor"):
+        ub.load_combinations(SCENE, {"spin": [ub.RotatingFrame(rate=1.0)]}, {"A": {"spin": 1.0}})

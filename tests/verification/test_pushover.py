@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: MIT
+"""Pushover of a portal with a rigid girder: plastic theory and hand calculations of targets.
+
+[closed] Elastic slope 24 EI/h³; limit load 4 M_p/h; with the weights P on both columns the
+equilibrium of the mechanism with rigid members gives (4 M_p - 2 P h sin θ) / (h cos θ), where
+sin θ = sway/h.  The columns have no shear and axial strain, cells of degree 3 are exact for
+them, and hinges at their ends have no length.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import trapezoid
+
+import ufl_beam as ub
+
+EI, H, L, M_P, MASS, P = 2e7, 4.0, 6.0, 148e3, 10e3, 200e3  # N m², m, m, N m, kg, N
+RIGID = 1e5  # stiffness of the girder over the stiffness of columns: an error of EI/RIGID
+CUBIC = ub.Mesh(degree=3)
+PLASTIC = ub.ElastoPlastic(M_P)
+
+
+def portal(weight=0.0, law=PLASTIC, loads=(), rhoA=0.0):
+    column = ub.Section(EA=1e12, GA=1e12, EI=EI, rhoA=rhoA)
+    girder = ub.Section(EA=1e13, GA=1e13, EI=RIGID * EI, rhoA=0.0)
+    hinges = {} if law is None else {0.0: law, 1.0: law}
+    left = ub.Beam((0, 0), (0, H), column, cells=1, hinges=hinges, name="left")
+    right = ub.Beam((L, 0), (L, H), column, cells=1, hinges=hinges, name="right")
+    top = ub.Beam((0, H), (L, H), girder, cells=1, name="top")
+    corners = left.end, right.end
+    weights = [ub.PointLoad(corner, (0, -weight)) for corner in corners if weight]
+    return ub.Scene(
+        [left, right, top],
+        joints=[ub.Rigid(left.end, top.start), ub.Rigid(right.end, top.end)],
+        supports=[ub.Clamped(left.start), ub.Clamped(right.start)],
+        masses=[ub.PointMass(corner, MASS) for corner in corners],
+        loads=[*weights, *loads],
+    )
+
+
+def pushed(scene, target=0.1, steps=25, **options):
+    place = scene["left"].end
+    return ub.pushover(scene, place, target, steps=steps, mesh=CUBIC, progress=False, **options)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return pushed(portal())
+
+
+def of_mechanism(sway, weight):
+    θ = np.arcsin(sway / H)
+    return (4 * M_P - 2 * weight * H * np.sin(θ)) / (H * np.cos(θ))
+
+
+@pytest.mark.parametrize(
+    ("weight", "pattern", "sign"),
+    [(0.0, "mode", 1), (P, "mode", -1), (P, "uniform", 1), (0.0, "triangular", 1)],
+)
+def test_slope_and_limit_load_are_those_of_plastic_theory(weight, pattern, sign):
+    """Stiffness within EI/RIGID of the girder; P-Δ in the elastic range is 6/5 P/h a column.
+
+    The geometric stiffness 6/5 P/h of the cubic shape is the first order of the stability
+    functions; the next is 1/700 (P h²/EI)² EI/h³ a column, 1e-5 of the slope.  The elastic columns
+    of the mechanism rotate by M_p h/(6 EI) = 5e-3 more than their chords and so shorten by 1e-5.
+    """
+    curve = pushed(portal(weight), sign * 0.1, pattern=pattern)
+    slope = 24 * EI / H**3 - 2 * 1.2 * weight / H
+    assert curve.stiffness == pytest.approx(slope, rel=3e-5 + 1e-4)
+    assert np.allclose(curve.base_shear[1] / curve.displacement[1], slope, rtol=2e-4)
+    beyond = np.abs(curve.displacement) > 1.2 * M_P * H**2 / (6 * EI)
+    limit = of_mechanism(np.abs(curve.displacement), weight)
+    assert np.allclose(sign * curve.base_shear[beyond], limit[beyond], rtol=1e-3)
+    assert {hinge.what for hinge in curve.hinges} == {"yields"}
+    assert len(curve.hinges) == 4
+    assert not curve.failure
+
+
+def test_base_shear_is_the_sum_of_reactions():
+    scene = portal(P, rhoA=50.0)
+    curve = pushed(scene, pattern="mode")
+    reactions = sum(curve.path.reaction(support) for support in scene.supports)
+    # Newton's tolerance 1e-8 of the largest forces
+    assert np.allclose(curve.base_shear, -reactions[:, 0], atol=1e-7 * M_P)
+    assert np.allclose(reactions[1:, 1], 2 * P, rtol=1e-7)
+
+
+def test_participation_of_a_cantilever_with_distributed_mass():
+    """[closed] Triangular shape on a uniform column: m* = m h/2, Γ = (1/2)/(1/3) = 3/2.
+
+    A Gauss rule of four points is exact for polynomials of degree 7.
+    """
+    section = ub.Section(EA=1e10, GA=1e10, EI=EI, rhoA=100.0)
+    column = ub.Beam((0, 0), (0, H), section, cells=2, name="column")
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start)])
+    curve = ub.pushover(scene, column.end, 0.01, pattern="triangular", steps=2, progress=False)
+    assert curve.mass == pytest.approx(100 * H, rel=1e-12)
+    assert curve.equivalent_mass == pytest.approx(50 * H, rel=1e-12)
+    assert curve.gamma == pytest.approx(1.5, rel=1e-12)
+    modal = ub.pushover(scene, column.end, 0.01, steps=2, progress=False, mesh=CUBIC)
+    assert modal.gamma == pytest.approx(1.5660, rel=1e-3)  # of a cantilever; EA, GA are finite
+    assert modal.period == pytest.approx(2 * math.pi / 3.5160 * math.sqrt(100 * H**4 / EI), 1e-2)
+
+
+def test_loads_of_a_user_give_the_same_curve(plain):
+    """Forces at the corner instead of the masses: the girder is rigid up to EA = 1e13."""
+    scene = portal()
+    push = [ub.PointLoad(scene["left"].end, (7.0, 0), amplitude=lambda t: 3 * t)]
+    curve = pushed(scene, pattern=push)
+    at = np.linspace(0, 0.1, 20)
+    first, second = (np.interp(at, c.displacement, c.base_shear) for c in (plain, curve))
+    assert np.allclose(first, second, rtol=1e-3, atol=1e-3 * M_P)
+    assert curve.gamma == pytest.approx(1.0, rel=1e-5)
+
+
+def design(T):
+    """Spectrum with a plateau of 10 m/s² up to 0.5 s."""
+    return 10 * min(1.0, 0.5 / T)
+
+
+def test_n2_by_hand(plain):
+    """EN 1998-1 annex B with Γ = 1, m* = 2 m, T* of the bilinear curve, below and above T_C."""
+    d, V = plain.displacement, plain.base_shear
+    end = np.argmax(V)
+    strength = V[end]
+    dy = 2 * (d[end] - trapezoid(V[: end + 1], d[: end + 1]) / strength)
+    T = 2 * math.pi * math.sqrt(2 * MASS * dy / strength)
+    q = 2 * MASS * 10 / strength
+    det = 10 * (T / (2 * math.pi)) ** 2
+    found = plain.n2(design, 0.5)
+    assert found.period == pytest.approx(T, rel=1e-5)  # Γ and m* are 1e-6 off
+    assert found.strength_ratio == pytest.approx(q, rel=1e-5)
+    assert found.displacement == pytest.approx(det / q * (1 + (q - 1) * 0.5 / T), rel=1e-5)
+    assert plain.displacement[found.n] >= found.displacement > plain.displacement[found.n - 1]
+    # the idealised curve of an elastic and perfectly plastic one is itself, up to the step
+    assert dy == pytest.approx(M_P * H**2 / (6 * EI), rel=0.02)
+    long = plain.n2(design, 0.2)  # T* above T_C: equal displacements
+    assert long.displacement == pytest.approx(det, rel=1e-5)
+    weak = plain.n2((np.array([0.0, 4.0]), np.array([1.0, 1.0])), 0.5)  # stays elastic
+    assert weak.displacement == pytest.approx(det / 10, rel=1e-5)
+    assert weak.strength_ratio < 1
+
+
+def test_asce_41_by_hand(plain):
+    """Equation 7-28 with T = 0.324 s and an elastic and perfectly plastic curve.
+
+    The curve is the closed form up to a step of 4 mm at the kink, whose area is below 1 % of the
+    energy; T_e, μ and C1 have at most the same error.
+    """
+    T = 2 * math.pi * math.sqrt(2 * MASS / (24 * EI / H**3))
+    μ = 2 * MASS * 10 / (4 * M_P / H)  # C_m = 1 for one degree of freedom
+    c1, c2 = 1 + (μ - 1) / (60 * T**2), 1 + ((μ - 1) / T) ** 2 / 800
+    found = plain.asce41(design)
+    assert found.displacement == pytest.approx(c1 * c2 * 10 * T**2 / (4 * math.pi**2), rel=0.01)
+    assert found.factors["C0"] == pytest.approx(1.0, rel=1e-5)
+    assert found.factors["C1"] == pytest.approx(c1, rel=0.01)
+    stiff = plain.asce41(design, site="A")
+    assert stiff.factors["C1"] == pytest.approx(1 + (μ - 1) / (130 * T**2), rel=0.01)
+    weak = plain.asce41(lambda T: 1.0)
+    assert weak.factors["C1"] == pytest.approx(1.0, abs=1e-6)  # to the last iteration
+    assert weak.displacement == pytest.approx(T**2 / (4 * math.pi**2), rel=3e-4)
+
+
+def test_two_lines_have_the_energy_of_the_curve():
+    from ufl_beam.analysis.pushover_result import bilinear
+
+    d = np.linspace(0, 0.1, 400)
+    V = 1e5 * np.tanh(d / 0.02)
+    strength, stiffness = bilinear(d, V, 0.1)
+    yields, last = strength / stiffness, V[-1]
+    energy = strength * yields / 2 + (strength + last) / 2 * (0.1 - yields)
+    assert energy == pytest.approx(trapezoid(V, d), rel=1e-9)  # tolerance of the root finder
+    assert np.interp(0.6 * yields, d, V) == pytest.approx(0.6 * strength, rel=1e-9)
+
+
+# -- what cannot be done is said ---------------------------------------------------------------
+
+
+def test_a_target_beyond_the_reach_is_reported_with_the_hinge():
+    """A brittle hinge: fracture energy below the elastic energy, so the sway snaps back."""
+    section = ub.Section(EA=1e10, GA=1e10, EI=EI)
+    brittle = ub.LinearSoftening(limit=M_P, fracture_energy=1e2)
+    column = ub.Beam((0, 0), (0, H), section, cells=4, hinges={0.0: brittle}, name="column")
+    scene = ub.Scene(
+        [column], supports=[ub.Clamped(column.start)], masses=[ub.PointMass(column.end, MASS)]
+    )
+    with pytest.warns(ub.ModelWarning, match=r"ends at u = .* of 0.3 m.*column.start \(0, 0\)"):
+        curve = ub.pushover(scene, column.end, 0.3, progress=False)
+    # M_p h²/(3 EI) is the sway at the limit of the hinge; cells of h/4: (1/4)²/4 of it stiffer
+    assert curve.displacement[-1] == pytest.approx(M_P * H**2 / (3 * EI), rel=0.02)
+    assert "snap" not in str(curve.hinges)
+    with pytest.warns(ub.ModelWarning, match="beyond the end of the capacity curve"):
+        curve.n2(lambda T: 100.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"place": "start"}, "does not move u of left.start"),
+        ({"pattern": [ub.Gravity()]}, "no sum along u"),
+        ({"pattern": "triangular", "place": "start"}, "does not move u of left.start"),
+    ],
+)
+def test_a_pattern_that_does_not_push_the_place_is_refused(options, words):
+    scene = portal()
+    place = getattr(scene["left"], options.pop("place", "end"))
+    with pytest.raises(ub.ArgumentError, match=words):
+        ub.pushover(scene, place, 0.1, progress=False, **options)
+
+
+def test_masses_and_periods_are_required(plain):
+    scene = portal()
+    massless = ub.Scene(scene.beams, joints=scene.joints, supports=scene.supports)
+    with pytest.raises(ub.ArgumentError, match="nothing that moves has mass"):
+        pushed(massless)
+    push = [ub.PointLoad(massless["left"].end, (1.0, 0))]
+    curve = pushed(massless, pattern=push, steps=5)
+    with pytest.raises(ub.ArgumentError, match="the scene has no mass"):
+        curve.asce41(design)
+    with pytest.raises(ub.ArgumentError, match=r"covers periods from 1 to 2 s, but not 0.32"):
+        plain.n2(([1.0, 2.0], [3.0, 2.0]), 0.5)
+    with pytest.raises(ub.ArgumentError, match="beyond the end of the curve"):
+        plain.n2(design, 0.5, upto=1.0)
+    with pytest.raises(ub.ArgumentError, match="site"):
+        plain.asce41(design, site="X")
+
+
+def test_a_structure_that_its_loads_break_is_refused():
+    """A push of 200 kN is beyond the limit load of 4 M_p/h, and the weights P make it unstable."""
+    scene = portal(P)
+    push = ub.PointLoad(scene["left"].end, (200e3, 0))
+    scene = replace(scene, loads=[*scene.loads, push])
+    with pytest.raises(ub.ConvergenceError, match=r"pushover: no equilibrium beyond 0\.\d+ times"):
+        pushed(scene)

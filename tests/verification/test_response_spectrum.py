@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: MIT
+"""Response spectrum analysis: a shear frame by hand, the formula of CQC, static runs of modes.
+
+[calc] A two-storey shear frame: rigid girders of mass m and columns of 24 EI/h³ a storey have the
+2 x 2 matrices M = diag(m1, m2), K = [[2k, -k], [-k, k]].
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+import ufl_beam as ub
+from ufl_beam.analysis.response_spectrum import cqc
+
+EI, H, L, M1, M2 = 2e6, 3.0, 5.0, 12e3, 8e3  # N m², m, m, kg, kg
+CUBIC = ub.Mesh(degree=3)
+STOREY = 24 * EI / H**3  # N/m
+STIFF = 1e6
+"""Ratio of the stiffness of girders, and of axial stiffness, to bending: errors below 1e-5."""
+
+
+def spectrum(T):
+    """A spectrum with a plateau up to 0.4 s; m/s²."""
+    return 6.0 * min(1.0, 0.4 / T)
+
+
+def frame():
+    column = ub.Section(EA=STIFF * EI, GA=STIFF * EI, EI=EI, rhoA=0.0)
+    girder = ub.Section(EA=STIFF * EI, GA=STIFF * EI, EI=STIFF * EI, rhoA=0.0)
+
+    def beam(a, b, section, name):
+        return ub.Beam(a, b, section, cells=1, name=name)
+
+    left = [beam((0, H * i), (0, H * (i + 1)), column, f"left {i}") for i in (0, 1)]
+    right = [beam((L, H * i), (L, H * (i + 1)), column, f"right {i}") for i in (0, 1)]
+    tops = [beam((0, H * i), (L, H * i), girder, f"girder {i}") for i in (1, 2)]
+    joints = []
+    for side, end in ((left, "start"), (right, "end")):
+        joints += [
+            ub.Rigid(side[0].end, side[1].start, getattr(tops[0], end)),
+            ub.Rigid(side[1].end, getattr(tops[1], end)),
+        ]
+    masses = [
+        ub.PointMass(side[i].end, mass / 2)
+        for side in (left, right) for i, mass in enumerate((M1, M2))
+    ]  # fmt: skip
+    supports = [ub.Clamped(left[0].start), ub.Clamped(right[0].start)]
+    return ub.Scene([*left, *right, *tops], joints=joints, supports=supports, masses=masses)
+
+
+SCENE = frame()
+
+
+def analysed(rule="CQC", n=2, **options):
+    return ub.response_spectrum_analysis(SCENE, spectrum, n=n, rule=rule, mesh=CUBIC, **options)
+
+
+def by_hand():
+    """Frequencies, drifts of the roof and storey forces of both modes."""
+    K = STOREY * np.array([[2.0, -1.0], [-1.0, 1.0]])
+    M = np.diag([M1, M2])
+    squares, φ = eigh(K, M)
+    Γ = φ.T @ M @ np.ones(2)
+    Sa = np.array([spectrum(2 * math.pi / ω) for ω in np.sqrt(squares)])
+    u = φ * Γ * Sa / squares
+    return np.sqrt(squares), Γ**2, u, K @ u, Sa
+
+
+@pytest.mark.parametrize("rule", ["SRSS", "CQC"])
+def test_a_shear_frame_is_that_of_hand_calculation(rule):
+    response = analysed(rule)
+    ω, effective, u, forces, Sa = by_hand()
+    assert np.allclose(response.modes.omega, ω, rtol=2e-5)
+    assert np.allclose(response.effective_masses, effective, rtol=1e-4)
+    ρ = cqc(ω, 0.05) if rule == "CQC" else np.eye(2)
+
+    def combined(x):
+        return math.sqrt(x @ ρ @ x)
+
+    shears = np.cumsum(forces[::-1], axis=0)[::-1]  # of both storeys
+    for i, name in enumerate(("left 0", "left 1")):
+        beam = SCENE[name]
+        assert response.displacement(beam.end)[0] == pytest.approx(combined(u[i]), rel=1e-4)
+        diagram = response.diagram(beam, points=3)
+        assert np.allclose(diagram.V, combined(shears[i]) / 2, rtol=1e-4)
+        assert diagram.M[0] == pytest.approx(combined(shears[i]) / 2 * H / 2, rel=1e-4)
+    drift = response.combine(
+        response.peaks(SCENE["left 1"].end) - response.peaks(SCENE["left 0"].end)
+    )
+    assert drift[0] == pytest.approx(combined(u[1] - u[0]), rel=1e-4)
+    assert response.base_shear == pytest.approx(combined(effective * Sa), rel=1e-4)
+    reactions = [response.reactions[:, i, 0] for i in (0, 1)]
+    assert np.allclose(-sum(reactions), shears[0], rtol=1e-4)
+    assert response.missing_mass == pytest.approx(0.0, abs=1e-9)
+
+
+def test_effective_masses_add_up_to_the_mass_that_moves():
+    """All modes of a cantilever with consistent mass, and of the frame with constraints."""
+    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+    beam = ub.Beam((0, 0), (0, 2), section, cells=4, name="beam")
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
+    for mesh, moving in ((ub.Mesh(lumped=True), 7 / 8), (None, None)):
+        response = ub.response_spectrum_analysis(scene, lambda T: 1.0, n=12, mesh=mesh)
+        # sums of squares of 12 products of eigenvectors, which are accurate to 1e-8
+        assert response.missing_mass == pytest.approx(0.0, abs=1e-7)
+        if moving:  # half of the first cell is at the clamp
+            assert response.mass == pytest.approx(moving * 2 * section.rhoA, rel=1e-12)
+    other = ub.Beam((0, 2), (1, 2), section, cells=2, name="other")
+    joint = ub.Rigid(beam.end, other.start, multipliers=True)
+    angled = ub.Scene([beam, other], joints=[joint], supports=[ub.Clamped(beam.start)])
+    shared = replace(angled, joints=[ub.Rigid(beam.end, other.start)])
+    held, equal = (ub.response_spectrum_analysis(x, lambda T: 1.0, n=18) for x in (angled, shared))
+    assert held.missing_mass == pytest.approx(0.0, abs=1e-7)
+    assert held.mass == pytest.approx(equal.mass, rel=1e-9)
+    assert held.base_shear == pytest.approx(equal.base_shear, rel=1e-6)
+
+
+def test_coefficients_of_cqc():
+    """Equation 24 of Der Kiureghian 1981 in the ratio r of frequencies, for equal damping."""
+    ω, ζ = np.array([3.0, 3.3, 20.0]), 0.05
+    for i in range(3):
+        for j in range(3):
+            r = ω[j] / ω[i]
+            above = 8 * ζ**2 * (1 + r) * r**1.5
+            below = (1 - r**2) ** 2 + 4 * ζ**2 * r * (1 + r) ** 2
+            assert cqc(ω, ζ)[i, j] == pytest.approx(above / below, rel=1e-14)
+    assert np.allclose(np.diag(cqc(ω, ζ)), 1.0)
+
+
+def test_one_mode_is_itself():
+    """The combination of one mode has the magnitudes of the mode."""
+    response = analysed(n=1)
+    place = SCENE["left 1"].end
+    assert np.allclose(response.displacement(place), np.abs(response.peaks(place)[0]), rtol=1e-14)
+    assert response.base_shear == pytest.approx(
+        response.effective_masses[0] * spectrum(1 / response.modes.frequencies[0]), rel=1e-14
+    )
+
+
+@pytest.mark.parametrize("degree", [1, 3])
+def test_section_forces_of_a_mode_are_those_of_a_static_run(degree):
+    """Under the inertial forces of the mode, of distributed and point masses.
+
+    Forces are so small that nonlinear terms are below 1e-6, and above the tolerance of Newton's
+    method, 1e-8 of the largest force.  The inertial forces of a cell are consistent in the
+    analysis, and of a Gauss rule that is exact for the shape functions in the run.
+    """
+    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+    column = ub.Beam((0, 0), (0, 3), section, cells=6, name="column")
+    arm = ub.Beam((0, 3), (2, 3.5), section, cells=4, name="arm")
+    mass = ub.PointMass(arm.end, 300.0)
+    scene = ub.Scene(
+        [column, arm], joints=[ub.Rigid(column.end, arm.start)],
+        supports=[ub.Clamped(column.start)], masses=[mass],
+    )  # fmt: skip
+    mesh, small = ub.Mesh(degree=degree), 1e-5
+    with pytest.warns(ub.ModelWarning, match="of the mass"):
+        response = ub.response_spectrum_analysis(scene, lambda T: small, n=1, mesh=mesh)
+    size = response.participation[0] * small  # times ω²/ω²
+    loads = [ub.PointLoad(arm.end, tuple(300.0 * size * response.modes.shape(0, arm.end)[:2].real))]
+    for beam in scene.beams:
+        for axis, force in enumerate(((1.0, 0.0), (0.0, 1.0))):
+            density = section.rhoA * size
+
+            def along(s, beam=beam, axis=axis):
+                return float(response.modes.shape(0, beam.at(s))[axis].real)
+
+            loads.append(ub.LineLoad(beam, (density * force[0], density * force[1]), profile=along))
+
+        def turn(s, beam=beam):
+            return float(response.modes.shape(0, beam.at(s))[2].real)
+
+        loads.append(ub.LineLoad(beam, moment=section.rhoI * size, profile=turn))
+    run = ub.simulate(
+        replace(scene, loads=loads), ub.Static(), t=(0, 1), dt=1.0, mesh=mesh, progress=False
+    )
+    assert np.allclose(
+        response.displacement(arm.end), np.abs(run.displacement(arm.end)[-1]), rtol=1e-5
+    )
+    for beam in scene.beams:
+        ends, found = run.diagram(beam, points=5), response.diagram(beam, points=5)
+        for name in ("N", "V", "M"):
+            values = np.abs(getattr(ends, name))
+            assert np.allclose(getattr(found, name), values, rtol=0, atol=1e-5 * values.max())
+    assert np.allclose(
+        response.reaction(scene.supports[0]), np.abs(run.reaction(scene.supports[0])[-1]), rtol=1e-5
+    )
+
+
+def test_a_loaded_state_softens_the_frame():
+    """[closed] A weight P on a storey of columns: k - 6/5 P/h, to 1/700 (P h²/EI)²."""
+    weight = 1e4
+    loads = [ub.PointLoad(SCENE[name].end, (0, -weight)) for name in ("left 1", "right 1")]
+    loaded = replace(SCENE, loads=loads)
+    state = ub.simulate(loaded, ub.Static(), t=(0, 1), dt=1.0, mesh=CUBIC, progress=False)
+    response = ub.response_spectrum_analysis(loaded, spectrum, n=2, at=state)
+    k = STOREY - 2 * 1.2 * weight / H
+    K = k * np.array([[2.0, -1.0], [-1.0, 1.0]])
+    squares = eigh(K, np.diag([M1, M2]), eigvals_only=True)
+    assert np.allclose(response.modes.omega, np.sqrt(squares), rtol=1e-4)
+
+
+def test_what_cannot_be_analysed_is_refused():
+    mast = ub.Beam((0, 0), (0, 3), ub.Section(EA=1e8, GA=1e8, EI=1e6, rhoA=10.0), cells=2)
+    free = ub.Scene([mast])
+    scene = ub.Scene([mast], supports=[ub.Clamped(mast.start)])
+    damper = ub.Stretch(ub.ground(1, 3), mast.end, ub.Damper(1e4))
+    with pytest.raises(ub.ArgumentError, match="move without strain"):
+        ub.response_spectrum_analysis(free, spectrum)
+    with pytest.raises(ub.ArgumentError, match=r"covers periods from 1 to 2 s, but not 0\.\d+"):
+        ub.response_spectrum_analysis(scene, ([1.0, 2.0], [3.0, 2.0]), n=1)
+    with pytest.raises(ub.ArgumentError, match="must be positive"):
+        ub.response_spectrum_analysis(scene, lambda T: 0.0, n=1)
+    with pytest.raises(ub.ArgumentError, match="dampers"):
+        ub.response_spectrum_analysis(replace(scene, connectors=[damper]), spectrum, n=1)
+    light = ub.Beam((0, 0), (0, 3), ub.Section(1e8, 1e8, 1e6, rhoA=0.0), cells=2)
+    with pytest.raises(ub.ArgumentError, match="nothing that can move has mass"):
+        ub.response_spectrum_analysis(
+            ub.Scene([light], supports=[ub.Clamped(light.start)]), spectrum
+        )

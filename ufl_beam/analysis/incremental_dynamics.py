@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: MIT
+"""Incremental dynamic analysis: runs under ground motions that are scaled to intensities."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.analysis.constant_loads import require_options
+from ufl_beam.analysis.incremental_dynamics_result import (
+    BEYOND_LIMIT,
+    COMPLETED,
+    NO_EQUILIBRIUM,
+    DemandCurves,
+)
+from ufl_beam.analysis.parameter_study import study
+from ufl_beam.errors import (
+    ArgumentError,
+    ConvergenceError,
+    require_all,
+    require_function,
+    require_kind,
+    require_number,
+    require_row,
+    shorten,
+)
+from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
+from ufl_beam.mechanics.time_schemes import EnergyMomentum
+from ufl_beam.model.beams import Mesh
+from ufl_beam.model.ground_motion import GroundMotion
+from ufl_beam.model.scene import Scene
+from ufl_beam.parallel import progress_bar
+from ufl_beam.simulation.initial_state import require_scheme
+from ufl_beam.simulation.run import running, take_steps
+from ufl_beam.simulation.simulation import Simulation
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.step_lengths import EqualSteps, step_count
+from ufl_beam.solvers.newton_options import Newton
+
+CHECKS = 10  # number of times in a run at which the demand is compared with the limit
+WHAT = "incremental_dynamic_analysis"
+Measure = Callable[[Solution], npt.ArrayLike]
+
+
+def incremental_dynamic_analysis(
+    build: Callable[[GroundMotion], Scene],
+    motions: Sequence[GroundMotion],
+    intensities: Sequence[float],
+    measure: Measure,
+    *,
+    limit: float,
+    intensity: Callable[[GroundMotion], float] | None = None,
+    scheme: Scheme | None = None,
+    dt: float | None = None,
+    start: Solution | None = None,
+    newton: Newton | None = None,
+    mesh: Mesh | None = None,
+    path: str | Path | None = None,
+    anew: bool = False,
+    progress: bool = True,
+    comm: MPI.Intracomm | None = None,
+) -> DemandCurves:
+    """Simulate a structure under each ground motion, scaled to each intensity.
+
+    The analysis is that of Vamvatsikos and Cornell (Earthquake Engineering and Structural Dynamics
+    31, 2002) at given intensities.  The runs are the members of a :func:`study`: in parallel under
+    ``mpirun``, each on one process, with results in a file from which the analysis continues.
+
+    A structure collapses if its demand exceeds ``limit``, which ends the run, or if a step has no
+    equilibrium.  The demand is compared with the limit at 10 times of a run.
+
+    Args:
+        build: Function that returns the scene under a scaled motion.  Its beams are always the
+            same if there is a ``start``.
+        motions: Ground motions; a run is as long as its motion.
+        intensities: Increasing intensities, to which each motion is scaled.
+        measure: Function of the solution so far that returns the demand, such as the drift of each
+            storey at each time, in an array of any shape; its largest magnitude is the demand.
+        limit: Demand beyond which the structure has collapsed.
+        intensity: Function that returns the intensity of a motion, which is proportional to the
+            motion, such as the spectral acceleration at the first period.  By default it is the
+            peak acceleration; m/s².
+        scheme: Time scheme; by default :class:`EnergyMomentum`.
+        dt: Time step; by default the time step of the motion; s.
+        start: Static solution under permanent loads, from whose last state all runs begin.
+        newton: Tolerances and options of Newton's method.
+        mesh: Discretization; by default as in ``start``, or the cells of the beams.
+        path: File of the results, from which the analysis continues if the script is run again,
+            also with further motions or intensities.
+        anew: Discard the results in the file, as is necessary after a change of ``build``,
+            ``measure``, ``limit`` or ``dt``.  Changes of motions are recognised.
+        progress: Show a progress bar in a terminal or notebook.
+        comm: Processes; by default all.
+
+    Returns:
+        The demands, their fractiles, and by :meth:`DemandCurves.fragility` the probability
+        of collapse over the intensity.
+
+    Raises:
+        ArgumentError: The call or the file is wrong.
+        RuntimeError: All runs failed for other reasons than a missing equilibrium.
+
+    Example:
+        >>> pulse = ub.GroundMotion(0.02, np.sin(10 * np.arange(0, 1, 0.02)))
+        >>> def build(motion):
+        ...     shaking = ub.Gravity((0, -1), amplitude=motion.acceleration)
+        ...     return ub.Scene([beam], supports=scene.supports, loads=[shaking])
+        >>> dynamics = ub.incremental_dynamic_analysis(build, [pulse], [5.0, 10.0],
+        ...     measure=lambda run: run.displacement(beam.end)[:, 1], limit=0.1)
+        >>> print((1e3 * dynamics.demand).round(2))  # mm
+        [[0.12 0.23]]
+    """
+    require_function(build, f"{WHAT}: build", "a GroundMotion")
+    require_function(measure, f"{WHAT}: measure", "a solution")
+    limit = require_number(limit, f"{WHAT}: limit", positive=True)
+    of = {_key(motion): motion for motion in require_all(motions, f"{WHAT}: motions", GroundMotion)}
+    levels = require_row(intensities, f"{WHAT}: intensities")
+    if not len(levels) or levels[0] <= 0 or (np.diff(levels) <= 0).any():
+        raise ArgumentError(f"{WHAT}: intensities must be positive and increase")
+    if not of:
+        raise ArgumentError(f"{WHAT}: motions is empty")
+    if len(of) < len(motions):
+        raise ArgumentError(f"{WHAT}: motions: the same motion occurs twice")
+    if intensity is not None:
+        require_function(intensity, f"{WHAT}: intensity", "a GroundMotion")
+    chosen: Any = EnergyMomentum() if scheme is None else scheme
+    require_scheme(chosen, f"{WHAT}: scheme")
+    if not has_inertia(chosen):
+        raise ArgumentError(f"{WHAT}: scheme = {chosen!r} is static; give a dynamic scheme")
+    if dt is not None:
+        dt = require_number(dt, f"{WHAT}: dt", positive=True)
+    if start is not None:
+        require_kind(start, Solution, f"{WHAT}: start")
+    require_options(newton, mesh, progress, WHAT)
+    unit = dict[str, float]()
+    for key, motion in of.items():
+        size = motion.peak if intensity is None else intensity(motion)
+        unit[key] = require_number(size, f"{WHAT}: intensity of {motion.name}", positive=True)
+    first = next(iter(of))
+    require_kind(build(of[first].scaled(levels[0] / unit[first])), Scene, f"{WHAT}: build(motion)")
+
+    def member(motion: str, intensity: float) -> dict[str, float]:
+        scaled = of[motion].scaled(intensity / unit[motion])
+        begin = time.perf_counter()
+        simulation = Simulation(build(scaled), chosen, start=start, newton=newton, mesh=mesh)
+        steps = StepsToLimit(simulation, scaled.duration, dt or scaled.dt, measure, limit)
+        outcome = COMPLETED
+        try:
+            with running(simulation, [], [], begin):
+                take_steps(simulation, steps, [], progress_bar(False, simulation.comm, total=1.0))
+        except ConvergenceError:
+            steps.compare()
+            outcome = NO_EQUILIBRIUM
+        if steps.demand > limit:
+            outcome = BEYOND_LIMIT
+        return {"demand": steps.demand, "end": simulation.t, "outcome": float(outcome)}
+
+    member.__name__ = WHAT
+    cases = [{"motion": key, "intensity": float(level)} for key in of for level in levels]
+    results = study(member, cases, path=path, anew=anew, progress=progress, comm=comm)
+    demand, end, outcome = (
+        results[name].reshape(len(of), len(levels)) for name in ("demand", "end", "outcome")
+    )
+    names = tuple(motion.name for motion in of.values())
+    return DemandCurves(names, levels, limit, demand, end, outcome, results)
+
+
+def _key(motion: GroundMotion) -> str:
+    """Return the name of a motion, with a checksum of its values."""
+    values = np.array([motion.dt, *motion.values])
+    return f"{motion.name} {hashlib.sha256(values.tobytes()).hexdigest()[:12]}"
+
+
+class StepsToLimit:
+    """Equal steps to the end of a motion, or until the demand exceeds a limit.
+
+    Attributes:
+        demand: Largest magnitude of the measure when it was last compared with the limit.
+    """
+
+    def __init__(
+        self, simulation: Simulation, t1: float, dt: float, measure: Measure, limit: float
+    ) -> None:
+        self._steps, self._solution = EqualSteps(simulation, t1, dt), simulation.solution
+        self._measure, self._limit = measure, limit
+        self._between = -(-step_count(t1 - simulation.t, dt) // CHECKS)
+        self.demand, self.error = 0.0, math.nan
+
+    @property
+    def steps(self) -> int:
+        """Number of steps so far."""
+        return self._steps.steps
+
+    @property
+    def finished(self) -> bool:
+        """True after the last step, or if the demand exceeds the limit."""
+        return self._steps.finished or self.demand > self._limit
+
+    @property
+    def progress(self) -> float:
+        """Fraction of the steps that have been taken."""
+        return self._steps.progress
+
+    def advance(self, most: int = 1, *, keep: bool = False) -> None:
+        """Take up to ``most`` steps, at most until the next comparison with the limit."""
+        left = self._between - self.steps % self._between
+        self._steps.advance(min(most, left), keep=keep)
+        if self._steps.finished or self.steps % self._between == 0:
+            self.compare()
+
+    def compare(self) -> None:
+        """Update the demand.
+
+        Raises:
+            ArgumentError: The measure returns no numbers.
+        """
+        value = self._measure(self._solution)
+        try:
+            sizes = np.abs(np.asarray(value, dtype=float))
+        except (TypeError, ValueError):
+            sizes = np.empty(0)
+        sizes = sizes[~np.isnan(sizes)]  # the first row of many results is NaN
+        if not len(sizes) or not np.isfinite(sizes).all():
+            raise ArgumentError(f"{WHAT}: measure returned {shorten(value)}, not finite numbers")
+        self.demand = float(sizes.max())

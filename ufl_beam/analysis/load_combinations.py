@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""Load combinations: one nonlinear run each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from ufl_beam.analysis.constant_loads import AT, require_options, size_of, with_amplitude
+from ufl_beam.analysis.load_combinations_result import LoadCombinations
+from ufl_beam.errors import (
+    ArgumentError,
+    ArgumentTypeError,
+    ConvergenceError,
+    require_all,
+    require_count,
+    require_kind,
+    require_number,
+    require_text,
+    shorten,
+    warn,
+)
+from ufl_beam.mechanics.time_schemes import Static
+from ufl_beam.model.beams import Mesh
+from ufl_beam.model.functions import Table
+from ufl_beam.model.loads import Load, RotatingFrame
+from ufl_beam.model.scene import Scene
+from ufl_beam.simulation.run import simulate
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.solvers.newton_options import Newton
+
+
+def load_combinations(
+    scene: Scene,
+    cases: Mapping[str, Sequence[Load]],
+    combinations: Mapping[str, Mapping[str, float]],
+    *,
+    steps: int = 10,
+    newton: Newton | None = None,
+    mesh: Mesh | None = None,
+    progress: bool = True,
+) -> LoadCombinations:
+    """Compute the equilibrium under each combination of load cases.
+
+    Results of nonlinear models cannot be superposed, so each combination is a static run.  The
+    loads of its cases grow together from zero to the factor times their value at t = 1 s.  Loads
+    and motions of the scene itself act in every combination, unchanged.
+
+    Args:
+        scene: Model.
+        cases: Loads of each case by its name, such as "dead", "snow", "wind from the left".
+        combinations: Factors of cases by the name of each combination, such as
+            ``{"ULS 1": {"dead": 1.35, "snow": 1.5}}``.
+        steps: Number of steps of each run, which is from 0 to 1 s.
+        newton: Tolerances and options of Newton's method.
+        mesh: Discretization; by default the cells of the beams.
+        progress: Show progress bars in a terminal or notebook.
+
+    Raises:
+        ArgumentError: The call is wrong, such as a combination with the name of no case.
+        ConvergenceError: No combination has an equilibrium.
+
+    Warns:
+        ModelWarning: A combination has no equilibrium; the envelope leaves it out.
+
+    Example:
+        >>> free = ub.Scene([beam], supports=scene.supports)
+        >>> cases = {"G": [ub.Gravity()], "Q": [ub.PointLoad(beam.end, force=(0, -1e4))]}
+        >>> both = ub.load_combinations(free, cases, {"1": {"G": 1.35, "Q": 1.5}, "2": {"G": 1}})
+        >>> reaction = both.reaction(scene.supports[0])
+        >>> print(reaction.high[1].round(), reaction.high_by[1])  # N
+        19158.0 1
+    """
+    what = "load_combinations"
+    require_kind(scene, Scene, f"{what}: scene")
+    steps = require_count(steps, f"{what}: steps")
+    require_options(newton, mesh, progress, what)
+    loads = dict[str, tuple[Load, ...]]()
+    for name, case in _named(cases, f"{what}: cases").items():
+        loads[name] = require_all(case, f"{what}: cases[{name!r}]", Load)
+        if any(isinstance(load, RotatingFrame) for load in loads[name]):
+            raise ArgumentError(
+                f"{what}: cases[{name!r}]: forces of a RotatingFrame have no factor; give the "
+                "frame to the scene"
+            )
+    factors, scenes = dict[str, dict[str, float]](), dict[str, Scene]()
+    for name, combination in _named(combinations, f"{what}: combinations").items():
+        where = f"{what}: combinations[{name!r}]"
+        factors[name] = row = {}
+        for case, factor in _named(combination, where).items():
+            if case not in loads:
+                raise ArgumentError(f"{where}: {case!r} is not a case; cases: {', '.join(loads)}")
+            row[case] = require_number(factor, f"{where}[{case!r}]")
+        growing = [
+            with_amplitude(load, Table((0.0, AT), (0.0, factor * size_of(load))))
+            for case, factor in row.items()
+            for load in loads[case]
+        ]
+        scenes[name] = replace(scene, loads=[*scene.loads, *growing])
+    solutions, errors = dict[str, Solution](), dict[str, ConvergenceError]()
+    for name, one in scenes.items():
+        try:
+            solutions[name] = simulate(
+                one, Static(), t=(0.0, AT), dt=AT / steps, every=steps, newton=newton, mesh=mesh,
+                progress=progress,
+            )  # fmt: skip
+        except ConvergenceError as error:
+            error.args = (f"{name}: no equilibrium beyond {error.time:.3g} of its loads: {error}",)
+            errors[name] = error
+            if len(errors) == len(scenes):
+                raise
+            warn(f"{what}: {error}")
+    return LoadCombinations(factors, solutions, {name: str(errors[name]) for name in errors})
+
+
+def _named(value: Any, what: str) -> dict[str, Any]:
+    """Return ``value`` as a dictionary with at least one text as key, or raise."""
+    if not isinstance(value, Mapping):
+        raise ArgumentTypeError(f"{what} = {shorten(value)} must be a dict, with names as keys")
+    if not value:
+        raise ArgumentError(f"{what} is empty")
+    for name in value:
+        require_text(name, f"{what}: name")
+    return dict(value)

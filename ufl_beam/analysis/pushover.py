@@ -1,0 +1,356 @@
+# SPDX-License-Identifier: MIT
+"""Pushover: forces with a constant distribution that grow until a target displacement."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ufl_beam.analysis.constant_loads import (
+    AT,
+    loaded_state,
+    require_options,
+    size_of,
+    with_amplitude,
+)
+from ufl_beam.analysis.linearization import SmallMotions
+from ufl_beam.analysis.modes import modes
+from ufl_beam.analysis.path_controls import DisplacementControl
+from ufl_beam.analysis.path_following import Path, follow
+from ufl_beam.analysis.pushover_result import HingeFormation, Pushover
+from ufl_beam.arrays import Array
+from ufl_beam.discretization.dof_numbering import DofNumbering, values_at
+from ufl_beam.discretization.function_spaces import point_masses
+from ufl_beam.errors import (
+    ArgumentError,
+    ConvergenceError,
+    require_all,
+    require_count,
+    require_kind,
+    require_number,
+    shorten,
+    warn,
+)
+from ufl_beam.model.beams import Mesh
+from ufl_beam.model.bodies import AttachmentPoint, Place
+from ufl_beam.model.connectors import law_of, place_of
+from ufl_beam.model.loads import Gravity, LineLoad, Load, PointLoad
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import COMPONENTS
+from ufl_beam.output.history import Events
+from ufl_beam.simulation.initial_state import mesh_of
+from ufl_beam.simulation.simulation import Simulation
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.solvers.newton_options import Newton
+
+PATTERNS = "mode", "uniform", "triangular"
+MODES = 6  # number of modes among which the one with the largest effective mass is chosen
+LEAST_MOTION = 1e-6  # of the control place, as a fraction of the largest motion of the scene
+SAME = 1e-9  # fraction of the target that a step may miss by round-off
+NEAR = 0.99  # fraction of its limit from which on a hinge is named if the path ends
+MOST_STEPS = 20  # largest number of steps of a path, in multiples of the steps asked for
+Shape = Callable[[AttachmentPoint], float]
+"""Displacement of a place, relative to the displacement of the control place."""
+
+
+def pushover(
+    scene: Scene,
+    place: Place,
+    target: float,
+    *,
+    pattern: str | Sequence[Load] = "mode",
+    component: str = "u",
+    steps: int = 100,
+    newton: Newton | None = None,
+    mesh: Mesh | None = None,
+    progress: bool = True,
+) -> Pushover:
+    """Push a structure to a target displacement under constant loads of the scene.
+
+    The loads of the scene act first, with their values at t = 1 s, and then stay constant.  Forces
+    with a constant distribution grow, controlled by the displacement of a place.  They act on
+    masses, of beams and of points.
+
+    Args:
+        scene: Model with its permanent loads.
+        place: Control place, such as the end of the highest column.
+        target: Displacement of the control place, with its sign, beyond the displacement due to the
+            loads of the scene; m.
+        pattern: Distribution of the pushing forces: "mode", mass times the elastic mode with the
+            largest effective mass; "uniform", mass; "triangular", mass times the height above the
+            lowest point; or a list of :class:`PointLoad`, :class:`LineLoad` and :class:`Gravity`.
+            The sum of the forces in the direction of the component is scaled to the base shear.
+        component: "u" to push along x, or "v" along y.
+        steps: Number of steps to the target.
+        newton: Tolerances and options of Newton's method.
+        mesh: Discretization; by default the cells of the beams.
+        progress: Show a progress bar in a terminal or notebook.
+
+    Returns:
+        The curve, with the equilibrium path and the sequence of hinges.  With a list of loads, the
+        shape φ of masses and participation factors is the elastic deflection under these loads.
+
+    Raises:
+        ArgumentError: The call is wrong, a pattern needs mass and there is none, the pattern does
+            not move the control place, or a motion or force in the scene depends on time.
+        ConvergenceError: There is no equilibrium under the loads of the scene, or no first step.
+
+    Warns:
+        ModelWarning: The path ended before the target; the message has its end and the hinges.
+
+    Example:
+        >>> mass = ub.PointMass(weak.end, 5e3)
+        >>> pile = ub.Scene([weak], supports=[ub.Clamped(weak.start)], masses=[mass])
+        >>> capacity = ub.pushover(pile, weak.end, -0.05, component="v", pattern="uniform")
+        >>> print(capacity.hinges[0].where, capacity.hinges[0].what)
+        beam.start (0, 0) opens
+    """
+    require_kind(scene, Scene, "pushover: scene")
+    require_kind(place, Place, "pushover: place")
+    target = require_number(target, "pushover: target")
+    if target == 0.0:
+        raise ArgumentError("pushover: target = 0 leads nowhere; give a displacement in m")
+    if not isinstance(component, str) or component not in COMPONENTS[:2]:
+        raise ArgumentError(f"pushover: component = {shorten(component)} must be 'u' or 'v'")
+    steps = require_count(steps, "pushover: steps")
+    require_options(newton, mesh, progress, "pushover")
+    control = DisplacementControl(place, component, target / steps)
+    control.require(scene)
+    loads: tuple[Load, ...] = ()
+    if not isinstance(pattern, str):
+        loads = require_all(pattern, "pushover: pattern", (PointLoad, LineLoad, Gravity))
+    elif pattern not in PATTERNS:
+        raise ArgumentError(
+            f"pushover: pattern = {shorten(pattern)} must be one of {', '.join(PATTERNS)}, or a "
+            "list of loads"
+        )
+    for owner, function in scene.time_functions():
+        if not isinstance(owner, Load) and any(function(t) != function(AT) for t in (-1.0, 0, 0.5)):
+            raise ArgumentError(
+                f"pushover: {owner} depends on time, and a pushover has none; make it constant, or "
+                "use ub.follow"
+            )
+    axis = COMPONENTS.index(component)
+    steady, start = loaded_state(scene, "pushover", mesh, newton)
+    numbering = DofNumbering(scene, mesh_of(start, mesh))
+    masses = mass_points(numbering, axis)
+    total = sum(mass for _, mass in masses)
+    if isinstance(pattern, str) and not total > 0:
+        raise ArgumentError(
+            f"pushover: nothing that moves has mass, and the pattern {pattern!r} acts on masses; "
+            "give sections rho or rhoA, give PointMass, or a list of loads as pattern"
+        )
+    if isinstance(pattern, str):
+        shape = _shape(pattern, place, axis, steady, start, mesh, masses)
+        loads = tuple(_forces(scene, axis, shape))
+    sum_of_forces = sum(_along(load, axis, numbering) for load in loads)
+    largest = sum(_along(load, i, numbering, abs) for load in loads for i in (0, 1))
+    if not abs(sum_of_forces) > LEAST_MOTION * largest:
+        raise ArgumentError(
+            f"pushover: the forces of the pattern have no sum along {component}, so that there is "
+            "no base shear"
+        )
+    unit = [with_amplitude(load, Proportional(size_of(load) / sum_of_forces)) for load in loads]
+    pushed = replace(steady, loads=[*steady.loads, *unit])
+    linear = SmallMotions(pushed, start, abs(sum_of_forces), mesh).linear_change("pushover")
+    moved = float(values_at(numbering, place, linear[None])[0, axis])
+    if not abs(moved) > LEAST_MOTION * np.abs(linear[numbering.dofs[:, :2]]).max():
+        raise ArgumentError(
+            f"pushover: the pattern does not move {component} of {place}; give another control "
+            "place or component"
+        )
+    if not isinstance(pattern, str):
+
+        def shape(at: AttachmentPoint) -> float:
+            return float(values_at(numbering, at, linear[None])[0, axis]) / moved
+
+    weighted = np.array([(mass, mass * shape(at)) for at, mass in masses]).reshape(-1, 2)
+    first, second = weighted[:, 1].sum(), (weighted[:, 1] ** 2 / weighted[:, 0]).sum()
+    period = _main_mode(steady, start, mesh, masses, axis)[1] if total > 0 else math.nan
+    path, events, failure = _follow(
+        pushed, control, target, steps, start, newton=newton, mesh=mesh, progress=progress
+    )
+    displacement = path.displacement(place)[:, axis]
+    displacement = displacement - displacement[0]
+    hinges = tuple(_formations(events, path, displacement))
+    if failure:
+        named = [f"{hinge.where} {hinge.what}" for hinge in hinges]
+        named += [f"{at} is at its limit" for at in _at_limit(path)]
+        failure = (
+            f"the path ends at {component} = {displacement[-1]:.4g} m of {target:g} m, with a base "
+            f"shear of {path.factor[-1]:.4g} N; hinges: {'; '.join(named) or 'none'}. {failure}"
+        )
+        warn(f"pushover: {failure}")
+    return Pushover(
+        path, place, component, target, displacement, path.factor, hinges,
+        abs(sum_of_forces) / abs(moved), total, first, first / second if total > 0 else math.nan,
+        period, failure,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Proportional:
+    """Function that is proportional to the load factor."""
+
+    slope: float
+
+    def __call__(self, t: float) -> float:
+        """Return the value at a load factor."""
+        return self.slope * t
+
+
+def mass_points(numbering: DofNumbering, axis: int) -> list[tuple[AttachmentPoint, float]]:
+    """List points with mass (kg): Gauss points of cells, and point masses that can move.
+
+    ``axis`` is the component in which a support does not hold a point mass.
+    """
+    scene, weights = numbering.scene, np.polynomial.legendre.leggauss(4)[1] / 2
+    rows: list[tuple[AttachmentPoint, float]] = []
+    for beam in scene.beams:
+        if rhoA := beam.section.rhoA:
+            lengths = numbering.lengths(numbering.cells_of(beam))
+            points = zip(
+                numbering.gauss_parameters(beam).ravel(), np.outer(lengths, weights).ravel(),
+                strict=True,
+            )  # fmt: skip
+            rows += [(beam.at(float(s)), rhoA * float(length)) for s, length in points]
+    held = {int(numbering.node(s.place)[c]) for s in scene.supports for c in s.held}
+    return rows + [
+        (at, mass)
+        for at, mass, _ in point_masses(scene)
+        if mass and int(numbering.node(at)[axis]) not in held
+    ]
+
+
+def _main_mode(
+    scene: Scene,
+    start: Solution | None,
+    mesh: Mesh | None,
+    masses: list[tuple[AttachmentPoint, float]],
+    axis: int,
+) -> tuple[Shape, float]:
+    """Return the shape and the period (s) of the mode with the largest effective mass."""
+    found = modes(replace(scene, damping=()), MODES, at=start, mesh=mesh)
+    m = np.array([mass for _, mass in masses])
+    effective = []
+    for k in range(len(found)):
+        motion = np.array([found.shape(k, at)[:2].real for at, _ in masses])
+        effective.append(float((m @ motion[:, axis]) ** 2 / (m @ motion**2).sum()))
+    k = int(np.argmax(effective))
+    return lambda at: float(found.shape(k, at)[axis].real), 1.0 / float(found.frequencies[k])
+
+
+def _shape(
+    pattern: str, place: Place, axis: int, scene: Scene, start: Solution | None,
+    mesh: Mesh | None, masses: list[tuple[AttachmentPoint, float]],
+) -> Shape:  # fmt: skip
+    """Return the shape of a named pattern, which is 1 at the control place.
+
+    Raises:
+        ArgumentError: The pattern does not move the control place.
+    """
+    if pattern == "uniform":
+        return lambda at: 1.0
+    form: Shape
+    if pattern == "triangular":
+        lowest = min(at.point[1] for at, _ in masses)
+        lowest = min([lowest, *(support.place.point[1] for support in scene.supports)])
+        form, largest = (lambda at: float(at.point[1] - lowest)), scene.size
+    else:
+        (form, _), largest = _main_mode(scene, start, mesh, masses, axis), 1.0
+    there = form(place)
+    if not abs(there) > LEAST_MOTION * largest:
+        raise ArgumentError(
+            f"pushover: the pattern {pattern!r} does not move {COMPONENTS[axis]} of {place}; give "
+            "another control place or pattern"
+        )
+    return lambda at: form(at) / there
+
+
+def _forces(scene: Scene, axis: int, shape: Shape) -> list[Load]:
+    """Return loads of mass times the shape along an axis, on beams and point masses."""
+    direction = (1.0, 0.0) if axis == 0 else (0.0, 1.0)
+    loads: list[Load] = []
+    for beam in scene.beams:
+        if rhoA := beam.section.rhoA:
+
+            def along(s: float, beam: Any = beam) -> float:
+                return shape(beam.at(s))
+
+            force = (rhoA * direction[0], rhoA * direction[1])
+            loads.append(LineLoad(beam, force, profile=along))
+    held = {support.place for support in scene.supports if axis in support.held}
+    for at, mass, _ in point_masses(scene):
+        if mass and at not in held:
+            size = mass * shape(at)
+            loads.append(PointLoad(at, (size * direction[0], size * direction[1])))
+    return loads
+
+
+def _along(
+    load: Load, axis: int, numbering: DofNumbering, size: Callable[[Any], Any] = float
+) -> float:
+    """Return the force of a load along an axis, with ``size=abs`` its magnitude; N."""
+    factor = size_of(load)
+    if isinstance(load, PointLoad):
+        return float(size(factor * load.force[axis]))
+    if isinstance(load, Gravity):
+        mass = sum(mass for _, mass in mass_points(numbering, axis))
+        return float(size(factor * load.acceleration[axis] * mass))
+    if isinstance(load, LineLoad):
+        weights = np.polynomial.legendre.leggauss(4)[1] / 2
+        lengths = numbering.lengths(numbering.cells_of(load.beam))
+        shares = load.factors(numbering.gauss_parameters(load.beam)) @ weights
+        return float(size(factor * load.force[axis] * float(lengths @ shares)))
+    raise TypeError(f"{type(load).__name__} has no sum of forces")
+
+
+def _follow(
+    scene: Scene, control: DisplacementControl, target: float, steps: int, start: Solution | None,
+    **options: Any,
+) -> tuple[Path, Events, str]:  # fmt: skip
+    """Follow the path to the target; return it, its events, and why it ended before."""
+    axis, sign = COMPONENTS.index(control.component), math.copysign(1.0, target)
+    events, before = Events(), 0.0 if start is None else start.displacement(control.place)[-1, axis]
+
+    def reached(now: Simulation) -> bool:
+        moved = sign * float(now.displacement(control.place)[axis] - before)
+        return moved >= abs(target) * (1.0 - SAME)
+
+    try:
+        path = follow(
+            scene, control, until=reached, steps=MOST_STEPS * steps, start=start, record=events,
+            **options,
+        )  # fmt: skip
+    except ConvergenceError as error:
+        path = error.solution
+        if len(path) < 2:
+            raise
+        return path, events, str(error)
+    moved = sign * float(path.displacement(control.place)[-1, axis] - before)
+    return path, events, "" if moved >= abs(target) * (1.0 - SAME) else "too many steps"
+
+
+def _at_limit(path: Path) -> list[Place]:
+    """Return the closed hinges whose moments nearly reach their limits at the end of a path."""
+    found = []
+    for hinge in path.scene.hinges:
+        limit, state = float(law_of(hinge).limit), path.connector(hinge)
+        if state.dissipated[-1] == 0.0 and abs(state.force[-1]) >= NEAR * limit:
+            found.append(place_of(hinge))
+    return found
+
+
+def _formations(events: Events, path: Path, displacement: Array) -> Any:
+    """Iterate over the events with the states at which they are found."""
+    n = 0
+    for event in events.found:
+        # An event has the load factor at the end of its step, which may occur twice on a path.
+        n = next((k for k in range(n, len(path)) if path.factor[k] == event.time), n)
+        yield HingeFormation(
+            n, float(displacement[n]), float(path.factor[n]), event.where, event.what
+        )

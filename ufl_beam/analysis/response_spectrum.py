@@ -1,0 +1,314 @@
+# SPDX-License-Identifier: MIT
+"""Response spectrum analysis: peak responses of modes, combined by SRSS or CQC."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from mpi4py import MPI
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+
+from ufl_beam.analysis.linearization import SmallMotions
+from ufl_beam.analysis.modes import Modes, modes
+from ufl_beam.analysis.spectra import Spectrum, spectral_accelerations
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import lib
+from ufl_beam.discretization.compiled_forms import cached_forms
+from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.display import Rich
+from ufl_beam.dolfinx_compat import fem
+from ufl_beam.errors import (
+    ArgumentError,
+    require_count,
+    require_kind,
+    require_number,
+    require_vector,
+    shorten,
+    warn,
+)
+from ufl_beam.mechanics.time_schemes import Static
+from ufl_beam.model.beams import Mesh
+from ufl_beam.model.bodies import AttachmentPoint, Member
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import Support
+from ufl_beam.output.section_forces import Diagram, ForcesAlongCells
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.terms.beam_forces import elastic_forms
+from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.term import InCells
+
+RULES = "CQC", "SRSS"
+LEAST_MASS = 0.9  # fraction of the mass that modes should have; EN 1998-1:2004, 4.3.3.3.1
+AT_REST = 1e-6  # frequency below which a mode is a rigid motion, as a fraction of the highest
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpectralResponse(Rich):
+    """Peak responses to a spectrum; made by :func:`response_spectrum_analysis`.
+
+    Combined responses are positive, and belong to different times.
+
+    Attributes:
+        modes: The modes, without damping.
+        direction: Unit vector of the ground motion.
+        accelerations: Spectral acceleration of each mode; (n,); m/s².
+        participation: Participation factor of each mode, for its largest displacement of 1; (n,).
+        effective_masses: Effective mass of each mode in the direction; (n,); kg.
+        mass: Mass that moves; kg.
+        correlation: Coefficients ρ of the combination; (n, n).
+        resultants: Peak forces on the ends of cells in each mode, ``cell_number`` of loops.h;
+            (n, 9, num_cells).
+        reactions: Peak force (x, y) and moment of each support in each mode; (n, num_supports, 3).
+
+    Example:
+        >>> response = ub.response_spectrum_analysis(scene, lambda T: 3.0, n=4, direction=(0, 1))
+        >>> print(f"{response.base_shear:.0f} N, {response.missing_mass:.1%} of the mass missing")
+        620 N, 3.7% of the mass missing
+        >>> print(response.reaction(scene.supports[0])[1:].round())  # N, N m
+        [620. 852.]
+        >>> figure = ub.plot(response, "M")
+    """
+
+    modes: Modes
+    direction: tuple[float, float]
+    accelerations: Array
+    participation: Array
+    effective_masses: Array
+    mass: float
+    correlation: Array
+    resultants: Array
+    reactions: Array
+
+    @property
+    def scene(self) -> Scene:
+        """The model of the modes."""
+        return self.modes.scene
+
+    @property
+    def missing_mass(self) -> float:
+        """Fraction of the mass that the effective masses of the modes lack."""
+        return 1.0 - float(self.effective_masses.sum()) / self.mass
+
+    @property
+    def base_shear(self) -> float:
+        """Combined inertial force in the direction; N."""
+        return float(self.combine(self.effective_masses * self.accelerations))
+
+    def combine(self, peaks: npt.ArrayLike) -> Array:
+        """Combine the peaks of all modes, such as drifts; (n, ...) to (...).
+
+        The combination of the peaks R is the root of Σ ρ_ij R_i R_j.
+        """
+        values = np.asarray(peaks, dtype=float)
+        if values.shape[:1] != self.accelerations.shape:
+            raise ArgumentError(
+                f"combine: peaks of shape {values.shape} must have a row for each of the "
+                f"{len(self.accelerations)} modes"
+            )
+        squares = np.einsum("ij,i...,j...->...", self.correlation, values, values)
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))  # round-off may be negative
+
+    def peaks(self, place: AttachmentPoint) -> Array:
+        """Return the peak motion (u, v, ψ) of a place in each mode, with its sign; (n, 3).
+
+        Raises:
+            ArgumentError: The place is not in the scene.
+        """
+        sizes = self.participation * self.accelerations / self.modes.omega**2
+        return np.array([size * self.modes.shape(k, place).real for k, size in enumerate(sizes)])
+
+    def displacement(self, place: AttachmentPoint) -> Array:
+        """Return the combined motion (u, v, ψ) of a place relative to the ground; (3,); m, rad."""
+        return self.combine(self.peaks(place))
+
+    def diagram(self, beam: Member, *, points: int = 9) -> Diagram:
+        """Return combined section forces along a beam, with ``points`` points in each cell.
+
+        Raises:
+            ArgumentError: The beam is not in the scene, or ``points`` is less than 2.
+        """
+        require_number(points, "diagram: points", at_least=2)
+        numbering = self.modes.numbering
+        s, fractions = numbering.parameters(beam), np.arange(int(points)) / (int(points) - 1)
+        cells, along = numbering.cells_of(beam), ForcesAlongCells(numbering)
+        q = self.modes.q[along.dofs[cells]]
+        peaks = [along(cells, fractions, forces[:, cells], q) for forces in self.resultants]
+        at = s[:-1, None] + fractions * np.diff(s)[:, None]
+        return Diagram(at.ravel(), *self.combine(peaks).reshape(-1, 3).T)
+
+    def reaction(self, support: Support) -> Array:
+        """Return the combined force (x, y) and moment of a support; (3,); N, N, N m.
+
+        Raises:
+            ArgumentError: The support is not in the scene.
+        """
+        if support not in self.scene.supports:
+            raise ArgumentError(f"reaction: {support} is not in the scene")
+        return self.combine(self.reactions[:, self.scene.supports.index(support)])
+
+    def __str__(self) -> str:
+        lines = ["mode     period  acceleration  effective mass"]
+        rows = zip(self.modes.frequencies, self.accelerations, self.effective_masses, strict=True)
+        lines += [
+            f"{k:4d} {1 / f:8.4g} s {a:8.4g} m/s² {m:8.4g} kg  {m / self.mass:.1%}"
+            for k, (f, a, m) in enumerate(rows)
+        ]
+        return "\n".join([
+            *lines, f"missing mass {self.missing_mass:.1%}, base shear {self.base_shear:.4g} N",
+        ])  # fmt: skip
+
+    def __repr__(self) -> str:
+        return (
+            f"<SpectralResponse: {len(self.modes)} modes, base shear {self.base_shear:.4g} N, "
+            f"missing mass {self.missing_mass:.1%}>"
+        )
+
+
+def response_spectrum_analysis(
+    scene: Scene,
+    spectrum: Spectrum,
+    *,
+    n: int = 10,
+    direction: tuple[float, float] = (1.0, 0.0),
+    damping: float = 0.05,
+    rule: str = "CQC",
+    at: Solution | None = None,
+    mesh: Mesh | None = None,
+) -> SpectralResponse:
+    """Compute peak responses of a structure to a spectrum by its modes.
+
+    All supports have the same motion.  The peaks of modes are combined by the complete quadratic
+    combination of Der Kiureghian (Earthquake Engineering and Structural Dynamics 9, 1981), or by
+    the root of the sum of squares.  Modes that are left out contribute nothing; the missing mass is
+    reported.  The section forces of a mode are in equilibrium with its inertial forces; axes of
+    sections are those of the state.
+
+    Args:
+        scene: Model.
+        spectrum: Spectral acceleration (m/s²) as a function of the period (s), or (periods,
+            accelerations), for the damping ratio.
+        n: Number of modes; fewer if the scene has fewer.
+        direction: Direction of the ground motion; only its direction matters.
+        damping: Damping ratio of all modes for CQC; damping of the scene is ignored.
+        rule: "CQC" or "SRSS".
+        at: Static solution about whose last state the scene vibrates; responses are beyond this
+            state.  By default the scene is undeformed.
+        mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
+
+    Raises:
+        ArgumentError: The call is wrong, the spectrum does not cover the periods, nothing has mass,
+            the scene can move freely, or it has dampers, follower loads or works.
+
+    Warns:
+        ModelWarning: The modes have less than 90 % of the mass.
+
+    Example:
+        >>> response = ub.response_spectrum_analysis(scene, ([1e-4, 4.0], [3.0, 3.0]), n=6)
+        >>> print(response.displacement(beam.end).shape, response.diagram(beam).M.shape)
+        (3,) (36,)
+    """
+    what = "response_spectrum_analysis"
+    require_kind(scene, Scene, f"{what}: scene")
+    n = require_count(n, f"{what}: n")
+    x, y = require_vector(direction, f"{what}: direction")
+    if not (size := math.hypot(x, y)) > 0.0:
+        raise ArgumentError(f"{what}: direction = {shorten(direction)} has no length")
+    damping = require_number(damping, f"{what}: damping", positive=True)
+    if damping >= 1.0:
+        raise ArgumentError(f"{what}: damping = {damping:g} must be below 1")
+    if not isinstance(rule, str) or rule not in RULES:
+        raise ArgumentError(f"{what}: rule = {shorten(rule)} must be one of {', '.join(RULES)}")
+    if mesh is not None:
+        require_kind(mesh, Mesh, f"{what}: mesh")
+    if at is not None:
+        require_kind(at, Solution, f"{what}: at")
+    spectral_accelerations(spectrum, np.zeros(0), what)
+    if scene.works:
+        raise ArgumentError(f"{what}: {scene.works[0]}: works are left out of section forces")
+    undamped = replace(scene, damping=())
+    found = modes(undamped, n, at=at, mesh=mesh)
+    _require_vibration(found, what)
+    small = SmallMotions(undamped if at else replace(undamped, loads=()), at, mesh=mesh)
+    shapes, omega = np.asarray(found.shapes.real), found.omega
+    toward, mass = small.participation(np.array([x, y]) / size)
+    own = np.einsum("ik,ik->k", shapes, small.masses @ shapes)
+    along = shapes.T @ toward
+    participation, effective = along / own, along**2 / own
+    accelerations = spectral_accelerations(spectrum, np.asarray(2.0 * math.pi / omega), what)
+    sizes = participation * accelerations / omega**2
+    forces = small.support_forces(shapes, omega) * sizes
+    places = [small.numbering.node(support.place) for support in scene.supports]
+    reactions = np.array([forces[dofs].T for dofs in places]).reshape(len(places), len(sizes), 3)
+    response = SpectralResponse(
+        replace(found, scene=scene), (x / size, y / size), accelerations, participation, effective,
+        mass, cqc(omega, damping) if rule == "CQC" else np.eye(len(omega)),
+        _resultants(found, sizes), reactions.transpose(1, 0, 2),
+    )  # fmt: skip
+    if response.missing_mass > 1.0 - LEAST_MASS:
+        warn(
+            f"{what}: the {len(found)} modes have {1.0 - response.missing_mass:.0%} of the mass "
+            f"along ({x:g}, {y:g}); 90 % are usual (EN 1998-1, 4.3.3.3.1): give a larger n"
+        )
+    return response
+
+
+def _require_vibration(found: Modes, what: str) -> None:
+    """Raise unless all modes are undamped vibrations about a stable state."""
+    if not len(found):
+        raise ArgumentError(f"{what}: the scene has no mode")
+    if np.iscomplexobj(found.shapes) or (np.abs(found.damping) > AT_REST).any():
+        raise ArgumentError(
+            f"{what}: dampers, follower loads or a rotating frame act on the scene, or it is "
+            "unstable, so that it has no undamped modes; leave them out, or use simulate"
+        )
+    if (found.omega <= AT_REST * found.omega.max()).any():
+        raise ArgumentError(f"{what}: the scene can move without strain; give it supports")
+
+
+def cqc(omega: Array, damping: float) -> Array:
+    """Return the correlation coefficients of modes with equal damping ratios; (n, n).
+
+    Der Kiureghian 1981, equation 24, for frequencies ``omega``; rad/s.
+    """
+    i, j = omega[:, None], omega
+    product, ζ = i * j, damping
+    above = 8.0 * ζ**2 * np.sqrt(product) * (i + j) * product
+    below = (i**2 - j**2) ** 2 + 4.0 * ζ**2 * product * (i**2 + j**2) + 8.0 * ζ**2 * product**2
+    return np.asarray(above / below)
+
+
+@cached_forms
+def _linear_forces(element: Element) -> tuple[ufl.Form, fem.Function]:
+    """Return the forces of cells, linearized about a configuration, and this configuration."""
+    about = element.configuration()
+    work = ufl.replace(elastic_forms(element, Static()).work, {element.q1: about})
+    return ufl.derivative(work, about, element.q1), about
+
+
+def _resultants(found: Modes, sizes: Array) -> Array:
+    """Return the peak forces of stress and inertia on the ends of cells; (n, 9, num_cells)."""
+    subdomain = Subdomain(found.numbering, MPI.COMM_SELF)
+    fields, space = Fields(subdomain), np.zeros(subdomain.size)
+    form, about = _linear_forces(fields.element)
+    stress, inertia = fields.kernel(form, fields.element.q1), mass_kernel(fields)
+    cells = CellForces(
+        subdomain,
+        [
+            InCells(lambda: stress, lib.STRESS, fields.order),
+            InCells(lambda: inertia, lib.DENSITY, fields.order),
+        ],
+    )
+    stress.set(about, found.q)
+    peaks = []
+    for shape, size, omega in zip(found.shapes.real.T, sizes, found.omega, strict=True):
+        x = np.ascontiguousarray(size * shape)
+        stress.add(x, space)
+        inertia.add(-(omega**2) * x, space)
+        cells.accept()
+        peaks.append(cells(x, x))
+    return np.array(peaks)

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of analyses of structures: capacity curves, responses to spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ufl_beam.analysis.incremental_dynamics_result import PERCENT, DemandCurves
+from ufl_beam.analysis.load_combinations_result import LoadCombinations
+from ufl_beam.analysis.pushover_result import Pushover, TargetDisplacement
+from ufl_beam.arrays import Array
+from ufl_beam.errors import ArgumentError
+from ufl_beam.plotting import style
+from ufl_beam.plotting.frame_pictures import MOST, draw_frame, plane_canvas
+from ufl_beam.plotting.style import BLUE, COLORS, GREY, ORANGE, RED, shade
+from ufl_beam.simulation.solution import Solution
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_NAMED = 12  # largest number of events that a legend names
+
+
+def draw_pushover(
+    pushover: Pushover,
+    *,
+    targets: TargetDisplacement | Sequence[TargetDisplacement] = (),
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw the capacity curve with numbered hinges, and the idealised curves of targets.
+
+    Events of the same step share a number.
+    """
+    several = (targets,) if isinstance(targets, TargetDisplacement) else tuple(targets)
+    sign = float(np.sign(pushover.target))
+    unit, prefix = style.decimal_prefix(float(np.abs(pushover.base_shear).max()))
+    with style.panel(ax, (8.0, 5.0)) as axes:
+        style.time_axes(axes)
+        axes.margins(x=0.05)
+        axes.plot(pushover.displacement, pushover.base_shear / unit, color=BLUE, zorder=3)
+        for target, color in zip(several, (RED, *COLORS[2:]), strict=False):
+            d, V = target.yield_displacement, target.yield_shear
+            far, end = max(target.displacement, d), V
+            if target.method != "N2" and target.displacement > d:
+                end = float(
+                    np.interp(far, *(sign * pushover.displacement, sign * pushover.base_shear))
+                )
+            axes.plot(
+                [0.0, sign * d, sign * far], [0.0, sign * V / unit, sign * end / unit], "--",
+                color=color, linewidth=1.4, zorder=2,
+            )  # fmt: skip
+            axes.axvline(
+                sign * target.displacement, color=color, linewidth=1.4, linestyle=":", zorder=2,
+                label=f"{target.method}: {target.displacement:.3g} m",
+            )  # fmt: skip
+        steps = [list(same) for _, same in groupby(pushover.hinges, key=lambda hinge: hinge.n)]
+        for number, same in enumerate(steps, start=1):
+            at = same[0].displacement, same[0].base_shear / unit
+            names = [f"{hinge.where} {hinge.what}" for hinge in same]
+            words = names[0] + (f" and {len(names) - 1} more" if len(names) > 1 else "")
+            label = f"{number}: {words}" if len(steps) <= MOST_NAMED else None
+            axes.plot(*at, "o", color=shade(ORANGE), ms=6.0, zorder=4, label=label)
+            axes.annotate(
+                str(number), at, (-4, 5), textcoords="offset points", ha="right", zorder=5,
+                fontsize=style.font_size(11.0),
+            )  # fmt: skip
+        axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
+        axes.set_xlabel(f"{pushover.component} of {pushover.place} (m)")
+        axes.set_ylabel(f"base shear ({prefix}N)")
+        if steps or several:
+            style.draw_legend(
+                axes, ax, loc="outside upper left", ncols=2, fontsize=style.font_size(10.0)
+            )
+    return style.parent_figure(axes)
+
+
+def draw_response(response: Any, *, quantity: str = "M", ax: Axes | None = None) -> Figure:
+    """Draw a section force of a :class:`SpectralResponse` on the frame, with both signs."""
+    diagrams = [
+        (beam, sign * getattr(response.diagram(beam), quantity))
+        for beam in response.scene.beams
+        for sign in (1.0, -1.0)
+    ]
+    title = f"{style.RESULTANTS[quantity][0]} {quantity}", "by response spectrum"
+    return _on_frame(response.modes.motion(0), title, quantity, diagrams, ax)
+
+
+def draw_combinations(
+    combined: LoadCombinations, *, quantity: str = "M", ax: Axes | None = None
+) -> Figure:
+    """Draw the envelope of a section force over load combinations on the undeformed frame."""
+    index, solutions = list(style.RESULTANTS).index(quantity), [*combined.solutions.values()]
+    reached = [(beam, combined.section_forces(beam)) for beam in solutions[0].scene.beams]
+    diagrams = [
+        (beam, values[:, index])
+        for beam, extremes in reached
+        for values in (extremes.high, extremes.low)
+    ]
+    title = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}"
+    return _on_frame(
+        solutions[0], (title, f"of {len(solutions)} load combinations"), quantity, diagrams, ax
+    )
+
+
+def draw_dynamics(dynamics: DemandCurves) -> Figure:
+    """Draw intensities over demands, with fractiles, beside the probability of collapse.
+
+    The curve of a motion ends at its first collapse.  The probability is left out if it has no fit.
+    """
+    try:
+        fragility = dynamics.fragility()
+    except ArgumentError:
+        fragility = None
+    im, limit = dynamics.intensities, dynamics.limit
+    with style.picture((11.0 if fragility else 7.0, 5.0)) as figure:
+        axes, *others = figure.subplots(1, 2 if fragility else 1, sharey=True, squeeze=False)[0]
+        rows = np.where(dynamics.collapsed, np.inf, dynamics.demand)
+        for k, demand in enumerate(rows):
+            label = f"{len(rows)} motions" if not k else None
+            _draw_curve(axes, demand, im, limit, color=GREY, lw=0.8, label=label)
+        fractiles = zip(PERCENT, dynamics.fractiles(), ("--", "-", ":"), strict=True)
+        for percent, demand, line in fractiles:
+            label = f"{percent:g} % of the motions"
+            _draw_curve(axes, demand, im, limit, color=BLUE, lw=2.2, ls=line, label=label)
+        axes.set(xlim=(0.0, limit), ylim=(0.0, 1.05 * im[-1]), xlabel="demand", ylabel="intensity")
+        axes.legend(loc="lower right", fontsize=style.font_size(9.0))
+        if fragility:
+            (other,) = others
+            x = np.linspace(0.0, 1.05 * im[-1], 200)[1:]
+            label = f"median {fragility.median:.3g}, dispersion {fragility.dispersion:.2g}"
+            other.plot(fragility(x), x, color=RED, label=label)
+            other.plot(fragility.exceeded / fragility.number, im, "o", color=shade(RED))
+            other.set(xlim=(-0.03, 1.03), xlabel="probability of collapse")
+            other.legend(loc="lower right", fontsize=style.font_size(9.0))
+    return figure
+
+
+def _draw_curve(axes: Axes, demand: Array, im: Array, limit: float, **options: Any) -> None:
+    """Draw intensities over demands from zero on, up to the first infinite demand."""
+    known = np.isfinite(demand)
+    end = len(demand) if known.all() else int(np.argmin(known))
+    x, y = np.append(0.0, demand[:end]), np.append(0.0, im[:end])
+    if end < len(demand) and np.isinf(demand[end]):
+        x, y = np.append(x, limit), np.append(y, im[end])
+    axes.plot(x, y, **options)
+
+
+def _on_frame(
+    solution: Solution,
+    title: tuple[str, str],
+    quantity: str,
+    diagrams: Sequence[tuple[Any, Array]],
+    ax: Axes | None,
+) -> Figure:
+    """Draw diagrams of a section force on the undeformed frame of a solution."""
+    shape = plane_canvas(solution, [], 1.0, ax, MOST)[0].undeformed
+    return draw_frame(ax, solution, 0, shape, title, quantity, diagrams)
