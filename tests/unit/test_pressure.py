@@ -127,5 +127,5 @@ def test_a_beam_of_polynomial_forces():
 
 def test_buckling_refuses_pressure():
     scene, _ = blown()
-    with pytest.raises(ub.ArgumentError, match="a Pressure has a stiffness of its own"):
+    with pytest.raises(ub.ArgumentError, match="the Pressure has a stiffness of its own"):
         ub.buckling(scene, 1)
