@@ -246,7 +246,12 @@ def test_lumped_is_yes_or_no():
 
 STIFF = {"EA": 100.0, "GA": 100.0, "EI": 1.0, "rhoA": 0.01, "rhoI": 1e-5}
 INELASTIC = {
-    "yields": {"section": ub.Section(**STIFF, bending=ub.ElastoPlastic(0.5, isotropic=0.1))},
+    "yields": {
+        "section": ub.Section(
+            **STIFF, bending=ub.ElastoPlastic(0.5, isotropic=0.1),
+            axial=ub.RambergOsgood(1.0, 0.02, 3.0),
+        )
+    },
     "softens": {"section": ub.Section(**STIFF, hinge=ub.Softening(0.5, 0.5))},
     "fibres": {
         "section": ub.Section.rectangle(
@@ -268,7 +273,8 @@ def test_cells_that_yield_take_a_higher_degree(kind, mesh, shared_path):
     hinges = {} if kind == "fibres" else {0.0: None, 1.0: None}
     beam = ub.Beam((0, 0), (1, 0), cells=2, hinges=hinges, **INELASTIC[kind])
     lift = ub.PrescribedDisplacement(beam.end, v=lambda t: 0.3 * math.sin(math.pi * t) ** 2)
-    scene, extremes = clamped(beam, lift), ub.Extremes(points=9)
+    warm = ub.ImposedStrain(beam, axial=2e-3, curvature=0.05, amplitude=lambda t: t)
+    scene, extremes = clamped(beam, lift, loads=[warm]), ub.Extremes(points=9)
 
     def run(t=(0, 0.8), solver=False, **more):
         newton = ub.Newton(rtol=1e-12, reference=solver)
