@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Combinations of features agree with themselves: 31 of them, and 300 in `make verify`.
+"""Combinations of features agree with themselves: 31 of them, and 400 in `make verify`.
 
 ``python3 tests/properties/combinations.py --from 1000 --number 500`` checks others and prints a
 table, ``--show SEED`` prints the script of one.
@@ -16,7 +16,7 @@ from features import FEATURES
 
 import ufl_beam as ub
 
-NUMBER = 300
+NUMBER = 400
 """Combinations that draw everything."""
 
 FEW = range(30)
