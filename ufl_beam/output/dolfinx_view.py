@@ -22,7 +22,9 @@ from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.time_scheme import has_inertia
+from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.terms.beam_forces import elastic_forms, inelastic_forms
+from ufl_beam.terms.imposed_strains import imposed_at_points
 
 
 class BeamForms(NamedTuple):
@@ -280,6 +282,12 @@ class DolfinxView:
                 table[cells] += rows
         for function, table in zip(self._around, tables, strict=False):  # none in elastic scenes
             put_in_cells(function, table[self.cells])
+        if self._imposed is not None:
+            table = np.zeros((len(numbering.cells), numbering.mesh.degree, 6))
+            for beams in self._view.beams:
+                if (imposed := beams.imposed) is not None:
+                    table[imposed.cells] = np.tile(imposed.strains[:, :, 1], 2)
+            put_in_cells(self._imposed, table[self.cells].reshape(len(self.cells), -1))
         return forms
 
     @cached_property
@@ -290,7 +298,9 @@ class DolfinxView:
         """
         element, scheme = self._fields.element, self._view.scheme
         self._around: tuple[fem.Function, ...] = ()
-        work = elastic_forms(element, scheme).work
+        imposed = any(isinstance(load, ImposedStrain) for load in self._view.scene.loads)
+        self._imposed: fem.Function | None = imposed_at_points(element) if imposed else None
+        work = elastic_forms(element, scheme, imposed=imposed).work
         if self._view.inelastic:
             points = inelastic_forms(element, scheme)
             work, self._around = work + points.around, (points.b, points.D)

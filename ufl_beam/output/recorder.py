@@ -30,7 +30,7 @@ from ufl_beam.output.state_rows import FORCE, Connection, connection, connector_
 from ufl_beam.output.states import States
 from ufl_beam.parallel import on_first
 from ufl_beam.solvers.newton import Solver
-from ufl_beam.terms.beam_forces import InelasticBeams
+from ufl_beam.terms.beam_forces import Cells, InelasticBeams
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.inertia_and_damping import Inertia
 
@@ -114,6 +114,7 @@ class StateView(PresentState):
     cell_forces: CellForces
     solution: Any  # `Solution` of the run
     inertia: Inertia
+    beams: list[Cells]
     inelastic: list[InelasticBeams]
     solver: Solver  # Newton's method
     controllers: Any  # `Controllers` of the simulation

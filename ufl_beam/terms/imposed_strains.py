@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, loop, struct
 from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.function_spaces import Element, Fields
@@ -59,12 +59,14 @@ class CellStrains:
     """Imposed strains of the cells of one term.
 
     Attributes:
+        cells: Cells of the scene; (num_cells,).
         strains: Imposed strains at the integration points at both ends of the step;
             (num_cells, points, 2, 3); 1, 1, 1/m.
         c: ``imposed_cells`` of loops.h.
     """
 
-    def __init__(self, fields: Sequence[Array]) -> None:
+    def __init__(self, cells: Index, fields: Sequence[Array]) -> None:
+        self.cells = cells
         self.strains: Array = np.zeros((*fields[0].shape[:2], 2, 3))
         self._fields = [np.ascontiguousarray(field) for field in fields]
         self._kernels: list[Kernel] = []
@@ -142,7 +144,7 @@ class ImposedStrains(LoadTerm):
             arrays[self._index[id(load.amplitude)], mine] += shares @ load.strains(s)
         if not arrays.any():
             return None
-        self._cells.append(CellStrains([*arrays]))
+        self._cells.append(CellStrains(cells, [*arrays]))
         self._cells[-1].put(self._factors[1].tolist())
         return self._cells[-1]
 
