@@ -221,7 +221,7 @@ SCENES = [
     (lambda: scene(joints=[ub.Clamped(END)]), "Scene: joints[0] = ...is not a Joint"),
     (
         lambda: scene(loads=[ub.Clamped(END)]),
-        "Scene: loads[0] = ...is not a PointLoad or FollowerLoad or LineLoad or Gravity",
+        "Scene: loads[0] = ...is not a PointLoad or FollowerLoad or LineLoad or Pressure",
     ),
     # parts of a beam that is not in the scene
     (lambda: scene(supports=[ub.Clamped(STRAY.start)]), "Clamped at stray.start" + ABSENT),

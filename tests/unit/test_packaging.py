@@ -121,7 +121,7 @@ def test_a_wheel_has_the_package_its_c_and_the_licence(copied, wheel):
     known = {
         str(path.relative_to(ROOT))
         for path in package.rglob("*")
-        if path.suffix in {".py", ".c", ".h", ".typed"}
+        if path.suffix in {".py", ".c", ".h", ".csv", ".typed"}
     }
     assert any(name.endswith(".h") for name in known)
     assert inside == known

@@ -27,12 +27,12 @@ static void predict_strains(predicted_strains *p, const double *q)
   if (p->imposed) {
     /* At the beginning imposed strains are extrapolated as well, so without an extrapolation the
      * tangent has the forces before the step. */
-    const double part = p->begins ? p->ratio : 1;
+    const double reached = p->begins ? p->ratio : 1;
     const double *x = p->imposed;
     e = p->e;
     for (int k = 0; k < p->strains->number * p->of_cell; ++k) {
       const int i = k / 3 * 6 + k % 3;
-      e[k] -= x[i] + part * (x[i + 3] - x[i]);
+      e[k] -= x[i] + reached * (x[i + 3] - x[i]);
     }
   }
   p->stale = 0;

@@ -16,11 +16,11 @@ static double peak_in_step(double x0, double x1, double r0, double r1, double dt
 void oscillator_peaks(const oscillator *o, int number, const double *load, double strength, double *peaks)
 {
   const double w = o->omega, hardening = o->hardening, k = (1 - hardening) * w * w;
-  const double limit = (1 - hardening) * strength, friction = 2 * o->damping * w;
+  const double limit = (1 - hardening) * strength, drag = 2 * o->damping * w;
   const double real = -o->damping * w, imaginary = w * sqrt(1 - o->damping * o->damping);
   const double *E = o->E, *c0 = o->c0, *c1 = o->c1;
   double x = 0, y = 0, u = 0, v = 0, plastic = 0; /* x + i y: complex state */
-  double f1 = load[0], acceleration = 0, rate = f1, rate_of_acceleration = -friction * f1;
+  double f1 = load[0], acceleration = 0, rate = f1, rate_of_acceleration = -drag * f1;
   peaks[0] = peaks[1] = peaks[2] = 0;
   for (int step = 0; step < (number - 1) * o->substeps; ++step) {
     const int i = step / o->substeps, j = step % o->substeps + 1;
@@ -40,9 +40,9 @@ void oscillator_peaks(const oscillator *o, int number, const double *load, doubl
     const double u0 = u, v0 = v, a0 = acceleration, r0 = rate, s0 = rate_of_acceleration;
     u = y / imaginary;
     v = x + real * u;
-    acceleration = -friction * v - w * w * u + k * plastic;
+    acceleration = -drag * v - w * w * u + k * plastic;
     rate = acceleration + f1;
-    rate_of_acceleration = -friction * rate - (excess > 0 ? hardening : 1) * w * w * v;
+    rate_of_acceleration = -drag * rate - (excess > 0 ? hardening : 1) * w * w * v;
     peaks[0] = fmax(peaks[0], peak_in_step(u0, u, v0, v, o->dt));
     peaks[1] = fmax(peaks[1], peak_in_step(v0, v, r0, rate, o->dt));
     peaks[2] = fmax(peaks[2], peak_in_step(a0, acceleration, s0, rate_of_acceleration, o->dt));
