@@ -91,7 +91,7 @@ class Frame:
     hinge = {"stiffness": 5.3e8, "limit": 4.0e5, "ratio": 1e-3}  # of girders; N m/rad, N m
     foot = {"stiffness": 2.0e9, "limit": 7.6e5, "ratio": 1e-3}
     damping = 0.3  # of masses, 1/s
-    dt_record, end = 0.01, 12.0  # s
+    dt_record, end, sampled = 0.01, 12.0, 0.05  # s
 
     @classmethod
     def record(cls, scale):
