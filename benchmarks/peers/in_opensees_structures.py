@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The structures in OpenSees: zero-length sections, fibre elements, and hinges of one law each."""
 
+from itertools import pairwise
+
 import numpy as np
 import openseespy.opensees as ops
 from stopwatch import Stopwatch
@@ -89,13 +91,13 @@ def section(kind):
     return result | {"values": {"moment": values}}
 
 
-def column(cells, points=2, kind="dispBeamColumn", rule="Legendre"):
+def column(cells, kind):
     p = SECTIONS["concrete"]
     ops.wipe()
     ops.model("basic", "-ndm", 2, "-ndf", 3)
     section_of(p)
     ops.geomTransf("Corotational", 1)
-    ops.beamIntegration(rule, 1, 1, points)
+    ops.beamIntegration("Legendre", 1, 1, 2)
     for i in range(cells + 1):
         ops.node(i + 1, 0.0, Column.length * i / cells)
     for i in range(cells):
@@ -109,42 +111,54 @@ def column(cells, points=2, kind="dispBeamColumn", rule="Legendre"):
     ops.pattern("Plain", 2, 2)
     ops.load(top, 1.0, 0.0, 0.0)
     ops.test("NormDispIncr", 1e-8, 50, 0)
-    ops.algorithm("NewtonLineSearch")
-    moves = np.diff(Column.moves)
+    moves, repeated = np.diff(Column.moves), set()
 
     def step(i):
-        ops.integrator("DisplacementControl", top, 1, float(moves[i]))
-        ops.analysis("Static")
-        return ops.analyze(1)
+        """Take the step, after a failure with other algorithms or in ten or hundred parts."""
+        for parts in (1, 10, 100):
+            ops.integrator("DisplacementControl", top, 1, float(moves[i]) / parts)
+            done = 0
+            for algorithm in ("NewtonLineSearch", "Newton", "KrylovNewton", "ModifiedNewton"):
+                ops.algorithm(algorithm)
+                ops.analysis("Static")
+                while done < parts and not ops.analyze(1):
+                    done += 1
+                if done < parts:
+                    repeated.add(i)
+            if done:
+                return done < parts
+        return 1
 
     values, result = follow(len(moves), step, lambda: ops.getLoadFactor(2))
-    return result | {"values": {"force": values}}
+    return result | {"repeated": len(repeated), "values": {"force": values}}
 
 
-def hinge(kind, capacity, unloading):
+def hinge(kind, largest, lost):
     h = Hinge
     ops.wipe()
     ops.model("basic", "-ndm", 1, "-ndf", 1)
     backbone = (
         h.capping, h.post_capping, h.ultimate, h.limit, h.overstrength, h.residual
     )  # fmt: skip
-    modes = 3 if kind == "IMKBilin" else 4
-    lost = [capacity] * (modes - 1) + [unloading]
+    # Zero is no energy at all in IMKBilin: a large number stands for no deterioration.
+    lost = [x or 1e9 for x in lost]
+    if kind == "IMKBilin":
+        del lost[2]
     more = (h.kappa_F, h.kappa_D) if kind == "IMKPinching" else ()
     ops.uniaxialMaterial(
-        kind, 1, h.stiffness, *backbone, *backbone, *map(float, lost), *[1.0] * modes, 1.0, 1.0,
+        kind, 1, h.stiffness, *backbone, *backbone, *lost, *[1.0] * len(lost), 1.0, 1.0,
         *more,
     )  # fmt: skip
     ops.testUniaxialMaterial(1)
     stopwatch, moments = Stopwatch(), []
     with stopwatch:
-        for x in h.rotations:
+        for x in h.rotations(largest):
             ops.setStrain(float(x))
             moments.append(ops.getStress())
     return {"values": {"moment": moments}, **stopwatch.read()}
 
 
-def frame(scale, dt, cells=1):
+def frame(scale, dt, cells):
     f = Frame
     ops.wipe()
     ops.model("basic", "-ndm", 2, "-ndf", 3)
@@ -162,9 +176,11 @@ def frame(scale, dt, cells=1):
 
     def member(a, b, s):
         ends = np.array([ops.nodeCoord(a), ops.nodeCoord(b)])
-        inner = [node(*map(float, ends[0] + (ends[1] - ends[0]) * i / cells)) for i in range(1, cells)]
+        inner = [
+            node(*map(float, ends[0] + (ends[1] - ends[0]) * i / cells)) for i in range(1, cells)
+        ]
         chain = [a, *inner, b]
-        for i, j in zip(chain, chain[1:]):
+        for i, j in pairwise(chain):
             element("elasticBeamColumn", i, j, s["EA"], 1.0, s["EI"], 1)
 
     for tag, h in ((1, f.hinge), (2, f.foot)):
@@ -204,18 +220,20 @@ def frame(scale, dt, cells=1):
     return joints[0], round(f.end / dt)
 
 
-def frame_run(scale, dt, **more):
-    places, n = frame(scale, dt, **more)
+def collapse(scale, dt, cells):
+    places, n = frame(scale, dt, cells)
     stopwatch, samples, said = Stopwatch(), [], {}
     every = round(Frame.sampled / dt)
     for first in range(0, n, every):
         with stopwatch:
             failed = ops.analyze(every, dt)
         if failed:
-            said = {"failed": f"stopped between t = {first * dt:g} s and {(first + every) * dt:g} s"}
+            said = {
+                "failed": f"stopped between t = {first * dt:g} s and {(first + every) * dt:g} s"
+            }
             break
         samples.append([ops.nodeDisp(p, 1) for p in places])
     return {"steps": n, "values": {"u": samples}, **said, **stopwatch.read()}
 
 
-RUNS = {"section": section, "column": column, "hinge": hinge, "frame": frame_run}
+RUNS = {"section": section, "column": column, "hinge": hinge, "frame": collapse}

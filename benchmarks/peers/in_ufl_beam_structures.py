@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The structures in ufl_beam."""
 
-import math
+from itertools import pairwise
 
 import numpy as np
 from stopwatch import Stopwatch
@@ -51,24 +51,24 @@ def column(cells, degree):
     return {"values": {"force": run.reaction(push)[1:, 0].tolist()}, **stopwatch.read()}
 
 
-def hinge(kind, capacity, unloading):
-    h = Hinge
+def hinge(kind, largest, lost):
+    h, rotations = Hinge, Hinge.rotations(largest)
     backbone = ub.Backbone(
         h.limit, capping=h.capping, post_capping=h.post_capping, overstrength=h.overstrength,
         residual=h.residual, ultimate=h.ultimate,
     )  # fmt: skip
-    lost = dict.fromkeys(("strength", "softening"), capacity or math.inf)
-    lost["unloading"] = unloading or math.inf
+    names = "strength", "softening", "reloading", "unloading"
+    modes = {name: x for name, x in zip(names, lost, strict=True) if x}
     if kind == "IMKBilin":
-        law = ub.IbarraKrawinkler(h.stiffness, backbone, **lost)
+        law = ub.IbarraKrawinkler(h.stiffness, backbone, **modes)
     else:
         pinching = {"kappa_F": h.kappa_F, "kappa_D": h.kappa_D} if kind == "IMKPinching" else {}
-        lost["reloading"] = capacity or math.inf
-        law = ub.PinchingHinge(h.stiffness, backbone, **lost, **pinching)
+        law = ub.PinchingHinge(h.stiffness, backbone, **modes, **pinching)
     arm = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e9, GA=1e9, EI=1e8, rhoA=1.0), cells=1)
     spring = ub.Turn(ub.ground(0, 0), arm.start, law)
-    n = len(h.rotations) - 1
-    turn = ub.PrescribedDisplacement(arm.start, u=0.0, v=0.0, psi=ub.Table(range(n + 1), h.rotations))
+    n = len(rotations) - 1
+    turning = ub.Table(range(n + 1), rotations)
+    turn = ub.PrescribedDisplacement(arm.start, u=0.0, v=0.0, psi=turning)
     scene = ub.Scene([arm], supports=[turn], connectors=[spring])
     stopwatch = Stopwatch()
     with stopwatch:
@@ -81,7 +81,7 @@ def bilinear(stiffness, limit, ratio):
     return ub.Spring(stiffness, law=law)
 
 
-def frame(scale, dt, degree=3, cells=1):
+def frame(scale, dt, cells):
     f = Frame
     rigid = 1e13  # GA; no shear strains, as in elasticBeamColumn
     post, rail = (ub.Section(**s, GA=rigid, rhoA=0.0) for s in (f.column, f.girder))
@@ -95,7 +95,7 @@ def frame(scale, dt, degree=3, cells=1):
         foot = posts[side][0].start
         feet.append(ub.Pinned(foot))
         connectors.append(ub.Turn(ub.ground(x, 0), foot, bilinear(**f.foot)))
-        joints += [ub.Rigid(a.end, b.start) for a, b in zip(posts[side], posts[side][1:])]
+        joints += [ub.Rigid(a.end, b.start) for a, b in pairwise(posts[side])]
         masses += [ub.PointMass(p.end, f.mass, f.inertia) for p in posts[side]]
     members += posts[0] + posts[1]
     for left, right in zip(*posts, strict=True):
@@ -112,7 +112,7 @@ def frame(scale, dt, degree=3, cells=1):
         "joints": joints, "connectors": connectors, "supports": feet, "masses": masses,
         "loads": [weight, shake],
     }  # fmt: skip
-    mesh = ub.Mesh(degree=degree)
+    mesh = ub.Mesh(degree=2)
     undamped = ub.Scene(members, **shared)
     still = ub.simulate(undamped, ub.Static(), t=(0, 1), dt=0.1, mesh=mesh, progress=False)
     places = [p.end for p in posts[0]]
@@ -121,10 +121,12 @@ def frame(scale, dt, degree=3, cells=1):
     return moving, places, round(f.end / dt)
 
 
-def frame_run(scale, dt, **more):
-    moving, places, n = frame(scale, dt, **more)
+def collapse(scale, dt, cells):
+    moving, places, n = frame(scale, dt, cells)
     stopwatch, samples, said = Stopwatch(), [], {}
     every = round(Frame.sampled / dt)
+    accounts = [moving.ledger.state, moving.ledger.supplied, moving.ledger.lost]
+    entries = [[dict(account) for account in accounts]]
     for first in range(1, n + 1, every):
         ends = 1.0 + dt * np.arange(first, first + every)
         try:
@@ -135,7 +137,13 @@ def frame_run(scale, dt, **more):
             said["failed"] = str(error)[:200]
             break
         samples.append([float(moving.displacement(p)[0]) for p in places])
+        entries.append([dict(account) for account in accounts])
+    parts = [
+        {name: np.array([one[i][name] for one in entries]) for name in account}
+        for i, account in enumerate(accounts)
+    ]
+    said["ledger"] = ub.Energy(*parts).worst
     return {"steps": n, "values": {"u": samples}, **said, **stopwatch.read()}
 
 
-RUNS = {"section": section, "column": column, "hinge": hinge, "frame": frame_run}
+RUNS = {"section": section, "column": column, "hinge": hinge, "frame": collapse}

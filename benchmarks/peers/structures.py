@@ -2,6 +2,7 @@
 """Structures of civil engineering: the numbers that ufl_beam and OpenSees share; SI units."""
 
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,10 +21,12 @@ def cycles(sizes, steps):
 class Reinforced:
     """Rectangular section of concrete, 0.4 m by 0.5 m, with three rows of bars."""
 
-    cover = {"strength": 30e6, "residual": 6e6, "ultimate": 0.006}  # Pa, Pa, 1
-    core = {"strength": 36e6, "residual": 7.2e6, "ultimate": 0.025}
+    cover: ClassVar = {"strength": 30e6, "residual": 6e6, "ultimate": 0.006}  # Pa, Pa, 1
+    core: ClassVar = {"strength": 36e6, "residual": 7.2e6, "ultimate": 0.025}
     concrete = 30e9  # Young's modulus, Pa
-    steel = {"yield_limit": 500e6, "hardening": 0.01, "a1": 0.05, "a2": 5.0, "a3": 0.05, "a4": 5.0}
+    steel: ClassVar = {
+        "yield_limit": 500e6, "hardening": 0.01, "a1": 0.05, "a2": 5.0, "a3": 0.05, "a4": 5.0,
+    }  # fmt: skip
     bars = 200e9  # Young's modulus, Pa
     N = -1e6  # N
 
@@ -41,10 +44,12 @@ class Reinforced:
             yield y, A, "steel"
 
 
-class Tube:
+class Plate:
     """Section of 40 fibres of steel, 0.1 m by 0.2 m."""
 
-    steel = {"yield_limit": 355e6, "hardening": 0.01, "a1": 0.0, "a2": 1.0, "a3": 0.0, "a4": 1.0}
+    steel: ClassVar = {
+        "yield_limit": 355e6, "hardening": 0.01, "a1": 0.0, "a2": 1.0, "a3": 0.0, "a4": 1.0,
+    }  # fmt: skip
     bars = 210e9
     N = -1e6
 
@@ -55,7 +60,7 @@ class Tube:
             yield 0.2 * ((i + 0.5) / 40 - 0.5), 0.1 * 0.2 / 40, "steel"
 
 
-SECTIONS = {"concrete": Reinforced, "steel": Tube}
+SECTIONS = {"concrete": Reinforced, "steel": Plate}
 CURVATURES = cycles((0.005, 0.015, 0.03, 0.05), 100)  # 1/m
 
 
@@ -73,7 +78,11 @@ class Hinge:
     limit, capping, post_capping = 3e5, 0.025, 0.17  # N m, rad, rad
     overstrength, residual, ultimate = 1.1, 0.4, 0.25
     kappa_F, kappa_D = 0.4, 0.3
-    rotations = cycles((0.01, 0.02, 0.03, 0.04, 0.05, 0.06), 200)  # rad
+
+    @staticmethod
+    def rotations(largest):
+        """Return cycles that grow to the largest rotation; the cap is at 0.035 rad."""
+        return cycles([largest * i / 6 for i in range(1, 7)], 200)
 
 
 class Frame:
@@ -84,12 +93,16 @@ class Frame:
     """
 
     storeys, height, bay = 3, 3.5, 8.0  # m
-    column = {"EA": 4.15e9, "EI": 1.21e8}  # N, N m²
-    girder = {"EA": 2.07e9, "EI": 7.09e7}
+    column: ClassVar = {"EA": 4.15e9, "EI": 1.21e8}  # N, N m²
+    girder: ClassVar = {"EA": 2.07e9, "EI": 7.09e7}
     mass, inertia = 6e4, 6e3  # kg, kg m², at each joint
     g = 9.81
-    hinge = {"stiffness": 5.3e8, "limit": 4.0e5, "ratio": 1e-3}  # of girders; N m/rad, N m
-    foot = {"stiffness": 2.0e9, "limit": 7.6e5, "ratio": 1e-3}
+    hinge: ClassVar = {
+        "stiffness": 5.3e8,
+        "limit": 4.0e5,
+        "ratio": 1e-3,
+    }  # of girders; N m/rad, N m
+    foot: ClassVar = {"stiffness": 2.0e9, "limit": 7.6e5, "ratio": 1e-3}
     damping = 0.3  # of masses, 1/s
     dt_record, end, sampled = 0.01, 12.0, 0.05  # s
 
