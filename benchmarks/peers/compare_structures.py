@@ -101,11 +101,15 @@ def compared(case, run, peers):
     return kept
 
 
-def said(result):
-    """Return why a program stopped, and how many steps it repeated."""
-    repeated = result.get("repeated", 0)
+def times(result):
+    """Return wall and processor time, why a program stopped, and how many steps it repeated."""
     words = [result["failed"]] if "failed" in result else []
-    return ", ".join(words + [f"{repeated} steps repeated"] * bool(repeated))
+    if result["wall"]:
+        wall, cpu = (statistics.median(result[clock]) for clock in ("wall", "cpu"))
+        words.insert(0, f"{wall:.3g}, {cpu:.3g}")
+    if result.get("repeated"):
+        words.append(f"{result['repeated']} steps repeated")
+    return "; ".join(words)
 
 
 def row(kept):
@@ -121,20 +125,21 @@ def row(kept):
         if difference is not None and difference <= asked
         else "**no**"
     )
-    times = [kept[name]["wall"] for name in ("ufl_beam", "opensees")]
-    failed = [said(kept[name]) for name in ("ufl_beam", "opensees")]
-    walls = [
-        f"{statistics.median(t):.3g}" + (f", {why}" if why else "") if t else why
-        for t, why in zip(times, failed, strict=True)
-    ]
-    return [kept["title"], shown, f"{asked:g} %" if asked else "", met if asked else "", *walls]
+    return [
+        kept["title"], shown, f"{asked:g} %" if asked else "", met if asked else "",
+        *(times(kept[name]) for name in ("ufl_beam", "opensees")),
+    ]  # fmt: skip
 
 
 def save(records, of_machine):
     """Write the records and the table in the page."""
     with RESULTS.open("w") as file:
         file.writelines(json.dumps(record | of_machine) + "\n" for record in records)
-    head = ("structure", "largest difference", "asked", "met", "ufl_beam (s)", "OpenSees (s)")
+    clocks = "wall time, processor time (s)"
+    head = (
+        "structure", "largest difference", "asked", "met", f"ufl_beam: {clocks}",
+        f"OpenSees: {clocks}",
+    )  # fmt: skip
     lines = table(head, [row(record) for record in records])
     versions = sorted({r[name]["version"] for r in records for name in ("ufl_beam", "opensees")})
     about = (
