@@ -35,11 +35,7 @@ def limit_factor(nodes, members, held, loads, plastic, constant=None) -> float:
     balance[:, -1] = np.ravel(loads)
     right = np.zeros(3 * len(nodes)) if constant is None else -np.ravel(constant).astype(float)
     free = [i for i in range(3 * len(nodes)) if (i // 3, i % 3) not in set(held)]
-    bounds = [
-        bound
-        for moment in plastic
-        for bound in ((None, None), (-moment, moment), (-moment, moment))
-    ]
+    bounds = [pair for moment in plastic for pair in ((None, None), *[(-moment, moment)] * 2)]
     found = linprog(
         np.r_[np.zeros(count), -1.0],
         A_eq=balance[free],

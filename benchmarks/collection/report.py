@@ -37,8 +37,8 @@ def save(rows: list[dict]) -> None:
     lines = [
         "# Models that fail elsewhere",
         "",
-        "Written by `make collection`; do not edit. The models are of the kinds that users of other "
-        "programs report as failures to converge: issues",
+        "Written by `make collection`; do not edit. The models are of the kinds that users of "
+        "other programs report as failures to converge: issues",
         f"of OpenSees ([688]({ISSUES}/688), [1445]({ISSUES}/1445), [1533]({ISSUES}/1533), "
         f"[1625]({ISSUES}/1625), [1666]({ISSUES}/1666), [1669]({ISSUES}/1669)), and others. Where "
         "a thread has numbers,",

@@ -2,6 +2,7 @@
 """Models of statics: limit loads, softening, cycles and snap-through."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from limit_analysis import limit_factor
@@ -38,14 +39,8 @@ def cycles(*sizes):
     return ub.Table(range(len(turns)), turns), float(len(turns) - 1)
 
 
-@model(
-    "hinge at the kink to residual strength, in cycles",
-    "statics",
-    "OpenSees 688, with its numbers in kN m and mrad",
-    "moment of the hinge, N m",
-)
-def residual_strength(divisor, record):
-    """The hinge of the issue at the end of a cantilever of ten times its stiffness."""
+def deteriorating_hinge(divisor, record, *sizes):
+    """The hinge of OpenSees 688 at the foot of a cantilever ten times as stiff, in cycles."""
     backbone = ub.Backbone(
         923.6e3,
         capping=0.0173,
@@ -57,12 +52,33 @@ def residual_strength(divisor, record):
     law = ub.IbarraKrawinkler(80e6, backbone, strength=0.3, softening=1.0, unloading=1.0)
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e10, GA=1e10, EI=3e8), cells=2)
     turn = ub.Turn(ub.ground(0, 0), beam.start, law)
-    drive, end = cycles(0.01, 0.02, 0.03, 0.05, 0.07, 0.08)
+    drive, end = cycles(*sizes)
     move = ub.PrescribedDisplacement(beam.end, v=drive)
     scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), move], connectors=[turn])
-    return statics(
-        scene, 50 * round(end), divisor, lambda run: run.connector(turn).force, end, record=record
-    )
+    steps = 50 * round(end)
+    return statics(scene, steps, divisor, lambda run: run.connector(turn).force, end, record=record)
+
+
+@model(
+    "hinge at the kink to residual strength, in cycles",
+    "statics",
+    "OpenSees 688, with its numbers in kN m and mrad",
+    "moment of the hinge, N m",
+)
+def residual_strength(divisor, record):
+    """The kink is at 69 mrad, and the cycles reach 80 mrad."""
+    return deteriorating_hinge(divisor, record, 0.01, 0.02, 0.03, 0.05, 0.07, 0.08)
+
+
+@model(
+    "the same hinge beyond its ultimate rotation",
+    "statics",
+    "OpenSees 688; no moment is left in the last cycle",
+    "moment of the hinge, N m",
+)
+def ultimate_rotation(divisor, record):
+    """Cycles up to 110 mrad; the ultimate rotation is 95 mrad."""
+    return deteriorating_hinge(divisor, record, 0.02, 0.05, 0.08, 0.11, 0.11)
 
 
 def portal(hinge, cells=4):
@@ -102,7 +118,7 @@ def portal_limit(solution):
     "statics",
     "OpenSees 1533: hinges of zero length; the tangent becomes singular",
     "sway, m",
-    stops="mechanism",
+    stops="a mechanism has formed",
     limit=portal_limit,
     tolerance=1e-3,  # the static theorem on the displaced geometry leaves the shear of the cells
 )
@@ -156,7 +172,7 @@ def fibre_limit(solution):
     "statics",
     "perfectly plastic fibres have no tangent stiffness",
     "sway, m",
-    stops="mechanism",
+    stops="a limit load",
     limit=fibre_limit,
     tolerance=1 / 80,  # the lowest cell has the moment of its middle, at 1/80 of the height
 )
@@ -183,11 +199,11 @@ def two_storeys(hinge):
     columns = {
         (i, k): ub.Beam((x, y), (x, top), SECTION, cells=2, hinges=ends, name=f"column {i}{k}")
         for i, x in enumerate(axes)
-        for k, (y, top) in enumerate(zip(heights, heights[1:], strict=False))
+        for k, (y, top) in enumerate(pairwise(heights))
     }
     girders = {
         (i, k): ub.Beam((x, y), (right, y), SECTION, cells=2, hinges=ends, name=f"girder {i}{k}")
-        for i, (x, right) in enumerate(zip(axes, axes[1:], strict=False))
+        for i, (x, right) in enumerate(pairwise(axes))
         for k, y in enumerate(heights[1:])
     }
     joints = []
@@ -222,7 +238,7 @@ def two_storeys_limit(solution):
     "statics",
     "OpenSees 1533: hinges of zero length",
     "sway, m",
-    stops="mechanism",
+    stops="a limit load",
     limit=two_storeys_limit,
     tolerance=0.02,  # the sway stiffness of the last elastic members is below that of the weight
 )
@@ -269,7 +285,7 @@ def leaning_limit(solution):
     "statics",
     "weight makes the stiffness negative at the first hinge",
     "sway, m",
-    stops="mechanism",
+    stops="a mechanism has formed",
     limit=leaning_limit,
     tolerance=2e-3,  # the shaft also shears and shortens: N/GA + N/EA = 0.9e-3
 )
