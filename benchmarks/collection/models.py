@@ -115,7 +115,8 @@ def judged(one: Model) -> dict:
         row["difference"] = float(abs(np.abs(first.values).max() / size - 1))
         return row | {"verdict": "WRONG" if one.stops else "end"}
     if first.end is None or second.end is None:
-        return row | {"verdict": "WRONG", "message": first.message or second.message}
+        row |= {"message": first.message or second.message, "end": first.end or second.end}
+        return row | {"verdict": "FAILS"}
     row["difference"] = abs(first.end / second.end - 1)
     if not one.stops:
         return row | {"verdict": "FAILS"}

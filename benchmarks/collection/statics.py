@@ -516,7 +516,7 @@ def snap_back(divisor, record):
     energy = 0.1 * PLASTIC**2 * 5.0 / SECTION.EI
     hinge = ub.Softening(PLASTIC, energy)
     beam = ub.Beam((0, 0), (5, 0), SECTION, cells=10, hinges={0.0: hinge})
-    load = ub.PointLoad(beam.end, force=(0, -1e3), amplitude=lambda t: t)
+    load = ub.PointLoad(beam.end, force=(0, -1e5), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     control = ub.DissipationControl(energy / (40 * divisor), ub.ArcLength(0.02))
     path = ub.follow(
