@@ -116,7 +116,7 @@ def four_storeys(divisor, record):
 
 
 def falling(divisor, record, inertia):
-    """Two storeys whose hinges soften to zero, with 60 t at the nodes; the run includes the fall."""
+    """Two storeys whose hinges soften to zero, with 60 t at the nodes, and their fall."""
     columns, girders, joints, feet = two_storeys(ub.Softening(PLASTIC, 10e3))
     beams = [*columns.values(), *girders.values()]
     scene = ub.Scene(
