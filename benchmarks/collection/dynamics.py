@@ -153,6 +153,9 @@ def collapse(divisor, record):
     "dynamics",
     "no inertia resists a node whose hinges all soften; the jump takes no time",
     "sway of the top, m",
+    failure="Hinges of zero length on all sides of a node without rotary inertia begin to soften in "
+    "the same step. The moments at the node have no equilibrium nearby, and no inertia carries the "
+    "node over the jump; the message names the nodes. With a rotary inertia the run reaches the end.",
 )
 def collapse_without_inertia(divisor, record):
     """Each node has three or four hinges at its joint, and no inertia against rotation."""

@@ -43,6 +43,7 @@ class Model:
         limit: Function that computes the time at which it must stop by limit analysis, from the
             solution at this time, whose displaced geometry it may use.
         tolerance: Relative difference that `limit` allows.
+        failure: Reason why this package fails, if it is known to.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Model:
     stops: str = ""
     limit: Callable[[ub.Solution], float] | None = None
     tolerance: float = 0.0
+    failure: str = ""
 
 
 MODELS: dict[str, Model] = {}
@@ -106,7 +108,12 @@ def judged(one: Model) -> dict:
     first, second = result(one, 1), result(one, 4)
     row = {"name": one.name, "kind": one.kind, "source": one.source, "quantity": one.quantity}
     row |= {"cut": first.cut, "cut_fine": second.cut, "seconds": first.seconds}
-    row |= {"message": first.message, "end": first.end, "seconds_fine": second.seconds}
+    row |= {
+        "failure": one.failure,
+        "message": first.message,
+        "end": first.end,
+        "seconds_fine": second.seconds,
+    }
     if first.end is None and second.end is None:
         fine = second.values if one.kind == "path" else second.values[::4]
         size = np.abs(second.values).max()
