@@ -76,8 +76,8 @@ def residual_strength(divisor, record):
     "OpenSees 688; no moment is left in the last cycle",
     "moment of the hinge, N m",
     failure="No force is left, and the prescribed motion is zero at the end of a step. The "
-    "tolerance of laws of connectors is relative to the largest motion, which vanishes, so Newton's "
-    "method does not end. With an offset of 1e-9 m the run reaches the end.",
+    "tolerance of laws of connectors is relative to the largest motion, which vanishes, so that "
+    "Newton's method does not end. With an offset of 1e-9 m the run reaches the end.",
 )
 def ultimate_rotation(divisor, record):
     """Cycles up to 110 mrad; the ultimate rotation is 95 mrad."""
