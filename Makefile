@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links test-notebook check-docs docs-pictures accelerations bench bench-test bench-compare bench-peers bench-structures extremes schemes study
+.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links test-notebook check-docs docs-pictures accelerations bench bench-test bench-compare bench-peers bench-structures collection extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -88,6 +88,9 @@ docs-pictures: docs ## pictures in docs/pictures: of pages, demos, stored measur
 
 extremes: ## results at extreme parameters, as tables in docs/extremes.md
 	@./env python3 benchmarks/extremes
+
+collection: ## models that fail elsewhere, as docs/collection.md; a few minutes
+	@./env python3 benchmarks/collection
 
 study: ## cost and error of each setting, as docs/study.md; twenty minutes, `make study only=--quick` two
 	@./env python3 benchmarks/study $(only)

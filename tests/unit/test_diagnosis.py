@@ -183,6 +183,18 @@ def test_collapse_by_its_weight_is_a_limit_load():
     assert path.factor.max() == pytest.approx(error.time, rel=1e-3)
 
 
+def test_collapse_of_a_column_on_a_plastic_hinge_is_a_mechanism():
+    """P-Delta: the hinge at the foot carries 100 kN m, the shaft bends; kL = 0.79."""
+    section = ub.Section(EA=4e9, GA=1.5e9, EI=4e7)
+    column = ub.Beam((0, 0), (0, 5), section, cells=4, hinges={0.0: ub.ElastoPlastic(1e5)})
+    loads = [
+        ub.PointLoad(column.end, force=(0, -1e6)),
+        ub.PointLoad(column.end, force=(5e4, 0), amplitude=lambda t: t),
+    ]
+    error = failure(clamped(column, loads=loads), t=(0, 1), dt=0.025)
+    assert re.search("a mechanism has formed.*beyond the hinge. gives way", str(error))
+
+
 def test_snap_through_is_a_limit_load():
     section = ub.Section(EA=1e6, GA=1e6, EI=1e9, depth=0.1)
     left = ub.Beam((-4, 0), (0, 1), section, cells=1)

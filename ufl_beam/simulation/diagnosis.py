@@ -33,6 +33,7 @@ from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.factorization import Factorization
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vectors
+from ufl_beam.terms.connector_rows import RigidPlasticLaws
 from ufl_beam.terms.term import KINDS
 
 LEAST_NAMED = 0.1
@@ -207,6 +208,9 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
             continue  # beyond the end of a guide, which the failure of the step reports
         connectors[group.indices] = np.abs(change)
         left[group.indices] = group.response.remaining()
+        if isinstance(group.response, RigidPlasticLaws):
+            # A held connector cannot move, so one that moves slips in the latest tangent.
+            left[group.indices[np.abs(change) >= LEAST_NAMED]] = 0.0
     connectors /= np.where(
         [connector.is_rotation for connector in scene.all_connectors], 1.0, scene.size
     )

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""A model of the collection, and the judgement of its runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+import ufl_beam as ub
+
+
+class CutSteps(ub.Recorder):
+    """Recorder that counts the steps that were divided into substeps."""
+
+    def __init__(self) -> None:
+        self.cut = self.last = 0
+
+    def open(self, simulation) -> None:
+        """Begin at the present number of substeps."""
+        self.last = simulation.substeps
+
+    def write(self, simulation) -> None:
+        """Count the last step if it has several substeps."""
+        self.cut += simulation.substeps > self.last + 1
+        self.last = simulation.substeps
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model that fails elsewhere.
+
+    Attributes:
+        name: Title.
+        kind: "statics", "path" or "dynamics".
+        source: Report of the failure, or the reason why such models fail.
+        quantity: Name and unit of the compared number.
+        run: Function of the divisor of the step and of recorders; returns the history of the
+            compared quantity, one number for each step.
+        stops: Part of the message if the model must stop; empty if it must reach the end.
+        limit: Function that computes the time at which it must stop by limit analysis, from the
+            solution at this time, whose displaced geometry it may use.
+        tolerance: Relative difference that `limit` allows.
+        failure: Reason why this package fails, if it is known to.
+    """
+
+    name: str
+    kind: str
+    source: str
+    quantity: str
+    run: Callable[[int, CutSteps], np.ndarray]
+    stops: str = ""
+    limit: Callable[[ub.Solution], float] | None = None
+    tolerance: float = 0.0
+    failure: str = ""
+
+
+MODELS: dict[str, Model] = {}
+"""The collection."""
+
+
+def model(name: str, kind: str, source: str, quantity: str, **more):
+    """Enter a run into the collection."""
+
+    def enter(run):
+        MODELS[name] = Model(name, kind, source, quantity, run, **more)
+        return run
+
+    return enter
+
+
+@dataclass(frozen=True)
+class Result:
+    """Result of one run.
+
+    Attributes:
+        end: Time of the last state if the run stopped; None if it reached the end.
+        message: First sentence of the error; empty if the run reached the end.
+        values: History of the compared quantity; empty if the run stopped.
+        cut: Number of steps that were divided.
+        seconds: Time of the run.
+        solution: States up to the stop; None if the run reached the end.
+    """
+
+    end: float | None
+    message: str
+    values: np.ndarray
+    cut: int
+    seconds: float
+    solution: ub.Solution | None
+
+
+def result(one: Model, divisor: int) -> Result:
+    """Run a model with its step divided by ``divisor``."""
+    steps, begin = CutSteps(), time.perf_counter()
+    end, message, values, solution = None, "", np.zeros(0), None
+    try:
+        values = np.asarray(one.run(divisor, steps), dtype=float)
+    except ub.ConvergenceError as error:
+        end, message, solution = error.time, " ".join(str(error).split()), error.solution
+    return Result(end, message, values, steps.cut, time.perf_counter() - begin, solution)
+
+
+def judged(one: Model) -> dict:
+    """Run a model with its step and with a quarter of it; return the row of the table."""
+    first, second = result(one, 1), result(one, 4)
+    row = {"name": one.name, "kind": one.kind, "source": one.source, "quantity": one.quantity}
+    row |= {"cut": first.cut, "cut_fine": second.cut, "seconds": first.seconds}
+    row |= {
+        "failure": one.failure,
+        "message": first.message,
+        "end": first.end,
+        "seconds_fine": second.seconds,
+    }
+    if first.end is None and second.end is None:
+        fine = second.values if one.kind == "path" else second.values[::4]
+        size = np.abs(second.values).max()
+        row["peak"] = float(size)
+        row["history"] = float(np.abs(first.values - fine).max() / size)
+        row["difference"] = float(abs(np.abs(first.values).max() / size - 1))
+        return row | {"verdict": "WRONG" if one.stops else "end"}
+    if first.end is None or second.end is None:
+        row |= {"message": first.message or second.message, "end": first.end or second.end}
+        return row | {"verdict": "FAILS"}
+    row["difference"] = abs(first.end / second.end - 1)
+    if not one.stops:
+        return row | {"verdict": "FAILS"}
+    if one.stops not in first.message:
+        return row | {"verdict": "WRONG"}
+    if one.limit is not None:
+        row["limit"] = one.limit(first.solution)
+        row["missed"] = abs(first.end / row["limit"] - 1)
+        if row["missed"] > one.tolerance:
+            return row | {"verdict": "WRONG"}
+    return row | {"verdict": "stops"}

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""The page of the collection, from its results."""
+
+from pathlib import Path
+
+PAGE = Path(__file__).parents[2] / "docs" / "collection.md"
+
+ISSUES = "https://github.com/OpenSees/OpenSees/issues"
+
+
+def outcome(row: dict) -> str:
+    """Describe the outcome of a model."""
+    if row["verdict"] == "end":
+        return "end"
+    if row["verdict"] == "stops":
+        return f"stops at {row['end']:.4g}"
+    return f"**{row['verdict']}** at {row['end']:.4g}" if row["end"] else f"**{row['verdict']}**"
+
+
+def confirmation(row: dict) -> str:
+    """Describe the comparison of a model."""
+    if "limit" in row:
+        return f"limit analysis {row['limit']:.4g}; quarter of the step {row['difference']:.0e}"
+    if "peak" in row:
+        return f"{row['difference']:.0e} of the peak, {row['history']:.0e} of the history"
+    return f"quarter of the step stops {row['difference']:.0e} apart" if "difference" in row else ""
+
+
+def beside(row: dict) -> str:
+    """Describe the outcome in OpenSees with both controls."""
+    ends = ["end" if end is None else f"fails at {end:.4g}" for end in row.get("opensees", ())]
+    return " / ".join(ends) or "—"
+
+
+def cause(message: str) -> str:
+    """Return the cause in a message: the text after its beginning, up to the next sentence."""
+    return message.split("s: ", 1)[-1].split(";")[0].split(" (")[0]
+
+
+def save(rows: list[dict]) -> None:
+    """Write docs/collection.md."""
+    count = {v: sum(r["verdict"] == v for r in rows) for v in ("end", "stops", "FAILS", "WRONG")}
+    lines = [
+        "# Models that fail elsewhere",
+        "",
+        "Written by `make collection`; do not edit. The models are of the kinds that users of "
+        "other programs report as failures to converge: issues",
+        f"of OpenSees ([688]({ISSUES}/688), [1445]({ISSUES}/1445), [1533]({ISSUES}/1533), "
+        f"[1625]({ISSUES}/1625), [1666]({ISSUES}/1666), [1669]({ISSUES}/1669)), and others. Where "
+        "a thread has numbers,",
+        "the model has them; the others state the kind only. "
+        "Models and steps: [benchmarks/collection](../benchmarks/collection).",
+        "",
+        f"Of {len(rows)} models {count['end']} reach the end, {count['stops']} stop at a limit "
+        f"load, {count['FAILS']} stop without a cause in the structure, {count['WRONG']} disagree "
+        "with their confirmation.",
+        "",
+        "Each model runs twice, with its step and with a quarter of it; *cut steps* are the steps "
+        "that were divided into substeps in both runs. A model that",
+        "reaches the end is compared with the second run: the largest value, and the largest "
+        "difference of the histories, relative to the largest value.",
+        "A load at which a model stops is compared with an independent limit analysis: linear "
+        "programming on the displaced geometry, a closed form,",
+        "or an integration of the column. Times are those of the first run with building.",
+        "",
+        "The last column is OpenSees 3.8 in the same run, for models with a counterpart: with an "
+        "imposed motion / with its displacement control. In each step it tries",
+        "four algorithms (Newton, line search, Krylov, initial stiffness), but divides no step. "
+        "Elements of fibres have two Gauss points; the model of issue 1669 is",
+        "force-based, with Concrete07. The hinge is the one of the issue.",
+        "",
+        "| model | kind | outcome | cut steps | confirmed by | s | OpenSees |",
+        "|---|---|---|--:|---|--:|---|",
+    ]
+    lines += [
+        f"| {r['name']} | {r['kind']} | {outcome(r)} | {r['cut']}, {r['cut_fine']} | "
+        f"{confirmation(r)} | {r['seconds']:.1f} | {beside(r)} |"
+        for r in rows
+    ]
+    lines += [
+        "",
+        "## Why they fail elsewhere",
+        "",
+        "| model | reason | compared |",
+        "|---|---|---|",
+    ]
+    lines += [f"| {r['name']} | {r['source']} | {r['quantity']} |" for r in rows]
+    stopped = [r for r in rows if r["message"]]
+    if stopped:
+        lines += ["", "## Messages", "", "| model | cause in the message |", "|---|---|"]
+        lines += [f"| {r['name']} | {cause(r['message'])} |" for r in stopped]
+    if any(r["failure"] for r in rows):
+        lines += ["", "## Failures of this package", ""]
+        lines += [f"* {r['name']}: {r['failure']}" for r in rows if r["failure"]]
+    PAGE.write_text("\n".join(lines) + "\n")

@@ -1,0 +1,588 @@
+# SPDX-License-Identifier: MIT
+"""Models of statics: limit loads, softening, cycles and snap-through."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from limit_analysis import limit_factor
+from models import model
+from scipy.optimize import brentq
+
+import ufl_beam as ub
+
+STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
+"""Pa, -, kg/m³."""
+
+PLASTIC = 100e3
+"""Plastic moment of hinges; N m."""
+
+SECTION = ub.Section(EA=4e9, GA=1.5e9, EI=4e7, rhoA=60.0, rhoI=0.5)
+
+BARS = ub.Fibres(ub.MenegottoPinto(450e6, 0.01, 15.0))
+"""Steel02 of OpenSees issue 1625."""
+
+
+def statics(scene, steps, divisor, watched, end=1.0, **more):
+    """Run a scene in statics; the history of ``watched``."""
+    solution = ub.simulate(
+        scene, ub.Static(), t=(0, end), dt=end / (steps * divisor), progress=False, **more
+    )
+    return watched(solution)
+
+
+def cycles(*sizes):
+    """Function of time that goes to each size and back, one second each way; and its end (s)."""
+    turns = [0.0]
+    for size in sizes:
+        turns += [size, -size]
+    return ub.Table(range(len(turns)), turns), float(len(turns) - 1)
+
+
+def deteriorating_hinge(divisor, record, *sizes):
+    """The hinge of OpenSees 688 at the foot of a cantilever ten times as stiff, in cycles."""
+    backbone = ub.Backbone(
+        923.6e3,
+        capping=0.0173,
+        post_capping=0.0401,
+        overstrength=1.075,
+        residual=0.02,
+        ultimate=0.095,
+    )
+    law = ub.IbarraKrawinkler(80e6, backbone, strength=0.3, softening=1.0, unloading=1.0)
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e10, GA=1e10, EI=3e8), cells=2)
+    turn = ub.Turn(ub.ground(0, 0), beam.start, law)
+    drive, end = cycles(*sizes)
+    move = ub.PrescribedDisplacement(beam.end, v=drive)
+    scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), move], connectors=[turn])
+    steps = 50 * round(end)
+    return statics(scene, steps, divisor, lambda run: run.connector(turn).force, end, record=record)
+
+
+@model(
+    "hinge at the kink to residual strength, in cycles",
+    "statics",
+    "OpenSees 688, with its numbers in kN m and mrad",
+    "moment of the hinge, N m",
+)
+def residual_strength(divisor, record):
+    """The kink is at 69 mrad, and the cycles reach 80 mrad."""
+    return deteriorating_hinge(divisor, record, 0.01, 0.02, 0.03, 0.05, 0.07, 0.08)
+
+
+@model(
+    "the same hinge beyond its ultimate rotation",
+    "statics",
+    "OpenSees 688; no moment is left in the last cycle",
+    "moment of the hinge, N m",
+    failure="No force is left, and the prescribed motion is zero at the end of a step. The "
+    "tolerance of laws of connectors is relative to the largest motion, which vanishes, so that "
+    "Newton's method does not end. With an offset of 1e-9 m the run reaches the end.",
+)
+def ultimate_rotation(divisor, record):
+    """Cycles up to 110 mrad; the ultimate rotation is 95 mrad."""
+    return deteriorating_hinge(divisor, record, 0.02, 0.05, 0.08, 0.11, 0.11)
+
+
+def portal(hinge, cells=4):
+    """Portal of 6 m by 4 m with hinges at the ends and in the middle of its members."""
+    left = ub.Beam((0, 0), (0, 4), SECTION, cells=cells, hinges={0.0: hinge}, name="left")
+    right = ub.Beam((6, 0), (6, 4), SECTION, cells=cells, hinges={0.0: hinge}, name="right")
+    girder = ub.Beam(
+        (0, 4),
+        (6, 4),
+        SECTION,
+        cells=2 * cells,
+        hinges=dict.fromkeys((0.0, 0.5, 1.0), hinge),
+        name="girder",
+    )
+    joints = [ub.Rigid(left.end, girder.start), ub.Rigid(girder.end, right.end)]
+    return [left, girder, right], joints, [ub.Clamped(left.start), ub.Clamped(right.start)]
+
+
+def displaced(solution, places):
+    """Last positions (m) of places."""
+    return [solution.position(place)[-1, :2] for place in places]
+
+
+def portal_limit(solution):
+    """Load factor of the displaced portal by linear programming."""
+    loads = np.zeros((5, 3))
+    loads[1, 0], loads[2, 1] = 100e3, -150e3
+    held = [(n, k) for n in (0, 4) for k in range(3)]
+    left, girder, right = solution.scene.beams
+    places = left.start, left.end, girder.at(0.5), right.end, right.start
+    nodes = displaced(solution, places)
+    return limit_factor(nodes, [(0, 1), (1, 2), (2, 3), (3, 4)], held, loads, [PLASTIC] * 4)
+
+
+@model(
+    "perfectly plastic portal, load control until a mechanism",
+    "statics",
+    "OpenSees 1533: hinges of zero length; the tangent becomes singular",
+    "sway, m",
+    stops="a mechanism has formed",
+    limit=portal_limit,
+    tolerance=1e-3,  # the static theorem on the displaced geometry leaves the shear of the cells
+)
+def portal_mechanism(divisor, record):
+    """Sway force and load of the girder grow together."""
+    beams, joints, feet = portal(ub.ElastoPlastic(PLASTIC))
+    loads = [
+        ub.PointLoad(beams[0].end, force=(100e3, 0), amplitude=lambda t: t),
+        ub.PointLoad(beams[1].at(0.5), force=(0, -150e3), amplitude=lambda t: t),
+    ]
+    scene = ub.Scene(beams, joints=joints, supports=feet, loads=loads)
+    return statics(
+        scene, 40, divisor, lambda run: run.displacement(beams[0].end)[:, 0], 2.0, record=record
+    )
+
+
+def fibre_limit(solution):
+    """Largest load factor of the column by integration of its deflection, small rotations.
+
+    From the top downwards EI w'' = -M with M = 50 kN λ s + N w, and a curvature of M from layers;
+    for each slope at the top λ follows from the clamped foot, and the largest λ is the limit.
+    """
+    N, y = 200e3, (np.arange(400) + 0.5) / 4000 - 0.05
+    curvatures, moments = np.linspace(0.0, 0.5, 400), []
+    for curvature in curvatures:
+
+        def stress(strain, curvature=curvature):
+            return np.clip(210e9 * (strain - curvature * y), -355e6, 355e6)
+
+        def missing(strain, stress=stress):
+            return stress(strain).sum() * 0.01 / 400 + N
+
+        moments.append(-(stress(brentq(missing, -0.03, 0.03)) * y).sum() * 0.01 / 400)
+    s = np.linspace(0.0, 3.0, 1201)
+    h = s[1]
+
+    def slope_at_foot(factor, slope):
+        w = 0.0
+        for x in s[:-1]:  # leap-frog: slopes in the middles of intervals, second order
+            moment = 50e3 * factor * x + N * w
+            slope -= h * np.interp(moment, moments, curvatures) * (0.5 if x == 0.0 else 1.0)
+            w += h * slope
+        return slope - h / 2 * np.interp(50e3 * factor * 3.0 + N * w, moments, curvatures)
+
+    slopes = np.linspace(0.02, 0.08, 13)
+    return max(brentq(slope_at_foot, 0.0, 1.0, args=(slope,), xtol=1e-5) for slope in slopes)
+
+
+@model(
+    "column of perfectly plastic fibres, load control until P-Delta collapse",
+    "statics",
+    "perfectly plastic fibres have no tangent stiffness",
+    "sway, m",
+    stops="a limit load",
+    limit=fibre_limit,
+    tolerance=1 / 80,  # the lowest cell has the moment of its middle, at 1/80 of the height
+)
+def fibre_column(divisor, record):
+    """A cantilever of 3 m, 0.1 m square, under 200 kN; 40 fibres in each of 40 cells."""
+    section = ub.Section.rectangle(
+        b=0.1, h=0.1, fibres=ub.Fibres(ub.ElastoPlastic(355e6), number=40), **STEEL
+    )
+    column = ub.Beam((0, 0), (0, 3), section, cells=40)
+    loads = [
+        ub.PointLoad(column.end, force=(0, -200e3)),
+        ub.PointLoad(column.end, force=(50e3, 0), amplitude=lambda t: t),
+    ]
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start)], loads=loads)
+    return statics(
+        scene, 80, divisor, lambda run: run.displacement(column.end)[:, 0], record=record
+    )
+
+
+def two_storeys(hinge):
+    """Frame of two storeys and two bays; hinges at the ends of all members."""
+    heights, axes = (0.0, 3.5, 7.0), (0.0, 6.0, 12.0)
+    ends = {0.0: hinge, 1.0: hinge}
+    columns = {
+        (i, k): ub.Beam((x, y), (x, top), SECTION, cells=2, hinges=ends, name=f"column {i}{k}")
+        for i, x in enumerate(axes)
+        for k, (y, top) in enumerate(pairwise(heights))
+    }
+    girders = {
+        (i, k): ub.Beam((x, y), (right, y), SECTION, cells=2, hinges=ends, name=f"girder {i}{k}")
+        for i, (x, right) in enumerate(pairwise(axes))
+        for k, y in enumerate(heights[1:])
+    }
+    joints = []
+    for i in range(3):
+        for k in range(2):
+            places = [columns[i, k].end]
+            places += [columns[i, k + 1].start] if k == 0 else []
+            places += [girders[i, k].start] if i < 2 else []
+            places += [girders[i - 1, k].end] if i else []
+            joints.append(ub.Rigid(*places))
+    feet = [ub.Clamped(columns[i, 0].start) for i in range(3)]
+    return columns, girders, joints, feet
+
+
+def two_storeys_limit(solution):
+    """Load factor of the displaced frame of two storeys by linear programming."""
+    columns = solution.scene.beams[:6]  # of the first axis, of the second, of the third
+    places = [column.start for column in columns[::2]]
+    places += [column.end for column in (*columns[::2], *columns[1::2])]
+    nodes = displaced(solution, places)
+    members = [(n, n + 3) for n in range(6)] + [(3, 4), (4, 5), (6, 7), (7, 8)]
+    loads = np.zeros((9, 3))
+    loads[3, 0], loads[6, 0] = 50e3, 100e3
+    weight = np.zeros((9, 3))
+    weight[3:, 1] = -200e3
+    held = [(n, k) for n in range(3) for k in range(3)]
+    return limit_factor(nodes, members, held, loads, [PLASTIC] * 10, weight)
+
+
+@model(
+    "two storeys with 20 perfectly plastic hinges, load control until a mechanism",
+    "statics",
+    "OpenSees 1533: hinges of zero length",
+    "sway, m",
+    stops="a limit load",
+    limit=two_storeys_limit,
+    tolerance=0.02,  # the sway stiffness of the last elastic members is below that of the weight
+)
+def two_storeys_mechanism(divisor, record):
+    """200 kN on each node; the sway forces of both floors grow together."""
+    columns, girders, joints, feet = two_storeys(ub.ElastoPlastic(PLASTIC))
+    loads = [ub.PointLoad(column.end, force=(0, -200e3)) for column in columns.values()]
+    loads += [
+        ub.PointLoad(columns[0, 0].end, force=(50e3, 0), amplitude=lambda t: t),
+        ub.PointLoad(columns[0, 1].end, force=(100e3, 0), amplitude=lambda t: t),
+    ]
+    scene = ub.Scene(
+        [*columns.values(), *girders.values()], joints=joints, supports=feet, loads=loads
+    )
+    top = columns[0, 1].end
+    return statics(scene, 60, divisor, lambda run: run.displacement(top)[:, 0], 3.0, record=record)
+
+
+@model(
+    "two storeys with 20 softening hinges, pushed beyond the largest load",
+    "statics",
+    "softening hinges open in turn; several share one step",
+    "base shear, N",
+)
+def two_storeys_softening(divisor, record):
+    """The top is pushed by 0.4 m; each hinge loses its moment at a fracture energy of 20 kJ."""
+    columns, girders, joints, feet = two_storeys(ub.Softening(PLASTIC, 20e3))
+    push = ub.PrescribedDisplacement(columns[0, 1].end, u=lambda t: 0.4 * t)
+    scene = ub.Scene([*columns.values(), *girders.values()], joints=joints, supports=[*feet, push])
+    return statics(scene, 200, divisor, lambda run: run.reaction(push)[:, 0], record=record)
+
+
+def leaning_limit(solution):
+    """Load factor of a rigid-plastic column on an elastic shaft at first yield of its foot.
+
+    Horizontal force λ H and weight N: the moment at the foot is H λ tan(kL)/k, with k² = N/EI.
+    """
+    k = math.sqrt(1e6 / SECTION.EI)
+    return PLASTIC / (50e3 * math.tan(k * 5.0) / k)
+
+
+@model(
+    "column under weight and sway, load control until P-Delta collapse",
+    "statics",
+    "weight makes the stiffness negative at the first hinge",
+    "sway, m",
+    stops="a mechanism has formed",
+    limit=leaning_limit,
+    tolerance=2e-3,  # the shaft also shears and shortens: N/GA + N/EA = 0.9e-3
+)
+def leaning_column(divisor, record):
+    """A cantilever of 5 m under 1 MN with one hinge of constant moment at its foot."""
+    column = ub.Beam((0, 0), (0, 5), SECTION, cells=16, hinges={0.0: ub.ElastoPlastic(PLASTIC)})
+    loads = [
+        ub.PointLoad(column.end, force=(0, -1e6)),
+        ub.PointLoad(column.end, force=(50e3, 0), amplitude=lambda t: t),
+    ]
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start)], loads=loads)
+    return statics(
+        scene, 40, divisor, lambda run: run.displacement(column.end)[:, 0], record=record
+    )
+
+
+@model(
+    "the same column, pushed beyond the collapse",
+    "statics",
+    "the sway force becomes negative",
+    "sway force, N",
+)
+def leaning_column_pushed(divisor, record):
+    """The top is pushed by 1 m after the weight."""
+    column = ub.Beam((0, 0), (0, 5), SECTION, cells=16, hinges={0.0: ub.ElastoPlastic(PLASTIC)})
+    weight = ub.PointLoad(column.end, force=(0, -1e6), amplitude=ub.ramp(1.0))
+    push = ub.PrescribedDisplacement(column.end, u=ub.Table([0, 1, 2], [0, 0, 1.0]))
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start), push], loads=[weight])
+    return statics(scene, 100, divisor, lambda run: run.reaction(push)[:, 0], 2.0, record=record)
+
+
+def concrete_half(ultimate):
+    """Half of a simply supported beam of 6 m with 1.2 % and 0.6 % of steel; Kent-Park."""
+    concrete = ub.Fibres(ub.KentPark(25e6, 5e6, ultimate), number=30)
+    plain = ub.Section.rectangle(b=0.3, h=0.5, E=25e9, nu=0.2, rho=2500.0, fibres=concrete)
+    section = plain.reinforced(y=[-0.21, 0.21], A=[3.6e-3, 0.6e-3], E=200e9, fibres=BARS)
+    return ub.Beam((0, 0), (3, 0), section, cells=10)
+
+
+@model(
+    "reinforced concrete beam beyond its peak",
+    "statics",
+    "OpenSees 1445; the concrete crushes",
+    "load, N",
+)
+def concrete_beam(divisor, record):
+    """Confined concrete, 5 MPa from 2 %; pushed by 0.12 m in the middle."""
+    half = concrete_half(0.02)
+    middle = ub.PrescribedDisplacement(half.end, v=lambda t: -0.12 * t, psi=0.0)
+    scene = ub.Scene([half], supports=[ub.Pinned(half.start), middle])
+    return statics(scene, 240, divisor, lambda run: run.reaction(middle)[:, 1], record=record)
+
+
+@model(
+    "brittle reinforced concrete beam, snap-back of the deflection",
+    "path",
+    "OpenSees 1445; one cell crushes while the others unload",
+    "load factor",
+)
+def brittle_concrete_beam(divisor, record):
+    """5 MPa from 0.35 % in cells of 0.3 m; no displacement control passes the crushing."""
+    half = concrete_half(0.0035)
+    turn = ub.PrescribedDisplacement(half.end, psi=0.0)
+    load = ub.PointLoad(half.end, force=(0, -1e5), amplitude=lambda t: t)
+    scene = ub.Scene([half], supports=[ub.Pinned(half.start), turn], loads=[load])
+    path = ub.follow(
+        scene,
+        ub.ArcLength(0.002 / divisor, factor=100.0),
+        steps=2000 * divisor,
+        until=lambda now: now.displacement(half.end)[1] < -0.12,
+        record=record,
+        progress=False,
+    )
+    return [path.factor.max(), path.factor[-1]]
+
+
+@model(
+    "two storeys of reinforced concrete, pushed after the vertical loads",
+    "statics",
+    "OpenSees 1625, with its materials and section, in the plane",
+    "base shear, N",
+)
+def concrete_frame(divisor, record):
+    """Columns of 0.6 m by 0.4 m under 6 kN/m on girders, then pushed by 0.12 m; 8 bars of 12 mm."""
+    plain = ub.Section.rectangle(
+        b=0.4,
+        h=0.6,
+        E=25e9,
+        nu=0.2,
+        rho=2500.0,
+        fibres=ub.Fibres(ub.KentPark(25e6, 5e6, 0.0035), number=20),
+    )
+    bar = 0.000113097
+    section = plain.reinforced(
+        y=[-0.255, -0.085, 0.085, 0.255], A=[2 * bar] * 4, E=200e9, fibres=BARS
+    )
+    columns, girders = {}, []
+    for i, x in enumerate((0.0, 5.0)):
+        for k in range(2):
+            columns[i, k] = ub.Beam((x, 3 * k), (x, 3 * k + 3), section, cells=6)
+    for k in range(2):
+        girders.append(ub.Beam((0, 3 * k + 3), (5, 3 * k + 3), section, cells=8))
+    joints = [
+        ub.Rigid(columns[i, 0].end, columns[i, 1].start, (girders[0].start, girders[0].end)[i])
+        for i in range(2)
+    ]
+    joints += [ub.Rigid(columns[i, 1].end, (girders[1].start, girders[1].end)[i]) for i in range(2)]
+    push = ub.PrescribedDisplacement(columns[0, 1].end, u=ub.Table([0, 1, 3], [0, 0, 0.12]))
+    hold = ub.ramp(1.0)
+    scene = ub.Scene(
+        [*columns.values(), *girders],
+        joints=joints,
+        supports=[ub.Clamped(columns[i, 0].start) for i in range(2)] + [push],
+        loads=[ub.LineLoad(girder, force=(0, -6e3), amplitude=hold) for girder in girders],
+    )
+    return statics(scene, 150, divisor, lambda run: run.reaction(push)[:, 0], 3.0, record=record)
+
+
+@model(
+    "concrete without tension under gravity, then bent",
+    "statics",
+    "OpenSees 1669: Concrete07 fails in the first step of gravity",
+    "sway force, N",
+)
+def no_tension(divisor, record):
+    """Mander's concrete, which is the backbone of Concrete07, with steel; cracked by the sway."""
+    plain = ub.Section.rectangle(
+        b=0.4,
+        h=0.4,
+        E=27e9,
+        nu=0.2,
+        rho=2500.0,
+        fibres=ub.Fibres(ub.Mander(30e6, 0.002), number=30),
+    )
+    section = plain.reinforced(y=[-0.16, 0.16], A=[1e-3, 1e-3], E=200e9, fibres=BARS)
+    column = ub.Beam((0, 0), (0, 3), section, cells=8)
+    weight = ub.PointLoad(column.end, force=(0, -0.8e6), amplitude=ub.ramp(1.0))
+    push = ub.PrescribedDisplacement(column.end, u=ub.Table([0, 1, 2], [0, 0, 0.06]))
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start), push], loads=[weight])
+    return statics(scene, 120, divisor, lambda run: run.reaction(push)[:, 0], 2.0, record=record)
+
+
+def confined():
+    """Cover and core of the column that is loaded in cycles."""
+    hoops = {"ratio": 0.012, "yield_limit": 400e6, "width": 0.32, "spacing": 0.1}
+    return ub.KentPark.confined(30e6), ub.KentPark.confined(30e6, **hoops)
+
+
+def cover_and_core():
+    """Parameters of Concrete01 of OpenSees for cover and core."""
+    return [
+        [-law.strength, -2 * law.strength / 30e9, -law.residual, -law.ultimate]
+        for law in confined()
+    ]
+
+
+@model(
+    "column of reinforced concrete, cycles until the concrete crushes",
+    "statics",
+    "cover and core soften in compression while bars reverse",
+    "sway force, N",
+)
+def concrete_cycles(divisor, record):
+    """0.4 m square, 3 m high, 30 % of its strength in compression, drifts up to 3 %."""
+    cover, core = confined()
+    cover, core = ub.Fibres(cover, number=20), ub.Fibres(core)
+    plain = ub.Section.rectangle(
+        b=0.4, h=0.4, E=30e9, nu=0.2, rho=2500.0, fibres=cover, core=core, cover=0.04
+    )
+    section = plain.reinforced(y=[-0.15, 0.0, 0.15], A=[1e-3, 0.6e-3, 1e-3], E=200e9, fibres=BARS)
+    column = ub.Beam((0, 0), (0, 3), section, cells=8)
+    drive, end = cycles(0.015, 0.03, 0.045, 0.06, 0.09)
+    push = ub.PrescribedDisplacement(column.end, u=lambda t: drive(t - 1.0) if t > 1.0 else 0.0)
+    weight = ub.PointLoad(column.end, force=(0, -1.4e6), amplitude=ub.ramp(1.0))
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start), push], loads=[weight])
+    return statics(
+        scene,
+        50 * round(end + 1),
+        divisor,
+        lambda run: run.reaction(push)[:, 0],
+        end + 1,
+        record=record,
+    )
+
+
+@model(
+    "brace that buckles and yields in cycles",
+    "statics",
+    "buckling, plastic hinge in the middle and straightening in each cycle",
+    "axial force, N",
+)
+def brace(divisor, record):
+    """A tube of 4 m, slenderness 85, bow of L/500; fibres of Menegotto and Pinto."""
+    steel = ub.Fibres(ub.MenegottoPinto(355e6, 0.01, 20.0), number=20)
+    section = ub.Section.tube(d=0.14, t=0.006, fibres=steel, **STEEL)
+    points = np.linspace(0, 1, 13)
+    bow = [(4 * s, 0.008 * math.sin(math.pi * s)) for s in points]
+    brace = ub.Beam.polyline(bow, section, cells=12)
+    drive, end = cycles(0.004, 0.008, 0.016, 0.032)
+    move = ub.PrescribedDisplacement(brace.end, u=drive, v=0.0)
+    scene = ub.Scene([brace], supports=[ub.Pinned(brace.start), move])
+    return statics(
+        scene, 100 * round(end), divisor, lambda run: run.reaction(move)[:, 0], end, record=record
+    )
+
+
+@model(
+    "snap-through of a shallow truss onto a stop",
+    "path",
+    "the load falls, and the contact stiffness grows a thousandfold",
+    "load factor",
+)
+def snap_through(divisor, record):
+    """Two bars of slope 0.1; the stop is 0.15 m below the top, within the falling branch."""
+    bars = ub.Section(EA=1e7, GA=4e6, EI=10.0)
+    left = ub.Beam((-1, 0), (0, 0.1), bars, cells=2)
+    right = ub.Beam((0, 0.1), (1, 0), bars, cells=2)
+    stop = ub.Slide(ub.ground(0, 0.1), left.end, ub.Stop(1e8, low=-0.15), axis=(0, 1))
+    load = ub.PointLoad(left.end, force=(0, -1e3), amplitude=lambda t: t)
+    scene = ub.Scene(
+        [left, right],
+        joints=[ub.Revolute(left.end, right.start)],
+        supports=[ub.Pinned(left.start), ub.Pinned(right.end)],
+        connectors=[stop],
+        loads=[load],
+    )
+    control = ub.DisplacementControl(left.end, "v", -0.1505 / (100 * divisor))
+    path = ub.follow(scene, control, steps=100 * divisor, record=record, progress=False)
+    return [path.factor.max(), path.factor.min(), path.factor[-1]]
+
+
+@model(
+    "snap-back of a cracking beam",
+    "path",
+    "the fracture energy is a tenth of the stored energy",
+    "deflection at the end, m",
+)
+def snap_back(divisor, record):
+    """A cantilever with a brittle hinge, by dissipation control to 95 % of the fracture energy."""
+    energy = 0.1 * PLASTIC**2 * 5.0 / SECTION.EI
+    hinge = ub.Softening(PLASTIC, energy)
+    beam = ub.Beam((0, 0), (5, 0), SECTION, cells=10, hinges={0.0: hinge})
+    load = ub.PointLoad(beam.end, force=(0, -1e5), amplitude=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    control = ub.DissipationControl(energy / (40 * divisor), ub.ArcLength(0.02))
+    path = ub.follow(
+        scene,
+        control,
+        steps=400 * divisor,
+        until=lambda now: now.damage()[1].sum() >= 0.95 * energy * (1 - 1e-9),
+        record=record,
+        progress=False,
+    )
+    return [path.displacement(beam.end)[:, 1].min()]
+
+
+@model(
+    "two gaps that close in the same step",
+    "statics",
+    "symmetric contact: both or none",
+    "force in the left stop, N",
+)
+def two_gaps(divisor, record):
+    """A beam on rollers between two equal stops is pressed onto both by a force in its middle."""
+    beam = ub.Beam((0, 0), (4, 0), SECTION, cells=8)
+    stops = [
+        ub.Slide(ub.ground(x, 0), beam.at(x / 4), ub.Stop(1e8, low=-0.01), axis=(0, 1))
+        for x in (0.0, 4.0)
+    ]
+    soft = [
+        ub.Slide(ub.ground(x, 0), beam.at(x / 4), ub.Spring(1e5), axis=(0, 1)) for x in (0.0, 4.0)
+    ]
+    load = ub.PointLoad(beam.at(0.5), force=(0, -5e5), amplitude=lambda t: t)
+    hold = ub.PrescribedDisplacement(beam.at(0.5), u=0.0)
+    scene = ub.Scene([beam], supports=[hold], connectors=[*stops, *soft], loads=[load])
+    return statics(scene, 10, divisor, lambda run: run.connector(stops[0]).force, record=record)
+
+
+@model(
+    "mast on two cables that become slack in turn",
+    "statics",
+    "a slack cable has no stiffness; with both slack the mast is a mechanism",
+    "sway force, N",
+)
+def slack_cables(divisor, record):
+    """A pinned mast of 10 m with cables that only pull, driven to both sides; no prestress."""
+    mast = ub.Beam((0, 0), (0, 10), SECTION, cells=4)
+    cables = [ub.Stretch(ub.ground(x, 0), mast.end, ub.Stop(2e6, high=0.001)) for x in (-6.0, 6.0)]
+    drive, end = cycles(0.02, 0.05, 0.1)
+    push = ub.PrescribedDisplacement(mast.end, u=drive)
+    weight = ub.PointLoad(mast.end, force=(0, -1e4))
+    scene = ub.Scene(
+        [mast], supports=[ub.Pinned(mast.start), push], connectors=cables, loads=[weight]
+    )
+    return statics(
+        scene, 20 * round(end), divisor, lambda run: run.reaction(push)[:, 0], end, record=record
+    )
