@@ -209,7 +209,7 @@ def engineering(case):
     The sums are taken in another order.  Drifts are differences of displacements.
     """
     solution, scene = case.whole.solution, case.whole.names["scene"]
-    rows, (_, lost) = solution.hinges(of=scene.beams).rows, solution.damage()
+    rows, (_, lost) = solution.hinges(only=scene.beams).rows, solution.damage()
     assert difference(sum(row.dissipated for row in rows), lost.sum(), lost.sum() or 1.0) < 1e-12
     assert all(row.n < 0 or row.time == solution.times[row.n] for row in rows)
     for beam in scene.beams if len(solution.v) else ():

@@ -179,9 +179,9 @@ def test_rows_are_those_of_other_results(everything):
 def test_hinges_of_some_beams_and_connectors(everything):
     scene = everything.scene
     chosen = scene["hinge"], scene.connectors[2]
-    rows = everything.hinges(LIMITS, of=chosen).rows
+    rows = everything.hinges(LIMITS, only=chosen).rows
     assert {str(row.where).split()[0] for row in rows} == {"hinge.at(0.5)", "Turn(ground"}
-    assert everything.hinges(of=[scene["elastic"]]).rows == ()
+    assert everything.hinges(only=[scene["elastic"]]).rows == ()
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ def test_hinges_of_some_beams_and_connectors(everything):
 )  # fmt: skip
 def test_states_of_acceptance(everything, limit, state):
     limits = {} if limit is None else {"IO": limit}
-    rows = everything.hinges(limits, of=[everything.scene["hinge"]]).rows
+    rows = everything.hinges(limits, only=[everything.scene["hinge"]]).rows
     assert [row.state for row in rows] == [state]
 
 
@@ -210,8 +210,8 @@ def test_a_hinge_below_its_limit_is_elastic():
         ({"limits": {"IO": 0.02, "LS": 0.01}}, ["limits['LS'] = 0.01 rad", "increasing order"]),
         ({"limits": [0.1]}, ["hinges: limits", "is not a Mapping"]),
         ({"limits": {1: 0.1}}, ["hinges: limits", "must be text"]),
-        ({"of": [PLAIN]}, ["hinges: of[0]", "is not a Beam or Connector"]),
-        ({"of": [ub.Beam((0, 0), (1, 0), PLAIN)]}, ["of[0]", "is not in the scene"]),
+        ({"only": [PLAIN]}, ["hinges: only[0]", "is not a Beam or Connector"]),
+        ({"only": [ub.Beam((0, 0), (1, 0), PLAIN)]}, ["only[0]", "is not in the scene"]),
     ],
 )
 def test_wrong_arguments_of_hinges(everything, arguments, words):

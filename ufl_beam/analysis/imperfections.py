@@ -155,8 +155,8 @@ class _Change:
         s = np.array([0.0, 1.0])
         if self._mode is not None:
             numbering = self._mode.numbering
-            s, parts = numbering.parameters(beam), 1 if numbering.mesh.degree == 1 else 12
-            s = np.interp(np.arange(parts * (len(s) - 1) + 1) / parts, np.arange(len(s)), s)
+            s, pieces = numbering.parameters(beam), 1 if numbering.mesh.degree == 1 else 12
+            s = np.interp(np.arange(pieces * (len(s) - 1) + 1) / pieces, np.arange(len(s)), s)
         shape = np.array([self._motion(beam.at(float(x))) for x in s])
         bow = (-size * (y1 - y0), size * (x1 - x0))
         return Displaced(beam.curve, self._sway, self._lowest, bow, s, shape)

@@ -122,13 +122,15 @@ def incremental_dynamic_analysis(
     require_function(build, f"{WHAT}: build", "a GroundMotion")
     require_function(measure, f"{WHAT}: measure", "a solution")
     limit = require_number(limit, f"{WHAT}: limit", positive=True)
-    of = {_key(motion): motion for motion in require_all(motions, f"{WHAT}: motions", GroundMotion)}
+    known = {
+        _key(motion): motion for motion in require_all(motions, f"{WHAT}: motions", GroundMotion)
+    }
     levels = require_row(intensities, f"{WHAT}: intensities")
     if not len(levels) or levels[0] <= 0 or (np.diff(levels) <= 0).any():
         raise ArgumentError(f"{WHAT}: intensities must be positive and increase")
-    if not of:
+    if not known:
         raise ArgumentError(f"{WHAT}: motions is empty")
-    if len(of) < len(motions):
+    if len(known) < len(motions):
         raise ArgumentError(f"{WHAT}: motions: the same motion occurs twice")
     if intensity is not None:
         require_function(intensity, f"{WHAT}: intensity", "a GroundMotion")
@@ -142,14 +144,16 @@ def incremental_dynamic_analysis(
         require_kind(start, Solution, f"{WHAT}: start")
     require_options(newton, mesh, progress, WHAT)
     unit = dict[str, float]()
-    for key, motion in of.items():
+    for key, motion in known.items():
         size = motion.peak if intensity is None else intensity(motion)
         unit[key] = require_number(size, f"{WHAT}: intensity of {motion.name}", positive=True)
-    first = next(iter(of))
-    require_kind(build(of[first].scaled(levels[0] / unit[first])), Scene, f"{WHAT}: build(motion)")
+    first = next(iter(known))
+    require_kind(
+        build(known[first].scaled(levels[0] / unit[first])), Scene, f"{WHAT}: build(motion)"
+    )
 
     def member(motion: str, intensity: float) -> dict[str, float]:
-        scaled = of[motion].scaled(intensity / unit[motion])
+        scaled = known[motion].scaled(intensity / unit[motion])
         begin = time.perf_counter()
         simulation = Simulation(build(scaled), chosen, start=start, newton=newton, mesh=mesh)
         steps = StepsToLimit(simulation, scaled.duration, dt or scaled.dt, measure, limit)
@@ -165,12 +169,12 @@ def incremental_dynamic_analysis(
         return {"demand": steps.demand, "end": simulation.t, "outcome": float(outcome)}
 
     member.__name__ = WHAT
-    cases = [{"motion": key, "intensity": float(level)} for key in of for level in levels]
+    cases = [{"motion": key, "intensity": float(level)} for key in known for level in levels]
     results = study(member, cases, path=path, anew=anew, progress=progress, comm=comm)
     demand, end, outcome = (
-        results[name].reshape(len(of), len(levels)) for name in ("demand", "end", "outcome")
+        results[name].reshape(len(known), len(levels)) for name in ("demand", "end", "outcome")
     )
-    names = tuple(motion.name for motion in of.values())
+    names = tuple(motion.name for motion in known.values())
     return DemandCurves(names, levels, limit, demand, end, outcome, results)
 
 

@@ -129,9 +129,9 @@ class SmallMotions:
         all modes: the mass of the scene without the part that only moves with supports.
         """
         r = np.zeros(self.numbering.size)
-        for axis, part in enumerate(direction):
+        for axis, component in enumerate(direction):
             for dofs in (self.numbering.dofs, self.numbering.dofs_of_bodies):
-                r[dofs[:, axis]] = part
+                r[dofs[:, axis]] = component
         toward = np.asarray(self.masses @ r)
         massive = self.M.diagonal() > 0.0
         along = np.asarray(self._Z.T @ toward)[massive]

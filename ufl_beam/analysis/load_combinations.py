@@ -99,10 +99,10 @@ def load_combinations(
         ]
         scenes[name] = replace(scene, loads=[*scene.loads, *growing])
     solutions, errors = dict[str, Solution](), dict[str, ConvergenceError]()
-    for name, one in scenes.items():
+    for name, loaded in scenes.items():
         try:
             solutions[name] = simulate(
-                one, Static(), t=(0.0, AT), dt=AT / steps, every=steps, newton=newton, mesh=mesh,
+                loaded, Static(), t=(0.0, AT), dt=AT / steps, every=steps, newton=newton, mesh=mesh,
                 progress=progress,
             )  # fmt: skip
         except ConvergenceError as error:

@@ -51,7 +51,7 @@ PATTERNS = "mode", "uniform", "triangular"
 MODES = 6  # number of modes among which the one with the largest effective mass is chosen
 LEAST_MOTION = 1e-6  # of the control place, as a fraction of the largest motion of the scene
 SAME = 1e-9  # fraction of the target that a step may miss by round-off
-NEAR = 0.99  # fraction of its limit from which on a hinge is named if the path ends
+NAMED_FROM = 0.99  # fraction of its limit from which on a hinge is named if the path ends
 MOST_STEPS = 20  # largest number of steps of a path, in multiples of the steps asked for
 Shape = Callable[[AttachmentPoint], float]
 """Displacement of a place, relative to the displacement of the control place."""
@@ -155,8 +155,8 @@ def pushover(
             "no base shear"
         )
     unit = [with_amplitude(load, Proportional(size_of(load) / sum_of_forces)) for load in loads]
-    pushed = replace(steady, loads=[*steady.loads, *unit])
-    linear = SmallMotions(pushed, start, abs(sum_of_forces), mesh).linear_change("pushover")
+    loaded = replace(steady, loads=[*steady.loads, *unit])
+    linear = SmallMotions(loaded, start, abs(sum_of_forces), mesh).linear_change("pushover")
     moved = float(values_at(numbering, place, linear[None])[0, axis])
     if not abs(moved) > LEAST_MOTION * np.abs(linear[numbering.dofs[:, :2]]).max():
         raise ArgumentError(
@@ -172,7 +172,7 @@ def pushover(
     first, second = weighted[:, 1].sum(), (weighted[:, 1] ** 2 / weighted[:, 0]).sum()
     period = _main_mode(steady, start, mesh, masses, axis)[1] if total > 0 else math.nan
     path, events, failure = _follow(
-        pushed, control, target, steps, start, newton=newton, mesh=mesh, progress=progress
+        loaded, control, target, steps, start, newton=newton, mesh=mesh, progress=progress
     )
     displacement = path.displacement(place)[:, axis]
     displacement = displacement - displacement[0]
@@ -218,11 +218,11 @@ def mass_points(numbering: DofNumbering, axis: int) -> list[tuple[AttachmentPoin
                 strict=True,
             )  # fmt: skip
             rows += [(beam.at(float(s)), rhoA * float(length)) for s, length in points]
-    held = {int(numbering.node(s.place)[c]) for s in scene.supports for c in s.held}
+    constrained = {int(numbering.node(s.place)[c]) for s in scene.supports for c in s.held}
     return rows + [
         (at, mass)
         for at, mass, _ in point_masses(scene)
-        if mass and int(numbering.node(at)[axis]) not in held
+        if mass and int(numbering.node(at)[axis]) not in constrained
     ]
 
 
@@ -262,13 +262,13 @@ def _shape(
         form, largest = (lambda at: float(at.point[1] - lowest)), scene.size
     else:
         (form, _), largest = _main_mode(scene, start, mesh, masses, axis), 1.0
-    there = form(place)
-    if not abs(there) > LEAST_MOTION * largest:
+    at_place = form(place)
+    if not abs(at_place) > LEAST_MOTION * largest:
         raise ArgumentError(
             f"pushover: the pattern {pattern!r} does not move {COMPONENTS[axis]} of {place}; give "
             "another control place or pattern"
         )
-    return lambda at: form(at) / there
+    return lambda at: form(at) / at_place
 
 
 def _forces(scene: Scene, axis: int, shape: Shape) -> list[Load]:
@@ -283,9 +283,9 @@ def _forces(scene: Scene, axis: int, shape: Shape) -> list[Load]:
 
             force = (rhoA * direction[0], rhoA * direction[1])
             loads.append(LineLoad(beam, force, profile=along))
-    held = {support.place for support in scene.supports if axis in support.held}
+    constrained = {support.place for support in scene.supports if axis in support.held}
     for at, mass, _ in point_masses(scene):
-        if mass and at not in held:
+        if mass and at not in constrained:
             size = mass * shape(at)
             loads.append(PointLoad(at, (size * direction[0], size * direction[1])))
     return loads
@@ -340,7 +340,7 @@ def _at_limit(path: Path) -> list[Place]:
     found = []
     for hinge in path.scene.hinges:
         limit, state = float(law_of(hinge).limit), path.connector(hinge)
-        if state.dissipated[-1] == 0.0 and abs(state.force[-1]) >= NEAR * limit:
+        if state.dissipated[-1] == 0.0 and abs(state.force[-1]) >= NAMED_FROM * limit:
             found.append(place_of(hinge))
     return found
 

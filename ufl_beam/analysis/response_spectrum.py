@@ -231,10 +231,10 @@ def response_spectrum_analysis(
     if scene.works:
         raise ArgumentError(f"{what}: {scene.works[0]}: works are left out of section forces")
     undamped = replace(scene, damping=())
-    found = modes(undamped, n, at=at, mesh=mesh)
-    _require_vibration(found, what)
+    basis = modes(undamped, n, at=at, mesh=mesh)
+    _require_vibration(basis, what)
     small = SmallMotions(undamped if at else replace(undamped, loads=()), at, mesh=mesh)
-    shapes, omega = np.asarray(found.shapes.real), found.omega
+    shapes, omega = np.asarray(basis.shapes.real), basis.omega
     toward, mass = small.participation(np.array([x, y]) / size)
     own = np.einsum("ik,ik->k", shapes, small.masses @ shapes)
     along = shapes.T @ toward
@@ -245,28 +245,28 @@ def response_spectrum_analysis(
     places = [small.numbering.node(support.place) for support in scene.supports]
     reactions = np.array([forces[dofs].T for dofs in places]).reshape(len(places), len(sizes), 3)
     response = SpectralResponse(
-        replace(found, scene=scene), (x / size, y / size), accelerations, participation, effective,
+        replace(basis, scene=scene), (x / size, y / size), accelerations, participation, effective,
         mass, cqc(omega, damping) if rule == "CQC" else np.eye(len(omega)),
-        _resultants(found, sizes), reactions.transpose(1, 0, 2),
+        _resultants(basis, sizes), reactions.transpose(1, 0, 2),
     )  # fmt: skip
     if response.missing_mass > 1.0 - LEAST_MASS:
         warn(
-            f"{what}: the {len(found)} modes have {1.0 - response.missing_mass:.0%} of the mass "
+            f"{what}: the {len(basis)} modes have {1.0 - response.missing_mass:.0%} of the mass "
             f"along ({x:g}, {y:g}); 90 % are usual (EN 1998-1, 4.3.3.3.1): give a larger n"
         )
     return response
 
 
-def _require_vibration(found: Modes, what: str) -> None:
+def _require_vibration(basis: Modes, what: str) -> None:
     """Raise unless all modes are undamped vibrations about a stable state."""
-    if not len(found):
+    if not len(basis):
         raise ArgumentError(f"{what}: the scene has no mode")
-    if np.iscomplexobj(found.shapes) or (np.abs(found.damping) > AT_REST).any():
+    if np.iscomplexobj(basis.shapes) or (np.abs(basis.damping) > AT_REST).any():
         raise ArgumentError(
             f"{what}: dampers, follower loads or a rotating frame act on the scene, or it is "
             "unstable, so that it has no undamped modes; leave them out, or use simulate"
         )
-    if (found.omega <= AT_REST * found.omega.max()).any():
+    if (basis.omega <= AT_REST * basis.omega.max()).any():
         raise ArgumentError(f"{what}: the scene can move without strain; give it supports")
 
 
@@ -290,9 +290,9 @@ def _linear_forces(element: Element) -> tuple[ufl.Form, fem.Function]:
     return ufl.derivative(work, about, element.q1), about
 
 
-def _resultants(found: Modes, sizes: Array) -> Array:
+def _resultants(basis: Modes, sizes: Array) -> Array:
     """Return the peak forces of stress and inertia on the ends of cells; (n, 9, num_cells)."""
-    subdomain = Subdomain(found.numbering, MPI.COMM_SELF)
+    subdomain = Subdomain(basis.numbering, MPI.COMM_SELF)
     fields, space = Fields(subdomain), np.zeros(subdomain.size)
     form, about = _linear_forces(fields.element)
     stress, inertia = fields.kernel(form, fields.element.q1), mass_kernel(fields)
@@ -303,9 +303,9 @@ def _resultants(found: Modes, sizes: Array) -> Array:
             InCells(lambda: inertia, lib.DENSITY, fields.order),
         ],
     )
-    stress.set(about, found.q)
+    stress.set(about, basis.q)
     peaks = []
-    for shape, size, omega in zip(found.shapes.real.T, sizes, found.omega, strict=True):
+    for shape, size, omega in zip(basis.shapes.real.T, sizes, basis.omega, strict=True):
         x = np.ascontiguousarray(size * shape)
         stress.add(x, space)
         inertia.add(-(omega**2) * x, space)

@@ -29,7 +29,7 @@ from ufl_beam.model.fibres import Fibres
 from ufl_beam.model.sections import Section
 from ufl_beam.terms.material_points import Points
 
-PARTS = 1024
+SUBSTEPS = 1024
 """Number of smallest substeps in a step of curvature and axial force."""
 
 TOLERANCE = 1e-13
@@ -50,13 +50,13 @@ class _State:
         points = section.section_points(section.hinge)
         if length is not None:
             require_number(length, f"{what}: length", positive=True)
-        elif any(of_class.softening is not None for of_class in points):
+        elif any(class_points.softening is not None for class_points in points):
             raise ArgumentError(
                 f"{what}: the section has cracks or a hinge, whose openings are strains times a "
                 "length; give the length of a cell, length= (m)"
             )
         lengths, keys = np.full(states, length or 1.0), [(0, 0)] * states
-        self._points = [Points(of_class, keys, lengths, Static()) for of_class in points]
+        self._points = [Points(class_points, keys, lengths, Static()) for class_points in points]
         # Without points the section is elastic; otherwise the points have the elastic resultants.
         self._rest = np.zeros(3) if points else np.array([section.EA, section.GA, section.EI])
         self._EA, self._depth, self._strain, self._length = section.EA, section.depth, 0.0, lengths
@@ -203,18 +203,18 @@ def moment_curvature(
     path = np.column_stack(np.broadcast_arrays(K, forces))
     loads_first = int(K[0] != 0 and path[0, 1] != 0)
     for after in [np.array([0.0, path[0, 1]])] * loads_first + list(path):
-        done, part, found = 0, PARTS, None
-        while done < PARTS:
-            target = before + (after - before) * ((done + part) / PARTS)
-            found = state.reach(float(target[0]), float(target[1]), dt * part / PARTS)
-            if found is not None:
-                done += part
-                part = math.gcd(done, PARTS)
-            elif part > 1:
-                part //= 2
+        done, substep, reached = 0, SUBSTEPS, None
+        while done < SUBSTEPS:
+            target = before + (after - before) * ((done + substep) / SUBSTEPS)
+            reached = state.reach(float(target[0]), float(target[1]), dt * substep / SUBSTEPS)
+            if reached is not None:
+                done += substep
+                substep = math.gcd(done, SUBSTEPS)
+            elif substep > 1:
+                substep //= 2
             else:
                 break
-        if found is None:
+        if reached is None:
             said = (
                 f"{what}: the section cannot bear N = {target[1]:.4g} N at the curvature "
                 f"{target[0]:.4g} 1/m"
@@ -223,7 +223,7 @@ def moment_curvature(
                 raise ArgumentError(said)
             warn(f"{said}; the result ends at {rows[-1][0]:.4g} 1/m")
             break
-        rows.append([*after, *found, float(state.dissipated()[0])])
+        rows.append([*after, *reached, float(state.dissipated()[0])])
         before = after
     K, forces, strains, moments, lost = np.array(rows)[loads_first:].T
     return MomentCurvature(K, moments, forces, strains, lost)
@@ -327,27 +327,27 @@ def interaction_diagram(
         limits = dict.fromkeys(placed.fibres, limits)
     allowed = np.full((2, len(placed.y)), math.inf)
     for fibres, pair in limits.items():
-        numbers = [number for number, own in enumerate(placed.fibres) if own == fibres]
-        if not numbers:
+        indices = [number for number, own in enumerate(placed.fibres) if own == fibres]
+        if not indices:
             raise ArgumentError(f"{what}: limits of {fibres!r}, which is not in the section")
         try:
             compressive, tensile = pair
         except (TypeError, ValueError):
             raise ArgumentError(f"{what}: limits = {pair!r} must be two strains") from None
         for row, limit in zip(allowed, (compressive, tensile), strict=True):
-            row[np.isin(placed.material, numbers)] = require_number(
+            row[np.isin(placed.material, indices)] = require_number(
                 limit, f"{what}: limits", positive=True, infinite=True
             )
     angle = 2 * math.pi * np.arange(points) / points
     strain, curvature = np.cos(angle), 2 / section.depth * np.sin(angle)
-    of_fibres = strain[:, None] - curvature[:, None] * placed.y
+    fibre_strains = strain[:, None] - curvature[:, None] * placed.y
     with np.errstate(divide="ignore"):
-        factors = np.where(of_fibres < 0, allowed[0], allowed[1]) / np.abs(of_fibres)
+        factors = np.where(fibre_strains < 0, allowed[0], allowed[1]) / np.abs(fibre_strains)
     factor = factors.min(axis=1)
     if not np.isfinite(factor).all():
-        way = "tension" if strain[np.argmax(factor)] > 0 else "compression"
+        sense = "tension" if strain[np.argmax(factor)] > 0 else "compression"
         raise ArgumentError(
-            f"{what}: no fibre limits the strain in {way}; give some fibres a limit there"
+            f"{what}: no fibre limits the strain in {sense}; give some fibres a limit there"
         )
     strain, curvature = factor * strain, factor * curvature
     for step in range(1, steps + 1):

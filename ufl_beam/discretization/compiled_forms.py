@@ -273,24 +273,24 @@ def _without_copies(expressions: Sequence[Expr]) -> tuple[Expr, ...]:
 
     The time in which UFL compares two equal nodes grows exponentially with their depth.
     """
-    found: dict[int, Expr] = {}  # the node to use, by the identity of a node
+    shared: dict[int, Expr] = {}  # the node to use, by the identity of a node
     known: dict[Any, Expr] = {}
     for expression in expressions:
         waiting = [expression]
         while waiting:
             node = waiting[-1]
-            if missing := [x for x in node.ufl_operands if id(x) not in found]:
+            if missing := [x for x in node.ufl_operands if id(x) not in shared]:
                 waiting += missing
                 continue
             waiting.pop()
-            if id(node) not in found:
-                operands = tuple(found[id(x)] for x in node.ufl_operands)
+            if id(node) not in shared:
+                operands = tuple(shared[id(x)] for x in node.ufl_operands)
                 key = (type(node), *map(id, operands)) if operands else node
                 if key not in known:
                     same = all(x is y for x, y in zip(operands, node.ufl_operands, strict=True))
                     known[key] = node if same else node._ufl_expr_reconstruct_(*operands)
-                found[id(node)] = known[key]
-    return tuple(found[id(expression)] for expression in expressions)
+                shared[id(node)] = known[key]
+    return tuple(shared[id(expression)] for expression in expressions)
 
 
 class Pointwise:

@@ -247,19 +247,19 @@ class DofNumbering:
         sections, beam_sections = self.sections
         for number, section in enumerate(sections):
             points = section.section_points(section.hinge)
-            if not all(of_class.elastic for of_class in points):
-                for of_class in points:
-                    groups.setdefault(of_class, []).append(number)
+            if not all(class_points.elastic for class_points in points):
+                for class_points in points:
+                    groups.setdefault(class_points, []).append(number)
         cell_sections = beam_sections[self.beam_of_cell]
-        found = [
+        with_cells = [
             (section_points, np.flatnonzero(np.isin(cell_sections, group)))
             for section_points, group in groups.items()
         ]
-        for section_points, cells in found:
+        for section_points, cells in with_cells:
             lengths = self.lengths(cells)
             if fault := section_points.fault(float(lengths.max(initial=0.0))):
                 raise ModelError(f"{self.describe_cell(int(cells[lengths.argmax()]))}: {fault}")
-        return found
+        return with_cells
 
     @cached_property
     def inelastic_cells(self) -> Index:

@@ -114,7 +114,7 @@ def by_class(points: Sequence[SectionPoints], rest: Array) -> tuple[SectionPoint
     for p in sorted(points, key=lambda p: p.softening is not None):
         # Elastic points join others of their class, whose equations hold for them, too.
         kind = p.kind if p.yields else yielding.get(type(p.laws[0][0]), p.kind)
-        alike = (of for k, of in groups if k == kind and of[-1].softening in (None, p.softening))
+        alike = (g for k, g in groups if k == kind and g[-1].softening in (None, p.softening))
         if (group := next(alike, None)) is None:
             groups.append((kind, group := []))
         group.append(p)
@@ -219,7 +219,7 @@ class PlacedFibres:
             except ModelError as error:
                 raise ModelError(f"Section: cover = {cover} m leaves no core: {error}") from None
         corners = [
-            y - shape.y for of in shapes for loop in (of.corners, *of.holes) for _, y, *_ in loop
+            y - shape.y for x in shapes for loop in (x.corners, *x.holes) for _, y, *_ in loop
         ]
         cuts = np.union1d(np.linspace(low, high, fibres.number + 1), np.clip(corners, low, high))
         cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * (high - low), 0, True)]
@@ -253,25 +253,25 @@ class PlacedFibres:
                 )
             # Materials of earlier bars come first, the core last.
             for number in reversed(range(len(self.fibres))):
-                of = np.flatnonzero(self.material == number)
-                gap = float(np.diff(np.unique(at[of])).max(initial=0.0))
-                if at[of].min() - gap / 2 <= bar <= at[of].max() + gap / 2:
+                rows = np.flatnonzero(self.material == number)
+                gap = float(np.diff(np.unique(at[rows])).max(initial=0.0))
+                if at[rows].min() - gap / 2 <= bar <= at[rows].max() + gap / 2:
                     break
-            width, away = gap or 1.0, at[of] - bar
-            removed = np.full(len(of), math.inf)
-            while not ((removed >= 0) & (removed < areas[of])).all():
+            width, away = gap or 1.0, at[rows] - bar
+            removed = np.full(len(rows), math.inf)
+            while not ((removed >= 0) & (removed < areas[rows])).all():
                 if width > 2 * (high - low + gap):
                     raise ModelError(
                         f"Section.reinforced: bars of A = {area:g} m² at y = {bar:g} m displace "
                         "more than the fibres of the section there"
                     )
                 # Near fibres lose the area, if possible with its centroid at the bar.
-                near = areas[of] * np.maximum(1 - np.abs(away) / width, 0.0)
-                removed, width = near * (area / near.sum()), 2 * width
-                if away[near > 0].min() < 0 < away[near > 0].max():
-                    m0, m1, m2 = near.sum(), near @ away, near @ away**2
-                    removed = near * area * (m2 - m1 * away) / (m0 * m2 - m1**2)
-            areas[of] -= removed
+                nearby = areas[rows] * np.maximum(1 - np.abs(away) / width, 0.0)
+                removed, width = nearby * (area / nearby.sum()), 2 * width
+                if away[nearby > 0].min() < 0 < away[nearby > 0].max():
+                    m0, m1, m2 = nearby.sum(), nearby @ away, nearby @ away**2
+                    removed = nearby * area * (m2 - m1 * away) / (m0 * m2 - m1**2)
+            areas[rows] -= removed
         material = np.concatenate([np.zeros(len(y), dtype=np.int64), self.material + 1])
         moduli = np.concatenate([np.full(len(y), E), self.E])
         number = self.bars + len(y)

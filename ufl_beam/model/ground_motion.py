@@ -164,8 +164,8 @@ class GroundMotion(Record):
             if dt is not None and not math.isclose(dt, step, rel_tol=1e-9):
                 raise ModelError(f"{file}: dt = {dt:g} s, but the file has {step:g} s")
             dt = step
-            if unit is None and (stated := re.search(r"UNITS\s+OF\s+(\S+)", head, re.I)):
-                unit = stated[1].strip(".,")
+            if unit is None and (unit_in_file := re.search(r"UNITS\s+OF\s+(\S+)", head, re.I)):
+                unit = unit_in_file[1].strip(".,")
         known = re.sub(r"/s(ec)?(/s(ec)?|\^2|²)$", "/s2", str(unit).lower())
         if known not in UNITS:
             wrong = (

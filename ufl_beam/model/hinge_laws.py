@@ -106,7 +106,7 @@ class Backbone(Record):
                 f"rotation, whose plastic part is {self.capping:g} rad"
             )
 
-    def numbers(self, stiffness: float) -> dict[str, float]:
+    def data(self, stiffness: float) -> dict[str, float]:
         """Return intercepts and slopes of the lines of the backbone, for an elastic stiffness."""
         limit, yields = self.yield_limit, self.yield_limit / stiffness
         caps, largest = yields + self.capping, self.overstrength * limit
@@ -273,18 +273,18 @@ class _DeterioratingHinge(Record, ConnectorLaw):
     def __post_init__(self) -> None:
         super().__post_init__()
         backbones = {"plus": self.backbone, "minus": self.negative or self.backbone}
-        numbers = {
+        data = {
             f"{name}_{side}": x
             for side, backbone in backbones.items()
-            for name, x in backbone.numbers(self.stiffness).items()
+            for name, x in backbone.data(self.stiffness).items()
         }
         limit = self.backbone.yield_limit
         for name in self.modes:
-            numbers[f"{name}_energy"] = min(getattr(self, name) * limit, UNBOUNDED)
-        slope = max(numbers["hardening_plus"], numbers["hardening_minus"])
-        numbers["least"] = max(LEAST_STIFFNESS, 2 * slope / self.stiffness)
-        numbers |= {"stiffness": self.stiffness, "exponent": self.exponent}
-        vars(self).update(numbers, _numbers=numbers)
+            data[f"{name}_energy"] = min(getattr(self, name) * limit, UNBOUNDED)
+        slope = max(data["hardening_plus"], data["hardening_minus"])
+        data["least"] = max(LEAST_STIFFNESS, 2 * slope / self.stiffness)
+        data |= {"stiffness": self.stiffness, "exponent": self.exponent}
+        vars(self).update(data, _numbers=data)
 
     def parameters(self) -> dict[str, Any]:
         """Return the numbers of the lines of both backbones, and the reference energies."""
@@ -298,13 +298,13 @@ class _DeterioratingHinge(Record, ConnectorLaw):
         self, motion: Values, rate: Values, state: State, dt: Values
     ) -> Mapping[str, Values]:
         """Return the changes of the variables on a monotone way to the motion."""
-        numbers, stiffness = vars(self), state.rest * self.stiffness
-        way = sign(motion - state.plastic)  # of the moment
-        x, p = way * motion, way * state.plastic
-        crosses = below(way * state.side, 0.0)
+        data, stiffness = vars(self), state.rest * self.stiffness
+        direction = sign(motion - state.plastic)  # of the moment
+        x, p = direction * motion, direction * state.plastic
+        crosses = below(direction * state.side, 0.0)
 
-        def here(name: str, of: Mapping[str, Values] = numbers) -> Values:
-            return where(below(way, 0.0), of[f"{name}_minus"], of[f"{name}_plus"])
+        def sided(name: str, source: Mapping[str, Values] = data) -> Values:
+            return where(below(direction, 0.0), source[f"{name}_minus"], source[f"{name}_plus"])
 
         def lost(capacity: Values, spent: Values, energy: Values) -> Values:
             """Return β^(1/c), at most 1."""
@@ -313,23 +313,24 @@ class _DeterioratingHinge(Record, ConnectorLaw):
 
         # the end of an excursion
         ended = where(crosses, state.dissipated, 0.0)
-        ratios = {name: lost(numbers[f"{name}_energy"], state.spent, ended) for name in self.modes}
-        basic = here("basic", vars(state)) * (1 - ratios["strength"] ** self.exponent)
-        falling = here("falling", vars(state)) * (1 - ratios["softening"] ** self.exponent)
+        ratios = {name: lost(data[f"{name}_energy"], state.spent, ended) for name in self.modes}
+        basic = sided("basic", vars(state)) * (1 - ratios["strength"] ** self.exponent)
+        falling = sided("falling", vars(state)) * (1 - ratios["softening"] ** self.exponent)
         works = below(reduce(larger, ratios.values()), 1.0)
-        most = where(works, here("most", vars(state)), 0.0)
-        other = where(works, where(below(way, 0.0), state.most_plus, state.most_minus), 0.0)
+        most = where(works, sided("most", vars(state)), 0.0)
+        reverse = where(works, where(below(direction, 0.0), state.most_plus, state.most_minus), 0.0)
         spent, dissipated = state.spent + ended, state.dissipated - ended
         before = where(crosses, state.rest, state.rest_before)
 
         # the bound, at x >= 0 of moments that are positive in this excursion
         backbone = _Bound(
-            first=basic * here("first"), hardening=basic * here("hardening"),
-            reference=falling * here("reference"), falls=here("falls"), residual=here("residual"),
-            most=most * here("largest"), last=here("last"), ultimate=here("ultimate"),
-            steep=here("steep"), least_slope=1e-12 * self.stiffness,
+            first=basic * sided("first"), hardening=basic * sided("hardening"),
+            reference=falling * sided("reference"), falls=sided("falls"),
+            residual=sided("residual"),
+            most=most * sided("largest"), last=sided("last"), ultimate=sided("ultimate"),
+            steep=sided("steep"), least_slope=1e-12 * self.stiffness,
         )  # fmt: skip
-        bound, path = self._path(backbone, state, here, p, before, crosses, ratios)
+        bound, path = self._path(backbone, state, sided, p, before, crosses, ratios)
         limit = bound.at(x)
         flows = below(limit, stiffness * (x - p))
         start = bound.meets(stiffness, p)
@@ -337,36 +338,36 @@ class _DeterioratingHinge(Record, ConnectorLaw):
             dissipated + stiffness * (start - p) ** 2 / 2 + bound.integral(start, larger(x, start))
         )
         energy = work - limit**2 / (2 * before * self.stiffness)
-        ratio = lost(numbers["unloading_energy"], spent, energy)
-        least = larger(numbers["least"], path["least_rest"]) if path else numbers["least"]
+        ratio = lost(data["unloading_energy"], spent, energy)
+        least = larger(data["least"], path["least_rest"]) if path else data["least"]
         rest = larger(before * (1 - ratio**self.exponent), smaller(before, least))
         after = rest * self.stiffness
 
         def changed(new: Values, old: Values) -> Values:
             return where(flows, new, old)
 
-        fallen = smaller(most, backbone.fallen(x) / here("largest"))
+        fallen = smaller(most, backbone.fallen(x) / sided("largest"))
         if path:  # on the way to the target the moment is below the backbone
             fallen = where(below(x, path["target"]), most, fallen)
         most = changed(fallen, most)
-        other = changed(smaller(other, positive(backbone.breaking(x)) / here("last")), other)
+        reverse = changed(smaller(reverse, positive(backbone.breaking(x)) / sided("last")), reverse)
         new = {
-            "plastic": way * changed(x - limit / after, p),
-            "side": way,
+            "plastic": direction * changed(x - limit / after, p),
+            "side": direction,
             "dissipated": changed(work - limit**2 / (2 * after), dissipated),
             "spent": spent,
             "rest": changed(rest, state.rest),
             "rest_before": before,
             **path,
         }
-        for side, is_here in (("plus", below(-way, 0.0)), ("minus", below(way, 0.0))):
+        for side, is_here in (("plus", below(-direction, 0.0)), ("minus", below(direction, 0.0))):
             for name, value in (("basic", basic), ("falling", falling)):
                 new[f"{name}_{side}"] = where(is_here, value, getattr(state, f"{name}_{side}"))
-            new[f"most_{side}"] = where(is_here, most, other)
+            new[f"most_{side}"] = where(is_here, most, reverse)
             if path:
                 peak = getattr(state, f"peak_{side}")
-                aims = where(crosses, path["target"] / here("yields"), peak)
-                reached = larger(aims, changed(x / here("yields"), aims))
+                aims = where(crosses, path["target"] / sided("yields"), peak)
+                reached = larger(aims, changed(x / sided("yields"), aims))
                 new[f"peak_{side}"] = where(is_here, reached, peak)
         return {name: value - getattr(state, name) for name, value in new.items()}
 
@@ -374,7 +375,7 @@ class _DeterioratingHinge(Record, ConnectorLaw):
         self,
         backbone: _Bound,
         state: State,
-        here: Callable[..., Values],
+        sided: Callable[..., Values],
         p: Values,
         before: Values,
         crosses: Values,
@@ -497,25 +498,25 @@ class PinchingHinge(_DeterioratingHinge):
         self,
         backbone: _Bound,
         state: State,
-        here: Callable[..., Values],
+        sided: Callable[..., Values],
         p: Values,
         before: Values,
         crosses: Values,
         ratios: Mapping[str, Values],
     ) -> tuple[_Bound | _Reloading, dict[str, Values]]:
         """Return the bound of an excursion, and the new values of the variables of its path."""
-        stiffness, least = before * self.stiffness, 1e-12 * here("yields")
+        stiffness, least = before * self.stiffness, 1e-12 * sided("yields")
         farther = 1 + ratios["reloading"] ** self.exponent
-        aims = here("peak", vars(state)) * here("yields") * farther
+        aims = sided("peak", vars(state)) * sided("yields") * farther
         target = where(crosses, aims, state.target)
         start = where(crosses, p, state.start)
         moment = backbone.at(target)
         slope = moment / larger(target - start, least)
         remains = target - moment / stiffness
-        turn = remains - self.kappa_D * positive(remains)
-        first = where(below(start, turn), self.kappa_F * slope, slope)
-        second = (moment - first * (turn - start)) / larger(target - turn, least)
-        second = where(below(start, turn), second, slope)
+        kink = remains - self.kappa_D * positive(remains)
+        first = where(below(start, kink), self.kappa_F * slope, slope)
+        second = (moment - first * (kink - start)) / larger(target - kink, least)
+        second = where(below(start, kink), second, slope)
         # otherwise the elastic line reaches the backbone before the target
         reloads = below((1 + 1e-6) * moment, stiffness * (target - start))
         first, second = where(reloads, first, 0.0), where(reloads, second, 0.0)
@@ -570,9 +571,9 @@ class AxialBendingHinge(Record, ConnectorLaw):
 
     def energy(self, motion: Any, state: State) -> Values:
         """Return the elastic energy; J."""
-        x, y, turn = motion
+        x, y, angle = motion
         elastic = self.along * (x - state.stretch) ** 2 + self.across * y**2
-        return (elastic + self.turning * (turn - state.rotation) ** 2) / 2
+        return (elastic + self.turning * (angle - state.rotation) ** 2) / 2
 
     def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
         """Return the increments of the plastic motions: projection on the yield surface.

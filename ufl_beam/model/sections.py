@@ -149,7 +149,7 @@ class Section(Record):
         return by_class(points, np.where(inelastic, 0.0, stiffness))
 
     @classmethod
-    def _of_material(
+    def _from_material(
         cls, A: float, I: float, E: float, nu: float, rho: float | None, shear_factor: float,
         *, fibres: PlacedFibres | None, **more: Any,
     ) -> Section:  # fmt: skip
@@ -203,7 +203,7 @@ class Section(Record):
             )
         # Files compare objects that are one with such that are equal: each section has its own.
         shape = copy(shape) if axis == "strong" else shape.turned()
-        return cls._of_material(
+        return cls._from_material(
             shape.A, shape.I, E, nu, rho, shear_factor, depth=shape.top - shape.bottom,
             fibres=PlacedFibres.layers(fibres, E, shape, core, cover), shape=shape, **laws,
         )  # fmt: skip
@@ -262,7 +262,7 @@ class Section(Record):
         placed = PlacedFibres.about_centroid(laws, material, moduli, at, areas)
         mass = density * areas
         mean, total = placed.EA / float(areas.sum()), float(areas.sum())
-        return cls._of_material(
+        return cls._from_material(
             total, placed.EI / mean, mean, nu, None, shear_factor,
             depth=float(np.ptp(at)), fibres=placed,
             **({} if rho is None else {"rhoA": mass.sum(), "rhoI": mass @ placed.y**2}),
@@ -526,7 +526,7 @@ def _require_positive(owner: str, **sizes: float) -> None:
 
 def _each(values: float | Sequence[float], n: int, what: str) -> Array:
     """Return a value for each of n fibres, from one number or from n numbers."""
-    numbers = require_array(values, what)
-    if numbers.ndim and numbers.shape != (n,):
-        raise ModelError(f"{what} has shape {numbers.shape}; give a number, or {n} numbers")
-    return np.array(np.broadcast_to(numbers, n))
+    checked = require_array(values, what)
+    if checked.ndim and checked.shape != (n,):
+        raise ModelError(f"{what} has shape {checked.shape}; give a number, or {n} numbers")
+    return np.array(np.broadcast_to(checked, n))

@@ -265,17 +265,17 @@ class HingeTable(Tabular):
 def hinges_of(
     states: States,
     limits: Mapping[str, float],
-    of: Sequence[Member | Connector] | None,
+    only: Sequence[Member | Connector] | None,
     parameter: Parameter,
 ) -> HingeTable:
     """Collect the hinges of a solution; see :meth:`Solution.hinges`."""
     _require_limits(limits)
     scene = states.scene
     known = {*scene.beams, *scene.connectors}
-    owners = known if of is None else require_all(of, "hinges: of", (Member, Connector))
+    owners = known if only is None else require_all(only, "hinges: only", (Member, Connector))
     for i, owner in enumerate(owners):
         if owner not in known:
-            raise ArgumentError(f"hinges: of[{i}] = {shorten(owner)} is not in the scene")
+            raise ArgumentError(f"hinges: only[{i}] = {shorten(owner)} is not in the scene")
     rows, chosen = list[HingeState](), {*owners}
 
     def add(

@@ -237,20 +237,20 @@ class Extremes(Restartable):
 
     def write(self, simulation: StateView) -> None:
         """Include the state of a step."""
-        found = list[tuple[Extent, Array]]()
+        pairs = list[tuple[Extent, Array]]()
         if self._in_c is not None:
             self._in_c.add(simulation.substeps, simulation.t, simulation.q, simulation.q_before)
         else:
             forces = simulation.now.cell_forces(0, self._fractions)
             q = simulation.subdomain.gather(simulation.q)  # the same on every process
-            found += zip(self._taken, (forces, q), strict=False)
+            pairs += zip(self._taken, (forces, q), strict=False)
         if self._accelerated:
             v = simulation.subdomain.gather(simulation.velocities()[0])
             now = np.append(simulation.t, v)
             change = now - self._before
-            found.append((self._taken[2], change[1:] / change[0]))
+            pairs.append((self._taken[2], change[1:] / change[0]))
             self._before[:] = now
-        for extent, values in found:
+        for extent, values in pairs:
             for reached, when, beyond in (
                 (extent.low, extent.time_low, values < extent.low),
                 (extent.high, extent.time_high, values > extent.high),

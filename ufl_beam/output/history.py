@@ -195,10 +195,10 @@ class History(Restartable):
 
         on_first(self._comm, sync)
         texts = {"content": content, "digest": digest}
-        numbers = {"counts": counts}
+        numeric = {"counts": counts}
         if self._accelerated:
-            numbers["before"] = self._before.copy()
-        return {**numbers, **{n: np.frombuffer(x, dtype=np.uint8) for n, x in texts.items()}}
+            numeric["before"] = self._before.copy()
+        return {**numeric, **{n: np.frombuffer(x, dtype=np.uint8) for n, x in texts.items()}}
 
     def _go_on(self, content: bytes, digest: bytes, length: int) -> None:
         """Open the file, or write its ``content`` anew, and cut off rows beyond ``length``."""

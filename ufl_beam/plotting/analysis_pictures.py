@@ -130,13 +130,13 @@ def draw_dynamics(dynamics: DemandCurves) -> Figure:
         axes.set(xlim=(0.0, limit), ylim=(0.0, 1.05 * im[-1]), xlabel="demand", ylabel="intensity")
         axes.legend(loc="lower right", fontsize=style.font_size(9.0))
         if fragility:
-            (other,) = others
+            (right,) = others
             x = np.linspace(0.0, 1.05 * im[-1], 200)[1:]
             label = f"median {fragility.median:.3g}, dispersion {fragility.dispersion:.2g}"
-            other.plot(fragility(x), x, color=RED, label=label)
-            other.plot(fragility.exceeded / fragility.number, im, "o", color=shade(RED))
-            other.set(xlim=(-0.03, 1.03), xlabel="probability of collapse")
-            other.legend(loc="lower right", fontsize=style.font_size(9.0))
+            right.plot(fragility(x), x, color=RED, label=label)
+            right.plot(fragility.exceeded / fragility.number, im, "o", color=shade(RED))
+            right.set(xlim=(-0.03, 1.03), xlabel="probability of collapse")
+            right.legend(loc="lower right", fontsize=style.font_size(9.0))
     return figure
 
 

@@ -356,12 +356,12 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
     """
     (axis, factors), unit = drawing.subject.line(load), drawing.outside
     largest = factors[np.abs(factors).argmax()]  # the sizes in labels are the largest ones
-    force, turns = _components(load) * largest, isinstance(load, Pressure)
+    force, follows = _components(load) * largest, isinstance(load, Pressure)
     size, moment = math.hypot(*force), load.moment * largest if isinstance(load, LineLoad) else 0.0
     shares = factors / largest if largest else factors
     lengths = positions.lengths_along(axis)
     ways: Array = np.tile(force / (size or 1.0), (len(axis), 1))  # direction at each point
-    if turns:
+    if follows:
         tangents = unit_vectors(np.gradient(axis, lengths, axis=0))
         ways = ways[:, :1] * tangents + ways[:, 1:] * normal(tangents)
 
@@ -370,42 +370,42 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
         number = max(1, round(lengths[-1] / distance))
         steps = (np.arange(number + 1) if ends else np.arange(number) + 0.5) / number
         at = steps * lengths[-1]
-        share, *way = (np.interp(at, lengths, x) for x in (shares, *ways.T))
-        return list(zip(points_along(axis, steps), share, np.column_stack(way), strict=True))
+        share, *heading = (np.interp(at, lengths, x) for x in (shares, *ways.T))
+        return list(zip(points_along(axis, steps), share, np.column_stack(heading), strict=True))
 
     if size > 0.0:
         direction, chord = force / size, axis[-1] - axis[0]
-        across = direction[1] if turns else normal(chord) @ direction / np.linalg.norm(chord)
+        across = direction[1] if follows else normal(chord) @ direction / np.linalg.norm(chord)
         if abs(across) > 0.25:
             height = (1.3 + 1.1 * size / drawing.subject.line_load) * unit
             begin = drawing.stack((load.beam, *np.round(direction, 6)), height + 0.35 * unit)
             low = begin + 0.3 * unit
             line = axis - (low + height * np.abs(shares))[:, None] * ways
             drawing.strokes["loads"] += [Stroke(line, RED, 1.2, layer=FRONT)]
-            for foot, share, way in spaced(2.0 * unit, ends=True):
+            for foot, share, heading in spaced(2.0 * unit, ends=True):
                 if height * abs(share) > 0.5 * unit:
-                    ends = foot - np.outer((low + height * abs(share), low), way)
+                    ends = foot - np.outer((low + height * abs(share), low), heading)
                     ends = ends if share > 0 else ends[::-1]
-                    drawing.strokes["loads"] += _arrow(ends, RED, unit, hollow=turns, size=0.62)
+                    drawing.strokes["loads"] += _arrow(ends, RED, unit, hollow=follows, size=0.62)
             outwards = [
-                (at, left if (across if turns else left @ direction) < 0 else -left)
+                (at, left if (across if follows else left @ direction) < 0 else -left)
                 for at, left in _normals(line)
             ]
             spots = [Candidate(at, side) for at, out in outwards for side in (out, -out)]
         else:
             aside = 0.8 * unit + drawing.stack((load.beam, "along"), 0.7 * unit)
-            for at, share, way in spaced(2.4 * unit):
+            for at, share, heading in spaced(2.4 * unit):
                 if abs(share) > 0.05:
                     half = 0.9 * unit * math.copysign(1.0, share)
-                    ends = at + aside * normal(way) + np.outer((-half, half), way)
-                    drawing.strokes["loads"] += _arrow(ends, RED, unit, hollow=turns, size=0.62)
+                    ends = at + aside * normal(heading) + np.outer((-half, half), heading)
+                    drawing.strokes["loads"] += _arrow(ends, RED, unit, hollow=follows, size=0.62)
             spots = [
                 Candidate(
-                    at, direction[0] * left if turns else normal(direction), aside + 0.3 * unit
+                    at, direction[0] * left if follows else normal(direction), aside + 0.3 * unit
                 )
                 for at, left in _normals(axis)
             ]
-        text = in_time(with_unit(size, "N/m"), load.amplitude) + ", follows" * turns
+        text = in_time(with_unit(size, "N/m"), load.amplitude) + ", follows" * follows
         drawing.write(text, RED, LOAD_LABELS, spots)
     if moment:
         for at, share, _ in spaced(3.2 * unit):

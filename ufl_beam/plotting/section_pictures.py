@@ -38,9 +38,9 @@ def draw_section(section: Section, *, ax: Axes | None = None) -> Figure:
         axes.axhline(0.0, color=shade(INK), lw=0.8, ls=(0, (8, 4)), zorder=3)
         axis = fibres.axis if fibres is not None else shape.y if shape is not None else 0.0
         core = fibres.core if fibres is not None else None
-        outer = [of for of in (shape, core) if of is not None]
-        for number, (of, color) in enumerate(zip(outer, (BLUE, ORANGE), strict=False)):
-            loops = [MM * (loop - 1j * axis) for loop in of.outlines()]
+        outer = [drawn for drawn in (shape, core) if drawn is not None]
+        for number, (drawn, color) in enumerate(zip(outer, (BLUE, ORANGE), strict=False)):
+            loops = [MM * (loop - 1j * axis) for loop in drawn.outlines()]
             paths = [Path(np.column_stack([z.real, z.imag]), closed=True) for z in loops]
             area = PathPatch(Path.make_compound_path(*paths), fc=(color, 0.2), ec=color, lw=1.5)
             axes.add_patch(area)

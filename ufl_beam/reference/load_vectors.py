@@ -260,7 +260,7 @@ class MovingForce(LoadForce):
         )
         return (after - before) / step.dt, (after - 2 * now + before) / half**2
 
-    def _of_mass(self, step: Step, q1: Array) -> tuple[Array, Array, csr_array]:
+    def _mass_forces(self, step: Step, q1: Array) -> tuple[Array, Array, csr_array]:
         """Return nodal forces of the mass, :attr:`on_nodes`, and the derivative of the forces."""
         inertia, at, slope = self._inertia, self._at(step.load_time), csr_array((self.size,) * 2)
         if inertia is None or at is None:
@@ -272,12 +272,12 @@ class MovingForce(LoadForce):
         θ, κ = self._direction(cell, shapes, slopes, self.place(step, q1)[dofs[2]])
         speed, gain = self._speeds(step)
         t, n = np.array([math.cos(θ), math.sin(θ)]), np.array([-math.sin(θ), math.cos(θ)])
-        turn = 2 * speed * (shapes @ v[dofs[2]]) + speed**2 * κ
-        force = -self._moving.mass * (a[dofs[:2]] @ shapes + gain * t + turn * n)
+        across = 2 * speed * (shapes @ v[dofs[2]]) + speed**2 * κ
+        force = -self._moving.mass * (a[dofs[:2]] @ shapes + gain * t + across * n)
         c_a, c_v = (row[0] for row in rows)
         w, half = self.scheme.load_weight, s[dofs[2]] / 2 * self.scheme.half_tangents
-        by_turn = np.outer(n, 2 * speed * c_v * (1 + half**2) * shapes + w * speed**2 * slopes)
-        by_ψ = -self._moving.mass * (by_turn + w * np.outer(gain * n - turn * t, shapes))
+        by_rotation = np.outer(n, 2 * speed * c_v * (1 + half**2) * shapes + w * speed**2 * slopes)
+        by_ψ = -self._moving.mass * (by_rotation + w * np.outer(gain * n - across * t, shapes))
         for k in (0, 1):
             for column, row_values in (
                 (dofs[k], -self._moving.mass * c_a * shapes),
@@ -311,7 +311,7 @@ class MovingForce(LoadForce):
         force, on_cells = (a + step.fraction * (b - a) for a, b in pairs)
         self._end_forces = force, on_cells
         self.force, self.on_nodes = (a + step.at * step.fraction * (b - a) for a, b in pairs)
-        force, on_nodes, slope = self._of_mass(step, q1)
+        force, on_nodes, slope = self._mass_forces(step, q1)
         self.force, self.on_nodes = self.force + force, self.on_nodes + on_nodes
         return -self.force, csr_array(-slope)
 

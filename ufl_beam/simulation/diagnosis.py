@@ -336,8 +336,8 @@ class LedgerWatch:
         connectors, laws = numbering.scene.all_connectors, list[MaterialLaw]()
         for beam in numbering.scene.beams:
             points = beam.section.section_points(beam.section.hinge)
-            if not all(of_class.elastic for of_class in points):
-                laws += [law for of_class in points for law, _ in of_class.laws]
+            if not all(class_points.elastic for class_points in points):
+                laws += [law for class_points in points for law, _ in class_points.laws]
         springs = [
             connector.law.law for connector in connectors if isinstance(connector.law, Spring)
         ]

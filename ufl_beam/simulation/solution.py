@@ -270,7 +270,7 @@ class Solution(States, Rich):
         self,
         limits: Mapping[str, float] = MappingProxyType({}),
         *,
-        of: Sequence[Member | Connector] | None = None,
+        only: Sequence[Member | Connector] | None = None,
     ) -> HingeTable:
         """Return rotations, ductility and dissipated energy of all hinges, as a table.
 
@@ -281,7 +281,7 @@ class Solution(States, Rich):
         Args:
             limits: Acceptance limits of the plastic rotation by name, in increasing order, as in
                 ``{"IO": 0.01, "LS": 0.025, "CP": 0.04}``; rad.
-            of: Beams and connectors whose hinges are listed; all by default.
+            only: Beams and connectors whose hinges are listed; all by default.
 
         Raises:
             ArgumentError: A limit is not positive or not above the limit before it, or a beam or
@@ -292,7 +292,7 @@ class Solution(States, Rich):
             >>> print(row.where, row.state)
             beam.start (0, 0) LS
         """
-        return hinges_of(self, limits, of, self.parameter)
+        return hinges_of(self, limits, only, self.parameter)
 
     def hinge_place_error(self) -> dict[Member, float]:
         """Return the largest relative error of the hinge limit, by beam with open embedded hinges.
@@ -469,13 +469,13 @@ class Opened:
                 )
         for member, number, error, place in self.hinges():
             if error > WARNED_SHIFT:
-                where, there = (
+                where, at_point = (
                     ("in the middle", "in its middle") if middle else ("at a Gauss point", "there")
                 )
                 warn(
                     f"{member.name}: the hinge of the section opened in {_cells_in_words(number)}, "
                     f"{where} of a cell. At the ends of the cell at "
-                    f"s = {place.s:.3g} the moment differs from the moment {there} by "
+                    f"s = {place.s:.3g} the moment differs from the moment {at_point} by "
                     f"{_percent(error)} of the limit, so the load at which the hinge opens has the "
                     "same uncertainty. Put a hinge exactly where it belongs, "
                     "Beam(hinges={s: law}), or use shorter cells"

@@ -89,7 +89,7 @@ class StepEquation:
         imposed = ImposedStrains(strains, subdomain, scheme, ledger, t0) if strains else None
 
         def imposed_on(some: Fields) -> CellStrains | None:
-            return None if imposed is None else imposed.of_cells(some)
+            return None if imposed is None else imposed.on_cells(some)
 
         # Terms create their ledger entries in the order of the columns of tables.  All processes
         # create the same entries, even without cells or connectors of a kind.

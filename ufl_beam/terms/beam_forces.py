@@ -246,7 +246,7 @@ class ElasticBeams(FormForces, Cells):
         work = fields.kernel(work_on_imposed_strains(element, scheme), q1)
         self._step_kernels.append(work)
         kernels = [*self._step_kernels[:-1], self._stored]
-        imposed.of_elastic(kernels, work, imposed_at_points(element))
+        imposed.enter_forms(kernels, work, imposed_at_points(element))
         if self.predicted is not None:
             fill(self.predicted, imposed=imposed.strains)
 
@@ -343,7 +343,7 @@ class InelasticBeams(Cells):
             tangents = {"forces": forces, "last_b": last_b, "last_D": last_D}
             fill(self._in_c, predicted=self.predicted, **tangents)
         if imposed is not None:
-            imposed.of_points(self._in_c)
+            imposed.enter_points(self._in_c)
             fill(self._in_c, imposed=imposed.strains)
             if self.predicted is not None:
                 fill(self.predicted, imposed=imposed.strains)

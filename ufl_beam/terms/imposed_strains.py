@@ -89,7 +89,7 @@ class CellStrains:
         """Imposed strains at the end of the step; (num_cells points, 3)."""
         return self.strains[:, :, 1].reshape(-1, 3)
 
-    def of_elastic(self, kernels: Sequence[Kernel], work: Kernel, function: fem.Function) -> None:
+    def enter_forms(self, kernels: Sequence[Kernel], work: Kernel, function: fem.Function) -> None:
         """Write the strains in each step into ``function`` in the kernels of elastic cells."""
         self._function = function
         self._kernels = [kernel for kernel in (*kernels, work) if kernel.uses(function)]
@@ -98,7 +98,7 @@ class CellStrains:
         forms = [(kernel.cells, kernel.position(function)) for kernel in self._kernels]
         fill(self.c, forms=len(forms), form=ffi.new("form_of_step[]", forms), work=work.cells)
 
-    def of_points(self, inelastic: Any) -> None:
+    def enter_points(self, inelastic: Any) -> None:
         """Subtract the strains in each step from the strains of cells with material points."""
         fill(self.c, inelastic=inelastic, before=np.zeros((self.strains.size // 6, 3)))
 
@@ -126,7 +126,7 @@ class ImposedStrains(LoadTerm):
         self.vector = struct("vector", size=0)
         self.loops = loop("subtract_vector", self.vector), None
 
-    def of_cells(self, fields: Fields) -> CellStrains | None:
+    def on_cells(self, fields: Fields) -> CellStrains | None:
         """Return the imposed strains of the cells of ``fields``; None if there are none."""
         numbering, cells = self._subdomain.numbering, self._subdomain.cells[fields.order]
         points, weights = np.polynomial.legendre.leggauss(4)
@@ -138,9 +138,9 @@ class ImposedStrains(LoadTerm):
         shares = fitted @ moments.T
         arrays = np.zeros((len(self._in_time), len(cells), len(own), 3))
         for load in self._loads:
-            of_beam = numbering.cells_of(load.beam)
-            mine = np.flatnonzero((cells >= of_beam[0]) & (cells <= of_beam[-1]))
-            s = numbering.gauss_parameters(load.beam)[cells[mine] - of_beam[0]]
+            beam_cells = numbering.cells_of(load.beam)
+            mine = np.flatnonzero((cells >= beam_cells[0]) & (cells <= beam_cells[-1]))
+            s = numbering.gauss_parameters(load.beam)[cells[mine] - beam_cells[0]]
             arrays[self._index[id(load.amplitude)], mine] += shares @ load.strains(s)
         if not arrays.any():
             return None

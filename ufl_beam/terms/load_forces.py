@@ -318,7 +318,7 @@ class Pressures(_AtDofs):
         at_points = weights[:, in_order, None] * mesh.slopes(points)[:, None, in_order]
         pairs = [_loaded_cells(load, subdomain) for load in loads]
         order: Index = np.concatenate([cells for cells, _ in pairs])
-        of_load = np.repeat(np.arange(len(loads)), [len(cells) for cells, _ in pairs])
+        load_index = np.repeat(np.arange(len(loads)), [len(cells) for cells, _ in pairs])
         shares = np.tensordot(np.concatenate([factors for _, factors in pairs]), at_points, 1)
         nodes = numbering.nodes_of_cells[subdomain.cells[order]]
         dofs = subdomain.cell_dofs[order, : 2 * nodes.shape[1]]
@@ -332,7 +332,7 @@ class Pressures(_AtDofs):
         self._each = ffi.new("double *[1]", [doubles(each)]), each
         self._c = struct(
             "pressures", loads=len(loads), cells=len(order), nodes=nodes.shape[1],
-            size=len(self.dofs), dof=self.dofs, load=of_load.astype(np.int32),
+            size=len(self.dofs), dof=self.dofs, load=load_index.astype(np.int32),
             at=np.searchsorted(self.dofs, dofs).astype(np.int32), share=shares,
             place=np.ascontiguousarray(numbering.points[nodes].transpose(0, 2, 1)), q0=self._q0,
             part=scheme.load_weight, tangential=np.array([load.tangential for load in loads]),
@@ -344,7 +344,7 @@ class Pressures(_AtDofs):
         )  # fmt: skip
         tangent = loop("add_tangent_of_pressures", self._c)
         self.loops, self._A = (loop("subtract_pressures", self._c), tangent), A
-        self.in_cells = [InCells(lambda: _Entries(self._each[0], second), lib.DENSITY, order)]
+        self.in_cells = [InCells(lambda: _NodeForces(self._each[0], second), lib.DENSITY, order)]
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return the loops that begin and accept a step."""
@@ -429,7 +429,7 @@ class MovingLoads(_AtDofs):
             )  # fmt: skip
             tangent = loop("add_tangent_of_moving_masses", self._c)
         self.loops = loop("subtract_moving_loads", self._c), tangent
-        self.in_cells = [InCells(lambda: _Entries(self._each[0], second), lib.DENSITY, order)]
+        self.in_cells = [InCells(lambda: _NodeForces(self._each[0], second), lib.DENSITY, order)]
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return the loops that begin and accept a step."""
@@ -483,7 +483,7 @@ def _in_order(mesh: Mesh) -> list[int]:
     return [first, last, *between]
 
 
-class _Entries(NamedTuple):
+class _NodeForces(NamedTuple):
     """Forces on the nodes of cells that C stores in each residual, as a compiled form does."""
 
     each: Any
