@@ -33,8 +33,8 @@ def beside(row: dict) -> str:
 
 
 def cause(message: str) -> str:
-    """Return the cause in a message: the text after its beginning, up to the next sentence."""
-    return message.split("s: ", 1)[-1].split(";")[0].split(" (")[0]
+    """Return the cause in a message: the text after its beginning, up to numbers of iterations."""
+    return message.split("s: ", 1)[-1].split("; Newton's")[0].split("; residual")[0]
 
 
 def save(rows: list[dict]) -> None:
@@ -46,14 +46,14 @@ def save(rows: list[dict]) -> None:
         "Written by `make collection`; do not edit. The models are of the kinds that users of "
         "other programs report as failures to converge: issues",
         f"of OpenSees ([688]({ISSUES}/688), [1445]({ISSUES}/1445), [1533]({ISSUES}/1533), "
-        f"[1625]({ISSUES}/1625), [1666]({ISSUES}/1666), [1669]({ISSUES}/1669)), and others. Where "
-        "a thread has numbers,",
-        "the model has them; the others state the kind only. "
+        f"[1625]({ISSUES}/1625), [1666]({ISSUES}/1666), [1669]({ISSUES}/1669)), and others.",
+        "The hinge of issue 688, and the materials and the section of issue 1625, have the numbers "
+        "of the threads; the other models are of the same kinds.",
         "Models and steps: [benchmarks/collection](../benchmarks/collection).",
         "",
         f"Of {len(rows)} models {count['end']} reach the end, {count['stops']} stop at a limit "
-        f"load, {count['FAILS']} stop without a cause in the structure, {count['WRONG']} disagree "
-        "with their confirmation.",
+        f"load, {count['FAILS']} fail for the reasons at the end of this page, {count['WRONG']} "
+        "disagree with their confirmation.",
         "",
         "Each model runs twice, with its step and with a quarter of it; *cut steps* are the steps "
         "that were divided into substeps in both runs. A model that",
