@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -41,8 +41,8 @@ class Governing(NamedTuple):
 
     low: Array
     high: Array
-    low_by: npt.NDArray[np.str_]
-    high_by: npt.NDArray[np.str_]
+    low_by: npt.NDArray[Any]
+    high_by: npt.NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -3,7 +3,7 @@
 
 Arrays may be complex, because some derivatives are computed by complex steps: use
 :func:`absolute` instead of ``abs``.  Besides these functions, laws use the
-operators + - * / and **.
+operators ``+ - * /`` and ``**``.
 
 Example:
     >>> f = ub.law_functions
