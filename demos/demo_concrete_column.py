@@ -30,7 +30,7 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Published data
 #
-# Dimensions, strengths and the axial force are those of the PEER Structural Performance Database
+# Dimensions, strengths and the axial force are from the PEER Structural Performance Database
 # (specimen 7) and of Taylor et al., NISTIR 5984, 1997, which also normalise the specimen with two
 # ends to a cantilever.  The history is the one of the database in example qfem-0034 of quoFEM
 # (SimCenter), which omits the first, elastic cycles and the last cycles up to 98 mm.  Of its 548
@@ -75,7 +75,7 @@ u, F = test[:, 0] * 1e-3, test[:, 1] * 1e3  # m, N
 # ## Section
 #
 # The stiffness of the concrete, 5000 √f_c, the strength of the confined core and the efficiency k_e
-# of the hoops are those of Mander, Priestley and Park (1988), with all bars in corners of hoops.
+# of the hoops are from Mander, Priestley and Park (1988), with all bars in corners of hoops.
 # The rest are **assumptions** of usual size, made before the computation: strain 0.002 at the
 # strength, spalling at 0.006, bars that harden by 1 % of their stiffness, a tensile strength of
 # 0.62 √f_c and a fracture energy of 100 J/m².

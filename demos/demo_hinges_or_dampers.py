@@ -219,10 +219,10 @@ ub.print_once("\npicture:", output / "hinges_or_dampers.png")
 # %% [markdown]
 # ## Verification
 #
-# The equivalent damping ratios are those by hand.  These neglect axial strains, which increase u_y
-# by 0.2 %; just above u_y this is 0.07 % of damping.  The hinges dissipate M_p times their
+# The equivalent damping ratios are the ones by hand, which neglect axial strains.  These increase
+# u_y by 0.2 %; just above u_y this is 0.07 % of damping.  The hinges dissipate M_p times their
 # accumulated rotation, the damper its force times its motion.  The portal with the damper is linear
-# but for squares of the drift, below 1e-3, so its drift is in proportion to the record.  All
+# up to squares of the drift, below 1e-3, so its drift is in proportion to the record.  All
 # columns are elastic.
 #
 # So the same damping ratio at the design displacement has different effects:

@@ -61,7 +61,7 @@ def save(rows: list[dict]) -> None:
         "difference of the histories, relative to the largest value.",
         "A load at which a model stops is compared with an independent limit analysis: linear "
         "programming on the displaced geometry, a closed form,",
-        "or an integration of the column. Times are those of the first run with building.",
+        "or an integration of the column. Times are of the first run and include building.",
         "",
         "The last column is OpenSees 3.8 in the same run, for models with a counterpart: with an "
         "imposed motion / with its displacement control. In each step it tries",

@@ -71,7 +71,7 @@ def incremental_dynamic_analysis(
 ) -> DemandCurves:
     """Simulate a structure under each ground motion, scaled to each intensity.
 
-    The analysis is that of Vamvatsikos and Cornell (Earthquake Engineering and Structural Dynamics
+    The analysis is after Vamvatsikos and Cornell (Earthquake Engineering and Structural Dynamics
     31, 2002) at given intensities.  The runs are the members of a :func:`study`: in parallel under
     ``mpirun``, each on one process, with results in a file from which the analysis continues.
 

@@ -180,7 +180,7 @@ class DemandCurves(Rich):
         ]).T  # fmt: skip
 
     def fragility(self, limit: float | None = None) -> Fragility:
-        """Fit the probability that the demand exceeds a limit, by default that of collapse.
+        """Fit the probability that the demand exceeds a limit, by default of collapse.
 
         Raises:
             ArgumentError: The limit is not positive or above the limit of collapse, or the fraction

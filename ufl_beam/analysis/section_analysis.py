@@ -168,7 +168,7 @@ def moment_curvature(
 ) -> MomentCurvature:  # fmt: skip
     """Compute the bending moment of a section under a history of curvatures and axial forces.
 
-    The material points are those of a cell of a beam in a :class:`Static` run.  The axial strain
+    A cell of a beam in a :class:`Static` run has the same material points.  The axial strain
     follows from N.  Before the first curvature, N is applied without curvature.  A step without
     equilibrium is divided.  If the section cannot bear N even in the smallest substep, the result
     ends there, with a warning.

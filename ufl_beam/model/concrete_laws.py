@@ -32,7 +32,7 @@ TINY = 1e-30
 """Strain that replaces zero in divisors and logarithms."""
 
 BEYOND = 1e30
-"""Finite number in the place of an infinite strain."""
+"""Finite number instead of an infinite strain."""
 
 NO_TENSION = LinearSoftening(0.0, 1.0)
 
@@ -167,7 +167,7 @@ class KentPark(_Concrete):
     """Concrete of Kent and Park, modified for confinement: a parabola, a line, a constant stress.
 
     The parabola begins with the stiffness C, so the strain at the strength is 2 strength/C.  After
-    Scott, Park and Priestley, ACI Journal 79 (1982).  Unloading is that of Karsan and Jirsa, J.
+    Scott, Park and Priestley, ACI Journal 79 (1982).  Unloading is after Karsan and Jirsa, J.
     Struct. Div. ASCE 95 (1969), by a straight line to the residual strain, as in ``Concrete01`` of
     OpenSees; tension softens by the fracture energy over the length of the cell.
 
@@ -292,7 +292,7 @@ class Mander(_Concrete):
     With x the compressive strain over ``strain``, the stress is strength x r/(r - 1 + x^r), where
     r = C/(C - strength/strain).  Unconfined concrete spalls: beyond 2 ``strain`` a straight line
     leads to zero at the strain ``spalling``.  After Mander, Priestley and Park, J. Struct. Eng.
-    ASCE 114 (1988).  Unloading is that of Karsan and Jirsa, ibid. 95 (1969), by a straight line to
+    ASCE 114 (1988).  Unloading is after Karsan and Jirsa, ibid. 95 (1969), by a straight line to
     the residual strain, as in ``Concrete04`` of OpenSees, instead of their curves; tension softens
     by the fracture energy over the length of the cell.
 

@@ -432,7 +432,7 @@ class IbarraKrawinkler(_DeterioratingHinge):
 class PinchingHinge(_DeterioratingHinge):
     """Peak-oriented or pinching hysteresis with the backbone of Ibarra, Medina and Krawinkler.
 
-    Backbones and deterioration are those of :class:`IbarraKrawinkler`.  Where the moment changes
+    Backbones and deterioration are as in :class:`IbarraKrawinkler`.  Where the moment changes
     its sign, at the rotation x0, the path aims at the largest rotation of earlier excursions in
     the new direction, at first the yield rotation, and at its moment M on the deteriorated
     backbone.  With ``kappa_F`` = 1 the path is straight (peak-oriented).  Otherwise it has two

@@ -123,7 +123,7 @@ class ImposedStrain(Load):
     ) -> ImposedStrain:  # fmt: skip
         """Create the strains that a tendon with a given force causes in an elastic section.
 
-        Section forces of the scene are those of the section with its tendon.  So the concrete bears
+        Section forces of the scene act on the section with its tendon.  So the concrete bears
         ``N - force``, and in a statically determinate beam without other loads N and M vanish.
 
         Args:

@@ -83,7 +83,7 @@ class MenegottoPinto(_Plastic):
     active: ClassVar[bool] = True  # energy of the Bauschinger effect is not in the stored energy
     memory: ClassVar[bool] = True
     # A branch has a start, a level σr/C, a span ε0 - εr and a sharpness R.  "turned" is the branch
-    # that begins if the strain turns at "last".  A span of zero is that of virgin steel.
+    # that begins if the strain turns at "last".  Virgin steel has a span of zero.
     variables: ClassVar[Mapping[str, float]] = {
         "plastic": 0.0, "last": 0.0, "largest": 0.0, "least": 0.0, "start": 0.0, "level": 0.0,
         "span": 0.0, "sharpness": 0.0, "turned_span": 0.0, "turned_sharpness": 0.0,
