@@ -220,9 +220,9 @@ ub.print_once("\npicture:", output / "hinges_or_dampers.png")
 # ## Verification
 #
 # The equivalent damping ratios agree with the closed form, which neglects axial strains.  These
-# increase u_y by 0.2 %; just above u_y this is 0.07 % of damping.  The hinges dissipate M_p times their
-# accumulated rotation, the damper its force times its motion.  The portal with the damper is linear
-# up to squares of the drift, below 1e-3, so its drift is in proportion to the record.  All
+# increase u_y by 0.2 %; just above u_y this is 0.07 % of damping.  The hinges dissipate M_p times
+# their accumulated rotation, the damper its force times its motion.  The portal with the damper is
+# linear up to squares of the drift, below 1e-3, so its drift is in proportion to the record.  All
 # columns are elastic.
 #
 # So the same damping ratio at the design displacement has different effects:
