@@ -51,7 +51,7 @@ ACCELERATIONS = {
         by.SHIPPED, by.SCALAR,
         (
             "compiled/simd_kernels.py", "compiled/c/assembly_simd.c", "compiled/c/assembly_simd.h",
-            "discretization/compiled_forms.py~several|LANES|lanes",
+            "discretization/compiled_forms.py~several|BATCH|batch_size",
             "discretization/function_spaces.py:Fields._coordinates_in_lanes",
         ),
     ),

@@ -113,8 +113,8 @@ def gallery():
         saved.sort(key=lambda path: ("shapes" not in path.name, path.name))
         picture = [f":img-top: {path.relative_to(DOCS)}" for path in saved[:1]]
         head = f":::{{grid-item-card}} {title}"
-        link = [f":link: demos/{script.removesuffix('.py')}", ":link-type: doc"]
-        return "\n".join([head, *link, *picture, "", topic, ":::", ""])
+        target = [f":link: demos/{script.removesuffix('.py')}", ":link-type: doc"]
+        return "\n".join([head, *target, *picture, "", topic, ":::", ""])
 
     cards = map(card, re.finditer(r"\| `(demo_\w+\.py)` \| (.*) \|", text))
     return "\n".join(["::::{grid} 1 2 3 3", ":gutter: 3", "", *cards, "::::", ""])
@@ -185,8 +185,8 @@ def where_used(app, what, name, obj, options, lines):
     """Append links to the pages and demos that use a name."""
     pages = used.get(name.removeprefix("ufl_beam."), [])
     if pages:
-        links = (f":doc:`/{page.relative_to(DOCS).with_suffix('')}`" for page in pages)
-        lines += ["", ".. rubric:: Used in", "", ", ".join(links), ""]
+        references = (f":doc:`/{page.relative_to(DOCS).with_suffix('')}`" for page in pages)
+        lines += ["", ".. rubric:: Used in", "", ", ".join(references), ""]
 
 
 def hide_colons(app, what, name, obj, options, lines):
@@ -213,19 +213,19 @@ def parsable(app, what, name, obj, options, signature, returns):
 
 def without_checks(signature):
     """Replace each ``Annotated[type, check]`` in a signature by its type."""
-    while found := re.search(r"(~?typing\.)?Annotated\[", signature):
-        commas, depth, end = [], 1, found.end()
+    while match := re.search(r"(~?typing\.)?Annotated\[", signature):
+        commas, depth, end = [], 1, match.end()
         while depth:
             depth += {"[": 1, "(": 1, "]": -1, ")": -1}.get(signature[end], 0)
             if signature[end] == "," and depth == 1:
                 commas.append(end)
             end += 1
-        kind = signature[found.end() : commas[0]]
-        signature = signature[: found.start()] + kind + signature[end:]
+        kind = signature[match.end() : commas[0]]
+        signature = signature[: match.start()] + kind + signature[end:]
     return signature
 
 
-class NamesAreLinks(SphinxTransform):
+class CrossReferences(SphinxTransform):
     """Public names in inline code lead to their pages in the reference."""
 
     default_priority = 1  # before references are resolved
@@ -233,12 +233,12 @@ class NamesAreLinks(SphinxTransform):
     def apply(self, **kwargs):
         """Wrap literals such as ``Beam`` and ``ub.simulate(...)``."""
         for literal in list(self.document.findall(nodes.literal)):
-            found = re.match(r"(?:ub\.)?(\w+)(?:$|\()", literal.astext())
+            match = re.match(r"(?:ub\.)?(\w+)(?:$|\()", literal.astext())
             inside = (nodes.reference, pending_xref, nodes.title)
-            if not found or found[1] not in NAMES or isinstance(literal.parent, inside):
+            if not match or match[1] not in NAMES or isinstance(literal.parent, inside):
                 continue
             options = {"refdomain": "py", "reftype": "obj", "refexplicit": True}
-            target = pending_xref("", reftarget=f"ufl_beam.{found[1]}", refwarn=False, **options)
+            target = pending_xref("", reftarget=f"ufl_beam.{match[1]}", refwarn=False, **options)
             target["refdoc"] = self.env.docname
             literal.replace_self(target)
             target += literal
@@ -270,6 +270,6 @@ def setup(app):
     app.connect("autodoc-process-docstring", show_colons, priority=600)
     app.connect("autodoc-process-docstring", where_used, priority=700)
     app.connect("autodoc-process-signature", parsable)
-    app.add_transform(NamesAreLinks)
+    app.add_transform(CrossReferences)
     for node, display in ((nodes.math, "inline"), (nodes.math_block, "block")):
         app.add_node(node, override=True, html=formula(display))

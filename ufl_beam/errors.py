@@ -138,13 +138,13 @@ class ConvergenceError(RuntimeError):
         self.reason = reason
 
 
-class CopiesDiffer(RuntimeError):
+class ProcessesDiffer(RuntimeError):
     """Error of redundant computations of a small scene: motions differ, or one process failed.
 
     Example:
         >>> try:
         ...     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05)
-        ... except ub.CopiesDiffer as error:
+        ... except ub.ProcessesDiffer as error:
         ...     print("Does a function of the scene depend on the rank?", error)
     """
 

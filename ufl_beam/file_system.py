@@ -83,7 +83,7 @@ class Lock:
         self._file.flush()
         return ""
 
-    def release(self) -> None:
+    def unlock(self) -> None:
         """Release the lock, if it was acquired, and remove the lock file."""
         if self._file is not None:
             self.path.unlink(missing_ok=True)

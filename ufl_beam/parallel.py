@@ -28,7 +28,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ArgumentError, CopiesDiffer, StepFailed, shorten, warn
+from ufl_beam.errors import ArgumentError, ProcessesDiffer, StepFailed, shorten, warn
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # of tqdm in a notebook without ipywidgets
@@ -295,7 +295,7 @@ def sharing(comm: MPI.Intracomm, cells: int) -> MPI.Intracomm:
     return comm if cells >= comm.size * SMALLEST_SUBDOMAIN else MPI.COMM_SELF
 
 
-class Copies:
+class ProcessComparison:
     """Redundant computation of a small scene, once on each process.
 
     If a user's function draws random numbers or reads a clock, solutions may differ between
@@ -355,7 +355,7 @@ class Copies:
         self._compared = self._steps
 
     def _complete(self) -> None:
-        """Complete a pending comparison; raise :class:`CopiesDiffer` if states differ."""
+        """Complete a pending comparison; raise :class:`ProcessesDiffer` if states differ."""
         if self._pending is None:
             return
         (request, ends), self._pending = self._pending, None
@@ -376,7 +376,7 @@ class Copies:
             what = "find different motions"
             if failed:
                 what = "continue differently: one of them has failed"
-            raise CopiesDiffer(
+            raise ProcessesDiffer(
                 f"the {self._comm.size} processes, each of which computes this small scene, "
                 f"{what}, seen by process {self._comm.rank} after {self._steps} steps. Something "
                 "in the scene differs between them: random numbers without a seed, a clock, the "

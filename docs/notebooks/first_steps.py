@@ -120,7 +120,7 @@ def drifts(run):
     return np.interp(instants, run.times, run.displacement(left.end)[:, 0])
 
 
-found = ub.tradeoff(
+tradeoff = ub.tradeoff(
     scene,
     {"drift": drifts},
     scheme=ub.EnergyMomentum(),
@@ -128,10 +128,10 @@ found = ub.tradeoff(
     dt=period / 20,
     tolerance={"drift": 1e-3},  # m
 )
-found
+tradeoff
 
 # %% [markdown]
 # The recommended setting is a set of arguments for `simulate`:
 
 # %%
-ub.simulate(scene, **found.recommended)
+ub.simulate(scene, **tradeoff.recommended)

@@ -53,7 +53,7 @@ ELSEWHERE = {
     },
     "many runs": {"Study", "TradeoffError", "study", "tradeoff"},
     "other geometry of ordinary scenes": {"imperfect"},
-    "errors and words": {"ConvergenceError", "CopiesDiffer", "ModelWarning", "ArgumentError",
+    "errors and words": {"ConvergenceError", "ProcessesDiffer", "ModelWarning", "ArgumentError",
         "ArgumentTypeError", "ModelError", "print_once"},
     "pictures of what is not in every combination, or of a second each": {
         "Camera", "animate", "picture", "render",

@@ -60,7 +60,7 @@ def test_a_second_run_is_refused_before_it_touches_a_file(shared_path):
             run(shared_path, t1=t1)
         assert contents() == before
     MPI.COMM_WORLD.barrier()
-    first.release()
+    first.unlock()
     assert is_free(shared_path)
     run(shared_path, t1=0.1)
 
@@ -103,7 +103,7 @@ def test_the_lock_ends_with_its_process(tmp_path):
         process.kill()
     assert lock.path.exists()
     assert lock.acquire() == ""
-    lock.release()
+    lock.unlock()
     assert not lock.path.exists()
 
 

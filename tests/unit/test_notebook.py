@@ -24,7 +24,7 @@ def test_the_notebook_runs_as_a_script(tmp_path, monkeypatch):
         pytest.skip(str(missing))
     assert names["solution"].energy.worst < 1e-9  # the ledger closes
     assert names["damaged"].energy["hinges"][-1] > 1e3  # J
-    assert names["found"].ratio(names["found"].best) <= 1  # the tolerance is met
+    assert names["tradeoff"].ratio(names["tradeoff"].best) <= 1  # the tolerance is met
     assert (tmp_path / "first_steps.gif").stat().st_size > 1000
 
 
@@ -46,7 +46,7 @@ def shown(outputs):
     return result.data
 
 
-@pytest.mark.parametrize("name", ["scene", "modes", "solution", "damaged", "found"])
+@pytest.mark.parametrize("name", ["scene", "modes", "solution", "damaged", "tradeoff"])
 def test_models_and_results_have_a_page(cells, name):
     data = shown(cells[name])
     assert data["text/plain"].startswith("<")

@@ -36,7 +36,7 @@ def test_scenes_that_differ_between_processes_end_with_words(outcomes):
             continue
         seen += 1
         for outcome in both:
-            assert outcome.startswith("CopiesDiffer: the 2 processes"), (function, name, outcome)
+            assert outcome.startswith("ProcessesDiffer: the 2 processes"), (function, name, outcome)
             assert "find different motions" in outcome
             assert "random numbers without a seed" in outcome
     assert seen == 2 * 6
@@ -60,7 +60,7 @@ def test_a_process_that_fails_alone_ends_the_others(outcomes):
     """The one keeps its own exception; the other does not wait for it."""
     for name in ("equal steps", "static", "adaptive", "recorded", "stepped"):
         first, second = outcomes["fails", name]
-        assert first.startswith("CopiesDiffer: the 2 processes")
+        assert first.startswith("ProcessesDiffer: the 2 processes")
         assert "one of them has failed" in first
         assert second == "RuntimeError: user"
 

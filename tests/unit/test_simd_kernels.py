@@ -28,7 +28,7 @@ def pointwise(expression, values, *, several=False):
     f, z = fem.Function(space), ufl.TestFunction(space)
     form = expression(f) * z * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})
     x = cell_coordinates(mesh)[:, :, :2]
-    interleaved = [in_batches(x, simd_kernels.LANES)] if several else []
+    interleaved = [in_batches(x, simd_kernels.BATCH)] if several else []
     kernel = Kernel(form, f, np.asarray(space.dofmap.list), x, *interleaved)
     by_cell = np.empty(n)
     by_cell[np.asarray(space.dofmap.list)[:, 0]] = values
@@ -41,7 +41,7 @@ def both(expression, values):
     one, several = np.zeros((2, len(q)))
     kernel.add(q, one)
     kernel, _ = pointwise(expression, values, several=True)
-    assert kernel.cells.lanes > 1
+    assert kernel.cells.batch_size > 1
     kernel.add(q, several)
     return one, several
 
@@ -72,7 +72,7 @@ def test_quotients_are_right_to_the_last_digit(flag):
         "{ for (int i = 0; i < n; i += LANES) *(lanes *)(c + i) = "
         "quotient(*(lanes *)(a + i), *(lanes *)(b + i), 1 / *(lanes *)(b + i)); }"
     )
-    head = f"#define LANES {simd_kernels.LANES}\n{jit.text('assembly_simd.h')}"
+    head = f"#define LANES {simd_kernels.BATCH}\n{jit.text('assembly_simd.h')}"
     source = "\n".join([jit.HEADERS, head, divide, loop])
     flags = [*simd_kernels.FLAGS, flag]
     module = jit.compiled(
@@ -123,7 +123,7 @@ def test_expressions_hold_for_any_number_of_cells(expression, cells):
 )
 def test_what_vectors_cannot_is_computed_cell_by_cell(expression, meant):
     kernel, q = pointwise(expression, np.linspace(-1.0, 2.0, 5), several=True)
-    assert kernel.cells.lanes == 1
+    assert kernel.cells.batch_size == 1
     values = np.zeros(len(q))
     kernel.add(q, values)
     assert np.allclose(values, meant(q), rtol=1e-14)
@@ -177,7 +177,7 @@ def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
     caplog.set_level("INFO", logger="ufl_beam")
     for told in (["WARNING", "INFO"], ["INFO"]):
         kernel, q = pointwise(ufl.sin, np.linspace(0.1, 1.0, 5), several=True)
-        assert kernel.cells.lanes == 1
+        assert kernel.cells.batch_size == 1
         assert [record.levelname for record in caplog.records] == told
         assert "entries differ from FFCx's kernel" in caplog.text
         values = np.zeros(len(q))
@@ -190,13 +190,13 @@ def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
 @pytest.mark.serial
 @pytest.mark.parametrize(
     ("condition", "lanes"),
-    [(CONDITIONS["nested"], simd_kernels.LANES), (lambda x: ufl.lt(ufl.as_ufl(1.0), 2.0), 1)],
+    [(CONDITIONS["nested"], simd_kernels.BATCH), (lambda x: ufl.lt(ufl.as_ufl(1.0), 2.0), 1)],
     ids=["logical", "known"],
 )
 def test_the_compiler_says_nothing(fresh, capfd, condition, lanes):
     values = np.linspace(0, 1, 9)
     kernel, _ = pointwise(lambda x: ufl.conditional(condition(x), x, -1.0), values, several=True)
-    assert kernel.cells.lanes == lanes
+    assert kernel.cells.batch_size == lanes
     assert "error" not in capfd.readouterr().err
 
 
@@ -209,7 +209,7 @@ def test_the_check_is_made_once(fresh, monkeypatch):
     )
     for _ in range(2):
         kernel, _ = pointwise(ufl.cos, np.ones(2), several=True)
-        assert kernel.cells.lanes > 1
+        assert kernel.cells.batch_size > 1
         simd_kernels.interleaved.cache_clear()
     assert len(calls) == 1
 
@@ -222,7 +222,7 @@ def test_what_is_slower_is_said(fresh, caplog, monkeypatch):
     pointwise(ufl.sin, np.ones(2))
     monkeypatch.setenv("CC", "no-such-compiler")
     kernel, _ = pointwise(ufl.sin, np.ones(2), several=True)
-    assert kernel.cells.lanes == 1
+    assert kernel.cells.batch_size == 1
     assert "which is slower: ufl_beam_lanes cannot be compiled" in caplog.text
 
 
@@ -304,7 +304,7 @@ def test_kernels_of_the_hot_loop(run):
     compared = 0
     for term in simulation.terms:
         for name, kernel in kernels(term).items():
-            if kernel.cells.lanes == 1:
+            if kernel.cells.batch_size == 1:
                 assert name == "_first"  # once a step is not often
                 continue
             entries = len(kernel._dofs) * kernel._entries

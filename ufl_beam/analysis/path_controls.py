@@ -115,7 +115,7 @@ class PathCorrector:
         motion = direction[:-1]
         now, size = self.dissipation(q), self.size(motion)
         active = any(
-            group.response.slip_direction.any() for group in self.simulation.connector_terms
+            group.response.flow_direction.any() for group in self.simulation.connector_terms
         )
         flows = self.subdomain.total(float(active))
         for doubled in range(MOST_DOUBLINGS if (now > 0 or flows) and size > 0 else 0):

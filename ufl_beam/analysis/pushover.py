@@ -234,14 +234,14 @@ def _main_mode(
     axis: int,
 ) -> tuple[Shape, float]:
     """Return the shape and the period (s) of the mode with the largest effective mass."""
-    found = modes(replace(scene, damping=()), MODES, at=start, mesh=mesh)
+    shapes = modes(replace(scene, damping=()), MODES, at=start, mesh=mesh)
     m = np.array([mass for _, mass in masses])
     effective = []
-    for k in range(len(found)):
-        motion = np.array([found.shape(k, at)[:2].real for at, _ in masses])
+    for k in range(len(shapes)):
+        motion = np.array([shapes.shape(k, at)[:2].real for at, _ in masses])
         effective.append(float((m @ motion[:, axis]) ** 2 / (m @ motion**2).sum()))
     k = int(np.argmax(effective))
-    return lambda at: float(found.shape(k, at)[axis].real), 1.0 / float(found.frequencies[k])
+    return lambda at: float(shapes.shape(k, at)[axis].real), 1.0 / float(shapes.frequencies[k])
 
 
 def _shape(
@@ -337,12 +337,12 @@ def _follow(
 
 def _at_limit(path: Path) -> list[Place]:
     """Return the closed hinges whose moments nearly reach their limits at the end of a path."""
-    found = []
+    hinges = []
     for hinge in path.scene.hinges:
         limit, state = float(law_of(hinge).limit), path.connector(hinge)
         if state.dissipated[-1] == 0.0 and abs(state.force[-1]) >= NAMED_FROM * limit:
-            found.append(place_of(hinge))
-    return found
+            hinges.append(place_of(hinge))
+    return hinges
 
 
 def _formations(events: Events, path: Path, displacement: Array) -> Any:

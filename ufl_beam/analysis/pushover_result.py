@@ -186,7 +186,7 @@ class Pushover(Rich):
         inside = d < end
         return np.append(d[inside], end), np.append(V[inside], np.interp(end, d, V))
 
-    def _demand(self, method: str, displacement: float, *rest: Any) -> TargetDisplacement:
+    def _target(self, method: str, displacement: float, *rest: Any) -> TargetDisplacement:
         reached = np.abs(self.displacement) >= displacement
         if not reached.any():
             warn(
@@ -233,7 +233,7 @@ class Pushover(Rich):
         if period < corner and ratio > 1.0:
             demand = elastic / ratio * (1.0 + (ratio - 1.0) * corner / period)
             demand = min(demand, 3.0 * elastic)
-        return self._demand(
+        return self._target(
             "N2", self.gamma * demand, yields, strength, period, acceleration, ratio,
             {"Gamma": self.gamma},
         )  # fmt: skip
@@ -276,7 +276,7 @@ class Pushover(Rich):
             if abs(end - before) <= SAME * end:
                 break
         factors = {"C0": self.gamma, "C1": c1, "C2": c2, "Cm": fraction}
-        return self._demand(
+        return self._target(
             "ASCE 41", demand, strength / stiffness, strength, period, acceleration, ratio, factors
         )
 

@@ -475,10 +475,10 @@ class _Search:
                 notes[-1] += "; begin with coarser steps and cells"
         return notes
 
-    def ratio(self, run: Run, other: Run | None = None) -> float:
+    def ratio(self, run: Run, reference: Run | None = None) -> float:
         """Return the largest distance from the limits, or another run, divided by ``units``."""
         limits = {name: convergence.limit for name, convergence in self.convergence.items()}
-        goal = other.values if other else limits
+        goal = reference.values if reference else limits
         return max(size(run.values[name] - goal[name]) / unit for name, unit in self.units.items())
 
     # -- runs ----------------------------------------------------------------------------------

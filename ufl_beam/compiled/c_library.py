@@ -39,7 +39,7 @@ extern "Python" void curve_in_python(void *handle, double s, double step, double
 extern "Python" double time_in_python(void *handle, double t);
 extern "Python" void phase_in_python(void *handle, const time_step *step, const double *q1,
                                      const double *s);
-extern "Python" int numbers_in_python(void *handle, scheme_numbers *numbers);
+extern "Python" int coefficients_in_python(void *handle, scheme_numbers *numbers);
 extern "Python" void agree_in_python(void *handle, int number, const int *how, double *values);
 extern "Python" int solve_in_python(void *handle, int anew);
 extern "Python" void find_conjugates_in_python(void *handle, const double *q);

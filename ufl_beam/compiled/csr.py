@@ -75,21 +75,21 @@ class Csr:
             raise ValueError("the matrix has no such entry")
         return positions
 
-    def blocks(self, dofs: Index, lanes: int) -> Index:
+    def blocks(self, dofs: Index, batch_size: int) -> Index:
         """Find the entries of all pairs of ``dofs`` (int32) of each cell; the entries must exist.
 
-        The result has the shape (num_batches, pairs, lanes), see :func:`in_batches`.  If the
+        The result has the shape (num_batches, pairs, batch_size), see :func:`in_batches`.  If the
         matrix is :meth:`narrow`, the results are positions in the row (uint8), else in
         :attr:`data` (int32).
         """
         cells, cell_size = dofs.shape
         narrow = self.narrow()
-        shape = (-(-cells // lanes), cell_size**2, lanes)
+        shape = (-(-cells // batch_size), cell_size**2, batch_size)
         positions = np.empty(shape, dtype=np.uint8 if narrow else np.int32)
         place = ffi.NULL if narrow else integers(positions)
         column = ffi.from_buffer("uint8_t[]", positions) if narrow else ffi.NULL
         structure = self.size, integers(self.indptr), integers(self.indices)
-        sizes = cells, cell_size, lanes
+        sizes = cells, cell_size, batch_size
         if not lib.find_blocks(*structure, *sizes, integers(dofs), place, column):
             raise ValueError("the matrix has no such entry")
         return positions

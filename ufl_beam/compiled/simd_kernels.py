@@ -35,7 +35,7 @@ LOGGER = logging.getLogger("ufl_beam")
 
 _WIDE = {"AVX512F", "X86_V4"} & {*PROCESSOR.get("baseline", ()), *PROCESSOR.get("found", ())}
 
-LANES = 8 if _WIDE else 4
+BATCH = 8 if _WIDE else 4
 """Number of cells that are computed at once, one for each number in a vector of AVX-512 or AVX.
 For other processors, compilers split the vectors."""
 
@@ -106,12 +106,12 @@ def written(source: Path) -> str:
     raise Refused(f"{source} has no kernel")
 
 
-def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
-    """Arrange ``rows``, one per cell, in batches (num_batches, numbers, lanes), see loops.h."""
+def in_batches(rows: npt.NDArray[Any], batch_size: int) -> npt.NDArray[Any]:
+    """Arrange ``rows``, one per cell, in batches (num_batches, numbers, batch size)."""
     rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
-    if missing := -len(rows) % lanes:
+    if missing := -len(rows) % batch_size:
         rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
-    batches = rows.reshape(len(rows) // lanes, lanes, rows.shape[1])
+    batches = rows.reshape(len(rows) // batch_size, batch_size, rows.shape[1])
     return np.ascontiguousarray(batches.transpose(0, 2, 1))
 
 
@@ -131,9 +131,12 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
     random, (entries, width, constants) = np.random.default_rng(0), sizes
     at, wrong = partial(module.ffi.from_buffer, "double[]"), 0
     for signs in ([1.0], [1.0], [-1.0, 1.0], [-1.0, 1.0]):
-        w = random.uniform(0.1, 1.0, (width, LANES)) * random.choice(signs, (width, LANES))
-        x = np.array([[0.0, 0.0, 0.0, 1.0, 0.5, 0.0]]).T + random.uniform(-0.1, 0.1, (6, LANES))
-        c, (single, several) = random.uniform(0.1, 0.9, constants), np.zeros((2, entries, LANES))
+        w = random.uniform(0.1, 1.0, (width, BATCH)) * random.choice(signs, (width, BATCH))
+        x = np.array([[0.0, 0.0, 0.0, 1.0, 0.5, 0.0]]).T + random.uniform(-0.1, 0.1, (6, BATCH))
+        c, (single, several) = (
+            random.uniform(0.1, 0.9, constants),
+            np.zeros((2, entries, BATCH)),
+        )
         address = module.ffi.cast("void *", kernel)
         module.lib.compute_both(address, *map(at, (w, c, x, single, several)))
         scale = np.abs(single).max(axis=0, where=np.isfinite(single), initial=0.0)
@@ -141,7 +144,7 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
             good = (np.abs(several - single) <= AGREEMENT * scale) | (several == single)
         wrong += np.sum(~good & ~(np.isnan(single) & np.isnan(several)))
     if wrong:
-        why = f"{wrong} of {4 * LANES * entries} entries differ from FFCx's kernel"
+        why = f"{wrong} of {4 * BATCH * entries} entries differ from FFCx's kernel"
         LOGGER.warning("a vector kernel, from code of %s, is wrong: %s", VERSIONS, why)
         raise Refused(why)
 
@@ -156,7 +159,7 @@ def interleaved(
     unknown among the coefficients, and the number of unknowns.
     """
     names = ("LANES", "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "AT", "UNKNOWNS")
-    values = LANES, math.isqrt(sizes[0]), *sizes, *unknowns
+    values = BATCH, math.isqrt(sizes[0]), *sizes, *unknowns
     defined = [f"#define {x} {n}" for x, n in zip(names, values, strict=True)]
     head = "\n".join([HEADERS, DECLARATIONS, *defined, text("assembly_simd.h")])
     loop = text("assembly_simd.c")

@@ -27,7 +27,7 @@ from ufl_beam.caches import cached_forms as cached_forms
 from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib, view_pointer
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
-from ufl_beam.compiled.simd_kernels import LANES, in_batches, interleaved
+from ufl_beam.compiled.simd_kernels import BATCH, in_batches, interleaved
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
 
@@ -89,13 +89,13 @@ def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
     Batches of cells with equal positions share a pattern.  With cells of degree 1, patterns whose
     entries are adjacent in each row of the matrix come first.
     """
-    batches, entries, lanes = places.shape
-    rows = places.reshape(batches, entries * lanes).view(f"V{entries * lanes}")[:, 0]
+    batches, entries, batch_size = places.shape
+    rows = places.reshape(batches, entries * batch_size).view(f"V{entries * batch_size}")[:, 0]
     _, first, has = np.unique(rows, return_index=True, return_inverse=True)
     distinct = places[first]
     in_rows = np.zeros(len(first), dtype=bool)
     if entries == 36:
-        by_node = distinct.reshape(len(distinct), 6, 6, lanes)[:, :, [0, 2, 4, 1, 3, 5]]
+        by_node = distinct.reshape(len(distinct), 6, 6, batch_size)[:, :, [0, 2, 4, 1, 3, 5]]
         in_rows = (np.diff(by_node, axis=2) == 1).all(axis=(1, 2, 3))
     order = np.argsort(~in_rows, kind="stable")
     number = np.empty(len(first), dtype=np.int32)
@@ -118,10 +118,10 @@ class Kernel:
             need not depend on it.
         cell_dofs: Degrees of freedom of the unknown; shape (num_cells, dofs per cell).
         coordinates: Vertices of the cells; shape (num_cells, 2, 2); m.
-        several: ``coordinates`` in batches of :data:`LANES`, see :func:`in_batches`; None: no SIMD.
+        several: ``coordinates`` in batches of :data:`BATCH`, by :func:`in_batches`; None: no SIMD.
 
     Attributes:
-        lanes: Number of cells that are computed at once with SIMD; else 1.
+        batch_size: Number of cells that are computed at once with SIMD; else 1.
     """
 
     def __init__(
@@ -129,17 +129,17 @@ class Kernel:
         several: Array | None = None,
     ) -> None:  # fmt: skip
         self._form = ready = prepared(form)
-        self._entries = ready.entries
+        self._num_values = ready.entries
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
         num_cells = len(cell_dofs)
         spaces = [argument.ufl_function_space() for argument in form.arguments()]
         self._is_functional, self._is_vector = not spaces, len(spaces) == 1
         self._to_dofs = self._is_vector and spaces[0] is unknown.function_space
-        per_cell = self._dofs.shape[1] if self._to_dofs else self._entries
+        per_cell = self._dofs.shape[1] if self._to_dofs else self._num_values
         expected = (0, per_cell, (num_cells, 2, 2))
-        if expected != (num_cells % len(ready.packed), self._entries, coordinates.shape):
+        if expected != (num_cells % len(ready.packed), self._num_values, coordinates.shape):
             raise ValueError(
-                f"a form with {self._entries} entries of a cell, stated on {len(ready.packed)} "
+                f"a form with {self._num_values} entries of a cell, stated on {len(ready.packed)} "
                 f"cells, got rows of shape {(num_cells, per_cell)} and coordinates of shape "
                 f"{coordinates.shape}"
             )
@@ -157,37 +157,38 @@ class Kernel:
             }
         address = None
         if several is not None:
-            sizes = (self._entries, ready.packed.shape[1], len(ready.constants))
+            sizes = (self._num_values, ready.packed.shape[1], len(ready.constants))
             tabulate = int(ffi.cast("intptr_t", ready.tabulate))
             address = interleaved(ready.source, tabulate, sizes, (self._at, self._unknowns))
         if several is None or address is None:
-            self.lanes, self._in_lanes = 1, ffi.NULL
+            self.batch_size, self._tabulate_batch = 1, ffi.NULL
             self._coordinates = in_batches(coordinates, 1)
         else:
-            self.lanes, self._in_lanes = LANES, ffi.cast("in_lanes *", address)
+            self.batch_size = BATCH
+            self._tabulate_batch = ffi.cast("tabulate_batch *", address)
             self._coordinates = several
 
     @cached_property
     def _packed(self) -> Array:
         """Values of all coefficients except the unknown in the cells, in batches."""
         values = self._values
-        return in_batches(np.tile(values, (len(self._dofs) // len(values), 1)), self.lanes)
+        return in_batches(np.tile(values, (len(self._dofs) // len(values), 1)), self.batch_size)
 
     @cached_property
     def _places(self) -> dict[str, Any]:
         """Fields of the struct ``cells`` with the positions to which entries are added."""
-        shape = len(self._dofs), self._entries
+        shape = len(self._dofs), self._num_values
         if self._to_dofs or self._is_functional:
             return {}
         if self._matrix is not None:
-            positions = self._matrix.blocks(self._dofs, self.lanes)
+            positions = self._matrix.blocks(self._dofs, self.batch_size)
             if positions.dtype == np.int32:
                 return {"row": positions}
             return {"begin": self._matrix.indptr, **patterns(positions)}
         places = np.zeros(shape, dtype=np.int32)
         if self._is_vector:
             places += np.arange(places.size, dtype=np.int32).reshape(shape)
-        return {"row": in_batches(places, self.lanes)}
+        return {"row": in_batches(places, self.batch_size)}
 
     @cached_property
     def cells(self) -> Any:
@@ -196,10 +197,10 @@ class Kernel:
         packed, coefficients = self._packed, self._form.packed.shape[1]
         return fill(
             ffi.new("cells *"),
-            tabulate=self._form.tabulate, several=self._in_lanes, lanes=self.lanes,
+            tabulate=self._form.tabulate, several=self._tabulate_batch, batch_size=self.batch_size,
             number=number, of_cell=cell_size, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
-            width=packed.strides[0] // (packed.itemsize * self.lanes), w=view_pointer(packed),
-            constants=self._form.constants, coordinates=self._coordinates, rows=self._entries,
+            width=packed.strides[0] // (packed.itemsize * self.batch_size), w=view_pointer(packed),
+            constants=self._form.constants, coordinates=self._coordinates, rows=self._num_values,
             coefficients=coefficients, all=np.empty(coefficients),
             is_functional=self._is_functional, **self._places,
         )  # fmt: skip
@@ -221,7 +222,7 @@ class Kernel:
         """Set the values of ``function`` in the cells; (num_cells, dofs per cell)."""
         columns = self._columns[id(function)]
         rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
-        self._packed[:, columns] = in_batches(rows, self.lanes)
+        self._packed[:, columns] = in_batches(rows, self.batch_size)
 
     def reuse_values(self, source: Kernel) -> bool:
         """Use the packed values of ``source``, if these contain this form's values as one block.
@@ -231,7 +232,11 @@ class Kernel:
         """
         mine, others = self._columns, source._columns
         shifts = {others[f].start - mine[f].start for f in mine.keys() & others.keys()}
-        if not mine.keys() <= others.keys() or len(shifts) != 1 or self.lanes != source.lanes:
+        if (
+            not mine.keys() <= others.keys()
+            or len(shifts) != 1
+            or self.batch_size != source.batch_size
+        ):
             return False
         (first,) = shifts
         self._packed = source._packed[:, first : first + self._values.shape[1]]
@@ -240,8 +245,10 @@ class Kernel:
     def place(self, A: Csr) -> None:
         """Let :meth:`add` of a bilinear form add to entries of ``A`` from now on."""
         per_cell = self._dofs.shape[1]
-        if self._entries != per_cell**2:
-            raise ValueError(f"{self._entries} entries of a cell are no matrix of {per_cell} rows")
+        if self._num_values != per_cell**2:
+            raise ValueError(
+                f"{self._num_values} entries of a cell are no matrix of {per_cell} rows"
+            )
         self._matrix = A
 
     def keep_entries(self) -> tuple[Any, int, Array]:
@@ -253,10 +260,10 @@ class Kernel:
             A pointer to the address of the array of entries; the number of cells in a batch, see
             :func:`in_batches`; and a second array, by which C may replace the first.
         """
-        batches = -(-len(self._dofs) // self.lanes)
-        each, second = np.zeros((2, batches, self._entries, self.lanes))
+        batches = -(-len(self._dofs) // self.batch_size)
+        each, second = np.zeros((2, batches, self._num_values, self.batch_size))
         fill(self.cells, each=each)
-        return ffi.addressof(self.cells, "each"), self.lanes, second
+        return ffi.addressof(self.cells, "each"), self.batch_size, second
 
     def add(self, q: Array, b: Array) -> None:
         """Add the form at the unknown ``q`` to ``b``, a vector or the entries of a matrix."""
@@ -268,7 +275,7 @@ class Kernel:
         return value
 
 
-def _without_copies(expressions: Sequence[Expr]) -> tuple[Expr, ...]:
+def _with_shared_nodes(expressions: Sequence[Expr]) -> tuple[Expr, ...]:
     """Return expressions in which equal nodes are the same object.
 
     The time in which UFL compares two equal nodes grows exponentially with their depth.
@@ -310,7 +317,7 @@ class Pointwise:
 
     def compile(self, *outputs: Expr) -> Any:
         """Compile a C function of the outputs, valid as long as this object exists."""
-        outputs = _without_copies(outputs)
+        outputs = _with_shared_nodes(outputs)
         z = ufl.TestFunction(self._values(len(outputs)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
         form, _ = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)

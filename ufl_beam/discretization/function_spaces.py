@@ -17,7 +17,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, zero_matrix
 from ufl_beam.compiled.jit import compiled_form
-from ufl_beam.compiled.simd_kernels import LANES, in_batches
+from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
@@ -161,8 +161,8 @@ class Fields:
             several: Whether to compute several cells at once, if possible.
         """
         dofs = self.cell_dofs if cell_dofs is None else cell_dofs
-        lanes = self._coordinates_in_lanes if several else None
-        kernel = Kernel(form, unknown, dofs, self._coordinates(), lanes)
+        batched = self._batched_coordinates if several else None
+        kernel = Kernel(form, unknown, dofs, self._coordinates(), batched)
         for function in (self.element.stiffness, self.element.inertia):
             if kernel.uses(function):
                 kernel.put(function, self.section_values(function))
@@ -170,10 +170,10 @@ class Fields:
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
         """Compile a virtual work and its derivative, added to ``A``, with the same coefficients."""
-        form, lanes = derivative(work, q1), self._coordinates_in_lanes
+        form, batched = derivative(work, q1), self._batched_coordinates
         force = self.kernel(work, q1)
-        tangent = Kernel(form, q1, self.cell_dofs, self._coordinates(), lanes)
-        if force.lanes != tangent.lanes:  # otherwise they could not share packed coefficients
+        tangent = Kernel(form, q1, self.cell_dofs, self._coordinates(), batched)
+        if force.batch_size != tangent.batch_size:  # they could not share coefficients
             force = self.kernel(work, q1, several=False)
             tangent = Kernel(form, q1, self.cell_dofs, self._coordinates())
         if not tangent.reuse_values(force):
@@ -188,8 +188,8 @@ class Fields:
         return np.asarray(numbering.points.take(vertices, axis=0))
 
     @cached_property
-    def _coordinates_in_lanes(self) -> Array:
-        return in_batches(self._coordinates(), LANES)
+    def _batched_coordinates(self) -> Array:
+        return in_batches(self._coordinates(), BATCH)
 
     def matrix(self) -> Csr:
         """Create a zero matrix for the degrees of freedom of this process."""

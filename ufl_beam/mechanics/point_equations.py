@@ -72,7 +72,7 @@ class End(NamedTuple):
 @lru_cache(maxsize=128)
 def curved(kind: Kind) -> bool:
     """Return whether stresses are nonlinear in strains, at constant variables or by memory."""
-    if kind.law.memory:
+    if kind.law.records_path:
         return True
 
     def symbol(_: str) -> Expr:
@@ -205,7 +205,7 @@ class PointEquations:
 
         at_θ, old = self.changes(at), self.state(at)
         changes = State({name: getattr(at_θ, name) * (1 / θ) for name in self._names})
-        if law.memory:
+        if law.records_path:
             changes = State(law.increments(argument(e1), old, at["dt"]))
         new = _plus(old, changes)
         before, now = (law.as_tuple(law.stress(argument(e), z)) for e, z in ((e0, old), (e1, new)))
@@ -213,7 +213,7 @@ class PointEquations:
         stored = elastic - law.elastic_energy(argument(e0), old)
         stored = stored + hardening - law.hardening_energy(old)
         work = sum(σ * e for σ, e in zip(self.stress(at), de, strict=True))
-        if law.memory:
+        if law.records_path:
             # The stresses at both ends are exact.  By their mean, ``worked`` does not depend on the
             # scheme; ``nonlinear_loss`` is the rest of the work of the stress at t_n+θ.
             lost = relaxed = zero

@@ -52,7 +52,7 @@ class _Concrete(Record, MaterialLaw):
     """
 
     tension: SofteningLaw
-    memory: ClassVar[bool] = True
+    records_path: ClassVar[bool] = True
     prestressed: ClassVar[bool] = False
     variables: ClassVar[Mapping[str, float]] = {"crushed": 0.0, "cracked": 0.0}
 
@@ -85,7 +85,7 @@ class _Concrete(Record, MaterialLaw):
         virgin = below(elastic, TINY)
         return crushed - elastic, where(virgin, self.C, stress / where(virgin, 1.0, elastic))
 
-    def _opening(self, cracked: Values) -> tuple[Values, Values]:
+    def _crack_opening(self, cracked: Values) -> tuple[Values, Values]:
         """Return the opening of a crack at a largest tensile strain, and its derivative; m.
 
         The factor deducts the elastic energy at the limit from the fracture energy.
@@ -96,9 +96,9 @@ class _Concrete(Record, MaterialLaw):
 
     def _secant(self, cracked: Values) -> Values:
         """Return the stiffness in tension after a largest tensile strain."""
-        opening, _ = self._opening(cracked)
+        width, _ = self._crack_opening(cracked)
         cracks = below(self.tension.limit / self.C, cracked)
-        traction = self.tension.traction(opening)
+        traction = self.tension.traction(width)
         return where(cracks, traction / larger(cracked, TINY), self.C)
 
     def stress(self, strain: Values, state: State) -> Values:
@@ -127,7 +127,7 @@ class _Concrete(Record, MaterialLaw):
             return (self.backbone(crushed) * elastic + self._secant(cracked) * cracked**2) / 2
 
         limit = self.tension.limit / self.C
-        (before, factor), (after, _) = self._opening(narrow), self._opening(wide)
+        (before, factor), (after, _) = self._crack_opening(narrow), self._crack_opening(wide)
         broken = self.tension.mean_traction(before, after - before) * (after - before) / factor
         elastic = self.C * (smaller(wide, limit) ** 2 - smaller(narrow, limit) ** 2) / 2
         work = self.area(low, high) + elastic + broken

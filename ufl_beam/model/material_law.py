@@ -51,9 +51,9 @@ class MaterialLaw(ABC):
             as fracture energies, divide by it.  It is 1 for springs.
         active: True if the law may supply energy, for example by swelling.  Otherwise a step is
             refused if the solution of :meth:`residuals` has a negative dissipation.
-        memory: True if the variables record the path of the strain, such as its largest value or
-            its last reversal, at any rate of strain.  :meth:`increments` is then also called with
-            the strain at the end of the step, and variables are not extrapolated from t_n+θ.
+        records_path: True if the variables record the path of the strain, such as its largest value
+            or its last reversal, at any rate of strain.  :meth:`increments` is then also called
+            with the strain at the end of the step, and variables are not extrapolated from t_n+θ.
 
     Example:
         >>> from dataclasses import dataclass
@@ -73,7 +73,7 @@ class MaterialLaw(ABC):
     variables: ClassVar[Mapping[str, float]] = {}
     resultants: ClassVar[str] = ""
     active: ClassVar[bool] = False
-    memory: ClassVar[bool] = False
+    records_path: ClassVar[bool] = False
     C: Values
     length: Values = 1.0
 
@@ -125,8 +125,8 @@ class MaterialLaw(ABC):
         None, the default, stands for the work that is neither stored nor lost by the time scheme.
 
         Args:
-            strain: Strain at the instant of the step at which the law holds; with ``memory`` at
-                the end of the step.
+            strain: Strain at the instant of the step at which the law holds; with ``records_path``
+                at the end of the step.
             state: Variables at this instant.
             changes: Increments of the variables in the step.
             dt: Length of the step; s.
@@ -222,9 +222,9 @@ def require_law(law: object, what: str, interaction: bool = False) -> None:
     if len(ways) != (1 if law.variables else len(ways)):
         has = "both increments and residuals" if ways else "neither increments nor residuals"
         raise ModelError(f"{kind} has {has}; define one of the two methods")
-    if law.memory and ways == ["residuals"]:
+    if law.records_path and ways == ["residuals"]:
         raise ModelError(
-            f"{kind} has memory = True and residuals; laws with memory define increments"
+            f"{kind} has records_path = True and residuals; such laws define increments"
         )
     parameters = law.parameters(uniform(law, np.ones(1)))
     if "C" in parameters:

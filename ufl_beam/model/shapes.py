@@ -120,9 +120,9 @@ class Shape(Record):
             z = x + 1j * y
             ahead = np.roll(z, -1) - z
             ahead /= np.abs(ahead)
-            turn = ahead / np.roll(ahead, 1)
-            z += distance * 1j * (np.roll(ahead, 1) + ahead) / (1 + turn.real)
-            radii = np.maximum(radii - distance * np.sign(turn.imag), 0.0)
+            rotation = ahead / np.roll(ahead, 1)
+            z += distance * 1j * (np.roll(ahead, 1) + ahead) / (1 + rotation.real)
+            radii = np.maximum(radii - distance * np.sign(rotation.imag), 0.0)
             if not (((np.roll(z, -1) - z) / ahead).real > 0).all():
                 raise ModelError(f"Shape.inset: sides vanish at {distance:g} m from {self!r}")
             loops.append([(w.real, w.imag, r) for w, r in zip(z, radii, strict=True)])
@@ -286,8 +286,8 @@ def _pieces(loop: Sequence[Sequence[float]]) -> list[Piece]:
     lengths = np.abs(np.roll(z, -1) - z)
     with np.errstate(divide="ignore", invalid="ignore"):
         ahead = (np.roll(z, -1) - z) / lengths
-        turns = np.angle(ahead / np.roll(ahead, 1))  # to the left if positive
-        cut = np.where(radii > 0, radii * np.tan(np.abs(turns) / 2), 0.0)
+        deflections = np.angle(ahead / np.roll(ahead, 1))  # to the left if positive
+        cut = np.where(radii > 0, radii * np.tan(np.abs(deflections) / 2), 0.0)
     fits = cut + np.roll(cut, -1) <= lengths * (1 + 1e-9)
     if not fits.all():
         i = int(np.argmin(fits))
@@ -299,10 +299,10 @@ def _pieces(loop: Sequence[Sequence[float]]) -> list[Piece]:
     pieces = []
     for i, r in enumerate(radii):
         if cut[i] > 0:
-            left = 1j * np.sign(turns[i])
+            left = 1j * np.sign(deflections[i])
             centre = z[i] - cut[i] * ahead[i - 1] + r * left * ahead[i - 1]
             first = float(np.angle(-left * ahead[i - 1]))
-            last = first + float(turns[i])
+            last = first + float(deflections[i])
             low, high = sorted((first, last))
             tops = np.pi * (np.arange(math.ceil(low / np.pi - 0.5), high / np.pi - 0.5 + 1) + 0.5)
             tops = tops[(tops > low + 1e-9) & (tops < high - 1e-9)]

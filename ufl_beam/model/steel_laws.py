@@ -81,7 +81,7 @@ class MenegottoPinto(_Plastic):
     a3: NotNegative = 0.0
     a4: Positive = 1.0
     active: ClassVar[bool] = True  # energy of the Bauschinger effect is not in the stored energy
-    memory: ClassVar[bool] = True
+    records_path: ClassVar[bool] = True
     # A branch has a start, a level σr/C, a span ε0 - εr and a sharpness R.  "turned" is the branch
     # that begins if the strain turns at "last".  Virgin steel has a span of zero.
     variables: ClassVar[Mapping[str, float]] = {
@@ -94,12 +94,12 @@ class MenegottoPinto(_Plastic):
         b, y = self.hardening, self.yield_limit / self.C
         change, none = strain - state.last, STANDSTILL * y
         virgin = below(absolute(state.span), 1e-4 * none)
-        turns = below(change * where(virgin, 0.0, sign(state.span)), -none)
+        reverses = below(change * where(virgin, 0.0, sign(state.span)), -none)
 
-        start = where(turns, state.last, state.start)
-        level = where(turns, state.last - state.plastic, state.level)
-        span = where(turns, state.turned_span, where(virgin, sign(change) * y, state.span))
-        R = where(turns, state.turned_sharpness, where(virgin, self.R0, state.sharpness))
+        start = where(reverses, state.last, state.start)
+        level = where(reverses, state.last - state.plastic, state.level)
+        span = where(reverses, state.turned_span, where(virgin, sign(change) * y, state.span))
+        R = where(reverses, state.turned_sharpness, where(virgin, self.R0, state.sharpness))
         x = (strain - start) / span
         size = log(larger(absolute(x), 1e-30))
         root = positive(size) + log(1 + exp(-R * absolute(size))) / R  # log(1 + abs(x)^R)/R

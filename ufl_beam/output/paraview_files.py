@@ -37,10 +37,10 @@ class Lines(NamedTuple):
 
     points: Array  # (n, 3); m
     cells: Index  # indices of the points at both ends of each line; (m, 2)
-    kinds: Array  # kind of each line: 0 for beams, or BODY, or LINK; (m,)
+    kinds: Array  # kind of each line: 0 for beams, or BODY, or CONNECTOR; (m,)
 
 
-BODY, LINK = 1, 2
+BODY, CONNECTOR = 1, 2
 """Kinds of lines: bodies, and links or connectors.  Lines of beams have the kind 0."""
 
 
@@ -49,7 +49,7 @@ class Rod(NamedTuple):
 
     a: AttachmentPoint
     b: AttachmentPoint
-    group: int  # BODY or LINK
+    group: int  # BODY or CONNECTOR
     along: Connector | None = None  # connector whose force acts along the line
 
 
@@ -66,9 +66,9 @@ def scene_rods(scene: Scene) -> list[Rod]:
         if joint.is_rod:
             a, b = joint.places
             pulls = next((c for c in joint.holders if c.stretches), None)
-            rods.append(Rod(a, b, LINK, pulls))
+            rods.append(Rod(a, b, CONNECTOR, pulls))
     rods += [
-        Rod(c.a, c.b, LINK, c if c.stretches else None)
+        Rod(c.a, c.b, CONNECTOR, c if c.stretches else None)
         for c in scene.connectors
         if not c.is_rotation and c.apart != (0.0, 0.0)
     ]
@@ -213,8 +213,8 @@ class XdmfWriter:
                 data += values.tobytes()
         self._data.put(length, data)
         # The text goes into the instruction, with a new tail that lies within one page.
-        grid, start = (text + "</Grid>\n").encode(), tail + len(TAIL)
-        new_tail = start + len(grid)
+        element, start = (text + "</Grid>\n").encode(), tail + len(TAIL)
+        new_tail = start + len(element)
         if new_tail % PAGE + len(TAIL) > PAGE:
             new_tail += -new_tail % PAGE
         if (least := new_tail + len(TAIL)) > capacity:
@@ -225,7 +225,7 @@ class XdmfWriter:
             self._xml.put(new_capacity, CLOSING)
             self._xml.put(capacity, b" " * len(CLOSING))
             capacity = new_capacity
-        self._xml.put(start, grid.ljust(new_tail - start) + TAIL)  # still in the instruction
+        self._xml.put(start, element.ljust(new_tail - start) + TAIL)  # still in the instruction
         self._xml.put(tail, b" " * len(TAIL))  # now in the document
         self.complete = Complete(steps + 1, new_tail, capacity, length + len(data))
 

@@ -140,7 +140,7 @@ class Columns:
         """Return columns with an additional last column, and without the column ``without``."""
         key = name, without
         if key not in self._others:
-            shapes = {n: of for n, of in self.shapes.items() if n != without}
+            shapes = {n: size for n, size in self.shapes.items() if n != without}
             self._others[key] = Columns({**shapes, name: shape})
         return self._others[key]
 
@@ -215,7 +215,7 @@ class StateWriter:
         self.columns = columns = Columns.create(
             numbering, moving=moving,
             record=numbering.size * len(vectors) + sum(n for _, n in others),
-            ledger=[f"{p}: {name}" for p, of in zip(LEDGER, accounts, strict=True) for name in of],
+            ledger=[f"{p}: {n}" for p, names in zip(LEDGER, accounts, strict=True) for n in names],
         )  # fmt: skip
         at = columns.at
         if subdomain.comm.rank == 0:

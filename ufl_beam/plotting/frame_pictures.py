@@ -188,7 +188,7 @@ def _draw_diagrams(
     scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
     values = np.where(np.abs(values) > DRAWN_AS_ZERO * largest, values, 0.0)
     # A beam may have several diagrams, which are not connected.
-    diagram = np.repeat(np.arange(len(diagrams)), [len(numbers) for numbers in cells_of])
+    diagram = np.repeat(np.arange(len(diagrams)), [len(beam_cells) for beam_cells in cells_of])
     axis, left = _along(solution, cells, diagram, nodes, points)
     ordinates = scale * values[:, None] * left
     rows: list[Array] = []

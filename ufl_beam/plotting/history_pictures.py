@@ -313,13 +313,13 @@ def draw_study(study: Study) -> Figure:
         raise ArgumentError("plot: the study has no results over numbers of its cases")
     rows, columns = len(study.results), len(varied)
     with picture((max(6.0, 4.0 * columns), max(4.0, 2.6 * rows))) as figure:
-        grid = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
-        for panels, (result, values) in zip(grid, study.results.items(), strict=True):
+        panels_of = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
+        for panels, (result, values) in zip(panels_of, study.results.items(), strict=True):
             sizes = np.abs(values.reshape(len(study), -1)).max(axis=1)
             panels[0].set_ylabel(result)
             for axes, x in zip(panels, varied.values(), strict=True):
                 axes.plot(x, sizes if values.ndim > 1 else values, "o", color=BLUE, ms=5.0)
-        for axes, name in zip(grid[-1], varied, strict=True):
+        for axes, name in zip(panels_of[-1], varied, strict=True):
             axes.set_xlabel(name)
     return figure
 

@@ -370,8 +370,10 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
         number = max(1, round(lengths[-1] / distance))
         steps = (np.arange(number + 1) if ends else np.arange(number) + 0.5) / number
         at = steps * lengths[-1]
-        share, *heading = (np.interp(at, lengths, x) for x in (shares, *ways.T))
-        return list(zip(points_along(axis, steps), share, np.column_stack(heading), strict=True))
+        intensity, *heading = (np.interp(at, lengths, x) for x in (shares, *ways.T))
+        return list(
+            zip(points_along(axis, steps), intensity, np.column_stack(heading), strict=True)
+        )
 
     if size > 0.0:
         direction, chord = force / size, axis[-1] - axis[0]
@@ -382,10 +384,10 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
             low = begin + 0.3 * unit
             line = axis - (low + height * np.abs(shares))[:, None] * ways
             drawing.strokes["loads"] += [Stroke(line, RED, 1.2, layer=FRONT)]
-            for foot, share, heading in spaced(2.0 * unit, ends=True):
-                if height * abs(share) > 0.5 * unit:
-                    ends = foot - np.outer((low + height * abs(share), low), heading)
-                    ends = ends if share > 0 else ends[::-1]
+            for foot, intensity, heading in spaced(2.0 * unit, ends=True):
+                if height * abs(intensity) > 0.5 * unit:
+                    ends = foot - np.outer((low + height * abs(intensity), low), heading)
+                    ends = ends if intensity > 0 else ends[::-1]
                     drawing.strokes["loads"] += _arrow(ends, RED, unit, hollow=follows, size=0.62)
             outwards = [
                 (at, left if (across if follows else left @ direction) < 0 else -left)
@@ -394,9 +396,9 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
             spots = [Candidate(at, side) for at, out in outwards for side in (out, -out)]
         else:
             aside = 0.8 * unit + drawing.stack((load.beam, "along"), 0.7 * unit)
-            for at, share, heading in spaced(2.4 * unit):
-                if abs(share) > 0.05:
-                    half = 0.9 * unit * math.copysign(1.0, share)
+            for at, intensity, heading in spaced(2.4 * unit):
+                if abs(intensity) > 0.05:
+                    half = 0.9 * unit * math.copysign(1.0, intensity)
                     ends = at + aside * normal(heading) + np.outer((-half, half), heading)
                     drawing.strokes["loads"] += _arrow(ends, RED, unit, hollow=follows, size=0.62)
             spots = [
@@ -408,9 +410,9 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
         text = in_time(with_unit(size, "N/m"), load.amplitude) + ", follows" * follows
         drawing.write(text, RED, LOAD_LABELS, spots)
     if moment:
-        for at, share, _ in spaced(3.2 * unit):
-            if abs(share) > 0.05:
-                line = _arc(np.asarray(at), 0.75 * unit, math.copysign(moment, moment * share))
+        for at, intensity, _ in spaced(3.2 * unit):
+            if abs(intensity) > 0.05:
+                line = _arc(np.asarray(at), 0.75 * unit, math.copysign(moment, moment * intensity))
                 drawing.strokes["loads"] += _arrow(line, RED, 0.7 * unit)
         text = in_time(with_unit(abs(moment), "N m/m"), load.amplitude)
         drawing.write(text, RED, LOAD_LABELS, _along(axis, 0.9 * unit))

@@ -129,7 +129,7 @@ class CheckpointFile:
         try:
             on_first(comm, self._find)
         except BaseException:
-            self.lock.release()
+            self.lock.unlock()
             raise
         if comm.size > 1:
             self.content = comm.bcast(self.content)

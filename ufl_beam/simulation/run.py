@@ -147,7 +147,7 @@ def simulate(
                 "record": [type(recorder).__qualname__ for recorder in recorders],
             }  # fmt: skip
             keeper = CheckpointFile(checkpoint, call, step, t1, recorders, comm)
-            stack.callback(keeper.lock.release)
+            stack.callback(keeper.lock.unlock)
         simulation = Simulation(
             scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
         )
@@ -196,7 +196,7 @@ def take_steps(
     def after_step() -> bool:
         solution.time_error = pace.error
         if recorders or keeper is not None:
-            simulation.copies.synchronize()  # raises before processes write different results
+            simulation.comparison.synchronize()  # raises before processes write different results
         if pace.steps % solution.every == 0 or pace.finished:
             simulation.keep()
             thins = len(solution) > max_states + 1 and not pace.finished
@@ -282,7 +282,7 @@ def running(
             yield
             check_ledger(simulation)
         except BaseException as error:
-            simulation.copies.finish()
+            simulation.comparison.finish()
             if simulation.subdomain.comm.size == 1 or error is simulation.together.raised:
                 simulation.end()  # otherwise only some processes would call it, and wait
             stopped: Any = error

@@ -71,7 +71,7 @@ class Simulation(Stepper):
         t: Time; s.
         solution: Solution so far.
         substeps: Number of substeps so far; an undivided step counts as one substep.
-        copies: Comparison of the processes if each of them computes a small scene as a whole.
+        comparison: Comparison of the processes if each of them computes a small scene as a whole.
 
     Example:
         >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
@@ -260,7 +260,7 @@ class Simulation(Stepper):
             ConvergenceError: Always, except in the next case; the error has the solution so far.
             ModelError: The first static step failed, and the scene can move without strain.
         """
-        self.copies.finish()
+        self.comparison.finish()
         self.supports.go_back()
         self.end()
         raise no_equilibrium(
@@ -356,7 +356,7 @@ class Simulation(Stepper):
 
     def end(self) -> None:
         """Store the last state, and the data for ``start=``, in the solution."""
-        self.copies.synchronize()
+        self.comparison.synchronize()
         if self.t not in self.solution.times[-1:]:
             self.keep()
         # Iterations of failed steps count, too.
@@ -365,7 +365,7 @@ class Simulation(Stepper):
 
     def snapshot(self) -> Solution:
         """Return the present state as a solution for ``start=``; all processes call it."""
-        self.copies.synchronize()
+        self.comparison.synchronize()
         now = Solution(self.scene, self.numbering, self.solution)
         self.keep(now)
         now.internal = self.equation.internal_variables(self.q, self.t)

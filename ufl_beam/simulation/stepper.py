@@ -26,7 +26,7 @@ from ufl_beam.mechanics.time_scheme import Step, with_half_tangents
 from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.output.recorder import StateView
 from ufl_beam.output.states import States
-from ufl_beam.parallel import Agreement, Copies
+from ufl_beam.parallel import Agreement, ProcessComparison
 from ufl_beam.simulation.controllers import ForceWatch
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StaticPath, StepEquation
@@ -140,7 +140,7 @@ class Stepper(StateView):
         prediction: Data of the last steps from which the initial guess is extrapolated.
         solution: Solution so far.
         time_loop: ``time_loop`` of loops.h.
-        copies: Comparison of the processes if each of them computes the scene as a whole.
+        comparison: Comparison of the processes if each of them computes the scene as a whole.
         together: Caller of functions on all processes that share the scene; if a function raises
             on one process, it raises on all.
     """
@@ -158,7 +158,7 @@ class Stepper(StateView):
         )
         self.equation, self.scheme, self.ledger, self.solution = equation, scheme, ledger, solution
         self.together, self._path, self._free_motion = together, path, free_motion
-        self.copies, self.parameter = Copies(comm, subdomain), solution.parameter
+        self.comparison, self.parameter = ProcessComparison(comm, subdomain), solution.parameter
         self.fields, self.terms, self.supports = equation.fields, equation.terms, equation.supports
         self.beams, self.inelastic = equation.beams, equation.inelastic
         self.connector_terms, self.loads = equation.connector_terms, equation.loads
@@ -198,7 +198,7 @@ class Stepper(StateView):
             states=len(ledger.state), state=ledger.state.amounts, cell_forces=self.cell_forces.c,
             opens=int(subdomain.largest(float(bool(opens)))), places=len(opens), place=places,
             admissions=len(admits), admission=ffi.new("admission_call[]", admits),
-            judges=int(subdomain.largest(float(bool(admits)))),
+            checks_laws=int(subdomain.largest(float(bool(admits)))),
             applying_turn=APPLYING_ROTATION, short_part=SHORT_SUBSTEP,
         )  # fmt: skip
         if self.time_loop.opens:
@@ -240,8 +240,8 @@ class Stepper(StateView):
         loops["accept"] = mine + [call for call in loops["accept"] if call[0] not in asking]
         if controllers.needs_evaluation:
             loops["begin"].insert(0, callbacks.phase(self._evaluate_controllers))
-        if self.copies.several:
-            record = self.copies.compare
+        if self.comparison.several:
+            record = self.comparison.compare
             took = callbacks.phase(lambda step, q1, s: record(step.t1, self._copy(q1)))
             loops["add_state"].append(took)
         for name, calls in loops.items():

@@ -178,7 +178,7 @@ class Elimination:
         vertices, number = len(indices["dof"]), len(indices["spike"])
         self.c = fill(
             ffi.new("chains *"),
-            chains=number, left=len(columns), stay=len(indices["entry"]),
+            count=number, left=len(columns), stay=len(indices["entry"]),
             rows=len(indices["kept"]), left_size=len(remaining), left_data=self.left.data,
             left_f=self.f, data=A.data, swaps=ffi.new("uint8_t[]", 3 * vertices),
             pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
@@ -226,7 +226,7 @@ class CondensedSolver:
 
     def drive(self, c: Any) -> None:
         """Let Newton's method in C use this solver; ``c`` is its ``equation`` of loops.h."""
-        c.chains, self._elimination.c.f = self._elimination.c, c.change
+        c.elimination, self._elimination.c.f = self._elimination.c, c.change
         self._solved.drive(c)
 
     def setUp(self, pc: PETSc.PC) -> None:

@@ -59,7 +59,7 @@ class CellForces:
                 self._unmade.append((force, c))
             else:
                 form = force.form()
-                each, c.lanes, accepted_values = form.keep_entries()
+                each, c.batch_size, accepted_values = form.keep_entries()
                 c.entries = accepted
                 self._alive.append(each)
                 if force.q0 is None:
@@ -112,14 +112,14 @@ class CellForces:
         """Create the forms that only cell forces need, at the first call."""
         for force, c in self._unmade:
             form = force.form()
-            each, c.lanes, _ = form.keep_entries()
+            each, c.batch_size, _ = form.keep_entries()
             c.entries, c.form = each, form.cells
             self._alive.append((form, each))
         self._unmade = []
 
-    def in_order(self, lanes: int) -> bool:
-        """Return whether each form has all cells, in batches of ``lanes`` cells."""
-        return all(not c.cell and c.lanes == lanes for c in self._forces)
+    def in_order(self, batch_size: int) -> bool:
+        """Return whether each form has all cells, in batches of ``batch_size`` cells."""
+        return all(not c.cell and c.batch_size == batch_size for c in self._forces)
 
     def keep_latest(self) -> None:
         """Store all entries of forms in each residual from now on, for use after a step."""

@@ -87,7 +87,7 @@ class Response:
         needs_accept_end: True if :meth:`accept_end` must be called when a step is accepted.
         motion: Accepted motions that solutions record, (num_connectors,); None if solutions record
             the motions of the nodes.
-        slip_direction: Direction of plastic slip in the latest iterate, 1 or -1; 0 without slip.
+        flow_direction: Direction of plastic slip in the latest iterate, 1 or -1; 0 without slip.
         sticks: True for each connector that friction holds in the latest iterate; None without
             friction.
         dissipated: Arrays (num_connectors,) of energies lost since the beginning, whose sum is
@@ -107,7 +107,7 @@ class Response:
         self._lengths = np.where(
             [connector.is_rotation for connector in connectors], 1.0, setting.scene.size
         )
-        self.slip_direction: Index = np.zeros(len(connectors), dtype=np.int32)
+        self.flow_direction: Index = np.zeros(len(connectors), dtype=np.int32)
         self.in_c: dict[str, Any] = {}
         self._in_steps: dict[str, Any] = {}
         self._time_functions: dict[str, list[tuple[TimeFunction, object]]] = {}
@@ -168,7 +168,7 @@ class Response:
 
     def remaining(self) -> Array:
         """Return the remaining fraction of elastic stiffness in the iterate; (num_connectors,)."""
-        return np.where(self.slip_direction == 0, 1.0, 0.0)
+        return np.where(self.flow_direction == 0, 1.0, 0.0)
 
     def bends(self, e1: Array) -> Array:
         """Return ∂α/∂e at constant internal variables; (num_connectors / k, k³).
@@ -412,7 +412,7 @@ class RigidPlasticLaws(Response):
         self._initial_limit = self._at["number yield_limit" if self._hardens else "number limit"]
         self._limit = self._initial_limit.copy()
         back_force, dissipated, excess = np.zeros((3, n))
-        self.slip_direction, direction_before, free = np.zeros((3, n), dtype=np.int32)
+        self.flow_direction, direction_before, free = np.zeros((3, n), dtype=np.int32)
         self.opens = {"number": n, "excess": doubles(excess), "free": integers(free)}
         self._stored = np.zeros(1)  # energy of hardening of all connectors together; J
         at = self._at["slipped"], self._at["start"]
@@ -427,7 +427,7 @@ class RigidPlasticLaws(Response):
             force=self._forms.force, end=self._forms.end, search=setting.search,
             limit=self._limit, back_force=back_force, dissipated=dissipated,
             slope=np.array([_slope(connector, setting.scene.size) for connector in connectors]),
-            excess=excess, free=free, direction=self.slip_direction,
+            excess=excess, free=free, direction=self.flow_direction,
             direction_before=direction_before,
         )  # fmt: skip
         self.in_c = {"rigid_plastic": self._c}

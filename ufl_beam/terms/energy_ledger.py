@@ -112,7 +112,7 @@ class Ledger:
         self.state.amounts.fill(0.0)
 
 
-class Entries(dict[str, Array]):
+class NamedEnergies(dict[str, Array]):
     """Entries of a part of the ledger by name; the error of a missing entry lists all names."""
 
     def __init__(self, entries: dict[str, Array], known: Sequence[str]) -> None:
@@ -155,7 +155,7 @@ class Energy(Mapping[str, Array], Rich):
     def __post_init__(self) -> None:
         names = [name for account in self._accounts for name in account]
         for kind in ("state", "supplied", "lost"):
-            object.__setattr__(self, kind, Entries(getattr(self, kind), names))
+            object.__setattr__(self, kind, NamedEnergies(getattr(self, kind), names))
 
     def __getitem__(self, name: str) -> Array:
         """Return the entry ``name``; (n+1,); J.  Effects that the scene lacks have no entries."""

@@ -83,7 +83,7 @@ def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
 
 
 @ffi.def_extern(error=0)  # type: ignore[misc, untyped-decorator, unused-ignore]
-def numbers_in_python(handle: Any, c: Any) -> int:
+def coefficients_in_python(handle: Any, c: Any) -> int:
     """Write ``scheme_numbers`` of loops.h for a step; C calls this function."""
     scheme, number = ffi.from_handle(handle)
     inertia, velocity, rates, defect = _coefficients(scheme, c.dt, c.last_dt, c.more)
@@ -129,7 +129,7 @@ class Inertia(Term):
         self._next = np.zeros((number - V_BEFORE - (not asks), size))
         self._defect = np.zeros(size if self.loses_energy else 0)
         handle = ffi.new_handle((scheme, number))
-        find = lib.numbers_in_python
+        find = lib.coefficients_in_python
         self.c = struct("rates", size=size, number=number, find=find, handle=handle)
         self.c.after_any = not scheme.uses_last_step
         first, *more = self._next if asks else (self._now[1], *self._next)

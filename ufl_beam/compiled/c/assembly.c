@@ -2,18 +2,18 @@
 /* Assembly: values of forms on cells into vectors and matrices, one cell at a time, and the pattern of
  * a matrix. Cells of one form are assembled several at a time by assembly_simd.c. */
 
-/* Coefficients of a cell from `at` on, c->lanes apart from each other. c->lanes is a power of two,
+/* Coefficients of a cell from `at` on, c->batch_size apart from each other. c->batch_size is a power of two,
  * so cell & -lanes cells come before the batch of the cell. */
 static inline double *in_cell(const cells *c, int cell, int at)
 {
-  return c->w + (cell & -c->lanes) * c->width + at * c->lanes + (cell & (c->lanes - 1));
+  return c->w + (cell & -c->batch_size) * c->width + at * c->batch_size + (cell & (c->batch_size - 1));
 }
 
 /* Write the values q at the unknowns of the cells into their packed coefficients, from `at` on. */
 void set_cells(const cells *c, const double *q, int at)
 {
   const int32_t *dofs = c->dofs;
-  const int n = c->lanes;
+  const int n = c->batch_size;
   double *batch = c->w + at * n;
   for (int first = 0; first < c->number; first += n, batch += c->width * n)
     for (int l = 0; l < n && first + l < c->number; ++l, dofs += c->of_cell)
@@ -24,7 +24,7 @@ void set_cells(const cells *c, const double *q, int at)
 static inline void put_in_cell(const cells *c, int cell, int at, int number, const double *values)
 {
   double *w = in_cell(c, cell, at);
-  for (int i = 0; i < number; ++i) w[i * c->lanes] = values[i];
+  for (int i = 0; i < number; ++i) w[i * c->batch_size] = values[i];
 }
 
 /* Add the entries of a cell to a matrix, a vector or a number; see insert_batch for several cells. */

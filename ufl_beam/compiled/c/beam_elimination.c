@@ -161,7 +161,7 @@ static inline double largest_entry(const pair *block, int lane)
 /* Begin the next chain; if none is left, repeat the other chain, whose results are not used. */
 static void begin_chain(const chains *c, chain_fronts *at, int lane)
 {
-  at->counts[lane] = at->next < c->chains;
+  at->counts[lane] = at->next < c->count;
   const int chain = at->counts[lane] ? at->next++ : at->chain[1 - lane];
   const int v = c->first[chain], width = c->spike[chain] ? 9 : 6;
   at->chain[lane] = chain, at->vertex[lane] = v, at->last[lane] = c->first[chain + 1] - 1;
@@ -292,9 +292,9 @@ void eliminate(const chains *c, const double *b)
   for (int k = 0; k < c->stay; ++k) c->left_data[c->place[k]] = c->data[c->entry[k]];
   for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->kept[k]];
   chain_fronts at = {.next = 0};
-  if (c->chains)
+  if (c->count)
     for (int l = 0; l < PAIR; ++l) begin_chain(c, &at, l);
-  for (int ended = 0; ended < c->chains;) {
+  for (int ended = 0; ended < c->count;) {
     int both = to_go(&at, 0) < to_go(&at, 1) ? to_go(&at, 0) : to_go(&at, 1);
     if (c->spike[at.chain[0]] || c->spike[at.chain[1]]) {
       for (; both > 2; --both) eliminate_vertices(c, &at, b, 1, 1);
@@ -338,7 +338,7 @@ static inline void go_on(const chains *c, int chain, int vertex, const double *b
 static inline int most_vertices(const chains *c, int chain)
 {
   int most = 0;
-  for (int l = 0; l < PAIR && chain + l < c->chains; ++l) {
+  for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
     const int number = c->first[chain + l + 1] - c->first[chain + l];
     if (number > most) most = number;
   }
@@ -367,11 +367,11 @@ void reduce(const chains *c, const double *b)
 {
   memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
   for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->kept[k]];
-  for (int chain = 0; chain < c->chains; chain += PAIR) {
+  for (int chain = 0; chain < c->count; chain += PAIR) {
     double next[PAIR][3] = {0};
     const int most = most_vertices(c, chain);
     for (int k = 0; k < most; ++k)
-      for (int l = 0; l < PAIR && chain + l < c->chains; ++l) {
+      for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
         const int v = c->first[chain + l] + k;
         double x[3], y[3];
         if (v >= c->first[chain + l + 1]) continue;
@@ -380,7 +380,7 @@ void reduce(const chains *c, const double *b)
         go_on(c, chain + l, v, x, y, next[l]);
         write_vertex(c, y, v, c->f);
       }
-    for (int l = 0; l < PAIR && chain + l < c->chains; ++l) {
+    for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
       const int32_t *numbers = c->ends + 6 * (chain + l);
       double left[3] = {0};
       if (c->spike[chain + l]) feel_first_vertex(c, chain + l, left);
@@ -411,16 +411,16 @@ static void follow_left_end(const chains *c, int chain, const double *left)
 void expand(const chains *c, const double *left, double *x)
 {
   for (int k = 0; k < c->rows; ++k) x[c->kept[k]] = left[c->number[k]];
-  for (int chain = 0; chain < c->chains; chain += PAIR) {
+  for (int chain = 0; chain < c->count; chain += PAIR) {
     double first[3], next[PAIR][3];
     const int most = most_vertices(c, chain);
-    for (int l = 0; l < PAIR && chain + l < c->chains; ++l) {
+    for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
       const int32_t *numbers = c->ends + 6 * (chain + l);
       for (int k = 0; k < 3; ++k) first[k] = left[numbers[k]], next[l][k] = left[numbers[3 + k]];
       if (c->spike[chain + l]) follow_left_end(c, chain + l, first);
     }
     for (int k = 1; k <= most; ++k)
-      for (int l = 0; l < PAIR && chain + l < c->chains; ++l) {
+      for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
         const int v = c->first[chain + l + 1] - k;
         double y[3];
         if (v < c->first[chain + l]) continue;

@@ -82,7 +82,7 @@ static void add_forms(const cell_forces *c, int now, int first, int number, plac
       add_cells(&some, *f->vector, 0);
     } else if (!whole)
       e += (size_t)first * 3 * c->nodes;
-    add_some(c, f->lanes, whole ? f->number : number, f->kind, f->factor, e, f->cell, p);
+    add_some(c, f->batch_size, whole ? f->number : number, f->kind, f->factor, e, f->cell, p);
   }
   for (int k = 0; c->loads && k < c->loads->vectors; ++k)
     for (int i = 0; c->loads->vector[k] && c->loads->accepted[k] != 0 && i < number; ++i) {
@@ -125,7 +125,7 @@ static void widen(const extent *e, size_t begin, int number, const double *restr
 void watch_step(const watch *w, int now, double t, const double *before, const double *q)
 {
   const cells *c = w->along;
-  const int n = c->lanes, in_order = w->in_order && !w->forces->initial;
+  const int n = c->batch_size, in_order = w->in_order && !w->forces->initial;
   const double b = w->between;
   const double *at = q;
   widen(&w->of_motion, 0, w->of_motion.size, q, t);

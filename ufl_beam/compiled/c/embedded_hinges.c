@@ -54,14 +54,14 @@ static void condense_hinge(const points *p, double *w, double *s)
   s[1] *= t[1] / (s[1] / w[LENGTH] + t[1]); /* P(76) */
 }
 
-/* Release the closed points whose excess in the latest response is at least `least`; they may open
- * in this step. */
-static void release(const points *p, double least)
+/* Allow the closed points whose excess in the latest response is at least `least` to open in this
+ * step. */
+static void allow_opening(const points *p, double least)
 {
   double s[3 + 9], *w = p->w;
   for (int i = 0; i < p->cells * p->of_cell; ++i, w += p->width) {
     if (w[FLOWS] != CLOSED || !(w[TRACTION] < INFINITY)) continue;
     answer(p, w, s);
-    if (fabs(s[0]) > w[TRACTION] && fabs(s[0]) / w[TRACTION] - 1 >= least) w[FLOWS] = RELEASED;
+    if (fabs(s[0]) > w[TRACTION] && fabs(s[0]) / w[TRACTION] - 1 >= least) w[FLOWS] = MAY_OPEN;
   }
 }

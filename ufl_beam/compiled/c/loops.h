@@ -32,11 +32,11 @@ enum { SOME = 128 };         /* cells of a block whose data stay in the processo
  * batch, then the second numbers, and so on. Copies of the last cell fill up the last batch.
  */
 typedef struct cells cells;
-typedef void (in_lanes)(const cells *self, const double *q, double *out);
+typedef void (tabulate_batch)(const cells *self, const double *q, double *out);
 struct cells {
   kernel *tabulate;
-  in_lanes *several; /* or none */
-  int lanes; /* cells of a batch, a power of two; else 1 */
+  tabulate_batch *several; /* or none */
+  int batch_size; /* cells of a batch, a power of two; else 1 */
   int number, of_cell, unknowns; /* cells, degrees of freedom of each, degrees of freedom that the form
                                   * depends on */
   const int32_t *dofs;
@@ -139,7 +139,7 @@ typedef struct {
   double *const *entries; /* of the accepted step, in batches */
   double *const *tee;     /* entries in the latest residual, in batches; or none */
   double factor;
-  int kind, number, lanes;
+  int kind, number, batch_size;
   const int32_t *cell; /* numbers of its cells; or none if the form has all cells */
 } force_in_cells;
 
@@ -200,7 +200,7 @@ enum point_input {
 };
 
 /* FLOWS: the jump did not grow in the last step, grew in the last step, may grow in this step. */
-enum { CLOSED, FLOWING, RELEASED };
+enum { CLOSED, FLOWING, MAY_OPEN };
 
 /* Outputs of a point at the end of a step; stresses and changes of variables follow. */
 enum point_output {
@@ -397,7 +397,7 @@ enum { BLOCK = 9 };
 enum end_block { LEFT_FIRST, RIGHT_LAST, FIRST_LEFT, LAST_RIGHT };
 
 typedef struct {
-  int chains;
+  int count; /* of chains */
   const int32_t *first;     /* first vertex of each chain, and their number */
   const int32_t *spike;     /* whether a chain has a left end */
   const int32_t *dof, *begin; /* of each vertex: first degree of freedom; where its rows begin */
@@ -575,7 +575,7 @@ typedef struct {
   const double *idle_stiffness;
 
   double rtol, loads; /* tolerance; size of the loads */
-  const chains *chains;
+  const chains *elimination;
   const fronts *fronts;  /* factors of the reduced system; or none: then PETSc factorizes it */
   void *left, *factors, *left_f, *left_x; /* in PETSc: reduced system, its factors, two vectors */
   void *snes, *x, *f, *y;                 /* in PETSc: solver; unknowns, residual, change */
@@ -1011,7 +1011,7 @@ typedef struct {
   const int32_t *rotation, *half_tangent, *multiplier;
   double turn, largest_turn; /* largest rotation in the step; limit of it, infinite if there is none */
   rates *rates;       /* in dynamics */
-  int admissions, judges; /* checks of laws; whether any process has checks */
+  int admissions, checks_laws; /* checks of laws; whether any process has checks */
   const admission_call *admission;
   static_path *path;  /* in statics */
   int loads;

@@ -107,7 +107,7 @@ static cells some_cells(const cells *c, int first)
   some.dofs += (size_t)first * c->of_cell, some.coordinates += (size_t)first * 4;
   some.w += (size_t)first * c->width;
   if (c->row) some.row += (size_t)first * c->rows;
-  if (c->pattern) some.has += first / c->lanes;
+  if (c->pattern) some.has += first / c->batch_size;
   return some;
 }
 
@@ -178,46 +178,6 @@ static int laws_met(const equation *e, const double *x, double scale)
   return over_processes(e, LARGEST, most) <= e->rtol;
 }
 
-/* Test whether Newton's method has converged, continues, or stalls.
- *
- * `floor` is several times the residual caused by the round-off of the unknowns.
- */
-static int judge(equation *e, const double *q, int iteration, double residual, double scale, double floor,
-                 int switched)
-{
-  const double wanted = e->rtol * scale;
-  /* The initial guess may just meet the tolerance without the effect of small loads beside large
-   * ones, such as imperfections that make columns buckle. The residual of an iterate is about the
-   * square of the previous one. */
-  const double enough = iteration < e->least ? SURE * wanted : wanted;
-  const int met = residual > wanted || laws_met(e, q, scale);
-  if (residual <= enough && met) return CONVERGED;
-  const int kept = e->near;
-  e->near = 0;
-  if (iteration > 1) {
-    /* A residual of a fraction of the round-off is luck, and final. A residual of a few times the
-     * round-off is final if Newton's method no longer halves it; the method may cycle between two
-     * such states for ever. With a kept tangent that is no proof, but it suffices close to the
-     * tolerance. */
-    const int close = residual <= CLOSE * wanted && !e->demanding;
-    const int stays = e->last / 2 < residual && residual <= floor && (!kept || close);
-    if ((stays || residual <= floor / 80) && laws_met(e, q, scale)) return AT_ROUND_OFF;
-    /* With a kept tangent, the residual falls by twice the last factor. It must fall far enough
-     * that works are the same as with a new tangent. */
-    e->near = !kept && 2000 * residual * (residual / e->last) <= wanted && (close || residual > floor);
-  }
-  /* A tangent with the row of a motion does not fit the row of a force: newtons of the residual
-   * would become metres of the change. */
-  if (switched) e->near = *e->switched = 0;
-  e->slow += 1;
-  /* Directly after the activation of a connector, balanced forces are no measure of convergence, as
-   * its law is not met yet. */
-  const double size = iteration > 0 || met ? residual : scale;
-  if (size <= e->best / 2) e->best = size, e->slow = 0;
-  e->last = residual;
-  return e->slow == e->patience ? STALLED : ITERATING;
-}
-
 /* Forces from the round-off of displacements and rotations, estimated with the diagonal of the
  * tangent. Strains have their own relative precision as long as rotations are small. */
 void find_round_off(const equation *e, const double *q, double *forces)
@@ -241,24 +201,54 @@ void find_motion(equation *e, const double *x)
   e->moved = fmin(over_processes(e, LARGEST, largest), e->scene);
 }
 
-/* Check an iterate x with the latest residual: the reason to stop, or ITERATING. */
-static int verdict(equation *e, const double *x, int iteration)
+/* Test of convergence of an iterate x with the latest residual: the reason to stop, or ITERATING. */
+static int test_convergence(equation *e, const double *x, int iteration)
 {
   const enum agreement how[] = {HYPOT, HYPOT, LARGEST, LARGEST};
   const double here = norm(e->size, 0, e->weight, e->residual), switched = e->demanding ? *e->switched : 0;
   double of_all[] = {here, e->inner_size, e->raised, switched};
   agree(e, 4, how, of_all);
-  const double now = of_all[0], scale = e->loads + of_all[1];
+  const double residual = of_all[0], scale = e->loads + of_all[1];
   e->raised = (int)of_all[2];
-  if (e->raised == OTHER || !isfinite(now)) return DIVERGED;
-  const int nearly = iteration > 1 && now > e->rtol * scale;
-  double floor = 0;
-  if (nearly || e->demanding) find_motion(e, x);
-  if (nearly || (iteration > 1 && e->demanding)) {
+  if (e->raised == OTHER || !isfinite(residual)) return DIVERGED;
+  const double wanted = e->rtol * scale;
+  const int not_yet = iteration > 1 && residual > wanted;
+  double floor = 0; /* several times the residual caused by the round-off of the unknowns */
+  if (not_yet || e->demanding) find_motion(e, x);
+  if (not_yet || (iteration > 1 && e->demanding)) {
     find_round_off(e, x, e->space);
     floor = 8 * norm_of(e, e->space);
   }
-  return judge(e, x, iteration, now, scale, floor, of_all[3] > 0);
+  /* The initial guess may just meet the tolerance without the effect of small loads beside large
+   * ones, such as imperfections that make columns buckle. The residual of an iterate is about the
+   * square of the previous one. */
+  const double enough = iteration < e->least ? SURE * wanted : wanted;
+  const int met = residual > wanted || laws_met(e, x, scale);
+  if (residual <= enough && met) return CONVERGED;
+  const int kept = e->near;
+  e->near = 0;
+  if (iteration > 1) {
+    /* A residual of a fraction of the round-off is luck, and final. A residual of a few times the
+     * round-off is final if Newton's method no longer halves it; the method may cycle between two
+     * such states for ever. With a kept tangent that is no proof, but it suffices close to the
+     * tolerance. */
+    const int close = residual <= CLOSE * wanted && !e->demanding;
+    const int stays = e->last / 2 < residual && residual <= floor && (!kept || close);
+    if ((stays || residual <= floor / 80) && laws_met(e, x, scale)) return AT_ROUND_OFF;
+    /* With a kept tangent, the residual falls by twice the last factor. It must fall far enough
+     * that works are the same as with a new tangent. */
+    e->near = !kept && 2000 * residual * (residual / e->last) <= wanted && (close || residual > floor);
+  }
+  /* A tangent with the row of a motion does not fit the row of a force: newtons of the residual
+   * would become metres of the change. */
+  if (of_all[3] > 0) e->near = *e->switched = 0;
+  e->slow += 1;
+  /* Directly after the activation of a connector, balanced forces are no measure of convergence, as
+   * its law is not met yet. */
+  const double size = iteration > 0 || met ? residual : scale;
+  if (size <= e->best / 2) e->best = size, e->slow = 0;
+  e->last = residual;
+  return e->slow == e->patience ? STALLED : ITERATING;
 }
 
 petsc_functions petsc;
@@ -279,10 +269,10 @@ static int note_change(void *matrix)
  * singular. */
 int factor_tangent(const equation *e, int *failed)
 {
-  eliminate(e->chains, e->residual);
-  if ((*failed = !all_finite(e->chains->left, e->chains->left_data))) return 0;
+  eliminate(e->elimination, e->residual);
+  if ((*failed = !all_finite(e->elimination->left, e->elimination->left_data))) return 0;
   if (e->fronts) {
-    *failed = !factor_fronts(e->fronts, e->chains->left_data);
+    *failed = !factor_fronts(e->fronts, e->elimination->left_data);
     return 0;
   }
   TRY(note_change(e->left));
@@ -296,12 +286,12 @@ int factor_tangent(const equation *e, int *failed)
  * residual is already eliminated in the chains. */
 int solve_tangent(const equation *e, int reduced)
 {
-  if (!reduced) reduce(e->chains, e->residual);
+  if (!reduced) reduce(e->elimination, e->residual);
   if (e->fronts) {
-    reduce_fronts(e->fronts, e->chains->left_f);
+    reduce_fronts(e->fronts, e->elimination->left_f);
     expand_fronts(e->fronts, e->found);
   } else TRY(petsc.PCApply(e->factors, e->left_f, e->left_x));
-  expand(e->chains, e->found, e->change);
+  expand(e->elimination, e->found, e->change);
   return 0;
 }
 
@@ -379,7 +369,7 @@ static int newton(equation *e, double *x)
   TRY(residual_at(e, x));
   for (;;) {
     if (e->monitored) TRY(petsc.SNESMonitor(e->snes, e->iterations, norm_of(e, e->residual)));
-    e->reason = verdict(e, x, e->iterations);
+    e->reason = test_convergence(e, x, e->iterations);
     if (e->border && e->reason > 0 && !e->border->met(e->border->handle)) e->reason = ITERATING;
     if (e->reason) return 0;
     if (e->iterations == e->most) {
@@ -461,7 +451,7 @@ int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason, void *self)
 {
   equation *e = self;
-  *reason = e->reason = verdict(e, e->unknowns, e->iterations = (int)iteration);
+  *reason = e->reason = test_convergence(e, e->unknowns, e->iterations = (int)iteration);
   return 0;
 }
 

@@ -126,7 +126,7 @@ static void open_places(time_loop *m, double least)
 {
   for (int k = 0; k < m->places; ++k) {
     const openable *o = m->place + k;
-    if (o->points) release(o->points, least);
+    if (o->points) allow_opening(o->points, least);
     if (o->cells) o->cells->latest[0] = NAN;
     for (int i = 0; i < o->number; ++i) o->free[i] |= o->excess[i] > 0 && o->excess[i] >= least;
   }
@@ -140,7 +140,7 @@ static void end_search(time_loop *m, int opened)
     const openable *o = m->place + k;
     const points *p = o->points;
     for (int i = 0; p && i < p->cells * p->of_cell; ++i)
-      if (p->w[i * p->width + FLOWS] == RELEASED) p->w[i * p->width + FLOWS] = CLOSED;
+      if (p->w[i * p->width + FLOWS] == MAY_OPEN) p->w[i * p->width + FLOWS] = CLOSED;
     if (o->number) memset(o->free, 0, o->number * sizeof *o->free);
   }
 }
@@ -255,7 +255,7 @@ static int solve_step(time_loop *m, int hold)
     return fails(m, raised_anywhere(e) == OTHER ? RAISED : NO_EQUILIBRIUM);
   if (!measure(m)) return 0;
   for (int k = 0; k < m->admissions; ++k) admitted &= m->admission[k].of(m->admission[k].self, m->x);
-  if (m->judges && over_processes(e, LARGEST, !admitted) > 0) return fails(m, GIVES_ENERGY);
+  if (m->checks_laws && over_processes(e, LARGEST, !admitted) > 0) return fails(m, GIVES_ENERGY);
   return !m->path || followed(m);
 }
 

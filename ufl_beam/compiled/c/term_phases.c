@@ -196,8 +196,8 @@ static void put_number(const user_work *w, int k, double value)
     const cells *form = w->form[j].form;
     const int at = w->at[j * w->numbers + k];
     if (at < 0) continue;
-    for (int c = 0; c < form->number; c += form->lanes)
-      for (int l = 0; l < form->lanes; ++l) in_cell(form, c, at)[l] = value;
+    for (int c = 0; c < form->number; c += form->batch_size)
+      for (int l = 0; l < form->batch_size; ++l) in_cell(form, c, at)[l] = value;
   }
 }
 
