@@ -13,5 +13,5 @@ def let_fail(simulation, fails):
         return not fails(time_loop.step.t1)
 
     calls = ffi.new("admission_call[]", [(admits, ffi.NULL)])
-    fill(time_loop, admissions=1, admission=calls, judges=1)
+    fill(time_loop, admissions=1, admission=calls, checks_laws=1)
     simulation._alive.append((calls, admits))
