@@ -52,7 +52,7 @@ def stepped(time):
         simulation.end()
         return simulation.solution.displacement(end)[-1].tolist()
     except BaseException:
-        simulation.copies.finish()
+        simulation.comparison.finish()
         raise
     finally:
         simulation.close()

@@ -69,5 +69,5 @@ def test_one_process_compares_nothing():
     section = ub.Section(EA=1.0, GA=1.0, EI=1e-3, rhoA=1.0)
     scene = ub.Scene([ub.Beam((0, 0), (1, 0), section, cells=2)])
     simulation = ub.Simulation(scene, ub.EnergyMomentum(), comm=MPI.COMM_SELF)
-    assert not simulation.copies.several
+    assert not simulation.comparison.several
     simulation.close()

@@ -286,7 +286,7 @@ def cell_by_cell(kernel):
         batches = getattr(kernel, name).transpose(0, 2, 1)
         rows = batches.reshape(len(batches) * batches.shape[1], batches.shape[2])[:n]
         setattr(one, name, in_batches(rows, 1))
-    one.lanes, one._in_lanes = 1, ffi.NULL
+    one.batch_size, one._tabulate_batch = 1, ffi.NULL
     for name in ("_places", "cells"):
         vars(one).pop(name, None)
     return one

@@ -313,7 +313,7 @@ def test_an_interrupt_while_something_opens():
     of_interrupt, interrupts = [], []
 
     def force(e, de):
-        if interrupts and any((x.points["flows"] == lib.RELEASED).any() for x in of_interrupt):
+        if interrupts and any((x.points["flows"] == lib.MAY_OPEN).any() for x in of_interrupt):
             raise interrupts.pop()
         return 1.0 * e
 
