@@ -307,7 +307,7 @@ def test_kernels_of_the_hot_loop(run):
             if kernel.cells.batch_size == 1:
                 assert name == "_first"  # once a step is not often
                 continue
-            entries = len(kernel._dofs) * kernel._entries
+            entries = len(kernel._dofs) * kernel._num_values
             several, one = np.zeros((2, max(entries, len(simulation.equation.A.data))))
             kernel.add(q, several)
             cell_by_cell(kernel).add(q, one)

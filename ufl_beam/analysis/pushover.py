@@ -42,6 +42,7 @@ from ufl_beam.model.loads import Gravity, LineLoad, Load, PointLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.output.history import Events
+from ufl_beam.quadrature import gauss_rule
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
@@ -208,7 +209,7 @@ def mass_points(numbering: DofNumbering, axis: int) -> list[tuple[AttachmentPoin
 
     ``axis`` is the component in which a support does not hold a point mass.
     """
-    scene, weights = numbering.scene, np.polynomial.legendre.leggauss(4)[1] / 2
+    scene, weights = numbering.scene, gauss_rule(4)[1]
     rows: list[tuple[AttachmentPoint, float]] = []
     for beam in scene.beams:
         if rhoA := beam.section.rhoA:
@@ -302,7 +303,7 @@ def _along(
         mass = sum(mass for _, mass in mass_points(numbering, axis))
         return float(size(factor * load.acceleration[axis] * mass))
     if isinstance(load, LineLoad):
-        weights = np.polynomial.legendre.leggauss(4)[1] / 2
+        weights = gauss_rule(4)[1]
         lengths = numbering.lengths(numbering.cells_of(load.beam))
         shares = load.factors(numbering.gauss_parameters(load.beam)) @ weights
         return float(size(factor * load.force[axis] * float(lengths @ shares)))

@@ -23,6 +23,7 @@ from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_scheme import Coefficients, Constant
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
+from ufl_beam.quadrature import gauss_rule
 
 # -- forces at the end of the step -------------------------------------------------------------
 
@@ -305,9 +306,9 @@ class _ForcesOverStep:
 
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
         """Return the mean of ``f`` on the straight line from q0 to q1, exact up to degree 7."""
-        points, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-        values = (f(q0 + float(1 + x) / 2 * (q1 - q0)) for x in points)
-        return sum((float(w) / 2 * f for w, f in zip(weights, values, strict=True)), 0)
+        points, weights = gauss_rule(GAUSS_POINTS)
+        values = (f(q0 + float(x) * (q1 - q0)) for x in points)
+        return sum((float(w) * f for w, f in zip(weights, values, strict=True)), 0)
 
 
 class EnergyMomentumBase(_ForcesOverStep):

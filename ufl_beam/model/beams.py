@@ -31,6 +31,7 @@ from ufl_beam.model.connector_laws import HingeLaw, require_hinge_law
 from ufl_beam.model.functions import Arc, Curve, Point, Polyline, Straight, curve_point
 from ufl_beam.model.records import Instance, Record, Text
 from ufl_beam.model.sections import Section
+from ufl_beam.quadrature import gauss_rule
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -243,12 +244,12 @@ class Mesh:
     @property
     def points(self) -> Array:
         """Gauss points of a cell, ascending from 0 to 1; (p,)."""
-        return np.asarray((1 + np.polynomial.legendre.leggauss(self.degree)[0]) / 2)
+        return gauss_rule(self.degree)[0]
 
     @property
     def point_weights(self) -> Array:
         """Weights of the Gauss points of a cell, with the sum 1; (p,)."""
-        return np.asarray(np.polynomial.legendre.leggauss(self.degree)[1] / 2)
+        return gauss_rule(self.degree)[1]
 
     @cached_property
     def fractions(self) -> Array:
@@ -264,9 +265,8 @@ class Mesh:
         A row of values at the points times the weights is the mean of the function times each
         Lagrange polynomial.  It is exact for polynomials up to degree 7 - p.
         """
-        points, weights = np.polynomial.legendre.leggauss(4)
-        s = (1 + points) / 2
-        return s, weights[:, None] / 2 * self.weights(s)
+        points, weights = gauss_rule(4)
+        return points, weights[:, None] * self.weights(points)
 
     def weights(self, s: npt.ArrayLike) -> Array:
         """Evaluate the Lagrange polynomials of a cell at ``s``, from 0 to 1; (..., nodes)."""

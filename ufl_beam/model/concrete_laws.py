@@ -10,8 +10,6 @@ from dataclasses import dataclass, fields
 from functools import partial
 from typing import Annotated, Any, ClassVar
 
-import numpy as np
-
 from ufl_beam.errors import ModelError
 from ufl_beam.model.checks import require_number
 from ufl_beam.model.law_functions import (
@@ -27,6 +25,7 @@ from ufl_beam.model.law_functions import (
 from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.records import NotNegative, Positive, Record
 from ufl_beam.model.softening_laws import LinearSoftening, SofteningLaw, require_softening
+from ufl_beam.quadrature import gauss_rule
 
 TINY = 1e-30
 """Strain that replaces zero in divisors and logarithms."""
@@ -72,9 +71,8 @@ class _Concrete(Record, MaterialLaw):
 
     def area(self, low: Values, high: Values) -> Values:
         """Return the integral of the backbone between strains, by Gauss-Legendre quadrature."""
-        points, weights = np.polynomial.legendre.leggauss(4)
-        at = [(low + high) / 2 + x * (high - low) / 2 for x in points.tolist()]
-        means = (w / 2 * self.backbone(x) for w, x in zip(weights.tolist(), at, strict=True))
+        rule = [(float(x), float(w)) for x, w in zip(*gauss_rule(4), strict=True)]
+        means = (w * self.backbone(low + x * (high - low)) for x, w in rule)
         return (high - low) * sum(means)
 
     def _unloading(self, crushed: Values) -> tuple[Values, Values]:

@@ -127,6 +127,9 @@ class Section(Record):
             return self.fibres.section_points(self.GA)
         if hinge is not None and not hinge.opens:
             hinge = None
+        resultants = self.axial, self.shear, self.bending
+        if all(law is None for law in (*resultants, self.interaction, hinge)):
+            return ()
         stiffness, bending = np.array([self.EA, self.GA, self.EI]), self.bending
         if self.interaction is not None:
             if hinge is not None:

@@ -20,6 +20,7 @@ from ufl_beam.arrays import Array, Complex
 from ufl_beam.errors import ModelError
 from ufl_beam.model.checks import require_array, require_sequence
 from ufl_beam.model.records import Record
+from ufl_beam.quadrature import gauss_rule
 
 Loop = tuple[tuple[float, float, float], ...]
 """Corners (x, y, radius) of a closed polygon before they are rounded; m."""
@@ -379,7 +380,7 @@ def thin_walled_shear_area(walls: Walls) -> float:
     """
     area = sum(abs(end - start) * t for start, end, t in walls)
     centre = sum(abs(end - start) * t * (start + end).imag / 2 for start, end, t in walls) / area
-    nodes, weights = (np.polynomial.legendre.leggauss(3)[0] + 1) / 2, np.array([5, 8, 5]) / 18
+    nodes, weights = gauss_rule(3)
     inflow: dict[complex, float] = {}
     energy = I = 0.0
     for start, end, t in walls:

@@ -18,6 +18,7 @@ from ufl_beam.model.checks import require_kind
 from ufl_beam.model.law_functions import Values, below, exp, positive, where
 from ufl_beam.model.material_law import WRITTEN, require_field, require_fields
 from ufl_beam.model.records import FromZero, Positive, Record
+from ufl_beam.quadrature import gauss_rule
 
 OWN_LAW = "state a SofteningLaw of your own"
 """Advice in the error that a subclass of a closed class raises."""
@@ -89,9 +90,8 @@ class SofteningLaw(ABC):
         The mean is a difference of :meth:`energy_to` divided by the growth.  If a law has no
         ``energy_to``, or if the growth is small, the mean is computed by Gauss-Legendre quadrature.
         """
-        points, weights = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
-        terms = zip(points.tolist(), weights.tolist(), strict=True)
-        mean = sum(w / 2 * self.traction(opening + (1 + x) / 2 * growth) for x, w in terms)
+        rule = [(float(x), float(w)) for x, w in zip(*gauss_rule(QUADRATURE_POINTS), strict=True)]
+        mean = sum(w * self.traction(opening + x * growth) for x, w in rule)
         before, after = self.energy_to(opening), self.energy_to(opening + growth)
         if before is None or after is None:
             return mean

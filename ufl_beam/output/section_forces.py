@@ -18,6 +18,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.display import in_one_line
+from ufl_beam.quadrature import gauss_rule
 
 
 @in_one_line
@@ -62,8 +63,7 @@ class Material(NamedTuple):
 MIDDLE: Array = np.full(1, 0.5)
 """Middle of a cell, as a fraction of its length."""
 
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
-GAUSS = [(float(1 + x) / 2, float(w) / 2) for x, w in zip(POINTS, WEIGHTS, strict=True)]
+GAUSS = [*zip(*(values.tolist() for values in gauss_rule(3)), strict=True)]
 """Points and weights of a Gauss rule from 0 to 1; it is exact for the integrals below."""
 
 
