@@ -334,6 +334,7 @@ typedef struct {
   double weight_of_before;         /* weight of the force before the step in the work of the step */
   const int32_t *dofs;             /* of each connector: six of its nodes, then the forces */
   const double *length;            /* 1 for a rotation, else the size of the scene */
+  const double *stiffness;         /* elastic stiffness; 0 if a law has none, or no internal variables */
   double size;                     /* of the scene */
 } connectors;
 
