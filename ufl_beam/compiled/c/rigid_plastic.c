@@ -57,7 +57,7 @@ static void set_rows_of_rigid_plastic(const connectors *c, const double *q)
     if (!way) continue;
     set_slip(w, motion, way);
     ask(p->force, w, 2, s);
-    const double slope = way * s[1], r = p->slope[i];
+    const double r = p->slope[i], slope = p->search[STIFF] ? fabs(s[1]) : way * s[1];
     row[0] = slope / r, row[1] = -1 / r, row[2] = (slope * c->e1[i] - s[0]) / r;
   }
 }
