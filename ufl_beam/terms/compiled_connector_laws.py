@@ -136,6 +136,18 @@ class CompiledLaws(Response):
             places = [doubles(self._limits) + i for i in range(n)]
             self._rub(places, laws=self._c, limit_of_law=self._forms.limit)
 
+    def bind_term(self, term: Any) -> None:
+        """Store the array of the latest rows of the laws."""
+        super().bind_term(term)
+        self._rows = term.latest_rows
+
+    def remaining(self) -> Array:
+        """Return the remaining fraction of elastic stiffness in the iterate; (num_connectors,)."""
+        k = self._components
+        slopes = -np.einsum("ijj->ij", self._rows.reshape(-1, k, k + 2)[:, :, :k]).ravel()
+        whole = np.ones(len(slopes))
+        return np.asarray(np.divide(slopes, self.stiffness, out=whole, where=self.stiffness > 0))
+
     def bends(self, e1: Array) -> Array:
         """Return minus the second derivatives of the forces at constant variables.
 

@@ -166,7 +166,8 @@ void add_connectors_force(void *self, const double *q, double *r)
  *
  * A law with internal variables computes its force from the elastic part of a motion, which has the
  * round-off of the motions at both ends of the step. Times the elastic stiffness it is all that
- * remains of the force of a spring that has failed, where the slope of the row and `scale` vanish. */
+ * remains of the force of a spring that has failed, where the slope of the row and `scale` vanish.
+ * The law and the unknown force, which is the law of an earlier iterate, err by half a digit each. */
 double missed_by_connectors(void *self, const double *q, const double *r, double scale, double moved)
 {
   const connectors *c = self;
@@ -186,9 +187,10 @@ double missed_by_connectors(void *self, const double *q, const double *r, double
                                                     : weight * scale * c->size / length[j];
       double reach = 0; /* of the motions in the row */
       for (int l = 0; l < n; ++l) reach += fabs(row[l]) * length[l];
-      reach = fmax(reach, weight * c->stiffness[n * i + j] * length[j]);
+      const double elastic = weight * c->stiffness[n * i + j] * length[j];
       const double farthest = fmax(far, fabs(c->e0[n * i + j]) / length[j]);
-      const double left = fabs(r[c->force[n * i + j]]) - 8 * reach * last_digit(farthest);
+      const double round_off = fmax(8 * reach * last_digit(far), elastic * last_digit(farthest));
+      const double left = fabs(r[c->force[n * i + j]]) - round_off;
       if (left > 0) most = fmax(most, left / size);
     }
   }
