@@ -201,7 +201,7 @@ BROKEN = ub.Spring(K, softening=ub.Softening(10.0, 0.1))
 def test_a_hinge_that_has_failed_returns_to_its_initial_rotation(law, reference):
     """The prescribed motion is zero again and no moment is left, so all forces are round-off.
 
-    Their size is the largest stiffness, EA and GA of a cell of 0.5 m, times the round-off of motions.
+    Their size is the largest stiffness, EA of a cell of 0.5 m, times the round-off of motions.
     The moment of the spring falls as exp(-100 slip): limit/energy = 100 per rad, the slip is 0.8.
     """
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e6, GA=1e6, EI=1e5), cells=2)

@@ -75,7 +75,7 @@ class LawInStep:
         stored: Energies in the accepted state, by entry of the ledger; J.
         opens: Object that opens or slips beyond a limit, or None; see ``Solver._equilibrium``.
         slope: Number by which equations that state the force are divided.
-        stiffness: Elastic stiffness of each component, if the law has internal variables, else zero.
+        stiffness: Elastic stiffness of the components of laws with internal variables, else zero.
     """
 
     account, entry, sign, saved_as = "lost", "", 1.0, ""
@@ -230,7 +230,9 @@ class _EnergyLaw(LawInStep):
             setting.loses("numerical")
         if self.law.variables:
             k, (*_, z) = self.law.components, self.after(0.0, 0.0)
-            lengths = np.array([self.length] if k == 1 else [setting.numbering.scene.size] * 2 + [1.0])
+            lengths = np.array(
+                [self.length] if k == 1 else [setting.numbering.scene.size] * 2 + [1.0]
+            )
             slopes = around(lambda e: self._elastic(e, z), np.zeros(k), 1e-6 * lengths[:k])
             self.stiffness = np.abs(np.diag(slopes))
 

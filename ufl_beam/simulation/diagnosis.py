@@ -213,9 +213,7 @@ def _singularity(equation: StepEquation, q: Array) -> str:
     return f"a mechanism has formed: {said}" if mechanism else ""
 
 
-def _deformations(
-    equation: StepEquation, q: Array, x: Array, most: float = SOFT
-) -> list[Deformed]:
+def _deformations(equation: StepEquation, q: Array, x: Array, most: float = SOFT) -> list[Deformed]:
     """Find the connectors and the cells that deform in a small motion along ``x`` from ``q``.
 
     Those with at most the fraction ``most`` of their elastic stiffness are soft.
