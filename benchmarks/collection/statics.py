@@ -247,7 +247,7 @@ def two_storeys_limit(solution):
         # five of the six hinges that turn in the linear program; the last one has not yielded yet
         *(
             f"Hinge(column {end}"
-            for end in ("00.start", "10.start", "20.start", "10.end", "20.end")
+            for end in ("00.st", "10.st", "20.st", "10.end", "20.end")
         ),
     ),
     limit=two_storeys_limit,
