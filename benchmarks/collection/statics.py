@@ -245,10 +245,7 @@ def two_storeys_limit(solution):
     stops=(
         "a limit load",
         # five of the six hinges that turn in the linear program; the last one has not yielded yet
-        *(
-            f"Hinge(column {end}"
-            for end in ("00.st", "10.st", "20.st", "10.end", "20.end")
-        ),
+        *(f"Hinge(column {end}" for end in ("00.st", "10.st", "20.st", "10.end", "20.end")),
     ),
     limit=two_storeys_limit,
     tolerance=0.02,  # the sway stiffness of the last elastic members is below that of the weight
