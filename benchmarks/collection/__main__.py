@@ -11,6 +11,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+sys.path.insert(1, str(Path(__file__).parents[1]))  # of the module records
+
 import dynamics  # noqa: F401  # enters its models
 import statics
 from models import MODELS, judged

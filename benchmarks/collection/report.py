@@ -3,6 +3,8 @@
 
 from pathlib import Path
 
+from records import machine
+
 PAGE = Path(__file__).parents[2] / "docs" / "collection.md"
 
 ISSUES = "https://github.com/OpenSees/OpenSees/issues"
@@ -33,12 +35,13 @@ def beside(row: dict) -> str:
 
 
 def cause(message: str) -> str:
-    """Return the cause in a message: the text after its beginning, up to numbers of iterations."""
-    return message.split("s: ", 1)[-1].split("; Newton's")[0].split("; residual")[0]
+    """Return the cause in a message: the text between time and numbers of iterations."""
+    return message.split(" s: ", 1)[-1].split("; Newton's")[0].split("; residual")[0]
 
 
 def save(rows: list[dict]) -> None:
     """Write docs/collection.md."""
+    here = machine()
     count = {v: sum(r["verdict"] == v for r in rows) for v in ("end", "stops", "FAILS", "WRONG")}
     lines = [
         "# Models that fail elsewhere",
@@ -51,9 +54,12 @@ def save(rows: list[dict]) -> None:
         "of the threads; the other models are of the same kinds.",
         "Models and steps: [benchmarks/collection](../benchmarks/collection).",
         "",
+        f"Commit {here['commit']}, Python {here['python']}, DOLFINx {here['dolfinx']}, "
+        f"{here['processor']}, one thread.",
+        "",
         f"Of {len(rows)} models {count['end']} reach the end, {count['stops']} stop at a limit "
-        f"load, {count['FAILS']} fail for the reasons at the end of this page, {count['WRONG']} "
-        "disagree with their confirmation.",
+        f"load with a message that names hinges or cells of the mechanism, {count['FAILS']} fail, "
+        f"{count['WRONG']} disagree with their confirmation.",
         "",
         "Each model runs twice, with its step and with a quarter of it; *cut steps* are the steps "
         "that were divided into substeps in both runs. A model that",

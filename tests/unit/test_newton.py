@@ -90,3 +90,47 @@ def test_a_kept_tangent_ends_below_the_tolerance():
         ends.append(np.delete(run.q[-1], run.numbering.multipliers))
     # 1e-10 of some 1e5 N in each of 50 steps, on stiffnesses of the frame above 1e6 N/m.
     assert np.abs(ends[0] - ends[1]).max() < 50 * 1e-10 * 1e5 / 1e6
+
+
+SPEEDS = 0.071, 0.022, -0.029, -0.007
+"""Rotations of the far ends of four members in the whole run; rad."""
+
+
+def slips(steps, damper=0.0):
+    """Slips of the hinges of four members at their common node, at hundredths of the run."""
+    section = ub.Section(EA=4e9, GA=1.5e9, EI=4e7)
+    ends = (0, -3), (0, 3), (-3, 0), (3, 0)
+    laws = [
+        ub.Softening(*numbers)  # N m, J
+        for numbers in ((106e3, 3.5e3), (96e3, 5.1e3), (89e3, 43.7e3), (93e3, 39.8e3))
+    ]
+    beams = [
+        ub.Beam(end, (0, 0), section, cells=2, hinges={1.0: law})
+        for end, law in zip(ends, laws, strict=True)
+    ]
+    turned = [
+        ub.PrescribedDisplacement(beam.start, u=0, v=0, psi=lambda t, speed=speed: speed * t)
+        for beam, speed in zip(beams, SPEEDS, strict=True)
+    ]
+    node = ub.Rigid(*(beam.end for beam in beams))
+    dampers = [ub.Turn(ub.ground(0, 0), beams[0].end, ub.Damper(damper))] if damper else []
+    scene = ub.Scene(beams, joints=[node], supports=turned, connectors=dampers)
+    hinges = [one for one in scene.all_connectors if one.kind == "Hinge"]
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / steps)
+    moments = np.array([run.connector(hinge).force for hinge in hinges])
+    found = np.array([run.connector(hinge).motion for hinge in hinges])
+    return moments[:, :: steps // 100], found[:, :: steps // 100]
+
+
+def test_a_node_whose_hinges_all_soften():
+    """Its rotation has a negative stiffness; it follows the unbalanced moment as with a damper.
+
+    Newton's method alone moves it the other way.  The damper takes 2 kN m s times 0.05 rad/s, a
+    thousandth of the moments, so that it delays the slips by less than a step of the fastest pair.
+    """
+    moments, free = slips(200)
+    # equilibrium of the node, relative to the largest moment
+    assert np.abs(moments.sum(axis=0)).max() < 1e-9 * np.abs(moments).max()
+    _, damped = slips(400, damper=2e3)
+    assert np.abs(free - damped).max() < (SPEEDS[0] - SPEEDS[2]) / 100
+    assert np.abs(free[:2, -1]).min() > 0.014  # the hinges of the first two members open

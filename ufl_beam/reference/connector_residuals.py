@@ -126,7 +126,8 @@ class Connectors(ConnectorGroup):
         """Return the largest relative residual of a law, without round-off of motions.
 
         A residual in motion is relative to 1 % of ``moved`` (m), a residual in force to ``scale``
-        (N).  Rotations are multiplied, and moments divided, by the size of the scene.
+        (N).  Rotations are multiplied, and moments divided, by the size of the scene.  The force of
+        a law with internal variables has the round-off of the motions times its elastic stiffness.
         """
         size = self.setting.numbering.scene.size
         k, length = self._k, self._length.reshape(-1, self._k)
@@ -138,8 +139,11 @@ class Connectors(ConnectorGroup):
         positions = np.maximum(np.abs(q[self.dofs[:, :4]]).max(axis=1) / size,
                          np.abs(q[self.dofs[:, 4:6]]).max(axis=1)) + amplitude  # fmt: skip
         left = np.abs(r[self.forces_at])
-        row_motions = np.abs(self._rows[:, :k]) * np.repeat(length, k, axis=0)
-        left -= 8 * row_motions.sum(axis=1) * np.spacing(positions)
+        row_motions = (np.abs(self._rows[:, :k]) * np.repeat(length, k, axis=0)).sum(axis=1)
+        elastic = np.concatenate([np.broadcast_to(law.stiffness, k) for law in self.laws])
+        farthest = np.maximum(positions, np.abs(self._e0) / self._length)
+        in_law = weight * elastic * self._length * np.spacing(farthest)
+        left -= np.maximum(8 * row_motions * np.spacing(positions), in_law)
         with np.errstate(divide="ignore", invalid="ignore"):
             return float(np.where(left <= 0, 0.0, left / wanted).max())
 

@@ -75,10 +75,12 @@ class LawInStep:
         stored: Energies in the accepted state, by entry of the ledger; J.
         opens: Object that opens or slips beyond a limit, or None; see ``Solver._equilibrium``.
         slope: Number by which equations that state the force are divided.
+        stiffness: Elastic stiffness of the components of laws with internal variables, else zero.
     """
 
     account, entry, sign, saved_as = "lost", "", 1.0, ""
     slope = 1.0
+    stiffness: Any = 0.0
     _row: Row
 
     def __init__(self, connector: Connector, setting: Setting) -> None:
@@ -226,6 +228,13 @@ class _EnergyLaw(LawInStep):
         self._delayed = scheme.weight_of_before == 0 and self._load_weight > 0.5
         if self._delayed:
             setting.loses("numerical")
+        if self.law.variables:
+            k, (*_, z) = self.law.components, self.after(0.0, 0.0)
+            lengths = np.array(
+                [self.length] if k == 1 else [setting.numbering.scene.size] * 2 + [1.0]
+            )
+            slopes = around(lambda e: self._elastic(e, z), np.zeros(k), 1e-6 * lengths[:k])
+            self.stiffness = np.abs(np.diag(slopes))
 
     def _energy(self, e: Motions, z: State) -> Any:
         return np.sum(self.law.energy(self.law.as_argument([*np.atleast_1d(e)[:, None]]), z))
@@ -305,7 +314,7 @@ class _SpringLaw(LawInStep):
             softening=softening if softening is not None and softening.opens else None,
         )  # fmt: skip
         self._points = MaterialPoints(section_points, key, np.ones(1), setting)
-        self.stored = self._points.stored
+        self.stored, self.stiffness = self._points.stored, self.law.stiffness
         self.opens = self._points if self._points.softens else None
 
     def row(self, e1: float, λ: float) -> Row:

@@ -43,9 +43,12 @@ the least force that a message names, relative to the largest force."""
 SOFT = 1e-3
 """Stiffness up to which a connector or cell is soft, as a fraction of its elastic stiffness."""
 
+YIELDED = 0.5
+"""The same fraction, up to which a message on a limit load names a connector or cell."""
+
 PROBE_DISTANCE = 1e-3
-"""Largest distance of the probe state from the initial state of a step; in sizes of the scene, or
-rad.  The tangent in the probe state shows which material yields at the start of the step."""
+"""Distance of the probe state from the initial state of a step; in sizes of the scene, or rad.  The
+tangent in the probe state shows which material yields at the start of the step."""
 
 FREE_MOTION = (
     "Loads can hold the scene only near an equilibrium, as a weight below its hinge, and the run "
@@ -65,6 +68,9 @@ LEDGER_TOLERANCE = 10.0
 
 NAMED = 3
 """Largest number of names that a message lists."""
+
+MOST_LISTED = 12
+"""Largest number of connectors and cells that a message lists as parts of a mechanism."""
 
 
 class Deformed(NamedTuple):
@@ -125,7 +131,8 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
 
     The criteria are a least singular value of the tangent that is a small fraction of its value in
     the first state, and a changed number of negative pivots.  The pivots are also counted at
-    ``probe``, a little beyond ``q0``, where yielding has reduced the stiffness.
+    ``probe``, a little beyond ``q0``, where yielding has reduced the stiffness.  The message names
+    connectors and cells that yield there and deform in the motion of least stiffness.
     """
     if not len(equation.force) or not len(solution):
         return ""
@@ -138,23 +145,37 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
             return ""
         try:
             signs.append(Factorization(csr_array(K)).negative)
-            least.append(null_vectors(K)[0][-1])
+            sizes, vectors = null_vectors(K)
         except (np.linalg.LinAlgError, RuntimeError):
             return ""
+        least.append(sizes[-1])
     if len(set(signs)) == 1 and least[1] > LIMIT_STIFFNESS * least[0]:
         return ""
+    numbering = equation.subdomain.numbering
+    x: Array = np.zeros(numbering.size)
+    x[free] = vectors[:, -1]
+    x /= np.abs(x * numbering.scales).max() or 1.0
+    names = _names(numbering, *_deformations(equation, probe, x, YIELDED))
+    verb = "yields or softens" if len(names) == 1 else "yield or soften"
+    said = f"; {_list(names, MOST_LISTED)} {verb}" if names else ""
     return (
-        "a limit load or a bifurcation is near, where the tangent stiffness is singular; follow "
-        "the path through it with ub.follow(scene, ub.ArcLength(...))"
+        f"a limit load or a bifurcation is near, where the tangent stiffness is singular{said}; "
+        "follow the path through it with ub.follow(scene, ub.ArcLength(...))"
     )
 
 
 def _probe_state(equation: StepEquation, q0: Array, q1: Array) -> Array:
-    """Return a state from ``q0`` toward ``q1``, at most :data:`PROBE_DISTANCE` from ``q0``."""
+    """Return a state in the direction from ``q0`` to ``q1``, :data:`PROBE_DISTANCE` from ``q0``.
+
+    It may lie beyond ``q1``; forces of connectors are then the ones of ``q1``.
+    """
     subdomain = equation.subdomain
-    increment = np.abs(q1 - q0) * subdomain.numbering.scales[subdomain.dofs]
-    far = subdomain.largest(float(increment.max(initial=0.0)))
-    return np.asarray(q0 + min(1.0, PROBE_DISTANCE / far) * (q1 - q0)) if 0 < far < np.inf else q0
+    scales, change = subdomain.numbering.scales[subdomain.dofs], q1 - q0
+    far = subdomain.largest(float(np.abs(change * scales).max(initial=0.0)))
+    if not 0 < far < np.inf:
+        return q0
+    part = PROBE_DISTANCE / far
+    return np.asarray(q0 + np.where(scales > 0, part, min(1.0, part)) * change)
 
 
 def _singularity(equation: StepEquation, q: Array) -> str:
@@ -192,8 +213,11 @@ def _singularity(equation: StepEquation, q: Array) -> str:
     return f"a mechanism has formed: {said}" if mechanism else ""
 
 
-def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
-    """Find the connectors and the cells that deform in a small motion along ``x`` from ``q``."""
+def _deformations(equation: StepEquation, q: Array, x: Array, most: float = SOFT) -> list[Deformed]:
+    """Find the connectors and the cells that deform in a small motion along ``x`` from ``q``.
+
+    Those with at most the fraction ``most`` of their elastic stiffness are soft.
+    """
     subdomain, numbering, scene = (
         equation.subdomain,
         equation.subdomain.numbering,
@@ -244,7 +268,7 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     sizes = np.abs(strains).max(axis=1, initial=0.0)
     deformations = []
     for deformed, remaining in ((connectors, left), (sizes, left_in_cells)):
-        soft = remaining <= SOFT
+        soft = remaining <= most
         stiff = bool((deformed[~soft] >= LEAST_NAMED).any())
         deformations.append(Deformed(_named(np.where(soft, deformed, 0.0)), stiff))
     return deformations
@@ -266,11 +290,10 @@ def _describe(
             "limit load or a bifurcation"
         )
     said = f"{_list(phrases)} {'is' if len(phrases) == 1 else 'are'} held by nothing"
-    ways = [str(numbering.scene.all_connectors[i]) for i in connectors.soft]
-    ways += [numbering.describe_cell(i) for i in cells.soft]
-    if ways:
-        verb = "gives way" if len(ways) == 1 else "give way together"
-        said += f"; {_list(ways)} {verb} at no further force"
+    names = _names(numbering, connectors, cells)
+    if names:
+        verb = "gives way" if len(names) == 1 else "give way together"
+        said += f"; {_list(names, MOST_LISTED)} {verb} at no further force"
     sections = (numbering.scene.beams[numbering.beam_of_cell[i]].section for i in cells.soft)
     laws = (
         law
@@ -294,9 +317,19 @@ def _named(sizes: Array) -> Index:
     return order[sizes[order] >= LEAST_NAMED]
 
 
-def _list(names: list[str]) -> str:
-    """Join names for a sentence: the first :data:`NAMED` names, and the number of the others."""
-    names, more = names[:NAMED], len(names) - NAMED
+def _names(numbering: DofNumbering, connectors: Deformed, cells: Deformed) -> list[str]:
+    """Return the names of soft connectors and cells; the name of a hinge has one of its places."""
+    names = []
+    for i in connectors.soft:
+        connector = numbering.scene.all_connectors[i]
+        place = connector.b if getattr(connector.a, "beyond", False) else connector.a
+        names.append(f"Hinge({place})" if connector.kind == "Hinge" else str(connector))
+    return names + [numbering.describe_cell(i) for i in cells.soft]
+
+
+def _list(names: list[str], most: int = NAMED) -> str:
+    """Join names for a sentence: the first ``most`` names, and the number of the others."""
+    names, more = names[:most], len(names) - most
     if more > 0:
         return f"{', '.join(names)} and {more} more"
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

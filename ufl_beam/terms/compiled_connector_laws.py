@@ -90,6 +90,10 @@ class LawForms:
 _law_forms = cached_forms(LawForms)
 
 
+SMALL_MOTION = 1e-6
+"""Motion for the elastic stiffness of a law; rad, or fraction of the size of the scene."""
+
+
 class CompiledLaws(Response):
     """Connectors with laws of one class; each law has its own parameters."""
 
@@ -125,10 +129,24 @@ class CompiledLaws(Response):
             stored=self._stored, lost=lost, answer=self._answer, sum=np.zeros(2),
         )  # fmt: skip
         self.in_c = {"laws": self._c}
+        if law.variables:
+            self.stiffness[:] = self._elastic_stiffness()
         if law.holds:
             self._limits = np.zeros(n)
             places = [doubles(self._limits) + i for i in range(n)]
             self._rub(places, laws=self._c, limit_of_law=self._forms.limit)
+
+    def bind_term(self, term: Any) -> None:
+        """Store the array of the latest rows of the laws."""
+        super().bind_term(term)
+        self._rows = term.latest_rows
+
+    def remaining(self) -> Array:
+        """Return the remaining fraction of elastic stiffness in the iterate; (num_connectors,)."""
+        k = self._components
+        slopes = -np.einsum("ijj->ij", self._rows.reshape(-1, k, k + 2)[:, :, :k]).ravel()
+        whole = np.ones(len(slopes))
+        return np.asarray(np.divide(slopes, self.stiffness, out=whole, where=self.stiffness > 0))
 
     def bends(self, e1: Array) -> Array:
         """Return minus the second derivatives of the forces at constant variables.
@@ -151,6 +169,17 @@ class CompiledLaws(Response):
         laws = law.with_parameters({name: at[f"number {name}"] for name in law.parameters()})
         motions = [at[f"before {i}"] for i in range(law.components)]
         return laws, motions, State({name: at[f"state {name}"] for name in law.variables})
+
+    def _elastic_stiffness(self) -> Array:
+        """Return the derivatives of elastic forces by their motions at rest; (num_connectors,)."""
+        law, rest, variables = self._accepted_state()
+        moved = SMALL_MOTION * self._lengths.reshape(-1, law.components).T
+        forces = law.elastic_forces(rest, variables)
+        slopes = np.empty_like(moved)
+        for i, δ in enumerate(moved):
+            motions = [*rest[:i], rest[i] + δ, *rest[i + 1 :]]
+            slopes[i] = np.abs(law.elastic_forces(motions, variables)[i] - forces[i]) / δ
+        return slopes.T.ravel()
 
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Return the energy that rate-independent laws dissipate in a static step to ``e1``; J.

@@ -177,6 +177,7 @@ class ConnectorForces(ConnectorTerm):
             "connectors", number=self._cells, components=k, dofs=self._dofs, rows=self.latest_rows,
             force=self.forces_at.copy(), size=setting.scene.size,
             length=np.where([c.is_rotation for c in connectors], 1.0, setting.scene.size),
+            stiffness=self.response.stiffness,
             work=work.cells, tangent=tangent.cells, motion=value.cells,
             row=work.position(forms.row), row_of_tangent=tangent.position(forms.row),
             e0=self._e, e1=self._now, before=self._before,

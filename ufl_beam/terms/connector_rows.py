@@ -92,6 +92,7 @@ class Response:
             friction.
         dissipated: Arrays (num_connectors,) of energies lost since the beginning, whose sum is
             ``dissipated`` of :class:`Connection`; J.
+        stiffness: Elastic stiffness of laws with internal variables, else zero; N/m or N m/rad.
     """
 
     must_dissipate = needs_accept_end = False
@@ -108,6 +109,7 @@ class Response:
             [connector.is_rotation for connector in connectors], 1.0, setting.scene.size
         )
         self.flow_direction: Index = np.zeros(len(connectors), dtype=np.int32)
+        self.stiffness: Array = np.zeros(len(connectors))
         self.in_c: dict[str, Any] = {}
         self._in_steps: dict[str, Any] = {}
         self._time_functions: dict[str, list[tuple[TimeFunction, object]]] = {}
@@ -259,6 +261,7 @@ class Springs(Response):
     def __init__(self, law: Spring, connectors: Sequence[Connector], setting: Setting) -> None:
         super().__init__(connectors, setting, "_Sprung")
         softening, number = law.softening, len(connectors)
+        self.stiffness[:] = law.stiffness
         section_points = SectionPoints(
             strains=np.array([[1.0, 0.0, 0.0]]),
             weights=np.ones(1),

@@ -162,7 +162,12 @@ void add_connectors_force(void *self, const double *q, double *r)
 
 /* Largest residual of a row. Residuals of motions are divided by 1 % of `moved`, which is at most
  * the size of the scene; residuals of forces are divided by `scale`. Round-off of the motions does
- * not count; it grows with the distance from the initial position and with the number of turns. */
+ * not count; it grows with the distance from the initial position and with the number of turns.
+ *
+ * A law with internal variables computes its force from the elastic part of a motion, which has the
+ * round-off of the motions at both ends of the step. Times the elastic stiffness it is all that
+ * remains of the force of a spring that has failed, where the slope of the row and `scale` vanish.
+ * The law and the unknown force, which is the law of an earlier iterate, err by half a digit each. */
 double missed_by_connectors(void *self, const double *q, const double *r, double scale, double moved)
 {
   const connectors *c = self;
@@ -182,7 +187,10 @@ double missed_by_connectors(void *self, const double *q, const double *r, double
                                                     : weight * scale * c->size / length[j];
       double reach = 0; /* of the motions in the row */
       for (int l = 0; l < n; ++l) reach += fabs(row[l]) * length[l];
-      const double left = fabs(r[c->force[n * i + j]]) - 8 * reach * last_digit(far);
+      const double elastic = weight * c->stiffness[n * i + j] * length[j];
+      const double farthest = fmax(far, fabs(c->e0[n * i + j]) / length[j]);
+      const double round_off = fmax(8 * reach * last_digit(far), elastic * last_digit(farthest));
+      const double left = fabs(r[c->force[n * i + j]]) - round_off;
       if (left > 0) most = fmax(most, left / size);
     }
   }

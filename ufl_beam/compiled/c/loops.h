@@ -217,7 +217,8 @@ extern const double NO_ENERGY; /* relative size below which dissipation counts a
 enum { LINE = 3 }; /* strain, stress and slope of the tangent line of a point */
 
 /* Flags of the present search for an equilibrium, which all points and connectors of a scene share.
- * OPENED: a point has opened. STIFF: points that do not open answer with their elastic stiffness.
+ * OPENED: a point has opened. STIFF: points that do not open answer with their elastic stiffness,
+ * rigid-plastic connectors that soften with a stiffness of the opposite sign.
  * HOLD: points that do not flow stay closed. OVER: a held point has borne more than its limit. */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 
@@ -334,6 +335,7 @@ typedef struct {
   double weight_of_before;         /* weight of the force before the step in the work of the step */
   const int32_t *dofs;             /* of each connector: six of its nodes, then the forces */
   const double *length;            /* 1 for a rotation, else the size of the scene */
+  const double *stiffness;         /* elastic stiffness; 0 if a law has none, or no internal variables */
   double size;                     /* of the scene */
 } connectors;
 
