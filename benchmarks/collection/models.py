@@ -29,6 +29,69 @@ class CutSteps(ub.Recorder):
 
 
 @dataclass(frozen=True)
+class Case:
+    """A scene, its load history or path, and the compared quantity.
+
+    Attributes:
+        scene: The scene.
+        watched: Method of the solution ("displacement", "reaction"), "force" of a connector or
+            "factor" of a path, with the place, support or connector; and the component.
+        steps: Number of steps.
+        end: Time of the end; s.
+        rest: Scene in whose equilibrium dynamics begin; None begins undeformed.
+        dynamic: Whether the run is in dynamics.
+        control: Function of the divisor that returns the control of a path; None for a run.
+        until: End of the path.
+    """
+
+    scene: ub.Scene
+    watched: tuple
+    steps: int
+    end: float = 1.0
+    rest: ub.Scene | None = None
+    dynamic: bool = False
+    control: Callable[[int], object] | None = None
+    until: Callable | None = None
+
+    def history(self, run) -> np.ndarray:
+        """Return the history of the compared quantity."""
+        method, *of = self.watched
+        if method == "factor":
+            return run.factor
+        if method == "force":
+            return run.connector(*of).force
+        return getattr(run, method)(of[0])[:, of[1]]
+
+    def run(self, divisor: int = 1, record=()) -> np.ndarray:
+        """Run with the step divided; the history, or of a path its extremes and end."""
+        if self.control is not None:
+            path = ub.follow(
+                self.scene,
+                self.control(divisor),
+                steps=self.steps * divisor,
+                until=self.until,
+                record=record,
+                progress=False,
+            )
+            values = self.history(path)
+            return np.array([values.max(), values.min(), values[-1]])
+        rest = self.rest and ub.simulate(self.rest, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+        scheme = ub.EnergyMomentum() if self.dynamic else ub.Static()
+        more = {} if rest is None else {"start": rest}
+        return self.history(
+            ub.simulate(
+                self.scene,
+                scheme,
+                t=(0, self.end),
+                dt=self.end / (self.steps * divisor),
+                record=record,
+                progress=False,
+                **more,
+            )
+        )
+
+
+@dataclass(frozen=True)
 class Model:
     """A model that fails elsewhere.
 
@@ -37,8 +100,7 @@ class Model:
         kind: "statics", "path" or "dynamics".
         source: Report of the failure, or the reason why such models fail.
         quantity: Name and unit of the compared number.
-        run: Function of the divisor of the step and of recorders; returns the history of the
-            compared quantity, one number for each step.
+        case: Function that builds the case.
         stops: Part of the message if the model must stop; empty if it must reach the end.
         limit: Function that computes the time at which it must stop by limit analysis, from the
             solution at this time, whose displaced geometry it may use.
@@ -50,7 +112,7 @@ class Model:
     kind: str
     source: str
     quantity: str
-    run: Callable[[int, CutSteps], np.ndarray]
+    case: Callable[[], Case]
     stops: str = ""
     limit: Callable[[ub.Solution], float] | None = None
     tolerance: float = 0.0
@@ -62,11 +124,11 @@ MODELS: dict[str, Model] = {}
 
 
 def model(name: str, kind: str, source: str, quantity: str, **more):
-    """Enter a run into the collection."""
+    """Enter a case into the collection."""
 
-    def enter(run):
-        MODELS[name] = Model(name, kind, source, quantity, run, **more)
-        return run
+    def enter(case):
+        MODELS[name] = Model(name, kind, source, quantity, case, **more)
+        return case
 
     return enter
 
@@ -97,7 +159,7 @@ def result(one: Model, divisor: int) -> Result:
     steps, begin = CutSteps(), time.perf_counter()
     end, message, values, solution = None, "", np.zeros(0), None
     try:
-        values = np.asarray(one.run(divisor, steps), dtype=float)
+        values = one.case().run(divisor, steps)
     except ub.ConvergenceError as error:
         end, message, solution = error.time, " ".join(str(error).split()), error.solution
     return Result(end, message, values, steps.cut, time.perf_counter() - begin, solution)
