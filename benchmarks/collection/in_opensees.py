@@ -17,8 +17,14 @@ import openseespy.opensees as ops
 ALGORITHMS = (("Newton",), ("NewtonLineSearch",), ("KrylovNewton",), ("ModifiedNewton", "-initial"))
 """Algorithms in the order in which a step tries them."""
 
+ITERATIONS = 50
+"""Largest number of iterations of an algorithm."""
+
 HALVINGS = 6
 """Largest number of times that a step is halved."""
+
+MOST = 5000
+"""Largest number of steps of a path."""
 
 SERIES = 1000
 """First tag of time series and patterns."""
@@ -34,7 +40,7 @@ def settings(kind):
     ops.system("UmfPack")
     ops.numberer("RCM")
     ops.constraints("Transformation")
-    ops.test("NormDispIncr", 1e-8, 100)
+    ops.test("NormDispIncr", 1e-8, ITERATIONS)
     ops.algorithm("Newton")
     ops.integrator(*(("Newmark", 0.5, 0.25) if kind == "Transient" else ("LoadControl", 0.0)))
     ops.analysis(kind, "-noWarnings")
@@ -96,9 +102,8 @@ def load(forces):
         ops.load(node, *force)
 
 
-def watched(model, control):
-    """Return the present value of the compared quantity."""
-    what, *of = model["watched"]
+def value(what, *of, control=""):
+    """Return the present value of a quantity."""
     if what == "displacement":
         return ops.nodeDisp(of[1], of[0])
     if what == "force":
@@ -109,16 +114,33 @@ def watched(model, control):
     return sum(ops.nodeReaction(node, of[0]) for node in of[1:])
 
 
+def along(path, forces, keep):
+    """Follow a path until a quantity falls below its limit."""
+    settings("Static")
+    ops.timeSeries("Linear", SERIES)
+    ops.pattern("Plain", SERIES, SERIES)
+    load(forces)
+    begin = partial(by_displacement, *path["at"]) if "at" in path else by_arc
+    before = now = 0.0
+    for _ in range(MOST):
+        if path["limit"] > now < before:
+            return
+        yield advance(path["size"], begin)
+        before, now = now, value(*path["end"])
+        keep()
+    raise Failure
+
+
 def run(model, control, values):
-    """Run a model; append the compared quantity after each step; the number of halved steps."""
+    """Run a model; append the compared quantity after each step; yield whether it was halved."""
     ops.wipe()
     for name, *arguments in model["commands"]:
         getattr(ops, name)(*arguments)
-    dt, steps, halved = model["dt"], model["steps"], 0
+    dt, steps = model["dt"], model["steps"]
     values.append(0.0)
 
     def keep():
-        values.append(watched(model, control))
+        values.append(value(*model["watched"], control=control))
 
     if model["rest"]:
         settings("Static")
@@ -126,18 +148,21 @@ def run(model, control, values):
         for forces in model["rest"]:
             load(forces)
         for _ in range(4):
-            halved += advance(0.25, by_time)
+            yield advance(0.25, by_time)
         ops.loadConst("-time", 0.0)
-        values[0] = watched(model, control)
+        values[0] = value(*model["watched"])
+    if path := model["path"]:
+        yield from along(path, model["patterns"][0]["loads"], keep)
+        return
     for k, one in enumerate(model["patterns"]):
         pattern(SERIES + 1 + k, one["values"], dt)
         load(one["loads"])
     if model["dynamic"]:
         settings("Transient")
         for _ in range(steps):
-            halved += advance(dt, by_dynamics)
+            yield advance(dt, by_dynamics)
             keep()
-        return halved
+        return
     settings("Static")
     if control == "displacement control":
         (motion,) = model["motions"]
@@ -145,7 +170,7 @@ def run(model, control, values):
         path = motion["values"]
         first = next(k for k, value in enumerate(path) if value) - 1
         for _ in range(first or bool(model["patterns"])):
-            halved += advance(dt, by_time)
+            yield advance(dt, by_time)
             values += [0.0] * bool(first)
         ops.loadConst("-time", 0.0)
         ops.timeSeries("Linear", SERIES)
@@ -154,18 +179,18 @@ def run(model, control, values):
         settings("Static")
         start = ops.nodeDisp(*at)
         for n in range(first, steps):
-            halved += advance(path[n + 1] - path[n], partial(by_displacement, *at))
+            yield advance(path[n + 1] - path[n], partial(by_displacement, *at))
             if not abs(ops.nodeDisp(*at) - start - path[n + 1]) < 1e-6:
                 raise Failure
             keep()
-        return halved
+        return
     for k, motion in enumerate(model["motions"]):
         pattern(SERIES + 100 + k, motion["values"], dt)
         ops.sp(motion["node"], motion["dof"], 1.0)
     for _ in range(steps):
-        halved += advance(dt, by_time)
+        yield advance(dt, by_time)
         keep()
-    return halved
+    return
 
 
 def main():
@@ -174,9 +199,11 @@ def main():
     values: list = []
     result = {"end": None, "halved": 0, "values": values}
     try:
-        result["halved"] = run(model, sys.argv[1], values)
+        for halved in run(model, sys.argv[1], values):
+            result["halved"] += halved
     except Failure:
-        result["end"] = (len(values) - 1) * model["dt"]
+        done = (len(values) - 1) * model["dt"]
+        result["end"] = ops.getLoadFactor(SERIES) if model["path"] else done
     print("result", json.dumps(result | {"seconds": time.perf_counter() - begin}))
 
 

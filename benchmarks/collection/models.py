@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,10 @@ class Case:
         dynamic: Whether the run is in dynamics.
         control: Function of the divisor that returns the control of a path; None for a run.
         until: End of the path.
+        compared: Function that returns the compared numbers of the history of a path.
+        arc: Length of a step of a path in OpenSees; m.
+        ends: End of the path in OpenSees: a quantity as in ``watched``, and the limit below which
+            it falls.
     """
 
     scene: ub.Scene
@@ -52,6 +56,9 @@ class Case:
     dynamic: bool = False
     control: Callable[[int], object] | None = None
     until: Callable | None = None
+    compared: Callable[[np.ndarray], list] | None = None
+    arc: float = 0.0
+    ends: tuple = ()
 
     def history(self, run) -> np.ndarray:
         """Return the history of the compared quantity."""
@@ -63,7 +70,7 @@ class Case:
         return getattr(run, method)(of[0])[:, of[1]]
 
     def run(self, divisor: int = 1, record=()) -> np.ndarray:
-        """Run with the step divided; the history, or of a path its extremes and end."""
+        """Run with the step divided; the history, or the compared numbers of a path."""
         if self.control is not None:
             path = ub.follow(
                 self.scene,
@@ -73,8 +80,7 @@ class Case:
                 record=record,
                 progress=False,
             )
-            values = self.history(path)
-            return np.array([values.max(), values.min(), values[-1]])
+            return np.array(self.compared(self.history(path)))
         rest = self.rest and ub.simulate(self.rest, ub.Static(), t=(0, 1), dt=0.25, progress=False)
         scheme = ub.EnergyMomentum() if self.dynamic else ub.Static()
         more = {} if rest is None else {"start": rest}
@@ -89,6 +95,41 @@ class Case:
                 **more,
             )
         )
+
+    def small(self) -> Case:
+        """Return the case with a thousandth of all loads and motions; a path under load control.
+
+        Dynamics end after a quarter of the time.
+        """
+
+        def motion(function):
+            return lambda t: function(t) / 1000
+
+        swap: dict = {}
+        for support in self.scene.supports:
+            if isinstance(support, ub.PrescribedDisplacement):
+                moves = {("u", "v", "psi")[k]: motion(f) for k, f in support.held.items()}
+                swap[support] = replace(support, **moves)
+        for load in self.scene.loads:
+            field = "acceleration" if isinstance(load, ub.Gravity) else "force"
+            swap[load] = replace(load, **{field: tuple(x / 1000 for x in getattr(load, field))})
+
+        def swapped(scene):
+            lists = {
+                name: [swap.get(one, one) for one in getattr(scene, name)]
+                for name in ("supports", "loads")
+            }
+            return replace(scene, **lists)
+
+        watched = tuple(swap.get(x, x) for x in self.watched)
+        steps, end = self.steps, self.end
+        if self.dynamic:
+            steps, end = steps // 4, end / 4
+        if self.control is not None:
+            place = self.scene.loads[0].place
+            watched, steps = ("displacement", place, 1), 1
+        rest = self.rest and swapped(self.rest)
+        return Case(swapped(self.scene), watched, steps, end, rest, self.dynamic)
 
 
 @dataclass(frozen=True)

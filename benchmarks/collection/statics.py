@@ -349,6 +349,9 @@ def brittle_concrete_beam():
         2000,
         control=lambda divisor: ub.ArcLength(0.002 / divisor, factor=100.0),
         until=lambda now: now.displacement(half.end)[1] < -0.12,
+        compared=lambda factor: [factor.max(), factor[-1]],
+        arc=0.002,
+        ends=("displacement", half.end, 1, -0.12),
     )
 
 
@@ -444,8 +447,11 @@ def snap_through():
     return Case(
         scene,
         ("factor",),
-        100,
-        control=lambda divisor: ub.DisplacementControl(left.end, "v", -0.001505 / divisor),
+        150,
+        control=lambda divisor: ub.DisplacementControl(left.end, "v", -0.0015 / divisor),
+        until=lambda now: now.displacement(left.end)[1] < -0.1505,
+        compared=lambda factor: [factor[: factor.argmin()].max(), factor.min()],
+        ends=("displacement", left.end, 1, -0.1505),
     )
 
 
@@ -468,6 +474,9 @@ def snap_back():
         400,
         control=lambda divisor: ub.DissipationControl(energy / (40 * divisor), ub.ArcLength(0.02)),
         until=lambda now: now.damage()[1].sum() >= 0.95 * energy * (1 - 1e-9),
+        compared=lambda deflection: [deflection.min()],
+        arc=0.001,
+        ends=("factor", 0.05 * PLASTIC / 5e5),
     )
 
 

@@ -1,32 +1,46 @@
 # SPDX-License-Identifier: MIT
 """Cases of the collection in the commands of OpenSees: one translation for all models.
 
-Nodes, cells, layers, bars, masses and steps are those of the case.  The differences:
+Nodes, cells, layers, bars, masses, damping and steps are those of the case.  A cell is a
+corotational ``forceBeamColumn`` with one Gauss point, whose section has the shear stiffness of the
+case: for small strains of the cell this is the cell of the case.  The differences:
 
-* Elastic cells are ``ElasticTimoshenkoBeam``, cells of fibres ``dispBeamColumn`` with two Gauss
-  points and without shear deformation; both are corotational.  Masses are lumped.
-* A hinge of zero length is a ``zeroLength`` spring, 10 000 times as stiff as the member, with the
-  law ``ElasticPP`` or, for exponential softening, ``UVCuniaxial`` whose yield limit decays.
+* Masses of beams are lumped, and Newmark's method begins without an acceleration.
+* A hinge of zero length is a ``zeroLength`` spring with a large stiffness and the law ``ElasticPP``
+  or, for exponential softening, ``UVCuniaxial``, whose yield limit decays.
 * Coulomb friction has an elastic displacement of 0.01 mm.
-* Contact with damping is ``ViscoelasticGap``; its damping is linear in the velocity.  Cables with
-  damping of contact have none.  ``HertzDamp`` has the law of the case, but a tangent of the wrong
-  sign.
+* Contact with damping is ``ViscoelasticGap``: its damping is linear in the velocity, and equal at a
+  depth of 1 mm.  Cables have no damping of contact.  ``HertzDamp`` has the law of the case, but a
+  tangent of the wrong sign.
 """
 
-from itertools import count
+import json
+import math
+import os
+import subprocess
+import sys
+from itertools import count, pairwise
+from pathlib import Path
 
 import numpy as np
 
 import ufl_beam as ub
 
+LONGEST = 600
+"""Time after which a run of OpenSees is stopped; s."""
 
-import os
-FORCE=os.environ.get("FORCE","1")=="1"
+SMALLEST = 1e-9
+"""Largest value of a history that counts as zero: a slab that sticks; m."""
+
+FACTORS = 1000, 100
+"""Stiffnesses of hinges of zero length, as multiples of EI/L of the member; both are tried."""
+
+
 class Translation:
     """Commands for a scene; its nodes and elements by place, connector and support."""
 
-    def __init__(self, scene: ub.Scene) -> None:
-        self.scene, self.tags = scene, count(1)
+    def __init__(self, scene: ub.Scene, factor: float) -> None:
+        self.scene, self.factor, self.tags = scene, factor, count(1)
         self.commands: list = []
         self.nodes: dict = {}
         self.sections: dict = {}
@@ -128,7 +142,9 @@ class Translation:
                 branch = b.capping, b.post_capping, b.ultimate, b.yield_limit, b.overstrength
                 branch = *branch, b.residual
                 modes = law.strength, law.softening, law.unloading
-                return self.material("IMKBilin", law.stiffness, *branch, *branch, *modes, *[1.0] * 5)
+                return self.material(
+                    "IMKBilin", law.stiffness, *branch, *branch, *modes, *[1.0] * 5
+                )
             case ub.Spring():
                 return self.material("Elastic", law.stiffness)
             case ub.Coulomb():
@@ -147,7 +163,16 @@ class Translation:
         if section not in self.sections:
             placed, tag = section.fibres, next(self.tags)
             if placed is None:
-                self.add("section", "Elastic", tag, 1.0, section.EA, section.EI, 1.0, section.GA / section.EA)
+                self.add(
+                    "section",
+                    "Elastic",
+                    tag,
+                    1.0,
+                    section.EA,
+                    section.EI,
+                    1.0,
+                    section.GA / section.EA,
+                )
             else:
                 laws = {}
                 for number, E in zip(placed.material, placed.E, strict=True):
@@ -155,20 +180,27 @@ class Translation:
                         laws[number, E] = self.law(placed.fibres[number].law, float(E))
                 plane, tag = tag, next(self.tags)
                 self.add("section", "Fiber", plane)
-                for number, E, y, A in zip(placed.material, placed.E, placed.y, placed.A, strict=True):
+                for number, E, y, A in zip(
+                    placed.material, placed.E, placed.y, placed.A, strict=True
+                ):
                     self.add("fiber", y, 0.0, A, laws[number, E])
                 shear = self.material("Elastic", section.GA)
                 self.add("section", "Aggregator", tag, shear, "Vy", "-section", plane)
             self.sections[section] = tag
-            self.add("beamIntegration", "Legendre", tag, tag, 1 if FORCE else 2)
+            self.add("beamIntegration", "Legendre", tag, tag, 1)
         return self.sections[section]
 
     def beam(self, beam) -> None:
         """Create the cells, masses and hinges of a beam."""
         at, section = beam.vertices(self.scene.attached[beam]), beam.section
-        length = [float(np.hypot(*np.diff([beam.at(a).point, beam.at(b).point], axis=0)[0]))
-                  for a, b in zip(at, at[1:])]
-        firsts, lasts = [self.node(beam.at(s)) for s in at[:-1]], [self.node(beam.at(s)) for s in at[1:]]
+        length = [
+            float(np.hypot(*np.diff([beam.at(a).point, beam.at(b).point], axis=0)[0]))
+            for a, b in pairwise(at)
+        ]
+        firsts, lasts = (
+            [self.node(beam.at(s)) for s in at[:-1]],
+            [self.node(beam.at(s)) for s in at[1:]],
+        )
         for s, law in beam.hinges.items():
             k = int(np.abs(np.subtract(at, s)).argmin())
             beyond = self.new_node(beam.at(s).point)
@@ -179,14 +211,23 @@ class Translation:
                 lasts[-1] = beyond
             self.add("equalDOF", *pair, 1, 2)
             self.tied.setdefault(pair[0], []).append(beyond)
-            stiffness = 1e4 * section.EI / sum(length)
-            self.add("element", "zeroLength", next(self.tags), *pair, "-mat", self.law(law, stiffness), "-dir", 6)
+            stiffness = self.factor * section.EI / sum(length)
+            self.add(
+                "element",
+                "zeroLength",
+                next(self.tags),
+                *pair,
+                "-mat",
+                self.law(law, stiffness),
+                "-dir",
+                6,
+            )
         self.cells[beam] = []
-        for i, j, h in zip(firsts, lasts, length):
+        for i, j, h in zip(firsts, lasts, length, strict=True):
             for n in (i, j):
                 self.mass(n, section.rhoA * h / 2, section.rhoI * h / 2)
             rule = self.section(section)
-            self.add("element", "forceBeamColumn" if FORCE else "dispBeamColumn", next(self.tags), i, j, 1, rule)
+            self.add("element", "forceBeamColumn", next(self.tags), i, j, 1, rule)
             self.cells[beam].append((i, j, h))
 
     def connector(self, connector) -> None:
@@ -197,7 +238,9 @@ class Translation:
         self.elements[connector] = tag = next(self.tags)
         if isinstance(connector, ub.Stretch):
             length = float(np.hypot(*np.subtract(a.point, b.point)))
-            material = self.material("ElasticPPGap", law.stiffness * length, 1e20, law.high / length)
+            material = self.material(
+                "ElasticPPGap", law.stiffness * length, 1e20, law.high / length
+            )
             i = self.new_node(a.point)
             self.add("fix", i, 1, 1, 1)
             self.add("element", "corotTruss", tag, i, j, 1.0, material)
@@ -229,9 +272,9 @@ class Translation:
         raise NotImplementedError(load)
 
 
-def translated(case) -> dict:
-    """Return the commands of a case, its loads and motions at the ends of steps, and its quantity."""
-    of = Translation(case.scene)
+def translated(case, factor: float = FACTORS[0]) -> dict:
+    """Return the commands of a case, loads and motions at the ends of steps, path and quantity."""
+    of = Translation(case.scene, factor)
     times = np.linspace(0.0, case.end, case.steps + 1)
 
     def values(function):
@@ -256,8 +299,73 @@ def translated(case) -> dict:
         place = what[0] if method == "displacement" else what[0].place
         node = of.node(place)
         watched = method, what[1] + 1, node, *of.tied.get(node, ())
+    path = None
+    if case.control is not None:
+        control, (method, *what) = case.control(1), case.ends
+        end = (method,) if method == "factor" else (method, what[1] + 1, of.node(what[0]))
+        path = {"size": case.arc, "end": end, "limit": what[-1]}
+        if isinstance(control, ub.DisplacementControl):
+            component = ("u", "v", "psi").index(control.component)
+            path |= {"size": control.step, "at": (of.node(control.place), component + 1)}
     return {
         "commands": of.commands, "patterns": patterns, "motions": motions, "rest": rest,
         "dt": case.end / case.steps, "steps": case.steps, "dynamic": case.dynamic,
-        "watched": watched,
+        "watched": watched, "path": path, "hinges": any(beam.hinges for beam in case.scene.beams),
     }  # fmt: skip
+
+
+def in_opensees(model: dict, control: str) -> dict:
+    """Run a translated case in a process of its own; ``end`` is None at the end."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "peers"))
+    from install import installed  # installs from PyPI
+
+    environment = {**os.environ, "PYTHONPATH": str(installed())}
+    command = [sys.executable, str(Path(__file__).with_name("in_opensees.py")), control]
+    try:
+        done = subprocess.run(
+            command, input=json.dumps(model), env=environment, capture_output=True, text=True,
+            timeout=LONGEST, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return {"end": math.nan, "halved": 0, "values": [0.0], "seconds": float(LONGEST)}
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("result ")]
+    return json.loads(line.removeprefix("result "))
+
+
+def values_of(case) -> np.ndarray:
+    """Run a case; the compared quantity at the ends of the steps up to the end or the stop."""
+    try:
+        return case.run()
+    except ub.ConvergenceError as error:
+        return case.history(error.solution)[: int(error.time * case.steps / case.end + 1e-6) + 1]
+
+
+def apart(case, ours, found) -> float | None:
+    """Return the largest difference of the histories, relative to the largest value."""
+    theirs, size = np.array(found["values"]), float(np.abs(ours).max())
+    if case.control is not None:
+        if found["end"] is not None:
+            return None
+        theirs = np.array(case.compared(theirs))
+    n = min(len(ours), len(theirs))
+    return float(np.abs(theirs[:n] - ours[:n]).max() / size) if size > SMALLEST else None
+
+
+def beside(case) -> dict:
+    """Run a case in both programs, and a thousandth of it: all ways, and their differences.
+
+    Prescribed motions are imposed, or reached by displacement control; cases without them that
+    have hinges of zero length run with both stiffnesses.
+    """
+    ours, small, runs = values_of(case), case.small(), []
+    model = translated(case)
+    ways = [("imposed motion", FACTORS[0]), ("displacement control", FACTORS[0])]
+    if not model["motions"]:
+        ways = [("", factor) for factor in (FACTORS if model["hinges"] else FACTORS[:1])]
+    for control, factor in ways:
+        found = in_opensees(translated(case, factor), control)
+        found["history"] = apart(case, ours, found)
+        del found["values"]
+        runs.append(found)
+    elastic = apart(small, values_of(small), in_opensees(translated(small), ""))
+    return {"runs": runs, "elastic": elastic}
