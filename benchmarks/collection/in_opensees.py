@@ -202,8 +202,12 @@ def main():
         for halved in run(model, sys.argv[1], values):
             result["halved"] += halved
     except Failure:
-        done = (len(values) - 1) * model["dt"]
-        result["end"] = ops.getLoadFactor(SERIES) if model["path"] else done
+        if model["path"]:
+            result["end"] = ops.getLoadFactor(SERIES)
+        elif sys.argv[1] == "displacement control":
+            result["end"] = (len(values) - 1) * model["dt"]
+        else:
+            result["end"] = ops.getTime()
     print("result", json.dumps(result | {"seconds": time.perf_counter() - begin}))
 
 

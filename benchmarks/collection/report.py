@@ -30,7 +30,10 @@ def in_opensees(row: dict) -> list[str]:
     """Describe outcome, difference and time in OpenSees, each way it ran."""
     found = row["opensees"]
     runs = found["runs"]
-    ends = ["end" if r["end"] is None else f"fails at {r['end']:.4g}" for r in runs]
+    ends = [
+        "end" if r["end"] is None else f"fails at {r['end']:.4g}".replace("fails at nan", "600 s")
+        for r in runs
+    ]
     halved = [f"{r['halved']}" for r in runs]
     apart = ["—" if r["history"] is None else f"{r['history']:.0e}" for r in runs]
     elastic = "—" if found["elastic"] is None else f"{found['elastic']:.0e}"
@@ -79,7 +82,8 @@ def save(rows: list[dict]) -> None:
         "thousandth of loads and motions, *apart* the largest difference of the",
         "histories over the steps that both have reached, relative to the largest value. Where "
         "this package stops at a limit load, failing there is right, and",
-        "reaching the end is a jump to another equilibrium.",
+        "reaching the end is a jump to another equilibrium. Springs of Ibarra, Medina and "
+        "Krawinkler differ for reasons in [peers.md](peers.md), contact by its damping.",
         "",
         "| model | kind | outcome | cut steps | confirmed by | s | OpenSees | halved | elastic "
         "| apart | s |",

@@ -105,6 +105,12 @@ class Translation:
                 self.add("rigidLink", "beam", self.node(body.middle), self.nodes[place])
         return self.nodes[place]
 
+    def spring(self, i, j, material, direction, kind="zeroLength") -> int:
+        """Create a spring between two nodes."""
+        tag = next(self.tags)
+        self.add("element", kind, tag, i, j, "-mat", material, "-dir", direction)
+        return tag
+
     def mass(self, node, mass, inertia) -> None:
         """Add a mass to a node."""
         old = self.masses.get(node, (0.0, 0.0, 0.0))
@@ -139,23 +145,20 @@ class Translation:
                 return self.material("UVCuniaxial", E, law.limit, *decay, 1, 1.0, 1.0)
             case ub.IbarraKrawinkler():
                 b = law.backbone
-                branch = b.capping, b.post_capping, b.ultimate, b.yield_limit, b.overstrength
-                branch = *branch, b.residual
-                modes = law.strength, law.softening, law.unloading
-                return self.material(
-                    "IMKBilin", law.stiffness, *branch, *branch, *modes, *[1.0] * 5
-                )
+                rotations = b.capping, b.post_capping, b.ultimate
+                branch = *rotations, b.yield_limit, b.overstrength, b.residual
+                modes = law.strength, law.softening, law.unloading, *[1.0] * 5
+                return self.material("IMKBilin", law.stiffness, *branch, *branch, *modes)
             case ub.Spring():
                 return self.material("Elastic", law.stiffness)
             case ub.Coulomb():
                 return self.material("ElasticPP", law.force / 1e-5, 1e-5)
             case ub.Stop():
                 gap, sign = (law.low, -1.0) if np.isinf(law.high) else (law.high, 1.0)
-                if law.damping and sign < 0:  # equal loss at a depth of 1 mm
-                    return self.material(
-                        "ViscoelasticGap", E, E * law.damping * 1e-3, min(gap, -1e-12)
-                    )
-                return self.material("ElasticPPGap", E, sign * 1e20, gap or sign * 1e-12)
+                gap = gap or sign * 1e-12  # zero is no gap in OpenSees
+                if law.damping and sign < 0:
+                    return self.material("ViscoelasticGap", E, E * law.damping * 1e-3, gap)
+                return self.material("ElasticPPGap", E, sign * 1e20, gap)
         raise NotImplementedError(law)
 
     def section(self, section) -> int:
@@ -163,26 +166,17 @@ class Translation:
         if section not in self.sections:
             placed, tag = section.fibres, next(self.tags)
             if placed is None:
-                self.add(
-                    "section",
-                    "Elastic",
-                    tag,
-                    1.0,
-                    section.EA,
-                    section.EI,
-                    1.0,
-                    section.GA / section.EA,
-                )
+                shear = section.GA / section.EA
+                self.add("section", "Elastic", tag, 1.0, section.EA, section.EI, 1.0, shear)
             else:
-                laws = {}
-                for number, E in zip(placed.material, placed.E, strict=True):
-                    if (number, E) not in laws:
-                        laws[number, E] = self.law(placed.fibres[number].law, float(E))
+                laws = {
+                    (number, E): self.law(placed.fibres[number].law, float(E))
+                    for number, E in dict.fromkeys(zip(placed.material, placed.E, strict=True))
+                }
                 plane, tag = tag, next(self.tags)
                 self.add("section", "Fiber", plane)
-                for number, E, y, A in zip(
-                    placed.material, placed.E, placed.y, placed.A, strict=True
-                ):
+                rows = zip(placed.y, placed.A, placed.material, placed.E, strict=True)
+                for y, A, number, E in rows:
                     self.add("fiber", y, 0.0, A, laws[number, E])
                 shear = self.material("Elastic", section.GA)
                 self.add("section", "Aggregator", tag, shear, "Vy", "-section", plane)
@@ -197,14 +191,12 @@ class Translation:
             float(np.hypot(*np.diff([beam.at(a).point, beam.at(b).point], axis=0)[0]))
             for a, b in pairwise(at)
         ]
-        firsts, lasts = (
-            [self.node(beam.at(s)) for s in at[:-1]],
-            [self.node(beam.at(s)) for s in at[1:]],
-        )
+        places = [self.node(beam.at(s)) for s in at]
+        firsts, lasts = places[:-1], places[1:]
         for s, law in beam.hinges.items():
             k = int(np.abs(np.subtract(at, s)).argmin())
             beyond = self.new_node(beam.at(s).point)
-            pair = self.node(beam.at(s)), beyond
+            pair = places[k], beyond
             if k < len(firsts):
                 firsts[k] = beyond
             else:
@@ -212,16 +204,7 @@ class Translation:
             self.add("equalDOF", *pair, 1, 2)
             self.tied.setdefault(pair[0], []).append(beyond)
             stiffness = self.factor * section.EI / sum(length)
-            self.add(
-                "element",
-                "zeroLength",
-                next(self.tags),
-                *pair,
-                "-mat",
-                self.law(law, stiffness),
-                "-dir",
-                6,
-            )
+            self.spring(*pair, self.law(law, stiffness), 6)
         self.cells[beam] = []
         for i, j, h in zip(firsts, lasts, length, strict=True):
             for n in (i, j):
@@ -235,8 +218,8 @@ class Translation:
         a, b = connector.a, connector.b
         grounded = getattr(a, "body", None) is ub.ground(0, 0).body
         law, j = connector.law, self.node(b)
-        self.elements[connector] = tag = next(self.tags)
         if isinstance(connector, ub.Stretch):
+            self.elements[connector] = tag = next(self.tags)
             length = float(np.hypot(*np.subtract(a.point, b.point)))
             material = self.material(
                 "ElasticPPGap", law.stiffness * length, 1e20, law.high / length
@@ -250,10 +233,10 @@ class Translation:
             self.add("fix", i, 1, 1, 1)
         direction = 6 if isinstance(connector, ub.Turn) else 1 + int(abs(connector.axis[1]))
         material = self.law(law, getattr(law, "stiffness", None))
-        if grounded or direction == 6:
-            self.add("element", "zeroLength", tag, i, j, "-mat", material, "-dir", direction)
-        else:
-            self.add("element", "twoNodeLink", tag, i, j, "-mat", material, "-dir", direction)
+        apart = not grounded and direction != 6
+        self.elements[connector] = self.spring(
+            i, j, material, direction, "twoNodeLink" if apart else "zeroLength"
+        )
 
     def forces(self, load) -> list:
         """Return the nodal forces of a load."""
