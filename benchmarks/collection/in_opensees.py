@@ -190,7 +190,6 @@ def run(model, control, values):
     for _ in range(steps):
         yield advance(dt, by_time)
         keep()
-    return
 
 
 def main():

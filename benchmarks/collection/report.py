@@ -26,6 +26,11 @@ def confirmation(row: dict) -> str:
     return f"quarter of the step stops {row['difference']:.0e} apart" if "difference" in row else ""
 
 
+def numbers(values: list[float]) -> str:
+    """Write relative differences."""
+    return ", ".join(f"{value:.0e}" for value in values) or "—"
+
+
 def in_opensees(row: dict) -> list[str]:
     """Describe outcome, difference and time in OpenSees, each way it ran."""
     found = row["opensees"]
@@ -35,10 +40,10 @@ def in_opensees(row: dict) -> list[str]:
         for r in runs
     ]
     halved = [f"{r['halved']}" for r in runs]
-    apart = ["—" if r["history"] is None else f"{r['history']:.0e}" for r in runs]
-    elastic = "—" if found["elastic"] is None else f"{found['elastic']:.0e}"
+    apart = [numbers(r["apart"]) for r in runs]
+    elastic = [numbers(found["elastic"])]
     seconds = [f"{r['seconds']:.1f}" for r in runs]
-    return [" / ".join(column) for column in (ends, halved, [elastic], apart, seconds)]
+    return [" / ".join(column) for column in (ends, halved, elastic, apart, seconds)]
 
 
 def cause(message: str) -> str:
@@ -76,11 +81,12 @@ def save(rows: list[dict]) -> None:
         "laws, masses and steps, see",
         "[to_opensees.py](../benchmarks/collection/to_opensees.py). Prescribed motions run as an "
         "imposed motion / under displacement control; models that have hinges of zero",
-        "length and are loaded run with springs of 1000 / 100 EI/L. A step tries Newton, line "
-        "search, Krylov and initial stiffness, 50 iterations each, and is",
+        "length and are loaded run with springs of 1000 / 100 EI/L; paths run under displacement "
+        "control or with its arc length. A step tries Newton, line",
+        "search, Krylov and initial stiffness, 50 iterations each, and is "
         "halved up to six times. *Elastic* is the difference between both programs for a "
-        "thousandth of loads and motions, *apart* the largest difference of the",
-        "histories over the steps that both have reached, relative to the largest value. Where "
+        "thousandth of loads and motions, *apart* that of the largest values, if both",
+        "reach the end, and the largest difference of the histories over the common steps. Where "
         "this package stops at a limit load, failing there is right, and",
         "reaching the end is a jump to another equilibrium. Springs of Ibarra, Medina and "
         "Krawinkler differ for reasons in [peers.md](peers.md), contact by its damping.",

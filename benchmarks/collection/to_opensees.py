@@ -323,15 +323,22 @@ def values_of(case) -> np.ndarray:
         return case.history(error.solution)[: int(error.time * case.steps / case.end + 1e-6) + 1]
 
 
-def apart(case, ours, found) -> float | None:
-    """Return the largest difference of the histories, relative to the largest value."""
+def apart(case, ours, found) -> list[float]:
+    """Return the differences of the largest values and of the histories, relative to the largest.
+
+    The first is left out unless both programs reach the end, both if there is nothing to compare.
+    """
     theirs, size = np.array(found["values"]), float(np.abs(ours).max())
     if case.control is not None:
         if found["end"] is not None:
-            return None
+            return []
         theirs = np.array(case.compared(theirs))
+    if size <= SMALLEST:
+        return []
     n = min(len(ours), len(theirs))
-    return float(np.abs(theirs[:n] - ours[:n]).max() / size) if size > SMALLEST else None
+    history = float(np.abs(theirs[:n] - ours[:n]).max() / size)
+    peak = abs(float(np.abs(theirs).max()) / size - 1)
+    return [peak, history] if len(ours) == len(theirs) else [history]
 
 
 def beside(case) -> dict:
@@ -347,8 +354,8 @@ def beside(case) -> dict:
         ways = [("", factor) for factor in (FACTORS if model["hinges"] else FACTORS[:1])]
     for control, factor in ways:
         found = in_opensees(translated(case, factor), control)
-        found["history"] = apart(case, ours, found)
+        found["apart"] = apart(case, ours, found)
         del found["values"]
         runs.append(found)
-    elastic = apart(small, values_of(small), in_opensees(translated(small), ""))
+    elastic = apart(small, values_of(small), in_opensees(translated(small), ""))[-1:]
     return {"runs": runs, "elastic": elastic}
