@@ -4,13 +4,10 @@
 from functools import cache
 
 import numpy as np
-from models import model
-from statics import PLASTIC, SECTION, STEEL, two_storeys
+from models import Case, model
+from statics import PLASTIC, SECTION, STEEL, frame
 
 import ufl_beam as ub
-
-STORY = 3.5
-"""Height of a storey; m."""
 
 
 @cache
@@ -22,69 +19,23 @@ def earthquake(peak, seconds=10.0, seed=3):
     return ub.GroundMotion(0.01, noise * shape).scaled(peak=peak).corrected()
 
 
-def shaken(scene, motion, divisor, watched, record, seconds=10.0, dt=0.01):
-    """Apply the weight in statics, then shake; the history of ``watched``."""
-    weight = [ub.Gravity()]
-
-    def loaded(*loads, damping=()):
-        return ub.Scene(
-            scene.beams,
-            joints=scene.joints,
-            supports=scene.supports,
-            connectors=scene.connectors,
-            bodies=scene.bodies,
-            masses=scene.masses,
-            damping=damping,
-            loads=[*scene.loads, *weight, *loads],
-        )
-
-    at_rest = ub.simulate(loaded(), ub.Static(), t=(0, 1), dt=0.25, progress=False)
-    quake = ub.Gravity(acceleration=(-1.0, 0.0), amplitude=motion.acceleration)
-    solution = ub.simulate(
-        loaded(quake, damping=scene.damping),
-        ub.EnergyMomentum(),
-        t=(0, seconds),
-        dt=dt / divisor,
-        start=at_rest,
-        record=record,
-        progress=False,
-    )
-    return watched(solution)
+def shaken(beams, peak, watched, *, seconds=10.0, dt=0.01, **parts):
+    """Frame that bears its weight and is then shaken by a record with a peak in m/s²."""
+    weight = ub.Gravity()
+    quake = ub.Gravity(acceleration=(-1.0, 0.0), amplitude=earthquake(peak).acceleration)
+    damping = [ub.Rayleigh(stiffness=2e-3)]
+    scene = ub.Scene(beams, loads=[weight, quake], damping=damping, **parts)
+    at_rest = ub.Scene(beams, loads=[weight], **parts)
+    return Case(scene, watched, round(seconds / dt), seconds, at_rest, dynamic=True)
 
 
-def frame(storeys, bays, section, ends=None, cells=2, mass=20e3):
-    """Frame with equal storeys and bays of 6 m; masses (kg) at its nodes."""
-    hinges = {} if ends is None else {0.0: ends, 1.0: ends}
-
-    def member(a, b, name):
-        return ub.Beam(a, b, section, cells=cells, hinges=hinges, name=name)
-
-    columns = {
-        (i, k): member((6 * i, STORY * k), (6 * i, STORY * (k + 1)), f"column {i}, storey {k}")
-        for i in range(bays + 1)
-        for k in range(storeys)
-    }
-    girders = {
-        (i, k): member(
-            (6 * i, STORY * (k + 1)), (6 * (i + 1), STORY * (k + 1)), f"girder {i}, storey {k}"
-        )
-        for i in range(bays)
-        for k in range(storeys)
-    }
-    joints = []
-    for i, k in columns:
-        places = [columns[i, k].end]
-        places += [columns[i, k + 1].start] if (i, k + 1) in columns else []
-        places += [girders[i, k].start] if (i, k) in girders else []
-        places += [girders[i - 1, k].end] if (i - 1, k) in girders else []
-        joints.append(ub.Rigid(*places))
-    return ub.Scene(
-        [*columns.values(), *girders.values()],
-        joints=joints,
-        supports=[ub.Clamped(columns[i, 0].start) for i in range(bays + 1)],
-        masses=[ub.PointMass(column.end, mass) for column in columns.values()],
-        damping=[ub.Rayleigh(stiffness=2e-3)],
-    ), columns
+def shaken_frame(storeys, bays, peak, section, ends=None, *, mass=20e3, inertia=0.0, **more):
+    """Frame with a mass (kg) at each node under a record; the sway of its top is compared."""
+    girder_cells = more.pop("cells", 2)
+    columns, _, parts = frame(storeys, bays, section, ends, cells=(girder_cells, girder_cells))
+    masses = [ub.PointMass(column.end, mass, inertia) for column in columns.values()]
+    top = columns[0, storeys - 1].end
+    return shaken(peak=peak, watched=("displacement", top, 0), masses=masses, **parts, **more)
 
 
 @model(
@@ -93,13 +44,11 @@ def frame(storeys, bays, section, ends=None, cells=2, mass=20e3):
     "OpenSees 1666: ten storeys of fibre elements",
     "sway of the top, m",
 )
-def ten_storeys(divisor, record):
+def ten_storeys():
     """Three bays of HEB 400; 20 fibres of Menegotto and Pinto in 280 cells; peak 6 m/s²."""
     steel = ub.Fibres(ub.MenegottoPinto(355e6, 0.01, 20.0), number=20)
     section = ub.Section.steel("HEB 400", fibres=steel)
-    scene, columns = frame(10, 3, section, cells=4)
-    top = columns[0, 9].end
-    return shaken(scene, earthquake(6.0), divisor, lambda run: run.displacement(top)[:, 0], record)
+    return shaken_frame(10, 3, 6.0, section, cells=4)
 
 
 @model(
@@ -108,33 +57,15 @@ def ten_storeys(divisor, record):
     "OpenSees 1533: the first step with hinges of zero length fails",
     "sway of the top, m",
 )
-def four_storeys(divisor, record):
+def four_storeys():
     """56 hinges that soften with a fracture energy of 100 kJ each; peak 5 m/s²."""
-    scene, columns = frame(4, 2, SECTION, ub.Softening(2 * PLASTIC, 100e3))
-    top = columns[0, 3].end
-    return shaken(scene, earthquake(5.0), divisor, lambda run: run.displacement(top)[:, 0], record)
+    return shaken_frame(4, 2, 5.0, SECTION, ub.Softening(2 * PLASTIC, 100e3))
 
 
-def falling(divisor, record, inertia):
+def falling(inertia):
     """Two storeys whose hinges soften to zero, with 60 t at the nodes, and their fall."""
-    columns, girders, joints, feet = two_storeys(ub.Softening(PLASTIC, 10e3))
-    beams = [*columns.values(), *girders.values()]
-    scene = ub.Scene(
-        beams,
-        joints=joints,
-        supports=feet,
-        masses=[ub.PointMass(one.end, 60e3, inertia) for one in columns.values()],
-        damping=[ub.Rayleigh(stiffness=2e-3)],
-    )
-    top = columns[0, 1].end
-    return shaken(
-        scene,
-        earthquake(6.0),
-        divisor,
-        lambda run: run.displacement(top)[:, 0],
-        record,
-        seconds=6.0,
-    )
+    hinge = ub.Softening(PLASTIC, 10e3)
+    return shaken_frame(2, 2, 6.0, SECTION, hinge, mass=60e3, inertia=inertia, seconds=6.0)
 
 
 @model(
@@ -143,9 +74,9 @@ def falling(divisor, record, inertia):
     "the frame loses its stiffness and falls",
     "sway of the top, m",
 )
-def collapse(divisor, record):
+def collapse():
     """The nodes have a rotary inertia of 1 t m²."""
-    return falling(divisor, record, 1e3)
+    return falling(1e3)
 
 
 @model(
@@ -154,9 +85,9 @@ def collapse(divisor, record):
     "no inertia resists a node whose hinges all soften; the jump takes no time",
     "sway of the top, m",
 )
-def collapse_without_inertia(divisor, record):
+def collapse_without_inertia():
     """Each node has three or four hinges at its joint, and no inertia against rotation."""
-    return falling(divisor, record, 0.0)
+    return falling(0.0)
 
 
 @model(
@@ -165,7 +96,7 @@ def collapse_without_inertia(divisor, record):
     "OpenSees 688 in dynamics: kinks of cap, residual strength and ultimate rotation",
     "sway of the top, m",
 )
-def deteriorating(divisor, record):
+def deteriorating():
     """A portal with four springs of Ibarra, Medina and Krawinkler and columns on pins."""
     left = ub.Beam((0, 0), (0, 4), SECTION, cells=3, name="left")
     right = ub.Beam((6, 0), (6, 4), SECTION, cells=3, name="right")
@@ -176,16 +107,14 @@ def deteriorating(divisor, record):
     law = ub.IbarraKrawinkler(6e8, backbone, strength=0.3, softening=0.5, unloading=0.5)
     pairs = [(ub.ground(0, 0), left.start), (ub.ground(6, 0), right.start)]
     pairs += [(left.end, girder.start), (right.end, girder.end)]
-    scene = ub.Scene(
+    return shaken(
         [left, right, girder],
+        5.0,
+        ("displacement", left.end, 0),
         joints=[ub.Revolute(left.end, girder.start), ub.Revolute(right.end, girder.end)],
         supports=[ub.Pinned(left.start), ub.Pinned(right.start)],
         connectors=[ub.Turn(*pair, law) for pair in pairs],
         masses=[ub.PointMass(left.end, 20e3), ub.PointMass(right.end, 20e3)],
-        damping=[ub.Rayleigh(stiffness=2e-3)],
-    )
-    return shaken(
-        scene, earthquake(5.0), divisor, lambda run: run.displacement(left.end)[:, 0], record
     )
 
 
@@ -195,7 +124,7 @@ def deteriorating(divisor, record):
     "twenty contacts open and close, several in one step",
     "rotation, rad",
 )
-def rocking(divisor, record):
+def rocking():
     """A pier of 8 m with 50 t on a footing of 3 m; soil without tension, damped contact."""
     pier = ub.Beam((0, 0), (0, 8), SECTION, cells=4)
     footing = ub.Body((0, 0), mass=20e3, inertia=15e3)
@@ -204,21 +133,15 @@ def rocking(divisor, record):
     bed = [ub.Slide(ub.ground(x, 0), footing.at(x, 0), soil, axis=(0, 1)) for x in places]
     bed += [ub.Slide(one.a, one.b, ub.Spring(5e4), axis=(0, 1)) for one in bed]  # at the start
     hold = ub.Slide(ub.ground(0, 0), footing.middle, ub.Spring(1e9), axis=(1, 0))
-    scene = ub.Scene(
+    return shaken(
         [pier],
+        4.0,
+        ("displacement", footing.middle, 2),
+        dt=0.005,
         bodies=[footing],
         joints=[ub.Rigid(pier.start, footing.middle)],
         connectors=[*bed, hold],
         masses=[ub.PointMass(pier.end, 50e3)],
-        damping=[ub.Rayleigh(stiffness=2e-3)],
-    )
-    return shaken(
-        scene,
-        earthquake(4.0),
-        divisor,
-        lambda run: run.displacement(footing.middle)[:, 2],
-        record,
-        dt=0.005,
     )
 
 
@@ -228,7 +151,7 @@ def rocking(divisor, record):
     "two gaps close in the same step; the contact stiffness is large",
     "sway of the middle tower, m",
 )
-def pounding(divisor, record):
+def pounding():
     """Two stiff towers beside a flexible one; gaps of 20 mm, 200 MN/m, damped."""
     soft = ub.Section(EA=4e9, GA=1.5e9, EI=1.5e7, rhoA=60.0, rhoI=0.5)
     towers = [
@@ -240,20 +163,14 @@ def pounding(divisor, record):
         ub.Slide(towers[a].end, towers[b].end, ub.Stop(2e8, low=-gap, damping=0.5), axis=(1, 0))
         for a, b in ((0, 1), (1, 2))
     ]
-    scene = ub.Scene(
+    return shaken(
         towers,
+        4.0,
+        ("displacement", towers[1].end, 0),
+        dt=0.002,
         supports=[ub.Clamped(tower.start) for tower in towers],
         connectors=stops,
         masses=[ub.PointMass(tower.end, 15e3) for tower in towers],
-        damping=[ub.Rayleigh(stiffness=2e-3)],
-    )
-    return shaken(
-        scene,
-        earthquake(4.0),
-        divisor,
-        lambda run: run.displacement(towers[1].end)[:, 0],
-        record,
-        dt=0.002,
     )
 
 
@@ -263,7 +180,7 @@ def pounding(divisor, record):
     "Coulomb friction without an elastic branch sticks and slides",
     "sway of the slab, m",
 )
-def isolator(divisor, record):
+def isolator():
     """A column on a slab of 40 t that slides at 0.1 g, with a spring of 2 s."""
     slab = ub.Body((0, 0), mass=40e3, inertia=50e3)
     column = ub.Beam((0, 0), (0, 4), SECTION, cells=4)
@@ -273,16 +190,14 @@ def isolator(divisor, record):
         ub.Slide(*between, ub.Coulomb(5.5e4), axis=(1, 0)),
         ub.Slide(*between, ub.Spring(5.5e5), axis=(1, 0)),
     ]
-    scene = ub.Scene(
+    return shaken(
         [column],
+        4.0,
+        ("displacement", slab.middle, 0),
         bodies=[slab],
         joints=[ub.Rigid(column.start, slab.middle), guide],
         connectors=connectors,
         masses=[ub.PointMass(column.end, 15e3)],
-        damping=[ub.Rayleigh(stiffness=2e-3)],
-    )
-    return shaken(
-        scene, earthquake(4.0), divisor, lambda run: run.displacement(slab.middle)[:, 0], record
     )
 
 
@@ -292,7 +207,7 @@ def isolator(divisor, record):
     "progressive collapse: sudden unloading, catenary action of fibres",
     "deflection above the column, m",
 )
-def removed_column(divisor, record):
+def removed_column():
     """Two girders of 6 m, HEB 300 of fibres with 600 kN at the lost support; damped."""
     steel = ub.Fibres(ub.MenegottoPinto(355e6, 0.01, 20.0), number=20)
     section = ub.Section.steel("HEB 300", fibres=steel)
@@ -304,19 +219,9 @@ def removed_column(divisor, record):
         supports=[ub.Clamped(girder.start), ub.Clamped(girder.end)],
         masses=[ub.PointMass(middle, weight / 9.81)],
         damping=[ub.Rayleigh(mass=1.0, stiffness=1e-3)],
-        loads=[
-            ub.PointLoad(middle, force=(0, -weight)),
-        ],
+        loads=[ub.PointLoad(middle, force=(0, -weight))],
     )
-    solution = ub.simulate(
-        scene,
-        ub.EnergyMomentum(),
-        t=(0, 4.0),
-        dt=0.01 / divisor,
-        record=record,
-        progress=False,
-    )
-    return solution.displacement(middle)[:, 1]
+    return Case(scene, ("displacement", middle, 1), 400, 4.0, dynamic=True)
 
 
 @model(
@@ -325,7 +230,7 @@ def removed_column(divisor, record):
     "both cables are slack at the same time; each tightening is an impact",
     "sway of the mast, m",
 )
-def guyed_mast(divisor, record):
+def guyed_mast():
     """A pinned mast of 10 m with a mass of 1 t and cables with 5 mm of slack."""
     mast = ub.Beam((0, 0), (0, 10), ub.Section.tube(d=0.1, t=0.005, **STEEL), cells=4)
     cables = [
@@ -342,12 +247,4 @@ def guyed_mast(divisor, record):
         masses=[ub.PointMass(mast.end, 1e3)],
         loads=[gusts, ub.Gravity()],
     )
-    solution = ub.simulate(
-        scene,
-        ub.EnergyMomentum(),
-        t=(0, 6.0),
-        dt=0.002 / divisor,
-        record=record,
-        progress=False,
-    )
-    return solution.displacement(mast.end)[:, 0]
+    return Case(scene, ("displacement", mast.end, 0), 3000, 6.0, dynamic=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,110 @@ class CutSteps(ub.Recorder):
 
 
 @dataclass(frozen=True)
+class Case:
+    """A scene, its load history or path, and the compared quantity.
+
+    Attributes:
+        scene: The scene.
+        watched: Method of the solution ("displacement", "reaction"), "force" of a connector or
+            "factor" of a path, with the place, support or connector; and the component.
+        steps: Number of steps.
+        end: Time of the end; s.
+        rest: Scene in whose equilibrium dynamics begin; None begins undeformed.
+        dynamic: Whether the run is in dynamics.
+        control: Function of the divisor that returns the control of a path; None for a run.
+        until: End of the path.
+        compared: Function that returns the compared numbers of the history of a path.
+        arc: Length of a step of a path in OpenSees; m.
+        ends: End of the path in OpenSees: a quantity as in ``watched``, and the limit below which
+            it falls.
+    """
+
+    scene: ub.Scene
+    watched: tuple
+    steps: int
+    end: float = 1.0
+    rest: ub.Scene | None = None
+    dynamic: bool = False
+    control: Callable[[int], object] | None = None
+    until: Callable | None = None
+    compared: Callable[[np.ndarray], list] | None = None
+    arc: float = 0.0
+    ends: tuple = ()
+
+    def history(self, run) -> np.ndarray:
+        """Return the history of the compared quantity."""
+        method, *of = self.watched
+        if method == "factor":
+            return run.factor
+        if method == "force":
+            return run.connector(*of).force
+        return getattr(run, method)(of[0])[:, of[1]]
+
+    def run(self, divisor: int = 1, record=()) -> np.ndarray:
+        """Run with the step divided; the history, or the compared numbers of a path."""
+        if self.control is not None:
+            path = ub.follow(
+                self.scene,
+                self.control(divisor),
+                steps=self.steps * divisor,
+                until=self.until,
+                record=record,
+                progress=False,
+            )
+            return np.array(self.compared(self.history(path)))
+        rest = self.rest and ub.simulate(self.rest, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+        scheme = ub.EnergyMomentum() if self.dynamic else ub.Static()
+        more = {} if rest is None else {"start": rest}
+        return self.history(
+            ub.simulate(
+                self.scene,
+                scheme,
+                t=(0, self.end),
+                dt=self.end / (self.steps * divisor),
+                record=record,
+                progress=False,
+                **more,
+            )
+        )
+
+    def small(self) -> Case:
+        """Return the case with a thousandth of all loads and motions; a path under load control.
+
+        Dynamics end after a quarter of the time.
+        """
+
+        def motion(function):
+            return lambda t: function(t) / 1000
+
+        swap: dict = {}
+        for support in self.scene.supports:
+            if isinstance(support, ub.PrescribedDisplacement):
+                moves = {("u", "v", "psi")[k]: motion(f) for k, f in support.held.items()}
+                swap[support] = replace(support, **moves)
+        for load in self.scene.loads:
+            field = "acceleration" if isinstance(load, ub.Gravity) else "force"
+            swap[load] = replace(load, **{field: tuple(x / 1000 for x in getattr(load, field))})
+
+        def swapped(scene):
+            lists = {
+                name: [swap.get(one, one) for one in getattr(scene, name)]
+                for name in ("supports", "loads")
+            }
+            return replace(scene, **lists)
+
+        watched = tuple(swap.get(x, x) for x in self.watched)
+        steps, end = self.steps, self.end
+        if self.dynamic:
+            steps, end = steps // 4, end / 4
+        if self.control is not None:
+            place = self.scene.loads[0].place
+            watched, steps = ("displacement", place, 1), 1
+        rest = self.rest and swapped(self.rest)
+        return Case(swapped(self.scene), watched, steps, end, rest, self.dynamic)
+
+
+@dataclass(frozen=True)
 class Model:
     """A model that fails elsewhere.
 
@@ -37,8 +141,7 @@ class Model:
         kind: "statics", "path" or "dynamics".
         source: Report of the failure, or the reason why such models fail.
         quantity: Name and unit of the compared number.
-        run: Function of the divisor of the step and of recorders; returns the history of the
-            compared quantity, one number for each step.
+        case: Function that builds the case.
         stops: Parts of the message if the model must stop, such as the names of the hinges of its
             mechanism; empty if it must reach the end.
         limit: Function that computes the time at which it must stop by limit analysis, from the
@@ -51,7 +154,7 @@ class Model:
     kind: str
     source: str
     quantity: str
-    run: Callable[[int, CutSteps], np.ndarray]
+    case: Callable[[], Case]
     stops: tuple[str, ...] = ()
     limit: Callable[[ub.Solution], float] | None = None
     tolerance: float = 0.0
@@ -63,11 +166,11 @@ MODELS: dict[str, Model] = {}
 
 
 def model(name: str, kind: str, source: str, quantity: str, **more):
-    """Enter a run into the collection."""
+    """Enter a case into the collection."""
 
-    def enter(run):
-        MODELS[name] = Model(name, kind, source, quantity, run, **more)
-        return run
+    def enter(case):
+        MODELS[name] = Model(name, kind, source, quantity, case, **more)
+        return case
 
     return enter
 
@@ -98,7 +201,7 @@ def result(one: Model, divisor: int) -> Result:
     steps, begin = CutSteps(), time.perf_counter()
     end, message, values, solution = None, "", np.zeros(0), None
     try:
-        values = np.asarray(one.run(divisor, steps), dtype=float)
+        values = one.case().run(divisor, steps)
     except ub.ConvergenceError as error:
         end, message, solution = error.time, " ".join(str(error).split()), error.solution
     return Result(end, message, values, steps.cut, time.perf_counter() - begin, solution)

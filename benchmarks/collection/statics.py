@@ -2,11 +2,10 @@
 """Models of statics: limit loads, softening, cycles and snap-through."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 from limit_analysis import limit_factor
-from models import model
+from models import Case, model
 from scipy.optimize import brentq
 
 import ufl_beam as ub
@@ -23,14 +22,6 @@ BARS = ub.Fibres(ub.MenegottoPinto(450e6, 0.01, 15.0))
 """Steel02 of OpenSees issue 1625."""
 
 
-def statics(scene, steps, divisor, watched, end=1.0, **more):
-    """Run a scene in statics; the history of ``watched``."""
-    solution = ub.simulate(
-        scene, ub.Static(), t=(0, end), dt=end / (steps * divisor), progress=False, **more
-    )
-    return watched(solution)
-
-
 def cycles(*sizes):
     """Function of time that goes to each size and back, one second each way; and its end (s)."""
     turns = [0.0]
@@ -39,7 +30,7 @@ def cycles(*sizes):
     return ub.Table(range(len(turns)), turns), float(len(turns) - 1)
 
 
-def deteriorating_hinge(divisor, record, *sizes):
+def deteriorating_hinge(*sizes):
     """The hinge of OpenSees 688 at the foot of a cantilever ten times as stiff, in cycles."""
     backbone = ub.Backbone(
         923.6e3,
@@ -55,8 +46,7 @@ def deteriorating_hinge(divisor, record, *sizes):
     drive, end = cycles(*sizes)
     move = ub.PrescribedDisplacement(beam.end, v=drive)
     scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), move], connectors=[turn])
-    steps = 50 * round(end)
-    return statics(scene, steps, divisor, lambda run: run.connector(turn).force, end, record=record)
+    return Case(scene, ("force", turn), 50 * round(end), end)
 
 
 @model(
@@ -65,9 +55,9 @@ def deteriorating_hinge(divisor, record, *sizes):
     "OpenSees 688, with its numbers in kN m and mrad",
     "moment of the hinge, N m",
 )
-def residual_strength(divisor, record):
+def residual_strength():
     """The kink is at 69 mrad, and the cycles reach 80 mrad."""
-    return deteriorating_hinge(divisor, record, 0.01, 0.02, 0.03, 0.05, 0.07, 0.08)
+    return deteriorating_hinge(0.01, 0.02, 0.03, 0.05, 0.07, 0.08)
 
 
 @model(
@@ -76,25 +66,50 @@ def residual_strength(divisor, record):
     "OpenSees 688; no moment is left in the last cycle",
     "moment of the hinge, N m",
 )
-def ultimate_rotation(divisor, record):
+def ultimate_rotation():
     """Cycles up to 110 mrad; the ultimate rotation is 95 mrad."""
-    return deteriorating_hinge(divisor, record, 0.02, 0.05, 0.08, 0.11, 0.11)
+    return deteriorating_hinge(0.02, 0.05, 0.08, 0.11, 0.11)
 
 
-def portal(hinge, cells=4):
-    """Portal of 6 m by 4 m with hinges at the ends and in the middle of its members."""
-    left = ub.Beam((0, 0), (0, 4), SECTION, cells=cells, hinges={0.0: hinge}, name="left")
-    right = ub.Beam((6, 0), (6, 4), SECTION, cells=cells, hinges={0.0: hinge}, name="right")
-    girder = ub.Beam(
-        (0, 4),
-        (6, 4),
-        SECTION,
-        cells=2 * cells,
-        hinges=dict.fromkeys((0.0, 0.5, 1.0), hinge),
-        name="girder",
-    )
-    joints = [ub.Rigid(left.end, girder.start), ub.Rigid(girder.end, right.end)]
-    return [left, girder, right], joints, [ub.Clamped(left.start), ub.Clamped(right.start)]
+def frame(storeys, bays, section, ends=None, *, height=3.5, bay=6.0, cells=(2, 2)):
+    """Clamped frame: columns and girders by axis or bay and storey, and the fields of its scene.
+
+    ``ends``: law of hinges at the ends of all members; ``cells``: of a column, of a girder.
+    """
+    hinges = {} if ends is None else {0.0: ends, 1.0: ends}
+
+    def member(a, b, count, name):
+        return ub.Beam(a, b, section, cells=count, hinges=hinges, name=name)
+
+    columns = {
+        (i, k): member(
+            (bay * i, height * k), (bay * i, height * (k + 1)), cells[0], f"column {i}, storey {k}"
+        )
+        for i in range(bays + 1)
+        for k in range(storeys)
+    }
+    girders = {
+        (i, k): member(
+            columns[i, k].ends[1], columns[i + 1, k].ends[1], cells[1], f"girder {i}, storey {k}"
+        )
+        for i in range(bays)
+        for k in range(storeys)
+    }
+    joints = []
+    for i, k in columns:
+        places = [columns[i, k].end]
+        places += [columns[i, k + 1].start] if (i, k + 1) in columns else []
+        places += [girders[i, k].start] if (i, k) in girders else []
+        places += [girders[i - 1, k].end] if (i - 1, k) in girders else []
+        joints.append(ub.Rigid(*places))
+    feet = [ub.Clamped(columns[i, 0].start) for i in range(bays + 1)]
+    beams = [*columns.values(), *girders.values()]
+    return columns, girders, {"beams": beams, "joints": joints, "supports": feet}
+
+
+def swayed(tip, force):
+    """Sway force that grows in time."""
+    return ub.PointLoad(tip, force=(force, 0), amplitude=lambda t: t)
 
 
 def displaced(solution, places):
@@ -126,17 +141,23 @@ def portal_limit(solution):
     limit=portal_limit,
     tolerance=1e-3,  # the static theorem on the displaced geometry leaves the shear of the cells
 )
-def portal_mechanism(divisor, record):
-    """Sway force and load of the girder grow together."""
-    beams, joints, feet = portal(ub.ElastoPlastic(PLASTIC))
-    loads = [
-        ub.PointLoad(beams[0].end, force=(100e3, 0), amplitude=lambda t: t),
-        ub.PointLoad(beams[1].at(0.5), force=(0, -150e3), amplitude=lambda t: t),
-    ]
-    scene = ub.Scene(beams, joints=joints, supports=feet, loads=loads)
-    return statics(
-        scene, 40, divisor, lambda run: run.displacement(beams[0].end)[:, 0], 2.0, record=record
+def portal_mechanism():
+    """6 m by 4 m, hinges at the ends and in the middle of members; both loads grow together."""
+    hinge = ub.ElastoPlastic(PLASTIC)
+    left = ub.Beam((0, 0), (0, 4), SECTION, cells=4, hinges={0.0: hinge}, name="left")
+    right = ub.Beam((6, 0), (6, 4), SECTION, cells=4, hinges={0.0: hinge}, name="right")
+    hinges = dict.fromkeys((0.0, 0.5, 1.0), hinge)
+    girder = ub.Beam((0, 4), (6, 4), SECTION, cells=8, hinges=hinges, name="girder")
+    scene = ub.Scene(
+        [left, girder, right],
+        joints=[ub.Rigid(left.end, girder.start), ub.Rigid(girder.end, right.end)],
+        supports=[ub.Clamped(left.start), ub.Clamped(right.start)],
+        loads=[
+            swayed(left.end, 100e3),
+            ub.PointLoad(girder.at(0.5), force=(0, -150e3), amplitude=lambda t: t),
+        ],
     )
+    return Case(scene, ("displacement", left.end, 0), 40, 2.0)
 
 
 def fibre_limit(solution):
@@ -180,46 +201,15 @@ def fibre_limit(solution):
     limit=fibre_limit,
     tolerance=1 / 80,  # the lowest cell has the moment of its middle, at 1/80 of the height
 )
-def fibre_column(divisor, record):
+def fibre_column():
     """A cantilever of 3 m, 0.1 m square, under 200 kN; 40 fibres in each of 40 cells."""
     section = ub.Section.rectangle(
         b=0.1, h=0.1, fibres=ub.Fibres(ub.ElastoPlastic(355e6), number=40), **STEEL
     )
     column = ub.Beam((0, 0), (0, 3), section, cells=40)
-    loads = [
-        ub.PointLoad(column.end, force=(0, -200e3)),
-        ub.PointLoad(column.end, force=(50e3, 0), amplitude=lambda t: t),
-    ]
+    loads = [ub.PointLoad(column.end, force=(0, -200e3)), swayed(column.end, 50e3)]
     scene = ub.Scene([column], supports=[ub.Clamped(column.start)], loads=loads)
-    return statics(
-        scene, 80, divisor, lambda run: run.displacement(column.end)[:, 0], record=record
-    )
-
-
-def two_storeys(hinge):
-    """Frame of two storeys and two bays; hinges at the ends of all members."""
-    heights, axes = (0.0, 3.5, 7.0), (0.0, 6.0, 12.0)
-    ends = {0.0: hinge, 1.0: hinge}
-    columns = {
-        (i, k): ub.Beam((x, y), (x, top), SECTION, cells=2, hinges=ends, name=f"column {i}{k}")
-        for i, x in enumerate(axes)
-        for k, (y, top) in enumerate(pairwise(heights))
-    }
-    girders = {
-        (i, k): ub.Beam((x, y), (right, y), SECTION, cells=2, hinges=ends, name=f"girder {i}{k}")
-        for i, (x, right) in enumerate(pairwise(axes))
-        for k, y in enumerate(heights[1:])
-    }
-    joints = []
-    for i in range(3):
-        for k in range(2):
-            places = [columns[i, k].end]
-            places += [columns[i, k + 1].start] if k == 0 else []
-            places += [girders[i, k].start] if i < 2 else []
-            places += [girders[i - 1, k].end] if i else []
-            joints.append(ub.Rigid(*places))
-    feet = [ub.Clamped(columns[i, 0].start) for i in range(3)]
-    return columns, girders, joints, feet
+    return Case(scene, ("displacement", column.end, 0), 80)
 
 
 def two_storeys_limit(solution):
@@ -250,19 +240,12 @@ def two_storeys_limit(solution):
     limit=two_storeys_limit,
     tolerance=0.02,  # the sway stiffness of the last elastic members is below that of the weight
 )
-def two_storeys_mechanism(divisor, record):
+def two_storeys_mechanism():
     """200 kN on each node; the sway forces of both floors grow together."""
-    columns, girders, joints, feet = two_storeys(ub.ElastoPlastic(PLASTIC))
+    columns, _, parts = frame(2, 2, SECTION, ub.ElastoPlastic(PLASTIC))
     loads = [ub.PointLoad(column.end, force=(0, -200e3)) for column in columns.values()]
-    loads += [
-        ub.PointLoad(columns[0, 0].end, force=(50e3, 0), amplitude=lambda t: t),
-        ub.PointLoad(columns[0, 1].end, force=(100e3, 0), amplitude=lambda t: t),
-    ]
-    scene = ub.Scene(
-        [*columns.values(), *girders.values()], joints=joints, supports=feet, loads=loads
-    )
-    top = columns[0, 1].end
-    return statics(scene, 60, divisor, lambda run: run.displacement(top)[:, 0], 3.0, record=record)
+    loads += [swayed(columns[0, 0].end, 50e3), swayed(columns[0, 1].end, 100e3)]
+    return Case(ub.Scene(**parts, loads=loads), ("displacement", columns[0, 1].end, 0), 60, 3.0)
 
 
 @model(
@@ -271,12 +254,27 @@ def two_storeys_mechanism(divisor, record):
     "softening hinges open in turn; several share one step",
     "base shear, N",
 )
-def two_storeys_softening(divisor, record):
+def two_storeys_softening():
     """The top is pushed by 0.4 m; each hinge loses its moment at a fracture energy of 20 kJ."""
-    columns, girders, joints, feet = two_storeys(ub.Softening(PLASTIC, 20e3))
+    columns, _, parts = frame(2, 2, SECTION, ub.Softening(PLASTIC, 20e3))
     push = ub.PrescribedDisplacement(columns[0, 1].end, u=lambda t: 0.4 * t)
-    scene = ub.Scene([*columns.values(), *girders.values()], joints=joints, supports=[*feet, push])
-    return statics(scene, 200, divisor, lambda run: run.reaction(push)[:, 0], record=record)
+    parts["supports"].append(push)
+    return Case(ub.Scene(**parts), ("reaction", push, 0), 200)
+
+
+def weighed_then_pushed(column, weight, sway, steps, end):
+    """Column whose top bears its weight (N) at 1 s and is then pushed."""
+    load = ub.PointLoad(column.end, force=(0, -weight), amplitude=ub.ramp(1.0))
+    push = ub.PrescribedDisplacement(column.end, u=sway)
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start), push], loads=[load])
+    return Case(scene, ("reaction", push, 0), steps, end)
+
+
+def reinforced(b, h, law, y, A, number=20, E=25e9, **core):
+    """Rectangle of layers of concrete with bars at ``y`` (m)."""
+    concrete = {"fibres": ub.Fibres(law, number=number), **core}
+    plain = ub.Section.rectangle(b=b, h=h, E=E, nu=0.2, rho=2500.0, **concrete)
+    return plain.reinforced(y=y, A=A, E=200e9, fibres=BARS)
 
 
 def leaning_limit(solution):
@@ -297,17 +295,12 @@ def leaning_limit(solution):
     limit=leaning_limit,
     tolerance=2e-3,  # the shaft also shears and shortens: N/GA + N/EA = 0.9e-3
 )
-def leaning_column(divisor, record):
+def leaning_column():
     """A cantilever of 5 m under 1 MN with one hinge of constant moment at its foot."""
     column = ub.Beam((0, 0), (0, 5), SECTION, cells=16, hinges={0.0: ub.ElastoPlastic(PLASTIC)})
-    loads = [
-        ub.PointLoad(column.end, force=(0, -1e6)),
-        ub.PointLoad(column.end, force=(50e3, 0), amplitude=lambda t: t),
-    ]
+    loads = [ub.PointLoad(column.end, force=(0, -1e6)), swayed(column.end, 50e3)]
     scene = ub.Scene([column], supports=[ub.Clamped(column.start)], loads=loads)
-    return statics(
-        scene, 40, divisor, lambda run: run.displacement(column.end)[:, 0], record=record
-    )
+    return Case(scene, ("displacement", column.end, 0), 40)
 
 
 @model(
@@ -316,20 +309,16 @@ def leaning_column(divisor, record):
     "the sway force becomes negative",
     "sway force, N",
 )
-def leaning_column_pushed(divisor, record):
+def leaning_column_pushed():
     """The top is pushed by 1 m after the weight."""
     column = ub.Beam((0, 0), (0, 5), SECTION, cells=16, hinges={0.0: ub.ElastoPlastic(PLASTIC)})
-    weight = ub.PointLoad(column.end, force=(0, -1e6), amplitude=ub.ramp(1.0))
-    push = ub.PrescribedDisplacement(column.end, u=ub.Table([0, 1, 2], [0, 0, 1.0]))
-    scene = ub.Scene([column], supports=[ub.Clamped(column.start), push], loads=[weight])
-    return statics(scene, 100, divisor, lambda run: run.reaction(push)[:, 0], 2.0, record=record)
+    return weighed_then_pushed(column, 1e6, ub.Table([0, 1, 2], [0, 0, 1.0]), 100, 2.0)
 
 
 def concrete_half(ultimate):
     """Half of a simply supported beam of 6 m with 1.2 % and 0.6 % of steel; Kent-Park."""
-    concrete = ub.Fibres(ub.KentPark(25e6, 5e6, ultimate), number=30)
-    plain = ub.Section.rectangle(b=0.3, h=0.5, E=25e9, nu=0.2, rho=2500.0, fibres=concrete)
-    section = plain.reinforced(y=[-0.21, 0.21], A=[3.6e-3, 0.6e-3], E=200e9, fibres=BARS)
+    law = ub.KentPark(25e6, 5e6, ultimate)
+    section = reinforced(0.3, 0.5, law, [-0.21, 0.21], [3.6e-3, 0.6e-3], number=30)
     return ub.Beam((0, 0), (3, 0), section, cells=10)
 
 
@@ -339,12 +328,12 @@ def concrete_half(ultimate):
     "OpenSees 1445; the concrete crushes",
     "load, N",
 )
-def concrete_beam(divisor, record):
+def concrete_beam():
     """Confined concrete, 5 MPa from 2 %; pushed by 0.12 m in the middle."""
     half = concrete_half(0.02)
     middle = ub.PrescribedDisplacement(half.end, v=lambda t: -0.12 * t, psi=0.0)
     scene = ub.Scene([half], supports=[ub.Pinned(half.start), middle])
-    return statics(scene, 240, divisor, lambda run: run.reaction(middle)[:, 1], record=record)
+    return Case(scene, ("reaction", middle, 1), 240)
 
 
 @model(
@@ -353,21 +342,22 @@ def concrete_beam(divisor, record):
     "OpenSees 1445; one cell crushes while the others unload",
     "load factor",
 )
-def brittle_concrete_beam(divisor, record):
+def brittle_concrete_beam():
     """5 MPa from 0.35 % in cells of 0.3 m; no displacement control passes the crushing."""
     half = concrete_half(0.0035)
     turn = ub.PrescribedDisplacement(half.end, psi=0.0)
     load = ub.PointLoad(half.end, force=(0, -1e5), amplitude=lambda t: t)
     scene = ub.Scene([half], supports=[ub.Pinned(half.start), turn], loads=[load])
-    path = ub.follow(
+    return Case(
         scene,
-        ub.ArcLength(0.002 / divisor, factor=100.0),
-        steps=2000 * divisor,
+        ("factor",),
+        2000,
+        control=lambda divisor: ub.ArcLength(0.002 / divisor, factor=100.0),
         until=lambda now: now.displacement(half.end)[1] < -0.12,
-        record=record,
-        progress=False,
+        compared=lambda factor: [factor.max(), factor[-1]],
+        arc=0.002,
+        ends=("displacement", half.end, 1, -0.12),
     )
-    return [path.factor.max(), path.factor[-1]]
 
 
 @model(
@@ -376,40 +366,16 @@ def brittle_concrete_beam(divisor, record):
     "OpenSees 1625, with its materials and section, in the plane",
     "base shear, N",
 )
-def concrete_frame(divisor, record):
+def concrete_frame():
     """Columns of 0.6 m by 0.4 m under 6 kN/m on girders, then pushed by 0.12 m; 8 bars of 12 mm."""
-    plain = ub.Section.rectangle(
-        b=0.4,
-        h=0.6,
-        E=25e9,
-        nu=0.2,
-        rho=2500.0,
-        fibres=ub.Fibres(ub.KentPark(25e6, 5e6, 0.0035), number=20),
-    )
-    bar = 0.000113097
-    section = plain.reinforced(
-        y=[-0.255, -0.085, 0.085, 0.255], A=[2 * bar] * 4, E=200e9, fibres=BARS
-    )
-    columns, girders = {}, []
-    for i, x in enumerate((0.0, 5.0)):
-        for k in range(2):
-            columns[i, k] = ub.Beam((x, 3 * k), (x, 3 * k + 3), section, cells=6)
-    for k in range(2):
-        girders.append(ub.Beam((0, 3 * k + 3), (5, 3 * k + 3), section, cells=8))
-    joints = [
-        ub.Rigid(columns[i, 0].end, columns[i, 1].start, (girders[0].start, girders[0].end)[i])
-        for i in range(2)
-    ]
-    joints += [ub.Rigid(columns[i, 1].end, (girders[1].start, girders[1].end)[i]) for i in range(2)]
+    bar, law = 0.000113097, ub.KentPark(25e6, 5e6, 0.0035)
+    section = reinforced(0.4, 0.6, law, [-0.255, -0.085, 0.085, 0.255], [2 * bar] * 4)
+    columns, girders, parts = frame(2, 1, section, height=3.0, bay=5.0, cells=(6, 8))
     push = ub.PrescribedDisplacement(columns[0, 1].end, u=ub.Table([0, 1, 3], [0, 0, 0.12]))
+    parts["supports"].append(push)
     hold = ub.ramp(1.0)
-    scene = ub.Scene(
-        [*columns.values(), *girders],
-        joints=joints,
-        supports=[ub.Clamped(columns[i, 0].start) for i in range(2)] + [push],
-        loads=[ub.LineLoad(girder, force=(0, -6e3), amplitude=hold) for girder in girders],
-    )
-    return statics(scene, 150, divisor, lambda run: run.reaction(push)[:, 0], 3.0, record=record)
+    loads = [ub.LineLoad(girder, force=(0, -6e3), amplitude=hold) for girder in girders.values()]
+    return Case(ub.Scene(**parts, loads=loads), ("reaction", push, 0), 150, 3.0)
 
 
 @model(
@@ -418,36 +384,12 @@ def concrete_frame(divisor, record):
     "OpenSees 1669: Concrete07 fails in the first step of gravity",
     "sway force, N",
 )
-def no_tension(divisor, record):
+def no_tension():
     """Mander's concrete, which is the backbone of Concrete07, with steel; cracked by the sway."""
-    plain = ub.Section.rectangle(
-        b=0.4,
-        h=0.4,
-        E=27e9,
-        nu=0.2,
-        rho=2500.0,
-        fibres=ub.Fibres(ub.Mander(30e6, 0.002), number=30),
-    )
-    section = plain.reinforced(y=[-0.16, 0.16], A=[1e-3, 1e-3], E=200e9, fibres=BARS)
+    law = ub.Mander(30e6, 0.002)
+    section = reinforced(0.4, 0.4, law, [-0.16, 0.16], [1e-3, 1e-3], number=30, E=27e9)
     column = ub.Beam((0, 0), (0, 3), section, cells=8)
-    weight = ub.PointLoad(column.end, force=(0, -0.8e6), amplitude=ub.ramp(1.0))
-    push = ub.PrescribedDisplacement(column.end, u=ub.Table([0, 1, 2], [0, 0, 0.06]))
-    scene = ub.Scene([column], supports=[ub.Clamped(column.start), push], loads=[weight])
-    return statics(scene, 120, divisor, lambda run: run.reaction(push)[:, 0], 2.0, record=record)
-
-
-def confined():
-    """Cover and core of the column that is loaded in cycles."""
-    hoops = {"ratio": 0.012, "yield_limit": 400e6, "width": 0.32, "spacing": 0.1}
-    return ub.KentPark.confined(30e6), ub.KentPark.confined(30e6, **hoops)
-
-
-def cover_and_core():
-    """Parameters of Concrete01 of OpenSees for cover and core."""
-    return [
-        [-law.strength, -2 * law.strength / 30e9, -law.residual, -law.ultimate]
-        for law in confined()
-    ]
+    return weighed_then_pushed(column, 0.8e6, ub.Table([0, 1, 2], [0, 0, 0.06]), 120, 2.0)
 
 
 @model(
@@ -456,27 +398,16 @@ def cover_and_core():
     "cover and core soften in compression while bars reverse",
     "sway force, N",
 )
-def concrete_cycles(divisor, record):
+def concrete_cycles():
     """0.4 m square, 3 m high, 30 % of its strength in compression, drifts up to 3 %."""
-    cover, core = confined()
-    cover, core = ub.Fibres(cover, number=20), ub.Fibres(core)
-    plain = ub.Section.rectangle(
-        b=0.4, h=0.4, E=30e9, nu=0.2, rho=2500.0, fibres=cover, core=core, cover=0.04
-    )
-    section = plain.reinforced(y=[-0.15, 0.0, 0.15], A=[1e-3, 0.6e-3, 1e-3], E=200e9, fibres=BARS)
+    hoops = {"ratio": 0.012, "yield_limit": 400e6, "width": 0.32, "spacing": 0.1}
+    cover, core = ub.KentPark.confined(30e6), ub.KentPark.confined(30e6, **hoops)
+    y, A = [-0.15, 0.0, 0.15], [1e-3, 0.6e-3, 1e-3]
+    section = reinforced(0.4, 0.4, cover, y, A, E=30e9, core=ub.Fibres(core), cover=0.04)
     column = ub.Beam((0, 0), (0, 3), section, cells=8)
     drive, end = cycles(0.015, 0.03, 0.045, 0.06, 0.09)
-    push = ub.PrescribedDisplacement(column.end, u=lambda t: drive(t - 1.0) if t > 1.0 else 0.0)
-    weight = ub.PointLoad(column.end, force=(0, -1.4e6), amplitude=ub.ramp(1.0))
-    scene = ub.Scene([column], supports=[ub.Clamped(column.start), push], loads=[weight])
-    return statics(
-        scene,
-        50 * round(end + 1),
-        divisor,
-        lambda run: run.reaction(push)[:, 0],
-        end + 1,
-        record=record,
-    )
+    sway = ub.Table([0.0, *(t + 1.0 for t in drive.times)], [0.0, *drive.values])
+    return weighed_then_pushed(column, 1.4e6, sway, 50 * round(end + 1), end + 1)
 
 
 @model(
@@ -485,7 +416,7 @@ def concrete_cycles(divisor, record):
     "buckling, plastic hinge in the middle and straightening in each cycle",
     "axial force, N",
 )
-def brace(divisor, record):
+def brace():
     """A tube of 4 m, slenderness 85, bow of L/500; fibres of Menegotto and Pinto."""
     steel = ub.Fibres(ub.MenegottoPinto(355e6, 0.01, 20.0), number=20)
     section = ub.Section.tube(d=0.14, t=0.006, fibres=steel, **STEEL)
@@ -495,9 +426,7 @@ def brace(divisor, record):
     drive, end = cycles(0.004, 0.008, 0.016, 0.032)
     move = ub.PrescribedDisplacement(brace.end, u=drive, v=0.0)
     scene = ub.Scene([brace], supports=[ub.Pinned(brace.start), move])
-    return statics(
-        scene, 100 * round(end), divisor, lambda run: run.reaction(move)[:, 0], end, record=record
-    )
+    return Case(scene, ("reaction", move, 0), 100 * round(end), end)
 
 
 @model(
@@ -506,7 +435,7 @@ def brace(divisor, record):
     "the load falls, and the contact stiffness grows a thousandfold",
     "load factor",
 )
-def snap_through(divisor, record):
+def snap_through():
     """Two bars of slope 0.1; the stop is 0.15 m below the top, within the falling branch."""
     bars = ub.Section(EA=1e7, GA=4e6, EI=10.0)
     left = ub.Beam((-1, 0), (0, 0.1), bars, cells=2)
@@ -520,9 +449,15 @@ def snap_through(divisor, record):
         connectors=[stop],
         loads=[load],
     )
-    control = ub.DisplacementControl(left.end, "v", -0.1505 / (100 * divisor))
-    path = ub.follow(scene, control, steps=100 * divisor, record=record, progress=False)
-    return [path.factor.max(), path.factor.min(), path.factor[-1]]
+    return Case(
+        scene,
+        ("factor",),
+        150,
+        control=lambda divisor: ub.DisplacementControl(left.end, "v", -0.0015 / divisor),
+        until=lambda now: now.displacement(left.end)[1] < -0.1505,
+        compared=lambda factor: [factor[: factor.argmin()].max(), factor.min()],
+        ends=("displacement", left.end, 1, -0.1505),
+    )
 
 
 @model(
@@ -531,23 +466,23 @@ def snap_through(divisor, record):
     "the fracture energy is a tenth of the stored energy",
     "deflection at the end, m",
 )
-def snap_back(divisor, record):
+def snap_back():
     """A cantilever with a brittle hinge, by dissipation control to 95 % of the fracture energy."""
     energy = 0.1 * PLASTIC**2 * 5.0 / SECTION.EI
     hinge = ub.Softening(PLASTIC, energy)
     beam = ub.Beam((0, 0), (5, 0), SECTION, cells=10, hinges={0.0: hinge})
     load = ub.PointLoad(beam.end, force=(0, -1e5), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    control = ub.DissipationControl(energy / (40 * divisor), ub.ArcLength(0.02))
-    path = ub.follow(
+    return Case(
         scene,
-        control,
-        steps=400 * divisor,
+        ("displacement", beam.end, 1),
+        400,
+        control=lambda divisor: ub.DissipationControl(energy / (40 * divisor), ub.ArcLength(0.02)),
         until=lambda now: now.damage()[1].sum() >= 0.95 * energy * (1 - 1e-9),
-        record=record,
-        progress=False,
+        compared=lambda deflection: [deflection.min()],
+        arc=0.001,
+        ends=("factor", 0.05 * PLASTIC / 5e5),
     )
-    return [path.displacement(beam.end)[:, 1].min()]
 
 
 @model(
@@ -556,7 +491,7 @@ def snap_back(divisor, record):
     "symmetric contact: both or none",
     "force in the left stop, N",
 )
-def two_gaps(divisor, record):
+def two_gaps():
     """A beam on rollers between two equal stops is pressed onto both by a force in its middle."""
     beam = ub.Beam((0, 0), (4, 0), SECTION, cells=8)
     stops = [
@@ -569,7 +504,7 @@ def two_gaps(divisor, record):
     load = ub.PointLoad(beam.at(0.5), force=(0, -5e5), amplitude=lambda t: t)
     hold = ub.PrescribedDisplacement(beam.at(0.5), u=0.0)
     scene = ub.Scene([beam], supports=[hold], connectors=[*stops, *soft], loads=[load])
-    return statics(scene, 10, divisor, lambda run: run.connector(stops[0]).force, record=record)
+    return Case(scene, ("force", stops[0]), 10)
 
 
 @model(
@@ -578,7 +513,7 @@ def two_gaps(divisor, record):
     "a slack cable has no stiffness; with both slack the mast is a mechanism",
     "sway force, N",
 )
-def slack_cables(divisor, record):
+def slack_cables():
     """A pinned mast of 10 m with cables that only pull, driven to both sides; no prestress."""
     mast = ub.Beam((0, 0), (0, 10), SECTION, cells=4)
     cables = [ub.Stretch(ub.ground(x, 0), mast.end, ub.Stop(2e6, high=0.001)) for x in (-6.0, 6.0)]
@@ -588,6 +523,4 @@ def slack_cables(divisor, record):
     scene = ub.Scene(
         [mast], supports=[ub.Pinned(mast.start), push], connectors=cables, loads=[weight]
     )
-    return statics(
-        scene, 20 * round(end), divisor, lambda run: run.reaction(push)[:, 0], end, record=record
-    )
+    return Case(scene, ("reaction", push, 0), 20 * round(end), end)
