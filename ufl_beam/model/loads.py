@@ -14,6 +14,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import (
+    require_kind,
     ArgumentError,
     ArgumentTypeError,
     ModelError,
@@ -406,12 +407,26 @@ class Rayleigh(Record):
     yielding cells and on hinges that open in cells, but neither on hinges of zero length nor on
     springs, see docs/howto_earthquake.md.
 
+    With ``tangent=True``, K is the tangent stiffness of the cells at the end of the last step, the
+    committed stiffness of other programs.  It is constant during a step.  Yielding cells and open
+    hinges are then damped with their reduced stiffness, in the present directions of the beams.
+
+    * Negative eigenvalues of the tangents of sections, as of softening, count as zero.  With them
+      the damping would supply energy.
+    * Geometric stiffness is left out.  It would resist the rotation of beams in tension and supply
+      energy to beams in compression.
+    * K is of the last step, so that a run is of first order in the step where K changes.
+    * A run begins with the elastic stiffness, also after :func:`simulate` with ``start=``, unless
+      the earlier run had this damping.
+
     Args:
         mass: Factor a0 on the mass matrix; 1/s.
         stiffness: Factor a1 on the stiffness matrix; s.
+        tangent: True for the tangent stiffness of the last step instead of the initial stiffness.
 
     Raises:
-        ModelError: A factor is negative, or both are zero.
+        ModelError: A factor is negative, both are zero, or ``stiffness`` is zero with
+            ``tangent=True``.
 
     Example:
         >>> damping = ub.Rayleigh(mass=1.0, stiffness=1e-5)  # 1/s, s
@@ -424,25 +439,37 @@ class Rayleigh(Record):
     _: KW_ONLY
     mass: NotNegative = 0.0
     stiffness: NotNegative = 0.0
+    tangent: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_kind(self.tangent, bool, "Rayleigh: tangent")
         if self.mass == self.stiffness == 0.0:
             raise ModelError("Rayleigh: mass and stiffness are both zero; leave damping out")
+        if self.tangent and self.stiffness == 0.0:
+            raise ModelError(
+                "Rayleigh: tangent=True has no effect with stiffness = 0; give stiffness, or leave "
+                "out tangent"
+            )
 
     @classmethod
     def with_ratios(
-        cls, ratios: float | tuple[float, float], omega: tuple[float, float]
+        cls,
+        ratios: float | tuple[float, float],
+        omega: tuple[float, float],
+        *,
+        tangent: bool = False,
     ) -> Rayleigh:
         """Build the damping that has given damping ratios at two circular frequencies.
 
         Args:
             ratios: Damping ratio at both frequencies, or a pair of damping ratios.
             omega: Two different circular frequencies, such as ``modes(scene, 2).omega``; rad/s.
+            tangent: As in :class:`Rayleigh`.
 
         Raises:
             ModelError: A frequency is not positive, the frequencies are equal, or the ratios would
-                need a negative factor.
+                need a negative factor, or with ``tangent=True`` a zero stiffness factor.
 
         Example:
             >>> damping = ub.Rayleigh.with_ratios(0.03, ub.modes(scene, 2).omega)
@@ -463,7 +490,7 @@ class Rayleigh(Record):
                 f"factors mass = {mass:.3g}, stiffness = {stiffness:.3g}, which must not be "
                 "negative; give positive ratios that differ less than the frequencies"
             )
-        return cls(mass=mass, stiffness=stiffness)
+        return cls(mass=mass, stiffness=stiffness, tangent=tangent)
 
 
 @closed("state other damping as a VirtualWork of v")

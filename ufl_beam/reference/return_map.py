@@ -178,7 +178,7 @@ class MaterialPoints:
         rest = self._section_points.rest  # stiffness of resultants without points
         self.r = rest * ((1 - θ) * self.strains0 + θ * strains)
         self.r = self.r + np.einsum("n,acn,nak->ck", w, stress, self._B)
-        self.D = np.einsum("n,abcn,nak,nbl->ckl", w, slope, self._B, self._B) + θ * np.diag(rest)
+        self.D = self._of_sections(slope)
 
     def _bulk(self, at: At) -> tuple[Array, Array]:
         """Return bulk stresses at t_n+θ, and slopes by strain; (d, cells, n), (d, d, cells, n)."""
@@ -226,6 +226,28 @@ class MaterialPoints:
                 return
         for name in self._z1:
             at[name][~done] = np.nan
+
+    @np.errstate(all="ignore")
+    def elastic_tangent(self) -> Array:
+        """Return derivatives of (N, V, M) at constant variables in the state; (cells, 3, 3)."""
+        at = {**self.at, **{name: self.at[before] for name, before in zip(self._e, self._e0)}}
+
+        def stress(at: At) -> Array:
+            return self._array(self._equations.elastic_stress(at))
+
+        _, slope = jacobian(stress, at, self._e)
+        return self._of_sections(slope) / self._scheme.theta
+
+    def _of_sections(self, slope: Array) -> Array:
+        """Return derivatives of (N, V, M) from derivatives of stresses, (d, d, cells, n)."""
+        w, rest = self._section_points.weights, self._section_points.rest
+        D = np.einsum("n,abcn,nak,nbl->ckl", w, slope, self._B, self._B)
+        return np.asarray(D + self._scheme.theta * np.diag(rest))
+
+    def elastic(self) -> Array:
+        """Return elastic stiffnesses of the sections; (cells, 3); N, N, N m²."""
+        w, C = self._section_points.weights, np.array([self.at[name] for name in self._C])
+        return np.asarray(self._section_points.rest + np.einsum("n,acn,nak->ck", w, C, self._B**2))
 
     # -- discontinuities -------------------------------------------------------------------------
 

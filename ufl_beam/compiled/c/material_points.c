@@ -246,6 +246,64 @@ double missed_by_points(void *self, const double *q, const double *r, double sca
   return largest > 0 ? largest / scale : 0;
 }
 
+/* Remove the negative eigenvalues from the symmetric part of D, relative to the stiffnesses C, by
+ * Jacobi's method. */
+static void remove_negative(const double *C, double *D)
+{
+  double A[3][3], V[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j <= i; ++j) {
+      D[3 * i + j] = D[3 * j + i] = (D[3 * i + j] + D[3 * j + i]) / 2;
+      A[i][j] = A[j][i] = D[3 * i + j] / sqrt(C[i] * C[j]);
+    }
+  for (int sweep = 0; sweep < 10; ++sweep)
+    for (int i = 0; i < 2; ++i)
+      for (int j = i + 1; j < 3; ++j) {
+        if (A[i][j] == 0) continue;
+        const double ratio = (A[j][j] - A[i][i]) / (2 * A[i][j]);
+        const double t = copysign(1, ratio) / (fabs(ratio) + sqrt(ratio * ratio + 1));
+        const double c = 1 / sqrt(t * t + 1), s = t * c;
+        for (int k = 0; k < 3; ++k) {
+          const double x = A[k][i], y = A[k][j], v = V[k][i], w = V[k][j];
+          A[k][i] = c * x - s * y, A[k][j] = s * x + c * y;
+          V[k][i] = c * v - s * w, V[k][j] = s * v + c * w;
+        }
+        for (int k = 0; k < 3; ++k) {
+          const double x = A[i][k], y = A[j][k];
+          A[i][k] = c * x - s * y, A[j][k] = s * x + c * y;
+        }
+        A[i][j] = A[j][i] = 0;
+      }
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; A[k][k] < 0 && i < 3; ++i)
+      for (int j = 0; j < 3; ++j) D[3 * i + j] -= A[k][k] * V[i][k] * V[j][k] * sqrt(C[i] * C[j]);
+}
+
+/* Store the tangents at the strains of the latest response. They do not depend on its iterates: no
+ * point follows a prediction or answers with its elastic stiffness. */
+void keep_tangents(const points *p)
+{
+  const int d = p->components;
+  double s[3 + 9], t[2], r[3], new[MOST_VARIABLES], *w = p->w, *D = p->committed;
+  for (int c = 0; c < p->cells; ++c, D += 9) {
+    memset(D, 0, 9 * sizeof *D);
+    for (int k = 0; k < 3; ++k) D[4 * k] = p->rest[k] * p->theta;
+    for (int i = 0; i < p->of_cell; ++i, w += p->width) {
+      double *z = w + p->strain + 3 * d + p->variables;
+      if (p->solves) memcpy(new, z, p->variables * sizeof *z);
+      answer(p, w, s);
+      if (p->solves) memcpy(z, new, p->variables * sizeof *z);
+      if (w[DIRECTION] != 0) {
+        ask(p->resistance, w, 2, t);
+        s[1] *= t[1] / (s[1] / w[LENGTH] + t[1]); /* as in condense_hinge */
+      }
+      add_answer(d, p->B + 3 * d * i, p->weight[i], s, r, D);
+    }
+    for (int k = 0; k < 9; ++k) D[k] /= p->theta;
+    remove_negative(p->elastic + 3 * c, D);
+  }
+}
+
 /* Accept the end of the step as the new state.
  *
  * `kept` of a section has its resultants (3), the jump of its last point, and the dissipation by
