@@ -387,7 +387,7 @@ class TangentRayleighForce(MatrixForce):
         by_stiffness = mass.cells.on_nodes("stress", self._product.assembled())
         self.on_nodes = damping.mass * by_mass + damping.stiffness * by_stiffness
         for beams, tangents in zip(self._yielding, self._tangents, strict=True):
-            tangents[:] = positive(beams.points.D / self.scheme.theta, beams.points.elastic())
+            tangents[:] = positive(beams.points.end_tangent(), beams.points.elastic())
 
     def start(self, q: Array) -> None:
         """Set unknown tangents to the elastic stiffness."""

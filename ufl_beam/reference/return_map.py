@@ -19,7 +19,7 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.law_functions import Values
-from ufl_beam.reference.cell_forms import Setting
+from ufl_beam.reference.cell_forms import Search, Setting
 
 CLOSED, FLOWING = 0.0, 1.0
 """Values of the flag of a discontinuity that did not grow, or did grow, in the last step."""
@@ -155,7 +155,7 @@ class MaterialPoints:
 
         The step has the length ``dt``; s.
         """
-        at, θ, w = self.at, self._scheme.theta, self._section_points.weights
+        at, θ, w = self.at, float(self.at["theta"][0, 0]), self._section_points.weights
         self.strains, at["dt"][:] = strains.copy(), dt
         for name, values in zip(self._e, self._at_points(strains), strict=True):
             at[name][:] = values
@@ -178,7 +178,7 @@ class MaterialPoints:
         rest = self._section_points.rest  # stiffness of resultants without points
         self.r = rest * ((1 - θ) * self.strains0 + θ * strains)
         self.r = self.r + np.einsum("n,acn,nak->ck", w, stress, self._B)
-        self.D = self._of_sections(slope)
+        self.D = self._of_sections(slope, θ)
 
     def _bulk(self, at: At) -> tuple[Array, Array]:
         """Return bulk stresses at t_n+θ, and slopes by strain; (d, cells, n), (d, d, cells, n)."""
@@ -227,22 +227,32 @@ class MaterialPoints:
         for name in self._z1:
             at[name][~done] = np.nan
 
+    def end_tangent(self) -> Array:
+        """Return derivatives of (N, V, M) if the laws hold at the end of the step; (cells, 3, 3)."""
+        kept = self.at, self.r, self.D, self.excess, self._search
+        self.at, self._search = {name: x.copy() for name, x in self.at.items()}, Search()
+        self.at["theta"][:] = 1.0
+        self.return_map(self.strains, self.at["dt"][0, 0])
+        D = self.D
+        self.at, self.r, self.D, self.excess, self._search = kept
+        return np.where(np.isfinite(D).all(axis=(1, 2), keepdims=True), D, self.D / self._scheme.theta)
+
     @np.errstate(all="ignore")
     def elastic_tangent(self) -> Array:
         """Return derivatives of (N, V, M) at constant variables in the state; (cells, 3, 3)."""
         at = {**self.at, **{name: self.at[before] for name, before in zip(self._e, self._e0)}}
+        at["theta"] = np.ones_like(at["theta"])
 
         def stress(at: At) -> Array:
             return self._array(self._equations.elastic_stress(at))
 
-        _, slope = jacobian(stress, at, self._e)
-        return self._of_sections(slope) / self._scheme.theta
+        return self._of_sections(jacobian(stress, at, self._e)[1], 1.0)
 
-    def _of_sections(self, slope: Array) -> Array:
+    def _of_sections(self, slope: Array, θ: float) -> Array:
         """Return derivatives of (N, V, M) from derivatives of stresses, (d, d, cells, n)."""
         w, rest = self._section_points.weights, self._section_points.rest
         D = np.einsum("n,abcn,nak,nbl->ckl", w, slope, self._B, self._B)
-        return np.asarray(D + self._scheme.theta * np.diag(rest))
+        return np.asarray(D + θ * np.diag(rest))
 
     def elastic(self) -> Array:
         """Return elastic stiffnesses of the sections; (cells, 3); N, N, N m²."""
@@ -263,7 +273,7 @@ class MaterialPoints:
             return over, -tangent[0, 0] / length - softens
 
         # After this growth, an elastic bulk has no stress.
-        bound = np.abs(stress) / at["stiffness"] * length / self._scheme.theta
+        bound = np.abs(stress) / at["stiffness"] * length / at["theta"]
         bound += np.finfo(float).tiny
         digits = np.maximum(np.abs(at["before"]), np.abs(at["strain"])) * length
         digits = 4 * EPS * (bound + digits + np.abs(at["jump"]))

@@ -185,8 +185,9 @@ class Points:
         softens: True if points may break.
         over: Largest ``|stress| / limit - 1`` of the points that the latest response has held
             closed, at least zero; (1,).
-        committed: Derivatives D of the accepted state without negative eigenvalues; (cells, 9); None
-            without damping that needs them.  NaN are unknown until :meth:`start_tangents`.
+        committed: Derivatives of (N, V, M) in the accepted state, with the laws at the end of the
+            step, without negative eigenvalues; (cells, 9); None without damping that needs them.
+            Unknown values are NaN until :meth:`start_tangents`.
         recorded: For each cell: (N, V, M) in the accepted state, the jump of the last point, and
             the energies that plastic strains and discontinuities have dissipated since the
             beginning; (cells, 6); N, N, N m, rad or m, J, J.
@@ -340,7 +341,8 @@ class Points:
             B = section_points.strains[k :: self._components]
             elastic += (section_points.weights * self[name]) @ B**2
         self.committed = np.full((len(elastic), 9), np.nan)
-        fill(self.c, committed=self.committed, elastic=elastic)
+        space = np.zeros(len(self.names))
+        fill(self.c, committed=self.committed, elastic=elastic, inputs=space)
 
     def start_tangents(self) -> None:
         """Set the unknown :attr:`committed` to the elastic stiffness at the accepted strains."""

@@ -244,8 +244,9 @@ typedef struct {
   int predicts;
   const double *linear; /* strains of sections that a static iteration predicts; or none */
   double *unlike; /* largest (N, V, M) by which a point's answer differs from the stress of its strain */
-  double *committed; /* derivatives D of the accepted state without negative parts; or none */
-  const double *elastic; /* stiffnesses of sections, to which the parts are relative */
+  double *committed; /* derivatives D of the accepted state without negative eigenvalues; or none */
+  const double *elastic; /* stiffnesses of sections, to which eigenvalues are relative */
+  double *inputs;        /* space for the inputs of a point */
 } points;
 
 /* Cells with points in `in_cell` sections each: forms of the strains times the `weight` of each

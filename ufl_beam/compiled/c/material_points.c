@@ -279,27 +279,44 @@ static void remove_negative(const double *C, double *D)
       for (int j = 0; j < 3; ++j) D[3 * i + j] -= A[k][k] * V[i][k] * V[j][k] * sqrt(C[i] * C[j]);
 }
 
-/* Store the tangents at the strains of the latest response. They do not depend on its iterates: no
- * point follows a prediction or answers with its elastic stiffness. */
-void keep_tangents(const points *p)
+/* Stress of a point, and its derivative, if the law holds at the fraction theta of the step; returns
+ * whether they are finite. */
+static int answer_at(const points *p, double theta, double *w, double *s)
 {
   const int d = p->components;
-  double s[3 + 9], t[2], r[3], new[MOST_VARIABLES], *w = p->w, *D = p->committed;
+  w[THETA] = theta, w[GROWTH] = w[DIRECTION] = 0;
+  answer(p, w, s);
+  if (fabs(s[0]) > w[TRACTION]) condense_hinge(p, w, s);
+  for (int a = 0; a < d + d * d; ++a)
+    if (!isfinite(s[a])) return 0;
+  return 1;
+}
+
+/* Store the tangents at the strains of the latest response, which remains.
+ *
+ * The law holds at the end of the step here, and its iteration starts from the state before the
+ * step. If a scheme satisfies the law within the step, stresses at the ends may alternate about the
+ * yield surface. Every second step of flowing material is then elastic, and its tangent is not the
+ * tangent of the motion.
+ */
+void keep_tangents(const points *p)
+{
+  const int d = p->components, width = p->width;
+  points at_end = *p;
+  double s[3 + 9], r[3], *w = p->w, *D = p->committed, *own = p->inputs;
+  at_end.tried = 0;
   for (int c = 0; c < p->cells; ++c, D += 9) {
     memset(D, 0, 9 * sizeof *D);
-    for (int k = 0; k < 3; ++k) D[4 * k] = p->rest[k] * p->theta;
-    for (int i = 0; i < p->of_cell; ++i, w += p->width) {
-      double *z = w + p->strain + 3 * d + p->variables;
-      if (p->solves) memcpy(new, z, p->variables * sizeof *z);
-      answer(p, w, s);
-      if (p->solves) memcpy(z, new, p->variables * sizeof *z);
-      if (w[DIRECTION] != 0) {
-        ask(p->resistance, w, 2, t);
-        s[1] *= t[1] / (s[1] / w[LENGTH] + t[1]); /* as in condense_hinge */
+    for (int k = 0; k < 3; ++k) D[4 * k] = p->rest[k];
+    for (int i = 0; i < p->of_cell; ++i, w += width) {
+      memcpy(own, w, width * sizeof *w);
+      double weight = p->weight[i];
+      if (!answer_at(&at_end, 1, own, s)) {
+        answer_at(p, p->theta, own, s);
+        weight /= p->theta;
       }
-      add_answer(d, p->B + 3 * d * i, p->weight[i], s, r, D);
+      add_answer(d, p->B + 3 * d * i, weight, s, r, D);
     }
-    for (int k = 0; k < 9; ++k) D[k] /= p->theta;
     remove_negative(p->elastic + 3 * c, D);
   }
 }
