@@ -363,6 +363,8 @@ class TangentRayleighForce(MatrixForce):
         self._position = np.argsort(cells.cell_indices)  # of each cell in the mesh
         # Unknown until the start of a run
         self._tangents = [np.full((len(beams.points.D), 3, 3), np.nan) for beams in yielding]
+        for beams in yielding:
+            beams.points.keeps_tangents = True
         super().__init__(setting, inertia.scheme, inertia.mass.matrix)
 
     def response(self, step: Step, q1: Array) -> Response:
@@ -387,7 +389,7 @@ class TangentRayleighForce(MatrixForce):
         by_stiffness = mass.cells.on_nodes("stress", self._product.assembled())
         self.on_nodes = damping.mass * by_mass + damping.stiffness * by_stiffness
         for beams, tangents in zip(self._yielding, self._tangents, strict=True):
-            tangents[:] = positive(beams.points.end_tangent(), beams.points.elastic())
+            tangents[:] = positive(beams.points.end_tangents, beams.points.elastic())
 
     def start(self, q: Array) -> None:
         """Set unknown tangents to the elastic stiffness."""

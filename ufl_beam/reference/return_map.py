@@ -86,6 +86,8 @@ class MaterialPoints:
         softens: True if points may open.
         excess: ``|stress| / limit - 1`` of points that are held closed, else 0; (cells, n).
         released: True for points that may open from this iterate on.
+        keeps_tangents: True if :meth:`accept` computes ``end_tangents``.
+        end_tangents: Derivatives of (N, V, M) in the accepted state; (cells, 3, 3).
     """
 
     def __init__(
@@ -128,6 +130,8 @@ class MaterialPoints:
         self.recorded: Array = np.zeros((cells, 6))
         self.excess: Array = np.zeros((cells, n))
         self.released: Any = False
+        self.keeps_tangents = False
+        self.end_tangents = self.D
         self.softens = section_points.softening is not None
         # Broken points have no stress at t_n+θ, where the law holds, but may have a stress at the
         # end of a step.  Its energy is a numerical loss.
@@ -227,7 +231,7 @@ class MaterialPoints:
         for name in self._z1:
             at[name][~done] = np.nan
 
-    def end_tangent(self) -> Array:
+    def _end_tangents(self) -> Array:
         """Return derivatives of (N, V, M) if the laws hold at the end of the step; (cells, 3, 3)."""
         kept = self.at, self.r, self.D, self.excess, self._search
         self.at, self._search = {name: x.copy() for name, x in self.at.items()}, Search()
@@ -341,6 +345,8 @@ class MaterialPoints:
     def accept(self) -> None:
         """Accept the latest response, and enter its dissipation in the ledger."""
         at, α = self.at, self._scheme.alpha
+        if self.keeps_tangents:
+            self.end_tangents = self._end_tangents()
         end = self._equations.end(at)
         plastic = np.sum(self._volume * end.worked, axis=1)
         broken = np.sum(self._section_points.weights * (end.broken + 0 * at["length"]), axis=1)
