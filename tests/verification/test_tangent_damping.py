@@ -14,7 +14,7 @@ import ufl_beam as ub
 
 PLAIN = {"EA": 1e4, "GA": 4e3, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.01}  # N, N, N m², kg/m, kg m
 
-# -- an oscillator: a bar without mass that yields, with a mass at its end ---------------------------
+# -- an oscillator: a bar without mass that yields, with a mass at its end -----------------------
 
 STIFFNESS, AFTER_YIELD, LIMIT = 100.0, 20.0, 1.0  # N/m, N/m, N; mass 1 kg
 A0, A1 = 0.2, 0.01  # 1/s, s: damping ratios 0.01 and 0.05
@@ -44,7 +44,8 @@ def integrated():
 
     The damping force is (a0 + a1 k) v with the slope k of the spring, which changes at a switch.
     """
-    y, t, flows, switches, fastest = np.zeros(5), 0.0, False, 0, 0.0  # u, v, spring force, back force, loss
+    y = np.zeros(5)  # u, v, spring force, back force, loss
+    t, flows, switches, fastest = 0.0, False, 0, 0.0
     while t < END:
         k = AFTER_YIELD if flows else STIFFNESS
         c = A0 + A1 * k
@@ -99,7 +100,7 @@ def test_a_yielding_oscillator_converges_with_first_order(scheme):
     assert abs(initial - exact) > 0.4 * abs(exact)  # another problem
 
 
-# -- beams -------------------------------------------------------------------------------------------
+# -- beams -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("scheme", "degree"), [(ub.EnergyMomentum(), 1), (ub.Newmark(), 2)])
@@ -145,14 +146,14 @@ def test_rigid_rotation_is_damped_less_with_smaller_steps():
 YIELDING = {
     "hardening": {"bending": ub.ElastoPlastic(3.0, kinematic=5.0)},
     "perfect": {"bending": ub.ElastoPlastic(3.0)},
-    "hinge": {"hinge": ub.Softening(4.0, 5.0)},
+    "hinge": {"hinge": ub.Softening(3.0, 5.0)},
     "interaction": {"interaction": ub.AxialBending(15.0, 4.0)},
 }
 
 
 def shaken(kind, scheme=None, t=(0, 0.8), tangent=True, **options):
     """A cantilever with a mass under a load that makes it yield, and its run; or of a section."""
-    fibres = ub.Fibres(ub.ElastoPlastic(6e4), number=4, softening=ub.Softening(9e4, 120.0))  # Pa
+    fibres = ub.Fibres(ub.ElastoPlastic(6e4), number=4, softening=ub.Softening(4e4, 400.0))
     section = ub.Section.rectangle(0.01, 0.1, E=1.2e8, nu=0.3, rho=1e3, fibres=fibres)
     if kind != "fibres":
         section = ub.Section(**PLAIN, **YIELDING[kind]) if kind in YIELDING else kind
@@ -175,18 +176,18 @@ def test_softening_supplies_no_energy(kind):
     assert runs[0].energy["damping"][-1] < 0.6 * runs[1].energy["damping"][-1]
 
 
-@pytest.mark.parametrize("kind", ["hinge", "fibres"])
+@pytest.mark.parametrize("kind", ["fibres", pytest.param("hinge", marks=pytest.mark.slow)])
 def test_the_reference_solver_finds_the_same(kind):
     """Tolerance: variables of laws have 9 digits, as corrections below this end their iteration."""
     newton = [ub.Newton(rtol=1e-12, reference=x) for x in (False, True)]
-    runs = [shaken(kind, t=(0, 0.25), newton=one)[1] for one in newton]
+    runs = [shaken(kind, t=(0, 0.15), newton=one)[1] for one in newton]
     np.testing.assert_allclose(runs[0].q, runs[1].q, rtol=0, atol=1e-9 * np.abs(runs[0].q).max())
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentumDecaying(), ub.GeneralizedAlpha()])
 def test_runs_continue_with_the_same_tangents(scheme, tmp_path):
     """Bit for bit from a checkpoint, to digits of Newton's method from `start=`."""
-    beam, run = shaken("hardening", scheme)
+    _, run = shaken("hardening", scheme)
     assert np.diff(run.energy["plastic"])[40] > 0  # it flows when the runs continue
 
     def simulate(scene, scheme, t, **options):

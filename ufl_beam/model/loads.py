@@ -14,12 +14,12 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import (
-    require_kind,
     ArgumentError,
     ArgumentTypeError,
     ModelError,
     closed,
     require_all,
+    require_kind,
     require_returned,
     require_vector,
     shorten,

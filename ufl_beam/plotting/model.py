@@ -110,7 +110,7 @@ def model_notes(scene: Scene) -> list[str]:
         if isinstance(damping, Rayleigh):
             coefficients = (("mass", damping.mass, "1/s"), ("stiffness", damping.stiffness, "s"))
             sizes = ", ".join(f"{name} {x:.3g} {unit}" for name, x, unit in coefficients if x)
-            notes.append(f"Rayleigh damping, {sizes}")
+            notes.append(f"Rayleigh damping, {sizes}{', tangent' * damping.tangent}")
         else:
             beams = damping.beams or ()
             where = " of " + ", ".join(b.name for b in beams[:4]) if beams else ""

@@ -401,7 +401,9 @@ class TangentRayleighForce(MatrixForce):
         """Save or restore the tangents."""
         for beams, tangents in zip(self._yielding, self._tangents, strict=True):
             rows = tangents.reshape(len(beams.rows), -1)
-            tangents[:] = archive.rows("committed tangents", beams.rows, rows).reshape(tangents.shape)
+            tangents[:] = archive.rows("committed tangents", beams.rows, rows).reshape(
+                tangents.shape
+            )
 
 
 def positive(D: Array, C: Array) -> Array:

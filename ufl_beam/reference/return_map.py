@@ -232,19 +232,24 @@ class MaterialPoints:
             at[name][~done] = np.nan
 
     def _end_tangents(self) -> Array:
-        """Return derivatives of (N, V, M) if the laws hold at the end of the step; (cells, 3, 3)."""
+        """Return :attr:`end_tangents` of the latest response, with the laws at the end of the step."""
         kept = self.at, self.r, self.D, self.excess, self._search
         self.at, self._search = {name: x.copy() for name, x in self.at.items()}, Search()
         self.at["theta"][:] = 1.0
         self.return_map(self.strains, self.at["dt"][0, 0])
         D = self.D
         self.at, self.r, self.D, self.excess, self._search = kept
-        return np.where(np.isfinite(D).all(axis=(1, 2), keepdims=True), D, self.D / self._scheme.theta)
+        return np.where(
+            np.isfinite(D).all(axis=(1, 2), keepdims=True), D, self.D / self._scheme.theta
+        )
 
     @np.errstate(all="ignore")
     def elastic_tangent(self) -> Array:
         """Return derivatives of (N, V, M) at constant variables in the state; (cells, 3, 3)."""
-        at = {**self.at, **{name: self.at[before] for name, before in zip(self._e, self._e0)}}
+        at = {
+            **self.at,
+            **{name: self.at[before] for name, before in zip(self._e, self._e0, strict=True)},
+        }
         at["theta"] = np.ones_like(at["theta"])
 
         def stress(at: At) -> Array:
