@@ -87,7 +87,8 @@ class MaterialPoints:
         excess: ``|stress| / limit - 1`` of points that are held closed, else 0; (cells, n).
         released: True for points that may open from this iterate on.
         keeps_tangents: True if :meth:`accept` computes ``end_tangents``.
-        end_tangents: Derivatives of (N, V, M) in the accepted state; (cells, 3, 3).
+        end_tangents: Derivatives of (N, V, M) in the accepted state, with the laws at the end of
+            the step; (cells, 3, 3).
     """
 
     def __init__(
@@ -232,7 +233,7 @@ class MaterialPoints:
             at[name][~done] = np.nan
 
     def _end_tangents(self) -> Array:
-        """Return :attr:`end_tangents` of the latest response, with the laws at the end of the step."""
+        """Return :attr:`end_tangents` of the latest response."""
         kept = self.at, self.r, self.D, self.excess, self._search
         self.at, self._search = {name: x.copy() for name, x in self.at.items()}, Search()
         self.at["theta"][:] = 1.0
