@@ -234,6 +234,6 @@ def test_first_step_after_statics_is_elastic():
 def test_bad_tangents_are_refused():
     with raises("Rayleigh: tangent=True has no effect with stiffness = 0"):
         ub.Rayleigh(mass=1.0, tangent=True)
-    with raises("Rayleigh: tangent = 1 is not a bool"):
+    with raises("Rayleigh: tangent = 1 must be True or False"):
         ub.Rayleigh(stiffness=1.0, tangent=1)
     assert ub.Rayleigh.with_ratios(0.03, (5.0, 50.0), tangent=True).tangent

@@ -19,7 +19,6 @@ from ufl_beam.errors import (
     ModelError,
     closed,
     require_all,
-    require_kind,
     require_returned,
     require_vector,
     shorten,
@@ -29,7 +28,7 @@ from ufl_beam.model.bodies import Beams, Member, PlaceField, ground, moves_with_
 from ufl_beam.model.connector_laws import PrescribedForce
 from ufl_beam.model.connectors import Component, Connector
 from ufl_beam.model.functions import Timed, TimeFunction, steady, value_at
-from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Record, Vector
+from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Record, Switch, Vector
 
 
 class Load(Record, ABC):
@@ -439,11 +438,10 @@ class Rayleigh(Record):
     _: KW_ONLY
     mass: NotNegative = 0.0
     stiffness: NotNegative = 0.0
-    tangent: bool = False
+    tangent: Switch = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_kind(self.tangent, bool, "Rayleigh: tangent")
         if self.mass == self.stiffness == 0.0:
             raise ModelError("Rayleigh: mass and stiffness are both zero; leave damping out")
         if self.tangent and self.stiffness == 0.0:
