@@ -294,7 +294,8 @@ def point_mass(d):
 
 @feature("damping", statics=False)
 def rayleigh(d):
-    d.damping.append(f"ub.Rayleigh(mass={d.some(0.1, 2):.3f}, stiffness={d.some(1e-4, 1e-3):.2e})")
+    factors = f"mass={d.some(0.1, 2):.3f}, stiffness={d.some(1e-4, 1e-3):.2e}"
+    d.damping.append(f"ub.Rayleigh({factors}{d.one(['', ', tangent=True'])})")
 
 
 @feature("viscous")

@@ -272,9 +272,12 @@ TABLE = {
     "Rayleigh.with_ratios": call(
         ub.Rayleigh.with_ratios,
         ratios=V(0.03, [None, "x", NAN, 0.0, -1.0, HUGE, (0.1, NAN), (0.1,), (0.01, 0.9)]),
-        omega=V((1.0, 2.0), [*VECTOR, (0.0, 1.0), (1.0, 1.0)]),
+        omega=V((1.0, 2.0), [*VECTOR, (0.0, 1.0), (1.0, 1.0)]), tangent=V(False, SWITCH),
     ),
-    "Rayleigh": call(ub.Rayleigh, mass=V(1.0, FROM_ZERO), stiffness=V(1.0, FROM_ZERO)),
+    "Rayleigh": call(
+        ub.Rayleigh,
+        mass=V(1.0, FROM_ZERO), stiffness=V(1.0, FROM_ZERO), tangent=V(False, SWITCH),
+    ),
     # beams, bodies, places
     "Beam": call(
         ub.Beam,

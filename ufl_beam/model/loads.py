@@ -28,7 +28,7 @@ from ufl_beam.model.bodies import Beams, Member, PlaceField, ground, moves_with_
 from ufl_beam.model.connector_laws import PrescribedForce
 from ufl_beam.model.connectors import Component, Connector
 from ufl_beam.model.functions import Timed, TimeFunction, steady, value_at
-from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Record, Vector
+from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Record, Switch, Vector
 
 
 class Load(Record, ABC):
@@ -409,12 +409,26 @@ class Rayleigh(Record):
     yielding cells and on hinges that open in cells, but neither on hinges of zero length nor on
     springs, see docs/howto_earthquake.md.
 
+    With ``tangent=True``, K is the tangent stiffness of the cells at the end of the last step, the
+    committed stiffness of other programs.  It is constant during a step.  Yielding cells and open
+    hinges are then damped with their reduced stiffness, in the present directions of the beams.
+
+    * Negative eigenvalues of the tangents of sections, as of softening, count as zero.  With them
+      the damping would supply energy.
+    * Geometric stiffness is left out.  It would resist the rotation of beams in tension and supply
+      energy to beams in compression.
+    * K is of the last step, so that a run is of first order in the step where K changes.
+    * A run begins with the elastic stiffness, also after :func:`simulate` with ``start=``, unless
+      the earlier run had this damping.
+
     Args:
         mass: Factor a0 on the mass matrix; 1/s.
         stiffness: Factor a1 on the stiffness matrix; s.
+        tangent: True for the tangent stiffness of the last step instead of the initial stiffness.
 
     Raises:
-        ModelError: A factor is negative, or both are zero.
+        ModelError: A factor is negative, both are zero, or ``stiffness`` is zero with
+            ``tangent=True``.
 
     Example:
         >>> damping = ub.Rayleigh(mass=1.0, stiffness=1e-5)  # 1/s, s
@@ -427,25 +441,36 @@ class Rayleigh(Record):
     _: KW_ONLY
     mass: NotNegative = 0.0
     stiffness: NotNegative = 0.0
+    tangent: Switch = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.mass == self.stiffness == 0.0:
             raise ModelError("Rayleigh: mass and stiffness are both zero; leave damping out")
+        if self.tangent and self.stiffness == 0.0:
+            raise ModelError(
+                "Rayleigh: tangent=True has no effect with stiffness = 0; give stiffness, or leave "
+                "out tangent"
+            )
 
     @classmethod
     def with_ratios(
-        cls, ratios: float | tuple[float, float], omega: tuple[float, float]
+        cls,
+        ratios: float | tuple[float, float],
+        omega: tuple[float, float],
+        *,
+        tangent: bool = False,
     ) -> Rayleigh:
         """Build the damping that has given damping ratios at two circular frequencies.
 
         Args:
             ratios: Damping ratio at both frequencies, or a pair of damping ratios.
             omega: Two different circular frequencies, such as ``modes(scene, 2).omega``; rad/s.
+            tangent: As in :class:`Rayleigh`.
 
         Raises:
             ModelError: A frequency is not positive, the frequencies are equal, or the ratios would
-                need a negative factor.
+                need a negative factor, or with ``tangent=True`` a zero stiffness factor.
 
         Example:
             >>> damping = ub.Rayleigh.with_ratios(0.03, ub.modes(scene, 2).omega)
@@ -466,7 +491,7 @@ class Rayleigh(Record):
                 f"factors mass = {mass:.3g}, stiffness = {stiffness:.3g}, which must not be "
                 "negative; give positive ratios that differ less than the frequencies"
             )
-        return cls(mass=mass, stiffness=stiffness)
+        return cls(mass=mass, stiffness=stiffness, tangent=tangent)
 
 
 @closed("state other damping as a VirtualWork of v")

@@ -108,7 +108,8 @@ def model_notes(scene: Scene) -> list[str]:
     notes = []
     for damping in scene.damping:
         if isinstance(damping, Rayleigh):
-            coefficients = (("mass", damping.mass, "1/s"), ("stiffness", damping.stiffness, "s"))
+            kind = "tangent stiffness" if damping.tangent else "stiffness"
+            coefficients = (("mass", damping.mass, "1/s"), (kind, damping.stiffness, "s"))
             sizes = ", ".join(f"{name} {x:.3g} {unit}" for name, x, unit in coefficients if x)
             notes.append(f"Rayleigh damping, {sizes}")
         else:

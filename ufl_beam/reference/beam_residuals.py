@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 
 import numpy as np
@@ -34,6 +34,7 @@ from ufl_beam.reference.cell_forms import (
     Force,
     Response,
     Setting,
+    cell_dofs,
     point_masses,
     put,
 )
@@ -142,7 +143,7 @@ class YieldingBeams(CellForce):
         work, around = (virtual_work(r, w_e) * element.dx(1) for r in (self._r, linear))
         super().__init__(cells, work, setting, around=around)
         self._degree = numbering.mesh.degree
-        self._rows = cells.cell_indices + section_points.number * len(numbering.cells)
+        self.rows = cells.cell_indices + section_points.number * len(numbering.cells)
         self._names = [
             numbering.describe_cell(number) for number in cells.cell_indices.repeat(self._degree)
         ]
@@ -194,7 +195,7 @@ class YieldingBeams(CellForce):
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the internal variables of all points."""
         state = self.points.state()
-        rows = archive.rows("cells", self._rows, state.reshape(len(self._rows), -1))
+        rows = archive.rows("cells", self.rows, state.reshape(len(self.rows), -1))
         self.points.state(rows.reshape(state.shape))
 
     def material(self) -> Array:
@@ -335,6 +336,87 @@ class RayleighForce(MatrixForce):
         self.on_nodes = damping.mass * by_mass + damping.stiffness * by_stiffness
 
 
+class TangentRayleighForce(MatrixForce):
+    """Rayleigh damping with the tangent stiffness of the accepted state.
+
+    The stiffness has the tangents of sections without negative eigenvalues, at the configuration at
+    the beginning of the step.
+    """
+
+    row = "velocity"
+
+    def __init__(
+        self, damping: Rayleigh, setting: Setting, inertia: Inertia,
+        yielding: Sequence[YieldingBeams],
+    ) -> None:  # fmt: skip
+        self.inertia, self._damping, self._yielding = inertia, damping, yielding
+        self._cells = cells = inertia.mass.cells
+        element = cells.element
+        self._step: Step | None = None
+        self._D, v = element.at_points(3, 3), ufl.TrialFunction(element.space)
+        e, w_e = (virtual_strain(element.q0, x, element.axis) for x in (v, element.w))
+        K = virtual_work(ufl.dot(self._D, e), w_e) * element.dx(1)
+        self._stiffness, self._product = cells.form(K), cells.form(ufl.action(K, element.q1))
+        C = element.stiffness.x.array.reshape(-1, 1, 3, 1) * np.eye(3)
+        order = cell_dofs(element.stiffness.function_space)[:, 0] // 3
+        self._sections = np.repeat(C[order], len(cells.weights), axis=1)
+        self._position = np.argsort(cells.cell_indices)  # of each cell in the mesh
+        # Unknown until the start of a run
+        self._tangents = [np.full((len(beams.points.D), 3, 3), np.nan) for beams in yielding]
+        for beams in yielding:
+            beams.points.keeps_tangents = True
+        super().__init__(setting, inertia.scheme, inertia.mass.matrix)
+
+    def response(self, step: Step, q1: Array) -> Response:
+        """Return forces and derivative; a new step has a new matrix."""
+        if step is not self._step:
+            self._step = step
+            for beams, tangents in zip(self._yielding, self._tangents, strict=True):
+                there = self._position[beams.cells.cell_indices]
+                self._sections[there] = tangents.reshape(len(there), -1, 3, 3)
+            put(self._D, self._sections)
+            self._cells.set(self._cells.element.q0, step.q0)
+            K = self._damping.stiffness * self._stiffness.assembled()
+            self.matrix = csr_array(self._damping.mass * self.inertia.matrix + K)
+        return super().response(step, q1)
+
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
+        """Enter the energy lost by damping in the ledger, and accept new tangents."""
+        self.ledger.lost["damping"] += float(s @ (self.matrix @ s)) / step.dt
+        mass, damping = self.inertia.mass, self._damping
+        by_mass = mass.on_nodes(self.rate)
+        # mass.on_nodes has set q1 of this form to the rate.
+        by_stiffness = mass.cells.on_nodes("stress", self._product.assembled())
+        self.on_nodes = damping.mass * by_mass + damping.stiffness * by_stiffness
+        for beams, tangents in zip(self._yielding, self._tangents, strict=True):
+            tangents[:] = positive(beams.points.end_tangents, beams.points.elastic())
+
+    def start(self, q: Array) -> None:
+        """Set unknown tangents to the elastic stiffness."""
+        for beams, tangents in zip(self._yielding, self._tangents, strict=True):
+            elastic = positive(beams.points.elastic_tangent(), beams.points.elastic())
+            tangents[:] = np.where(np.isnan(tangents), elastic, tangents)
+
+    def save_or_restore(self, archive: Archive) -> None:
+        """Save or restore the tangents."""
+        for beams, tangents in zip(self._yielding, self._tangents, strict=True):
+            rows = tangents.reshape(len(beams.rows), -1)
+            tangents[:] = archive.rows("committed tangents", beams.rows, rows).reshape(
+                tangents.shape
+            )
+
+
+def positive(D: Array, C: Array) -> Array:
+    """Return D without the negative eigenvalues of its symmetric part, relative to stiffnesses C.
+
+    D has the shape (n, 3, 3), C (n, 3).
+    """
+    scale, symmetric = np.sqrt(C[:, :, None] * C[:, None, :]), (D + D.transpose(0, 2, 1)) / 2
+    values, vectors = np.linalg.eigh(symmetric / scale)
+    negative = np.einsum("nik,nk,njk->nij", vectors, np.minimum(values, 0.0), vectors)
+    return np.asarray(symmetric - negative * scale)
+
+
 class KelvinVoigtForce(CellForce):
     """Kelvin-Voigt damping: resultants C Δe/Δt times the retardation time."""
 
@@ -357,7 +439,9 @@ class KelvinVoigtForce(CellForce):
         return super().response(step, q1)
 
 
-def damping_forces(setting: Setting, inertia: Inertia | None) -> list[Force]:
+def damping_forces(
+    setting: Setting, inertia: Inertia | None, yielding: Sequence[YieldingBeams]
+) -> list[Force]:
     """Return the forces of all damping in a scene."""
     forces: list[Force] = []
     for damping in setting.numbering.scene.damping:
@@ -376,6 +460,8 @@ def damping_forces(setting: Setting, inertia: Inertia | None) -> list[Force]:
                 "Rayleigh: it damps vibrations, and statics has no inertia. Use "
                 "KelvinVoigt, which acts in the time of a static run"
             )
+        elif damping.tangent:
+            forces.append(TangentRayleighForce(damping, setting, inertia, yielding))
         else:
             forces.append(RayleighForce(damping, setting, inertia))
     return forces

@@ -19,7 +19,7 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.law_functions import Values
-from ufl_beam.reference.cell_forms import Setting
+from ufl_beam.reference.cell_forms import Search, Setting
 
 CLOSED, FLOWING = 0.0, 1.0
 """Values of the flag of a discontinuity that did not grow, or did grow, in the last step."""
@@ -86,6 +86,9 @@ class MaterialPoints:
         softens: True if points may open.
         excess: ``|stress| / limit - 1`` of points that are held closed, else 0; (cells, n).
         released: True for points that may open from this iterate on.
+        keeps_tangents: True if :meth:`accept` computes ``end_tangents``.
+        end_tangents: Derivatives of (N, V, M) in the accepted state, with the laws at the end of
+            the step; (cells, 3, 3).
     """
 
     def __init__(
@@ -128,6 +131,8 @@ class MaterialPoints:
         self.recorded: Array = np.zeros((cells, 6))
         self.excess: Array = np.zeros((cells, n))
         self.released: Any = False
+        self.keeps_tangents = False
+        self.end_tangents = self.D
         self.softens = section_points.softening is not None
         # Broken points have no stress at t_n+θ, where the law holds, but may have a stress at the
         # end of a step.  Its energy is a numerical loss.
@@ -155,7 +160,7 @@ class MaterialPoints:
 
         The step has the length ``dt``; s.
         """
-        at, θ, w = self.at, self._scheme.theta, self._section_points.weights
+        at, θ, w = self.at, float(self.at["theta"][0, 0]), self._section_points.weights
         self.strains, at["dt"][:] = strains.copy(), dt
         for name, values in zip(self._e, self._at_points(strains), strict=True):
             at[name][:] = values
@@ -178,7 +183,7 @@ class MaterialPoints:
         rest = self._section_points.rest  # stiffness of resultants without points
         self.r = rest * ((1 - θ) * self.strains0 + θ * strains)
         self.r = self.r + np.einsum("n,acn,nak->ck", w, stress, self._B)
-        self.D = np.einsum("n,abcn,nak,nbl->ckl", w, slope, self._B, self._B) + θ * np.diag(rest)
+        self.D = self._of_sections(slope, θ)
 
     def _bulk(self, at: At) -> tuple[Array, Array]:
         """Return bulk stresses at t_n+θ, and slopes by strain; (d, cells, n), (d, d, cells, n)."""
@@ -227,6 +232,43 @@ class MaterialPoints:
         for name in self._z1:
             at[name][~done] = np.nan
 
+    def _end_tangents(self) -> Array:
+        """Return :attr:`end_tangents` of the latest response."""
+        kept = self.at, self.r, self.D, self.excess, self._search
+        self.at, self._search = {name: x.copy() for name, x in self.at.items()}, Search()
+        self.at["theta"][:] = 1.0
+        self.return_map(self.strains, self.at["dt"][0, 0])
+        D = self.D
+        self.at, self.r, self.D, self.excess, self._search = kept
+        return np.where(
+            np.isfinite(D).all(axis=(1, 2), keepdims=True), D, self.D / self._scheme.theta
+        )
+
+    @np.errstate(all="ignore")
+    def elastic_tangent(self) -> Array:
+        """Return derivatives of (N, V, M) at constant variables in the state; (cells, 3, 3)."""
+        at = {
+            **self.at,
+            **{name: self.at[before] for name, before in zip(self._e, self._e0, strict=True)},
+        }
+        at["theta"] = np.ones_like(at["theta"])
+
+        def stress(at: At) -> Array:
+            return self._array(self._equations.elastic_stress(at))
+
+        return self._of_sections(jacobian(stress, at, self._e)[1], 1.0)
+
+    def _of_sections(self, slope: Array, θ: float) -> Array:
+        """Return derivatives of (N, V, M) from derivatives of stresses, (d, d, cells, n)."""
+        w, rest = self._section_points.weights, self._section_points.rest
+        D = np.einsum("n,abcn,nak,nbl->ckl", w, slope, self._B, self._B)
+        return np.asarray(D + θ * np.diag(rest))
+
+    def elastic(self) -> Array:
+        """Return elastic stiffnesses of the sections; (cells, 3); N, N, N m²."""
+        w, C = self._section_points.weights, np.array([self.at[name] for name in self._C])
+        return np.asarray(self._section_points.rest + np.einsum("n,acn,nak->ck", w, C, self._B**2))
+
     # -- discontinuities -------------------------------------------------------------------------
 
     def _growth(self, stress: Array, opens: Array) -> Array:
@@ -241,7 +283,7 @@ class MaterialPoints:
             return over, -tangent[0, 0] / length - softens
 
         # After this growth, an elastic bulk has no stress.
-        bound = np.abs(stress) / at["stiffness"] * length / self._scheme.theta
+        bound = np.abs(stress) / at["stiffness"] * length / at["theta"]
         bound += np.finfo(float).tiny
         digits = np.maximum(np.abs(at["before"]), np.abs(at["strain"])) * length
         digits = 4 * EPS * (bound + digits + np.abs(at["jump"]))
@@ -309,6 +351,8 @@ class MaterialPoints:
     def accept(self) -> None:
         """Accept the latest response, and enter its dissipation in the ledger."""
         at, α = self.at, self._scheme.alpha
+        if self.keeps_tangents:
+            self.end_tangents = self._end_tangents()
         end = self._equations.end(at)
         plastic = np.sum(self._volume * end.worked, axis=1)
         broken = np.sum(self._section_points.weights * (end.broken + 0 * at["length"]), axis=1)

@@ -146,7 +146,7 @@ class Solver(PresentState):
         inertia = [] if self.inertia is None else [self.inertia]
         self.loads = all_loads(setting, self.inertia, t)
         self.inner: list[Force] = [*self.beams, *self.connectors]
-        damping = damping_forces(setting, self.inertia)
+        damping = damping_forces(setting, self.inertia, self.yielding)
         self.forces: list[Force] = [*self.inner, *self.loads, *inertia, *damping]
         self._groups = [group for group in self.connectors if isinstance(group, Connectors)]
         candidates = (law.opens for group in self._groups for law in group.laws)

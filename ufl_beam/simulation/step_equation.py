@@ -139,7 +139,7 @@ class StepEquation:
                 ledger.lost["numerical"] += 0.0
             others.append(inertia)
         for damping in scene.damping:
-            others += damping_forces(damping, fields, *setting, inertia)
+            others += damping_forces(damping, fields, *setting, inertia, self.inelastic)
         if scene.beams:
             ledger.state["stored"] += 0.0
         self.inner: list[Term] = [*self.beams, *self.connector_terms]

@@ -267,6 +267,9 @@ class ElasticBeams(FormForces, Cells):
 
 # -- beams with material points --------------------------------------------------------------------
 
+TANGENTS = "committed tangents"
+"""Name of the tangents for damping in saved data."""
+
 WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
 """Factors of :attr:`Points.recorded` that remove the jump of a fibre in cells without a hinge."""
 
@@ -377,6 +380,7 @@ class InelasticBeams(Cells):
         strains = self._elastic_strains(q)
         self.points.start(strains)
         self.points.refresh(strains)
+        self.points.start_tangents()
 
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if a point generates energy in the step to ``q1``."""
@@ -421,10 +425,23 @@ class InelasticBeams(Cells):
     # -- the state -----------------------------------------------------------------------------
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore the internal variables."""
-        state = self.points.state()
+        """Save or restore the internal variables, and tangents for damping."""
+        state, tangents = self.points.state(), self.points.committed
         rows = archive.rows("cells", self._rows, state.reshape(len(self._rows), -1))
         self.points.restore(rows.reshape(state.shape))
+        if tangents is not None:
+            rows = archive.rows(TANGENTS, self._rows, tangents.reshape(len(self._rows), -1))
+            tangents[:] = rows.reshape(tangents.shape)
+
+    def keep_tangents(self) -> tuple[Index, Array]:
+        """Let the points store tangents for damping; return positions of the cells, and tangents.
+
+        The tangents are (num_cells, 9 p) at p integration points; C updates them.
+        """
+        self.points.keep_tangents()
+        assert self.points.committed is not None
+        order = self._fields.order.astype(np.int32)
+        return order, self.points.committed.reshape(len(order), -1)
 
     def recorded(self) -> tuple[Index, Array]:
         """Return cells (scene numbers), and :attr:`Points.recorded`; (num_cells, degree, 6)."""

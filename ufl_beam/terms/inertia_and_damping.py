@@ -7,6 +7,7 @@ Coefficients of a scheme are cached, because steps have only a few different len
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache, partial
 from typing import Any
 
@@ -15,7 +16,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, lib, loop, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.function_spaces import (
@@ -42,7 +43,7 @@ from ufl_beam.mechanics.time_scheme import (
     with_half_tangents,
 )
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
-from ufl_beam.terms.beam_forces import FormForces
+from ufl_beam.terms.beam_forces import FormForces, InelasticBeams
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, fields_of_forms
 
@@ -301,9 +302,75 @@ class RayleighForces(Term):
         return Phases([loop("begin_product", c)], [loop("accept_rayleigh", c)])
 
 
+@cached_forms
+def _tangent_stiffness(element: Element) -> tuple[ufl.Form, fem.Function]:
+    """Return the material stiffness about ``q0``, and the tangents of the sections in it."""
+    D, motions = element.at_points(3, 3), (ufl.TrialFunction(element.space), element.w)
+    e, w_e = (virtual_strain(element.q0, w, element.axis) for w in motions)
+    return virtual_work(ufl.dot(D, e), w_e) * element.dx(1), D
+
+
+class TangentRayleighForces(Term):
+    """Rayleigh damping with the tangent stiffness of the accepted state; constant in a step.
+
+    The stiffness has the tangents of sections, and the directions of the cells, at the end of the
+    last step.  It is positive semidefinite, so damping dissipates energy.
+    """
+
+    kind = "damping"
+
+    def __init__(
+        self, damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
+        rates: Inertia, inelastic: Sequence[InelasticBeams],
+    ) -> None:  # fmt: skip
+        (form, D), element = _tangent_stiffness(fields.element), fields.element
+        K, M, C, dofs = fields.matrix(), mass_matrix(fields), fields.matrix(), fields.cell_dofs
+        width = dofs.shape[1]
+        C.data[:] = M.data != 0.0
+        C.data[C.positions(dofs.repeat(width, axis=1).ravel(), np.tile(dofs, width).ravel())] = 1.0
+        rotations = with_half_tangents(scheme, fields.subdomain.rotations)
+        self._times = StepProduct(C, rotations, A, fields.subdomain.scratch)
+        self.loops = self._times.loops
+        self._ledger, self._rates, self._A = ledger, rates, A
+        stiffness = fields.kernel(form, element.q0)
+        stiffness.place(K)
+        force = fields.kernel(applied(form, element.q1), element.q1)
+        elastic = fields.section_values(element.stiffness)[:, None, :, None] * np.eye(3)
+        at_points = np.repeat(elastic, len(fields.subdomain.numbering.mesh.point_weights), axis=1)
+        kernels = stiffness, force
+        for kernel in kernels:
+            kernel.put(D, at_points.reshape(len(elastic), -1))
+        forms = fields_of_forms(kernels, D)["form"]
+        cells = [beams.keep_tangents() for beams in inelastic]
+        groups = [(*tangents.shape, integers(cell), doubles(tangents)) for cell, tangents in cells]
+        at = C.positions(*self._times.A.pairs())
+        self._in_c = struct(
+            "tangent_damping", stiffness=stiffness.cells, force=force.cells,
+            at_q0=force.position(element.q0), form=forms, groups=len(groups),
+            group=ffi.new("committed_cells[]", groups), entries=len(K.data), K=K.data,
+            number=len(at), at=at, mass=damping.mass * M.data[at], factor=damping.stiffness,
+            C=self._times.A.data,
+        )  # fmt: skip
+        self._alive = kernels, groups
+        self.in_cells = [
+            InCells(lambda: force, lib.STRESS, fields.order, factor=damping.stiffness),
+            InCells(
+                partial(mass_kernel, fields), lib.DENSITY, fields.order, self._times.rate,
+                damping.mass,
+            ),
+        ]  # fmt: skip
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Return loops over the cells, the matrix and the velocities."""
+        c = self._rates.times(self._times, damps=1, lost=self._ledger.lost.pointer("damping"))
+        fill(self._in_c, damping=c)
+        begin, accept = (loop(f"{x}_tangent_damping", self._in_c) for x in ("begin", "accept"))
+        return Phases([begin], [accept])
+
+
 def damping_forces(
     damping: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
-    rates: Inertia | None,
+    rates: Inertia | None, inelastic: Sequence[InelasticBeams],
 ) -> list[Term]:  # fmt: skip
     """Return the terms of a damping; empty if the process has no damped cells."""
     ledger.lost["damping"] += 0.0
@@ -313,7 +380,10 @@ def damping_forces(
                 "Rayleigh: it damps vibrations, and statics has no inertia. Use "
                 "KelvinVoigt, which acts in the time of a static run"
             )
-        return [RayleighForces(damping, fields, scheme, A, ledger, rates)]
+        setting = (damping, fields, scheme, A, ledger, rates)
+        if damping.tangent:
+            return [TangentRayleighForces(*setting, inelastic)]
+        return [RayleighForces(*setting)]
     numbering = fields.subdomain.numbering
     beams = numbering.scene.beams if damping.beams is None else damping.beams
     pairs = (zip(numbering.cells_of(beam), numbering.hinges(beam), strict=True) for beam in beams)

@@ -18,7 +18,8 @@ force may be below the limit: sticking or sliding continues if such an equilibri
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -184,6 +185,9 @@ class Points:
         softens: True if points may break.
         over: Largest ``|stress| / limit - 1`` of the points that the latest response has held
             closed, at least zero; (1,).
+        committed: Derivatives of (N, V, M) in the accepted state, with the laws at the end of the
+            step, without negative eigenvalues; (cells, 9); None without damping that needs them.
+            Unknown values are NaN until :meth:`start_tangents`.
         recorded: For each cell: (N, V, M) in the accepted state, the jump of the last point, and
             the energies that plastic strains and discontinuities have dissipated since the
             beginning; (cells, 6); N, N, N m, rad or m, J, J.
@@ -240,6 +244,7 @@ class Points:
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
         self.over = np.zeros(1)
+        self.committed: Array | None = None
 
         self._forms = forms = _point_forms(self.names, section_points.kind, softening, scheme)
         self._dynamic = has_inertia(scheme)
@@ -312,13 +317,45 @@ class Points:
 
         The shapes are (cells, 3) and (cells, 9).  The latest response is restored.
         """
+        with self._unchanged():
+            return self._e0.copy(), self.return_map(self._e0)[1].copy()
+
+    @contextmanager
+    def _unchanged(self) -> Iterator[None]:
+        """Restore the latest response at the end of a ``with`` block."""
         arrays = self._storage, self.strains, self.r, self.D, self._search
         before = [array.copy() for array in arrays]
         try:
-            return self._e0.copy(), self.return_map(self._e0)[1].copy()
+            yield
         finally:
             for array, values in zip(arrays, before, strict=True):
                 array[:] = values
+
+    def keep_tangents(self) -> None:
+        """Store :attr:`committed` from now on, with eigenvalues relative to elastic stiffnesses."""
+        if self.committed is not None:
+            return
+        section_points, elastic = self._section_points, np.zeros((len(self.recorded), 3))
+        elastic += section_points.rest
+        for k, name in enumerate(self._rows("stiffness")):
+            B = section_points.strains[k :: self._components]
+            elastic += (section_points.weights * self[name]) @ B**2
+        self.committed = np.full((len(elastic), 9), np.nan)
+        space = np.zeros(len(self.names))
+        fill(self.c, committed=self.committed, elastic=elastic, inputs=space)
+
+    def start_tangents(self) -> None:
+        """Set the unknown :attr:`committed` to the elastic stiffness at the accepted strains."""
+        if self.committed is None:
+            return
+        known, law = self.committed.copy(), (self.c.law, self.c.solves)
+        with self._unchanged():
+            self["traction"][:] = np.inf
+            self.c.law, self.c.solves = self._forms.elastic, False
+            self.return_map(self._e0)
+            lib.keep_tangents(self.c)
+        self.c.law, self.c.solves = law
+        self.committed[:] = np.where(np.isnan(known), self.committed, known)
 
     def works(self, change: Array) -> Array:
         """Return works of the tangent and of the elastic stiffness on strains; (2, cells).
@@ -385,6 +422,9 @@ class Points:
             self["stiffness"][:, breaking] *= np.where(spent, FREED_STIFFNESS, 1.0)
         self["traction"][:] = np.inf
         self.c.law, self.c.solves = self._forms.elastic, False
+        if self.committed is not None:
+            self.committed[:] = np.nan
+            self.start_tangents()
 
     # -- the ledger ----------------------------------------------------------------------------
 

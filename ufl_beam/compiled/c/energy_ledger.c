@@ -258,6 +258,13 @@ void accept_rayleigh(void *self, const time_step *step, const double *q1, const 
   *m->lost += product_with(m, s, s) / step->dt;
 }
 
+void accept_tangent_damping(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const tangent_damping *t = self;
+  accept_rayleigh((void *)t->damping, step, q1, s);
+  add_cells((void *)t->force, t->damping->product->rate, 0); /* forces in cells */
+}
+
 static void respond_in_term(const inelastic_term *t, const double *q)
 {
   if (t->cells) respond_at(t->cells, q);
@@ -272,6 +279,7 @@ void accept_inelastic(void *self, const time_step *step, const double *q1, const
   const inelastic_term *t = self;
   const double *sum = t->points->sum;
   respond_in_term(t, q1);
+  if (t->points->committed) keep_tangents(t->points);
   commit(t->points);
   if (t->plastic) *t->plastic += sum[0];
   if (t->hinges) *t->hinges += sum[1];

@@ -245,6 +245,9 @@ typedef struct {
   int predicts;
   const double *linear; /* strains of sections that a static iteration predicts; or none */
   double *unlike; /* largest (N, V, M) by which a point's answer differs from the stress of its strain */
+  double *committed; /* derivatives D of the accepted state without negative eigenvalues; or none */
+  const double *elastic; /* stiffnesses of sections, to which eigenvalues are relative */
+  double *inputs;        /* space for the inputs of a point */
 } points;
 
 /* Cells with points in `in_cell` sections each: forms of the strains times the `weight` of each
@@ -347,6 +350,7 @@ part add_connectors_force, add_guides_force, add_guides_tangent;
 void respond(points *p);
 void respond_at(const inelastic *m, const double *q);
 int gives_energy(const points *p);
+void keep_tangents(const points *p);
 void commit(points *p);
 
 /* -- points on guide curves -------------------------------------------------------------------- */
@@ -900,6 +904,29 @@ typedef struct {
   double *kept, *lost; /* entries of the ledger, energy stored and dissipated; or none */
 } matrix_of_rates;
 
+/* Committed tangents of some cells, for damping: `numbers` of each of the cells `cell`. */
+typedef struct {
+  int number, numbers;
+  const int32_t *cell;
+  const double *tangents;
+} committed_cells;
+
+/* Rayleigh damping with the tangent of the accepted state; see TangentRayleighForces. */
+typedef struct {
+  const matrix_of_rates *damping;
+  const cells *stiffness, *force; /* forms: the stiffness of cells; its product with a vector */
+  int at_q0;                      /* position of the configuration in the coefficients of `force` */
+  const form_of_step *form;       /* positions of the tangents of sections in both forms */
+  int groups;
+  const committed_cells *group;
+  int entries;
+  double *K;                      /* entries of the stiffness */
+  int number;                     /* entries of the damping matrix C: C = mass + factor K[at] */
+  const int32_t *at;
+  const double *mass;
+  double factor, *C;
+} tangent_damping;
+
 /* Prescribed motions of supports, and their work. */
 typedef struct {
   int held, moving;
@@ -1051,6 +1078,7 @@ phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, be
   add_energy_of_moving_masses, begin_frame, accept_frame, begin_works,
   accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
   accept_second_differences, begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
+  begin_tangent_damping, accept_tangent_damping,
   begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,
   begin_connectors_again, accept_connectors, add_energy_of_connectors, begin_guides, accept_guides;
 admission points_dissipate;

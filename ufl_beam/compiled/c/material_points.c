@@ -246,6 +246,81 @@ double missed_by_points(void *self, const double *q, const double *r, double sca
   return largest > 0 ? largest / scale : 0;
 }
 
+/* Remove the negative eigenvalues from the symmetric part of D, relative to the stiffnesses C, by
+ * Jacobi's method. */
+static void remove_negative(const double *C, double *D)
+{
+  double A[3][3], V[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j <= i; ++j) {
+      D[3 * i + j] = D[3 * j + i] = (D[3 * i + j] + D[3 * j + i]) / 2;
+      A[i][j] = A[j][i] = D[3 * i + j] / sqrt(C[i] * C[j]);
+    }
+  for (int sweep = 0; sweep < 10; ++sweep)
+    for (int i = 0; i < 2; ++i)
+      for (int j = i + 1; j < 3; ++j) {
+        if (A[i][j] == 0) continue;
+        const double ratio = (A[j][j] - A[i][i]) / (2 * A[i][j]);
+        const double t = copysign(1, ratio) / (fabs(ratio) + sqrt(ratio * ratio + 1));
+        const double c = 1 / sqrt(t * t + 1), s = t * c;
+        for (int k = 0; k < 3; ++k) {
+          const double x = A[k][i], y = A[k][j], v = V[k][i], w = V[k][j];
+          A[k][i] = c * x - s * y, A[k][j] = s * x + c * y;
+          V[k][i] = c * v - s * w, V[k][j] = s * v + c * w;
+        }
+        for (int k = 0; k < 3; ++k) {
+          const double x = A[i][k], y = A[j][k];
+          A[i][k] = c * x - s * y, A[j][k] = s * x + c * y;
+        }
+        A[i][j] = A[j][i] = 0;
+      }
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; A[k][k] < 0 && i < 3; ++i)
+      for (int j = 0; j < 3; ++j) D[3 * i + j] -= A[k][k] * V[i][k] * V[j][k] * sqrt(C[i] * C[j]);
+}
+
+/* Stress of a point, and its derivative, if the law holds at the fraction theta of the step; returns
+ * whether they are finite. */
+static int answer_at(const points *p, double theta, double *w, double *s)
+{
+  const int d = p->components;
+  w[THETA] = theta, w[GROWTH] = w[DIRECTION] = 0;
+  answer(p, w, s);
+  if (fabs(s[0]) > w[TRACTION]) condense_hinge(p, w, s);
+  for (int a = 0; a < d + d * d; ++a)
+    if (!isfinite(s[a])) return 0;
+  return 1;
+}
+
+/* Store the tangents at the strains of the latest response, which remains.
+ *
+ * The law holds at the end of the step here, and its iteration starts from the state before the
+ * step. If a scheme satisfies the law within the step, stresses at the ends may alternate about the
+ * yield surface. Every second step of flowing material is then elastic, and its tangent is not the
+ * tangent of the motion.
+ */
+void keep_tangents(const points *p)
+{
+  const int d = p->components, width = p->width;
+  points at_end = *p;
+  double s[3 + 9], r[3], *w = p->w, *D = p->committed, *own = p->inputs;
+  at_end.tried = 0;
+  for (int c = 0; c < p->cells; ++c, D += 9) {
+    memset(D, 0, 9 * sizeof *D);
+    for (int k = 0; k < 3; ++k) D[4 * k] = p->rest[k];
+    for (int i = 0; i < p->of_cell; ++i, w += width) {
+      memcpy(own, w, width * sizeof *w);
+      double weight = p->weight[i];
+      if (!answer_at(&at_end, 1, own, s)) {
+        answer_at(p, p->theta, own, s);
+        weight /= p->theta;
+      }
+      add_answer(d, p->B + 3 * d * i, weight, s, r, D);
+    }
+    remove_negative(p->elastic + 3 * c, D);
+  }
+}
+
 /* Accept the end of the step as the new state.
  *
  * `kept` of a section has its resultants (3), the jump of its last point, and the dissipation by
