@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from itertools import zip_longest
 
 import numpy as np
-import scipy  # its subpackages are loaded when they are used
 import ufl
 
 from ufl_beam.arrays import Array, Index

@@ -14,7 +14,6 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-import scipy  # its subpackages are loaded when they are used
 import ufl
 from scipy.sparse import csr_array
 from ufl.algorithms import expand_derivatives
