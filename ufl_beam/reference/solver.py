@@ -159,7 +159,8 @@ class Solver(PresentState):
         self._weights[numbering.rotations] = 1 / self.scene.size
         self._weights[numbering.multipliers] = 0.0
         self._rtol, self._max_iterations, self._petsc = rtol, max_iterations, petsc
-        self._x, self._K = q, np.zeros((numbering.size, numbering.size))
+        self._x = q
+        self._K: Array = np.zeros((numbering.size, numbering.size))
         self._inner: Array = np.zeros(numbering.size)  # inner forces in the latest residual
         self._inner_before: Array = self._inner
         self._error: Exception | None = None
