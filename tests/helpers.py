@@ -21,6 +21,16 @@ def run(scene, scheme=None, t=(0, 1), dt=0.1, **options):
     return ub.simulate(scene, scheme or ub.EnergyMomentum(), t=t, dt=dt, **options)
 
 
+def in_turn(names, others, number=2):
+    """Pairs of each name with a number of the others, which take turns."""
+    others, step = list(others), len(list(others)) // number
+    return [
+        (n, others[(i + k * step) % len(others)])
+        for i, n in enumerate(names)
+        for k in range(number)
+    ]
+
+
 def raises(*parts, kind=ub.ArgumentError):
     """`pytest.raises` for an error whose message has all `parts`, in this order."""
     return pytest.raises(kind, match="(?s)" + ".*".join(map(re.escape, parts)))

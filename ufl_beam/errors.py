@@ -156,10 +156,10 @@ class TradeoffError(RuntimeError):
         runs: All runs so far, as in :attr:`Tradeoff.runs`.
 
     Example:
-        >>> chance = np.random.default_rng(0)
-        >>> noise = {"noise": lambda run: chance.uniform()}
+        >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
+        >>> wanted = {"scheme": ub.Static(), "t": (0, 1), "dt": 0.5, "tolerance": 1e-3}
         >>> try:
-        ...     ub.tradeoff(scene, noise, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=1e-3)
+        ...     ub.tradeoff(scene, tip, **wanted, max_seconds=1e-3)
         ... except ub.TradeoffError as error:
         ...     print(len(error.runs) > 0)
         True

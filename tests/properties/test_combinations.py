@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Combinations of features agree with themselves: 31 of them, and 400 in `make verify`.
+"""Combinations of features agree with themselves: 28 of them, and 400 in `make verify`.
 
 ``python3 tests/properties/combinations.py --from 1000 --number 500`` checks others and prints a
 table, ``--show SEED`` prints the script of one.
@@ -19,8 +19,11 @@ import ufl_beam as ub
 NUMBER = 400
 """Combinations that draw everything."""
 
-FEW = range(30)
-"""Those of them that are checked in `make test`."""
+FEW = (
+    *(3, 7, 12, 15, 18, 27, 35, 45, 66, 70, 81, 85, 111, 129, 139, 180, 222, 238, 242, 246, 253),
+    *(254, 266, 282, 340, 350, 353),
+)
+"""Those of them that are checked in `make test`: they draw every feature, scheme and name."""
 
 RECORDED = {
     "Events", "Extremes", "Fatigue", "Gerber", "Goodman", "History", "HotSpot", "Recorder",
@@ -68,7 +71,7 @@ KNOWN = ("passed", "not applicable", "refused")
 @pytest.mark.serial
 def test_everything_public_is_drawn():
     """A new public name is drawn by a feature, used by a check, or named above with a reason."""
-    drawn = set().union(*(draw(seed).names for seed in range(NUMBER)))
+    drawn = set().union(*(draw(seed).names for seed in FEW))
     others = RECORDED | CALLED | MADE
     others = others.union(*ELSEWHERE.values())
     assert not others - set(ub.__all__), "no public names any more"
@@ -82,7 +85,7 @@ def test_everything_public_is_drawn():
 
 @pytest.mark.serial
 def test_every_feature_and_scheme_is_drawn():
-    combinations = [draw(seed) for seed in range(NUMBER)]
+    combinations = [draw(seed) for seed in FEW]
     assert {one.name for c in combinations for one in c.features} == {f.name for f in FEATURES}
     for scheme in (*STATICS, *DYNAMICS):
         assert any(c.has(f".{scheme}\n", f"= {scheme}\n") for c in combinations), scheme

@@ -39,6 +39,15 @@ MACHINES = [0, 1, 5, 6, 8, 10, 11, *range(14, 21), 22, 23, *range(25, 32), 33, 3
 In those left out steps are cut, or forces have lost the digits that stiff parts take.
 """
 
+FEW = {
+    *(6, 11, 12, 13, 16, 18, 27, 29, 31, 33, 34, 44, 46, 51, 53, 56, 61, 67, 68, 81, 82, 91, 93),
+    *(110, 113, 165),
+}
+"""Scenes of `make test`: they have all that `SEEDS` have, and nine tenths of all pairs of it."""
+
+FEW_MACHINES = {8, 11, 14, 15, 28, 29, 31, 33, 34}
+"""The same of `MACHINES`, with eight tenths of all pairs."""
+
 SAME = 1e-9
 """Difference as a part of the largest motion or force, or of the energy that went through.
 
@@ -120,12 +129,17 @@ def require_same(case):
     assert max(found.values()) < SAME, {k: v for k, v in found.items() if not v < SAME}
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+def some(seeds, few):
+    """Those that are few, and the others for `make verify`."""
+    return [x if x in few else pytest.param(x, marks=pytest.mark.slow) for x in seeds]
+
+
+@pytest.mark.parametrize("seed", some(SEEDS, FEW))
 def test_random_scenes_have_the_results_of_the_reference(seed):
     require_same(made(random_scenes.script(seed), random_scenes.STEPS))
 
 
-@pytest.mark.parametrize("seed", MACHINES)
+@pytest.mark.parametrize("seed", some(MACHINES, FEW_MACHINES))
 def test_random_machines_have_the_results_of_the_reference(seed):
     require_same(made(random_machines.script(seed), random_machines.STEPS))
 
@@ -133,14 +147,15 @@ def test_random_machines_have_the_results_of_the_reference(seed):
 def test_the_scenes_have_everything():
     """The seeds above leave out nothing that hundreds of scenes have."""
 
-    def names(seeds):
-        words = " ".join(random_scenes.script(seed) for seed in seeds).split("ub.")[1:]
+    def names(seeds, of=random_scenes):
+        words = " ".join(of.script(seed) for seed in seeds).split("ub.")[1:]
         return {word.split("(")[0] for word in words}
 
-    assert names(SEEDS) == names(range(200))
+    assert names(FEW) == names(range(200))
+    assert names(FEW_MACHINES, random_machines) == names(MACHINES, random_machines)
 
 
-@pytest.mark.parametrize("seed", SEEDS[:40])
+@pytest.mark.parametrize("seed", sorted(FEW))
 def test_residuals_and_tangents(seed):
     """Somewhere off equilibrium, so that nothing hides behind a converged solution."""
     scene, scheme, (t0, _), dt, mesh = made(random_scenes.script(seed), random_scenes.STEPS)
@@ -168,8 +183,7 @@ def test_residuals_and_tangents(seed):
     (of_solver, K_of_solver), free = solver.response(x), solver.supports.free
     # States of both differ by the tolerance of one step.
     assert difference(r, of_solver) < SAME
-    tangent = K_of_solver.toarray()
-    assert difference(K[np.ix_(free, free)], tangent[np.ix_(free, free)]) < SAME
+    assert difference(K[np.ix_(free, free)], K_of_solver[np.ix_(free, free)]) < SAME
     simulation.close()
 
 
@@ -188,17 +202,20 @@ def dense(A):
 
 
 @pytest.mark.parametrize(
-    "scheme", [ub.EnergyMomentum(0.1), ub.EnergyMomentumDecaying(), ub.GeneralizedAlpha(0.6)]
-)
-@pytest.mark.parametrize("first", [False, True])
+    ("scheme", "first"),
+    [
+        (ub.EnergyMomentum(0.1), True), (ub.EnergyMomentumDecaying(), False),
+        (ub.GeneralizedAlpha(0.6), True), (ub.GeneralizedAlpha(0.6), False),
+    ],
+)  # fmt: skip
 def test_a_run_begins_where_another_one_ends(scheme, first):
     """Of either kind; internal variables and what the scheme keeps go on."""
-    options = {"dt": 2e-3}
+    options = {"dt": 5e-3}
     newton = {one: ub.Newton(rtol=1e-12, reference=one) for one in (False, True)}
     scene = yielding()
     begun = ub.simulate(scene, scheme, t=(0, 0.1), newton=newton[first], **options)
     one, other = (
-        ub.simulate(scene, scheme, t=(0.1, 0.12), newton=newton[by], start=begun, **options)
+        ub.simulate(scene, scheme, t=(0.1, 0.125), newton=newton[by], start=begun, **options)
         for by in (False, True)
     )
     assert max(differences(one, other).values()) < SAME
@@ -376,7 +393,7 @@ def yielding():
 @pytest.fixture(scope="module")
 def case():
     """The scene with everything that yields."""
-    return yielding(), ub.EnergyMomentum(0.1), (0, 0.12), 2e-3, None
+    return yielding(), ub.EnergyMomentum(0.1), (0, 0.12), 8e-3, None
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from helpers import AfterEachStep, law_of, require_reference, require_restart
+from helpers import AfterEachStep, in_turn, law_of, require_reference, require_restart
 from scenes import clamped
 
 import ufl_beam as ub
@@ -111,8 +111,7 @@ run = partial(ub.simulate, t=(0, 0.6), dt=0.02)
 # -- laws of several components ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(("name", "scheme"), in_turn(LAWS, SCHEMES, 3), ids=str)
 def test_tangent_is_the_derivative(name, scheme):
     """Against central differences, in small steps, in large ones, over edges and in none."""
     law, n = LAWS[name], LAWS[name].components
@@ -162,8 +161,7 @@ def test_springs_in_one_law_are_springs(scheme):
     assert found.energy.keys() == expected.energy.keys()
 
 
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(("name", "scheme"), in_turn(LAWS, SCHEMES), ids=str)
 def test_the_reference_finds_the_same(name, scheme):
     _, (connector,), scene = cantilever(LAWS[name])
     require_reference(run, scene, connector, scheme)

@@ -399,8 +399,11 @@ LOG = "import logging; logging.basicConfig(format='log: %(message)s'); "
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("before", ["", "import dolfinx; ", LOG])
-@pytest.mark.parametrize("options", [[], ["-W", "always"]], ids=["", "always"])
+@pytest.mark.parametrize(
+    ("before", "options"),
+    [("", []), ("import dolfinx; ", ["-W", "always"]), (LOG, ["-W", "always"])],
+    ids=["", "always, after dolfinx", "always, after logging"],
+)
 def test_warnings_are_seen(before, options):
     """FFCx 0.9 has all of them logged, which without a handler is nowhere.
 

@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from helpers import (
+    in_turn,
     law_of,
     needs_mpirun,
     on_two_processes,
@@ -195,8 +196,7 @@ def test_small_steps_keep_the_digits_of_the_force():
     np.testing.assert_allclose(history.force[1:], force[1:], rtol=1e-8)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(("name", "scheme"), in_turn(LAWS, SCHEMES), ids=str)
 def test_the_reference_finds_the_same(name, scheme):
     _, (connector,), scene = cantilever(LAWS[name])
     found = require_reference(run, scene, connector, scheme)

@@ -396,7 +396,7 @@ ub.print_once(study["square"].tolist())
 
 @pytest.mark.serial
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
-@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("ranks", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_a_script_under_mpirun(ranks, tmp_path):
     """Its member is defined in the script itself."""
     (tmp_path / "script.py").write_text(SCRIPT)

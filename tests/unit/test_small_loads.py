@@ -93,7 +93,7 @@ def test_a_motion_comes_to_rest():
 
 @pytest.mark.parametrize("force", [1e4, 2.0, 1e-6, 1e-200])
 @pytest.mark.parametrize(
-    "how", [ub.Static(), ub.EnergyMomentumStatic(), ub.LoadControl(0.1)], ids=str
+    "how", [ub.Static(), ub.EnergyMomentumStatic(), ub.LoadControl(0.5)], ids=str
 )
 def test_a_small_load_on_a_post_that_a_spring_holds(force, how):
     """[closed] F (h³/3EI (1 - 1/4n²) + h/GA + h²/k); moments in the middles of n cells bend them.
@@ -109,10 +109,10 @@ def test_a_small_load_on_a_post_that_a_spring_holds(force, how):
         loads=[ub.PointLoad(post.end, force=(force, 0), amplitude=lambda t: t / 20)],
     )
     if isinstance(how, ub.LoadControl):
-        solution = ub.follow(scene, how, steps=200)
+        solution = ub.follow(scene, how, steps=40)
         assert solution.critical == []
     else:
-        solution = ub.simulate(scene, how, t=(0, 20), dt=0.1)
+        solution = ub.simulate(scene, how, t=(0, 20), dt=0.5)
     assert solution.times[-1] == pytest.approx(20.0)
     bending = h**3 / (3 * EI) * (1 - 1 / (4 * 4**2))  # n = 4
     exact = force * (bending + h / GA + h**2 / k)

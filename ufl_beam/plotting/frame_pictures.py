@@ -80,7 +80,7 @@ def plane_canvas(
     high = float(np.clip(8.0 * extent[1] / max(extent[0], 1e-12), 3.2, 6.8))
     size = (9.0, high) if size is None else size
     # A new figure has numbers and words around the axes.
-    space = np.subtract(size, (0.9, 0.9)) if ax is None else style.axes_size(ax) / POINTS
+    space = np.subtract(size, (0.9, 0.9)) if ax is None else style.lay_out(ax) / POINTS
     scale = float(np.max((1.12, 1.20) * extent / space)) / POINTS
     return Canvas.at_scale(solution, magnify, scale, shown), size
 
@@ -342,6 +342,7 @@ def draw_damage_state(
             examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")
             sizes = [axes.plot([], [], **circle(x), label=words)[0] for x, words in examples]
             style.draw_legend(axes, ax, sizes, loc="outside upper left", ncols=3)
+        style.lay_out(axes)
         style.fit_texts(axes)
     return style.parent_figure(axes)
 
@@ -374,7 +375,6 @@ def _fit(axes: Axes, own: bool) -> None:
     if not own:
         return
     figure = style.parent_figure(axes)
-    figure.draw_without_rendering()
     wide, high = 0.0, 0.0
     for legend in figure.legends:
         wide, high = np.divide(legend.get_window_extent().size, figure.dpi)
@@ -389,18 +389,17 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
     """Write labels of peaks; a label that would cover another is omitted, unless it is extreme."""
     from matplotlib.transforms import Affine2D
 
-    figure = style.parent_figure(axes)
-    figure.draw_without_rendering()
+    size = style.lay_out(axes)
     looks: tuple[dict[str, Any], ...] = (
         {"size": font_size(10.0), "weight": "normal"},
         {"size": font_size(13.0), "weight": "bold"},
     )
     halves = [style.half_size(axes, peak.text, **looks[peak.extreme]) for peak in peaks]
-    crowded = 4 * sum(map(np.prod, halves)) > CROWDED * np.prod(style.axes_size(axes))
+    crowded = 4 * sum(map(np.prod, halves)) > CROWDED * np.prod(size)
     chosen = [k for k, peak in enumerate(peaks) if peak.extreme or not crowded]
     if not chosen:
         return []
-    to_points = axes.transData + Affine2D().scale(POINTS / figure.dpi)
+    to_points = axes.transData + Affine2D().scale(POINTS / style.parent_figure(axes).dpi)
     labels = []
     for k in chosen:
         # Directions to try: first perpendicular to the axis, then more and more to the side.

@@ -79,7 +79,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
             above = max([first, *(2 * measure(words)[0] for words in notes)])
             least[0] = min(max(least[0], above), most[0])
         else:
-            least = most = style.axes_size(axes)
+            least = most = style.lay_out(axes)
         drawing, placed, frame = _planned(subject, measure, least, most)
         _fit(axes, drawing.scale, frame, len(notes) if ax is None else None)
         draw_strokes(axes, drawing.strokes)

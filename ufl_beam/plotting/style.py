@@ -250,9 +250,10 @@ def draw_bar(axes: Axes, colors: Any, label: str) -> None:
 
 
 def fit_texts(axes: Axes) -> None:
-    """Extend the limits so that texts are inside and data are above a legend at the bottom."""
-    figure = parent_figure(axes)
-    figure.draw_without_rendering()
+    """Extend the limits so that texts are inside and data are above a legend at the bottom.
+
+    Texts have the places that they had when :func:`lay_out` was called.
+    """
     for text in axes.texts:
         box = text.get_window_extent().get_points()
         axes.update_datalim(axes.transData.inverted().transform(box))
@@ -263,10 +264,16 @@ def fit_texts(axes: Axes) -> None:
     axes.autoscale_view()
 
 
-def axes_size(axes: Axes) -> Array:
-    """Measure the present width and height of axes; (2,); points."""
+def lay_out(axes: Axes) -> Array:
+    """Compute the place of axes in their figure; return their width and height; (2,); points.
+
+    This takes half the time of drawing the figure.
+    """
     figure = parent_figure(axes)
-    figure.draw_without_rendering()
+    if engine := figure.get_layout_engine():
+        engine.execute(figure)
+    locator: Any = axes.get_axes_locator()
+    axes.apply_aspect(locator and locator(axes, None))
     return np.multiply(axes.get_window_extent().size, POINTS / figure.dpi)
 
 

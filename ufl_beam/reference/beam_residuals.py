@@ -8,9 +8,7 @@ from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 
 import numpy as np
-import scipy  # its subpackages are loaded when they are used
 import ufl
-from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
@@ -221,7 +219,7 @@ class Mass:
         form, diagonal = mass_form(cells.element), np.zeros(numbering.size)
         for dofs, mass, inertia in point_masses(numbering):
             np.add.at(diagonal, dofs, [mass, mass, inertia])
-        self.matrix = cells.form(form).assembled() + csr_array(scipy.sparse.diags_array(diagonal))
+        self.matrix = cells.form(form).assembled() + np.diag(diagonal)
         self._beam_form = cells.form(ufl.action(form, cells.element.q1))
 
     def on_nodes(self, v: Array) -> Array:
@@ -241,7 +239,7 @@ class MatrixForce(Force):
     row: str
     inertia: Inertia
 
-    def __init__(self, setting: Setting, scheme: DynamicScheme, matrix: csr_array) -> None:
+    def __init__(self, setting: Setting, scheme: DynamicScheme, matrix: Array) -> None:
         self.size, self.scheme, self.matrix = setting.numbering.size, scheme, matrix
         self.ledger, self._rotations = setting.ledger, setting.numbering.rotations.astype(np.int32)
 
@@ -256,8 +254,7 @@ class MatrixForce(Force):
         )
         self.rate, slope = combined(row, s, before), np.full(self.size, row[0])
         slope[turned] /= np.cos((q1 - step.q0)[turned] / 2) ** 2
-        K = csr_array(self.matrix @ scipy.sparse.diags_array(slope))
-        return np.asarray(self.matrix @ self.rate), K
+        return np.asarray(self.matrix @ self.rate), self.matrix * slope
 
 
 class Inertia(MatrixForce):
@@ -324,7 +321,7 @@ class RayleighForce(MatrixForce):
         K = virtual_work(resultants(e, element.stiffness), w_e) * element.dx(1)
         self._stiffness = cells.form(ufl.action(K, element.q1))
         matrix = damping.mass * inertia.matrix + damping.stiffness * cells.form(K).assembled()
-        super().__init__(setting, inertia.scheme, csr_array(matrix))
+        super().__init__(setting, inertia.scheme, matrix)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Enter the energy lost by damping in the ledger."""

@@ -14,7 +14,6 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-import scipy  # its subpackages are loaded when they are used
 import ufl
 from scipy.sparse import csr_array
 from ufl.algorithms import expand_derivatives
@@ -30,7 +29,7 @@ from ufl_beam.model.connectors import Connector
 
 T = TypeVar("T", bound=Array | None)
 
-Response = tuple[Array, csr_array]
+Response = tuple[Array, Array]
 """Forces, and their derivatives with respect to the configuration."""
 
 Entry = tuple[ufl.Form, str]
@@ -124,7 +123,7 @@ class Force:
 
     def response(self, step: Step, q1: Array) -> Response:
         """Return nodal forces in a step to ``q1``, and their derivative; (size,), (size, size)."""
-        return np.zeros(self.size), csr_array((self.size, self.size))
+        return np.zeros(self.size), np.zeros((self.size, self.size))
 
     def change(self, step: Step, q1: Array) -> float:
         """Return the energy that inner forces store and dissipate in the step to ``q1``; J.
@@ -177,8 +176,8 @@ class Form:
         if self._form.rank == 1:
             return np.array(fem.assemble_vector(self._form).array)
         self._matrix.set_value(0.0)
-        K = csr_array(fem.assemble_matrix(self._matrix, self._form).to_scipy())
-        return csr_array(self._joins.T @ K @ self._joins)
+        K = fem.assemble_matrix(self._matrix, self._form).to_dense()
+        return np.asarray(self._joins.T @ K @ self._joins)
 
     def joined(self, values: Array) -> Array:
         """Add up ``values`` of :meth:`assembled` at degrees of freedom of the scene; (size,)."""
@@ -245,14 +244,17 @@ class Cells:
         function.x.array[:] = q[self.at]
 
     @cached_property
-    def _strains(self) -> Form:
-        return self.form(self.element.sampled(strain(self.element.q1, self.element.axis)))
+    def _strains(self) -> tuple[Form, Index]:
+        """Form of the strains, and the indices of the strains of each cell in its values."""
+        element = self.element
+        form = self.form(element.sampled(strain(element.q1, element.axis)))
+        return form, cell_dofs(element.at_points(3).function_space)
 
     def strains(self, q: Array) -> Array:
         """Return strains (Σ, Γ, K) at quadrature points; (num_cells, points, 3); 1, 1, 1/m."""
         self.set(self.element.q1, q)
-        space = self.element.at_points(3).function_space
-        weighted = self._strains.assembled()[cell_dofs(space)]
+        form, dofs = self._strains
+        weighted = form.assembled()[dofs]
         strains = weighted.reshape(len(self.cell_indices), -1, 3) / self.weights.reshape(-1, 1)
         return np.asarray(strains)
 
@@ -323,7 +325,7 @@ class CellForce(Force):
         self.cells.set(self.element.q1, q1)
         forces = self.work.assembled()
         self.on_nodes = self.cells.on_nodes(self._kind, forces)
-        none = csr_array((self.size, self.size))
+        none = np.zeros((self.size, self.size))
         K = none if self._derivative is None else self._derivative.assembled()
         return self.work.joined(forces), K
 
@@ -358,7 +360,8 @@ def point_masses(numbering: DofNumbering) -> list[tuple[Index, float, float]]:
     return masses + bodies
 
 
-def coupled(size: int, rows: Index, columns: Index, values: Array) -> csr_array:
+def coupled(size: int, rows: Index, columns: Index, values: Array) -> Array:
     """Return the matrix of the scene with given entries; duplicates are added."""
-    triplets = np.ravel(values), (np.ravel(rows), np.ravel(columns))
-    return csr_array(scipy.sparse.coo_array(triplets, (size, size)))
+    K = np.zeros((size, size))
+    np.add.at(K, (np.ravel(rows), np.ravel(columns)), np.ravel(values))
+    return K

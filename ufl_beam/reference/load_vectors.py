@@ -86,7 +86,7 @@ class LoadForce(Force, ABC):
         self.factor, self._end = self._reached + step.at * growth, self._reached + growth
         forces, slope = self.forces(self.place(step, q1))
         self.force, self.on_nodes = self.factor * forces, self.factor * self.along
-        return -self.force, csr_array(-self.factor * self.scheme.load_weight * slope)
+        return -self.force, -self.factor * self.scheme.load_weight * slope
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Enter the work of the load on the nodal step in the ledger."""
@@ -138,7 +138,7 @@ class DeadLoad(LoadForce):
 
     def forces(self, q: Array) -> Response:
         """Return the consistent nodal forces, and their derivative, which is zero."""
-        return self._vector, csr_array((self.size, self.size))
+        return self._vector, np.zeros((self.size, self.size))
 
 
 class Follower(LoadForce):
@@ -182,9 +182,8 @@ class PressureForce(LoadForce):
         self._cells, self._matrices = cells, forces
         dofs = numbering.dofs[nodes][:, :, :2].transpose(0, 2, 1).reshape(len(cells), -1)
         self._places = numbering.points[nodes].transpose(0, 2, 1).reshape(dofs.shape)
-        self._dofs, rows = dofs, np.repeat(dofs, dofs.shape[1], axis=1).ravel()
-        columns = np.tile(dofs, dofs.shape[1]).ravel()
-        self._slope = csr_array((forces.ravel(), (rows, columns)), shape=(self.size, self.size))
+        self._dofs, rows = dofs, np.repeat(dofs, dofs.shape[1], axis=1)
+        self._slope = coupled(self.size, rows, np.tile(dofs, dofs.shape[1]), forces)
 
     def forces(self, q: Array) -> Response:
         """Return the nodal forces, which are linear in the positions of the nodes."""
@@ -260,9 +259,9 @@ class MovingForce(LoadForce):
         )
         return (after - before) / step.dt, (after - 2 * now + before) / half**2
 
-    def _mass_forces(self, step: Step, q1: Array) -> tuple[Array, Array, csr_array]:
+    def _mass_forces(self, step: Step, q1: Array) -> tuple[Array, Array, Array]:
         """Return nodal forces of the mass, :attr:`on_nodes`, and the derivative of the forces."""
-        inertia, at, slope = self._inertia, self._at(step.load_time), csr_array((self.size,) * 2)
+        inertia, at, slope = self._inertia, self._at(step.load_time), np.zeros((self.size,) * 2)
         if inertia is None or at is None:
             return *self._on_cell(step.load_time, np.zeros(2)), slope
         cell, dofs, shapes, slopes = at
@@ -283,10 +282,8 @@ class MovingForce(LoadForce):
                 (dofs[k], -self._moving.mass * c_a * shapes),
                 (dofs[2], by_ψ[k]),
             ):
-                values = np.outer(shapes, row_values)
-                pairs = (np.repeat(dofs[k], len(shapes)), np.tile(column, len(shapes)))
-                slope = slope + csr_array((values.ravel(), pairs), shape=slope.shape)
-        return *self._on_cell(step.load_time, force), csr_array(slope)
+                slope[np.ix_(dofs[k], column)] += np.outer(shapes, row_values)
+        return *self._on_cell(step.load_time, force), slope
 
     def _kinetic(self, t: float, q: Array, v: Array) -> float:
         """Return the kinetic energy of the mass, zero outside of the beam."""
@@ -302,7 +299,7 @@ class MovingForce(LoadForce):
 
     def forces(self, q: Array) -> Response:
         """Return the forces of the latest step, and their derivative, which is zero."""
-        return self.force, csr_array((self.size, self.size))
+        return self.force, np.zeros((self.size, self.size))
 
     def response(self, step: Step, q1: Array) -> Response:
         """Return minus the forces, and their derivative, which is zero."""
@@ -313,7 +310,7 @@ class MovingForce(LoadForce):
         self.force, self.on_nodes = (a + step.at * step.fraction * (b - a) for a, b in pairs)
         force, on_nodes, slope = self._mass_forces(step, q1)
         self.force, self.on_nodes = self.force + force, self.on_nodes + on_nodes
-        return -self.force, csr_array(-slope)
+        return -self.force, -slope
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Enter the work of the load, and of the drive of the mass, in the ledger."""
@@ -357,7 +354,7 @@ class FrameForce(LoadForce):
         self._double = 2 * self._Ω * has_inertia(setting.scheme)
         self._translational: Array = np.ones(numbering.size)
         self._translational[numbering.rotations] = 0.0
-        self._pull = csr_array(mass.matrix.multiply(self._Ω**2 * self._translational[:, None]))
+        self._pull = mass.matrix * (self._Ω**2 * self._translational[:, None])
         nodes = np.concatenate([numbering.dofs_of_bodies, numbering.dofs])
         self._pairs = np.unique(nodes[:, :2], axis=0)  # degrees of freedom u, v of the nodes
         # G: mass times a rotation by 90°.  The Coriolis forces are -2 Ω G v.
@@ -368,7 +365,7 @@ class FrameForce(LoadForce):
             G = G + coupled(
                 numbering.size, np.array([i, j]), np.array([j, i]), m * np.array([-1, 1])
             )
-        self._gyro = csr_array(self._double * G)
+        self._gyro = self._double * G
         centers = np.array([body.center for body in numbering.scene.rigid_bodies]).reshape(-1, 2)
         self._places: Array = np.zeros(numbering.size)  # positions from the centre of rotation
         self._places[nodes[:, :2]] = np.concatenate([centers, numbering.points]) - frame.about
@@ -381,7 +378,7 @@ class FrameForce(LoadForce):
         """Return minus the forces, and the derivative; Coriolis forces use mean velocities."""
         r, K = super().response(step, q1)
         coriolis = self._gyro @ (q1 - step.q0) / step.dt
-        return np.asarray(r + coriolis), csr_array(K + self._gyro / step.dt)
+        return np.asarray(r + coriolis), K + self._gyro / step.dt
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Enter the work, and store forces on cells from the accelerations of the frame."""

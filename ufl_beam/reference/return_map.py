@@ -46,15 +46,15 @@ def derivative(f: Callable[[Values], Values], x: Array) -> tuple[Array, Array]:
 
 
 def jacobian(
-    f: Callable[[At], Array], at: Mapping[str, Values], by: Sequence[str]
+    f: Callable[[At], Sequence[Values]], at: Mapping[str, Values], by: Sequence[str]
 ) -> tuple[Array, Array]:
     """Return values of functions, and derivatives by the k inputs ``by``; (n, ...), (n, k, ...)."""
-
-    def column(name: str) -> tuple[Array, Array]:
-        return derivative(lambda x: f({**at, name: x}), at[name])
-
-    columns = [column(name) for name in by]
-    return columns[0][0], np.stack([slope for _, slope in columns], axis=1)
+    k, shape = len(by), np.shape(at[by[0]])
+    # One call for all inputs: the first axis of an input is that of the k derivatives.
+    steps = 1j * IMAGINARY * np.eye(k).reshape(k, k, *np.ones_like(shape))
+    values = f({**at, **{name: at[name] + step for name, step in zip(by, steps, strict=True)}})
+    y = np.array([np.broadcast_to(value, (k, *shape)) for value in values])
+    return np.real(y[:, 0]).copy(), np.imag(y) / IMAGINARY
 
 
 def solved(A: Array, b: Array) -> Array:
@@ -187,17 +187,12 @@ class MaterialPoints:
 
     def _bulk(self, at: At) -> tuple[Array, Array]:
         """Return bulk stresses at t_n+θ, and slopes by strain; (d, cells, n), (d, d, cells, n)."""
-
-        def stress(at: At) -> Array:
-            return self._array(self._equations.stress(at))
-
+        stress, d, names = self._equations.stress, len(self._e), (*self._e, *self._z1)
         if not self._law.solves:
             return jacobian(stress, at, self._e)
         self._solve(at)
-        σ, by_strains = jacobian(stress, at, self._e)
-        _, by_unknown = jacobian(stress, at, self._z1)
-        J, E = (jacobian(self._residuals, at, names)[1] for names in (self._z1, self._e))
-        return σ, by_strains - np.einsum("aj...,jb...->ab...", by_unknown, solved(J, E))
+        (σ, S), (_, R) = (jacobian(f, at, names) for f in (stress, self._equations.residuals))
+        return σ, S[:, :d] - np.einsum("aj...,jb...->ab...", S[:, d:], solved(R[:, d:], R[:, :d]))
 
     def _residuals(self, at: At) -> Array:
         """Return residuals of the variables that a law solves for; (m, cells, n)."""
@@ -208,9 +203,10 @@ class MaterialPoints:
         for name, old in zip(self._z1, self._z, strict=True):
             at[name][:] = at[old]
         ε, done = np.array([at[name] for name in self._e]), np.zeros(at["length"].shape, bool)
+        equations, d, names = self._equations.residuals, len(self._e), (*self._e, *self._z1)
         for _ in range(CORRECTIONS + 1):
-            R, J = jacobian(self._residuals, at, self._z1)
-            _, E = jacobian(self._residuals, at, self._e)
+            R, slopes = jacobian(equations, at, names)
+            E, J = slopes[:, :d], slopes[:, d:]
             z, δ = np.array([at[name] for name in self._z1]), solved(J, R[:, None])[:, 0]
             # Sizes of the terms of each equation, and their round-off
             by_z, by_δ = (np.einsum("ij...,j...->i...", abs(J), abs(x)) for x in (z, δ))
@@ -317,10 +313,7 @@ class MaterialPoints:
         if not self._law.must_dissipate:
             return
 
-        def stored(at: At) -> Array:
-            return self._array([self._equations.stored(at)])
-
-        _, slopes = jacobian(stored, self.at, self._z1)
+        _, slopes = jacobian(lambda at: [self._equations.stored(at)], self.at, self._z1)
         own, size = self._equations.own_dissipation(self.at, tuple(slopes[0]))
         ratio = np.nan_to_num(own / size)
         worst = int(np.argmin(ratio))

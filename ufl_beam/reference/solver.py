@@ -159,7 +159,8 @@ class Solver(PresentState):
         self._weights[numbering.rotations] = 1 / self.scene.size
         self._weights[numbering.multipliers] = 0.0
         self._rtol, self._max_iterations, self._petsc = rtol, max_iterations, petsc
-        self._x, self._K = q, csr_array((numbering.size, numbering.size))
+        self._x = q
+        self._K: Array = np.zeros((numbering.size, numbering.size))
         self._inner: Array = np.zeros(numbering.size)  # inner forces in the latest residual
         self._inner_before: Array = self._inner
         self._error: Exception | None = None
@@ -401,8 +402,8 @@ class Solver(PresentState):
         self._inner = sum((r for r, _ in responses[:n]), none)
         r = np.asarray(axes @ sum((r for r, _ in responses[n:]), self._inner))
         self.supports.store_reactions(r)
-        K = sum((K for _, K in responses), csr_array((len(x), len(x))))
-        return r, csr_array(axes @ K @ axes.T)
+        K = sum((K for _, K in responses), np.zeros((len(x), len(x))))
+        return r, np.asarray(axes @ K @ axes.T)
 
     # -- Newton's method -------------------------------------------------------------------------
 
@@ -484,7 +485,7 @@ class Solver(PresentState):
 
     def _jacobian(self, snes: PETSc.SNES, vector: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         """Set the derivative with respect to the free degrees of freedom."""
-        K = csr_array(self._K[self.supports.free][:, self.supports.free])
+        K = csr_array(self._K[np.ix_(self.supports.free, self.supports.free)])
         if not np.isfinite(K.data).all():
             self._error = self._error or StepFailed("the tangent has entries that are no numbers")
             K.data[:] = 0.0
