@@ -203,7 +203,7 @@ def test_a_hinge_that_has_failed_returns_to_its_initial_rotation(law, reference)
     """The prescribed motion is zero again and no moment is left, so all forces are round-off.
 
     Their size is the largest stiffness, EA of a cell of 0.5 m, times the round-off of motions.
-    The moment of the spring falls as exp(-100 slip): limit/energy = 100 per rad, the slip is at least 0.3.
+    The moment of the spring falls as exp(-100 slip), limit over energy; the slip is above 0.3.
     """
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e6, GA=1e6, EI=1e5), cells=2)
     turn = ub.Turn(ub.ground(0, 0), beam.start, law)
