@@ -196,22 +196,23 @@ BROKEN = ub.Spring(K, softening=ub.Softening(10.0, 0.1))
 """10²/1e4/2 = 0.005 J are stored at the limit, less than the fracture energy of 0.1 J."""
 
 
-@pytest.mark.parametrize("reference", [False, True])
-@pytest.mark.parametrize("law", [LAW, PINCHED, BROKEN], ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize(
+    ("law", "reference"), [(LAW, False), (PINCHED, False), (BROKEN, False), (LAW, True)]
+)
 def test_a_hinge_that_has_failed_returns_to_its_initial_rotation(law, reference):
     """The prescribed motion is zero again and no moment is left, so all forces are round-off.
 
     Their size is the largest stiffness, EA of a cell of 0.5 m, times the round-off of motions.
-    The moment of the spring falls as exp(-100 slip): limit/energy = 100 per rad, the slip is 0.8.
+    The moment of the spring falls as exp(-100 slip), limit over energy; the slip is above 0.3.
     """
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e6, GA=1e6, EI=1e5), cells=2)
     turn = ub.Turn(ub.ground(0, 0), beam.start, law)
-    drive = ub.Table([0, 1, 2, 3, 4], [0, 0.4, 0, -0.4, 0])
+    drive = ub.Table([0, 1, 2], [0, 0.4, 0])
     move = ub.PrescribedDisplacement(beam.end, v=drive)
     scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), move], connectors=[turn])
     newton = ub.Newton(reference=reference)
-    run = ub.simulate(scene, ub.Static(), t=(0, 4), dt=0.1, newton=newton)
-    left = 10.0 * math.exp(-80.0) if law is BROKEN else 0.0
+    run = ub.simulate(scene, ub.Static(), t=(0, 2), dt=0.25, newton=newton)
+    left = 10.0 * math.exp(-30.0) if law is BROKEN else 0.0
     assert abs(run.connector(turn).force[-1]) <= left + 8 * 2e6 * np.spacing(0.4)
     assert run.displacement(beam.end)[-1, 1] == 0.0
 
