@@ -6,6 +6,7 @@ than it should.  Arguments select models by parts of their names, and only print
 """
 
 import sys
+from pathlib import Path
 
 sys.path.insert(1, str(Path(__file__).parents[1]))  # of the module records
 

@@ -299,8 +299,8 @@ class MovingLoad(Load):
     and n are tangent and normal of the cross-section.  The kinetic energy of the mass on the beam
     is part of "kinetic" in the ledger; "loads" contains the energy that the drive of the mass
     supplies, and with which the mass enters and leaves.  ``Gravity`` does not weigh this mass:
-    ``force`` contains its weight.  Analyses of modes ignore it.  For the kinetic energy the speed is
-    a difference of positions over 1e-5 s.  A mass that is exactly at a node at the time of an
+    ``force`` contains its weight.  Analyses of modes ignore it.  For the kinetic energy the speed
+    is a difference of positions over 1e-5 s.  A mass that is exactly at a node at the time of an
     equation belongs to one of both cells, and round-off decides to which; a curved axis has a kink
     at the node, so that two runs with the same data may differ by the error of the mesh.
 

@@ -374,7 +374,7 @@ class TangentRayleighForce(MatrixForce):
             put(self._D, self._sections)
             self._cells.set(self._cells.element.q0, step.q0)
             K = self._damping.stiffness * self._stiffness.assembled()
-            self.matrix = csr_array(self._damping.mass * self.inertia.matrix + K)
+            self.matrix = self._damping.mass * self.inertia.matrix + K
         return super().response(step, q1)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:

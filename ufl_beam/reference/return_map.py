@@ -249,10 +249,7 @@ class MaterialPoints:
         }
         at["theta"] = np.ones_like(at["theta"])
 
-        def stress(at: At) -> Array:
-            return self._array(self._equations.elastic_stress(at))
-
-        return self._of_sections(jacobian(stress, at, self._e)[1], 1.0)
+        return self._of_sections(jacobian(self._equations.elastic_stress, at, self._e)[1], 1.0)
 
     def _of_sections(self, slope: Array, θ: float) -> Array:
         """Return derivatives of (N, V, M) from derivatives of stresses, (d, d, cells, n)."""
