@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Models that fail elsewhere, run to the end or to the mechanism.
+"""Models that are hard to converge, run to the end or to the mechanism.
 
 Run by ``make collection``.  Writes ``docs/collection.md``; fails if a model ends in another way
 than it should.  Arguments select models by parts of their names, and only print.

@@ -134,7 +134,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Model:
-    """A model that fails elsewhere.
+    """A model that is hard to converge.
 
     Attributes:
         name: Title.

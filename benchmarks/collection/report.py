@@ -57,8 +57,9 @@ def save(rows: list[dict]) -> None:
     """Write docs/collection.md."""
     here = machine()
     count = {v: sum(r["verdict"] == v for r in rows) for v in ("end", "stops", "FAILS", "WRONG")}
+    stopped_there = [r["name"] for r in rows if "fails" in in_opensees(r)[0]]
     lines = [
-        "# Models that fail elsewhere",
+        "# Models that are hard to converge",
         "",
         "Written by `make collection`; do not edit. The models are of the kinds that users of "
         "other programs report as failures to converge: issues",
@@ -73,7 +74,8 @@ def save(rows: list[dict]) -> None:
         "",
         f"Of {len(rows)} models {count['end']} reach the end, {count['stops']} stop at a limit "
         f"load with a message that names hinges or cells of the mechanism, {count['FAILS']} fail, "
-        f"{count['WRONG']} disagree with their confirmation.",
+        f"{count['WRONG']} disagree with their confirmation. OpenSees, with the fallbacks below, "
+        f"stops before the end in {len(stopped_there)} of them: {', '.join(stopped_there)}.",
         "",
         "Each model runs twice, with its step and with a quarter of it; *cut steps* are the steps "
         "that were divided into substeps in both runs. A model that",
@@ -108,7 +110,7 @@ def save(rows: list[dict]) -> None:
     ]
     lines += [
         "",
-        "## Why they fail elsewhere",
+        "## Why they are hard",
         "",
         "| model | reason | compared |",
         "|---|---|---|",
