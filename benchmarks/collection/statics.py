@@ -83,14 +83,14 @@ def frame(storeys, bays, section, ends=None, *, height=3.5, bay=6.0, cells=(2, 2
 
     columns = {
         (i, k): member(
-            (bay * i, height * k), (bay * i, height * (k + 1)), cells[0], f"column {i}, storey {k}"
+            (bay * i, height * k), (bay * i, height * (k + 1)), cells[0], f"column {i}-{k}"
         )
         for i in range(bays + 1)
         for k in range(storeys)
     }
     girders = {
         (i, k): member(
-            columns[i, k].ends[1], columns[i + 1, k].ends[1], cells[1], f"girder {i}, storey {k}"
+            columns[i, k].ends[1], columns[i + 1, k].ends[1], cells[1], f"girder {i}-{k}"
         )
         for i in range(bays)
         for k in range(storeys)
@@ -235,7 +235,7 @@ def two_storeys_limit(solution):
     stops=(
         "a limit load",
         # five of the six hinges that turn in the linear program; the last one has not yielded yet
-        *(f"Hinge(column {end}" for end in ("00.st", "10.st", "20.st", "10.end", "20.end")),
+        *(f"Hinge(column {end}" for end in ("0-0.st", "1-0.st", "2-0.st", "1-0.end", "2-0.end")),
     ),
     limit=two_storeys_limit,
     tolerance=0.02,  # the sway stiffness of the last elastic members is below that of the weight
