@@ -164,7 +164,7 @@ def test_springs_in_one_law_are_springs(scheme):
 @pytest.mark.parametrize(("name", "scheme"), in_turn(LAWS, SCHEMES), ids=str)
 def test_the_reference_finds_the_same(name, scheme):
     _, (connector,), scene = cantilever(LAWS[name])
-    require_reference(run, scene, connector, scheme)
+    require_reference(run, scene, connector, scheme, dt=0.04)
 
 
 @pytest.mark.parametrize(

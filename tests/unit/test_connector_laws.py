@@ -199,7 +199,7 @@ def test_small_steps_keep_the_digits_of_the_force():
 @pytest.mark.parametrize(("name", "scheme"), in_turn(LAWS, SCHEMES), ids=str)
 def test_the_reference_finds_the_same(name, scheme):
     _, (connector,), scene = cantilever(LAWS[name])
-    found = require_reference(run, scene, connector, scheme)
+    found = require_reference(run, scene, connector, scheme, dt=0.04)
     mine = found.connector(connector)
     lost = found.energy.lost.get(LAWS[name].entry, 0.0)
     np.testing.assert_allclose(lost, mine.dissipated, rtol=0, atol=1e-15)
