@@ -52,7 +52,7 @@ ACCELERATIONS = {
         (
             "compiled/simd_kernels.py", "compiled/c/assembly_simd.c", "compiled/c/assembly_simd.h",
             "discretization/compiled_forms.py~several|BATCH|batch_size",
-            "discretization/function_spaces.py:Fields._coordinates_in_lanes",
+            "discretization/function_spaces.py:Fields._batched_coordinates",
         ),
     ),
     "elimination along beams": Acceleration(

@@ -64,8 +64,8 @@ def state_of(simulation):
     elimination = simulation.solver._factors._elimination.c
     return {
         "newton": simulation.solver._snes.getType(),
-        "SIMD": simulation.beams[0]._force.cells.lanes > 1,
-        "two ends": elimination.chains == 2,
+        "SIMD": simulation.beams[0]._force.cells.batch_size > 1,
+        "two ends": elimination.count == 2,
         "no chains": elimination.left_size == len(simulation.q),
         "fronts": bool(simulation.equation.c.fronts),
         "second order": bool(simulation.prediction.c.second),

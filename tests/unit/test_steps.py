@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from helpers import require_reference, run
 from scenes import SECTION, clamped, rigid_chain
 
 import ufl_beam as ub
@@ -239,6 +240,24 @@ def test_no_leap_beyond_a_limit_load():
     with pytest.raises(ub.ConvergenceError) as caught:
         simulation.step_to(1.0)
     assert 1.5 * caught.value.solution.times[-1] == pytest.approx(1.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("dt", [0.1, 0.03, 1 / 30, 0.007])
+def test_the_first_contact_in_statics_is_no_leap(dt):
+    """A lever of 2 m on a pin moves freely, until its middle, at half the motion, meets a stop.
+
+    Before the contact there is no energy in the scene to which the energy of the contact is small.
+    The force at the end holds half of the contact force.
+    """
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
+    end = ub.PrescribedDisplacement(beam.end, v=lambda t: 0.02 * t)
+    k, middle = 1e5, beam.at(0.5)
+    stop = ub.Slide(ub.ground(1, 0), middle, ub.Stop(k, high=5e-4), axis=(0, 1))
+    scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), end], connectors=[stop])
+    solution = require_reference(run, scene, stop, ub.Static(), t=(0, 0.3), dt=dt)
+    force = solution.connector(stop).force[-1]
+    assert force == pytest.approx(k * (solution.displacement(middle)[-1, 1] - 5e-4), rel=1e-9)
+    assert solution.reaction(end)[-1, 1] == pytest.approx(force / 2, rel=1e-5)
 
 
 @pytest.mark.parametrize("make", [elastic, inelastic, connected, jointed, driven])

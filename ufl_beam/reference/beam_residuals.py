@@ -369,8 +369,8 @@ class TangentRayleighForce(MatrixForce):
         if step is not self._step:
             self._step = step
             for beams, tangents in zip(self._yielding, self._tangents, strict=True):
-                there = self._position[beams.cells.cell_indices]
-                self._sections[there] = tangents.reshape(len(there), -1, 3, 3)
+                cells = self._position[beams.cells.cell_indices]
+                self._sections[cells] = tangents.reshape(len(cells), -1, 3, 3)
             put(self._D, self._sections)
             self._cells.set(self._cells.element.q0, step.q0)
             K = self._damping.stiffness * self._stiffness.assembled()

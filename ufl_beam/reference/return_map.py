@@ -230,12 +230,12 @@ class MaterialPoints:
 
     def _end_tangents(self) -> Array:
         """Return :attr:`end_tangents` of the latest response."""
-        kept = self.at, self.r, self.D, self.excess, self._search
+        state = self.at, self.r, self.D, self.excess, self._search
         self.at, self._search = {name: x.copy() for name, x in self.at.items()}, Search()
         self.at["theta"][:] = 1.0
         self.return_map(self.strains, self.at["dt"][0, 0])
         D = self.D
-        self.at, self.r, self.D, self.excess, self._search = kept
+        self.at, self.r, self.D, self.excess, self._search = state
         return np.where(
             np.isfinite(D).all(axis=(1, 2), keepdims=True), D, self.D / self._scheme.theta
         )

@@ -111,6 +111,7 @@ class Solver(PresentState):
         )
         self.t, self.q, self.q_before, self.last_dt = t, q, q, math.inf
         self.substeps = self.iterations = 0
+        self._rejected = 0.0  # energy of the first attempt of a step that leapt; J
         controlled = [
             connector
             for connector in scene.all_connectors
@@ -248,6 +249,7 @@ class Solver(PresentState):
     def _in_substeps(self, t1: float, attempt: Callable[[float], None]) -> None:
         """Go to ``t1`` at once, or in substeps: halves, quarters, and so on."""
         t0, done, substep = self.t, 0, MOST_SUBSTEPS
+        self._rejected = 0.0
         while done < MOST_SUBSTEPS:
             last = done + substep == MOST_SUBSTEPS
             try:
@@ -329,10 +331,12 @@ class Solver(PresentState):
         size += sum(float(np.abs(group.taken(q1)).sum()) for group in self._groups)
         size += sum((abs(beam.work_on_imposed()) for beam in self.beams), 0.0)
         energies = (abs(x) for account in vars(self.ledger).values() for x in account.values())
-        slack = self.scheme.slack * size + KINK_WORK * sum(energies) + sys.float_info.min
+        slack = self.scheme.slack * size + sys.float_info.min
+        slack += KINK_WORK * (sum(energies) + self._rejected)
         slack += float(self._round_off(self.supports.axes @ q1) @ np.abs(s))
         change = in_beams + in_connectors
         if abs(work - change) > slack:
+            self._rejected = self._rejected or size
             raise StepFailed(
                 f"the step stores and dissipates {change:.3e} J, but the forces along it do "
                 f"{work:.3e} J of work: it leaps to another branch of equilibria"

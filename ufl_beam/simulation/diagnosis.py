@@ -174,8 +174,8 @@ def _probe_state(equation: StepEquation, q0: Array, q1: Array) -> Array:
     far = subdomain.largest(float(np.abs(change * scales).max(initial=0.0)))
     if not 0 < far < np.inf:
         return q0
-    part = PROBE_DISTANCE / far
-    return np.asarray(q0 + np.where(scales > 0, part, min(1.0, part)) * change)
+    factor = PROBE_DISTANCE / far
+    return np.asarray(q0 + np.where(scales > 0, factor, min(1.0, factor)) * change)
 
 
 def _singularity(equation: StepEquation, q: Array) -> str:

@@ -422,7 +422,8 @@ LARGEST_MOTION = 1e3
 """Largest motion of a node in a step without a mechanism; in sizes of the scene, or rad."""
 
 KINK_IMBALANCE = 1e-6
-"""Imbalance of work that a kink of a law may cause, as a fraction of the energy transferred."""
+"""Imbalance of work that a kink of a law may cause, as a fraction of the energy transferred so far,
+or of the energy of the step before it was divided."""
 
 
 class StaticPath:

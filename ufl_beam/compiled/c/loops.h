@@ -1000,6 +1000,7 @@ typedef struct {
   double *const *account;
   const int32_t *entries;
   double moves, work, stored; /* largest motion, in the unit of `far`; J */
+  double rejected; /* energy of the first attempt to go to the end of a step that leapt, else zero; J */
 } static_path;
 
 /* Places that open beyond a limit: points of cells or of springs, rigid-plastic connectors, or

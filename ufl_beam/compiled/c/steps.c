@@ -241,7 +241,11 @@ static int followed(time_loop *m)
    * processes. */
   const double size = fabs(p->work) + fabs(of[BEAMS]) + of[EFFORT];
   const double slack = p->slack * size + of[ROUND_OFF] + DBL_MIN;
-  if (fabs(p->work - p->stored) <= slack + p->kink * of[THROUGH]) return 1;
+  /* A contact that closes shortly before the end of a step has a force at the end, but little energy.
+   * In shorter steps that energy vanishes with the square of the step, and the energy of a leap does
+   * not. */
+  if (fabs(p->work - p->stored) <= slack + p->kink * (of[THROUGH] + p->rejected)) return 1;
+  if (p->rejected == 0) p->rejected = size;
   return fails(m, LEAPS);
 }
 
@@ -319,7 +323,10 @@ int accept_step(time_loop *m)
   equation *e = m->equation;
   prediction *p = m->prediction;
   run(&m->accept, &m->step, m->x, m->s);
-  if (m->path) memcpy(m->path->force, e->inner_force, m->size * sizeof *m->path->force);
+  if (m->path) {
+    memcpy(m->path->force, e->inner_force, m->size * sizeof *m->path->force);
+    m->path->rejected = 0;
+  }
   accept_cell_forces(m->cell_forces);
   accept_supports(m);
   memset(m->state, 0, m->states * sizeof *m->state);
@@ -347,9 +354,13 @@ int accept_step(time_loop *m)
 int step_or_subdivide(time_loop *m, double end)
 {
   const double begin = m->t;
+  double rejected = 0; /* of the whole step */
   for (int done = 0, some = MOST_SUBSTEPS; done < MOST_SUBSTEPS;) {
+    if (m->path) m->path->rejected = rejected;
     const double t1 = done + some == MOST_SUBSTEPS ? end : begin + (end - begin) * (done + some) / MOST_SUBSTEPS;
-    if (attempt_step(m, t1, end)) {
+    const int solved = attempt_step(m, t1, end);
+    if (m->path) rejected = m->path->rejected;
+    if (solved) {
       if (!accept_step(m)) return 0;
       done += some;
       /* Double the substep at the times where a larger one would begin. */
