@@ -126,7 +126,7 @@ on_two = set -e; for demo in $(1); do echo "== $$demo, 2 ranks"; $(call mpi,2) p
 
 # Warnings are errors. All is built anew: what is kept does not notice changes of the package.
 sphinx = rm -rf docs/_build; docs/python -m sphinx -q -W --keep-going
-site = $(sphinx) -b html -d docs/_build/doctrees docs docs/_build/html; \
+site = $(sphinx) -b html -d docs/_build/doctrees docs docs/_build/html && \
 	echo "$$(find docs/_build/html -name '*.html' | wc -l) pages, $$(du -sh docs/_build/html | cut -f1): docs/_build/html/index.html"
 
 # The library of the address sanitizer must be the first one of Python; exceptions of C++ need theirs beside it. Leaks are

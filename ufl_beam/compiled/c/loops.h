@@ -218,9 +218,10 @@ enum { LINE = 3 }; /* strain, stress and slope of the tangent line of a point */
 
 /* Flags of the present search for an equilibrium, which all points and connectors of a scene share.
  * OPENED: a point has opened. STIFF: points that do not open answer with their elastic stiffness,
- * rigid-plastic connectors that soften with a stiffness of the opposite sign.
+ * and if it is STIFFEST, rigid-plastic connectors that soften with a stiffness of the opposite sign.
  * HOLD: points that do not flow stay closed. OVER: a held point has borne more than its limit. */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
+enum { STIFFEST = 2 };
 
 /* Points in cross-sections, `of_cell` in each of `cells` sections, with `width` numbers of each point
  * in w; see material_points.py. The sections are at the integration points of cells, one cell after

@@ -537,7 +537,7 @@ static void run(const phases *p, const time_step *step, const double *q1, const 
 static int stiffen(equation *e, int stiff)
 {
   const int opened = over_processes(e, LARGEST, e->search && e->search[OPENED]) > 0;
-  if (e->search) e->search[STIFF] = stiff && opened;
+  if (e->search) e->search[STIFF] = opened ? stiff : 0;
   if (stiff) run(&e->again, 0, 0, 0);
   return opened;
 }
@@ -553,11 +553,16 @@ static int find_equilibrium(equation *e, const double *guess)
     restart(e, EXACT);
     reason = iterate(e, LONG_PATIENCE, 1);
   }
-  if (reason > 0 || e->error || raised_anywhere(e) == OTHER || !stiffen(e, 1)) return reason;
-  /* Stiffer tangents approach the solution slowly; true tangents finish it. */
-  go_to(e, guess, PREDICTED);
-  const int slow = iterate(e, LONG_PATIENCE, 0);
-  stiffen(e, 0);
+  if (reason > 0) return reason;
+  for (int stiff = 1; stiff <= STIFFEST; ++stiff) {
+    if (e->error || raised_anywhere(e) == OTHER || !stiffen(e, stiff)) return reason;
+    /* Stiffer tangents approach the solution slowly; true tangents finish it. */
+    go_to(e, guess, PREDICTED);
+    reason = iterate(e, LONG_PATIENCE, 0);
+    stiffen(e, 0);
+    if (reason > 0 || reason == TOO_MANY) break;
+  }
+  const int slow = reason;
   if (slow != TOO_MANY && slow <= 0) return slow;
   memcpy(e->aside, e->unknowns, e->size * sizeof *e->aside);
   const int exact = iterate(e, SHORT_PATIENCE, 0);

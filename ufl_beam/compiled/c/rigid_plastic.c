@@ -47,7 +47,7 @@ static int direction_of_slip(const rigid_plastic *p, int i, double *w, double mo
  *
  * Between connectors that all soften, a node without inertia has a negative stiffness, and Newton's
  * method moves it against the unbalanced force, toward an unstable equilibrium. With the sign of
- * softening changed (STIFF) it moves with the unbalanced force, as a node with little inertia does. */
+ * softening changed (STIFFEST) it moves with the unbalanced force, as a node with little inertia does. */
 static void set_rows_of_rigid_plastic(const connectors *c, const double *q)
 {
   const rigid_plastic *p = c->rigid_plastic;
@@ -61,7 +61,7 @@ static void set_rows_of_rigid_plastic(const connectors *c, const double *q)
     if (!way) continue;
     set_slip(w, motion, way);
     ask(p->force, w, 2, s);
-    const double r = p->slope[i], slope = p->search[STIFF] ? fabs(s[1]) : way * s[1];
+    const double r = p->slope[i], slope = p->search[STIFF] == STIFFEST ? fabs(s[1]) : way * s[1];
     row[0] = slope / r, row[1] = -1 / r, row[2] = (slope * c->e1[i] - s[0]) / r;
   }
 }
