@@ -222,8 +222,8 @@ each_scheme = pytest.mark.parametrize(
 )
 
 
-@pytest.mark.parametrize("place", enumerate([*PLACES, "fibres"]), ids=lambda x: x[1])
-@pytest.mark.parametrize("name", enumerate(CRACKS), ids=lambda x: x[1])
+@pytest.mark.parametrize("place", [*enumerate([*PLACES, "fibres"])], ids=lambda x: x[1])
+@pytest.mark.parametrize("name", [*enumerate(CRACKS)], ids=lambda x: x[1])
 def test_both_solvers_agree(name, place):
     """To and fro; works and losses to 1e-9; the ledger closes.
 
