@@ -101,7 +101,7 @@ class PointForms:
 
     Attributes:
         law: Stresses and their derivatives with respect to strains.  A law that solves for its
-            variables has more outputs, see improve_sized in material_points.c.
+            variables has more outputs, see improve_sized in material_laws.c.
         resistance: Resistance of the discontinuity, and its derivative with respect to the growth.
         end: ``point_output`` of loops.h, stresses, and changes of the variables.
         own: Dissipation of a law that must dissipate, and the size of its terms; else null.
