@@ -386,3 +386,14 @@ def test_fatigue_and_extremes_have_pictures():
     assert sum(bar.get_width() for bar in damage.patches) == pytest.approx(100.0)
     with pytest.raises(ub.ArgumentError, match="is not one of"):
         ub.plot(extremes, "shape")
+
+
+def test_a_spot_given_twice_is_counted_once():
+    section = ub.Section.rectangle(E=2e11, b=0.1, h=0.2, nu=0.3, rho=7850.0)
+    beam = ub.Beam((0, 0), (2, 0), section, cells=4)
+    spot = ub.HotSpot.fibre(beam.start, y=0.1, E=2e11)
+    load = ub.PointLoad(beam.end, force=(0, -1e4), amplitude=lambda t: np.sin(20 * t))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    once, twice = (ub.Fatigue(spots, ub.SNCurve.eurocode(71e6)) for spots in (spot, [spot] * 2))
+    ub.simulate(scene, ub.Static(), t=(0, 3), dt=0.02, record=[once, twice], progress=False)
+    assert once.life(spot) == twice.life(spot)

@@ -344,7 +344,9 @@ class Fatigue(Restartable):
         self, spots: Sequence[HotSpot] | HotSpot, curve: SNCurve, *, resolution: float = 0.0
     ) -> None:
         several = (spots,) if isinstance(spots, HotSpot) else spots
-        self.spots: tuple[HotSpot, ...] = require_all(several, "Fatigue: spots", HotSpot)
+        self.spots: tuple[HotSpot, ...] = tuple(
+            dict.fromkeys(require_all(several, "Fatigue: spots", HotSpot))
+        )
         require_kind(curve, SNCurve, "Fatigue: curve")
         require_number(resolution, "Fatigue: resolution", at_least=0.0)
         self.curve = curve
@@ -358,7 +360,7 @@ class Fatigue(Restartable):
         self._cells = np.array([cell for cell, _ in at], dtype=np.int64)
         self._fractions, self._column = np.unique([s for _, s in at], return_inverse=True)
         self._counters, self._block = {}, []
-        for i, spot in enumerate(dict.fromkeys(self.spots)):
+        for i, spot in enumerate(self.spots):
             before = (state[f"counted {i}"], state[f"waiting {i}"]) if state else ()
             self._counters[spot] = RainflowCounter(self._resolution, *before)
         if state:
