@@ -257,6 +257,20 @@ BEAM = ub.Beam((0, 0), (4, 0), ub.Section.rectangle(b=0.2, h=0.4, E=30e9, nu=0.2
 
 
 @pytest.mark.parametrize(
+    "fibres", [None, ub.Fibres(ub.ElastoPlastic(30e6))], ids=["elastic", "fibres"]
+)
+def test_a_tendon_stays_in_an_unsymmetric_section(fibres):
+    """A T of 0.8 m with a flange of 1 m x 0.2 m at the top: the web reaches farther down."""
+    section = ub.Section.t_shape(0.8, 1.0, 0.2, 0.2, E=30e9, nu=0.2, rho=2500.0, fibres=fibres)
+    beam = ub.Beam((0, 0), (10, 0), section)
+    y = np.average([0.3, 0.7], weights=[0.6 * 0.2, 1.0 * 0.2])  # of the centroid, from the bottom
+    ub.ImposedStrain.tendon(beam, 1e6, 0.01 - y)
+    for outside in (-0.01 - y, 0.81 - y):
+        with raises("outside its section", kind=ub.ModelError):
+            ub.ImposedStrain.tendon(beam, 1e6, outside)
+
+
+@pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda: ub.ImposedStrain(BEAM, span=(0.5, 1.2)), "span = (0.5, 1.2) must be two"),
@@ -266,7 +280,7 @@ BEAM = ub.Beam((0, 0), (4, 0), ub.Section.rectangle(b=0.2, h=0.4, E=30e9, nu=0.2
         (lambda: ub.ImposedStrain.temperature(BEAM, 0.0, 10), "expansion"),
         (
             lambda: ub.ImposedStrain.tendon(BEAM, 1e6, (0.0, -0.25)),
-            "0.25 m from the axis of girder at s = 1, outside its section of depth 0.4 m",
+            "0.25 m from the axis of girder at s = 1, outside its section, which reaches from -0.2",
         ),
     ],
 )

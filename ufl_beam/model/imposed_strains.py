@@ -137,7 +137,7 @@ class ImposedStrain(Load):
             span: Parameters of the beam at both ends of the tendon.
 
         Raises:
-            ModelError: The tendon leaves the depth of the section.
+            ModelError: The tendon leaves the section between its lowest and highest points.
         """
         require_kind(beam, Beam, "ImposedStrain.tendon: beam")
         P = require_number(force, "ImposedStrain.tendon: force")
@@ -145,12 +145,18 @@ class ImposedStrain(Load):
         section, (first, last) = beam.section, require_span(span, "ImposedStrain.tendon: span")
         s = first + (last - first) * np.arange(101.0) / 100
         at = profile_at(s, e, (first, last), "ImposedStrain.tendon: eccentricity")
-        far = np.abs(at).argmax()
-        if abs(at[far]) > section.depth / 2:
+        low, high = -section.depth / 2, section.depth / 2
+        if section.fibres is not None:
+            low, high = (end - section.fibres.axis for end in section.fibres.ends)
+        elif section.shape is not None:
+            low, high = section.shape.bottom, section.shape.top
+        outside = np.maximum(at - high, low - at)
+        far = outside.argmax()
+        if outside[far] > 1e-9 * (high - low):
             raise ModelError(
                 f"ImposedStrain.tendon: the tendon is {abs(at[far]):.3g} m from the axis of "
-                f"{beam.name} at s = {s[far]:.3g}, outside its section of depth "
-                f"{section.depth:.3g} m"
+                f"{beam.name} at s = {s[far]:.3g}, outside its section, which reaches from "
+                f"{low:.3g} to {high:.3g} m"
             )
         curvature = _scaled(e, P / section.EI)
         return cls(beam, -P / section.EA, curvature, amplitude, span=span)
