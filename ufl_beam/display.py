@@ -72,7 +72,7 @@ def counted(*things: tuple[int, str, str]) -> str:
 
 @singledispatch
 def html_page(shown: object) -> str:
-    """Write an object as HTML, by default its text; classes may register other functions."""
+    """Return an object as HTML: its text, unless a function is registered for its class."""
     return f"<pre>{html.escape(str(shown))}</pre>"
 
 

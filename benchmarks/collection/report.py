@@ -85,19 +85,24 @@ def save(rows: list[dict]) -> None:
         "programming on the displaced geometry, a closed form,",
         "or an integration of the column. Times are of the first run and include building.",
         "",
-        "The columns after the time are OpenSees 3.8 in the same run, with the same cells, layers, "
-        "laws, masses and steps, see",
-        "[to_opensees.py](../benchmarks/collection/to_opensees.py). Prescribed motions run as an "
-        "imposed motion / under displacement control; models that have hinges of zero",
-        "length and are loaded run with springs of 1000 / 100 EI/L; paths run under displacement "
-        "control or with its arc length. A step tries Newton, line",
-        "search, Krylov and initial stiffness, 50 iterations each, and is "
-        "halved up to six times. *Elastic* is the difference between both programs for a "
-        "thousandth of loads and motions, *apart* that of the largest values, if both",
-        "reach the end, and the largest difference of the histories over the common steps. Where "
-        "this package stops at a limit load, failing there is right, and",
-        "reaching the end is a jump to another equilibrium. Springs of Ibarra, Medina and "
-        "Krawinkler differ for reasons in [peers.md](peers.md), contact by its damping.",
+        "The remaining columns belong to OpenSees 3.8 in the same run, with the same cells, "
+        "layers, laws, masses and steps, see",
+        "[to_opensees.py](../benchmarks/collection/to_opensees.py). Two values with a slash "
+        "between them come from two runs:",
+        "",
+        "* a prescribed motion runs as an imposed motion / under displacement control,",
+        "* a loaded model with hinges of zero length has springs of 1000 EI/L / 100 EI/L in their "
+        "place,",
+        "* a path runs under displacement control / under OpenSees' arc length.",
+        "",
+        "OpenSees tries Newton's method, line search, Krylov-Newton and the initial stiffness in "
+        "each step, with 50 iterations each, and halves the step up to six times (*halved*). "
+        "*Elastic* is the difference between both programs under a thousandth of the loads and "
+        "motions. *Apart* has two numbers, the difference of the largest values, if both programs "
+        "reach the end, and the largest difference of the histories over their common steps. "
+        "Where this package stops at a limit load, OpenSees should fail; if it reaches the end, it "
+        "jumps to another equilibrium. Springs of Ibarra, Medina and Krawinkler differ for the "
+        "reasons in [peers.md](peers.md). Contact differs because its damping does.",
         "",
         "| model | kind | outcome | cut steps | confirmed by | s | OpenSees | halved | elastic "
         "| apart | s |",

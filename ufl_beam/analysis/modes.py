@@ -56,7 +56,7 @@ class Shapes(Rich, ABC):
     Attributes:
         scene: Model.
         numbering: Vertices, cells and degrees of freedom of the scene.
-        q: Configuration in the state, in the order of the numbering; (size,).
+        q: Configuration about which the scene vibrates, ordered by ``numbering``; (size,).
         shapes: Modes, in columns; (size, n); complex if phases differ.  The largest displacement is
             1; in a mode without displacements, the largest rotation is 1.
     """
@@ -125,9 +125,9 @@ class Shapes(Rich, ABC):
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
-        """Write a time series for ParaView, which shows the k-th mode at the time k.
+        """Write a time series for ParaView, in which the time k shows the k-th mode.
 
-        Displacements are the sum of state and mode; N, V and M are the forces of the mode alone.
+        Displacements are the sum of the state and the mode.  N, V and M belong to the mode alone.
 
         Args:
             path: File, ending in ``.xdmf`` or ``.vtkhdf``, see :class:`XDMF`, :class:`VTKHDF`.
@@ -282,12 +282,12 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     The vibrations are about the undeformed, unloaded scene, or about the last state of the solution
     ``at``.  Section forces, loads and a :class:`RotatingFrame` contribute to the stiffness of this
     state.  Without ``at``, a scene that can move without strain, such as a pendulum, vibrates about
-    its equilibrium with its loads.  Yielded material is elastic, and openings of hinges are
-    constant; hinges that no longer carry a moment act as joints.  Sticking friction is a
-    constraint; sliding friction and controllers are ignored.
+    its equilibrium under its loads.  All material responds elastically, also where it has yielded,
+    and hinges keep their openings; hinges that no longer carry a moment act as joints.  Sticking
+    friction is a constraint; sliding friction and controllers are ignored.
 
     Without damping the modes solve K x = ω² M x.  With damping, Coriolis or follower forces they
-    solve (K + s C + s² M) x = 0, without the assumption of modal damping.  Motions that decay
+    solve (K + s C + s² M) x = 0, where C may be any matrix.  Motions that decay
     without oscillation are modes, too.  A negative damping ratio means flutter, or buckling if the
     ratio is -1.
 
@@ -342,8 +342,8 @@ def buckling(
     Loads and prescribed motions grow in proportion, from their values in the state ``at`` (λ = 0;
     zero without ``at``) to their values at the time ``t`` (λ = 1).  K' is the derivative of the
     stiffness along the initial tangent of this path; it includes changes of forces and of
-    displacements.  A factor is exact if the state itself buckles.  The error grows with the
-    distance of the state from buckling, and with the curvature of the path.  Loads that bend beams
+    displacements.  A factor 0 is exact: the state itself buckles.  The error grows with the
+    factor and with the curvature of the path.  Loads that bend beams
     far from buckling give factors without meaning; a warning names them.
 
     Args:

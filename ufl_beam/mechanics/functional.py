@@ -52,11 +52,11 @@ def modified_functional(W: Energy, q: Expr, D: Expr, r: Expr, axis: Axis) -> Exp
 
 
 def potential(W: Energy, q: Expr, α: Expr, hinge: Expr, axis: Axis) -> Expr:
-    """Return the potential of configuration and jumps, with the energy of each hinge (J), P(49).
+    """Return the potential as a function of configuration q and jumps α, P(49).
 
-    Resultants that are constant in a cell do no work on the strains that a jump adds, P(33).  The
-    derivative by q is the equilibrium of the beam, the derivative by α the equilibrium of the bulk
-    with its hinge, P(34).
+    ``hinge`` is the energy of each hinge (J).  Stress resultants are constant in a cell, so they do
+    no work on the strains that a jump adds, P(33).  The derivative by q is the equilibrium of the
+    beam, and the derivative by α is the equilibrium between the cell and its hinge, P(34).
     """
     return W(enhanced_strain(q, α, axis)) + hinge / axis.h
 

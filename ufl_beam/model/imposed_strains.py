@@ -21,7 +21,7 @@ from ufl_beam.model.records import Instance
 
 
 def require_along(value: object, what: str) -> Profile:
-    """Return a pair of numbers (two times a single number) or a function of s, or raise."""
+    """Return ``value`` as a pair of numbers at both ends or as a function of s, or raise."""
     if callable(value):
         return value
     if isinstance(value, Real):
@@ -40,12 +40,12 @@ class ImposedStrain(Load):
     Stresses follow from the strains of the beam minus the imposed strains.  Section forces,
     reactions, stored energy, yielding and hinges refer to these stresses.  The strains act on the
     whole section, also on sections of fibres: the axial strain of a fibre at y is
-    ``axial - y curvature``.  The work of the stresses on imposed strains is in the ledger, in the
+    ``axial - y curvature``.  The ledger contains the work of the stresses on imposed strains in the
     entry "loads".  A static run applies them in its first step, a dynamic run begins with them.
 
     Each strain is a number, a pair of values at both ends of the span, or a function of the
-    parameter s of the beam.  In a cell with p integration points, a polynomial of degree p - 1
-    approximates the strains, with equal means; a saved solution has samples of functions.
+    parameter s of the beam.  A cell with p integration points replaces the strains by a polynomial
+    of degree p - 1 with the same mean.  A saved solution contains values of functions at some s.
 
     Args:
         beam: The beam.
@@ -58,7 +58,7 @@ class ImposedStrain(Load):
             vertices of the mesh.
 
     Raises:
-        ModelError: The span is not inside the beam, or a strain is no number somewhere.
+        ModelError: The span is not inside the beam, or a strain is not finite at some s.
 
     Example:
         >>> fire = ub.ImposedStrain.temperature(beam, 1.2e-5, uniform=100.0)  # 1/K, K
@@ -123,13 +123,13 @@ class ImposedStrain(Load):
     ) -> ImposedStrain:  # fmt: skip
         """Create the strains that a tendon with a given force causes in an elastic section.
 
-        Section forces of the scene act on the section with its tendon.  So the concrete bears
-        ``N - force``, and in a statically determinate beam without other loads N and M vanish.
+        Section forces of the scene are sums over concrete and tendon.  So the concrete bears
+        ``N - force``, and N and M vanish in a statically determinate beam without other loads.
 
         Args:
             beam: The beam.
-            force: Force of the tendon, positive in tension; N.  It has the same value along the
-                beam; its decrease by friction needs several spans.
+            force: Force of the tendon, positive in tension; N.  It is constant along
+                the span; several loads with different spans can describe a loss by friction.
             eccentricity: Distance of the tendon from the axis, positive to the left of the
                 direction of the beam; m.  A number, a pair of values at both ends, or a function of
                 s, such as a parabola, or ``ub.Table`` for a polygon.

@@ -52,8 +52,8 @@ class Section(Record):
         EA: Axial stiffness; N.
         GA: Shear stiffness, shear factor included; N.
         EI: Bending stiffness; N m².
-        rhoA: Mass per length; kg/m.  Zero, the default, means a beam without mass.  Dynamics may
-            warn of the default, but never warns of an explicit zero.
+        rhoA: Mass per length; kg/m.  The default means a beam without mass, of which dynamics
+            may warn; there is no warning of an explicit zero.
         rhoI: Rotary inertia per length; kg m.
         depth: Depth in the plane of motion, for pictures; m.  The default is the depth of the
             rectangle with the same EI/EA.  A beam shorter than depth/√12 causes a warning.
@@ -108,8 +108,8 @@ class Section(Record):
         laws = [n for n in ("axial", "shear", "bending", "hinge") if getattr(self, n) is not None]
         if laws and self.fibres is not None:
             raise ModelError(
-                f"Section: a law {laws[0]} beside fibres, which bear N and M, while shear is "
-                "elastic; leave one out"
+                f"Section: a law {laws[0]} beside fibres; a section with fibres has an elastic "
+                "shear force and no other law; leave one out"
             )
         if self.interaction is not None and (laws or self.fibres is not None):
             law = laws[0] if laws else "fibres"
@@ -174,8 +174,8 @@ class Section(Record):
     ) -> Section:  # fmt: skip
         """Create a section of an isotropic material.
 
-        The other constructors of shapes pass these arguments on, with ``shear_factor`` by default.
-        The axis of the beam runs through the centroid.
+        The other constructors of shapes call this one; most have their own default of
+        ``shear_factor``.  The axis of the beam runs through the centroid.
 
         Args:
             shape: Shape that bends in the plane of its y.
@@ -204,7 +204,7 @@ class Section(Record):
                 f"{shape.obliquity:.2g} ∫ y² dA, not 0; turn the shape to its principal axes, or "
                 "give Section(EA=, GA=, EI=) of a beam that is held in the plane"
             )
-        # Files compare objects that are one with such that are equal: each section has its own.
+        # Saved models tell a shared object from equal ones, so each section has its own shape.
         shape = copy(shape) if axis == "strong" else shape.turned()
         return cls._from_material(
             shape.A, shape.I, E, nu, rho, shear_factor, depth=shape.top - shape.bottom,
@@ -276,8 +276,8 @@ class Section(Record):
     ) -> Section:
         """Return the section with bars of areas ``A`` (m²) at coordinates ``y`` (m).
 
-        The section has fibres, of which the bars displace their areas.  The coordinate y is
-        measured from mid-depth, or as the corners of a :class:`Shape` and in :meth:`of_fibres`.
+        The section must have fibres; bars replace equal areas of them.  The coordinate y is
+        measured from mid-depth, or from the origin of a :class:`Shape` or of :meth:`of_fibres`.
         The axis moves to the centroid of the stiffness EA, at y = ``fibres.axis`` of the new
         section.  GA and mass do not change: the density of reinforced concrete includes the bars.
 

@@ -187,7 +187,7 @@ class Cycles:
             return float(np.sum(self.count / curve.endurance(self.range, self.mean)))
 
     def equivalent(self, curve: SNCurve) -> float:
-        """Compute the constant range that does the same damage in the same number of cycles; Pa.
+        """Compute the stress range that does the same damage if all cycles have it; Pa.
 
         Only ``slope`` is used, not ``slope_beyond``, as is usual for damage-equivalent ranges.
         """

@@ -124,7 +124,7 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
         else:
             angle = support.angle - (0.0 if 1 in held else math.pi / 2)
             symbols.append((place, color, len({0, 1} & set(held)), _inward(place), angle))
-    # Places, and whether the joint rotates; None for connectors, which leave its symbol as it is
+    # Places, and whether the joint can rotate; None for connectors, which do not change the symbol
     grounded: list[tuple[Sequence[AttachmentPoint], bool | None]] = [
         (j.places, _rotates(j)) for j in scene.joints if joint_symbol(j).grounded
     ]
@@ -208,7 +208,9 @@ class JointSymbol(NamedTuple):
     """Symbol of a joint."""
 
     rod: float = 0.0  # width of a line from place to place; points
-    pins: tuple[int, ...] = ()  # indices of places with a pin; on a rail only if the joint turns
+    pins: tuple[
+        int, ...
+    ] = ()  # indices of places with a pin; on a rail only if the joint can rotate
     rail: Callable[[DeformedShape, Joint], Iterator[Stroke]] | None = None
     grounded: bool = True  # True if a point of the ground gets the symbol of a support
 
@@ -220,7 +222,7 @@ def _rail(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
     ahead = -normal(shape.turned(across.axis, base))
     s = float((block - start) @ ahead)
     low, high = shape.canvas.travels[across]
-    # If displacements are magnified, the block may be outside this range, as rotations are not.
+    # Magnified displacements may move the block out of its range, because rotations stay true.
     low, high = min(low, s) - 1.8 * unit, max(high, s) + 1.8 * unit
     rail = block + np.outer((low - s, high - s), ahead)
     yield Stroke(rail, STEEL, 2.2)
@@ -333,7 +335,7 @@ def _drive(straight: list[Stroke], fill: str, tail: float = -2.0, *more: Stroke)
     return LawSymbol(straight, turning=turning, sweep=1.4 * math.pi, spins=True)
 
 
-CENTRE = -9.0  # coordinate t beyond the pin, drawn at the least radius
+CENTRE = -9.0  # coordinate t of the centre of rotation, behind the pin
 _SPOKES = [_line((s, CENTRE), (s, 0)) for s in (-2, 2)]
 _TEETH = [(float(s), 0.55 * (-1.0) ** k) for k, s in enumerate(np.linspace(-1.0, 1.0, 13)[1::2])]
 _BOXED = [_line((-2, 0), (-0.8, 0)), _line((0.8, 0), (2, 0)), _box(-0.8, 0.8, 0.6, WHITE)]

@@ -8,12 +8,13 @@ implicit function theorem.
 
 With strong softening a step has two solutions: a hinge stays closed or opens.  A rule chooses
 between them.  A hinge, a crack of a fibre or a softening spring that did not open further in the
-last step stays closed if an equilibrium exists in which it bears at most its limit.  Of several
-points above their limits, the point with the largest excess opens first; the others open only if
-they still exceed their limits.
+last step stays closed if an equilibrium exists in which its stress is at most its limit.  If
+several points exceed their limits, the point with the largest excess opens first.  The others open
+only if they still exceed their limits afterwards.
 
-Rigid-plastic connectors follow the same rule.  So do connector laws with a limit, whose sliding
-force may be below the limit: sticking or sliding continues if such an equilibrium exists.
+Rigid-plastic connectors follow the same rule.  A connector law whose sliding force is below its
+limit may also have two solutions: it continues to stick, or to slide, if such an equilibrium
+exists.
 """
 
 from __future__ import annotations
@@ -161,10 +162,10 @@ _point_forms = cached_forms(PointForms)
 
 
 class Points:
-    """Points with the same layout in many cells.
+    """Material points of many cells whose sections have the same points.
 
-    Here a cell of degree p counts as p cells, one for each Gauss point, with its weight times the
-    length of the cell.
+    A cell of degree p counts as p cells here, one for each of its Gauss points.  The length of each
+    is the Gauss weight times the length of the cell.
 
     Args:
         section_points: The points of a cell.
@@ -185,9 +186,9 @@ class Points:
         softens: True if points may break.
         over: Largest ``|stress| / limit - 1`` of the points that the latest response has held
             closed, at least zero; (1,).
-        committed: Derivatives of (N, V, M) in the accepted state, with the laws at the end of the
-            step, without negative eigenvalues; (cells, 9); None without damping that needs them.
-            Unknown values are NaN until :meth:`start_tangents`.
+        committed: Derivatives of (N, V, M) in the accepted state by the strains, with negative
+            eigenvalues set to zero; (cells, 9).  None if no damping needs them, NaN until
+            :meth:`start_tangents`.
         recorded: For each cell: (N, V, M) in the accepted state, the jump of the last point, and
             the energies that plastic strains and discontinuities have dissipated since the
             beginning; (cells, 6); N, N, N m, rad or m, J, J.
@@ -313,7 +314,7 @@ class Points:
         return self.r, self.D
 
     def tangent(self) -> tuple[Array, Array]:
-        """Return the accepted strains, and derivatives of (N, V, M) in a step without motion.
+        """Return the accepted strains, and the tangents in a step that does not change them.
 
         The shapes are (cells, 3) and (cells, 9).  The latest response is restored.
         """
@@ -332,7 +333,10 @@ class Points:
                 array[:] = values
 
     def keep_tangents(self) -> None:
-        """Store :attr:`committed` from now on, with eigenvalues relative to elastic stiffnesses."""
+        """Store :attr:`committed` after each step from now on.
+
+        Eigenvalues are computed relative to the elastic stiffness of the section.
+        """
         if self.committed is not None:
             return
         section_points, elastic = self._section_points, np.zeros((len(self.recorded), 3))
@@ -345,7 +349,7 @@ class Points:
         fill(self.c, committed=self.committed, elastic=elastic, inputs=space)
 
     def start_tangents(self) -> None:
-        """Set the unknown :attr:`committed` to the elastic stiffness at the accepted strains."""
+        """Replace NaN in :attr:`committed` by the elastic stiffness at the accepted strains."""
         if self.committed is None:
             return
         known, law = self.committed.copy(), (self.c.law, self.c.solves)
