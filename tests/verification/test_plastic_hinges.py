@@ -147,6 +147,28 @@ def test_ledger_of_cycles(law, scheme, dt):
             np.testing.assert_allclose(history.work, history.dissipated, rtol=1e-9, atol=1e-12)
 
 
+def test_a_hinge_opens_where_its_neighbours_have_yielded():
+    """The end of a beam that hardens is turned until a hinge in its middle softens.
+
+    [closed form] ψ = M L/EI + (M_u - M_y)/H L + a with M = M_u exp(-M_u a/G_f) at the jump a.
+    The moment is a mean over a step, so the error of a is at most half of the rotation of a step.
+    """
+    EI, yields, hardening, limit, energy, steps = 121.7, 50.0, 3.334, 80.0, 100.0, 500
+    law = ub.ElastoPlastic(yields, isotropic=hardening)
+    beam = ub.Beam(
+        (0, 0), (1, 0), ub.Section(EA=1.46e7, GA=4.7e6, EI=EI, bending=law), cells=1,
+        corners=(0.4, 0.6), hinges={0.5: ub.Softening(limit, energy)},
+    )  # fmt: skip
+    turned_end = ub.PrescribedDisplacement(beam.end, psi=lambda t: math.pi * t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turned_end])
+    solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 4), dt=4 / steps)
+    jump = solution.material_at(beam.at(0.5)).jump[-1]
+    moment = limit * math.exp(-limit * jump / energy)
+    expected = 4 * math.pi - moment / EI - (limit - yields) / hardening
+    assert jump == pytest.approx(expected, abs=4 * math.pi / steps / 2)
+    assert solution.energy.worst < 1e-10
+
+
 def test_kinematic_hardening_remembers_its_direction():
     """[closed] Turned back, the moment flows at 2 limit below the one at the turn (Bauschinger)."""
     law = ub.ElastoPlastic(LIMIT, kinematic=50.0)
