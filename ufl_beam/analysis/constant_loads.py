@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Loads with their values at the end of a static run from 0 to 1 s, and the state under them."""
+"""Loads that are held constant at their values at 1 s, and the equilibrium under them."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ def with_amplitude(load: Any, amplitude: TimeFunction) -> Any:
 
 
 def grown(load: Load, factor: float = 1.0) -> Load:
-    """Return a load that grows from zero at -1 s to ``factor`` times its value at 0 s."""
+    """Return a load that grows from zero at -1 s to ``factor`` times :func:`size_of` at 0 s."""
     grown: Load = with_amplitude(load, Table((-1.0, 0.0), (0.0, factor * size_of(load))))
     return grown
 
 
 def constant(load: Load) -> Load:
-    """Return a load that keeps its value."""
+    """Return a load that has its value at the time :data:`AT` at all times."""
     constant: Load = with_amplitude(load, Constant(size_of(load)))
     return constant
 
@@ -56,7 +56,7 @@ def constant(load: Load) -> Load:
 def loaded_state(
     scene: Scene, what: str, mesh: Mesh | None, newton: Newton | None
 ) -> tuple[Scene, Solution | None]:
-    """Return the scene with constant loads, and its equilibrium under them, which ends at 0 s.
+    """Return the scene with constant loads, and a run from -1 s to 0 s to its equilibrium.
 
     The equilibrium is None if the scene has no loads.
 

@@ -56,7 +56,7 @@ class Shapes(Rich, ABC):
     Attributes:
         scene: Model.
         numbering: Vertices, cells and degrees of freedom of the scene.
-        q: Configuration about which the scene vibrates, ordered by ``numbering``; (size,).
+        q: Configuration of the state of the modes, ordered by ``numbering``; (size,).
         shapes: Modes, in columns; (size, n); complex if phases differ.  The largest displacement is
             1; in a mode without displacements, the largest rotation is 1.
     """
@@ -287,7 +287,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     friction is a constraint; sliding friction and controllers are ignored.
 
     Without damping the modes solve K x = ω² M x.  With damping, Coriolis or follower forces they
-    solve (K + s C + s² M) x = 0, where C may be any matrix.  Motions that decay
+    solve (K + s C + s² M) x = 0; K and C need not be symmetric.  Motions that decay
     without oscillation are modes, too.  A negative damping ratio means flutter, or buckling if the
     ratio is -1.
 
@@ -339,12 +339,12 @@ def buckling(
 ) -> Buckling:
     """Compute buckling load factors and modes, (K + λ K') x = 0.
 
-    Loads and prescribed motions grow in proportion, from their values in the state ``at`` (λ = 0;
-    zero without ``at``) to their values at the time ``t`` (λ = 1).  K' is the derivative of the
-    stiffness along the initial tangent of this path; it includes changes of forces and of
-    displacements.  A factor 0 is exact: the state itself buckles.  The error grows with the
-    factor and with the curvature of the path.  Loads that bend beams
-    far from buckling give factors without meaning; a warning names them.
+    Loads and prescribed motions grow in proportion, from their values in the state ``at``, or from
+    zero without ``at`` (λ = 0), to their values at the time ``t`` (λ = 1).  K' is the derivative
+    of the stiffness along the initial tangent of this path; it includes changes of forces and of
+    displacements.  A factor 0 is exact: the state itself buckles.  The error grows with the factor
+    and with the curvature of the path.  If loads bend beams long before they buckle, factors have
+    no meaning; a warning lists these factors.
 
     Args:
         scene: Model.

@@ -43,19 +43,19 @@ from ufl_beam.solvers.newton_options import Newton
 MESHES = Mesh(degree=2), Mesh()  # meshes that are compared by default
 NEWTONS = (Newton(),)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
-WRONG = "ArgumentError: "  # beginning of messages of failures that no refinement avoids
+WRONG = "ArgumentError: "  # in the message of a failure that no refinement can avoid
 
 LEAST_USED = 0.3  # least error of the recommended run, as a fraction of a tolerance
 # Largest uncertainty of a limit, as a fraction of a tolerance.  The sum of an error of LEAST_USED
 # and this uncertainty is the tolerance.
 MOST_UNCERTAINTY = 1 - LEAST_USED
-# Largest negligible error, as a fraction of a tolerance.  The search aims at the geometric mean of
-# the least and the largest error, 0.55 for an accurate limit.  Four negligible errors share the
-# rest: of unrefined cells, of unrefined steps, of options of Newton's method, and of the limit.
+# Largest negligible error, as a fraction of a tolerance.  The search accepts errors about the
+# geometric mean of the least and the largest error, 0.55 for an accurate limit.  Four negligible
+# errors share the rest: of unrefined cells, of unrefined steps, of options of Newton's method, and of the limit.
 NEGLIGIBLE = (1 - math.sqrt(LEAST_USED)) / 4
 NOISE = 1e-9  # noise as a fraction of a quantity: Newton's method leaves residuals of 1e-10
 STEP_ORDER = 2.0  # largest order of the schemes; the order of cells is twice their degree
-FURTHER = 2  # most levels from a base to the next; the finest run of a base is 2 levels finer
+FURTHER = 2  # most levels from one base of the search to the next
 REACH = 8  # most levels from the finest run to a setting; second-order errors fall by 2**16
 SETTINGS_PER_LEVEL = 8  # between two settings a second-order error changes by a factor of 2**(2/8)
 MOST_UNCONVERGED = 4  # number of bases without convergence after which the search ends
@@ -91,7 +91,7 @@ def tradeoff(
     Coarse runs decide between several schemes, steps and meshes.
 
     Args:
-        scene: Model; the ``cells`` of its beams are the coarsest cells.
+        scene: Model; the ``cells`` of its beams are the coarsest cells of degree 1.
         quantities: Functions of a :class:`Solution` by name that return a number, or an array
             whose shape does not depend on steps and cells: ``{"tip": lambda s:
             s.position(beam.end)[-1]}``.  The error of an array is its largest error.
@@ -101,11 +101,11 @@ def tradeoff(
         tolerance: Largest error of each quantity, by name, in its unit; or one number for all
             quantities, as a fraction of their largest magnitudes.
         budget: Largest wall time of one run, instead of a tolerance; s.
-        mesh: Mesh with the coarsest cells, or several meshes; by default cells of degree 1
+        mesh: Mesh that the search begins with, or several meshes; by default cells of degree 1
             and 2.
-        newton: Options of Newton's method, or several.  Runs use the first options; a coarse run
-            compares the others.  The recommendation uses the fastest options that change the
-            quantities little.
+        newton: Options of Newton's method, or several.  The search uses the
+            first options; one coarse run with each of the others compares them.  The
+            recommendation uses the fastest options that change the quantities little.
         max_seconds: Largest total wall time of the runs; s.
         progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run uses one process, and several run at a time.  Simultaneous runs
@@ -242,7 +242,7 @@ class _Runs:
 
     scene: Scene
     quantities: Mapping[str, Quantity]
-    families: Sequence[Setting]  # coarsest setting of each family
+    families: Sequence[Setting]  # coarsest setting of each family: scheme, step, mesh
     newtons: Sequence[Newton]
     t: tuple[float, float]
     max_seconds: float  # largest total wall time of the runs; s
@@ -253,7 +253,7 @@ class _Runs:
     spent: float = field(default=0.0, init=False)  # wall time of all runs; s
 
     def begin(self, family: int) -> None:
-        """Compile in a first run, of one step if steps are equal; then do the coarsest run."""
+        """Do a run that compiles, of one step if ``dt`` is a number; then do the coarsest run."""
         first = Refinement(family, Fraction(1), 0.0)
         dt = self.families[family].dt
         until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
@@ -325,7 +325,7 @@ class _Runs:
         return [run for refinement, run in self.runs.items() if refinement.family == family]
 
     def divisor(self, family: int) -> int:
-        """Return the largest q ≤ SETTINGS_PER_LEVEL for which ``refine`` may be (q+1)/q, or 1."""
+        """Return the largest q ≤ SETTINGS_PER_LEVEL for which ``refine`` may be (q+1)/q, else 1."""
         mesh, scene = self.families[family].mesh, self.scene
         for q in range(SETTINGS_PER_LEVEL, 1, -1):
             finer = replace(mesh, refine=mesh.refine * Fraction(q + 1, q))
@@ -399,8 +399,8 @@ class _Candidate(NamedTuple):
 class _Search:
     """Search with one family: three levels of cells and of steps from a base, and a finer run.
 
-    The base is refined until the chosen setting is about a level finer than the base.  Then the
-    finest levels are about a level finer than the setting.
+    While limits are uncertain, the base moves to about a level below the chosen setting, so that
+    the finest levels are about a level above the setting.
 
     Errors and uncertainties are divided by ``units``.  These are the tolerances or, with a budget,
     the sizes of the quantities.
@@ -446,7 +446,7 @@ class _Search:
             except TradeoffError:
                 if self.uncertainty > MOST_UNCERTAINTY:
                     raise
-                self._base = before  # no time is left, but the limits are accurate enough
+                self._base = before  # no finer base can run, but the limits are accurate enough
                 break
         self._choose_newton()
         self._try_settings()
@@ -457,7 +457,7 @@ class _Search:
         return max(x.uncertainty / self.units[n] for n, x in self.convergence.items())
 
     def best(self) -> Run:
-        """Return the best of all runs."""
+        """Return the best run of the family."""
         return min(self._runs.in_family(self.family), key=self._rank)
 
     def remarks(self, run: Run) -> list[str]:
@@ -487,7 +487,7 @@ class _Search:
         return Refinement(self.family, Fraction(refine), float(level), newton)
 
     def _refine_base(self) -> None:
-        """Run three levels from the base; refine the base if changes between levels do not fall."""
+        """Run two or three levels from the base; refine it while limits are too uncertain."""
         while True:
             i, j = self._base
             first, *others = wanted = [
@@ -504,8 +504,9 @@ class _Search:
                 unit = self._target.absolute.get(name, self._target.relative * size(value))
                 if unit == 0:
                     raise ArgumentError(
-                        f"tradeoff: quantity {name!r} is zero, so that a tolerance cannot be a "
-                        "fraction of it; give tolerances by name, in units of the quantities"
+                        f"tradeoff: quantity {name!r} is zero, so that its error cannot be a "
+                        "fraction of it; leave it out, or give tolerances by name, in units of the "
+                        "quantities, and no budget"
                     )
                 self.units[name] = unit
             thirds = [self._at(2 ** (i + 2), j), self._at(2**i, j + 2)]
@@ -600,13 +601,13 @@ class _Search:
                 return
             self._time_ratios[self._newton] *= run.seconds / candidate.seconds
             if candidate.likely > 0:
-                # The uncertainty of the limit is also the uncertainty of the errors.
+                # Errors below the uncertainty of the limit are unknown.
                 self._error_ratio *= max(self.ratio(run), self.uncertainty) / candidate.likely
 
     # -- decisions -----------------------------------------------------------------------------
 
     def _negligible(self, candidate: _Candidate) -> float:
-        """Return the largest negligible error, for a budget relative to a candidate's error."""
+        """Return the largest negligible error: a fraction of the tolerance, or of the error."""
         return NEGLIGIBLE * (1.0 if math.isinf(self._target.budget) else candidate.bound)
 
     def _choose(self, uncertainty: float) -> _Candidate:
@@ -616,10 +617,10 @@ class _Search:
         """
         some, setting = next(iter(self.convergence.values())), self._runs.families[self.family]
         top = 2 ** (some.cells.finest + REACH), 2 ** (some.steps.finest + REACH)
-        # The coarsest mesh has about the same number of nodes as the user's cells at degree 1.
+        # With degree p the coarsest mesh has 1/p of the user's cells, so about as many nodes.
         first = math.ceil(self._divisor / setting.mesh.degree)
         refine = [Fraction(k, self._divisor) for k in _geometric(first, self._divisor * top[0])]
-        # The number of steps is a multiple of the user's, so that all runs end at the same time.
+        # Numbers of steps are multiples of the user's, so that all runs reach the user's times.
         multiples = np.array(_geometric(1, top[1]), dtype=float)
         cell_levels, step_levels = np.log2(np.array(refine, dtype=float)), np.log2(multiples)
         likely = bound = np.zeros((len(cell_levels), len(step_levels)))

@@ -84,8 +84,8 @@ class Place:
     Attributes:
         beam: The beam, compared by identity.
         s: Parameter of the axis, from 0 to 1.
-        beyond: True for the cross-section beyond the plastic hinge at ``s``, to which no joint,
-            support or load is attached.
+        beyond: True for the cross-section on the far side of the plastic hinge at ``s``; joints,
+            supports and loads are attached to the near side.
 
     Example:
         >>> middle = beam.at(0.5)
@@ -236,7 +236,7 @@ class Representatives(dict[NodeDof, NodeDof]):
 
 
 def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
-    """Return one representative for all degrees of freedom that ``groups`` make equal."""
+    """Return a representative for each set of degrees of freedom that ``groups`` make equal."""
     # Each node is hashed once and gets a number, because hashing takes most of the time.
     number: dict[Node, int] = {}
     dofs: dict[int, NodeDof] = {}

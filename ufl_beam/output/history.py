@@ -49,13 +49,14 @@ class History(Restartable):
     The columns are the time or load factor; u, v, psi of each place; accelerations; motion, force,
     work of each connector; and the entries of the energy ledger.  The names of the columns end in
     their units.  Accelerations are means since the previous row, as in
-    :meth:`Solution.acceleration`; in the first row they are NaN.
+    :meth:`Solution.acceleration`; in the first row they are NaN.  They are not
+    changed if ``max_rows`` deletes that row.
 
     Args:
         path: File, ending in ``.csv``.
         places: Places to follow, on beams and bodies.
         connectors: Connectors to follow, see
-            :class:`~ufl_beam.output.state_rows.Connection`; a joint has several connectors.
+            :class:`~ufl_beam.output.state_rows.Connection`; a joint may have several.
         accelerations: Places whose accelerations are recorded, in dynamics.
         every: Number of steps between rows.
         max_rows: Largest number of rows after the initial row.  If it would be exceeded, every
@@ -120,7 +121,7 @@ class History(Restartable):
         for twice in {*names} & {*energies}:
             raise ArgumentError(
                 f"History {self._path}: {twice!r} would be a column of a connector and of the "
-                "energy ledger; give the work another name"
+                "energy ledger; give the VirtualWork or Potential another name"
             )
         columns = [simulation.parameter.column, *names, *energies]
         # Spreadsheets read such names as formulas, which may run programs
@@ -262,7 +263,8 @@ class Event(NamedTuple):
     Attributes:
         time: End of the step, s; in path following, its load factor.
         where: Middle of a cell, place of a plastic hinge, or connector.
-        what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
+        what: "yields", "opens", "is free" in a cell or a hinge;
+            "touches", "lets go", "slides", "sticks".
         parameter: Name and text formats of ``time``.
 
     Example:
@@ -293,7 +295,7 @@ class Events(Restartable):
     cell or hinge.
 
     Args:
-        tell: Function that the first process calls with each event at once, such as ``print``.
+        tell: Function that the first process calls with each event as soon as it is recorded.
 
     Attributes:
         found: Events in chronological order, the same on all processes.

@@ -197,7 +197,7 @@ class PressureForce(LoadForce):
 
 
 class MovingForce(LoadForce):
-    """Force and mass that move along a beam.
+    """Force and mass that move along a route of beams.
 
     Substeps in statics apply a part of the change of the nodal forces.  The axis at the mass has
     the tangent and the curvature of the rotations.
@@ -212,7 +212,7 @@ class MovingForce(LoadForce):
             self.stored = {"kinetic": 0.0}
 
     def _at(self, t: float) -> tuple[int, Array, Array, Array] | None:
-        """Return the cell at a time, its degrees of freedom (3, n), shapes, and their slopes."""
+        """Return the loaded cell at a time, its degrees of freedom (3, n), shapes and slopes."""
         numbering, load = self._numbering, self._moving
         d = value_at(load.position, t, load)
         cells = np.concatenate([numbering.cells_of(beam) for beam in load.route])
@@ -226,7 +226,7 @@ class MovingForce(LoadForce):
         return int(cells[i]), dofs.T, mesh.weights(s)[order], mesh.slopes(s)[order] / h
 
     def _on_cell(self, t: float, force: Array) -> tuple[Array, Array]:
-        """Return the nodal forces of a force at the place of a time, and :attr:`on_nodes`."""
+        """Return nodal forces of a force at its place at time ``t``, and :attr:`on_nodes`."""
         vector, at = np.zeros(self.size), self._at(t)
         if at is None:
             return vector, np.zeros((9, len(self._numbering.cells)))
@@ -286,7 +286,7 @@ class MovingForce(LoadForce):
         return *self._on_cell(step.load_time, force), slope
 
     def _kinetic(self, t: float, q: Array, v: Array) -> float:
-        """Return the kinetic energy of the mass, zero outside of the beam."""
+        """Return the kinetic energy of the mass, zero outside of the route."""
         if (at := self._at(t)) is None:
             return 0.0
         cell, dofs, shapes, slopes = at
@@ -302,7 +302,7 @@ class MovingForce(LoadForce):
         return self.force, np.zeros((self.size, self.size))
 
     def response(self, step: Step, q1: Array) -> Response:
-        """Return minus the forces, and their derivative, which is zero."""
+        """Return minus the forces of load and mass, and their derivative."""
         wanted = self._forces_at(step.load_time)
         pairs = list(zip(self._reached_forces, wanted, strict=True))
         force, on_cells = (a + step.fraction * (b - a) for a, b in pairs)
@@ -340,7 +340,7 @@ class MovingForce(LoadForce):
 class FrameForce(LoadForce):
     """Centrifugal forces, which have a potential, and Coriolis forces, which do no work.
 
-    The spin of rotary inertia is constant in steady rotation, so there are no moments.
+    The frame rotates at a constant rate, so its rotation adds no moments of rotary inertia.
     """
 
     def __init__(self, frame: RotatingFrame, setting: Setting, mass: Mass) -> None:
@@ -446,7 +446,7 @@ class WorkForce(CellForce):
         stored, t = self.stored.get(name, 0.0), float(acting(self._scheme, np.array(self._t), at))
         self._before, (self._t, self._grown) = self.force, self._end
         super().accept(step, q1, s)
-        if self._varies:  # supplied in time: the energy change minus the change by motion
+        if self._varies:  # supplied as time passes: the change of energy minus the change by motion
             self._put(t)
             moved = self.energy(q1) - self.energy(step.q0)
             supplied[self._work.in_time] += self.stored[name] - stored - moved
@@ -538,7 +538,7 @@ class Supports:
             x[dof] = x0[dof] + step.fraction * (wanted - x0[dof])
 
     def stop(self, v: Array) -> Array:
-        """Return velocities with zeros at fixed supports, where other values would oscillate."""
+        """Return initial velocities with zeros at fixed supports; others would oscillate there."""
         x = self.axes @ v
         moving = [dof for dof, *_ in self._motions]
         x[np.setdiff1d(self.constrained, moving)] = 0.0

@@ -49,7 +49,7 @@ from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS, Points, c
 from ufl_beam.terms.term import Callbacks
 
 CREEP = 1e-12
-"""Motion in a step of a sticking connector at its limit force; rad, or fraction of scene size.
+"""Motion of a sticking connector in a step with its limit force; rad, or fraction of scene size.
 
 Sticking connectors creep only if several of them may constrain the same motion.  The creep then
 determines how they share the force.
@@ -159,7 +159,7 @@ class Response:
             fill(self.in_c["friction"], rate=rate.cells, at_v=rate.position(v))
 
     def accept_end(self, e1: Array) -> None:
-        """Accept motions ``e1`` before C accepts the step; user functions may raise exceptions."""
+        """Accept motions ``e1`` before C accepts the step, because users' functions may raise."""
 
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Return the energy dissipated plastically in a step to the motions ``e1``; J."""
@@ -360,9 +360,10 @@ _rigid_plastic_forms = cached_forms(RigidPlasticForms)
 
 
 REFERENCE_MOTION = 0.01
-"""Motion m at which r m, see rigid_plastic.c, is the limit force; rad, or fraction of scene size.
+"""Motion m for which r m is the limit force, in rad or as a fraction of scene size.
 
-r decides whether a connector slips in an iterate; solutions do not depend on r.
+The factor r of rigid_plastic.c decides whether a connector slips in an iterate; solutions do not
+depend on it.
 """
 
 LEAST_SLOPE = 1e-9
@@ -420,7 +421,7 @@ class RigidPlasticLaws(Response):
         self._stored = np.zeros(1)  # energy of hardening of all connectors together; J
         at = self._at["slipped"], self._at["start"]
         self._variables = [*at, self._limit, back_force, dissipated, direction_before]
-        # Accumulated motions do not have the round-off of the constraints
+        # Motions are accumulated, because those of the nodes have round-off of the constraints
         self.motion, self.dissipated = self._at["start"], (dissipated,)
 
         kind = ElastoPlastic(1.0) if isinstance(law.law, ElastoPlastic) else law.law.kind()
@@ -443,7 +444,7 @@ class RigidPlasticLaws(Response):
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Return the energy dissipated in a step to the motions ``e1``; J.
 
-        A held connector whose force exceeds the limit counts with the excess times 1 m or 1 rad.
+        For a held connector with a force above its limit, the excess times 1 m or 1 rad is added.
         """
         arrays = doubles(e1), doubles(np.ascontiguousarray(λ))
         return float(lib.dissipation_of_rigid_plastic(self._c, *arrays))

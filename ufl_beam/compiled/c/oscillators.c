@@ -5,7 +5,7 @@
 static double peak_in_step(double x0, double x1, double r0, double r1, double dt)
 {
   double peak = fmax(fabs(x0), fabs(x1));
-  if (r0 * r1 < 0) { /* the cubic through both ends, at the zero of the linear rate */
+  if (r0 * r1 < 0) { /* value of the cubic through both ends where the linear rate is zero */
     const double s = r0 / (r0 - r1), z = 1 - s;
     peak = fmax(peak, fabs((1 + 2 * s) * z * z * x0 + s * z * z * dt * r0
                            + s * s * (1 + 2 * z) * x1 - s * s * z * dt * r1));
@@ -31,7 +31,7 @@ void oscillator_peaks(const oscillator *o, int number, const double *load, doubl
     y = E[0] * y + E[1] * before + c0[1] * g0 + c1[1] * g1;
     const double force = k * (y / imaginary - plastic), excess = fabs(force) - limit;
     if (excess > 0) {
-      /* The flow of the step changes the last load by k flow, and so the displacement. */
+      /* Plastic flow adds k times its increment to the load at the end of the step. */
       const double flow = copysign(excess / (1 - k * c1[1] / imaginary), force); /* times k */
       x += c1[0] * flow;
       y += c1[1] * flow;
