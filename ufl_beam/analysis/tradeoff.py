@@ -51,7 +51,8 @@ LEAST_USED = 0.3  # least error of the recommended run, as a fraction of a toler
 MOST_UNCERTAINTY = 1 - LEAST_USED
 # Largest negligible error, as a fraction of a tolerance.  The search accepts errors about the
 # geometric mean of the least and the largest error, 0.55 for an accurate limit.  Four negligible
-# errors share the rest: of unrefined cells, of unrefined steps, of options of Newton's method, and of the limit.
+# errors share the rest: of unrefined cells, of unrefined steps, of options of Newton's method, and
+# of the limit.
 NEGLIGIBLE = (1 - math.sqrt(LEAST_USED)) / 4
 NOISE = 1e-9  # noise as a fraction of a quantity: Newton's method leaves residuals of 1e-10
 STEP_ORDER = 2.0  # largest order of the schemes; the order of cells is twice their degree
