@@ -42,7 +42,10 @@ def with_amplitude(load: Any, amplitude: TimeFunction) -> Any:
 
 
 def grown(load: Load, factor: float = 1.0) -> Load:
-    """Return a load that grows from zero at -1 s to ``factor`` times :func:`size_of` at 0 s."""
+    """Return a load that grows from zero at -1 s to its final value at 0 s.
+
+    The final value is ``factor`` times the value of ``load`` at :data:`AT`.
+    """
     grown: Load = with_amplitude(load, Table((-1.0, 0.0), (0.0, factor * size_of(load))))
     return grown
 

@@ -618,7 +618,7 @@ class _Search:
         """
         some, setting = next(iter(self.convergence.values())), self._runs.families[self.family]
         top = 2 ** (some.cells.finest + REACH), 2 ** (some.steps.finest + REACH)
-        # With degree p the coarsest mesh has 1/p of the user's cells, so about as many nodes.
+        # The coarsest mesh of degree p has 1/p of the user's cells: the number of nodes is similar.
         first = math.ceil(self._divisor / setting.mesh.degree)
         refine = [Fraction(k, self._divisor) for k in _geometric(first, self._divisor * top[0])]
         # Numbers of steps are multiples of the user's, so that all runs reach the user's times.

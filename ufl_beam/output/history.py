@@ -295,7 +295,8 @@ class Events(Restartable):
     cell or hinge.
 
     Args:
-        tell: Function that the first process calls with each event as soon as it is recorded.
+        tell: Function, such as ``print``, that the first process calls with each event when the
+            event is recorded.
 
     Attributes:
         found: Events in chronological order, the same on all processes.

@@ -208,9 +208,7 @@ class JointSymbol(NamedTuple):
     """Symbol of a joint."""
 
     rod: float = 0.0  # width of a line from place to place; points
-    pins: tuple[
-        int, ...
-    ] = ()  # indices of places with a pin; on a rail only if the joint can rotate
+    pins: tuple[int, ...] = ()  # indices of places with a pin; on a rail, if the joint rotates
     rail: Callable[[DeformedShape, Joint], Iterator[Stroke]] | None = None
     grounded: bool = True  # True if a point of the ground gets the symbol of a support
 

@@ -421,7 +421,7 @@ class RigidPlasticLaws(Response):
         self._stored = np.zeros(1)  # energy of hardening of all connectors together; J
         at = self._at["slipped"], self._at["start"]
         self._variables = [*at, self._limit, back_force, dissipated, direction_before]
-        # Motions are accumulated, because those of the nodes have round-off of the constraints
+        # The sum of the increments is stored: motions of nodes have the round-off of constraints
         self.motion, self.dissipated = self._at["start"], (dissipated,)
 
         kind = ElastoPlastic(1.0) if isinstance(law.law, ElastoPlastic) else law.law.kind()
