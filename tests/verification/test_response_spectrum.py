@@ -190,6 +190,48 @@ def test_section_forces_of_a_mode_are_those_of_a_static_run(degree):
     )
 
 
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("state", ["heated", "yielded", "with an open hinge"])
+def test_section_forces_about_a_state_are_in_equilibrium_with_reactions(state, degree):
+    """At the ends of a clamped beam whose section forces are not those of its configuration.
+
+    Both are linear functions of the mode, so they agree to round-off.
+    """
+    limit = 250e6 * 0.1 * 0.1**2 / 4  # plastic moment; N m
+    laws = {
+        "heated": {},
+        "yielded": {"fibres": ub.Fibres(ub.ElastoPlastic(250e6, kinematic=2e9), number=8)},
+        "with an open hinge": {"hinge": ub.LinearSoftening(limit, 0.025 * limit)},
+    }
+    section = ub.Section.rectangle(b=0.1, h=0.1, E=210e9, nu=0.3, rho=7850.0, **laws[state])
+    in_cells = {0.0: None, 1.0: None} if "hinge" in laws[state] else {}  # not at the ends
+    beam = ub.Beam((0, 0), (2, 0), section, cells=12, hinges=in_cells)
+    actions = {
+        "heated": [ub.ImposedStrain.temperature(beam, 1.2e-5, uniform=200.0)],
+        "yielded": [ub.PointLoad(beam.at(0.5), (0, -9.0 * limit / 2))],
+        "with an open hinge": [],
+    }
+    turned = 0.2 if state == "with an open hinge" else 0.0
+    start = ub.PrescribedDisplacement(beam.start, u=0.0, v=0.0, psi=lambda t: turned * t)
+    supports = [start, ub.Clamped(beam.end)]
+    scene = ub.Scene([beam], supports=supports, loads=actions[state])
+    mesh = ub.Mesh(degree=degree)
+    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.05, mesh=mesh, progress=False)
+    with pytest.warns(ub.ModelWarning, match="of the mass"):
+        response = ub.response_spectrum_analysis(
+            scene, lambda T: 1.0, n=1, direction=(0, 1), at=at, mesh=mesh
+        )
+    diagram = response.diagram(beam)
+    reactions = [response.reaction(support)[2] for support in supports]
+    assert np.allclose(diagram.M[[0, -1]], reactions, rtol=0, atol=1e-9 * max(reactions))
+    shown, forces = response.modes.motion(0, amplitude=1e-12, count=1), at.section_forces(beam)
+    assert np.allclose(shown.section_forces(beam), forces, rtol=0, atol=1e-8 * abs(forces).max())
+    if state == "yielded":
+        assert at.energy.lost["plastic"][-1] > 0.0
+    if state == "with an open hinge":
+        assert at.energy.lost["hinges"][-1] > 0.9 * 0.025 * limit
+
+
 def test_a_loaded_state_softens_the_frame():
     """[closed] A weight P on a storey of columns: k - 6/5 P/h, to 1/700 (P h²/EI)²."""
     weight = 1e4

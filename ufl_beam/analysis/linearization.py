@@ -145,6 +145,19 @@ class SmallMotions:
         y = splu(A.tocsc()).solve(np.append(along, np.zeros(G.shape[0])))
         return toward, float(along @ y[: len(along)])
 
+    def section_law(self) -> tuple[Array, Array]:
+        """Return b and D of the section forces b + D e of all cells for strains e.
+
+        b is (num_cells, 3 p) and D (num_cells, 9 p), at p integration points.
+        """
+        cells, degree = len(self.numbering.cells), self.numbering.mesh.degree
+        b, D = np.zeros((cells, 3 * degree)), np.zeros((cells, 9 * degree))
+        for beams in self._simulation.beams:
+            some, own_b, own_D = beams.about_state()
+            b[some] += own_b
+            D[some] += own_D
+        return b, D
+
     def support_forces(self, shapes: Array, omega: Array) -> Array:
         """Return the forces that supports exert in modes of given frequencies (rad/s); (size, n).
 

@@ -17,9 +17,8 @@ import numpy as np
 from ufl_beam.analysis.linearization import SmallMotions
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.dof_numbering import DofNumbering, velocity_at
-from ufl_beam.discretization.function_spaces import Fields, section_forces
+from ufl_beam.discretization.function_spaces import Fields, Strains
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Rich
@@ -37,7 +36,7 @@ from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.beam_forces import elastic_forms
+from ufl_beam.terms.beam_forces import inelastic_forms
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.term import InCells
 
@@ -59,12 +58,15 @@ class Shapes(Rich, ABC):
         q: Configuration of the state of the modes, ordered by ``numbering``; (size,).
         shapes: Modes, in columns; (size, n); complex if phases differ.  The largest displacement is
             1; in a mode without displacements, the largest rotation is 1.
+        section_law: b and D of the section forces b + D e of cells for strains e, at p integration
+            points; (num_cells, 3 p), (num_cells, 9 p).
     """
 
     scene: Scene
     numbering: DofNumbering
     q: Array
     shapes: Array | Complex
+    section_law: tuple[Array, Array]
 
     word = "shape"
 
@@ -112,7 +114,10 @@ class Shapes(Rich, ABC):
         states = np.ascontiguousarray(self.q + swing)
         subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
         fields, r = Fields(subdomain), np.zeros(subdomain.size)
-        form = fields.kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
+        forms = inelastic_forms(fields.element, Static())
+        form = fields.kernel(forms.around, fields.element.q1)
+        for function, values in zip((forms.b, forms.D), self.section_law, strict=True):
+            form.put(function, values)
         cell_forces = CellForces(subdomain, [InCells(lambda: form, lib.STRESS, fields.order)])
         cells = []
         for q in states:
@@ -144,9 +149,9 @@ class Shapes(Rich, ABC):
     def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()
         subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
-        forces = section_forces(Fields(subdomain))
+        strains = Strains(Fields(subdomain))
         frames: list[Any] = [
-            _Frame(self, subdomain, forces, float(k), self._scaled(k, amplitude).real)
+            _Frame(self, subdomain, strains, float(k), self._scaled(k, amplitude).real)
             for k in range(len(self))
         ]
         try:
@@ -178,12 +183,12 @@ class _Frame:
     may_break = False
 
     def __init__(
-        self, shapes: Shapes, subdomain: Subdomain, forces: Kernel, t: float, change: Array
+        self, shapes: Shapes, subdomain: Subdomain, strains: Strains, t: float, change: Array
     ) -> None:
         self.scene, self.numbering = shapes.scene, shapes.numbering
         self.comm, self.subdomain = subdomain.comm, subdomain
         self.q, self.t = shapes.q + change, t
-        self._forces, self._state, self._change = forces, shapes.q, change
+        self._shapes, self._strains, self._change = shapes, strains, change
 
     def velocities(self) -> list[Array]:
         return []
@@ -192,11 +197,12 @@ class _Frame:
         return np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
 
     def section_forces(self) -> Array:
-        """Return section forces of the mode alone, by a central difference; (num_cells, 3)."""
-        ends, ε = np.zeros((2, len(self.numbering.cells), 3)), 1e-5
-        for sign, end in zip((1.0, -1.0), ends, strict=True):
-            self._forces.add(self._state + sign * ε * self._change, end)
-        return np.asarray((ends[0] - ends[1]) / (2 * ε))
+        """Return mean section forces of the mode alone; (num_cells, 3); N, N, N m."""
+        q, (_, D), ε = self._shapes.q, self._shapes.section_law, 1e-5
+        ends = [self._strains(q + sign * ε * self._change) for sign in (1.0, -1.0)]
+        e = ((ends[0] - ends[1]) / (2 * ε)).reshape(len(D), -1, 3)
+        weights = self.numbering.mesh.point_weights
+        return np.asarray(np.einsum("p,cpij,cpj->ci", weights, D.reshape(*e.shape, 3), e))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -331,7 +337,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         raise ArgumentError("modes: nothing that can move has mass; give sections rho or rhoA")
     warn_of_masses(scene)
     exponents, shapes = small.exponents(n)
-    return Modes(scene, small.numbering, small.q, shapes, exponents)
+    return Modes(scene, small.numbering, small.q, shapes, small.section_law(), exponents)
 
 
 def buckling(
@@ -387,7 +393,8 @@ def buckling(
             "nodes instead of along beams, give at= a state closer to buckling, follow the "
             "path with ub.follow, or find where a frequency of modes(..., at=) vanishes"
         )
-    return Buckling(scene, small.numbering, small.q, shapes, factors, errors)
+    law = small.section_law()
+    return Buckling(scene, small.numbering, small.q, shapes, law, factors, errors)
 
 
 def _checked_count(what: str, scene: Scene, n: int, at: Solution | None, mesh: Mesh | None) -> int:

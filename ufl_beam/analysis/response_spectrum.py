@@ -38,7 +38,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.section_forces import Diagram, ForcesAlongCells
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.beam_forces import elastic_forms
+from ufl_beam.terms.beam_forces import inelastic_forms
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.term import InCells
 
@@ -286,7 +286,7 @@ def cqc(omega: Array, damping: float) -> Array:
 def _linear_forces(element: Element) -> tuple[ufl.Form, fem.Function]:
     """Return the forces of cells, linearized about a configuration, and this configuration."""
     about = element.configuration()
-    work = ufl.replace(elastic_forms(element, Static()).work, {element.q1: about})
+    work = ufl.replace(inelastic_forms(element, Static()).around, {element.q1: about})
     return ufl.derivative(work, about, element.q1), about
 
 
@@ -304,6 +304,9 @@ def _resultants(basis: Modes, sizes: Array) -> Array:
         ],
     )
     stress.set(about, basis.q)
+    forms = inelastic_forms(fields.element, Static())
+    for function, values in zip((forms.b, forms.D), basis.section_law, strict=True):
+        stress.put(function, values)
     peaks = []
     for shape, size, omega in zip(basis.shapes.real.T, sizes, basis.omega, strict=True):
         x = np.ascontiguousarray(size * shape)

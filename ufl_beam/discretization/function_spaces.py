@@ -23,7 +23,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import ModelError, shorten
-from ufl_beam.mechanics.functional import kinetic_energy, resultants
+from ufl_beam.mechanics.functional import kinetic_energy
 from ufl_beam.mechanics.kinematics import Axis, strain
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint
@@ -288,21 +288,6 @@ class Strains:
         strains = np.zeros(self.shape)
         self.kernel.add(q, strains)
         return strains
-
-
-@cached_forms
-def _section_forces(element: Element) -> ufl.Form:
-    r = resultants(strain(element.q1, element.axis), element.stiffness)
-    return (
-        ufl.dot(r, ufl.TestFunction(element.stiffness.function_space))
-        / element.axis.h
-        * element.dx(1)
-    )
-
-
-def section_forces(fields: Fields) -> Kernel:
-    """Compile the mean (N, V, M) of elastic cells in a configuration; N, N, N m; P(7)."""
-    return fields.kernel(_section_forces(fields.element), fields.element.q1, several=False)
 
 
 # -- the cells as a mesh of DOLFINx ----------------------------------------------------------------

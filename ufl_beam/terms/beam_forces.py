@@ -8,6 +8,7 @@ works of the tangent and of its derivative.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -161,6 +162,14 @@ class Cells(Term):
             kernel.set(forms[motion], values)
         return kernel
 
+    @abstractmethod
+    def about_state(self) -> tuple[Index, Array, Array]:
+        """Return cells (numbers of the scene), and b and D of b + D e about the accepted state.
+
+        b + D e are the section forces for strains e at p integration points; b is (num_cells, 3 p),
+        D (num_cells, 9 p).
+        """
+
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
         self._at(q1, "matrix", u=u).add(q1, self._A.data)
@@ -249,6 +258,16 @@ class ElasticBeams(FormForces, Cells):
         imposed.enter_forms(kernels, work, imposed_at_points(element))
         if self.predicted is not None:
             fill(self.predicted, imposed=imposed.strains)
+
+    def about_state(self) -> tuple[Index, Array, Array]:
+        """See the base class."""
+        fields = self._fields
+        C, n = fields.section_values(fields.element.stiffness), len(fields.order)
+        D = np.repeat((C[:, None] * np.eye(3))[:, None], fields.element.degree, axis=1)
+        b = np.zeros((n, fields.element.degree, 3))
+        if self.imposed is not None:
+            b -= C[:, None] * self.imposed.strains[:, :, 1]
+        return fields.subdomain.cells[fields.order], b.reshape(n, -1), D.reshape(n, -1)
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
         if self.imposed is None:
@@ -410,11 +429,7 @@ class InelasticBeams(Cells):
         return strains if self.imposed is None else strains - self.imposed.now
 
     def about_state(self) -> tuple[Index, Array, Array]:
-        """Return cells (numbers of the scene), and b and D of b + D e about the accepted state.
-
-        b is (num_cells, 3 p), D (num_cells, 9 p), at p integration points.  D is for a step with
-        the length of the last step.
-        """
+        """See the base class; D is for a step with the length of the last step."""
         strains, D = self.points.tangent()
         if self.imposed is not None:
             strains += self.imposed.now
