@@ -7,7 +7,7 @@ Run on an idle machine, one core::
 
 Pairs: the flying beam elastic and yielding in every cell (8, 512 and 4096 cells, the last also over
 300 steps); a frame of 50 cells, one of which can hinge: without and closed, closed and opening; 100
-cells with 200 fibres each beside resultants, and with 40 fibres of MenegottoPinto beside
+cells with 200 fibres each beside resultants, and with 40 fibres of steel and concrete laws beside
 ElastoPlastic.  Each pair alternates, the figures are iterations per step, and medians of
 microseconds per Newton iteration and per step over the whole time loop; ratios are those of the
 medians.  One JSON line per pair goes to ``benchmarks/results/bench_inelastic.jsonl``.
@@ -54,6 +54,12 @@ def cantilever(**section):
 
 LAW = ub.ElastoPlastic(yield_limit=1.0, kinematic=10.0)
 FIBRES = ub.Fibres(ub.ElastoPlastic(250e6, kinematic=2e9), number=200)
+TENSION = ub.Softening(250e6, 5e6)
+LAWS = {
+    "MenegottoPinto": ub.MenegottoPinto(250e6, 0.01),
+    "KentPark": ub.KentPark(250e6, residual=200e6, ultimate=0.05, tension=TENSION),
+    "Mander": ub.Mander(500e6, strain=0.005, tension=TENSION),
+}
 PAIRS = {  # name: (scene without, scene with, steps, dt)
     "8 cells, all yield": (flying_beam(8), flying_beam(8, bending=LAW), 500, 0.01),
     "512 cells, all yield": (flying_beam(512), flying_beam(512, bending=LAW), 60, 0.01),
@@ -67,12 +73,15 @@ PAIRS = {  # name: (scene without, scene with, steps, dt)
         100,
         1e-3,
     ),
-    "40 fibres of Menegotto-Pinto beside bilinear": (
-        cantilever(fibres=ub.Fibres(ub.ElastoPlastic(250e6, kinematic=2e9), number=40)),
-        cantilever(fibres=ub.Fibres(ub.MenegottoPinto(250e6, 0.01), number=40)),
-        100,
-        1e-3,
-    ),
+    **{
+        f"40 fibres of {name} beside bilinear": (
+            cantilever(fibres=ub.Fibres(ub.ElastoPlastic(250e6, kinematic=2e9), number=40)),
+            cantilever(fibres=ub.Fibres(law, number=40)),
+            100 if name == "MenegottoPinto" else 20,  # later the beam breaks
+            1e-3,
+        )
+        for name, law in LAWS.items()
+    },
 }
 
 

@@ -5,6 +5,7 @@ Some have an option for that.  For the others, classes and functions of the pack
 while a simulation is built.
 """
 
+import math
 from contextlib import ExitStack, contextmanager
 from functools import cache
 from typing import Any, NamedTuple
@@ -20,6 +21,7 @@ from ufl_beam.simulation import stepper
 from ufl_beam.simulation.stepper import Prediction
 from ufl_beam.solvers import beam_elimination, newton
 from ufl_beam.solvers.substructuring import Klu
+from ufl_beam.terms import material_points
 
 plan = beam_elimination._plan
 
@@ -99,6 +101,7 @@ class Variant(NamedTuple):
 
 
 CELL_BY_CELL = (compiled_forms, "interleaved", nothing)
+POINT_BY_POINT = (material_points, "BATCH", math.inf)
 NO_CHAINS = (beam_elimination, "_plan", without_chains)
 NO_FRONTS = (beam_elimination, "Multifrontal", klu)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
@@ -112,7 +115,7 @@ TANGENTS, VELOCITY = "a tangent in each iteration", "guess at the last velocity"
 VARIANTS = {
     SHIPPED: Variant(),
     PETSC: Variant(newton={"petsc": {"snes_type": "newtonls"}}),
-    SCALAR: Variant((CELL_BY_CELL,)),
+    SCALAR: Variant((CELL_BY_CELL, POINT_BY_POINT)),
     WHOLE: Variant((NO_CHAINS,)),
     LEFT: Variant((NO_FRONTS,)),
     TANGENTS: Variant((ALL_TANGENTS,)),

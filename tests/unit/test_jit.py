@@ -33,6 +33,7 @@ static inline void tabulate(lanes *restrict A, const lanes *restrict w, const la
 {
   A[0] += PICK(w[0] < x[0], lanes_sin(w[0]) + lanes_cos(x[0]), lanes_fabs(c[0]));
   A[0] += lanes_sqrt(w[0]) * lanes_pow(w[0], -2);
+  A[0] += lanes_exp(w[0]) * lanes_log(x[0]) * lanes_power(w[0], x[0]) * quotient(w[0], x[0], c[0]);
 }
 """
 
@@ -45,19 +46,24 @@ def gcc(*arguments, **options):
         pytest.skip("needs gcc")
 
 
-def lanes_source():
-    """The loop of assembly_simd.c with a kernel that asks for every function of assembly_simd.h."""
+def lanes_source(loop):
+    """The loop in a file with a kernel that asks for every function of assembly_simd.h."""
     names = "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "UNKNOWNS"
     defined = ["#define LANES 4", "#define AT 0", *(f"#define {name} 1" for name in names)]
     head = [jit.HEADERS, jit.DECLARATIONS, *defined, jit.text("assembly_simd.h")]
     # The functions that Python calls are declared in no header: cffi reads them as text.
-    return "\n".join([*head, KERNEL, simd_kernels.INTERFACE, jit.text("assembly_simd.c")])
+    texts = jit.text("check_simd.c"), jit.text(loop)
+    return "\n".join([*head, KERNEL, simd_kernels.INTERFACE, *texts])
 
 
 @pytest.mark.parametrize(
     ("source", "flags"),
-    [(lambda: c_library._SOURCE, ["-O3"]), (lanes_source, ["-O2", "-march=native"])],
-    ids=["loops", "lanes"],
+    [
+        (lambda: c_library._SOURCE, ["-O3"]),
+        (lambda: lanes_source("assembly_simd.c"), ["-O2", "-march=native"]),
+        (lambda: lanes_source("points_simd.c"), ["-O2", "-march=native"]),
+    ],
+    ids=["loops", "cells", "points"],
 )
 def test_the_compiler_warns_of_nothing(tmp_path, source, flags):
     """The compiler finds nothing to warn of, at the level of optimisation of each library."""

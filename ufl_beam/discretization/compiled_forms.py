@@ -27,7 +27,7 @@ from ufl_beam.caches import cached_forms as cached_forms
 from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib, view_pointer
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
-from ufl_beam.compiled.simd_kernels import BATCH, in_batches, interleaved
+from ufl_beam.compiled.simd_kernels import BATCH, in_batches, interleaved, point_loop
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
 
@@ -317,12 +317,26 @@ class Pointwise:
 
     def compile(self, *outputs: Expr) -> Any:
         """Compile a C function of the outputs, valid as long as this object exists."""
+        return self._compiled(outputs)[0]
+
+    def compile_with_loop(self, *outputs: Expr) -> tuple[Any, Any]:
+        """Compile as :meth:`compile`, and a loop over points, ``answer_loop`` of loops.h.
+
+        The loop is null if it would not be faster.
+        """
+        function, source = self._compiled(outputs)
+        sizes = len(outputs), len(self.at), 0
+        address = point_loop(source, int(ffi.cast("intptr_t", function)), sizes)
+        return function, ffi.cast("answer_loop *", address or 0)
+
+    def _compiled(self, outputs: Sequence[Expr]) -> tuple[Any, Path]:
+        """Return a C function of the outputs, and the C file that FFCx wrote for it."""
         outputs = _with_shared_nodes(outputs)
         z = ufl.TestFunction(self._values(len(outputs)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
-        form, _ = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)
+        form, source = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)
         self._alive.append(form)
-        return tabulator(form)
+        return tabulator(form), source
 
     def _values(self, n: int) -> fem.FunctionSpace:
         element = basix.ufl.quadrature_element("interval", value_shape=(n,), degree=1)

@@ -31,6 +31,7 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
+from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import (
@@ -105,6 +106,7 @@ class PointForms:
             variables has more outputs, see improve_sized in material_laws.c.
         resistance: Resistance of the discontinuity, and its derivative with respect to the growth.
         end: ``point_output`` of loops.h, stresses, and changes of the variables.
+        law_loop, end_loop: Loops over points, or null, see :meth:`Pointwise.compile_with_loop`.
         own: Dissipation of a law that must dissipate, and the size of its terms; else null.
     """
 
@@ -143,9 +145,12 @@ class PointForms:
                 stored = ufl.as_ufl(equations.stored(at))
                 slopes = tuple(self._derivatives((stored,), unknown))
                 self.own = pointwise.compile(*equations.own_dissipation(at, slopes))
-        self.law = pointwise.compile(*outputs)
+        self.law, self.law_loop = pointwise.compile_with_loop(*outputs)
+        if law.solves:
+            self.law_loop = ffi.NULL  # each point iterates
         end = in_order("point_output", dict(zip(End._fields, energies, strict=False)))
-        self.end = pointwise.compile(*end, *stress, *changes)
+        self.end, self.end_loop = pointwise.compile_with_loop(*end, *stress, *changes)
+        self.most = max(len(outputs), len(end) + len(stress) + len(changes))
 
     @cached_property
     def elastic(self) -> Any:
@@ -264,6 +269,9 @@ class Points:
             e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.recorded, sum=self.sums,
             own=forms.own, over=self.over, unlike=np.zeros(3), search=self._search,
         )  # fmt: skip
+        if per_cell >= BATCH:
+            answers = np.zeros(per_cell * forms.most)
+            fill(self.c, law_loop=forms.law_loop, end_loop=forms.end_loop, answers=answers)
         if predicts and self._components == 1 and self._yields:
             lines = np.zeros((2, cells, per_cell, int(lib.LINE)))
             fill(self.c, line=lines[0], predicted=lines[1])
@@ -355,7 +363,7 @@ class Points:
         known, law = self.committed.copy(), (self.c.law, self.c.solves)
         with self._unchanged():
             self["traction"][:] = np.inf
-            self.c.law, self.c.solves = self._forms.elastic, False
+            self.c.law, self.c.law_loop, self.c.solves = self._forms.elastic, ffi.NULL, False
             self.return_map(self._e0)
             lib.keep_tangents(self.c)
         self.c.law, self.c.solves = law
@@ -425,7 +433,7 @@ class Points:
             spent = np.isfinite(limit) & (borne <= EXHAUSTED * limit)
             self["stiffness"][:, breaking] *= np.where(spent, FREED_STIFFNESS, 1.0)
         self["traction"][:] = np.inf
-        self.c.law, self.c.solves = self._forms.elastic, False
+        self.c.law, self.c.law_loop, self.c.solves = self._forms.elastic, ffi.NULL, False
         if self.committed is not None:
             self.committed[:] = np.nan
             self.start_tangents()

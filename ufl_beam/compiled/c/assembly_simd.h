@@ -5,6 +5,7 @@
 /* Vectors at any address of numbers, as NumPy allocates them. */
 typedef double lanes __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
 typedef int64_t mask __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
+typedef uint64_t bits __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
 
 #define ALL(x) ((lanes){0} + (x))
 #if LANES == 8
@@ -14,7 +15,8 @@ typedef int64_t mask __attribute__((vector_size(8 * LANES), aligned(8), may_alia
 #endif
 #define PICK(m, a, b) ((lanes)(((m) & (mask)ALL(a)) | (~(m) & (mask)ALL(b))))
 
-/* The polynomials of sine and cosine are those of fdlibm, k_sin.c and k_cos.c:
+/* The polynomials of sine, cosine, exponential and logarithm are those of fdlibm, k_sin.c, k_cos.c,
+ * e_exp.c and e_log.c:
  *
  * Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.
  *
@@ -49,6 +51,51 @@ static inline lanes trigonometric(lanes x, int64_t quarter)
 static inline lanes lanes_sin(lanes x) { return trigonometric(x, 0); }
 static inline lanes lanes_cos(lanes x) { return trigonometric(x, 1); }
 static inline lanes lanes_fabs(lanes x) { return (lanes)((mask)x & INT64_MAX); }
+
+/* exp(x), nearly always accurate to the last digit. The nearest multiple of log(2) is subtracted in
+ * two parts. Two factors, because the power of two of the result may be out of the range of one. */
+static inline lanes lanes_exp(lanes x)
+{
+  const lanes low = PICK(x < -760, ALL(-760), x), within = PICK(low > 720, ALL(720), low);
+  const lanes k = (within * 0x1.71547652b82fep0 + 0x1.8p52) - 0x1.8p52;
+  const lanes high = within - k * 6.93147180369123816490e-01, rest = k * 1.90821492927058770002e-10;
+  const lanes r = high - rest, z = r * r;
+  const lanes c = r - z * (1.66666666666666019037e-01 + z * (-2.77777777770155933842e-03 + z *
+    (6.61375632143793436117e-05 + z * (-1.65339022054652515390e-06 + z *
+    4.13813679705723846039e-08))));
+  const lanes y = 1 - ((rest - r * c / (2 - c)) - high), half = (k / 2 + 0x1.8p52) - 0x1.8p52;
+#define POWER_OF_TWO(n) ((lanes)((mask)((n) + (0x1.8p52 + 1023)) << 52))
+  return y * POWER_OF_TWO(half) * POWER_OF_TWO(k - half);
+#undef POWER_OF_TWO
+}
+
+/* log(x), nearly always accurate to the last digit: x is 2^k (1 + f), 1 + f next to 1. */
+static inline lanes lanes_log(lanes x)
+{
+  const mask tiny = x < DBL_MIN, beyond = ~(x < INFINITY);
+  const mask scaled = (mask)PICK(tiny, x * 0x1p54, x), above = scaled - 0x3fe6a09e667f3bcd;
+  const bits exponent = (bits)(above + (1023LL << 52)) >> 52;
+  const lanes near = (lanes)(exponent | (uint64_t)0x433LL << 52) - (0x1p52 + 1023);
+  const lanes k = near - PICK(tiny, ALL(54), ALL(0));
+  const lanes f = (lanes)(scaled - (above & (0xfffLL << 52))) - 1, s = f / (2 + f), z = s * s;
+  const lanes r = z * (6.666666666666735130e-01 + z * (3.999999999940941908e-01 + z *
+    (2.857142874366239149e-01 + z * (2.222219843214978396e-01 + z * (1.818357216161805012e-01 + z *
+    (1.531383769920937332e-01 + z * 1.479819860511658591e-01))))));
+  const lanes half = f * f / 2;
+  const lanes y = k * 6.93147180369123816490e-01 -
+    ((half - (s * (half + r) + k * 1.90821492927058770002e-10)) - f);
+  const lanes defined = PICK(x < 0, ALL(NAN), PICK(x == 0, ALL(-INFINITY), y));
+  return PICK(beyond, x, defined);
+}
+
+/* x^y, with a relative error of about y log(x) last digits. */
+static inline lanes lanes_power(lanes x, lanes y)
+{
+  lanes z = lanes_exp(y * lanes_log(x));
+  for (int l = 0; l < LANES; ++l)
+    if (!(x[l] > 0)) z[l] = pow(x[l], y[l]);
+  return z;
+}
 
 static inline lanes lanes_sqrt(lanes x)
 {

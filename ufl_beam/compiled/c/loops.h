@@ -223,6 +223,9 @@ enum { LINE = 3 }; /* strain, stress and slope of the tangent line of a point */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 enum { STIFFEST = 2 };
 
+/* Computes the answers of several points at once, from the inputs of each, point after point. */
+typedef void (answer_loop)(int number, const double *w, double *answers);
+
 /* Points in cross-sections, `of_cell` in each of `cells` sections, with `width` numbers of each point
  * in w; see material_points.py. The sections are at the integration points of cells, one cell after
  * the other; a spring has one section. */
@@ -232,6 +235,8 @@ typedef struct {
    * derivatives, see solve_law. resistance: of a discontinuity, and its derivative by the growth.
    * end: outputs at the end of a step, see point_output. */
   kernel *law, *resistance, *end;
+  answer_loop *law_loop, *end_loop; /* the same for all points of a section; or none */
+  double *answers;                  /* space for their results */
   kernel *own; /* dissipation of a law that must not give energy, and its size; or none */
   int solves, components, variables, strain;
   int cells, of_cell, width;

@@ -55,7 +55,8 @@ static double follow_prediction(const points *p, double *w, double linear, const
   if (line && !(fabs(first) > elastic * (ALIKE * fabs(start - line[0]) + DIGITS * fabs(start)))) return 0;
   if (p->solves) memcpy(kept, z, p->variables * sizeof *z);
   *strain = linear;
-  answer(p, w, now);
+  if (linear == start) memcpy(now, s, sizeof now);
+  else answer(p, w, now);
   const double predicted = line ? line[1] + line[2] * (linear - line[0]) : now[0];
   double excess = now[0] - predicted;
   for (int i = 0; i < 20 && fabs(excess) > 1e-3 * fabs(first); ++i) {
@@ -89,7 +90,7 @@ void respond(points *p)
 {
   double s[3 + 9], *w = p->w, *r = p->r, *D = p->D, *line = p->line;
   const double *e0 = p->e0, *e1 = p->e1, *predicted = p->predicted;
-  const int d = p->components;
+  const int d = p->components, answers = d * (1 + d);
   *p->over = 0;
   memset(p->unlike, 0, 3 * sizeof *p->unlike);
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
@@ -98,12 +99,17 @@ void respond(points *p)
       r[k] = p->rest[k] * ((1 - p->theta) * e0[k] + p->theta * e1[k]);
       D[4 * k] = p->rest[k] * p->theta;
     }
-    for (int i = 0; i < p->of_cell; ++i, w += p->width) {
-      double *strain = w + p->strain;
+    for (int i = 0; i < p->of_cell; ++i) {
+      double *at = w + i * p->width, *strain = at + p->strain;
       if (d == 1) find_strains(1, p->B + 3 * i, e1, strain);
       else find_strains(d, p->B + 3 * d * i, e1, strain);
-      w[GROWTH] = w[DIRECTION] = 0;
-      answer(p, w, s);
+      at[GROWTH] = at[DIRECTION] = 0;
+    }
+    if (p->law_loop) p->law_loop(p->of_cell, w, p->answers);
+    for (int i = 0; i < p->of_cell; ++i, w += p->width) {
+      double *strain = w + p->strain;
+      if (p->law_loop) memcpy(s, p->answers + answers * i, answers * sizeof *s);
+      else answer(p, w, s);
       const int over = fabs(s[0]) > w[TRACTION]; /* P(51) */
       if (over && p->search[HOLD] && w[FLOWS] == CLOSED && w[TRACTION] > 0) {
         *p->over = fmax(*p->over, fabs(s[0]) / w[TRACTION] - 1);
@@ -331,10 +337,9 @@ void keep_tangents(const points *p)
  */
 void commit(points *p)
 {
-  double s[POINT_OUTPUTS + 3 + MOST_VARIABLES], *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
+  double own[POINT_OUTPUTS + 3 + MOST_VARIABLES], *s = own, *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
   const double *e1 = p->e1, *rest = p->rest, *length = p->length, *weight = p->weight;
-  const double *stress = s + POINT_OUTPUTS, *changes = stress + p->components;
-  const int d = p->components;
+  const int d = p->components, answers = POINT_OUTPUTS + d + p->variables;
   memset(sum, 0, POINT_SUMS * sizeof *sum);
   for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, kept += POINT_KEPT) {
     double plastic = 0, broken = 0;
@@ -345,10 +350,13 @@ void commit(points *p)
       sum[3] += rest[k] * e1[k] * e1[k] / 2 * length[c];
       e0[k] = e1[k];
     }
+    if (p->end_loop) p->end_loop(p->of_cell, w, p->answers);
     for (int i = 0; i < p->of_cell; ++i, w += p->width) {
       const double volume = weight[i] * length[c];
       double *strain = w + p->strain;
-      ask(p->end, w, POINT_OUTPUTS + d + p->variables, s);
+      if (p->end_loop) s = p->answers + answers * i;
+      else ask(p->end, w, answers, s);
+      const double *stress = s + POINT_OUTPUTS, *changes = stress + d;
       for (int a = 0; a < d; ++a) strain[d + a] = strain[a];
       for (int j = 0; j < p->variables; ++j) strain[3 * d + j] += changes[j];
       w[JUMP] += w[DIRECTION] * w[GROWTH];
