@@ -30,6 +30,7 @@ from ufl_beam.reference.cell_forms import (
     CellForce,
     Cells,
     Force,
+    Form,
     Response,
     Setting,
     cell_dofs,
@@ -308,20 +309,12 @@ class Inertia(MatrixForce):
             self.last_dt = float(last[0])
 
 
-class RayleighForce(MatrixForce):
-    """Rayleigh damping: (a0 M + a1 K) v, with the stiffness K of the undeformed beams, P(92)."""
+class DampingForce(MatrixForce):
+    """Base of Rayleigh damping, (a0 M + a1 K) v, P(92)."""
 
     row = "velocity"
-
-    def __init__(self, damping: Rayleigh, setting: Setting, inertia: Inertia) -> None:
-        self.inertia, self._damping, cells = inertia, damping, inertia.mass.cells
-        element = cells.element
-        rest, v = element.configuration(), ufl.TrialFunction(element.space)
-        e, w_e = (virtual_strain(rest, x, element.axis) for x in (v, element.w))
-        K = virtual_work(resultants(e, element.stiffness), w_e) * element.dx(1)
-        self._stiffness = cells.form(ufl.action(K, element.q1))
-        matrix = damping.mass * inertia.matrix + damping.stiffness * cells.form(K).assembled()
-        super().__init__(setting, inertia.scheme, matrix)
+    _damping: Rayleigh
+    _action: Form  # product of K and the rate on cells
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Enter the energy lost by damping in the ledger."""
@@ -329,18 +322,30 @@ class RayleighForce(MatrixForce):
         mass, damping = self.inertia.mass, self._damping
         by_mass = mass.on_nodes(self.rate)
         # mass.on_nodes has set q1 of this form to the rate.
-        by_stiffness = mass.cells.on_nodes("stress", self._stiffness.assembled())
+        by_stiffness = mass.cells.on_nodes("stress", self._action.assembled())
         self.on_nodes = damping.mass * by_mass + damping.stiffness * by_stiffness
 
 
-class TangentRayleighForce(MatrixForce):
+class RayleighForce(DampingForce):
+    """Rayleigh damping with the stiffness K of the undeformed beams."""
+
+    def __init__(self, damping: Rayleigh, setting: Setting, inertia: Inertia) -> None:
+        self.inertia, self._damping, cells = inertia, damping, inertia.mass.cells
+        element = cells.element
+        rest, v = element.configuration(), ufl.TrialFunction(element.space)
+        e, w_e = (virtual_strain(rest, x, element.axis) for x in (v, element.w))
+        K = virtual_work(resultants(e, element.stiffness), w_e) * element.dx(1)
+        self._action = cells.form(ufl.action(K, element.q1))
+        matrix = damping.mass * inertia.matrix + damping.stiffness * cells.form(K).assembled()
+        super().__init__(setting, inertia.scheme, matrix)
+
+
+class TangentRayleighForce(DampingForce):
     """Rayleigh damping with the tangent stiffness of the accepted state.
 
     The stiffness has the tangents of sections without negative eigenvalues, at the configuration at
     the beginning of the step.
     """
-
-    row = "velocity"
 
     def __init__(
         self, damping: Rayleigh, setting: Setting, inertia: Inertia,
@@ -353,7 +358,7 @@ class TangentRayleighForce(MatrixForce):
         self._D, v = element.at_points(3, 3), ufl.TrialFunction(element.space)
         e, w_e = (virtual_strain(element.q0, x, element.axis) for x in (v, element.w))
         K = virtual_work(ufl.dot(self._D, e), w_e) * element.dx(1)
-        self._stiffness, self._product = cells.form(K), cells.form(ufl.action(K, element.q1))
+        self._stiffness, self._action = cells.form(K), cells.form(ufl.action(K, element.q1))
         C = element.stiffness.x.array.reshape(-1, 1, 3, 1) * np.eye(3)
         order = cell_dofs(element.stiffness.function_space)[:, 0] // 3
         self._sections = np.repeat(C[order], len(cells.weights), axis=1)
@@ -379,12 +384,7 @@ class TangentRayleighForce(MatrixForce):
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Enter the energy lost by damping in the ledger, and accept new tangents."""
-        self.ledger.lost["damping"] += float(s @ (self.matrix @ s)) / step.dt
-        mass, damping = self.inertia.mass, self._damping
-        by_mass = mass.on_nodes(self.rate)
-        # mass.on_nodes has set q1 of this form to the rate.
-        by_stiffness = mass.cells.on_nodes("stress", self._product.assembled())
-        self.on_nodes = damping.mass * by_mass + damping.stiffness * by_stiffness
+        super().accept(step, q1, s)
         for beams, tangents in zip(self._yielding, self._tangents, strict=True):
             tangents[:] = positive(beams.points.end_tangents, beams.points.elastic())
 
