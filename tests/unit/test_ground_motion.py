@@ -102,6 +102,8 @@ TIMED = "0.00 1\n0.01 2\n0.02 3\n0.03 4\n0.04 5\n"
             ", line 6: a time and an acceleration are expected",
         ),
         ("1,,2\n", {"unit": "g", "dt": 0.1}, ", line 1: no numbers: '1,,2'"),
+        ("1,2\n3,\n", {"unit": "g", "dt": 0.1}, ", line 2: a value is missing here"),
+        (",1\n", {"unit": "g", "dt": 0.1}, ", line 1: no numbers"),
         (TIMED, {"unit": "g", "dt": 0.01}, ": the first column has times with this step; omit dt="),
         ("0 1\n", IN_G, ": a record has at least two lines"),
         ("# nothing\n", IN_G, ": the file has no numbers"),
@@ -201,9 +203,8 @@ def test_the_filter_removes_long_waves():
 
 def test_shorter_steps_are_the_same_function():
     fine = RECORD.resampled(RECORD.dt / 4)
-    for t in np.linspace(0.0, RECORD.duration, 57):
+    for t in np.linspace(0.0, RECORD.duration + 2 * RECORD.dt, 57):
         assert fine.acceleration(t) == pytest.approx(RECORD.acceleration(t), abs=1e-13)
-        # The end of the record falls to zero in a shorter step, after the last of these times.
         assert fine.displacement(t) == pytest.approx(RECORD.displacement(t), abs=1e-12)
 
 
@@ -231,3 +232,22 @@ def test_rayleigh_damping_has_the_ratios():
         damping = ub.Rayleigh.with_ratios(ratios, (5.0, 40.0))
         at = [damping.mass / (2 * w) + damping.stiffness * w / 2 for w in (5.0, 40.0)]
         np.testing.assert_allclose(at, ratios, rtol=1e-14)
+
+
+def test_exponents_may_begin_with_d(written):
+    """As Fortran writes them."""
+    text = NEW.replace("   .0100 SEC", " 0.5D-02 SEC").replace(".3000000E+00", ".3000000D+00")
+    expected = ub.GroundMotion.read(written(NEW))
+    found = ub.GroundMotion.read(written(text))
+    assert found.dt == 0.005
+    assert found.values == expected.values
+
+
+def test_lines_may_all_end_with_a_comma(written):
+    file = written("1,2,\n3,4,\n")
+    assert ub.GroundMotion.read(file, unit="m/s2", dt=0.1).values == (1.0, 2.0, 3.0, 4.0)
+
+
+def test_a_record_too_short_for_the_filter_is_refused():
+    with pytest.raises(ub.ModelError, match="has 4 values; a filter needs more than 15"):
+        ub.GroundMotion(0.01, [0, 1, 2, 1.0]).corrected(highpass=1.0)

@@ -2,6 +2,7 @@
 """Modes and buckling: what is asked of them, and that it does not matter how."""
 
 import math
+from dataclasses import replace
 
 from mpi4py import MPI
 
@@ -490,3 +491,26 @@ def test_errors_of_factors_estimate_the_change_of_factors():
     assert alone.errors[0] < 1e-3
     change = 1 - across.factors[0] / alone.factors[0]
     assert change < across.errors[0] < 3 * change
+
+
+def test_masses_of_moving_loads_are_left_out():
+    """They would be damping, because their tangent grows with the square of the frequency."""
+    found, bare = [], cantilever()
+    for mass in (0.0, 2000.0):
+        axle = ub.MovingLoad(bare["beam"], lambda t: 1.3, force=(0, -2e-3), mass=mass)
+        scene = replace(bare, loads=[axle])
+        at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
+        found.append(ub.modes(scene, 3, at=at).exponents)
+    assert np.allclose(*found, rtol=1e-12)
+
+
+def test_buckling_about_a_state_needs_loads_that_grow():
+    section = ub.Section(EA=4e9, GA=1.5e9, EI=5e7, rhoA=300.0)
+    beam = ub.Beam((0, 0), (3, 0), section, cells=8)
+    load = ub.PointLoad(beam.end, force=(-1e7, 0), amplitude=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), ub.Roller(beam.end)], loads=[load])
+    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
+    with pytest.raises(ub.ArgumentError, match="so that nothing grows"):
+        ub.buckling(scene, 1, at=at)
+    whole, rest = ub.buckling(scene, 1).factors[0], ub.buckling(scene, 1, t=2.0, at=at).factors[0]
+    assert 1.0 + rest == pytest.approx(whole, rel=1e-2)

@@ -226,3 +226,12 @@ def test_limits_that_are_missing():
         ub.interaction_diagram(rectangle(), {steel: (0.01, 0.01)})
     with raises("the section has no fibres"):
         ub.interaction_diagram(ub.Section(EA=1.0, GA=1.0, EI=1.0), (0.01, 0.01))
+
+
+def test_moments_at_both_ends_of_an_interaction_diagram():
+    section = ub.Section.rectangle(
+        b=0.1, h=0.2, E=210e9, nu=0.3, fibres=ub.Fibres(ub.ElastoPlastic(250e6), number=8)
+    )
+    diagram = ub.interaction_diagram(section, (0.01, 0.01))
+    for N in (diagram.N.min(), diagram.N.max()):
+        assert np.allclose(diagram.moments(N), 0.0, atol=1e-6 * diagram.M.max())

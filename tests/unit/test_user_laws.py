@@ -312,3 +312,40 @@ def test_hinges_of_zero_length_have_no_elastic_stiffness():
         ub.Beam((0, 0), (1, 0), section(), hinges={0.5: LAW})
     with pytest.raises(ub.ArgumentError, match="PowerLaw is the law of an elastic stiffness"):
         ub.RigidPlastic(LAW)
+
+
+@dataclass(frozen=True)
+class Quarter(ub.MaterialLaw):
+    """A quarter of the stiffness, half in tension, by whole numbers or by others."""
+
+    whole: ClassVar[type] = int
+
+    def stress(self, strain, state):
+        factor = f.where(f.below(strain, 0.0), self.whole(1), self.whole(2)) / 4
+        root = f.sqrt(f.where(f.below(strain, 0.0), self.whole(2), self.whole(3)))
+        return self.C * strain * factor * root
+
+    def elastic_energy(self, strain, state):
+        return self.stress(strain, state) * strain / 2
+
+
+class QuarterInFloats(Quarter):
+    whole = float
+
+
+def test_whole_numbers_are_numbers():
+    """In C, 2/4 would be zero, and a root of a whole number a whole number."""
+    ends = []
+    for law in (Quarter(), QuarterInFloats()):
+        layers = ub.Section.rectangle(b=0.1, h=0.1, E=1e9, nu=0.3, fibres=ub.Fibres(law, number=4))
+        beam = ub.Beam((0, 0), (1, 0), layers, cells=2)
+        pull = ub.PrescribedDisplacement(beam.end, u=lambda t: 1e-3 * t)
+        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
+        ends.append(run.section_forces(beam)[0, 0] / (layers.EA * 1e-3))
+    assert np.allclose(ends, 3**0.5 / 2, rtol=1e-12)
+
+
+def test_a_field_that_is_not_a_number_is_refused():
+    with pytest.raises(ub.ModelError, match="PowerLaw: k0 = nan is not a number"):
+        section(bending=PowerLaw(M0=100.0, k0=float("nan"), n=5.0))

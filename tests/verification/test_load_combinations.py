@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Load combinations: closed forms of a cantilever, runs of the scene, combinations that fail."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers import raises, run
@@ -63,7 +65,7 @@ def test_combinations_are_runs_of_the_scene():
         load = ub.PointLoad(hinged.end, (0, -6e4), amplitude=ub.Table((0, 1), (0, factor)))
         alone = ub.Scene([hinged], supports=scene.supports, loads=[ub.Gravity(), load])
         same = run(alone, ub.Static(), dt=0.2, progress=False)
-        np.testing.assert_array_equal(found.solutions[name].q[-1], same.q[-1])
+        np.testing.assert_allclose(found.solutions[name].q[-1], same.q[-1], rtol=1e-10, atol=1e-15)
     drop = found.envelope(lambda one: one.displacement(hinged.end)[-1, 1])
     assert drop.low_by == "all"
     assert drop.low < 2.5 * drop.high  # elastic: 2
@@ -92,3 +94,25 @@ def test_mistakes_are_named():
         ub.load_combinations(SCENE, CASES, {"A": {"wnd": 1.0}})
     with raises("cases['spin']: forces of a RotatingFrame have no factor"):
         ub.load_combinations(SCENE, {"spin": [ub.RotatingFrame(rate=1.0)]}, {"A": {"spin": 1.0}})
+
+
+def test_dampers_and_damping_bear_nothing():
+    """And a moving load acts where it is at 1 s."""
+    axle = ub.MovingLoad(BEAM, lambda t: t * L / 2, force=(0, -1.0))
+    cases = {"axle": [axle], "side": [ub.PointLoad(BEAM.end, (0.5, 0.0))]}
+    combinations = {"all": {"axle": 2.0, "side": 1.0}}
+    brake = ub.Stretch(BEAM.start, BEAM.end, ub.Damper(1e9))
+    for more in ({"connectors": [brake]}, {"damping": [ub.KelvinVoigt(retardation_time=9.0)]}):
+        scene = replace(SCENE, loads=[], **more)
+        found = ub.load_combinations(scene, cases, combinations, progress=False)
+        reaction = found.solutions["all"].reaction(CLAMPED)[-1]
+        np.testing.assert_allclose(reaction, (-0.5, 2.0, L), rtol=1e-6)
+        still = ub.load_combinations(replace(SCENE, loads=[]), cases, combinations, progress=False)
+        ends = (one.solutions["all"].displacement(BEAM.end)[-1] for one in (found, still))
+        np.testing.assert_allclose(*ends, rtol=1e-8, atol=1e-15)
+
+
+def test_envelopes_of_something_else_are_refused():
+    found = ub.load_combinations(SCENE, CASES, COMBINATIONS, progress=False)
+    with pytest.raises(ub.ArgumentError, match="combination 'ULS 1' = None must be numbers"):
+        found.envelope(lambda run: None)

@@ -234,3 +234,60 @@ def test_a_structure_that_its_loads_break_is_refused():
     scene = replace(scene, loads=[*scene.loads, push])
     with pytest.raises(ub.ConvergenceError, match=r"pushover: no equilibrium beyond 0\.\d+ times"):
         pushed(scene)
+
+
+@pytest.mark.parametrize(
+    "viscous",
+    [
+        {"connectors": 1e7},
+        {"damping": [ub.KelvinVoigt(retardation_time=5.0)]},
+        {"damping": [ub.Rayleigh(mass=0.5)]},
+    ],
+    ids=["damper", "KelvinVoigt", "Rayleigh"],
+)
+def test_viscosity_has_no_effect(viscous):
+    """On the state under a horizontal load, the elastic mode, its period, and the curve."""
+    scene = portal()
+    load = ub.PointLoad(scene["left"].end, (20e3, -P))
+    plain, scene = replace(scene, loads=[load]), replace(scene, loads=[load])
+    if "damping" in viscous:
+        scene = replace(scene, damping=viscous["damping"])
+    else:
+        law = ub.Damper(viscous["connectors"])
+        brace = ub.Stretch(scene["left"].start, scene["right"].end, law)
+        scene = replace(scene, connectors=[brace])
+    expected, found = pushed(plain), pushed(scene)
+    assert found.period == pytest.approx(expected.period, rel=1e-9)
+    assert np.allclose(found.base_shear, expected.base_shear, rtol=1e-7, atol=1e-3)
+    places = found.path.displacement(scene["left"].end), expected.path.displacement(load.place)
+    assert np.allclose(*places, rtol=1e-8, atol=1e-12)
+
+
+def test_a_moving_load_stays_where_it_is_at_one_second():
+    """In front of the right column, during the whole curve."""
+    scene, places = portal(), (lambda t: 4.5 * t, lambda t: 4.5)
+    loads = [ub.MovingLoad(scene["top"], place, force=(0, -P)) for place in places]
+    moves, stays = (pushed(replace(scene, loads=[load])) for load in loads)
+    assert np.array_equal(moves.base_shear, stays.base_shear)
+    right = moves.path.reaction(scene.supports[1])[0, 1]
+    assert right == pytest.approx(0.75 * P, rel=0.05)
+
+
+@pytest.mark.parametrize("start", [0.7, 1.5, 50.0])
+def test_a_force_that_begins_later_is_refused(start):
+    scene = portal()
+    law = ub.PrescribedForce(lambda t: 20e3 * (t > start))
+    late = ub.Slide(ub.ground(0, H), scene["left"].end, law, axis=(1, 0))
+    with pytest.raises(ub.ArgumentError, match="depends on time"):
+        pushed(replace(scene, connectors=[late]))
+
+
+def test_n2_refuses_a_curve_that_has_fallen_too_far():
+    """The idealised curve would be stiffer than the structure, then have no period at all."""
+    soft = ub.LinearSoftening(limit=M_P, fracture_energy=M_P / 10)
+    curve = pushed(portal(law=soft), 0.6, steps=60)
+    peak = abs(curve.displacement[np.argmax(curve.base_shear)])
+    assert curve.n2(lambda T: 6.0, 0.5, upto=peak).displacement > 0
+    for upto in (0.5, 0.59):
+        with pytest.raises(ub.ArgumentError, match=f"give upto at most {peak:.4g} m"):
+            curve.n2(lambda T: 6.0, 0.5, upto=upto)

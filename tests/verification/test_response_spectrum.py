@@ -263,3 +263,16 @@ def test_what_cannot_be_analysed_is_refused():
         ub.response_spectrum_analysis(
             ub.Scene([light], supports=[ub.Clamped(light.start)]), spectrum
         )
+
+
+@pytest.mark.parametrize("load", ["FollowerLoad", "Pressure"])
+def test_loads_that_follow_the_motion_are_refused(load):
+    beam = SCENE["left 0"]
+    loads = {
+        "FollowerLoad": ub.FollowerLoad(beam.end, force=(0, -1.0)),
+        "Pressure": ub.Pressure(beam, 1.0),
+    }
+    scene = replace(SCENE, loads=[loads[load]])
+    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, mesh=CUBIC, progress=False)
+    with pytest.raises(ub.ArgumentError, match=f"{load}.*the force follows the motion"):
+        ub.response_spectrum_analysis(scene, spectrum, n=1, at=at, mesh=CUBIC)

@@ -10,7 +10,7 @@ from ufl_beam.errors import ConvergenceError, require_kind, require_switch
 from ufl_beam.mechanics.time_schemes import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.functions import Constant, Table, TimeFunction, value_at
-from ufl_beam.model.loads import Load, RotatingFrame
+from ufl_beam.model.loads import Load, MovingLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.solution import Solution
@@ -18,6 +18,10 @@ from ufl_beam.solvers.newton_options import Newton
 
 AT = 1.0
 """Time at which loads are evaluated: the end of a static run from 0 to 1; s."""
+
+REST = 1e12
+"""Duration of a run to an equilibrium at rest, in which the forces of dampers and viscous laws
+vanish; s."""
 
 STEPS = 10  # number of equal steps in which loads grow
 
@@ -36,17 +40,37 @@ def size_of(load: Load) -> float:
     return value_at(load.amplitude, AT, load)
 
 
+def duration(scene: Scene) -> float:
+    """Return the duration of a static run to 1 s: :data:`REST`, or 1 s if the scene varies in it.
+
+    Loads and motions of a scene that depend on time need a run in real time.
+    """
+    times = (0.0, 0.25, 0.5, 0.75)
+    varies = any(
+        function(t) != function(AT) for _, function in scene.time_functions() for t in times
+    )
+    return AT if varies else REST
+
+
 def with_amplitude(load: Any, amplitude: TimeFunction) -> Any:
-    """Return a load with another function of time; a :class:`RotatingFrame` has none."""
-    return load if isinstance(load, RotatingFrame) else replace(load, amplitude=amplitude)
+    """Return a load with another function of time; a :class:`RotatingFrame` has none.
+
+    A :class:`MovingLoad` stays where it is at the time :data:`AT`.
+    """
+    if isinstance(load, RotatingFrame):
+        return load
+    if isinstance(load, MovingLoad):
+        load = replace(load, position=Constant(value_at(load.position, AT, load)))
+    return replace(load, amplitude=amplitude)
 
 
-def grown(load: Load, factor: float = 1.0) -> Load:
-    """Return a load that grows from zero at -1 s to its final value at 0 s.
+def grown(load: Load, factor: float = 1.0, *, end: float = 0.0, duration: float = REST) -> Load:
+    """Return a load that grows from zero to its final value at the time ``end`` (s).
 
     The final value is ``factor`` times the value of ``load`` at :data:`AT`.
     """
-    grown: Load = with_amplitude(load, Table((-1.0, 0.0), (0.0, factor * size_of(load))))
+    table = Table((end - duration, end), (0.0, factor * size_of(load)))
+    grown: Load = with_amplitude(load, table)
     return grown
 
 
@@ -59,7 +83,7 @@ def constant(load: Load) -> Load:
 def loaded_state(
     scene: Scene, what: str, mesh: Mesh | None, newton: Newton | None
 ) -> tuple[Scene, Solution | None]:
-    """Return the scene with constant loads, and a run from -1 s to 0 s to its equilibrium.
+    """Return the scene with constant loads, and a run to its equilibrium at rest, at 0 s.
 
     The equilibrium is None if the scene has no loads.
 
@@ -71,11 +95,11 @@ def loaded_state(
     growing = replace(scene, loads=[grown(load) for load in scene.loads])
     try:
         state = simulate(
-            growing, Static(), t=(-1.0, 0.0), dt=1.0 / STEPS, mesh=mesh, newton=newton,
+            growing, Static(), t=(-REST, 0.0), dt=REST / STEPS, mesh=mesh, newton=newton,
             progress=False,
         )  # fmt: skip
     except ConvergenceError as error:
-        fraction = 1.0 + error.time
+        fraction = 1.0 + error.time / REST
         error.args = (
             f"{what}: no equilibrium beyond {fraction:.3g} times the loads of the scene: {error}",
         )

@@ -70,7 +70,7 @@ class Fragility(NamedTuple):
             ("intensities", "exceeded", "number"), (intensities, exceeded, number), strict=True
         )
         im, z, n = (require_row(row, f"Fragility.fit: {name}") for name, row in rows)
-        if not (len(im) == len(z) == len(n) and (im > 0).all() and ((z >= 0) & (z <= n)).all()):
+        if not (0 < len(im) == len(z) == len(n) and (im > 0).all() and ((z >= 0) & (z <= n)).all()):
             raise ArgumentError(
                 "Fragility.fit: intensities must be positive, with as many counts, and exceeded "
                 "must be from 0 to number"

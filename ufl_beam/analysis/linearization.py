@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -23,6 +24,7 @@ from ufl_beam.mechanics.time_scheme import Coefficients, Step
 from ufl_beam.mechanics.time_schemes import Newmark
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.functions import value_at
+from ufl_beam.model.loads import MovingLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
@@ -52,13 +54,15 @@ class SmallMotions:
     """Matrices of small motions about a state, without degrees of freedom constrained by supports.
 
     The state is the last state of ``at``, by default the undeformed scene.  Loads are evaluated at
-    the time ``t`` (s), by default the time of the state.
+    the time ``t`` (s), by default the time of the state.  Masses of moving loads are left out.
     """
 
     def __init__(
         self, scene: Scene, at: Solution | None, t: float | None = None, mesh: Mesh | None = None
     ) -> None:
         time = 0.0 if at is None else float(at.times[-1])
+        loads = [replace(x, mass=0.0) if isinstance(x, MovingLoad) else x for x in scene.loads]
+        scene = replace(scene, loads=loads)
         # All processes compute all matrices, so that no result depends on their number.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)  # these warnings concern runs
@@ -191,8 +195,11 @@ class SmallMotions:
 
     # -- frequencies ---------------------------------------------------------------------------
 
-    def exponents(self, n: int) -> tuple[Complex, Array | Complex]:
-        """Compute up to n exponents nearest to zero, and their shapes; (n,), 1/s; (size, n)."""
+    def exponents(self, n: int, *, damped: bool = True) -> tuple[Complex, Array | Complex]:
+        """Compute up to n exponents nearest to zero, and their shapes; (n,), 1/s; (size, n).
+
+        With ``damped=False`` forces that depend on velocities are left out.
+        """
         K, M = self.K, self.M
         heavy = (M.diagonal() > 0) & (K.diagonal() != 0)
         squares = np.abs(K.diagonal()[heavy]) / M.diagonal()[heavy]
@@ -210,7 +217,7 @@ class SmallMotions:
             # A second shift is far from zero eigenvalues, whose huge inverses cost digits.
             values, x = solve(shift=-first / 2)
             works, zero = self._works(x)
-        if abs(C).max() <= round_off * τ and symmetric:
+        if symmetric and (not damped or abs(C).max() <= round_off * τ):
             values = works / np.sum(x * (M @ x), axis=0)
             values[zero] = 0.0
             s, motions = np.sqrt((-values).astype(complex)), x.astype(complex)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ufl_beam.analysis.constant_loads import AT, require_options, size_of, with_amplitude
+from ufl_beam.analysis.constant_loads import AT, duration, grown, require_options
 from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.errors import (
     ArgumentError,
@@ -23,7 +23,6 @@ from ufl_beam.errors import (
 )
 from ufl_beam.mechanics.time_schemes import Static
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.functions import Table
 from ufl_beam.model.loads import Load, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.run import simulate
@@ -45,14 +44,16 @@ def load_combinations(
 
     Results of nonlinear models cannot be superposed, so each combination is a static run.  The
     loads of its cases grow together from zero to the factor times their value at t = 1 s.  Loads
-    and motions of the scene itself act in every combination, unchanged.
+    and motions of the scene itself act in every combination, unchanged.  They grow so slowly that
+    dampers and viscous laws bear nothing.  Only if loads or motions of the scene depend on time, a
+    run is from 0 to 1 s in real time.  Damping of the scene is ignored.
 
     Args:
         scene: Model.
         cases: Loads of each case by its name, such as "dead", "snow", "wind from the left".
         combinations: Factors of cases by the name of each combination, such as
             ``{"ULS 1": {"dead": 1.35, "snow": 1.5}}``.
-        steps: Number of steps of each run, which is from 0 to 1 s.
+        steps: Number of steps of each run.
         newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default the cells of the beams.
         progress: Show progress bars in a terminal or notebook.
@@ -84,6 +85,8 @@ def load_combinations(
                 f"{what}: cases[{name!r}]: forces of a RotatingFrame have no factor; give the "
                 "frame to the scene"
             )
+    scene = replace(scene, damping=())
+    period = duration(scene)
     factors, scenes = dict[str, dict[str, float]](), dict[str, Scene]()
     for name, combination in _named(combinations, f"{what}: combinations").items():
         where = f"{what}: combinations[{name!r}]"
@@ -93,7 +96,7 @@ def load_combinations(
                 raise ArgumentError(f"{where}: {case!r} is not a case; cases: {', '.join(loads)}")
             row[case] = require_number(factor, f"{where}[{case!r}]")
         growing = [
-            with_amplitude(load, Table((0.0, AT), (0.0, factor * size_of(load))))
+            grown(load, factor, end=AT, duration=period)
             for case, factor in row.items()
             for load in loads[case]
         ]
@@ -102,11 +105,12 @@ def load_combinations(
     for name, loaded in scenes.items():
         try:
             solutions[name] = simulate(
-                loaded, Static(), t=(0.0, AT), dt=AT / steps, every=steps, newton=newton, mesh=mesh,
-                progress=progress,
+                loaded, Static(), t=(AT - period, AT), dt=period / steps, every=steps,
+                newton=newton, mesh=mesh, progress=progress,
             )  # fmt: skip
         except ConvergenceError as error:
-            error.args = (f"{name}: no equilibrium beyond {error.time:.3g} of its loads: {error}",)
+            fraction = 1.0 - (AT - error.time) / period
+            error.args = (f"{name}: no equilibrium beyond {fraction:.3g} of its loads: {error}",)
             errors[name] = error
             if len(errors) == len(scenes):
                 raise

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import Rich, in_one_line
+from ufl_beam.errors import require_array
 from ufl_beam.model.bodies import AttachmentPoint, Member
 from ufl_beam.model.supports import Support
 from ufl_beam.simulation.solution import Solution
@@ -80,7 +81,10 @@ class LoadCombinations(Rich):
             'A'
         """
         names = np.array([*self.solutions])
-        values = np.array([value(solution) for solution in self.solutions.values()], dtype=float)
+        values = np.array([
+            require_array(value(run), f"envelope: the value of combination {name!r}")
+            for name, run in self.solutions.items()
+        ])  # fmt: skip
         return Governing(
             values.min(axis=0), values.max(axis=0),
             names[values.argmin(axis=0)], names[values.argmax(axis=0)],

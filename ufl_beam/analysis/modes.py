@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 import numpy as np
 
+from ufl_beam.analysis.constant_loads import AT, duration
 from ufl_beam.analysis.linearization import SmallMotions
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.c_library import lib
@@ -315,7 +316,13 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         >>> print(shapes.frequencies.round(1))  # Hz
         [ 41.5 250.6 646.8]
     """
-    n = _checked_count("modes", scene, n, at, mesh)
+    return computed_modes(scene, _checked_count("modes", scene, n, at, mesh), at, mesh)
+
+
+def computed_modes(
+    scene: Scene, n: int, at: Solution | None, mesh: Mesh | None, *, damped: bool = True
+) -> Modes:
+    """Compute modes as :func:`modes`; ``damped=False`` leaves velocity-dependent forces out."""
     if at is None:
         if any(isinstance(load, RotatingFrame) for load in scene.loads):
             raise ArgumentError(
@@ -323,10 +330,11 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
                 "steady rotation, at=simulate(scene, Static(), ...), or leave the frame out"
             )
         if scene.loads and require_no_mechanism(scene):
-            simulation = Simulation(replace(scene, damping=()), Static(), mesh=mesh)
+            undamped, t0 = replace(scene, damping=()), AT - duration(scene)
+            simulation = Simulation(undamped, Static(), t0=t0, mesh=mesh)
             # Some scenes have no equilibrium, such as a falling body.
             with suppress(ArgumentError), closing(simulation):
-                simulation.step_to(1.0)
+                simulation.step_to(AT)
                 at = simulation.snapshot()
         if at is None:
             scene = replace(scene, loads=())  # with loads, this state would be no equilibrium
@@ -336,7 +344,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     if not small.M.data.any():
         raise ArgumentError("modes: nothing that can move has mass; give sections rho or rhoA")
     warn_of_masses(scene)
-    exponents, shapes = small.exponents(n)
+    exponents, shapes = small.exponents(n, damped=damped)
     return Modes(scene, small.numbering, small.q, shapes, small.section_law(), exponents)
 
 
@@ -381,6 +389,16 @@ def buckling(
                 "modes(..., at=) about states with an increasing load, and find where a frequency "
                 "vanishes or a damping ratio becomes negative"
             )
+    functions = [function for _, function in scene.time_functions()]
+    if (
+        at is not None
+        and (scene.loads, scene.supports) == (at.scene.loads, at.scene.supports)
+        and all(f(t) == f(float(at.times[-1])) for f in functions)
+    ):
+        raise ArgumentError(
+            f"buckling: loads and motions at t = {t:g} s are those of the state at "
+            f"{float(at.times[-1]):g} s, so that nothing grows; give a larger t, or another state"
+        )
     if at is None and (said := require_no_mechanism(scene)):
         raise ArgumentError(f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)")
     small = SmallMotions(scene, at, t, mesh)

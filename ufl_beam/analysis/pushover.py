@@ -18,7 +18,7 @@ from ufl_beam.analysis.constant_loads import (
     with_amplitude,
 )
 from ufl_beam.analysis.linearization import SmallMotions
-from ufl_beam.analysis.modes import modes
+from ufl_beam.analysis.modes import computed_modes
 from ufl_beam.analysis.path_controls import DisplacementControl
 from ufl_beam.analysis.path_following import Path, follow
 from ufl_beam.analysis.pushover_result import HingeFormation, Pushover
@@ -49,6 +49,10 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
 
 PATTERNS = "mode", "uniform", "triangular"
+TIMES = -1.0, 0.0, 0.5, 2.0, 5.0, *(10.0**k for k in range(1, 7))
+"""Times at which a motion or force must have its value at 1 s; s.  The base shear is the time of
+the path, so that large times occur; N."""
+
 MODES = 6  # number of modes among which the one with the largest effective mass is chosen
 LEAST_MOTION = 1e-6  # of the control place, as a fraction of the largest motion of the scene
 SAME = 1e-9  # fraction of the target that a step may miss by round-off
@@ -74,7 +78,7 @@ def pushover(
 
     The loads of the scene act first, with their values at t = 1 s, and then stay constant.  Forces
     with a constant distribution grow, controlled by the displacement of a place.  They act on
-    masses, of beams and of points.
+    masses, of beams and of points.  Damping, dampers and viscosity have no effect.
 
     Args:
         scene: Model with its permanent loads.
@@ -130,12 +134,12 @@ def pushover(
             "list of loads"
         )
     for owner, function in scene.time_functions():
-        if not isinstance(owner, Load) and any(function(t) != function(AT) for t in (-1.0, 0, 0.5)):
+        if not isinstance(owner, Load) and any(function(t) != function(AT) for t in TIMES):
             raise ArgumentError(
                 f"pushover: {owner} depends on time, and a pushover has none; make it constant, or "
                 "use ub.follow"
             )
-    axis = COMPONENTS.index(component)
+    axis, scene = COMPONENTS.index(component), replace(scene, damping=())
     steady, start = loaded_state(scene, "pushover", mesh, newton)
     numbering = DofNumbering(scene, mesh_of(start, mesh))
     masses = mass_points(numbering, axis)
@@ -234,8 +238,8 @@ def _main_mode(
     masses: list[tuple[AttachmentPoint, float]],
     axis: int,
 ) -> tuple[Shape, float]:
-    """Return the shape and the period (s) of the mode with the largest effective mass."""
-    shapes = modes(replace(scene, damping=()), MODES, at=start, mesh=mesh)
+    """Return shape and period (s) of the undamped mode with the largest effective mass."""
+    shapes = computed_modes(scene, MODES, start, mesh, damped=False)
     m = np.array([mass for _, mass in masses])
     effective = []
     for k in range(len(shapes)):

@@ -215,7 +215,8 @@ class Pushover(Rich):
                 of the largest base shear; m.  With the computed target it may be called again.
 
         Raises:
-            ArgumentError: The spectrum does not cover the period, or the scene has no mass.
+            ArgumentError: The spectrum does not cover the period, the scene has no mass, or
+                ``upto`` is so far beyond the largest base shear that no such curve exists.
 
         Warns:
             ModelWarning: The target displacement is beyond the end of the curve.
@@ -225,6 +226,13 @@ class Pushover(Rich):
         energy = float(trapezoid(V, d))
         strength = float(V[-1])
         yields = 2.0 * (float(d[-1]) - energy / strength)
+        if yields * self.stiffness < 0.99 * strength:
+            peak = abs(float(self.displacement[np.abs(self.base_shear).argmax()]))
+            raise ArgumentError(
+                f"n2: up to {d[-1]:g} m the base shear has fallen so far that a curve of equal "
+                f"energy would be stiffer than the structure; give upto at most {peak:.4g} m, "
+                "where the base shear is largest"
+            )
         period = 2.0 * math.pi * math.sqrt(self.equivalent_mass * yields / strength)
         acceleration = float(spectral_accelerations(spectrum, np.array([period]), "n2")[0])
         elastic = acceleration * (period / (2.0 * math.pi)) ** 2

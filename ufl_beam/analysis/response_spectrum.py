@@ -34,6 +34,7 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_schemes import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint, Member
+from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.section_forces import Diagram, ForcesAlongCells
@@ -202,7 +203,8 @@ def response_spectrum_analysis(
 
     Raises:
         ArgumentError: The call is wrong, the spectrum does not cover the periods, nothing has mass,
-            the scene can move freely, or it has dampers, follower loads or works.
+            the scene can move freely, or it has dampers, works, or loads that follow the motion:
+            :class:`FollowerLoad`, :class:`Pressure`, :class:`RotatingFrame`.
 
     Warns:
         ModelWarning: The modes have less than 90 % of the mass.
@@ -230,6 +232,12 @@ def response_spectrum_analysis(
     spectral_accelerations(spectrum, np.zeros(0), what)
     if scene.works:
         raise ArgumentError(f"{what}: {scene.works[0]}: works are left out of section forces")
+    for load in scene.loads:
+        if not (load.dead or isinstance(load, ImposedStrain)):
+            raise ArgumentError(
+                f"{what}: {load}: the force follows the motion, so that modes are not orthogonal "
+                "or section forces lack a part; leave it out, or use simulate"
+            )
     undamped = replace(scene, damping=())
     basis = modes(undamped, n, at=at, mesh=mesh)
     _require_vibration(basis, what)

@@ -272,11 +272,12 @@ class InteractionDiagram:
         Raises:
             ArgumentError: The section cannot bear N.
         """
-        above = require_number(N, "moments: N") <= self.N
-        at = np.flatnonzero(above[1:] != above[:-1])
+        N, ends = require_number(N, "moments: N"), np.sort([self.N[:-1], self.N[1:]], axis=0)
+        at = np.flatnonzero((ends[0] <= N) & (ends[1] >= N))
         if not len(at):
             raise ArgumentError(f"moments: N = {N:g} N is beyond the diagram, {self!r}")
-        along = (N - self.N[at]) / (self.N[at + 1] - self.N[at])
+        change = self.N[at + 1] - self.N[at]
+        along = (N - self.N[at]) / np.where(change == 0.0, 1.0, change)
         M = self.M[at] + along * (self.M[at + 1] - self.M[at])
         return float(M.min()), float(M.max())
 

@@ -54,7 +54,7 @@ void compute_both(void *of_ffcx, const double *w, const double *constants, const
 """Functions of assembly_simd.c, points_simd.c and check_simd.c that Python calls."""
 
 _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
-_POWER = r"\bpow\(([\w\[\]]+), (?!-?\d+\))([^()]+)\)"
+_POWER = r"\bpow\(([^(),]+), (?!-?\d+\))([^(),]+)\)"
 _SLOW = rf"\b(?:exp|log)\(|{_POWER}"
 
 
@@ -69,7 +69,8 @@ def in_vectors(kernel: str) -> str:
         Refused: The kernel needs a function that assembly_simd.h does not provide.
     """
     body = kernel[kernel.index("{") :]
-    body = re.sub(_POWER, r"lanes_power(\1, ALL(0.0) + \2)", body)
+    body = re.sub(r"\bint (sp_\w+) =", r"double \1 =", body)  # signs
+    body = re.sub(_POWER, r"lanes_power(ALL(0.0) + \1, ALL(0.0) + \2)", body)
     called = re.findall(r"\b(?!for\b|lanes_)([a-z_]\w*)\(", body)
     missing = sorted(set(called) - FUNCTIONS)
     if missing:

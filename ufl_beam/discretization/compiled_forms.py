@@ -319,15 +319,15 @@ class Pointwise:
         """Compile a C function of the outputs, valid as long as this object exists."""
         return self._compiled(outputs)[0]
 
-    def compile_with_loop(self, *outputs: Expr) -> tuple[Any, Any]:
-        """Compile as :meth:`compile`, and a loop over points, ``answer_loop`` of loops.h.
+    def compile_loop(self, *outputs: Expr) -> Any:
+        """Compile a loop of the outputs over points, ``answer_loop`` of loops.h.
 
-        The loop is null if it would not be faster.
+        The loop is null if it would not be faster than calls of the function.
         """
         function, source = self._compiled(outputs)
         sizes = len(outputs), len(self.at), 0
         address = point_loop(source, int(ffi.cast("intptr_t", function)), sizes)
-        return function, ffi.cast("answer_loop *", address or 0)
+        return ffi.cast("answer_loop *", address or 0)
 
     def _compiled(self, outputs: Sequence[Expr]) -> tuple[Any, Path]:
         """Return a C function of the outputs, and the C file that FFCx wrote for it."""

@@ -33,7 +33,7 @@ from ufl_beam.model.records import Positive, Record, Text
 UNITS = {"m/s2": 1.0, "g": 9.80665, "cm/s2": 0.01, "gal": 0.01, "mm/s2": 0.001}
 """Units of acceleration in files; m/s²."""
 
-NUMBER = r"((?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?)"
+NUMBER = r"((?:\d+\.?\d*|\.\d+)(?:[ED][+-]?\d+)?)"
 PEER = rf"NPTS\s*=\s*(\d+)\s*,\s*DT\s*=\s*{NUMBER}", rf"^\s*(\d+)\s+{NUMBER}\s+NPTS,\s*DT"
 """Number of values and time step in the fourth line of PEER's files, new and old."""
 
@@ -160,7 +160,7 @@ class GroundMotion(Record):
             raise ModelError(f"GroundMotion.read: {file}: {error.strerror}") from None
         head, first, count = "\n".join(lines[:4]), 0, None
         if header := next(filter(None, (re.search(x, head, re.I | re.M) for x in PEER)), None):
-            first, count, step = 4, int(header[1]), float(header[2])
+            first, count, step = 4, int(header[1]), _number(header[2])
             if dt is not None and not math.isclose(dt, step, rel_tol=1e-9):
                 raise ModelError(f"{file}: dt = {dt:g} s, but the file has {step:g} s")
             dt = step
@@ -266,6 +266,11 @@ class GroundMotion(Record):
                     f"frequency of the record, {highest:g} Hz"
                 )
             sections = scipy.signal.butter(4, highpass, "highpass", fs=2 * highest, output="sos")
+            if len(a) <= (least := 3 * (2 * len(sections) + 1)):
+                raise ModelError(
+                    f"GroundMotion.corrected: the record has {len(a)} values; a filter needs more "
+                    f"than {least}; leave out highpass"
+                )
             a = np.asarray(scipy.signal.sosfiltfilt(sections, a))
         v = scipy.integrate.cumulative_trapezoid(a, dx=self.dt, initial=0.0)
         s, powers = np.linspace(0.0, 1.0, len(a))[:, None], np.arange(1, degree + 2)
@@ -281,8 +286,11 @@ class GroundMotion(Record):
         """
         dt = require_number(dt, "GroundMotion.resampled: dt", positive=True)
         if dt <= self.dt:
-            t = dt * np.arange(_steps(self.duration, dt) + 1)
-            return replace(self, dt=dt, values=np.interp(t, self.histories[0][:-1], self.values))
+            # The step after the last value, in which the acceleration falls to zero, belongs to it.
+            end = self.duration + self.dt
+            t = dt * np.arange(math.ceil(end / dt * (1 - 1e-12)))
+            times, values = self.dt * np.arange(len(self.values) + 1), (*self.values, 0.0)
+            return replace(self, dt=dt, values=np.interp(t, times, values))
         ratio = Fraction(self.dt / dt).limit_denominator(1000)
         if not math.isclose(ratio * dt, self.dt, rel_tol=1e-9):
             raise ModelError(
@@ -298,13 +306,25 @@ def _steps(duration: float, dt: float) -> int:
     return math.floor(duration / dt * (1 + 1e-12))
 
 
+def _number(word: str) -> float:
+    """Return a number, whose exponent may begin with E or, as in Fortran, with D."""
+    return float(re.sub("[dD]", "E", word))
+
+
 def _rows(file: Path, lines: Sequence[str], first: int) -> Iterator[tuple[int, list[float]]]:
     """Yield (number of the line, numbers in it) without comments and empty lines."""
+    trails: bool | None = None  # whether lines end with a separator, which all or none must do
     for number, line in enumerate(lines[first:], first + 1):
-        if not (text := line.strip(" \t,;")) or text[0] in "#%":
+        if not (text := line.strip()) or text[0] in "#%":
             continue
+        trails, before = text[-1] in ",;", trails
+        if before is not None and trails != before:
+            raise ModelError(
+                f"{file}, line {number}: a value is missing here, or a separator ends some lines "
+                f"and not others: {shorten(text)}"
+            )
         try:
-            row = [float(word) for word in re.split(r"\s*[,;]\s*|\s+", text)]
+            row = [_number(word) for word in re.split(r"\s*[,;]\s*|\s+", text.rstrip(" \t,;"))]
         except ValueError:
             raise ModelError(
                 f"{file}, line {number}: no numbers: {shorten(text)}; comments begin with #"

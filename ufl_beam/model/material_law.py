@@ -289,6 +289,8 @@ def require_field(value: object, what: str, kinds: Any = Real) -> None:
             f"{what} = {shorten(value)} is no number; fields of a law are numbers, its other "
             "attributes can be class variables"
         )
+    if np.isnan(value).any():
+        raise ModelError(f"{what} = {shorten(value)} is not a number; infinity is allowed")
 
 
 EVOLUTION_METHODS = ("increments", "residuals")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import KW_ONLY, dataclass, field, replace
 from difflib import get_close_matches
@@ -454,7 +454,7 @@ class Section(Record):
         name = re.sub(r"^HE(\d+)([ABM])$", r"HE\2\1", name)
         table = _steel_table()
         if name not in table:
-            similar = ", ".join(get_close_matches(name, table, n=5, cutoff=0.0))
+            similar = ", ".join(_similar(name, table))
             raise ModelError(
                 f"Section.steel: designation {designation!r} is not in the table of IPE, HEA, HEB, "
                 f"HEM, UPE, W and HSS; similar designations are {similar}"
@@ -509,6 +509,19 @@ class Section(Record):
             EA=EA, GA=shear / (2 * (1 + nu)), EI=own, rhoA=mass, rhoI=mass * own / EA,
             depth=depth, **laws,
         )  # fmt: skip
+
+
+def _similar(name: str, table: Iterable[str]) -> list[str]:
+    """Return five designations: those of the same series with the nearest sizes."""
+
+    def parts(name: str) -> tuple[str, float]:
+        series, size = re.match(r"([A-Z]*)(\d*)", name).groups()  # type: ignore[union-attr]
+        return series, float(size or 0)
+
+    series, size = parts(name)
+    others = [other for other in table if parts(other)[0] == series]
+    nearest = sorted(others, key=lambda other: abs(parts(other)[1] - size))[:5]
+    return nearest or get_close_matches(name, table, n=5, cutoff=0.0)
 
 
 @cache

@@ -174,9 +174,10 @@ class ExtremesInC:
 class Extremes(Restartable):
     """Recorder of the extremes of section forces along all cells and of motions of all nodes.
 
-    All steps are included, even if the solution does not store them.  Memory does not grow with the
-    number of steps.  Section forces are evaluated at equally spaced points of each cell, both ends
-    included, as in :meth:`Solution.diagram`.
+    All steps are included, even if the solution does not store them.  Steps that the solver divides
+    count as their parts, but as a whole on processes that share a scene.  Memory does not grow with
+    the number of steps.  Section forces are evaluated at equally spaced points of each cell, both
+    ends included, as in :meth:`Solution.diagram`.
 
     Args:
         points: Number of points of a cell, at least 2.

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from itertools import cycle, product
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,8 +16,8 @@ from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.response_spectra import ResponseSpectrum
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.display import TIME, html_page
-from ufl_beam.errors import ArgumentError, require_number
-from ufl_beam.model.bodies import AttachmentPoint
+from ufl_beam.errors import ArgumentError, require_all, require_number, require_row
+from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Place
 from ufl_beam.model.ground_motion import GroundMotion
 from ufl_beam.output.engineering_results import Storeys
 from ufl_beam.output.extremes import Extremes
@@ -60,7 +61,7 @@ CLASSES = 40  # number of bins of stress ranges, and of mean stresses, in pictur
 
 def draw_shapes(
     solution: Solution,
-    times: Sequence[float] = (),
+    times: Sequence[float] | None = None,
     *,
     count: int = 8,
     magnify: float = 1.0,
@@ -73,14 +74,19 @@ def draw_shapes(
     from matplotlib.colors import to_hex
 
     require_number(count, "plot: count", at_least=1)
-    if np.ndim(times) != 1:
-        raise ArgumentError(
-            f"plot: times = {times!r} must be a sequence of times (s); for a number of shapes "
-            f"give count={times!r}"
-        )
     instants = solution.times
-    nearest = [int(np.argmin(np.abs(instants - t))) for t in sorted(times)]
-    chosen = nearest or evenly(solution.progress, int(count))
+    if times is None:
+        chosen = evenly(solution.progress, int(count))
+    else:
+        if isinstance(times, Real):
+            raise ArgumentError(
+                f"plot: times = {times!r} must be a sequence of times (s); for a number of shapes "
+                f"give count={times!r}"
+            )
+        asked = require_row(times, "plot: times")
+        if not len(asked):
+            raise ArgumentError("plot: times is empty; give times (s), or count=")
+        chosen = [int(np.argmin(np.abs(instants - t))) for t in np.sort(asked)]
     canvas, size = plane_canvas(solution, chosen, magnify, ax)
     shapes = [canvas.shape(n) for n in chosen]
     with style.panel(ax, size) as axes:
@@ -123,7 +129,10 @@ def draw_history(
 ) -> Figure:
     """Draw a component of the motion of one or more places over time."""
     style.require_option(component, COMPONENTS, "plot: component")
-    followed = (places,) if isinstance(places, AttachmentPoint) else tuple(places)
+    followed = (places,) if isinstance(places, AttachmentPoint) else places
+    followed = require_all(followed, "plot: places", (Place, BodyPoint))
+    if not followed:
+        raise ArgumentError("plot: places is empty; give places whose motion is drawn")
     number = list(COMPONENTS).index(component)
     motion = (solution.displacement, solution.velocity, solution.acceleration)[number // 3]
     quantity, unit = COMPONENTS[component]
@@ -177,11 +186,14 @@ def draw_energy(solution: Solution) -> Figure:
 # -- analyses ----------------------------------------------------------------------------------
 
 
-def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float = 0.1) -> Figure:
+def draw_modes(
+    shapes: Shapes, *, numbers: Sequence[int] | None = None, amplitude: float = 0.1
+) -> Figure:
     """Draw modes side by side, in both directions from the undeformed scene, which is grey."""
-    chosen = list(numbers) or list(range(len(shapes)))
+    chosen = range(len(shapes)) if numbers is None else numbers
+    chosen = require_all(chosen, "plot: numbers", int)
     if not chosen:
-        raise ArgumentError("plot: there is no shape")
+        raise ArgumentError(f"plot: {'numbers is empty' if len(shapes) else 'there is no shape'}")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
     stages = [plane_canvas(swing, [0, 1], 1.0, size=(4.0, np.inf))[0] for swing in swings]
     box = np.concatenate([canvas.points() for canvas in stages])

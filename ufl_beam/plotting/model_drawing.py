@@ -41,6 +41,12 @@ MOVED = "#A86E00"  # colour of prescribed motions: the orange of drives, dark en
 HEAD, SHAFT = 0.85, 1.9  # length of the head of an arrow in units, and width of its line in points
 
 
+def _kilograms(mass: float) -> str:
+    """Write a mass with four digits, without an exponent up to a million kilograms."""
+    digits = max(3 - math.floor(math.log10(mass)), 0) if mass > 0 else 0
+    return f"{round(mass, digits):.10g} kg" if 1e-4 < mass < 1e6 else f"{mass:.4g} kg"
+
+
 class Subject:
     """Scene, with data for its pictures at any scale; lengths in m."""
 
@@ -172,7 +178,7 @@ def draw(subject: Subject, scale: float) -> Drawing:
         _draw_prescribed(drawing, support)
     for mass in scene.masses:
         spots = _around(np.array(mass.place.point), 0.45 * drawing.unit)
-        drawing.write(f"{mass.mass:.4g} kg", INK, CAPTIONS, spots)
+        drawing.write(f"{_kilograms(mass.mass)}", INK, CAPTIONS, spots)
     # Line loads come first, so that forces are stacked above them.
     for load in sorted(scene.loads, key=lambda load: not isinstance(load, LoadAlongBeam)):
         if isinstance(load, LoadAlongBeam):
@@ -226,7 +232,7 @@ def _name_bodies_and_connectors(drawing: Drawing) -> None:
     for body in scene.bodies if len(scene.bodies) <= symbols.MOST_BODIES else ():
         arms, name = canvas.outlines[body] - body.center, drawing.subject.names[body]
         spots = _around(np.array(body.center), 0.0)
-        words = f"{name}, {body.mass:.4g} kg" if body.mass else name
+        words = f"{name}, {_kilograms(body.mass)}" if body.mass else name
         outside = (x._replace(gap=float((arms @ x.direction).max())) for x in spots)
         drawing.write(words, TEXT, NAMES, outside)
     for connector in scene.connectors:

@@ -58,7 +58,7 @@ def draw_section(section: Section, *, ax: Axes | None = None) -> Figure:
             title = f"EA = {with_unit(section.EA, 'N')}, EI = {with_unit(section.EI, 'N m²')}"
             if shape is not None and (fibres is None or not fibres.bars):
                 title = (
-                    f"A = {1e4 * shape.A:.4g} cm², I = {1e8 * shape.I:.4g} cm⁴, "
+                    f"A = {1e4 * shape.A:.4g} cm², I = {1e8 * shape.I:.4g} cm⁴,\n"
                     f"Wpl = {1e6 * shape.Wpl:.4g} cm³"
                 )
             axes.set_title(title, loc="left", fontsize=style.font_size(11.0))

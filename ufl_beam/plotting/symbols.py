@@ -9,6 +9,7 @@ lengths is half the size of a symbol.  Symbols of loads are in `model_drawing.py
 from __future__ import annotations
 
 import math
+import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -315,11 +316,16 @@ def pins(shape: DeformedShape) -> Iterator[Pin]:
 # -2 at its place a to 2 at its place b, with the body from -1 to 1; t is perpendicular.
 
 
+def _class_words(law: Any) -> str:
+    """Return the name of a class in words, such as "prescribed motion"."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(law).__name__).lower()
+
+
 class LawSymbol(NamedTuple):
     """Symbol of a connector law, and the text of its parameters."""
 
     straight: list[Stroke]
-    words: Callable[[Any, str, str], str] = lambda law, force, unit: type(law).__name__.lower()
+    words: Callable[[Any, str, str], str] = lambda law, force, unit: _class_words(law)
     """Function of law, unit of force and unit of motion that returns the parameters as text."""
     turning: list[Stroke] | None = None  # around a pin; by default the straight one with spokes
     sweep: float = math.pi + 1.0  # angle of the undeformed symbol around the pin; rad

@@ -454,8 +454,8 @@ def damping_forces(
                 forces.append(KelvinVoigtForce(damping, indices, setting))
         elif inertia is None:
             raise ModelError(
-                "Rayleigh: it damps vibrations, and statics has no inertia. Use "
-                "KelvinVoigt, which acts in the time of a static run"
+                "Rayleigh: it damps vibrations, and statics has no inertia. Leave it out, by "
+                "dataclasses.replace(scene, damping=())"
             )
         elif damping.tangent:
             forces.append(TangentRayleighForce(damping, setting, inertia, yielding))

@@ -377,8 +377,8 @@ def damping_forces(
     if isinstance(damping, Rayleigh):
         if rates is None:
             raise ModelError(
-                "Rayleigh: it damps vibrations, and statics has no inertia. Use "
-                "KelvinVoigt, which acts in the time of a static run"
+                "Rayleigh: it damps vibrations, and statics has no inertia. Leave it out, by "
+                "dataclasses.replace(scene, damping=())"
             )
         setting = (damping, fields, scheme, A, ledger, rates)
         if damping.tangent:

@@ -49,7 +49,14 @@ from ufl_beam.model.material_law import traced
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.energy_ledger import Ledger
 
-law_functions.where.register(Condition, ufl.conditional)
+
+@law_functions.where.register(Condition)
+def _conditional(condition: Condition, yes: Any, no: Any) -> Expr:
+    """Return UFL's conditional; FFCx would compute with whole numbers as C does, 1/2 = 0."""
+    numbers = (float(x) if isinstance(x, int) else x for x in (yes, no))
+    return ufl.conditional(condition, *numbers)
+
+
 law_functions.below.register(Expr, ufl.lt)
 law_functions.exp.register(Expr, ufl.exp)
 law_functions.sqrt.register(Expr, ufl.sqrt)
@@ -106,7 +113,6 @@ class PointForms:
             variables has more outputs, see improve_sized in material_laws.c.
         resistance: Resistance of the discontinuity, and its derivative with respect to the growth.
         end: ``point_output`` of loops.h, stresses, and changes of the variables.
-        law_loop, end_loop: Loops over points, or null, see :meth:`Pointwise.compile_with_loop`.
         own: Dissipation of a law that must dissipate, and the size of its terms; else null.
     """
 
@@ -145,12 +151,21 @@ class PointForms:
                 stored = ufl.as_ufl(equations.stored(at))
                 slopes = tuple(self._derivatives((stored,), unknown))
                 self.own = pointwise.compile(*equations.own_dissipation(at, slopes))
-        self.law, self.law_loop = pointwise.compile_with_loop(*outputs)
-        if law.solves:
-            self.law_loop = ffi.NULL  # each point iterates
+        self.law = pointwise.compile(*outputs)
         end = in_order("point_output", dict(zip(End._fields, energies, strict=False)))
-        self.end, self.end_loop = pointwise.compile_with_loop(*end, *stress, *changes)
-        self.most = max(len(outputs), len(end) + len(stress) + len(changes))
+        self.end = pointwise.compile(*end, *stress, *changes)
+        self._outputs = outputs, [*end, *stress, *changes]
+
+    @cached_property
+    def loops(self) -> dict[str, Any]:
+        """Loops over points, which may be null, and space for the answers of one point."""
+        law, end = self._outputs
+        iterates = self._equations.law(self._at).solves
+        return {
+            "law_loop": ffi.NULL if iterates else self._pointwise.compile_loop(*law),
+            "end_loop": self._pointwise.compile_loop(*end),
+            "answers": np.zeros(max(len(law), len(end))),
+        }
 
     @cached_property
     def elastic(self) -> Any:
@@ -270,8 +285,7 @@ class Points:
             own=forms.own, over=self.over, unlike=np.zeros(3), search=self._search,
         )  # fmt: skip
         if per_cell >= BATCH:
-            answers = np.zeros(per_cell * forms.most)
-            fill(self.c, law_loop=forms.law_loop, end_loop=forms.end_loop, answers=answers)
+            fill(self.c, **forms.loops | {"answers": np.tile(forms.loops["answers"], per_cell)})
         if predicts and self._components == 1 and self._yields:
             lines = np.zeros((2, cells, per_cell, int(lib.LINE)))
             fill(self.c, line=lines[0], predicted=lines[1])
@@ -360,13 +374,13 @@ class Points:
         """Replace NaN in :attr:`committed` by the elastic stiffness at the accepted strains."""
         if self.committed is None:
             return
-        known, law = self.committed.copy(), (self.c.law, self.c.solves)
+        known, law = self.committed.copy(), (self.c.law, self.c.law_loop, self.c.solves)
         with self._unchanged():
             self["traction"][:] = np.inf
             self.c.law, self.c.law_loop, self.c.solves = self._forms.elastic, ffi.NULL, False
             self.return_map(self._e0)
             lib.keep_tangents(self.c)
-        self.c.law, self.c.solves = law
+        self.c.law, self.c.law_loop, self.c.solves = law
         self.committed[:] = np.where(np.isnan(known), self.committed, known)
 
     def works(self, change: Array) -> Array:

@@ -259,7 +259,7 @@ def test_a_section_is_drawn_to_scale():
     discs = ub.Section.of_fibres([0, 0.1], [1e-4, 2e-4], E=1e9, nu=0.3, fibres=steel)
     assert len(ub.plot(discs).axes[0].patches) == 2
     ipe = ub.plot(ub.Section.steel("IPE 300")).axes[0]
-    assert ipe.get_title(loc="left") == "A = 53.81 cm², I = 8356 cm⁴, Wpl = 628.4 cm³"
+    assert ipe.get_title(loc="left") == "A = 53.81 cm², I = 8356 cm⁴,\nWpl = 628.4 cm³"
     with pytest.raises(ub.ArgumentError, match="this Section has stiffnesses only"):
         ub.plot(ub.Section(EA=1.0, GA=1.0, EI=1.0))
 

@@ -407,3 +407,19 @@ def test_wrong_arguments_of_pictures_are_refused(portal, call, message):
     with pytest.raises(ub.ArgumentError) as caught:
         call(portal)
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "message"),
+    [
+        (("history", 3), {}, "places = 3"),
+        (("history", "end"), {}, "places = 'end' must be a list"),
+        (("history", []), {}, "places is empty"),
+        (("M",), {"n": "end"}, "n = 'end'"),
+        (("shapes",), {"times": "all"}, "times = 'all' must be numbers"),
+        (("shapes",), {"times": []}, "times is empty"),
+    ],
+)
+def test_wrong_arguments_are_named(portal, arguments, options, message):
+    with pytest.raises(ub.ArgumentError, match=f"plot: .*{message}"):
+        ub.plot(portal, *arguments, **options)
