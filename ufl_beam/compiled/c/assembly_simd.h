@@ -73,11 +73,11 @@ static inline lanes lanes_exp(lanes x)
 static inline lanes lanes_log(lanes x)
 {
   const mask tiny = x < DBL_MIN, beyond = ~(x < INFINITY);
-  const mask scaled = (mask)PICK(tiny, x * 0x1p54, x), above = scaled - 0x3fe6a09e667f3bcd;
-  const bits exponent = (bits)(above + (1023LL << 52)) >> 52;
+  const bits scaled = (bits)PICK(tiny, x * 0x1p54, x), above = scaled - 0x3fe6a09e667f3bcd;
+  const bits exponent = (above + ((uint64_t)1023 << 52)) >> 52;
   const lanes near = (lanes)(exponent | (uint64_t)0x433LL << 52) - (0x1p52 + 1023);
   const lanes k = near - PICK(tiny, ALL(54), ALL(0));
-  const lanes f = (lanes)(scaled - (above & (0xfffLL << 52))) - 1, s = f / (2 + f), z = s * s;
+  const lanes f = (lanes)(scaled - (above >> 52 << 52)) - 1, s = f / (2 + f), z = s * s;
   const lanes r = z * (6.666666666666735130e-01 + z * (3.999999999940941908e-01 + z *
     (2.857142874366239149e-01 + z * (2.222219843214978396e-01 + z * (1.818357216161805012e-01 + z *
     (1.531383769920937332e-01 + z * 1.479819860511658591e-01))))));
