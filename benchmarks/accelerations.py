@@ -47,8 +47,9 @@ ACCELERATIONS = {
     ),
     "SIMD kernels": Acceleration(
         "FFCx's kernels are compiled a second time with SIMD vectors and compute four or eight "
-        "cells at once; laws of fibres with powers, exponentials or logarithms compute as many "
-        "fibres. Without it, FFCx's own kernels compute one cell or fibre at a time.",
+        "cells at once; they also compute laws of fibres with powers, exponentials or "
+        "logarithms for several fibres at once. Without it, FFCx's own kernels compute one cell or "
+        "fibre at a time.",
         by.SHIPPED, by.SCALAR,
         (
             "compiled/simd_kernels.py", "compiled/c/assembly_simd.c", "compiled/c/assembly_simd.h",

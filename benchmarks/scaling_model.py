@@ -8,7 +8,7 @@ from collections import Counter
 import numpy as np
 
 from ufl_beam.compiled.c_library import doubles, ffi, lib
-from ufl_beam.discretization.partition import bisected
+from ufl_beam.discretization.partition import bisect
 
 COLLECTIVE = (
     "allreduce", "Allreduce", "Iallreduce", "allgather", "Allgather", "Allgatherv", "bcast",
@@ -87,7 +87,7 @@ def work(simulation):
 
 def borders(numbering, ranks):
     """Unknowns that several of so many processes have, in all and of one process at most."""
-    part = bisected(numbering.points[numbering.cells].mean(axis=1), ranks)
+    part = bisect(numbering.points[numbering.cells].mean(axis=1), ranks)
     of_cell = numbering.dofs[numbering.cells].reshape(len(part), 6)
     pairs = np.unique(of_cell.astype(np.int64) * ranks + part[:, None])
     dofs, ranks_of = pairs // ranks, pairs % ranks

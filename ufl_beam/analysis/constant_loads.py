@@ -64,12 +64,12 @@ def with_amplitude(load: Any, amplitude: TimeFunction) -> Any:
     return replace(load, amplitude=amplitude)
 
 
-def grown(load: Load, factor: float = 1.0, *, end: float = 0.0, duration: float = REST) -> Load:
-    """Return a load that grows from zero to its final value at the time ``end`` (s).
+def grown(load: Load, factor: float = 1.0, *, end: float = 0.0, span: float = REST) -> Load:
+    """Return a load that grows from zero during ``span`` (s) to its final value at ``end`` (s).
 
     The final value is ``factor`` times the value of ``load`` at :data:`AT`.
     """
-    table = Table((end - duration, end), (0.0, factor * size_of(load)))
+    table = Table((end - span, end), (0.0, factor * size_of(load)))
     grown: Load = with_amplitude(load, table)
     return grown
 

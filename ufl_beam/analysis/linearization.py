@@ -61,8 +61,9 @@ class SmallMotions:
         self, scene: Scene, at: Solution | None, t: float | None = None, mesh: Mesh | None = None
     ) -> None:
         time = 0.0 if at is None else float(at.times[-1])
-        loads = [replace(x, mass=0.0) if isinstance(x, MovingLoad) else x for x in scene.loads]
-        scene = replace(scene, loads=loads)
+        if any(isinstance(load, MovingLoad) and load.mass for load in scene.loads):
+            loads = [replace(x, mass=0.0) if isinstance(x, MovingLoad) else x for x in scene.loads]
+            scene = replace(scene, loads=loads)
         # All processes compute all matrices, so that no result depends on their number.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)  # these warnings concern runs
@@ -72,7 +73,7 @@ class SmallMotions:
         if t is not None:
             simulation.t = t
         self.scene, self._simulation = scene, simulation
-        self.numbering, self.q = simulation.numbering, simulation.q
+        self.beams, self.numbering, self.q = simulation.beams, simulation.numbering, simulation.q
         simulation.close()
         # Plastic strains and openings of hinges are constant from now on.
         simulation.controllers.evaluate(simulation)
@@ -148,19 +149,6 @@ class SmallMotions:
         A = csr_array(block_array([[M, G.T], [G, None]])) if G.shape[0] else M
         y = splu(A.tocsc()).solve(np.append(along, np.zeros(G.shape[0])))
         return toward, float(along @ y[: len(along)])
-
-    def section_law(self) -> tuple[Array, Array]:
-        """Return b and D of the section forces b + D e of all cells for strains e.
-
-        b is (num_cells, 3 p) and D (num_cells, 9 p), at p integration points.
-        """
-        cells, degree = len(self.numbering.cells), self.numbering.mesh.degree
-        b, D = np.zeros((cells, 3 * degree)), np.zeros((cells, 9 * degree))
-        for beams in self._simulation.beams:
-            some, own_b, own_D = beams.about_state()
-            b[some] += own_b
-            D[some] += own_D
-        return b, D
 
     def support_forces(self, shapes: Array, omega: Array) -> Array:
         """Return the forces that supports exert in modes of given frequencies (rad/s); (size, n).

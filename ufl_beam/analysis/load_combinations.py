@@ -86,7 +86,7 @@ def load_combinations(
                 "frame to the scene"
             )
     scene = replace(scene, damping=())
-    period = duration(scene)
+    span = duration(scene)
     factors, scenes = dict[str, dict[str, float]](), dict[str, Scene]()
     for name, combination in _named(combinations, f"{what}: combinations").items():
         where = f"{what}: combinations[{name!r}]"
@@ -96,7 +96,7 @@ def load_combinations(
                 raise ArgumentError(f"{where}: {case!r} is not a case; cases: {', '.join(loads)}")
             row[case] = require_number(factor, f"{where}[{case!r}]")
         growing = [
-            grown(load, factor, end=AT, duration=period)
+            grown(load, factor, end=AT, span=span)
             for case, factor in row.items()
             for load in loads[case]
         ]
@@ -105,11 +105,11 @@ def load_combinations(
     for name, loaded in scenes.items():
         try:
             solutions[name] = simulate(
-                loaded, Static(), t=(AT - period, AT), dt=period / steps, every=steps,
+                loaded, Static(), t=(AT - span, AT), dt=span / steps, every=steps,
                 newton=newton, mesh=mesh, progress=progress,
             )  # fmt: skip
         except ConvergenceError as error:
-            fraction = 1.0 - (AT - error.time) / period
+            fraction = 1.0 - (AT - error.time) / span
             error.args = (f"{name}: no equilibrium beyond {fraction:.3g} of its loads: {error}",)
             errors[name] = error
             if len(errors) == len(scenes):

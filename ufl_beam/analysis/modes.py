@@ -37,7 +37,7 @@ from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.beam_forces import inelastic_forms
+from ufl_beam.terms.beam_forces import inelastic_forms, section_law
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.term import InCells
 
@@ -345,7 +345,8 @@ def computed_modes(
         raise ArgumentError("modes: nothing that can move has mass; give sections rho or rhoA")
     warn_of_masses(scene)
     exponents, shapes = small.exponents(n, damped=damped)
-    return Modes(scene, small.numbering, small.q, shapes, small.section_law(), exponents)
+    law = section_law(small.beams, small.numbering)
+    return Modes(scene, small.numbering, small.q, shapes, law, exponents)
 
 
 def buckling(
@@ -396,7 +397,7 @@ def buckling(
         and all(f(t) == f(float(at.times[-1])) for f in functions)
     ):
         raise ArgumentError(
-            f"buckling: loads and motions at t = {t:g} s are those of the state at "
+            f"buckling: loads and motions at t = {t:g} s are the same as in the state at "
             f"{float(at.times[-1]):g} s, so that nothing grows; give a larger t, or another state"
         )
     if at is None and (said := require_no_mechanism(scene)):
@@ -411,7 +412,7 @@ def buckling(
             "nodes instead of along beams, give at= a state closer to buckling, follow the "
             "path with ub.follow, or find where a frequency of modes(..., at=) vanishes"
         )
-    law = small.section_law()
+    law = section_law(small.beams, small.numbering)
     return Buckling(scene, small.numbering, small.q, shapes, law, factors, errors)
 
 

@@ -512,15 +512,15 @@ class Section(Record):
 
 
 def _similar(name: str, table: Iterable[str]) -> list[str]:
-    """Return five designations: those of the same series with the nearest sizes."""
+    """Return five designations of the same series, with the nearest sizes."""
 
-    def parts(name: str) -> tuple[str, float]:
+    def series_and_size(name: str) -> tuple[str, float]:
         series, size = re.match(r"([A-Z]*)(\d*)", name).groups()  # type: ignore[union-attr]
         return series, float(size or 0)
 
-    series, size = parts(name)
-    others = [other for other in table if parts(other)[0] == series]
-    nearest = sorted(others, key=lambda other: abs(parts(other)[1] - size))[:5]
+    series, size = series_and_size(name)
+    others = [other for other in table if series_and_size(other)[0] == series]
+    nearest = sorted(others, key=lambda other: abs(series_and_size(other)[1] - size))[:5]
     return nearest or get_close_matches(name, table, n=5, cutoff=0.0)
 
 

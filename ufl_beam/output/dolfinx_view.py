@@ -23,7 +23,7 @@ from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.terms.beam_forces import elastic_forms, inelastic_forms
+from ufl_beam.terms.beam_forces import elastic_forms, inelastic_forms, section_law
 from ufl_beam.terms.imposed_strains import imposed_at_points
 
 
@@ -275,11 +275,7 @@ class DolfinxView:
         for function in (forms.q0, forms.q1):
             put_in_cells(function, self._view.q[self._fields.cell_dofs])
         numbering = self._view.subdomain.numbering
-        sizes = (numbering.mesh.degree * k for k in (3, 9))
-        tables = [np.zeros((len(numbering.cells), size)) for size in sizes]
-        for cells, *values in (beams.about_state() for beams in self._view.inelastic):
-            for table, rows in zip(tables, values, strict=True):
-                table[cells] += rows
+        tables = section_law(self._view.inelastic, numbering)
         for function, table in zip(self._around, tables, strict=False):  # none in elastic scenes
             put_in_cells(function, table[self.cells])
         if self._imposed is not None:

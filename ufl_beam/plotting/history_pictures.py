@@ -83,10 +83,10 @@ def draw_shapes(
                 f"plot: times = {times!r} must be a sequence of times (s); for a number of shapes "
                 f"give count={times!r}"
             )
-        asked = require_row(times, "plot: times")
-        if not len(asked):
+        requested = require_row(times, "plot: times")
+        if not len(requested):
             raise ArgumentError("plot: times is empty; give times (s), or count=")
-        chosen = [int(np.argmin(np.abs(instants - t))) for t in np.sort(asked)]
+        chosen = [int(np.argmin(np.abs(instants - t))) for t in np.sort(requested)]
     canvas, size = plane_canvas(solution, chosen, magnify, ax)
     shapes = [canvas.shape(n) for n in chosen]
     with style.panel(ax, size) as axes:
@@ -191,7 +191,7 @@ def draw_modes(
 ) -> Figure:
     """Draw modes side by side, in both directions from the undeformed scene, which is grey."""
     chosen = range(len(shapes)) if numbers is None else numbers
-    chosen = require_all(chosen, "plot: numbers", int)
+    chosen = require_all(chosen, "plot: numbers", (int, np.integer))
     if not chosen:
         raise ArgumentError(f"plot: {'numbers is empty' if len(shapes) else 'there is no shape'}")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]

@@ -178,7 +178,7 @@ def draw(subject: Subject, scale: float) -> Drawing:
         _draw_prescribed(drawing, support)
     for mass in scene.masses:
         spots = _around(np.array(mass.place.point), 0.45 * drawing.unit)
-        drawing.write(f"{_kilograms(mass.mass)}", INK, CAPTIONS, spots)
+        drawing.write(_kilograms(mass.mass), INK, CAPTIONS, spots)
     # Line loads come first, so that forces are stacked above them.
     for load in sorted(scene.loads, key=lambda load: not isinstance(load, LoadAlongBeam)):
         if isinstance(load, LoadAlongBeam):

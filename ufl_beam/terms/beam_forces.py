@@ -9,7 +9,7 @@ works of the tangent and of its derivative.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
@@ -164,11 +165,7 @@ class Cells(Term):
 
     @abstractmethod
     def about_state(self) -> tuple[Index, Array, Array]:
-        """Return cells (numbers of the scene), and b and D of b + D e about the accepted state.
-
-        b + D e are the section forces for strains e at p integration points; b is (num_cells, 3 p),
-        D (num_cells, 9 p).
-        """
+        """Return cells (numbers of the scene), and their b and D, see :func:`section_law`."""
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
@@ -179,6 +176,20 @@ class Cells(Term):
         if u is None:
             return self._at(q1, "tangent", x=x, y=y).value(q1)
         return self._at(q1, "change", u=u, x=x, y=y).value(q1)
+
+
+def section_law(groups: Iterable[Cells], numbering: DofNumbering) -> tuple[Array, Array]:
+    """Return b and D of the section forces b + D e of cells about the accepted state.
+
+    b + D e are the section forces for strains e at p integration points; b is (num_cells, 3 p), D
+    (num_cells, 9 p).  Rows of cells in no group are zero.
+    """
+    count, points = len(numbering.cells), numbering.mesh.degree
+    b, D = np.zeros((count, 3 * points)), np.zeros((count, 9 * points))
+    for cells, own_b, own_D in (group.about_state() for group in groups):
+        b[cells] += own_b
+        D[cells] += own_D
+    return b, D
 
 
 # -- elastic beams ---------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ typedef uint64_t bits __attribute__((vector_size(8 * LANES), aligned(8), may_ali
 #endif
 #define PICK(m, a, b) ((lanes)(((m) & (mask)ALL(a)) | (~(m) & (mask)ALL(b))))
 
-/* The polynomials of sine, cosine, exponential and logarithm are those of fdlibm, k_sin.c, k_cos.c,
+/* The polynomials of sine, cosine, exponential and logarithm come from fdlibm, k_sin.c, k_cos.c,
  * e_exp.c and e_log.c:
  *
  * Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.
