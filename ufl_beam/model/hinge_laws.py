@@ -244,6 +244,24 @@ class _Reloading(NamedTuple):
         return total + self.backbone.integral(larger(start, self.target), larger(end, self.target))
 
 
+class _Excursion(NamedTuple):
+    """State of a deteriorating hinge at the beginning of a step, seen along the moment.
+
+    Attributes:
+        crosses: True where the moment changes its sign in the step, so that an excursion begins.
+        p: Plastic rotation, positive in the direction of the moment.
+        before: Unloading stiffness before this excursion, as a fraction of the elastic one.
+        ratios: Ratios β^(1/c) of the excursion that ends, by the names of the modes.
+        sided: Function that returns a variable or number of the direction of the moment.
+    """
+
+    crosses: Values
+    p: Values
+    before: Values
+    ratios: Mapping[str, Values]
+    sided: Callable[..., Values]
+
+
 @dataclass(frozen=True)
 class _DeterioratingHinge(Record, ConnectorLaw):
     """Base of hinges that deteriorate by dissipated energy."""
@@ -330,7 +348,8 @@ class _DeterioratingHinge(Record, ConnectorLaw):
             most=most * sided("largest"), last=sided("last"), ultimate=sided("ultimate"),
             steep=sided("steep"), least_slope=1e-12 * self.stiffness,
         )  # fmt: skip
-        bound, path = self._path(backbone, state, sided, p, before, crosses, ratios)
+        excursion = _Excursion(crosses, p, before, ratios, sided)
+        bound, path = self._path(backbone, state, excursion)
         limit = bound.at(x)
         flows = below(limit, stiffness * (x - p))
         start = bound.meets(stiffness, p)
@@ -372,14 +391,7 @@ class _DeterioratingHinge(Record, ConnectorLaw):
         return {name: value - getattr(state, name) for name, value in new.items()}
 
     def _path(
-        self,
-        backbone: _Bound,
-        state: State,
-        sided: Callable[..., Values],
-        p: Values,
-        before: Values,
-        crosses: Values,
-        ratios: Mapping[str, Values],
+        self, backbone: _Bound, state: State, excursion: _Excursion
     ) -> tuple[_Bound | _Reloading, dict[str, Values]]:
         """Return the bound of an excursion, and the new values of the variables of its path."""
         return backbone, {}
@@ -495,16 +507,10 @@ class PinchingHinge(_DeterioratingHinge):
         vars(self).update(more)
 
     def _path(
-        self,
-        backbone: _Bound,
-        state: State,
-        sided: Callable[..., Values],
-        p: Values,
-        before: Values,
-        crosses: Values,
-        ratios: Mapping[str, Values],
+        self, backbone: _Bound, state: State, excursion: _Excursion
     ) -> tuple[_Bound | _Reloading, dict[str, Values]]:
         """Return the bound of an excursion, and the new values of the variables of its path."""
+        crosses, p, before, ratios, sided = excursion
         stiffness, least = before * self.stiffness, 1e-12 * sided("yields")
         farther = 1 + ratios["reloading"] ** self.exponent
         aims = sided("peak", vars(state)) * sided("yields") * farther
