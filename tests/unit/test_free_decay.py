@@ -344,7 +344,7 @@ def test_nothing_at_all():
 
 def test_amplitudes_that_have_no_logarithm():
     for amplitude in (0.0, -2.0):
-        with raises(f"amplitudes[1] = {amplitude:g} must be positive", "about"):
+        with raises(f"amplitudes[1] = {amplitude:g} must be positive", "from the equilibrium"):
             logarithmic_decrement([1.0, amplitude])
     t = np.linspace(0, 10, 1001)
     with raises("amplitudes[4] = -0.", "must be positive", "about"):

@@ -280,7 +280,7 @@ def test_a_tendon_stays_in_an_unsymmetric_section(fibres):
         (lambda: ub.ImposedStrain.temperature(BEAM, 0.0, 10), "expansion"),
         (
             lambda: ub.ImposedStrain.tendon(BEAM, 1e6, (0.0, -0.25)),
-            "0.25 m from the axis of girder at s = 1, outside its section, which reaches from -0.2",
+            "eccentricity -0.25 m in girder at s = 1, outside its section, which reaches from -0.2",
         ),
     ],
 )

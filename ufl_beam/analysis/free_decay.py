@@ -19,7 +19,8 @@ class Envelope:
     """Decay law fitted to peaks, with 95 % confidence intervals of Student's t distribution.
 
     Attributes:
-        initial: A_0, the fitted amplitude at the first peak, where t = 0; unit of x.
+        initial: A_0, the fitted amplitude at the first peak, where t = 0; in the unit of the
+            vibration x.
         rate: r of the law A_0 − r t, in the unit of x per s; or λ of the law A_0 exp(−λ t), 1/s.
         initial_95: Half-width of the confidence interval of ``initial``; unit of x.
         rate_95: Half-width of the confidence interval of ``rate``; unit of ``rate``.
@@ -103,8 +104,8 @@ class Decay:
     def evidence(self) -> float:
         """Evidence ratio of the better law, exp(ΔAIC/2) with Akaike's information criterion AIC.
 
-        Residuals are assumed independent and normal.  Round-off of the amplitudes replaces a
-        smaller ``rms``.
+        Residuals are assumed independent and normal.  An ``rms`` below the round-off of the
+        amplitudes is replaced by this round-off.
         """
         least = np.finfo(float).eps * np.max(self.amplitudes)
         linear, exponential = (max(law.rms, least) for law in (self.linear, self.exponential))
@@ -218,7 +219,7 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
     for i in np.flatnonzero(Φ <= 0):
         raise ArgumentError(
             f"logarithmic_decrement: amplitudes[{i}] = {Φ[i]:g} must be positive; "
-            "is `about` the equilibrium, and the prominence more than the noise?"
+            "peaks must be measured from the equilibrium, and lie above the noise"
         )
     δ = np.log(Φ[0] / Φ[n]) / n  # P(61)
     return float(δ), np.log(Φ[:-1] / Φ[1:])

@@ -50,16 +50,16 @@ from ufl_beam.solvers.newton_options import Newton
 
 PATTERNS = "mode", "uniform", "triangular"
 TIMES = -1.0, 0.0, 0.5, 2.0, 5.0, *(10.0**k for k in range(1, 7))
-"""Times at which a motion or force must have its value at 1 s; s.  The base shear is the time of
-the path, so that large times occur; N."""
+"""Times (s) at which a prescribed motion or a connector force must equal its value at 1 s.  They
+are large, because on the path the base shear (N) takes the place of time."""
 
 MODES = 6  # number of modes among which the one with the largest effective mass is chosen
 LEAST_MOTION = 1e-6  # of the control place, as a fraction of the largest motion of the scene
 SAME = 1e-9  # fraction of the target that a step may miss by round-off
-NAMED_FROM = 0.99  # fraction of its limit from which on a hinge is named if the path ends
+NAMED_FROM = 0.99  # fraction of its limit that a hinge bears which is named if the path ends early
 MOST_STEPS = 20  # largest number of steps of a path, in multiples of the steps asked for
 Shape = Callable[[AttachmentPoint], float]
-"""Displacement of a place, relative to the displacement of the control place."""
+"""Function of a place: its displacement in a mode, with any factor."""
 
 
 def pushover(
@@ -77,8 +77,9 @@ def pushover(
     """Push a structure to a target displacement under constant loads of the scene.
 
     The loads of the scene act first, with their values at t = 1 s, and then stay constant.  Forces
-    with a constant distribution grow, controlled by the displacement of a place.  They act on
-    masses, of beams and of points.  Damping, dampers and viscosity have no effect.
+    with a constant distribution grow, controlled by the displacement of a place.  Patterns
+    with a name act on the masses of beams and on point masses.  Damping, dampers and viscosity have
+    no effect.
 
     Args:
         scene: Model with its permanent loads.
@@ -97,7 +98,8 @@ def pushover(
 
     Returns:
         The curve, with the equilibrium path and the sequence of hinges.  With a list of loads, the
-        shape φ of masses and participation factors is the elastic deflection under these loads.
+        equivalent mass and the participation factor are computed with the elastic deflection under
+        these loads as shape φ.
 
     Raises:
         ArgumentError: The call is wrong, a pattern needs mass and there is none, the pattern does
@@ -211,7 +213,7 @@ class Proportional:
 def mass_points(numbering: DofNumbering, axis: int) -> list[tuple[AttachmentPoint, float]]:
     """List points with mass (kg): Gauss points of cells, and point masses that can move.
 
-    ``axis`` is the component in which a support does not hold a point mass.
+    Point masses that a support holds in the component ``axis`` are left out.
     """
     scene, weights = numbering.scene, gauss_rule(4)[1]
     rows: list[tuple[AttachmentPoint, float]] = []
@@ -318,7 +320,7 @@ def _follow(
     scene: Scene, control: DisplacementControl, target: float, steps: int, start: Solution | None,
     **options: Any,
 ) -> tuple[Path, Events, str]:  # fmt: skip
-    """Follow the path to the target; return it, its events, and why it ended before."""
+    """Follow the path to the target; return it, its events, and the reason of an early end."""
     axis, sign = COMPONENTS.index(control.component), math.copysign(1.0, target)
     events, before = Events(), 0.0 if start is None else start.displacement(control.place)[-1, axis]
 
@@ -341,7 +343,7 @@ def _follow(
 
 
 def _at_limit(path: Path) -> list[Place]:
-    """Return the closed hinges whose moments nearly reach their limits at the end of a path."""
+    """Return places of closed hinges whose moments nearly reach their limits when a path ends."""
     hinges = []
     for hinge in path.scene.hinges:
         limit, state = float(law_of(hinge).limit), path.connector(hinge)
@@ -354,7 +356,7 @@ def _formations(events: Events, path: Path, displacement: Array) -> Any:
     """Iterate over the events with the states at which they are found."""
     n = 0
     for event in events.found:
-        # An event has the load factor at the end of its step, which may occur twice on a path.
+        # The time of an event is a load factor.  The path may reach the same load factor twice.
         n = next((k for k in range(n, len(path)) if path.factor[k] == event.time), n)
         yield HingeFormation(
             n, float(displacement[n]), float(path.factor[n]), event.where, event.what

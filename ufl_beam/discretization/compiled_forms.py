@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""UFL forms, and functions of values at a point, compiled to C.
+"""Compilation to C of UFL forms, and of functions at a point such as the laws of materials.
 
 Coefficients of forms are packed once; later only changed values are packed.
 
@@ -84,7 +84,7 @@ def prepared(form: ufl.Form) -> Prepared:
 
 
 def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
-    """Return fields of the struct ``cells`` of loops.h for positions of :meth:`Csr.blocks`.
+    """Return fields of the struct ``cells`` of loops.h from the positions of :meth:`Csr.blocks`.
 
     Batches of cells with equal positions share a pattern.  With cells of degree 1, patterns whose
     entries are adjacent in each row of the matrix come first.
@@ -107,10 +107,11 @@ def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
 class Kernel:
     """Compiled cell form with the packed values of its coefficients.
 
-    A form on one cell is evaluated on all cells.  Coefficients have the values in this one cell
-    until :meth:`put` or :meth:`set` changes them.  A linear form whose test function is in the
-    space of the unknown adds to the degrees of freedom of the cells.  Any other linear form returns
-    separate entries for each cell.  After :meth:`place`, a bilinear form adds to a matrix.
+    The form is stated on a mesh of one cell, and the kernel evaluates it on all cells.
+    Coefficients have the values in this one cell until :meth:`put` or :meth:`set` changes them.  A
+    linear form whose test function is in the space of the unknown adds to the degrees of freedom of
+    the cells.  Any other linear form returns separate entries for each cell.  After :meth:`place`,
+    a bilinear form adds to a matrix.
 
     Args:
         form: Cell integrals with one quadrature rule.
@@ -254,7 +255,7 @@ class Kernel:
     def keep_entries(self) -> tuple[Any, int, Array]:
         """Store the entries of all cells in each evaluation from now on.
 
-        Call this method after :meth:`place` and :meth:`subdomain`, which have no effect later.
+        Call :meth:`place` before this method; it has no effect afterwards.
 
         Returns:
             A pointer to the address of the array of entries; the number of cells in a batch, see
@@ -316,11 +317,11 @@ class Pointwise:
         self.at: dict[str, Expr] = {name: x[i] for i, name in enumerate(inputs)}
 
     def compile(self, *outputs: Expr) -> Any:
-        """Compile a C function of the outputs, valid as long as this object exists."""
+        """Compile a C function that computes the outputs, valid as long as this object exists."""
         return self._compiled(outputs)[0]
 
     def compile_loop(self, *outputs: Expr) -> Any:
-        """Compile a loop of the outputs over points, ``answer_loop`` of loops.h.
+        """Compile a loop over points that computes the outputs, an ``answer_loop`` of loops.h.
 
         The loop is null if it would not be faster than calls of the function.
         """
@@ -330,7 +331,7 @@ class Pointwise:
         return ffi.cast("answer_loop *", address or 0)
 
     def _compiled(self, outputs: Sequence[Expr]) -> tuple[Any, Path]:
-        """Return a C function of the outputs, and the C file that FFCx wrote for it."""
+        """Return a C function that computes the outputs, and the C file that FFCx wrote for it."""
         outputs = _with_shared_nodes(outputs)
         z = ufl.TestFunction(self._values(len(outputs)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})

@@ -40,12 +40,14 @@ class ImposedStrain(Load):
     Stresses follow from the strains of the beam minus the imposed strains.  Section forces,
     reactions, stored energy, yielding and hinges refer to these stresses.  The strains act on the
     whole section, also on sections of fibres: the axial strain of a fibre at y is
-    ``axial - y curvature``.  The ledger contains the work of the stresses on imposed strains in the
-    entry "loads".  A static run applies them in its first step, a dynamic run begins with them.
+    ``axial - y curvature``.  The ledger contains minus the work of the stresses on the imposed
+    strains in the entry "loads".  A static run applies the initial imposed strains in its first
+    step; a dynamic run begins with them.
 
     Each strain is a number, a pair of values at both ends of the span, or a function of the
     parameter s of the beam.  A cell with p integration points replaces the strains by a polynomial
-    of degree p - 1 with the same mean.  A saved solution contains values of functions at some s.
+    of degree p - 1 with the same mean.  A saved solution contains a function of s as a table of
+    values.
 
     Args:
         beam: The beam.
@@ -106,8 +108,8 @@ class ImposedStrain(Load):
             beam: The beam.
             expansion: Coefficient of thermal expansion; 1/K.
             uniform: Change of the temperature of the axis; K.
-            gradient: Change of temperature per length to the left of the direction of the beam,
-                (left - right) / depth; K/m.
+            gradient: Gradient of the change of temperature across the depth, positive if the left
+                of the beam is warmer, (left - right) / depth; K/m.
             amplitude: Factor on both, a function of time t (s).
             span: Parameters of the beam at both ends of the heated part.
         """
@@ -137,7 +139,7 @@ class ImposedStrain(Load):
             span: Parameters of the beam at both ends of the tendon.
 
         Raises:
-            ModelError: The tendon leaves the section between its lowest and highest points.
+            ModelError: The tendon is below the lowest or above the highest point of the section.
         """
         require_kind(beam, Beam, "ImposedStrain.tendon: beam")
         P = require_number(force, "ImposedStrain.tendon: force")
@@ -154,7 +156,7 @@ class ImposedStrain(Load):
         far = outside.argmax()
         if outside[far] > 1e-9 * (high - low):
             raise ModelError(
-                f"ImposedStrain.tendon: the tendon is {abs(at[far]):.3g} m from the axis of "
+                f"ImposedStrain.tendon: the tendon has the eccentricity {at[far]:.3g} m in "
                 f"{beam.name} at s = {s[far]:.3g}, outside its section, which reaches from "
                 f"{low:.3g} to {high:.3g} m"
             )

@@ -47,7 +47,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     """Draw the undeformed model, before any run.
 
     It shows beams, their cells and names, bodies, joints, supports, connectors with parameters,
-    hinges, loads (red), prescribed motions (orange), masses and initial velocities (green).  Loads
+    hinges, loads (red), masses, prescribed motions (orange) and initial velocities (green).  Loads
     that turn with their place have hollow arrow heads.  Drives are orange: filled if they prescribe
     the motion, hollow if they prescribe the force.  Labels for which there is no space are omitted.
     """
@@ -104,7 +104,7 @@ def scene_page(scene: Scene) -> str:
 
 
 def model_notes(scene: Scene) -> list[str]:
-    """Return lines of text on damping, works, and hinges that may form in cells."""
+    """Return lines of text on damping, users' virtual works, and hinges that may form in cells."""
     notes = []
     for damping in scene.damping:
         if isinstance(damping, Rayleigh):
@@ -145,7 +145,7 @@ def scene_load_caption(load: Load) -> tuple[str, str, float]:
 def _planned(
     subject: Subject, measure: Measure, least: Array, most: Array
 ) -> tuple[Drawing, list[Placed], Array]:
-    """Return the drawing at the largest scale that fits, its labels, and the corners of the axes.
+    """Return the largest drawing that fits, its labels, and the corners of the axes.
 
     The least and the largest size of the axes, (2,), and the corners, (4,), are in points.
     """

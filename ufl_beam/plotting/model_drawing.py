@@ -38,11 +38,11 @@ MOST_CELLS = 300  # number of cells beyond which neither cells nor possible hing
 
 HINGE = "#B0508A"  # colour of hinges
 MOVED = "#A86E00"  # colour of prescribed motions: the orange of drives, dark enough for text
-HEAD, SHAFT = 0.85, 1.9  # length of the head of an arrow in units, and width of its line in points
+HEAD, SHAFT = 0.85, 1.9  # length of the head of an arrow in units of symbols; line width in points
 
 
 def _kilograms(mass: float) -> str:
-    """Write a mass with four digits, without an exponent up to a million kilograms."""
+    """Write a mass with at least four digits, without an exponent up to a million kilograms."""
     digits = max(3 - math.floor(math.log10(mass)), 0) if mass > 0 else 0
     return f"{round(mass, digits):.10g} kg" if 1e-4 < mass < 1e6 else f"{mass:.4g} kg"
 
@@ -83,9 +83,10 @@ class Subject:
         self._ends: Array = np.reshape(ends, (-1, 2, 2))
 
     def line(self, load: LoadAlongBeam | ImposedStrain) -> tuple[Array, Array]:
-        """Return points of the axis in the span of a load, (n, 2); m, and its factors or strains.
+        """Return points of the axis in the span of a load, and its factors or strains at them.
 
-        The points are the vertices and, if factors or strains vary, 99 points between the ends.
+        The points (n, 2), in m, are the vertices and 99 points between the ends.  A load with
+        constant factors has the vertices only.
         """
         s = np.array(load.beam.vertices(self.scene.attached[load.beam]))
         low, high = (np.abs(s - end).argmin() for end in load.span)
@@ -118,7 +119,7 @@ class Drawing:
     """Strokes of a picture by groups, in m, and its labels, in points."""
 
     def __init__(self, subject: Subject, scale: float) -> None:
-        self.subject, self.scale = subject, scale  # the scale is the length of a point
+        self.subject, self.scale = subject, scale  # length of a typographic point; m
         self.shape = positions.Canvas.at_scale(subject.scene, 1.0, scale).undeformed
         self.unit, self.outside = self.shape.canvas.unit, self.shape.canvas.outside
         self.strokes: defaultdict[str, list[Stroke]] = defaultdict(list)
@@ -308,7 +309,7 @@ def _draw_point_load(drawing: Drawing, load: LoadAtPlace) -> None:
 
 
 def _draw_moving_load(drawing: Drawing, load: MovingLoad) -> None:
-    """Draw the force at its place at t = 0, or at the end of the beams where it is closest."""
+    """Draw the force at its place at t = 0, or at the nearer end of its route."""
     size, subject = math.hypot(*load.force), drawing.subject
     lengths = [positions.lengths_along(subject.axes[beam])[-1] for beam in load.route]
     ends = np.cumsum(lengths)
@@ -334,7 +335,7 @@ def _force_arrow(
     """
     unit = drawing.outside
     at, length = np.array(place.point), (2.6 + 1.4 * fraction) * unit
-    if isinstance(place, Place):  # beyond a line load on the beam
+    if isinstance(place, Place):  # long enough to be seen beside a line load
         length += drawing.stacks[(place.beam, *np.round(direction, 6))]
     # Cosines of the angles between the force and the beams
     along = drawing.subject.directions_at(place) @ direction
@@ -356,7 +357,7 @@ def _components(load: LoadAlongBeam) -> Array:
 
 
 def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
-    """Draw arrows of a line load, which end on the beam or are parallel to it, and moments.
+    """Draw a line load: its moments, and arrows across the beam or parallel to it.
 
     Arrows of a pressure have hollow heads.
     """
@@ -372,7 +373,7 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
         ways = ways[:, :1] * tangents + ways[:, 1:] * normal(tangents)
 
     def spaced(distance: float, *, ends: bool = False) -> list[Any]:
-        """List equally spaced points, about ``distance`` apart; m, with shares and directions."""
+        """List equally spaced points, about ``distance`` (m) apart, with shares and directions."""
         number = max(1, round(lengths[-1] / distance))
         steps = (np.arange(number + 1) if ends else np.arange(number) + 0.5) / number
         at = steps * lengths[-1]

@@ -125,7 +125,7 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
         else:
             angle = support.angle - (0.0 if 1 in held else math.pi / 2)
             symbols.append((place, color, len({0, 1} & set(held)), _inward(place), angle))
-    # Places, and whether the joint can rotate; None for connectors, which do not change the symbol
+    # Places, and whether the joint can rotate; None for connectors, which leave this to the joints
     grounded: list[tuple[Sequence[AttachmentPoint], bool | None]] = [
         (j.places, _rotates(j)) for j in scene.joints if joint_symbol(j).grounded
     ]
@@ -209,7 +209,7 @@ class JointSymbol(NamedTuple):
     """Symbol of a joint."""
 
     rod: float = 0.0  # width of a line from place to place; points
-    pins: tuple[int, ...] = ()  # indices of places with a pin; on a rail, if the joint rotates
+    pins: tuple[int, ...] = ()  # indices of places with a pin, on a rail only if it rotates
     rail: Callable[[DeformedShape, Joint], Iterator[Stroke]] | None = None
     grounded: bool = True  # True if a point of the ground gets the symbol of a support
 
@@ -221,7 +221,7 @@ def _rail(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
     ahead = -normal(shape.turned(across.axis, base))
     s = float((block - start) @ ahead)
     low, high = shape.canvas.travels[across]
-    # Magnified displacements may move the block out of its range, because rotations stay true.
+    # Displacements may be magnified, rotations are not, so the block may leave its range.
     low, high = min(low, s) - 1.8 * unit, max(high, s) + 1.8 * unit
     rail = block + np.outer((low - s, high - s), ahead)
     yield Stroke(rail, STEEL, 2.2)
@@ -313,7 +313,7 @@ def pins(shape: DeformedShape) -> Iterator[Pin]:
 # -- connectors --------------------------------------------------------------------------------
 #
 # A symbol, along a line or around a pin, has coordinates (s, t).  s runs along the connector from
-# -2 at its place a to 2 at its place b, with the body from -1 to 1; t is perpendicular.
+# -2 at its place a to 2 at its place b; its middle part is from -1 to 1.  t is perpendicular.
 
 
 def _class_words(law: Any) -> str:
@@ -339,7 +339,7 @@ def _drive(straight: list[Stroke], fill: str, tail: float = -2.0, *more: Stroke)
     return LawSymbol(straight, turning=turning, sweep=1.4 * math.pi, spins=True)
 
 
-CENTRE = -9.0  # coordinate t of the centre of rotation, behind the pin
+CENTRE = -9.0  # coordinate t of the inner ends of spokes, which the pin hides
 _SPOKES = [_line((s, CENTRE), (s, 0)) for s in (-2, 2)]
 _TEETH = [(float(s), 0.55 * (-1.0) ** k) for k, s in enumerate(np.linspace(-1.0, 1.0, 13)[1::2])]
 _BOXED = [_line((-2, 0), (-0.8, 0)), _line((0.8, 0), (2, 0)), _box(-0.8, 0.8, 0.6, WHITE)]
@@ -458,7 +458,7 @@ def _straight(shape: DeformedShape, connector: Connector) -> Iterator[Stroke]:
             yield Stroke(np.array([end, lane, lane + offset * across]))
         inwards = 0.06 * (b - a)
         a, b = a + inwards + offset * across, b - inwards + offset * across
-    # The body is a constant fraction of the length, so that it stretches with the motion.
+    # The middle part is a constant fraction of the length, so it stretches with the motion.
     body = min(0.66, 6.0 * unit / max(length, unit))
     places = 0.0, (1 - body) / 2, (1 + body) / 2, 1.0
     for stroke in law_symbol(connector.law).straight:

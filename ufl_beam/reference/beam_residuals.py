@@ -64,7 +64,8 @@ class ElasticBeams(CellForce):
         change = ufl.dot(acting, imposed.now - imposed.before) * element.dx(1)
         self._work_on_imposed, self._supplied = cells.form(change), setting.ledger.supplied
         if scheme.lost_fraction:
-            # c C (Δe - r Δe') with Δe' of the last step and r = min(1, dt / length of last step)
+            # c C (Δe - ρ Δe'), with the lost fraction c, the change Δe' in the last step, and
+            # ρ = min(1, dt / length of last step)
             whole = strain(element.q1, element.axis) - strain(element.q0, element.axis)
             damped = element.constant(scheme.lost_fraction) * resultants(
                 whole - self._change_before, C
@@ -88,7 +89,7 @@ class ElasticBeams(CellForce):
         return super().response(step, q1)
 
     def change(self, step: Step, q1: Array) -> float:
-        """Return the energy stored in the step, and the work on imposed strains; J."""
+        """Return the sum of the energy stored in the step and the work on imposed strains; J."""
         return self.energy(q1) - self.stored["stored"] + self.work_on_imposed()
 
     def work_on_imposed(self) -> float:
@@ -162,7 +163,7 @@ class YieldingBeams(CellForce):
         return super().response(step, q1)
 
     def change(self, step: Step, q1: Array) -> float:
-        """Return the energy stored and dissipated in the step, and the work on imposed strains."""
+        """Return the sum of stored and dissipated energy and work on imposed strains in a step."""
         self.points.require_dissipation(self._names)
         return self.points.change() + self.work_on_imposed()
 
@@ -200,7 +201,7 @@ class YieldingBeams(CellForce):
     def material(self) -> Array:
         """Return the six values "material" at each Gauss point; (num_cells, degree, 6)."""
         data = self.points.recorded.copy()
-        data[:, 3] *= self._hinges  # zero without a hinge: jumps of fibres are no rotations
+        data[:, 3] *= self._hinges  # the rotation of a hinge; jumps of fibres are no rotations
         return data.reshape(-1, self._degree, 6)
 
 
@@ -224,7 +225,7 @@ class Mass:
         self._beam_form = cells.form(ufl.action(form, cells.element.q1))
 
     def on_nodes(self, v: Array) -> Array:
-        """Return :func:`end_forces` of the product of the mass matrix of the beams and ``v``."""
+        """Return the mass matrix of the beams times ``v``, as forces at the nodes of cells."""
         self.cells.set(self.cells.element.q1, v)
         return self.cells.on_nodes("density", self._beam_form.assembled())
 
@@ -278,7 +279,7 @@ class Inertia(MatrixForce):
             setting.loses("numerical")
 
     def after(self, s: Array) -> tuple[Array, ...]:
-        """Return velocities and further rates of the scheme after the nodal step ``s``."""
+        """Return velocities and further rates of the scheme after increments ``s`` of the nodes."""
         return tuple(combined(row, s, self) for row in self.coefficients.rates)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
@@ -321,7 +322,7 @@ class DampingForce(MatrixForce):
         self.ledger.lost["damping"] += float(s @ (self.matrix @ s)) / step.dt
         mass, damping = self.inertia.mass, self._damping
         by_mass = mass.on_nodes(self.rate)
-        # mass.on_nodes has set q1 of this form to the rate.
+        # mass.on_nodes has set the function q1, on which _action depends, to the rate.
         by_stiffness = mass.cells.on_nodes("stress", self._action.assembled())
         self.on_nodes = damping.mass * by_mass + damping.stiffness * by_stiffness
 
@@ -343,7 +344,7 @@ class RayleighForce(DampingForce):
 class TangentRayleighForce(DampingForce):
     """Rayleigh damping with the tangent stiffness of the accepted state.
 
-    The stiffness has the tangents of sections without negative eigenvalues, at the configuration at
+    Negative eigenvalues of the tangents of sections are removed.  The configuration is the one at
     the beginning of the step.
     """
 
@@ -404,9 +405,9 @@ class TangentRayleighForce(DampingForce):
 
 
 def positive(D: Array, C: Array) -> Array:
-    """Return D without the negative eigenvalues of its symmetric part, relative to stiffnesses C.
+    """Return the symmetric part of D without its negative eigenvalues.
 
-    D has the shape (n, 3, 3), C (n, 3).
+    The eigenvalues are those of D scaled by the stiffnesses C.  D is (n, 3, 3), C (n, 3).
     """
     scale, symmetric = np.sqrt(C[:, :, None] * C[:, None, :]), (D + D.transpose(0, 2, 1)) / 2
     values, vectors = np.linalg.eigh(symmetric / scale)

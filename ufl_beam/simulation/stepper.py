@@ -2,8 +2,8 @@
 """Steps of a scene, which steps.c solves, checks and accepts, or divides if they fail.
 
 Some static schemes satisfy equilibrium inside a step.  After large nodal rotations the end of the
-step is then out of equilibrium.  So these schemes apply loads that act from the start in the first
-eighth of the first step, in substeps with small rotations.
+step is then out of equilibrium.  So with these schemes, loads that already act at the beginning of
+a run grow during the first eighth of the first step, in substeps with small rotations.
 """
 
 from __future__ import annotations
@@ -97,7 +97,8 @@ The relative error of a moment in a substep is a quarter of the square of this a
 FREE_STIFFNESS = 1e-3
 """Loads count as resisting a motion without strain only if the stiffness against it exceeds this
 fraction of (size of the forces) · (size of the scene); N m.  The motion is measured as an angle,
-and the stiffness as a moment per angle.  A weight or a tension gives tenths of the product."""
+and the stiffness as a moment per angle.  The stiffness by a weight or a tension is typically some
+tenths of this product."""
 
 SHORT_SUBSTEP = 512
 """A substep of at most 1/512 of the time in which loads are applied may exceed APPLYING_ROTATION.
