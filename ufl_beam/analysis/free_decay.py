@@ -219,7 +219,7 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
     for i in np.flatnonzero(Φ <= 0):
         raise ArgumentError(
             f"logarithmic_decrement: amplitudes[{i}] = {Φ[i]:g} must be positive; "
-            "peaks must be measured from the equilibrium, and lie above the noise"
+            "peaks must be measured from the equilibrium (about= of damping), and lie above noise"
         )
     δ = np.log(Φ[0] / Φ[n]) / n  # P(61)
     return float(δ), np.log(Φ[:-1] / Φ[1:])
