@@ -57,8 +57,8 @@ class Decay:
         amplitudes: Amplitudes of the peaks; (n,); unit of x.
         decrement: Mean logarithmic decrement δ of all periods.
         decrements: Logarithmic decrement of each period; (n-1,).
-        linear: Fit of A_0 − r t, the law of dry friction.
-        exponential: Fit of A_0 exp(−λ t), the law of viscous damping.
+        linear: Fit of A_0 − r t, the law of dry friction; t from the first peak.
+        exponential: Fit of A_0 exp(−λ t), the law of viscous damping; t from the first peak.
 
     Example:
         >>> t = np.arange(0, 5, 0.01)
@@ -91,7 +91,7 @@ class Decay:
 
     @property
     def fitted_ratio_95(self) -> float:
-        """Half-width of the 95 % confidence interval of ``fitted_ratio``."""
+        """Half-width of the 95 % confidence interval of ``fitted_ratio``, for the mean period."""
         slope = (1 - self.fitted_ratio**2) ** 1.5 / (2 * np.pi)  # dζ/dδ
         return float(slope * self.exponential.rate_95 * self.period)
 

@@ -87,9 +87,10 @@ def pushover(
         target: Displacement of the control place, with its sign, beyond the displacement due to the
             loads of the scene; m.
         pattern: Distribution of the pushing forces: "mode", mass times the elastic mode with the
-            largest effective mass; "uniform", mass; "triangular", mass times the height above the
-            lowest point; or a list of :class:`PointLoad`, :class:`LineLoad` and :class:`Gravity`.
-            The sum of the forces in the direction of the component is scaled to the base shear.
+            largest effective mass of the first six; "uniform", mass; "triangular", mass times the
+            height above the lowest point; or a list of :class:`PointLoad`, :class:`LineLoad` and
+            :class:`Gravity`. The sum of the forces in the direction of the component is scaled to
+            the base shear.
         component: "u" to push along x, or "v" along y.
         steps: Number of steps to the target.
         newton: Tolerances and options of Newton's method.
@@ -103,7 +104,9 @@ def pushover(
 
     Raises:
         ArgumentError: The call is wrong, a pattern needs mass and there is none, the pattern does
-            not move the control place, or a motion or force in the scene depends on time.
+            not move the control place, the forces
+            along the component have no sum, or a prescribed motion or connector force depends on
+            time.
         ConvergenceError: There is no equilibrium under the loads of the scene, or no first step.
 
     Warns:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """C library of the package: loops over cells and connectors, material points, Newton's method.
 
-It is compiled once on each machine.  The loops over cells assemble the same vectors and matrices as
-DOLFINx, as a test verifies.  They also copy the unknowns into the coefficients of each cell, and
-add the entries of the cell at stored indices of the matrix.
+It is compiled at the first use, and again after changes of its source.  The loops over cells
+assemble the same vectors and matrices as DOLFINx, as a test verifies.  They also copy the unknowns
+into the coefficients of each cell, and add the entries of the cell at stored indices of the matrix.
 """
 
 from __future__ import annotations
@@ -135,7 +135,10 @@ def struct(kind: str, **fields: Any) -> Any:
 
 
 def names(enum: str, prefix: str = "") -> tuple[str, ...]:
-    """Return the names of an enum of loops.h in order, without the last one, which counts them."""
+    """Return the names of an enum of loops.h in lower case, without ``prefix`` and the last one.
+
+    The last one is the number of the others.
+    """
     elements = ffi.typeof(f"enum {enum}").elements
     return tuple(elements[i].lower().removeprefix(prefix) for i in range(len(elements) - 1))
 

@@ -60,7 +60,7 @@ class ImposedStrain(Load):
             vertices of the mesh.
 
     Raises:
-        ModelError: The span is not inside the beam, or a strain is not finite at some s.
+        ModelError: The span is not inside the beam, or a strain is not finite at an end of it.
 
     Example:
         >>> fire = ub.ImposedStrain.temperature(beam, 1.2e-5, uniform=100.0)  # 1/K, K

@@ -48,8 +48,9 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
 
     It shows beams, their cells and names, bodies, joints, supports, connectors with parameters,
     hinges, loads (red), masses, prescribed motions (orange) and initial velocities (green).  Loads
-    that turn with their place have hollow arrow heads.  Drives are orange: filled if they prescribe
-    the motion, hollow if they prescribe the force.  Labels for which there is no space are omitted.
+    that turn with their place have hollow arrow heads.  Drives that prescribe
+    a motion are filled with orange; drives that prescribe a force are hollow.  Labels for which
+    there is no space are omitted.
     """
     require_independent(scene)
     subject, notes = Subject(scene), model_notes(scene)

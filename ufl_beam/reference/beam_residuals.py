@@ -231,7 +231,7 @@ class Mass:
 
 
 class MatrixForce(Force):
-    """Product of a constant matrix and a rate; :class:`Coefficients` define the rate.
+    """Product of a matrix, constant in a step, and a rate; :class:`Coefficients` define the rate.
 
     Attributes:
         rate: Rate in the latest response; (size,).
