@@ -230,6 +230,36 @@ def test_processes_that_share_a_scene(actions, kind, monkeypatch):
         assert np.abs(one - other).max() < SOLVED * size
 
 
+@pytest.mark.parametrize("fails", [False, True])
+@pytest.mark.parametrize(
+    "hinges", [{}, {0.5: ub.Softening(limit=100.0, fracture_energy=50.0)}], ids=["elastic", "hinge"]
+)
+def test_extremes_include_substeps_on_processes_that_share_a_scene(hinges, fails, monkeypatch):
+    """A turn by 3 rad divides a step, and a jump in it ends the run after some of the substeps."""
+    monkeypatch.setattr("ufl_beam.parallel.SMALLEST_SUBDOMAIN", 1)
+    turn, jump = ub.Table([0.0, 0.5, 0.6], [0.0, 0.0, 3.0]), 9.0 * fails
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4, hinges=hinges)
+    moved = ub.PrescribedDisplacement(beam.start, psi=lambda t: turn(t) + jump * (t > 0.58))
+    scene, found = ub.Scene([beam], supports=[moved]), list[ub.Extremes]()
+    for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        found.append(extremes := ub.Extremes(3))
+        options = {"t": (0, 1), "dt": 0.1, "record": extremes, "comm": comm}
+        if fails:
+            with pytest.raises(ub.ConvergenceError) as failure:
+                ub.simulate(scene, ub.EnergyMomentum(), **options)
+            run = failure.value.solution
+        else:
+            run = ub.simulate(scene, ub.EnergyMomentum(), **options)
+        assert run.substeps > len(run) + 3
+        whole_steps = range(len(run) - fails)
+        of_states = max(run.diagram(beam, n, points=3).M.max() for n in whole_steps)
+        assert extremes.section_forces(beam).high[:, 2].max() > 1.05 * of_states
+    for kind in (ub.Extremes.section_forces, ub.Extremes.displacement):
+        one, other = (kind(extremes, beam) for extremes in found)
+        size = np.abs([other.low, other.high]).max(axis=(0, 1))
+        assert (np.abs([one.low - other.low, one.high - other.high]) <= SOLVED * size).all()
+
+
 @pytest.mark.parametrize("action", ACTIONS)
 def test_of_a_simulation(action):
     """What recorders ask for is what solutions have, on any process without the others."""

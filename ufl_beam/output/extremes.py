@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from mpi4py import MPI
+
 import numpy as np
 import ufl
 from ufl.core.expr import Expr
@@ -23,7 +25,7 @@ from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import Body, Member
 from ufl_beam.output.output_files import require_arrays
 from ufl_beam.output.recorder import Restartable, StateView
-from ufl_beam.output.section_forces import ForcesAlongCells, in_section, section_force
+from ufl_beam.output.section_forces import in_section, section_force
 from ufl_beam.terms.cell_forces import CellForces
 
 
@@ -68,7 +70,8 @@ def along_cells(
 
     Returns:
         The form, and its coefficients: degrees of freedom of a cell, or only rotations if all
-        fractions are 0 or 1; resultants (``cell_number`` of loops.h); ``ForcesAlongCells.angles``.
+        fractions are 0 or 1; resultants (``cell_number`` of loops.h); directions of the axis at
+        both ends of a cell.
     """
     mesh, h, between = Mesh(degree=element.degree), element.axis.h, set(fractions) > {0.0, 1.0}
     n = len(mesh.nodes)
@@ -104,7 +107,9 @@ def along_cells(
 
 
 class ExtremesInC:
-    """Extremes of section forces at points of cells, and of motions, for a scene on one process.
+    """Extremes of section forces at points of cells, and of motions, after each substep.
+
+    Each process updates the extremes of its cells and degrees of freedom.
 
     Attributes:
         c: Struct ``watch`` of loops.h.
@@ -112,26 +117,27 @@ class ExtremesInC:
     """
 
     def __init__(
-        self, fields: Fields, cell_forces: CellForces, along: ForcesAlongCells, between: float,
-        fractions: Array,
-    ) -> None:  # fmt: skip
-        size, works = fields.subdomain.size, bool(fields.subdomain.numbering.scene.works)
+        self, fields: Fields, cell_forces: CellForces, between: float, fractions: Array
+    ) -> None:
+        self._subdomain = subdomain = fields.subdomain
+        size, works = subdomain.size, bool(subdomain.numbering.scene.works)
         form, motions, resultants, angles = along_cells(
             fields.element, tuple(map(float, fractions)), works
         )
         moves, first = (x.ufl_shape[0] for x in (motions, resultants))
         self._kernel = fields.kernel(form, motions, fields.cell_dofs[:, -moves:])
         _, self._batch, spare = self._kernel.keep_entries()
-        self._cells, self._points, self._forces = len(along.angles), len(fractions), cell_forces
+        axes: Array = subdomain.numbering.axis_angles[subdomain.cells]
+        self._points, self._forces = len(fractions), cell_forces
         sizes = spare.size, size
         self._extents = [Extent(*np.zeros((4, n))) for n in sizes]
         cell_forces.keep_latest()
         self.c = struct(
             "watch", forces=cell_forces.c, along=self._kernel.cells, between=between,
-            angles=in_batches(along.angles, self._batch), q=np.zeros(size), first=first,
+            angles=in_batches(axes, self._batch), q=np.zeros(size), first=first,
             at_angles=self._kernel.position(angles),
             at_numbers=self._kernel.position(resultants),
-            numbers=np.zeros(lib.CELL_NUMBERS * self._cells),
+            numbers=np.zeros(lib.CELL_NUMBERS * len(axes)),
             some=np.zeros(lib.SOME * self._kernel.cells.width),
             in_order=cell_forces.in_order(self._batch),
         )  # fmt: skip
@@ -140,32 +146,48 @@ class ExtremesInC:
             fill(c, size=len(extent.low), **extent._asdict())
 
     def add(self, steps: int, t: float, q: Array, before: Array) -> None:
-        """Include the state after ``steps`` steps, unless :attr:`seen` is the same number."""
-        if steps == self.seen:
-            return
-        resultants = self._forces(q, before)
-        previous, self._forces.c.initial = self._forces.c.initial, doubles(resultants)
-        lib.watch_step(self.c, 0, t, doubles(before), doubles(q))
-        self._forces.c.initial = previous
-        self.seen = steps
+        """Include the state after ``steps`` steps, unless :attr:`seen` is the same number.
+
+        Processes that share the scene call this method together; it gathers their extremes.
+        """
+        if steps != self.seen:
+            resultants = self._forces(q, before)
+            previous, self._forces.c.initial = self._forces.c.initial, doubles(resultants)
+            lib.watch_step(self.c, 0, t, doubles(before), doubles(q))
+            self._forces.c.initial = previous
+            self.seen = steps
+        if not self._subdomain.alone:
+            self.gather()
 
     def begin(self, steps: int, forces: Extent, motion: Extent) -> None:
         """Set the extremes after ``steps`` steps, in the form that :meth:`extents` returns."""
         for to, values in zip(self._extents[0], forces, strict=True):
-            to[:] = in_batches(values, self._batch).ravel()
+            to[:] = in_batches(values[self._subdomain.cells], self._batch).ravel()
         for to, values in zip(self._extents[1], motion, strict=True):
-            to[:] = values
-        self.seen = steps
+            to[:] = values[self._subdomain.dofs]
+        self.seen, self._gathered = steps, [forces, motion]
+
+    def gather(self) -> None:
+        """Gather the extremes of all processes that share the scene; they call it together."""
+        subdomain, (forces, motion) = self._subdomain, self._extents
+        cells, shape = subdomain.cells, (-1, 3 * self._points, self._batch)
+        whole: Array = np.zeros((4, len(subdomain.numbering.cells), self._points, 3))
+        for k, values in enumerate(forces):
+            in_order = values.reshape(shape).transpose(0, 2, 1).reshape(-1, self._points, 3)
+            whole[k, cells] = in_order[: len(cells)]
+        if not subdomain.alone:
+            subdomain.comm.Allreduce(MPI.IN_PLACE, whole)
+        motions = (subdomain.gather(values).copy() for values in motion)
+        self._gathered = [Extent(*whole), Extent(*motions)]
 
     def extents(self) -> list[Extent]:
-        """Return the extremes of section forces, (num_cells, points, 3), and motions, (size,)."""
-        forces, motion = self._extents
-        shape = -1, 3 * self._points, self._batch
-        in_cells = (
-            x.reshape(shape).transpose(0, 2, 1).reshape(-1, self._points, 3)[: self._cells].copy()
-            for x in forces
-        )
-        return [Extent(*in_cells), Extent(*map(np.copy, motion))]
+        """Return the extremes of section forces, (num_cells, points, 3), and motions, (size,).
+
+        If processes share the scene, the extremes are those of the latest :meth:`gather`.
+        """
+        if self._subdomain.alone:
+            self.gather()
+        return self._gathered
 
 
 # -- the recorder ----------------------------------------------------------------------------------
@@ -175,14 +197,15 @@ class Extremes(Restartable):
     """Recorder of the extremes of section forces along all cells and of motions of all nodes.
 
     All steps are included, even if the solution does not store them.  Steps that the solver divides
-    count as their parts, but as a whole on processes that share a scene.  Memory does not grow with
-    the number of steps.  Section forces are evaluated at equally spaced points of each cell, both
-    ends included, as in :meth:`Solution.diagram`.
+    count as their substeps.  Memory does not grow with the number of steps.  Section forces are
+    evaluated at equally spaced points of each cell, both ends included, as in
+    :meth:`Solution.diagram`.  During a run, processes that share the scene have the extremes up to
+    the end of the last whole step.
 
     Args:
         points: Number of points of a cell, at least 2.
         accelerations: Record extremes of the accelerations of all nodes, which Python then updates
-            after each step.
+            after each whole step.
 
     Raises:
         ArgumentError: ``points`` is no number of at least 2.  A run raises it if it is static and
@@ -201,7 +224,7 @@ class Extremes(Restartable):
         require_switch(accelerations, "Extremes: accelerations")
         self._accelerated = bool(accelerations)
         self._fractions = np.arange(int(points)) / (int(points) - 1)
-        self._in_c: ExtremesInC | None = None
+        self._in_c: Any = None  # ExtremesInC during a run
         self._taken: list[Extent] = []
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
@@ -210,8 +233,7 @@ class Extremes(Restartable):
         self._solution = simulation.solution
         if self._accelerated and not has_inertia(simulation.scheme):
             raise ArgumentError("Extremes: accelerations: the run is static; there are none")
-        self._in_c = simulation.watch(self._fractions)
-        self.by_itself = self._in_c is not None and not self._accelerated
+        self.by_itself = simulation.subdomain.alone and not self._accelerated
         size = self._numbering.size
         shapes = (len(self._numbering.cells), len(self._fractions), 3), (size,), (size,)
         self._taken = []
@@ -222,8 +244,8 @@ class Extremes(Restartable):
                 require_arrays(state, dict.fromkeys(names, shape))
                 extent = Extent(*(state[name].copy() for name in names))
             self._taken.append(extent)
-        if self._in_c is not None:
-            self._in_c.begin(-1 if state is None else simulation.substeps, *self._taken[:2])
+        self._in_c = simulation.watch(self._fractions)
+        self._in_c.begin(-1 if state is None else simulation.substeps, *self._taken[:2])
         self._before: Array = np.full((1 + size) * self._accelerated, np.nan)
         if state is None:
             self.write(simulation)
@@ -238,20 +260,13 @@ class Extremes(Restartable):
 
     def write(self, simulation: StateView) -> None:
         """Include the state of a step."""
-        pairs = list[tuple[Extent, Array]]()
-        if self._in_c is not None:
-            self._in_c.add(simulation.substeps, simulation.t, simulation.q, simulation.q_before)
-        else:
-            forces = simulation.now.cell_forces(0, self._fractions)
-            q = simulation.subdomain.gather(simulation.q)  # the same on every process
-            pairs += zip(self._taken, (forces, q), strict=False)
+        self._in_c.add(simulation.substeps, simulation.t, simulation.q, simulation.q_before)
         if self._accelerated:
             v = simulation.subdomain.gather(simulation.velocities()[0])
             now = np.append(simulation.t, v)
             change = now - self._before
-            pairs.append((self._taken[2], change[1:] / change[0]))
             self._before[:] = now
-        for extent, values in pairs:
+            values, extent = change[1:] / change[0], self._taken[2]
             for reached, when, beyond in (
                 (extent.low, extent.time_low, values < extent.low),
                 (extent.high, extent.time_high, values > extent.high),

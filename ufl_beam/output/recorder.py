@@ -170,9 +170,9 @@ class StateView(PresentState):
         """Return jumps (rad) and dissipated energies (J) of cells; see :meth:`States.damage`."""
         return self.now.damage()
 
+    @abstractmethod
     def watch(self, fractions: Array) -> Any:
-        """Return extremes at fractions of cells that C updates after steps; None if C cannot."""
-        return None
+        """Return extremes at ``fractions`` of cells, which C updates after each substep."""
 
 
 class Recorder(ABC):

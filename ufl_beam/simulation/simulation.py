@@ -24,7 +24,6 @@ from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.extremes import ExtremesInC
-from ufl_beam.output.section_forces import ForcesAlongCells
 from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWriter, new_rows
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, communicator, sharing
@@ -238,17 +237,14 @@ class Simulation(Stepper):
             self.give_up(failure, float(c.failed_end))
         return taken
 
-    def watch(self, fractions: Array) -> ExtremesInC | None:
+    def watch(self, fractions: Array) -> ExtremesInC:
         """Return extremes of motions, and of section forces at ``fractions`` of cells.
 
-        C updates them after each step.  The result is None if processes share the scene.
+        C updates them after each substep.  All processes that share the scene call this method.
         """
-        if not self.subdomain.alone:
-            return None
-        along = ForcesAlongCells(self.numbering), self.solution.equilibrium_fraction
-        self._watches.append(
-            extremes := ExtremesInC(self.fields, self.cell_forces, *along, fractions)
-        )
+        between = self.solution.equilibrium_fraction
+        extremes = ExtremesInC(self.fields, self.cell_forces, between, fractions)
+        self._watches.append(extremes)
         pointers = ffi.new("watch *[]", [watch.c for watch in self._watches])
         fill(self.time_loop, watches=len(self._watches), watch=pointers)
         return extremes
@@ -355,10 +351,12 @@ class Simulation(Stepper):
         return DolfinxView(self)
 
     def end(self) -> None:
-        """Store the last state, and the data for ``start=``, in the solution."""
+        """Store the last state, and the data for ``start=``, in the solution; gather extremes."""
         self.comparison.synchronize()
         if self.t not in self.solution.times[-1:]:
             self.keep()
+        for extremes in self._watches:
+            extremes.gather()
         # Iterations of failed steps count, too.
         self.solution.substeps, self.solution.iterations = self.substeps, self.iterations
         self.solution.internal = self.equation.internal_variables(self.q, self.t)
