@@ -161,6 +161,20 @@ def test_energies_of_all_kinds_of_hinges_add_up_to_the_ledger(everything):
     assert with_yield == [c for c in everything.scene.connectors if isinstance(c.law, ub.Spring)]
 
 
+def test_energies_of_a_run_with_a_start_include_those_before(everything):
+    """And the ledger begins at zero."""
+    total, runs = 0.0, []
+    for ends in ((0.0, 0.6), (0.6, 1.0)):
+        start = runs[-1] if runs else None
+        scheme = ub.EnergyMomentumStatic()
+        runs.append(ub.simulate(everything.scene, scheme, t=ends, dt=0.02, start=start))
+        energy = runs[-1].energy
+        total += energy["plastic"][-1] + energy["hinges"][-1]
+        rows = runs[-1].hinges().rows
+        assert sum(row.dissipated for row in rows) == pytest.approx(total, rel=1e-12)
+    assert {row.time for row in rows} == {0.6}
+
+
 def test_rows_are_those_of_other_results(everything):
     """Of connectors, and of the material at the place of a hinge."""
     for row in everything.hinges().rows:

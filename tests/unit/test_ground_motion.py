@@ -44,8 +44,10 @@ def written(tmp_path):
     ("text", "options", "unit"),
     [
         (NEW, {}, G),
-        (NEW, {"unit": "m/s2", "dt": 0.01}, 1.0),
+        (NEW, {"unit": "g", "dt": 0.01}, G),
         (OLD, {}, 0.01),
+        (OLD, {"unit": "gal"}, 0.01),
+        (NEW.replace("OF G", "OF CM"), {"unit": "m/s2"}, 1.0),
         ("# t, a\n" + "\n".join(f"{k}e-2,{a}" for k, a in enumerate(VALUES)), {"unit": "g"}, G),
         ("\n".join(f" {k + 300}e-2\t{a} " for k, a in enumerate(VALUES)), {"unit": "gal"}, 0.01),
         ("0.1 -0.2 0.3\n\n0.4 0; -0.1; 0\n", {"unit": "m/s^2", "dt": 0.01}, 1.0),
@@ -110,6 +112,8 @@ TIMED = "0.00 1\n0.01 2\n0.02 3\n0.03 4\n0.04 5\n"
         (NEW.replace("      7", "      8"), {}, ": 7 accelerations, but NPTS = 8 in the head"),
         (NEW.replace(".3000000E+00", "*"), {}, ", line 5: no numbers"),
         (NEW, {"dt": 0.02}, ": dt = 0.02 s, but the file has 0.01 s"),
+        (NEW, {"unit": "m/s2"}, ": unit = 'm/s2', but the file has G; omit unit="),
+        (OLD, {"unit": "g"}, ": unit = 'g', but the file has CM/S/S; omit unit="),
     ],
 )
 def test_a_wrong_file_is_refused_with_its_line(written, text, options, message):

@@ -92,6 +92,7 @@ def test_elastic_demands_are_the_displacement_spectrum():
     )  # fmt: skip
     np.testing.assert_allclose(found.demand, np.tile(small, (3, 1)) / omega**2, rtol=2.6e-3)
     assert not found.collapsed.any()
+    assert found.labels == ("demand", "spectral")
 
 
 def test_members_are_runs_of_the_scaled_motion():
@@ -105,6 +106,7 @@ def test_members_are_runs_of_the_scaled_motion():
             comm=MPI.COMM_SELF,
         )  # fmt: skip
         assert found.demand[0, k] == np.abs(drift(run)).max()
+    assert found.labels == ("drift", "peak acceleration (m/s²)")
     assert found.outcome.tolist() == [[0, 0, 1]]
     assert found.demand[0, 2] > 0.05
     assert found.end[0, :2].tolist() == [record.duration] * 2
@@ -225,6 +227,13 @@ def test_mistakes_are_named():
         analysis([motion(1)], [1.0], scheme=ub.Static())
     with raises("intensity of seed 1 = 0 must be positive"):
         analysis([motion(1)], [1.0], intensity=lambda record: 0.0)
+    square = motion(1).peak ** 2
+    with raises(
+        f"intensity of seed 1 = {square:g}, and {4 * square:g} if the motion is doubled; give"
+    ):
+        analysis([motion(1)], [1.0], intensity=lambda record: record.peak**2)
+    with raises("if the motion is doubled; give an intensity that is proportional"):
+        analysis([motion(1)], [1.0], intensity=lambda record: 3.0)
     with pytest.raises(RuntimeError, match="measure returned None, not finite numbers"):
         analysis([motion(1)], [1.0], measure=lambda run: None)
 

@@ -47,6 +47,7 @@ from ufl_beam.simulation.step_lengths import EqualSteps, step_count
 from ufl_beam.solvers.newton_options import Newton
 
 CHECKS = 10  # number of times in a run at which the demand is compared with the limit
+PROPORTIONAL = 1e-9  # relative round-off of the intensity of a doubled motion
 WHAT = "incremental_dynamic_analysis"
 Measure = Callable[[Solution], npt.ArrayLike]
 
@@ -87,8 +88,8 @@ def incremental_dynamic_analysis(
             storey at each time, in an array of any shape; its largest magnitude is the demand.
         limit: Demand beyond which the structure has collapsed.
         intensity: Function that returns the intensity of a motion, which is proportional to the
-            motion, such as the spectral acceleration at the first period.  By default it is the
-            peak acceleration; m/s².
+            motion, such as the spectral acceleration at the first period; it is called with each
+            motion and its double.  By default it is the peak acceleration; m/s².
         scheme: Time scheme; by default :class:`EnergyMomentum`.
         dt: Time step; by default the time step of the motion; s.
         start: Static solution under permanent loads, from whose last state all runs begin.
@@ -106,7 +107,8 @@ def incremental_dynamic_analysis(
         of collapse over the intensity.
 
     Raises:
-        ArgumentError: The call or the file is wrong.
+        ArgumentError: The call or the file is wrong, or the intensity is not proportional to a
+            motion.
         RuntimeError: All runs failed for other reasons than a missing equilibrium.
 
     Example:
@@ -147,6 +149,14 @@ def incremental_dynamic_analysis(
     for key, motion in known.items():
         size = motion.peak if intensity is None else intensity(motion)
         unit[key] = require_number(size, f"{WHAT}: intensity of {motion.name}", positive=True)
+        if intensity is not None:
+            twice = require_number(intensity(motion.scaled(2.0)), f"{WHAT}: intensity")
+            if not math.isclose(twice, 2.0 * unit[key], rel_tol=PROPORTIONAL):
+                raise ArgumentError(
+                    f"{WHAT}: intensity of {motion.name} = {unit[key]:g}, and {twice:g} if the "
+                    "motion is doubled; give an intensity that is proportional to the motion, such "
+                    "as a spectral acceleration, or a root of an integral of squares"
+                )
     first = next(iter(known))
     require_kind(
         build(known[first].scaled(levels[0] / unit[first])), Scene, f"{WHAT}: build(motion)"
@@ -175,7 +185,15 @@ def incremental_dynamic_analysis(
         results[name].reshape(len(known), len(levels)) for name in ("demand", "end", "outcome")
     )
     names = tuple(motion.name for motion in known.values())
-    return DemandCurves(names, levels, limit, demand, end, outcome, results)
+    by_default = "peak acceleration (m/s²)" if intensity is None else "intensity"
+    labels = _name(measure, "demand"), _name(intensity, by_default)
+    return DemandCurves(names, levels, limit, demand, end, outcome, results, labels)
+
+
+def _name(function: Any, otherwise: str) -> str:
+    """Return the name of a function in words; lambda and other objects have none."""
+    name: str = getattr(function, "__name__", "")
+    return name.replace("_", " ").strip() if name.isidentifier() else otherwise
 
 
 def _key(motion: GroundMotion) -> str:

@@ -137,6 +137,8 @@ class DemandCurves(Rich):
         outcome: 0 if the run was completed, 1 if the demand exceeded the limit, 2 if a step had no
             equilibrium; (n, m).
         study: The :class:`Study`, with errors of failed runs and with wall times.
+        labels: Texts for demand and intensity in pictures: names of the functions ``measure`` and
+            ``intensity``, if they have names.
 
     Example:
         >>> pulse = ub.GroundMotion(0.02, np.sin(10 * np.arange(0, 1, 0.02)))
@@ -157,6 +159,7 @@ class DemandCurves(Rich):
     end: Array
     outcome: Array
     study: Study
+    labels: tuple[str, str] = ("demand", "intensity")
 
     @property
     def collapsed(self) -> npt.NDArray[np.bool_]:

@@ -101,7 +101,7 @@ def load_combinations(
             for load in loads[case]
         ]
         scenes[name] = replace(scene, loads=[*scene.loads, *growing])
-    solutions, errors = dict[str, Solution](), dict[str, ConvergenceError]()
+    solutions, failed = dict[str, Solution](), dict[str, str]()
     for name, loaded in scenes.items():
         try:
             solutions[name] = simulate(
@@ -110,12 +110,12 @@ def load_combinations(
             )  # fmt: skip
         except ConvergenceError as error:
             fraction = 1.0 - (AT - error.time) / span
-            error.args = (f"{name}: no equilibrium beyond {fraction:.3g} of its loads: {error}",)
-            errors[name] = error
-            if len(errors) == len(scenes):
+            failed[name] = f"no equilibrium beyond {fraction:.3g} of its loads: {error}"
+            error.args = (f"{name}: {failed[name]}",)
+            if len(failed) == len(scenes):
                 raise
             warn(f"{what}: {error}")
-    return LoadCombinations(factors, solutions, {name: str(errors[name]) for name in errors})
+    return LoadCombinations(factors, solutions, failed)
 
 
 def _named(value: Any, what: str) -> dict[str, Any]:

@@ -28,8 +28,8 @@ class Governing(NamedTuple):
     Attributes:
         low: The least values.
         high: The largest values.
-        low_by: Names of the combinations with the least values.
-        high_by: Names of the combinations with the largest values.
+        low_by: Names (``str``) of the combinations with the least values.
+        high_by: Names (``str``) of the combinations with the largest values.
 
     Example:
         >>> free = ub.Scene([beam], supports=scene.supports)
@@ -77,10 +77,10 @@ class LoadCombinations(Rich):
             >>> free = ub.Scene([beam], supports=scene.supports)
             >>> cases = {"Q": [ub.PointLoad(beam.end, force=(0, -1e4))]}
             >>> both = ub.load_combinations(free, cases, {"A": {"Q": 1.5}, "B": {"Q": -1.0}})
-            >>> str(both.envelope(lambda run: run.displacement(beam.end)[-1, 1]).low_by)
+            >>> both.envelope(lambda run: run.displacement(beam.end)[-1, 1]).low_by
             'A'
         """
-        names = np.array([*self.solutions])
+        names = np.array([*self.solutions], dtype=object)  # its elements are str, not np.str_
         values = np.array([
             require_array(value(run), f"envelope: the value of combination {name!r}")
             for name, run in self.solutions.items()

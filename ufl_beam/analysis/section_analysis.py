@@ -234,9 +234,10 @@ def moment_curvature(
 
 @dataclass(frozen=True, eq=False)
 class InteractionDiagram:
-    """Axial forces and moments at limit strains of a section, see :func:`interaction_diagram`.
+    """Largest moments of a section over the axial force, see :func:`interaction_diagram`.
 
-    The points form a closed curve; the first point is repeated at the end.
+    The points form a closed curve: the largest moments from tension to compression, then the least
+    moments back.  The first point is repeated at the end.
 
     Attributes:
         N: Axial forces, positive in tension; (n,); N.
@@ -288,12 +289,13 @@ Limits = tuple[float, float]
 
 def interaction_diagram(
     section: Section, limits: Limits | Mapping[Fibres, Limits], *, points: int = 360,
-    steps: int = 20, length: float | None = None,
+    steps: int = 50, length: float | None = None,
 ) -> InteractionDiagram:  # fmt: skip
-    """Compute the axial forces and moments at which a fibre of a section reaches a limit strain.
+    """Compute the moments that a section can bear at each axial force within limit strains.
 
-    Each point belongs to a plane of strains, which grows from zero in proportion until the first
-    fibre reaches its limit.  Strains are at the centroids of the fibres.
+    Planes of strains grow from zero in proportion until the first fibre reaches its limit.  The
+    diagram is the envelope of all their states: limit strains, or smaller ones if a law softens
+    before.  Strains are at the centroids of the fibres.
 
     Args:
         section: Section with fibres.
@@ -301,7 +303,8 @@ def interaction_diagram(
             for each of the :class:`Fibres` of the section, as ``{concrete: (0.0035, math.inf),
             steel: (0.02, 0.02)}``.  Fibres without an entry have no limit.
         points: Number of planes, in equal steps of the angle between strain and curvature.
-        steps: Number of equal steps in which strains grow; laws with curved branches need several.
+        steps: Number of equal steps in which strains grow; laws that are curved or soften need
+            many.
         length: Length of the cell, needed for cracks of fibres; m.
 
     Raises:
@@ -351,11 +354,24 @@ def interaction_diagram(
             f"{what}: no fibre limits the strain in {sense}; give some fibres a limit there"
         )
     strain, curvature = factor * strain, factor * curvature
-    for step in range(1, steps + 1):
+    reached = np.empty((4, steps, points))  # N, M, strain and curvature
+    for step in range(steps):
         state.begin(1.0)
-        r, _ = state.response(strain * step / steps, curvature * step / steps)
+        part = (step + 1) / steps
+        r, _ = state.response(strain * part, curvature * part)
         if not np.isfinite(r).all():
             raise ArgumentError(f"{what}: a law has no stress in a step; increase steps = {steps}")
         state.accept()
-    closed = np.append(np.arange(points), 0)
-    return InteractionDiagram(r[closed, 0], r[closed, 2], strain[closed], curvature[closed])
+        reached[:, step] = r[:, 0], r[:, 2], strain * part, curvature * part
+    # Segments between adjacent planes, and between adjacent steps
+    begins, ends = (reached, reached[:, :-1]), (np.roll(reached, -1, axis=2), reached[:, 1:])
+    first, last = (np.hstack([x.reshape(4, -1) for x in pair]) for pair in (begins, ends))
+    low, high = np.minimum(first[0], last[0]), np.maximum(first[0], last[0])
+    most, least = [], []
+    for N in np.unique([*reached[0, -1], *np.linspace(low.min(), high.max(), points)]):
+        at = (low <= N) & (high >= N)
+        a, change = first[:, at], last[:, at] - first[:, at]
+        crossed = a + change * ((N - a[0]) / np.where(change[0] == 0.0, 1.0, change[0]))
+        most.append(crossed[:, crossed[1].argmax()])
+        least.append(crossed[:, crossed[1].argmin()])
+    return InteractionDiagram(*np.transpose([*most[::-1], *least, most[-1]]))

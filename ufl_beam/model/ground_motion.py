@@ -141,12 +141,13 @@ class GroundMotion(Record):
         Args:
             path: File; the name of the record is its name without extension.
             unit: Unit of the accelerations: "m/s2", "g", "cm/s2", "gal" or "mm/s2".  Files of PEER
-                state their unit.
+                state their unit, which ``unit`` must equal.
             dt: Time step of a text file without times; s.
 
         Raises:
-            ModelError: The file cannot be read, the unit is missing or unknown, or the data have
-                text, missing numbers or uneven time steps; the message has the file and the line.
+            ModelError: The file cannot be read, the unit is missing, unknown or not the unit in the
+                file, or the data have text, missing numbers or uneven time steps; the message has
+                the file and the line.
 
         Example:
             >>> np.savetxt("record.txt", [[0.00, 0.0], [0.01, 0.5], [0.02, 0.0]])
@@ -158,20 +159,26 @@ class GroundMotion(Record):
             lines = file.read_text("utf-8-sig", errors="replace").splitlines()
         except OSError as error:
             raise ModelError(f"GroundMotion.read: {file}: {error.strerror}") from None
-        head, first, count = "\n".join(lines[:4]), 0, None
+        head, first, count, stated = "\n".join(lines[:4]), 0, None, None
         if header := next(filter(None, (re.search(x, head, re.I | re.M) for x in PEER)), None):
             first, count, step = 4, int(header[1]), _number(header[2])
             if dt is not None and not math.isclose(dt, step, rel_tol=1e-9):
                 raise ModelError(f"{file}: dt = {dt:g} s, but the file has {step:g} s")
             dt = step
-            if unit is None and (unit_in_file := re.search(r"UNITS\s+OF\s+(\S+)", head, re.I)):
-                unit = unit_in_file[1].strip(".,")
-        known = re.sub(r"/s(ec)?(/s(ec)?|\^2|²)$", "/s2", str(unit).lower())
-        if known not in UNITS:
+            if unit_in_file := re.search(r"UNITS\s+OF\s+(\S+)", head, re.I):
+                stated = unit_in_file[1].strip(".,")
+        unit = stated if unit is None else unit
+        size, size_in_file = (
+            UNITS.get(re.sub(r"/s(ec)?(/s(ec)?|\^2|²)$", "/s2", str(name).lower()))
+            for name in (unit, stated)
+        )
+        if size is None:
             wrong = (
                 "the record has no unit" if unit is None else f"unit = {shorten(unit)} is unknown"
             )
             raise ModelError(f"{file}: {wrong}; give unit= one of {', '.join(UNITS)}")
+        if size_in_file not in (None, size):
+            raise ModelError(f"{file}: unit = {unit!r}, but the file has {stated}; omit unit=")
         rows = [*_rows(file, lines, first)]
         if not rows:
             raise ModelError(f"{file}: the file has no numbers")
@@ -195,7 +202,7 @@ class GroundMotion(Record):
             values = [row[1] for _, row in rows]
         if count is not None and len(values) != count:
             raise ModelError(f"{file}: {len(values)} accelerations, but NPTS = {count} in the head")
-        return cls(dt, [UNITS[known] * x for x in values], file.stem)
+        return cls(dt, [size * x for x in values], file.stem)
 
     # -- functions of time --------------------------------------------------------------------
 

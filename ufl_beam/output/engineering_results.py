@@ -218,7 +218,7 @@ class HingeState(NamedTuple):
         rotation: Rotation of largest magnitude; rad.
         plastic: Plastic rotation of largest magnitude; rad.
         ductility: Magnitude of ``rotation`` divided by the yield rotation, if there is one.
-        dissipated: Dissipated energy at the end; J.
+        dissipated: Dissipated energy at the end, also that of runs before ``start=``; J.
         state: Name of the acceptance limit that the hinge satisfies, "elastic", or "beyond ...".
     """
 

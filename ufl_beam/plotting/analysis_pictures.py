@@ -13,10 +13,16 @@ from ufl_beam.analysis.incremental_dynamics_result import PERCENT, DemandCurves
 from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.analysis.pushover_result import Pushover, TargetDisplacement
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ArgumentError
+from ufl_beam.errors import ArgumentError, require_all
 from ufl_beam.plotting import style
-from ufl_beam.plotting.frame_pictures import MOST, draw_frame, plane_canvas
-from ufl_beam.plotting.style import BLUE, COLORS, GREY, ORANGE, RED, shade
+from ufl_beam.plotting.frame_pictures import (
+    MOST,
+    PointLabel,
+    draw_frame,
+    plane_canvas,
+    write_labels,
+)
+from ufl_beam.plotting.style import BLUE, COLORS, GREY, INK, ORANGE, RED, shade
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -34,14 +40,14 @@ def draw_pushover(
 ) -> Figure:
     """Draw the capacity curve with numbered hinges, and the idealised curves of targets.
 
-    Events of the same step share a number.
+    Events of the same step share a number.  Numbers for which there is no space are omitted.
     """
     several = (targets,) if isinstance(targets, TargetDisplacement) else tuple(targets)
     sign = float(np.sign(pushover.target))
     unit, prefix = style.decimal_prefix(float(np.abs(pushover.base_shear).max()))
     with style.panel(ax, (8.0, 5.0)) as axes:
         style.time_axes(axes)
-        axes.margins(x=0.05)
+        axes.margins(0.05, 0.1)
         axes.plot(pushover.displacement, pushover.base_shear / unit, color=BLUE, zorder=3)
         for target, color in zip(several, (RED, *COLORS[2:]), strict=False):
             d, V = target.yield_displacement, target.yield_shear
@@ -59,23 +65,23 @@ def draw_pushover(
                 label=f"{target.method}: {target.displacement:.3g} m",
             )  # fmt: skip
         steps = [list(same) for _, same in groupby(pushover.hinges, key=lambda hinge: hinge.n)]
+        numbers = []
         for number, same in enumerate(steps, start=1):
             at = same[0].displacement, same[0].base_shear / unit
             names = [f"{hinge.where} {hinge.what}" for hinge in same]
             words = names[0] + (f" and {len(names) - 1} more" if len(names) > 1 else "")
             label = f"{number}: {words}" if len(steps) <= MOST_NAMED else None
             axes.plot(*at, "o", color=shade(ORANGE), ms=6.0, zorder=4, label=label)
-            axes.annotate(
-                str(number), at, (-4, 5), textcoords="offset points", ha="right", zorder=5,
-                fontsize=style.font_size(11.0),
-            )  # fmt: skip
+            outward = sign * np.array([-0.6, 0.8])
+            numbers.append(PointLabel(str(number), shade(INK), np.array(at), outward))
         axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
         axes.set_xlabel(f"{pushover.component} of {pushover.place} (m)")
         axes.set_ylabel(f"base shear ({prefix}N)")
-        if steps or several:
+        if several or 0 < len(steps) <= MOST_NAMED:
             style.draw_legend(
                 axes, ax, loc="outside upper left", ncols=2, fontsize=style.font_size(10.0)
             )
+        write_labels(axes, numbers)
     return style.parent_figure(axes)
 
 
@@ -107,11 +113,15 @@ def draw_combinations(
     )
 
 
-def draw_dynamics(dynamics: DemandCurves) -> Figure:
+def draw_dynamics(dynamics: DemandCurves, *, labels: Sequence[str] | None = None) -> Figure:
     """Draw intensities over demands, with fractiles, beside the probability of collapse.
 
     The curve of a motion ends at its first collapse.  The probability is left out if it has no fit.
+    ``labels`` are texts for demand and intensity, which may have units.
     """
+    words = require_all(dynamics.labels if labels is None else labels, "plot: labels", str)
+    if len(words) != 2:
+        raise ArgumentError(f"plot: labels = {words} must be two texts, for demand and intensity")
     try:
         fragility = dynamics.fragility()
     except ArgumentError:
@@ -127,7 +137,7 @@ def draw_dynamics(dynamics: DemandCurves) -> Figure:
         for percent, demand, line in fractiles:
             label = f"{percent:g} % of the motions"
             _draw_curve(axes, demand, im, limit, color=BLUE, lw=2.2, ls=line, label=label)
-        axes.set(xlim=(0.0, limit), ylim=(0.0, 1.05 * im[-1]), xlabel="demand", ylabel="intensity")
+        axes.set(xlim=(0.0, limit), ylim=(0.0, 1.05 * im[-1]), xlabel=words[0], ylabel=words[1])
         axes.legend(loc="lower right", fontsize=style.font_size(9.0))
         if fragility:
             (right,) = others

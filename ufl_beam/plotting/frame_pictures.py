@@ -146,7 +146,7 @@ def draw_frame(
     with style.panel(ax, MOST) as axes:
         style.plane_axes(axes, heading)
         draw_undeformed(axes, solution, shape.canvas)
-        peaks: list[Peak] = []
+        peaks: list[PointLabel] = []
         if (sizes > LEAST_STRAIN * np.array(stiffness)).any():  # more than rounding
             rows = _draw_diagrams(axes, solution, shape.nodes, what, diagrams)
             peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MOST_DIAGRAMS else 1.0)
@@ -211,17 +211,17 @@ def _draw_diagrams(
     return np.array(rows)
 
 
-class Peak(NamedTuple):
-    """Value of the largest magnitude in an area of a diagram."""
+class PointLabel(NamedTuple):
+    """Text at a point of a diagram or a curve."""
 
     text: str
     color: str
-    tip: Array  # point of the diagram; (2,); m
-    outward: Array  # unit vector away from the axis; (2,)
-    extreme: bool  # True for the largest and the least value of all diagrams
+    tip: Array  # point of the diagram; (2,)
+    outward: Array  # vector to the side where the text should be; (2,)
+    extreme: bool = False  # True for the largest and the least value of all diagrams
 
 
-def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
+def _peaks(rows: Array, unit: float, least: float) -> list[PointLabel]:
     """Choose peaks to label: first the largest and the least value, then all large peaks.
 
     Large peaks exceed ``least`` times the largest magnitude.  Equal peaks at a point are one peak.
@@ -236,7 +236,7 @@ def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
     for k in [*extremes, *large]:
         chosen.setdefault((labels[k].lstrip("−"), *places[k]), k)
     return [
-        Peak(
+        PointLabel(
             labels[k], RED if values[k] > 0 else BLUE, axis[k] + up[k], unit_vectors(up[k]),
             k in extremes,
         )
@@ -350,7 +350,7 @@ def draw_damage_state(
 # -- labels ------------------------------------------------------------------------------------
 
 
-def _arrange(axes: Axes, peaks: Sequence[Peak], *, own: bool) -> None:
+def _arrange(axes: Axes, peaks: Sequence[PointLabel], *, own: bool) -> None:
     """Fit the limits, and the size of a new figure; put labels where they cover the least."""
     axes.margins(MARGIN)
     without_texts = axes.dataLim.frozen()
@@ -360,7 +360,7 @@ def _arrange(axes: Axes, peaks: Sequence[Peak], *, own: bool) -> None:
         _fit(axes, own)
         for text in written:
             text.remove()
-        written = _write(axes, peaks)
+        written = write_labels(axes, peaks)
         axes.dataLim.set(without_texts)
         style.fit_texts(axes)
     _fit(axes, own)
@@ -385,8 +385,8 @@ def _fit(axes: Axes, own: bool) -> None:
     figure.set_size_inches(np.clip(inches + around, np.minimum(least, MOST), MOST))
 
 
-def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
-    """Write labels of peaks; a label that would cover another is omitted, unless it is extreme."""
+def write_labels(axes: Axes, peaks: Sequence[PointLabel]) -> list[Annotation]:
+    """Write texts at points; a text that would cover another is omitted, unless it is extreme."""
     from matplotlib.transforms import Affine2D
 
     size = style.lay_out(axes)

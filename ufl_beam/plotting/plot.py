@@ -123,7 +123,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     ResponseSpectrum    any of its arrays   over the period; "pseudo_acceleration" by default
     Pushover            "curve"             capacity curve with its hinges; ``targets``, ``ax``
     SpectralResponse    "M", "N", "V"       combined section force, with both signs; ``ax``
-    DemandCurves        "curves"            intensity over demand, probability of collapse
+    DemandCurves        "curves"            intensity over demand, fragility; ``labels``
     LoadCombinations    "M", "N", "V"       envelope over the combinations; ``ax``
     ==================  ==================  ========================================================
 
@@ -138,7 +138,9 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             of them, such as "du/dt" or "d2u/dt2".  ``numbers`` are indices of modes, all by
             default.  ``amplitude`` is their largest displacement, as a fraction of the size of the
             scene.  ``targets`` is one or several of the target displacements of a
-            pushover.  ``ax`` are axes to draw in, instead of a new figure.
+            pushover.  ``labels`` are texts for demand and intensity, such as
+            ``("drift (1)", "spectral acceleration (m/s²)")``; by default they are the names of the
+            functions of the analysis.  ``ax`` are axes to draw in, instead of a new figure.
 
     Raises:
         ArgumentError: There is no such picture, or one of its arguments is wrong; the message says

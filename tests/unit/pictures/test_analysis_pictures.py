@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Pictures of analyses of structures: their curves and labels."""
 
+from dataclasses import replace
+
 import numpy as np
-from drawn import outlines
+import pytest
+from drawn import boxes_of, circles, outlines, require_apart, texts
+from matplotlib.figure import Figure
 
 import ufl_beam as ub
 from ufl_beam.plotting.style import BLUE, RED
@@ -28,6 +32,17 @@ def test_a_capacity_curve_shows_hinges_and_targets():
     lines = [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == ":"]
     np.testing.assert_allclose(lines, [-target.displacement for target in targets])
     assert axes.get_ylabel() == "base shear (kN)"
+    # Fifteen hinges in a quarter of the curve have numbers that are apart, or no number
+    several = [
+        curve.hinges[0]._replace(n=k, displacement=-0.05 + 8e-4 * k, base_shear=5e4 - 100.0 * k)
+        for k in range(15)
+    ]
+    for ax in (None, Figure(figsize=(6, 4), layout="constrained").subplots()):
+        figure = ub.plot(replace(curve, hinges=tuple(several)), ax=ax)
+        axes = figure.axes[0]
+        assert len(circles(axes)) == 15
+        assert len(texts(figure)) > 10
+        require_apart(boxes_of(figure), figure.bbox)
 
 
 def test_a_response_to_a_spectrum_has_both_signs():
@@ -72,3 +87,13 @@ def test_demand_curves_end_at_collapse():
         curves.motions, curves.intensities, 0.4, demand, curves.end, 0 * outcome, study
     )
     assert len(ub.plot(certain).axes) == 1  # nothing collapses
+    labels = "drift (1)", "spectral acceleration (m/s²)"
+    for figure, words in (
+        (ub.plot(certain), ("demand", "intensity")),
+        (ub.plot(replace(certain, labels=("drift", "g"))), ("drift", "g")),
+        (ub.plot(curves, labels=labels), labels),
+    ):
+        assert (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()) == words
+    for wrong in (("drift",), "ab", (1, 2)):
+        with pytest.raises(ub.ArgumentError, match="plot: labels"):
+            ub.plot(curves, labels=wrong)

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: MIT
 """Axes that the user gives, and settings and styles of Matplotlib that stay."""
 
+from itertools import pairwise
+
 import matplotlib as mpl
 import numpy as np
 import pytest
-from drawn import boxes_of, require_apart
+from drawn import STEEL, boxes_of, require_apart, static
 from matplotlib import pyplot as plt
 from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 
 import ufl_beam as ub
 from ufl_beam.plotting.style import BLUE, INK
+
+THIN = ub.Section.rectangle(b=1e-3, h=2e-3, E=210e9, nu=0.3)
 
 ONE_PANEL = {
     "scene": lambda s, e, **ax: ub.plot(s.scene, **ax),
@@ -59,6 +63,21 @@ def test_labels_and_legend_are_within_the_axes_of_the_user(damaged):
     boxes, legend = boxes_of(figure), axes.get_legend()
     assert legend.get_texts()[0].get_text() == "M > 0: tension right of the arrow"
     require_apart([*boxes, legend.get_window_extent()], axes.get_window_extent())
+
+
+@pytest.mark.parametrize("end", [(0, 30), (30, 0), (0, 0.3)])
+def test_labels_of_ticks_of_a_slender_object_are_apart(end):
+    """Along the short side, too."""
+    beam = ub.Beam((0, 0), end, STEEL if max(end) > 1 else THIN, cells=2)
+    run = static(ub.Scene([beam], supports=[ub.Clamped(beam.start)]))
+    for figure in (ub.plot(run.scene), ub.plot(run), ub.plot(run, "shapes", count=2)):
+        figure.draw_without_rendering()
+        for axis in (figure.axes[0].xaxis, figure.axes[0].yaxis):
+            low, high = axis.get_view_interval()
+            shown = [x for x in axis.get_major_ticks() if low <= x.get_loc() <= high]
+            boxes = [tick.label1.get_window_extent() for tick in shown]
+            assert boxes
+            assert not any(box.overlaps(after) for box, after in pairwise(boxes))
 
 
 def beam_of(figure):
