@@ -3,8 +3,9 @@
 
 Sparsity patterns and orders of elimination depend only on the connectivity of a scene: the
 structure.  Scenes that differ only in numbers, such as the members of a study, have the same
-structure.  The results for a structure are computed once.  Simulations with and without the cache
-agree in every bit, because all other results are computed for each scene.
+structure.  The results for a structure are computed once.  So are the contacts of beams, which also
+depend on coordinates.  Simulations with and without the cache agree in every bit, because all other
+results are computed for each scene.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def cached_forms(function: Callable[P, Cached]) -> Callable[P, Cached]:
 
 
 def cached_by_structure(function: Callable[..., T]) -> Callable[..., T]:
-    """Cache the results of a function of index arrays and whole numbers, by its arguments.
+    """Cache the results of a function of arrays and whole numbers, by its arguments.
 
     The function must depend only on its arguments and return a tuple of arrays.  The arrays become
     read-only, because callers share them.
@@ -60,13 +61,13 @@ def cached_by_structure(function: Callable[..., T]) -> Callable[..., T]:
 
     @wraps(function)
     def call(*arguments: Any) -> T:
-        sizes = (x.nbytes if isinstance(x, np.ndarray) else x for x in arguments)
-        if sum(sizes) > LARGEST:
-            return locked(function(*arguments))
-        keys = (
-            (x.dtype.str, x.shape, x.tobytes()) if isinstance(x, np.ndarray) else x
-            for x in arguments
-        )
+        keys, size = list[Any](), 0
+        for x in arguments:
+            is_array = isinstance(x, np.ndarray)
+            size += x.nbytes if is_array else x
+            if size > LARGEST:
+                return locked(function(*arguments))
+            keys.append((x.dtype, x.shape, x.tobytes()) if is_array else x)
         return cached(*keys)
 
     return call

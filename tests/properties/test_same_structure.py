@@ -75,6 +75,12 @@ def test_the_pattern_is_shared_by_scenes_of_one_structure():
     one, other = portal(), portal(stiffness=2e4, height=1.5)
     assert one.equation.A.indices is other.equation.A.indices
     assert one.equation.A.data is not other.equation.A.data
+    # Places of the entries of cells, and of the mass matrix
+    cells = [x.beams[0].loops[1][1] for x in (one, other)]
+    assert cells[0].pattern == cells[1].pattern
+    assert cells[0].has == cells[1].has
+    first = [x.inertia.times(x.inertia._times).product.A.first for x in (one, other)]
+    assert first[0] == first[1]
     with pytest.raises(ValueError, match="read-only"):
         one.equation.A.indices[0] = 1
 

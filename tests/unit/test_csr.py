@@ -125,7 +125,8 @@ def test_products_with_runs_of_rows(lumped):
     product, x = Product(A), np.random.default_rng(5).normal(size=A.size)
     assert product.c.runs <= (3 if lumped else 12)
     assert np.allclose(product(x), dense @ x, rtol=1e-14, atol=1e-14)
-    row, column = product.pairs()
+    places, _ = product.places(A)
+    row, column = A.rows()[places], A.indices[places]
     assert np.array_equal(np.sort(row * A.size + column), np.flatnonzero(dense))
     assert np.array_equal(product.data, dense[row, column])
 

@@ -3,8 +3,10 @@
 
 import gc
 import math
+import weakref
 from pathlib import Path
 
+from mpi4py import MPI
 from petsc4py import PETSc
 
 import pytest
@@ -108,6 +110,54 @@ def test_a_simulation_gives_everything_back():
     before = runs(20)
     # Meshes and spaces of a run take some 100 kB: 180 of them would be 18 MB
     assert runs(180) - before < 4 * MEBIBYTE
+
+
+def called_back():
+    """A simulation, alone on each process, whose load, law, guide and controller are functions."""
+    section = ub.Section(EA=1e5, GA=1e5, EI=100.0, rhoA=1.0, rhoI=0.01)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2)
+    body = ub.Body((1, 0.5), mass=1.0, inertia=0.1)
+    scene = clamped(
+        beam,
+        bodies=[body],
+        joints=[ub.Guided(body.middle, lambda s: (1.0, 0.5 + s))],
+        connectors=[
+            ub.Stretch(beam.end, body.middle, ub.ForceLaw(lambda e, de: 30.0 * e + 0.1 * de)),
+            ub.Turn(beam.end, body.middle, ub.Controller(lambda now: 0.1 * now.t)),
+        ],
+        loads=[ub.PointLoad(beam.end, force=(0.0, 1.0), amplitude=lambda t: t)],
+    )
+    return ub.Simulation(scene, ub.EnergyMomentum(), comm=MPI.COMM_SELF)
+
+
+def test_a_closed_simulation_is_freed_at_once():
+    """Without the garbage collector, which searches all objects of the process."""
+    gc.collect()
+    try:
+        gc.disable()
+        simulation = called_back()
+        simulation.step_to(0.01)
+        simulation.keep()
+        solution, parts = simulation.solution, (simulation, simulation.equation, simulation.solver)
+        alive = [weakref.ref(part) for part in parts]
+        simulation.close()
+        del simulation, parts
+        assert [part() for part in alive] == [None] * 3
+        assert solution.q.shape == (1, solution.numbering.size)
+    finally:
+        gc.enable()
+
+
+def test_a_closed_simulation_takes_no_steps():
+    simulation = called_back()
+    simulation.step_to(0.01)
+    simulation.close()
+    simulation.close()
+    q = simulation.q
+    with pytest.raises(ub.ArgumentError, match="the simulation is closed"):
+        simulation.step_to(0.02)
+    assert simulation.t == 0.01
+    assert (simulation.now.q[-1] == q).all()
 
 
 @unsanitized

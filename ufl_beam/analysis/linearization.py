@@ -74,7 +74,7 @@ class SmallMotions:
             simulation.t = t
         self.scene, self._simulation = scene, simulation
         self.beams, self.numbering, self.q = simulation.beams, simulation.numbering, simulation.q
-        simulation.close()
+        simulation.solver.destroy()  # not closed: functions of a user are called below
         # Plastic strains and openings of hinges are constant from now on.
         simulation.controllers.evaluate(simulation)
         for cells in simulation.inelastic:

@@ -102,7 +102,8 @@ def view_pointer(array: Array) -> Any:
     return ffi.gc(ffi.cast("double *", array.ctypes.data), lambda _, alive=array: None)
 
 
-_INT32, _INT32_ARRAY = np.dtype(np.int32), ffi.typeof("int32_t[]")
+_FLOAT64, _INT32 = np.dtype(np.float64), np.dtype(np.int32)
+_INT32_ARRAY = ffi.typeof("int32_t[]")
 
 
 def integers(array: Index) -> Any:
@@ -120,18 +121,26 @@ def fill(struct: Any, **fields: Any) -> Any:
 
     Arrays of float64 or int32 become pointers.
     """
-    alive = _alive.setdefault(struct, {})
+    values = _in_c(fields)
+    for name, value in values.items():
+        setattr(struct, name, value)
+    _alive.setdefault(struct, {}).update(values)
+    return struct
+
+
+def _in_c(fields: dict[str, Any]) -> dict[str, Any]:
+    """Return the values of fields, with pointers to arrays instead of the arrays."""
     for name, value in fields.items():
         if isinstance(value, np.ndarray):
-            value = doubles(value) if value.dtype == np.float64 else integers(value)
-        alive[name] = value
-        setattr(struct, name, value)
-    return struct
+            fields[name] = doubles(value) if value.dtype == _FLOAT64 else integers(value)
+    return fields
 
 
 def struct(kind: str, **fields: Any) -> Any:
     """Return a pointer to a new struct of loops.h, see :func:`fill`."""
-    return fill(ffi.new(f"{kind} *"), **fields)
+    values = _in_c(fields)
+    _alive[made := ffi.new(f"{kind} *", values)] = values
+    return made
 
 
 def names(enum: str, prefix: str = "") -> tuple[str, ...]:

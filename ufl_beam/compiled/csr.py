@@ -128,6 +128,43 @@ def _pattern(size: int, *coupled: Index) -> tuple[Index, Index]:
     return indices, indptr.copy()
 
 
+@cached_by_structure
+def _runs(nonzero: Index, indptr: Index, indices: Index) -> tuple[Index, ...]:
+    """Find runs of rows, see :class:`Product`, of a matrix with the entries ``nonzero``.
+
+    Returns:
+        The first row of each run, and last the number of rows; the distances of the runs from the
+        diagonal; the number of rows, and of distances, of each run; the index of the first entry of
+        each run.
+    """
+    size, begin = len(indptr) - 1, np.searchsorted(nonzero, indptr).astype(np.int32)
+    width = np.diff(begin)
+    row = np.repeat(np.arange(size, dtype=np.int32), width)
+    away = indices[nonzero] - row
+    begins = np.ones(size, dtype=bool)
+    for number in np.unique(width):
+        rows = np.flatnonzero(width == number).astype(np.int32)
+        distances = away[begin[rows, None] + np.arange(number, dtype=np.int32)]
+        alike = (distances[1:] == distances[:-1]).all(axis=1) & (np.diff(rows) == 1)
+        begins[rows[1:][alike]] = False
+    first = np.flatnonzero(begins)
+    after = np.append(first, size).astype(np.int32)
+    return after, away[begins[row]], np.diff(after), width[first], begin[first]
+
+
+@cached_by_structure
+def _places(
+    first: Index, away: Index, rows: Index, widths: Index, indptr: Index, indices: Index
+) -> tuple[Index, ...]:
+    """Find the entries of :func:`_runs` in a matrix; see :meth:`Product.places`."""
+    each = np.repeat(rows, widths)
+    before = np.cumsum(each) - each
+    begin = np.repeat(first[:-1], widths)
+    row = np.arange(each.sum(), dtype=np.int32) + np.repeat(begin - before, each)
+    places = Csr(np.empty(0), indices, indptr).positions(row, row + np.repeat(away, each))
+    return places, places - indptr[row]
+
+
 class Product:
     """Operator ``x -> A x`` on this process, which leaves out the stored zeros of ``A``.
 
@@ -137,34 +174,20 @@ class Product:
 
     def __init__(self, A: Csr) -> None:
         nonzero = np.flatnonzero(A.data).astype(np.int32)
-        indptr = np.searchsorted(nonzero, A.indptr).astype(np.int32)
-        width = np.diff(indptr)
-        row = np.repeat(np.arange(A.size, dtype=np.int32), width)
-        away = A.indices[nonzero] - row
-        begins = np.ones(A.size, dtype=bool)
-        for number in np.unique(width):
-            rows = np.flatnonzero(width == number).astype(np.int32)
-            distances = away[indptr[rows, None] + np.arange(number, dtype=np.int32)]
-            alike = (distances[1:] == distances[:-1]).all(axis=1) & (np.diff(rows) == 1)
-            begins[rows[1:][alike]] = False
-        first = np.flatnonzero(begins)
-        self._rows, self._widths = np.diff(np.append(first, A.size)).astype(np.int32), width[first]
-        self._away = away[begins[row]]
-        self._first = np.append(first, A.size).astype(np.int32)
-        self.data = A.data[A.positions(*self.pairs())]
+        *self._runs, at = _runs(nonzero, A.indptr, A.indices)
+        first, away, _, widths = self._runs
+        self.data = A.data[self.places(A)[0]]
         self.c = struct(
-            "constant_matrix", runs=len(first), first=self._first, away=self._away,
-            begin=np.append(0, np.cumsum(self._widths)).astype(np.int32), at=indptr[first],
-            data=self.data,
+            "constant_matrix", runs=len(widths), first=first, away=away,
+            begin=np.append(0, np.cumsum(widths)).astype(np.int32), at=at, data=self.data,
         )  # fmt: skip
 
-    def pairs(self) -> tuple[Index, Index]:
-        """Return the rows and the columns of all entries, in the order of :attr:`data`."""
-        rows = np.repeat(self._rows, self._widths)
-        first = np.repeat(self._first[:-1], self._widths)
-        before = np.cumsum(rows) - rows
-        row = np.arange(rows.sum(), dtype=np.int32) + np.repeat(first - before, rows)
-        return row, row + np.repeat(self._away, rows)
+    def places(self, A: Csr) -> tuple[Index, ...]:
+        """Return the index in ``A.data``, and the index in the row of ``A``, of each entry.
+
+        The order is that of :attr:`data`.  ``A`` must have these entries.
+        """
+        return _places(*self._runs, A.indptr, A.indices)
 
     def __call__(self, x: Array) -> Array:
         """Return the product in a new array."""
@@ -188,11 +211,10 @@ class StepProduct:
 
     def __init__(self, A: Csr, rotations: Index, tangent: Csr, scratch: Array) -> None:
         self.A, self._tangent = Product(A), tangent
-        row, column = self.A.pairs()
-        places = A.positions(row, column) - A.indptr[row]
-        place = {"far": places}
+        in_row = self.A.places(A)[1]
+        place = {"far": in_row}
         if A.narrow():
-            place = {"place": ffi.from_buffer("uint8_t[]", places.astype(np.uint8))}
+            place = {"place": ffi.from_buffer("uint8_t[]", in_row.astype(np.uint8))}
         self.c = struct(
             "step_product", size=A.size, A=self.A.c, begin=tangent.indptr, **place,
             rotations=len(rotations), rotation=rotations, space=scratch, rate=np.zeros(A.size),
@@ -204,5 +226,5 @@ class StepProduct:
     def matrix(self) -> Csr:
         """Return the matrix ``A`` in the pattern of the tangent."""
         A = self._tangent.zeros_like()
-        A.data[A.positions(*self.A.pairs())] = self.A.data
+        A.data[self.A.places(A)[0]] = self.A.data
         return A

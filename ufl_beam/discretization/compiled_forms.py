@@ -18,11 +18,11 @@ from typing import Any, NamedTuple
 
 import basix.ufl
 import numpy as np
-import numpy.typing as npt
 import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.caches import cached_by_structure
 from ufl_beam.caches import cached_forms as cached_forms
 from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib, view_pointer
 from ufl_beam.compiled.csr import Csr
@@ -83,13 +83,21 @@ def prepared(form: ufl.Form) -> Prepared:
     return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
 
 
-def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
-    """Return fields of the struct ``cells`` of loops.h from the positions of :meth:`Csr.blocks`.
+@cached_by_structure
+def _positions(indptr: Index, indices: Index, dofs: Index, batch_size: int) -> tuple[Index, ...]:
+    """Find the places of the entries of cells in a matrix.
 
     Batches of cells with equal positions share a pattern.  With cells of degree 1, patterns whose
     entries are adjacent in each row of the matrix come first.
+
+    Returns:
+        ``pattern``, ``has`` and ``in_rows`` of the struct ``cells`` of loops.h; if a row of the
+        matrix has too many entries for a pattern, only ``row``.
     """
-    batches, entries, batch_size = places.shape
+    places = Csr(np.empty(0), indices, indptr).blocks(dofs, batch_size)
+    if places.dtype == np.int32:
+        return (places,)
+    batches, entries, _ = places.shape
     rows = places.reshape(batches, entries * batch_size).view(f"V{entries * batch_size}")[:, 0]
     _, first, has = np.unique(rows, return_index=True, return_inverse=True)
     distinct = places[first]
@@ -100,8 +108,7 @@ def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
     order = np.argsort(~in_rows, kind="stable")
     number = np.empty(len(first), dtype=np.int32)
     number[order] = np.arange(len(first))
-    pattern = ffi.from_buffer("uint8_t[]", distinct[order])
-    return {"pattern": pattern, "has": number[has], "in_rows": int(in_rows.sum())}
+    return distinct[order], number[has], np.array([in_rows.sum()])
 
 
 class Kernel:
@@ -149,12 +156,13 @@ class Kernel:
         self._values, self._columns = ready.packed, ready.columns  # the unknown is removed below
         if self.uses(unknown):
             columns, self._unknowns = dict(ready.columns), self._dofs.shape[1]
-            unknown_columns = columns.pop(id(unknown))
-            self._at = unknown_columns.start
-            self._values = np.delete(ready.packed, unknown_columns, axis=1)
-            number = np.delete(np.arange(ready.packed.shape[1]), unknown_columns).searchsorted
+            removed = columns.pop(id(unknown))
+            self._at, width = removed.start, removed.stop - removed.start
+            values = ready.packed
+            self._values = np.hstack([values[:, : removed.start], values[:, removed.stop :]])
             self._columns = {
-                function: slice(number(x.start), number(x.stop)) for function, x in columns.items()
+                function: x if x.stop <= removed.start else slice(x.start - width, x.stop - width)
+                for function, x in columns.items()
             }
         address = None
         if several is not None:
@@ -182,10 +190,13 @@ class Kernel:
         if self._to_dofs or self._is_functional:
             return {}
         if self._matrix is not None:
-            positions = self._matrix.blocks(self._dofs, self.batch_size)
-            if positions.dtype == np.int32:
-                return {"row": positions}
-            return {"begin": self._matrix.indptr, **patterns(positions)}
+            A = self._matrix
+            places, *more = _positions(A.indptr, A.indices, self._dofs, self.batch_size)
+            if not more:
+                return {"row": places}
+            has, in_rows = more
+            pattern = ffi.from_buffer("uint8_t[]", places)
+            return {"begin": A.indptr, "pattern": pattern, "has": has, "in_rows": int(in_rows[0])}
         places = np.zeros(shape, dtype=np.int32)
         if self._is_vector:
             places += np.arange(places.size, dtype=np.int32).reshape(shape)

@@ -19,7 +19,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.display import counted
 from ufl_beam.errors import ModelError, shorten
-from ufl_beam.model.beams import Mesh
+from ufl_beam.model.beams import DEFAULT_MESH, Mesh
 from ufl_beam.model.bodies import (
     GROUND,
     AttachmentPoint,
@@ -65,7 +65,7 @@ class DofNumbering:
     """
 
     def __init__(self, scene: Scene, mesh: Mesh | None = None) -> None:
-        mesh = Mesh() if mesh is None else mesh
+        mesh = DEFAULT_MESH if mesh is None else mesh
         require_kind(mesh, Mesh, "mesh")
         self.scene, self.mesh, beams = scene, mesh, scene.beams
         self._beam_indices: dict[Member, int] = {beam: i for i, beam in enumerate(beams)}
@@ -96,7 +96,7 @@ class DofNumbering:
             x, y = self.points[self.cells[cell, 0]]
             name = beams[self.beam_of_cell[cell]].name
             raise ModelError(f"{name}: zero length of a cell at ({x:g}, {y:g})")
-        self._add_hinges([place_of(hinge) for hinge in scene.hinges])
+        self._add_hinges(scene.hinges)
         self._number()
         scene.free_caches()
 
@@ -112,11 +112,12 @@ class DofNumbering:
     def __repr__(self) -> str:
         return f"<DofNumbering: {self}>"
 
-    def _add_hinges(self, places: Sequence[Place]) -> None:
+    def _add_hinges(self, hinges: Sequence[Connector]) -> None:
         """Create the second vertex of each plastic hinge, an end of the cell beyond the hinge."""
+        places = [place_of(hinge) for hinge in hinges]
         at = np.array([self.vertex(place) for place in places], dtype=np.int64)
         vertices = range(len(self.points), len(self.points) + len(at))
-        beyond = [Place(place.beam, place.s, beyond=True) for place in places]
+        beyond = [h.a if h.b is near else h.b for h, near in zip(hinges, places, strict=True)]
         self._beyond = dict(zip(beyond, vertices, strict=True))
         self.points = np.concatenate([self.points, self.points[at]])
         self.cells_at_hinges = np.array([self.cell(place) for place in places], dtype=np.int64)

@@ -250,11 +250,13 @@ def point_masses(scene: Scene) -> list[tuple[AttachmentPoint, float, float]]:
 def mass_matrix(fields: Fields) -> Csr:
     """Assemble the mass matrix of the beams, the point masses and the bodies."""
     subdomain, M = fields.subdomain, fields.assembled(mass_form(fields.element))
-    for place, mass, inertia in point_masses(subdomain.numbering.scene):
-        dofs = subdomain.numbering.node(place)
-        mine = subdomain.owns(dofs)
-        local_dofs = subdomain.local(dofs[mine])
-        M.data[M.positions(local_dofs, local_dofs)] += np.array([mass, mass, inertia])[mine]
+    masses = point_masses(subdomain.numbering.scene)
+    nodes = [subdomain.numbering.node(place) for place, *_ in masses]
+    dofs = np.array(nodes, dtype=np.int32).ravel()
+    mine = subdomain.owns(dofs)
+    local_dofs = subdomain.local(dofs[mine])
+    values = np.array([(mass, mass, inertia) for _, mass, inertia in masses]).ravel()[mine]
+    np.add.at(M.data, M.positions(local_dofs, local_dofs), values)  # a node may have several
     return M
 
 

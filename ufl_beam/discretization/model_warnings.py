@@ -65,8 +65,9 @@ def warn_of_rates(scene: Scene) -> None:
 
 def warn_of_free_hinges(scene: Scene) -> None:
     """Warn of a beam's hinges that are left out because only a moment load is beyond them."""
-    hinge_places = {place_of(hinge) for hinge in scene.hinges}
-    for load in scene.moments:
+    moments = scene.moments
+    hinge_places = {place_of(hinge) for hinge in scene.hinges} if moments else set()
+    for load in moments:
         place = load.place
         if not isinstance(place, Place) or place in hinge_places:
             continue
@@ -98,8 +99,30 @@ def _touching(numbering: DofNumbering) -> Index:
     Ends that are connected with a vertex of the beam that they touch are left out.
     """
     first = numbering.first_vertices
+    end, touched, gap = _contacts(numbering.points[: first[-1]], first)
     beams = np.repeat(np.arange(len(first) - 1), np.diff(first))
-    points = numbering.points[: first[-1]]
+    group = _groups(numbering)[: first[-1]]
+    joined = group[end] == group[touched]
+    keys = end * len(first) + beams[touched]
+    loose = ~joined & ~np.isin(keys, keys[joined])
+    if not loose.any():
+        return np.empty((0, 2), dtype=np.int64)
+    end, touched, gap, keys = end[loose], touched[loose], gap[loose], keys[loose]
+    order = np.lexsort((gap, keys))
+    _, nearest = np.unique(keys[order], return_index=True)
+    pairs = np.column_stack([end, touched])[order][nearest]
+    # Two ends that touch each other count as one pair.
+    _, once = np.unique(np.sort(pairs, axis=1), axis=0, return_index=True)
+    return np.asarray(pairs[np.sort(once)])
+
+
+@cached_by_structure
+def _contacts(points: Array, first: Index) -> tuple[Index, Index, Array]:
+    """Return ends of beams, the vertices of beams that they touch, and the gaps (m), (n,) each.
+
+    The vertices of beam i are ``points[first[i] : first[i + 1]]``.
+    """
+    beams = np.repeat(np.arange(len(first) - 1), np.diff(first))
     ends = np.column_stack([first[:-1], first[1:] - 1]).ravel()
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(beams) == 0)
     lengths = np.bincount(beams[:-1], weights=steps, minlength=len(first) - 1)
@@ -113,20 +136,7 @@ def _touching(numbering: DofNumbering) -> Index:
     apart = (beams[end] != beams[touched]) | (np.isin(touched, ends) & (end < touched))
     gap = np.linalg.norm(points[end] - points[touched], axis=1)
     touching = apart & (gap <= np.minimum(reach[end], reach[touched]))
-    if not touching.any():
-        return np.empty((0, 2), dtype=np.int64)
-    end, touched, gap = end[touching], touched[touching], gap[touching]
-    group = _groups(numbering)[: first[-1]]
-    joined = group[end] == group[touched]
-    keys = end * len(first) + beams[touched]
-    loose = ~joined & ~np.isin(keys, keys[joined])
-    end, touched, gap, keys = end[loose], touched[loose], gap[loose], keys[loose]
-    order = np.lexsort((gap, keys))
-    _, nearest = np.unique(keys[order], return_index=True)
-    pairs = np.column_stack([end, touched])[order][nearest]
-    # Two ends that touch each other count as one pair.
-    _, once = np.unique(np.sort(pairs, axis=1), axis=0, return_index=True)
-    return np.asarray(pairs[np.sort(once)])
+    return end[touching], touched[touching], gap[touching]
 
 
 def _groups(numbering: DofNumbering) -> Index:

@@ -307,3 +307,7 @@ class Mesh:
         require_capacity(number, f"Mesh: refine = {self.refine} of {beam.name}, {number} cells,")
         at = np.arange(number + 1) * self.refine.denominator / self.refine.numerator
         return [float(s) for s in np.interp(at, np.arange(len(vertices)), vertices)]
+
+
+DEFAULT_MESH = Mesh()
+"""The cells of the beams, of degree 1; one object, because its properties are computed once."""

@@ -269,7 +269,7 @@ def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
 
     The vector is zero for points of the ground, which do not move.
     """
-    if node(place) is GROUND:
+    if node(place) is GROUND or (point is None and isinstance(place, Place)):
         return 0.0, 0.0
     x, y = point or place.point
     nx, ny = place.body.center if isinstance(place, BodyPoint) else place.point

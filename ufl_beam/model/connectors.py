@@ -361,7 +361,8 @@ def law_of(connector: Connector) -> HingeLaw:
 def place_of(hinge: Connector) -> Place:
     """Return the place of a plastic hinge, on the side to which joints and loads are attached."""
     assert isinstance(hinge.a, Place)
-    return hinge.a.beam.at(hinge.a.s)
+    assert isinstance(hinge.b, Place)
+    return hinge.b if hinge.a.beyond else hinge.a
 
 
 def _never_opens(place: Place, others: Sequence[Node], laws: Mapping[Place, HingeLaw]) -> bool:

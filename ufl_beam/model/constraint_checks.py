@@ -88,7 +88,7 @@ def require_inertia(scene: Scene) -> None:
         return isinstance(connector.law, (*RESISTING, ConnectorLaw, Damper, Coulomb))
 
     rows = _constraints(scene, determines, masses)
-    free = _null_space(csr_array(rows[:, loose]))
+    free = _null_space(rows[:, loose])
     if free.shape[1] == 0:
         return
     mode = np.zeros(rows.shape[1])
@@ -108,7 +108,7 @@ def _fixed(scene: Scene) -> set[NodeDof]:
     return {same[GROUND, component] for component in range(3)} | by_supports
 
 
-Row = list[tuple[Node, Array]]
+Row = list[tuple[Node, Sequence[float]]]
 """Linear constraint: nodes with their factors of (u, v, size ψ); size of the scene in m."""
 
 
@@ -188,7 +188,8 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
         sums: dict[NodeDof, float] = defaultdict(float)
         for carrier, factors in row:
             for component, factor in enumerate(factors):
-                sums[same[carrier, component]] += factor
+                if factor:
+                    sums[same[carrier, component]] += factor
         # Factors at both ends that act on the same degree of freedom cancel to round-off.
         combined.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
         for dof in combined[-1]:
@@ -211,7 +212,7 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
         for column, number in enumerate(indices)
         for dof, factor in combined[number].items()
     ]
-    gradients = _sparse(terms, (max(len(columns), 1), len(indices)))
+    gradients = _matrix(terms, (max(len(columns), 1), len(indices)))
     return [rows[number] for number in indices], _null_space(gradients)
 
 
@@ -251,29 +252,30 @@ def _rows(
 ) -> Iterator[tuple[object, Row]]:
     """Iterate over (owner, constraint) for connectors that ``acts`` selects, and ``supports``."""
     for connector in filter(acts, scene.all_connectors):
-        unit = np.array([1.0, 1.0, 1.0 if connector.is_rotation else 1 / scene.size])
+        turn = 1.0 if connector.is_rotation else 1 / scene.size
         ends = zip((connector.a, connector.b), connector.rigidly(), strict=True)
-        yield connector, [(node(end), np.multiply(factors, unit)) for end, factors in ends]
+        yield connector, [(node(end), (x, y, z * turn)) for end, (x, y, z) in ends]
     for support in supports:
         cos, sin = math.cos(support.angle), math.sin(support.angle)
-        turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
-        yield from ((support, [(node(support.place), turned[c])]) for c in support.held)
+        turned = (cos, sin, 0.0), (-sin, cos, 0.0), (0.0, 0.0, 1.0)
+        for component in support.held:
+            yield support, [(node(support.place), turned[component])]
 
 
 def _constraints(
     scene: Scene,
     acts: Callable[[Connector], bool] = lambda connector: resists(connector.law),
     also: Iterable[tuple[AttachmentPoint, int]] = (),
-) -> csr_array:
+) -> Array | csr_array:
     """Assemble the matrix of constraints on rigid motions (u, v, size ψ) of beams and bodies.
 
     The n rows are for joints, supports, connectors that ``acts`` selects and degrees of freedom in
     ``also``, and for beams with works, because a work may hold a beam.  The shape is (n, 3 times
     the number of beams and bodies).
     """
-    unit = np.eye(3)
+    unit = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     rows: list[Row] = [
-        [(first, -unit[component]), (second, unit[component])]
+        [(first, [-x for x in unit[component]]), (second, unit[component])]
         for (first, component), *others in scene.shared_by_joints
         for second, _ in others
     ]
@@ -293,25 +295,35 @@ def _constraints(
                 )
                 cx, cy = _center(member)
                 x, y = (px - cx) / scene.size, (py - cy) / scene.size
-                gradient = factors @ np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
-                terms += ((i, 3 * moving[member] + k, gradient[k]) for k in range(3))
-    return _sparse(terms, (max(len(rows), 1), 3 * len(moving)))
+                u, v, ψ = factors
+                gradient = u, v, ψ + v * x - u * y
+                terms += ((i, 3 * moving[member] + k, factor) for k, factor in enumerate(gradient))
+    return _matrix(terms, (max(len(rows), 1), 3 * len(moving)))
 
 
-def _sparse(terms: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
-    """Build a sparse matrix from (row, column, value) of its entries; duplicates are added."""
+def _matrix(terms: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> Array | csr_array:
+    """Build a matrix from (row, column, value) of its entries; duplicates are added.
+
+    The matrix is sparse if it has more than :data:`DENSE` columns.
+    """
     rows, columns, values = np.array(terms).reshape(-1, 3).T
-    return csr_array((values, (rows.astype(int), columns.astype(int))), shape=shape)
+    places = rows.astype(int), columns.astype(int)
+    if shape[1] > DENSE:
+        return csr_array((values, places), shape=shape)
+    matrix = np.zeros(shape)
+    np.add.at(matrix, places, values)
+    return matrix
 
 
-def _null_space(constraints: csr_array) -> Array:
+def _null_space(constraints: Array | csr_array) -> Array:
     """Return a basis of the null space, in columns; above :data:`DENSE` unknowns at most 6."""
     unknowns = constraints.shape[1]
     if unknowns <= DENSE:
-        _, sizes, rows = np.linalg.svd(constraints.toarray(), full_matrices=True)
+        dense = constraints.toarray() if isinstance(constraints, csr_array) else constraints
+        _, sizes, rows = np.linalg.svd(dense, full_matrices=True)
         rank = int(np.sum(sizes > 1e-10 * max(1.0, sizes.max(initial=0.0))))
         return np.asarray(rows[rank:].T)
-    gram = (constraints.T @ constraints).tocsc()
+    gram = csr_array(constraints.T @ constraints).tocsc()
     values, vectors = eigsh(gram, k=6, sigma=-1e-9, which="LM", v0=np.ones(unknowns))
     return np.asarray(vectors[:, values < 1e-13 * abs(gram).max()])
 
@@ -387,9 +399,11 @@ def require_rates(scene: Scene, scheme: Rated) -> None:
                 f"{name}: {owner} needs the mean velocity of a step, and this scheme takes all "
                 "forces at the end of the step; use EnergyMomentum() or EnergyMomentumDecaying()"
             )
+    if not scheme.accelerations_oscillate:
+        return
     prescribed = [str(c) for c in scene.all_connectors if isinstance(c.law, HOLDING)]
     prescribed += [f"the support of {s.place}" for s in scene.supports if s.moving]
-    if prescribed and scheme.accelerations_oscillate:
+    if prescribed:
         raise ModelError(
             f"{name}: {prescribed[0]} prescribes a motion, whose accelerations oscillate for ever "
             "without numerical damping; use GeneralizedAlpha(0.8), or EnergyMomentum()"

@@ -7,7 +7,8 @@ import math
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations
+from operator import ge
 from typing import Annotated
 
 import numpy as np
@@ -260,7 +261,7 @@ class Table:
         for name in ("times", "values"):
             checked = require_sequence(getattr(self, name), f"Table: {name}")
             object.__setattr__(self, name, checked)
-            if all(type(x) is float for x in checked) and np.isfinite(checked).all():
+            if {*map(type, checked)} <= {float} and np.isfinite(checked).all():
                 continue  # a record has many numbers
             for i, number in enumerate(checked):
                 require_number(number, f"Table: {name}[{i}]")
@@ -269,12 +270,13 @@ class Table:
                 f"Table: {len(self.times)} times and {len(self.values)} values; "
                 "give the same number of each"
             )
-        for i, (before, after) in enumerate(pairwise(self.times)):
-            if after <= before:
-                raise ModelError(
-                    f"Table: times must increase, but times[{i}] = {before:g} is followed "
-                    f"by {after:g}"
-                )
+        falls = [*map(ge, self.times, self.times[1:])]
+        if any(falls):
+            i = falls.index(True)
+            before, after = self.times[i : i + 2]
+            raise ModelError(
+                f"Table: times must increase, but times[{i}] = {before:g} is followed by {after:g}"
+            )
 
     @property
     def kinks(self) -> Sequence[float]:

@@ -242,9 +242,10 @@ class StateWriter:
             (dof, at["reactions"].start + 3 * k + c)
             for k, support in enumerate(numbering.scene.supports)
             for c, dof in ((c, subdomain.numbering.node(support.place)[c]) for c in support.held)
-            if subdomain.owns(np.array([dof]))[0]
-        ]  # fmt: skip
+        ]
         dofs, to = np.array(constrained, dtype=np.int64).reshape(-1, 2).T
+        owned = subdomain.owns(dofs)
+        dofs, to = dofs[owned], to[owned]
         mine = np.searchsorted(supports.dofs, subdomain.local(dofs))
         self._add(self._place(supports.reactions), mine, to)
         for term in inelastic:

@@ -24,7 +24,7 @@ from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.discretization.work_forms import statement
 from ufl_beam.errors import ArgumentError, require_kind, shorten, warn
 from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia
-from ufl_beam.model.beams import Mesh
+from ufl_beam.model.beams import DEFAULT_MESH, Mesh
 from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.constraint_checks import (
     require_independent,
@@ -100,7 +100,7 @@ def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
     if mesh is not None:
         require_kind(mesh, Mesh, "mesh")
         return mesh
-    return Mesh() if start is None else start.numbering.mesh
+    return DEFAULT_MESH if start is None else start.numbering.mesh
 
 
 SAME_TIME = 1e-12

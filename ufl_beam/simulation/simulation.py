@@ -397,5 +397,7 @@ class Simulation(Stepper):
             give_back_memory(len(self.q))
 
     def close(self) -> None:
-        """Destroy the PETSc objects."""
+        """Destroy the PETSc objects; later steps raise :class:`ArgumentError`."""
         self.solver.destroy()
+        self.equation.callbacks.close()
+        self._alive.clear()  # has some of the functions, too

@@ -350,8 +350,9 @@ class Stepper(StateView):
     @contextmanager
     def _in_c(self) -> Iterator[None]:
         """Context in which C takes steps; at its end Python gets the new state."""
-        c = self.time_loop
-        c.substeps, c.failure, self.equation.callbacks.error = 0, lib.SUCCEEDS, None
+        c, callbacks = self.time_loop, self.equation.callbacks
+        callbacks.require_open()
+        c.substeps, c.failure, callbacks.error = 0, lib.SUCCEEDS, None
         try:
             yield
         except SystemError as error:

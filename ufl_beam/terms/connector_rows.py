@@ -409,8 +409,10 @@ class RigidPlasticLaws(Response):
         inputs = (*INPUTS, *parameters(law.law))
         self._storage = np.zeros((n, len(inputs)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(inputs)}
-        for i, connector in enumerate(connectors):
-            for name, value in parameters(law_of(connector)).items():
+        laws = [law_of(connector) for connector in connectors]
+        of_laws = {id(one): parameters(one) for one in laws}  # hinges of a frame share a law
+        for i, one in enumerate(laws):
+            for name, value in of_laws[id(one)].items():
                 self._at[name][i] = value
         self._at["θ"][:], self._at["dt"][:] = scheme.theta, 1.0
         self._initial_limit = self._at["number yield_limit" if self._hardens else "number limit"]

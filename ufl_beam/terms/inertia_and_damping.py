@@ -279,9 +279,10 @@ class RayleighForces(Term):
         self, damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
         rates: Inertia,
     ) -> None:  # fmt: skip
-        C, M, form = fields.matrix(), mass_matrix(fields), _reference_stiffness(fields.element)
-        K = fields.assembled(form)
-        C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
+        C, form = rates.M, _reference_stiffness(fields.element)
+        C.data *= damping.mass
+        if damping.stiffness:
+            C.data += damping.stiffness * fields.assembled(form).data  # P(92)
         rotations = with_half_tangents(scheme, fields.subdomain.rotations)
         self._times = StepProduct(C, rotations, A, fields.subdomain.scratch)
         self.loops = self._times.loops
@@ -324,7 +325,7 @@ class TangentRayleighForces(Term):
         rates: Inertia, inelastic: Sequence[InelasticBeams],
     ) -> None:  # fmt: skip
         (form, D), element = _tangent_stiffness(fields.element), fields.element
-        K, M, C, dofs = fields.matrix(), mass_matrix(fields), fields.matrix(), fields.cell_dofs
+        K, M, C, dofs = fields.matrix(), rates.M, fields.matrix(), fields.cell_dofs
         width = dofs.shape[1]
         C.data[:] = M.data != 0.0
         C.data[C.positions(dofs.repeat(width, axis=1).ravel(), np.tile(dofs, width).ravel())] = 1.0
@@ -343,7 +344,7 @@ class TangentRayleighForces(Term):
         forms = fields_of_forms(kernels, D)["form"]
         cells = [beams.keep_tangents() for beams in inelastic]
         groups = [(*tangents.shape, integers(cell), doubles(tangents)) for cell, tangents in cells]
-        at = C.positions(*self._times.A.pairs())
+        at, _ = self._times.A.places(C)
         self._in_c = struct(
             "tangent_damping", stiffness=stiffness.cells, force=force.cells,
             at_q0=force.position(element.q0), form=forms, groups=len(groups),

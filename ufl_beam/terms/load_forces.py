@@ -219,15 +219,17 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Ind
         density = [g_x, g_y, 0.0]
     else:
         raise TypeError(f"{type(load).__name__} is not a dead load")
-    for place, force in at_places:
-        if moves_with_node(place):  # else a connector of Scene.all_connectors applies the force
-            dofs = numbering.node(place)
-            mine = subdomain.owns(dofs)
-            forces[subdomain.local(dofs[mine])] += np.array(force)[mine]
+    # Connectors of Scene.all_connectors apply the forces at other places.
+    at_nodes = [(numbering.node(at), force) for at, force in at_places if moves_with_node(at)]
+    dofs = np.array([node for node, _ in at_nodes], dtype=np.int32).ravel()
+    mine = subdomain.owns(dofs)
+    nodal = np.array([force for _, force in at_nodes], dtype=np.float64).ravel()
+    np.add.at(forces, subdomain.local(dofs[mine]), nodal[mine])
     if loaded is None:
         return None
     first, *between, last = (numbering.lengths(cells[loaded])[:, None] * shares).T
-    return loaded, np.kron(density, np.column_stack([first, last, *between]))
+    along = np.column_stack([first, last, *between])
+    return loaded, np.hstack([component * along for component in density])
 
 
 def _loaded_cells(load: LoadAlongBeam, subdomain: Subdomain) -> tuple[Index, Array]:

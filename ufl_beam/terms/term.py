@@ -24,7 +24,7 @@ from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.errors import StepFailed
+from ufl_beam.errors import ArgumentError, StepFailed
 from ufl_beam.model.functions import Constant, Table, TimeFunction, value_at
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
@@ -135,9 +135,25 @@ class Callbacks:
     """
 
     error: BaseException | None = None
+    _closed = False
 
     def __init__(self, c: Any) -> None:
         self.c, self._alive = c, list[Any]()
+
+    def close(self) -> None:
+        """Drop the functions, after which C must not be called.
+
+        They refer to the simulation, which refers to them.  Without this cycle, the memory of a
+        simulation is freed at once, and not by the garbage collector.
+        """
+        self._alive, self._closed = [], True
+
+    def require_open(self) -> None:
+        """Raise :class:`ArgumentError` after :meth:`close`."""
+        if self._closed:
+            raise ArgumentError(
+                "the simulation is closed; begin another one, with start=simulation.solution"
+            )
 
     # -- functions, with their data ---------------------------------------------------------------
 
@@ -174,6 +190,7 @@ class Callbacks:
     @contextmanager
     def raising(self) -> Iterator[None]:
         """Raise the exception of a callback at the end of a ``with`` block, outside of steps."""
+        self.require_open()
         before, self.error = (self.error, self.c.raised), None
         try:
             yield
