@@ -59,6 +59,8 @@ class _State:
         self._points = [Points(class_points, keys, lengths, Static()) for class_points in points]
         # Without points the section is elastic; otherwise the points have the elastic resultants.
         self._rest = np.zeros(3) if points else np.array([section.EA, section.GA, section.EI])
+        self._elastic = np.tile(np.diag(self._rest), (states, 1, 1))
+        self._strains = np.zeros((states, 3))
         self._EA, self._depth, self._strain, self._length = section.EA, section.depth, 0.0, lengths
         self._largest = 0.0  # strain so far, of the axis or by curvature
 
@@ -69,9 +71,9 @@ class _State:
 
     def response(self, strain: npt.ArrayLike, curvature: npt.ArrayLike) -> tuple[Array, Array]:
         """Return (N, V, M) and their derivatives in the step; (states, 3), (states, 3, 3)."""
-        e = np.zeros((len(self._length), 3))
+        e = self._strains
         e[:, 0], e[:, 2] = strain, curvature
-        r, D = self._rest * e, np.tile(np.diag(self._rest), (len(e), 1, 1))
+        r, D = self._rest * e, self._elastic
         for points in self._points:
             forces, slopes = points.return_map(e)
             r, D = r + forces, D + slopes.reshape(-1, 3, 3)

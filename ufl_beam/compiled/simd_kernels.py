@@ -42,6 +42,11 @@ For other processors, compilers split the vectors."""
 FLAGS = ["-O2", NATIVE, "-fno-math-errno", *(["-mprefer-vector-width=512"] if _WIDE else [])]
 """Compiler flags; without the last flag, compilers halve vectors of 512 bits for square roots."""
 
+SCHEDULED = [*FLAGS, "-fschedule-insns"]
+"""Compiler flags of loops over points.  The last flag sorts instructions before registers are
+chosen.  Long laws take up to 40 % less time with it, but tangents of cells of degree 3 a sixth
+more."""
+
 FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "exp", "log", "pow"}
 """Functions that assembly_simd.h provides for vectors; lanes_pow has whole constants as exponents,
 lanes_power others."""
@@ -164,7 +169,7 @@ def interleaved(
     unknown among the coefficients, and the number of unknowns.
     """
     numbers = {"SIDE": math.isqrt(sizes[0]), "AT": unknowns[0], "UNKNOWNS": unknowns[1]}
-    return _loop("assembly_simd.c", source, kernel, sizes, numbers)
+    return _loop("assembly_simd.c", source, kernel, sizes, numbers, FLAGS)
 
 
 @cache
@@ -176,12 +181,13 @@ def point_loop(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | 
     """
     if source.exists() and not re.search(_SLOW, source.read_text()):
         return None
-    return _loop("points_simd.c", source, kernel, sizes, {})
+    return _loop("points_simd.c", source, kernel, sizes, {}, SCHEDULED)
 
 
 def _loop(
-    file: str, source: Path, kernel: int, sizes: tuple[int, int, int], numbers: dict[str, int]
-) -> int | None:
+    file: str, source: Path, kernel: int, sizes: tuple[int, int, int], numbers: dict[str, int],
+    flags: list[str],
+) -> int | None:  # fmt: skip
     """Compile the loop in ``file`` over a kernel of FFCx, with ``numbers`` as macros."""
     numbers |= dict(zip(("ENTRIES", "WIDTH", "CONSTANTS"), sizes, strict=True)) | {"LANES": BATCH}
     defined = [f"#define {x} {n}" for x, n in numbers.items()]
@@ -194,7 +200,7 @@ def _loop(
             lambda: "\n".join([head, in_vectors(written(source)), loop]),
             # The name of the file is a hash of the form, options and versions of FFCx.
             depends_on=[source.name, head, loop, Path(__file__).read_text()],
-            flags=FLAGS,
+            flags=flags,
             check=lambda module: require_agreement(module, kernel, sizes),
         )
     except (Refused, CompilerError) as why:

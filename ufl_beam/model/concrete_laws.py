@@ -69,11 +69,9 @@ class _Concrete(Record, MaterialLaw):
     def backbone(self, strain: Values) -> Values:
         """Return the compressive stress at a compressive strain that was never exceeded."""
 
+    @abstractmethod
     def area(self, low: Values, high: Values) -> Values:
-        """Return the integral of the backbone between strains, by Gauss-Legendre quadrature."""
-        rule = [(float(x), float(w)) for x, w in zip(*gauss_rule(4), strict=True)]
-        means = (w * self.backbone(low + x * (high - low)) for x, w in rule)
-        return (high - low) * sum(means)
+        """Return the integral of the backbone between two strains."""
 
     def _unloading(self, crushed: Values) -> tuple[Values, Values]:
         """Return residual strain (compressive) and stiffness after a largest compressive strain."""
@@ -89,15 +87,15 @@ class _Concrete(Record, MaterialLaw):
         The factor deducts the elastic energy at the limit from the fracture energy.
         """
         t, G = self.tension.limit, self.tension.fracture_energy
-        factor = self.length * G / (G - t**2 * self.length / (2 * self.C))
-        return factor * positive(cracked - t / self.C), factor
+        limit = t / self.C
+        factor = self.length * G / (G - limit * t / 2 * self.length)
+        return factor * where(below(limit, cracked), cracked - limit, 0.0), factor
 
     def _secant(self, cracked: Values) -> Values:
         """Return the stiffness in tension after a largest tensile strain."""
         width, _ = self._crack_opening(cracked)
         cracks = below(self.tension.limit / self.C, cracked)
-        traction = self.tension.traction(width)
-        return where(cracks, traction / larger(cracked, TINY), self.C)
+        return where(cracks, self.tension.traction(width) / where(cracks, cracked, 1.0), self.C)
 
     def stress(self, strain: Values, state: State) -> Values:
         """Return the stress, negative in compression."""
@@ -365,19 +363,28 @@ class Mander(_Concrete):
         """Compressive strain at which spalling begins."""
         return where(below(self.spalling, BEYOND / 2), 2 * self.strain, self.spalling / 2)
 
+    def _curve(self, x: Values) -> Values:
+        """Return the stress on the curve of Popovics at a compressive strain over ``strain``."""
+        r = self.C / (self.C - self.strength / self.strain)
+        return self.strength * x * r / (r - 1 + exp(r * log(x + TINY)))
+
     def backbone(self, strain: Values) -> Values:
         """Return the compressive stress at a compressive strain that was never exceeded."""
-        r, begins = self.C / (self.C - self.strength / self.strain), self._begins
-        x = smaller(strain, begins) / self.strain
-        left = positive(self.spalling - larger(strain, begins)) / (self.spalling - begins)
-        return left * self.strength * x * r / (r - 1 + exp(r * log(larger(x, TINY))))
+        begins, end = self._begins, self.spalling
+        curved = below(strain, begins)
+        left = where(curved, 1.0, positive(end - strain) / (end - begins))
+        return left * self._curve(where(curved, strain, begins) / self.strain)
 
     def area(self, low: Values, high: Values) -> Values:
         """Return the integral of the backbone, by quadrature up to the beginning of spalling."""
         begins, end = self._begins, self.spalling
         before, after = (positive(end - larger(x, begins)) for x in (low, high))
-        line = self.backbone(begins) * (before**2 - after**2) / (2 * (end - begins))
-        return line + super().area(smaller(low, begins), smaller(high, begins))
+        # Without spalling both are equal: the difference of their squares would leave round-off.
+        line = self._curve(2.0) * (before - after) * ((before + after) / (2 * (end - begins)))
+        x0, x1 = (smaller(x, begins) / self.strain for x in (low, high))
+        rule = [(float(x), float(w)) for x, w in zip(*gauss_rule(4), strict=True)]
+        mean = sum(w * self._curve(x0 + x * (x1 - x0)) for x, w in rule)
+        return line + (x1 - x0) * self.strain * mean
 
     def parameters(self, C: Values) -> dict[str, Any]:
         """Return the parameters; an infinite strain of spalling as a large number."""

@@ -158,13 +158,16 @@ class PointForms:
 
     @cached_property
     def loops(self) -> dict[str, Any]:
-        """Loops over points, which may be null, and space for the answers of one point."""
+        """Loops over points, which may be null, and space for the answers of one point.
+
+        In statics, respond in material_points.c asks the law twice.
+        """
         law, end = self._outputs
         iterates = self._equations.law(self._at).solves
         return {
             "law_loop": ffi.NULL if iterates else self._pointwise.compile_loop(*law),
             "end_loop": self._pointwise.compile_loop(*end),
-            "answers": np.zeros(max(len(law), len(end))),
+            "answers": np.zeros(max(2 * len(law), len(end))),
         }
 
     @cached_property

@@ -236,7 +236,7 @@ typedef struct {
    * end: outputs at the end of a step, see point_output. */
   kernel *law, *resistance, *end;
   answer_loop *law_loop, *end_loop; /* the same for all points of a section; or none */
-  double *answers;                  /* space for their results */
+  double *answers;                  /* space for their results; for two answers of the law to each point */
   kernel *own; /* dissipation of a law that must not give energy, and its size; or none */
   int solves, components, variables, strain;
   int cells, of_cell, width;

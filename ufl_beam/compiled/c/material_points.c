@@ -8,6 +8,17 @@ static inline void find_strains(int d, const double *b, const double *e, double 
     strain[a] = b[3 * a] * e[0] + b[3 * a + 1] * e[1] + b[3 * a + 2] * e[2];
 }
 
+/* Set the strains of the points w of a section from its strains e; the points do not open. */
+static inline void set_strains(const points *p, const double *e, double *w)
+{
+  const int d = p->components;
+  for (int i = 0; i < p->of_cell; ++i, w += p->width) {
+    if (d == 1) find_strains(1, p->B + 3 * i, e, w + p->strain);
+    else find_strains(d, p->B + 3 * d * i, e, w + p->strain);
+    w[GROWTH] = w[DIRECTION] = 0;
+  }
+}
+
 /* Add stresses s of a point, and the derivatives that follow them in s, to the resultants of its
  * section. */
 static inline void add_answer(int d, const double *b, double weight, const double *s, double *r,
@@ -42,12 +53,13 @@ static const double ALIKE = 0.01, DIGITS = 1e-9;
  *
  * In statics, `linear`, the strain that the iteration predicts, replaces the strain of the iterate.
  * Before the first tangent there is no line; the point then answers on the branch of this strain.
+ * `known` is its answer there, or null.
  *
  * Changes s, the stress and its derivative. Returns the difference between the stress and the
  * stress of the strain.
  */
-static double follow_prediction(const points *p, double *w, double linear, const double *line,
-                                double *s)
+static double follow_prediction(const points *p, double *w, double linear, const double *known,
+                                const double *line, double *s)
 {
   double *strain = w + p->strain, *z = strain + 3 + p->variables, now[2], kept[MOST_VARIABLES];
   const double start = *strain, elastic = strain[2], beside = BESIDE_STRESS * p->theta * elastic;
@@ -55,7 +67,8 @@ static double follow_prediction(const points *p, double *w, double linear, const
   if (line && !(fabs(first) > elastic * (ALIKE * fabs(start - line[0]) + DIGITS * fabs(start)))) return 0;
   if (p->solves) memcpy(kept, z, p->variables * sizeof *z);
   *strain = linear;
-  if (linear == start) memcpy(now, s, sizeof now);
+  if (known) memcpy(now, known, sizeof now);
+  else if (linear == start) memcpy(now, s, sizeof now);
   else answer(p, w, now);
   const double predicted = line ? line[1] + line[2] * (linear - line[0]) : now[0];
   double excess = now[0] - predicted;
@@ -99,12 +112,12 @@ void respond(points *p)
       r[k] = p->rest[k] * ((1 - p->theta) * e0[k] + p->theta * e1[k]);
       D[4 * k] = p->rest[k] * p->theta;
     }
-    for (int i = 0; i < p->of_cell; ++i) {
-      double *at = w + i * p->width, *strain = at + p->strain;
-      if (d == 1) find_strains(1, p->B + 3 * i, e1, strain);
-      else find_strains(d, p->B + 3 * d * i, e1, strain);
-      at[GROWTH] = at[DIRECTION] = 0;
+    double *known = 0; /* answers that all points need */
+    if (p->law_loop && p->linear && !p->predicts) {
+      set_strains(p, p->linear + 3 * c, w);
+      p->law_loop(p->of_cell, w, known = p->answers + answers * p->of_cell);
     }
+    set_strains(p, e1, w);
     if (p->law_loop) p->law_loop(p->of_cell, w, p->answers);
     for (int i = 0; i < p->of_cell; ++i, w += p->width) {
       double *strain = w + p->strain;
@@ -123,8 +136,8 @@ void respond(points *p)
       } else if ((p->predicts || p->linear) && !(w[TRACTION] < INFINITY)) {
         double linear = *strain;
         if (p->linear) find_strains(1, p->B + 3 * i, p->linear + 3 * c, &linear);
-        const double *last = p->predicts ? predicted : 0;
-        const double unlike = p->weight[i] * follow_prediction(p, w, linear, last, s);
+        const double *last = p->predicts ? predicted : 0, *there = known ? known + answers * i : 0;
+        const double unlike = p->weight[i] * follow_prediction(p, w, linear, there, last, s);
         for (int k = 0; k < 3 && unlike > 0; ++k)
           p->unlike[k] = fmax(p->unlike[k], unlike * fabs(p->B[3 * i + k]));
       }
