@@ -404,6 +404,37 @@ def test_load_control_says_what_turns():
     assert "dt =" not in text
 
 
+def test_the_snap_back_of_a_second_hinge_is_told_apart_from_a_softening_that_is_gentle():
+    """[closed] The tops turn back if the hinge softens faster than the stiffness 3 EI/h of a column.
+
+    The first hinge hardly softens, so that the second one opens while the first one flows.
+    """
+    EI, M = 1e5, 100.0  # N m², N m; columns of 1 m
+    critical = M**2 / (6 * EI)  # J
+    section = ub.Section(EA=1e8, GA=1e8, EI=EI)
+
+    def path(energy):
+        laws = ub.LinearSoftening(M / 2, 1e3), ub.LinearSoftening(M, energy)
+        columns = [
+            ub.Beam((x, 0), (x, 1), section, cells=1, hinges={0.0: law})
+            for x, law in enumerate(laws)
+        ]
+        top, other = (column.end for column in columns)
+        feet = [ub.Clamped(column.start) for column in columns]
+        push = ub.PointLoad(top, force=(1, 0), amplitude=growing)
+        scene = ub.Scene(columns, joints=[ub.Link(top, other)], supports=feet, loads=[push])
+        return ub.follow(scene, ub.DisplacementControl(top, "u", 2e-5), steps=60)
+
+    gentle = path(2 * critical).factor
+    assert gentle.max() == pytest.approx(1.5 * M, rel=1e-3)  # (M/2 + M)/h, less the softening
+    assert gentle[-1] < M
+    with pytest.raises(ub.ConvergenceError, match=r": u of beam.*turns back, where") as failure:
+        path(critical / 2)
+    assert failure.value.time == pytest.approx(1.5 * M, rel=1e-3)
+    assert "mechanism" not in str(failure.value)
+    assert "perhaps" not in str(failure.value)
+
+
 # -- words and pictures -------------------------------------------------------------------------
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ufl_beam.analysis.critical_points import Stiffness
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ArgumentError, StepFailed, require_kind, require_number
+from ufl_beam.errors import ArgumentError, StepFailed, TurnsBack, require_kind, require_number
 from ufl_beam.mechanics.time_scheme import Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.scene import Scene
@@ -135,9 +135,23 @@ class PathCorrector:
         if self.dissipates or not (whole := self.dissipation(q + motion)) > 0:
             return None
         increment = self._length_to(ONSET_FRACTION * whole, q, motion, (0.0, 1.0), 40) * step
-        q, t = q + increment[:-1], self.simulation.t + increment[-1]
+        return increment, self.direction_beyond(increment)
+
+    def direction_beyond(self, step: Array) -> Array:
+        """Return the direction at the end of ``step`` in which dissipation grows."""
+        q, t = self.simulation.q + step[:-1], self.simulation.t + step[-1]
         _, direction = self.direction_at(q, t)
-        return increment, -direction if self.dissipation_side(q, direction) < 0 else direction
+        return -direction if self.dissipation_side(q, direction) < 0 else direction
+
+    def reverses(self, normal: Array, step: Array) -> bool:
+        """Return whether the quantity with the gradient ``normal`` falls beyond ``step``.
+
+        The result is true if a hinge or spring opens in the step beside others that flow already,
+        so that more dissipation needs a motion against ``normal``.
+        """
+        with suppress(StepFailed):
+            return self.dissipates and self.along(normal, self.direction_beyond(step)) < 0
+        return False
 
     def until(self, energy: float, increment: Array, direction: Array) -> Array:
         """Extend a step from ``increment`` along a direction until it dissipates ``energy`` (J)."""
@@ -334,15 +348,15 @@ class Control:
             normal = self.normal(corrector, direction)
             speed = corrector.along(normal, direction)
             if not speed > 0:
-                raise StepFailed(
-                    f"{self.quantity} turns back, where this control cannot follow; use ArcLength"
-                )
+                raise TurnsBack(self.quantity)
             step = increment + rest / speed * direction
             try:
                 return corrector.attempt(step, normal, target_change, hold=hold)
             except StepFailed as failure:
                 kink = corrector.kink(step) if hold else None
                 if kink is None and hold and self.quantity:
+                    if corrector.reverses(normal, step):
+                        raise TurnsBack(self.quantity) from None
                     raise StepFailed(
                         f"{failure}; perhaps {self.quantity} turns back here, where this control "
                         "cannot follow: use ArcLength",

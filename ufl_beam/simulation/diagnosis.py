@@ -13,7 +13,14 @@ from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.errors import ArgumentError, ConvergenceError, ModelError, NoNumber, StepFailed
+from ufl_beam.errors import (
+    ArgumentError,
+    ConvergenceError,
+    ModelError,
+    NoNumber,
+    StepFailed,
+    TurnsBack,
+)
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
 from ufl_beam.model.connector_laws import (
@@ -111,7 +118,8 @@ def no_equilibrium(
     if end != t:
         where = f"after {named.at(t, '.9g')}, even with {named.step.format(end - t)}"
     why = ""
-    if not isinstance(failure, NoNumber):  # without a value of a function there is no tangent
+    # Without a value of a function there is no tangent; a reversal is a reason by itself.
+    if not isinstance(failure, NoNumber | TurnsBack):
         probe = _probe_state(equation, q0, q1)
         why = _singularity(equation, q1)
         # If the latest tangent is regular, an earlier, nearly singular tangent may have caused the
