@@ -3,11 +3,13 @@
 
 import itertools
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import ufl
+from helpers import raises
 from scenes import clamped
 
 import ufl_beam as ub
@@ -390,6 +392,21 @@ def test_displacement_control_in_any_unit_of_the_load():
         factors = [point.factor * unit / 1e3 for point in path.critical]
         # Located to 1e-7 of a step, where the load is flat.
         np.testing.assert_allclose(factors, [force(s * LIMIT - HEIGHT) for s in (1, -1)], rtol=1e-9)
+
+
+def test_displacement_control_ends_where_it_is_told_to():
+    """Limit points within the path shift its steps, but not its end; round-off is left."""
+    apex, scene = truss()
+    control = ub.DisplacementControl(apex, "v", -0.125, end=-1.9)
+    path = ub.follow(scene, control)
+    v = path.displacement(apex)[:, 1]
+    assert len(path.critical) == 2
+    assert v[-1] == pytest.approx(-1.9, rel=1e-12)
+    assert np.diff(v).min() >= -0.125 * (1 + 1e-9)
+    further = ub.follow(scene, replace(control, end=-2.0), start=path)
+    assert further.displacement(apex)[-1, 1] == pytest.approx(-2.0, rel=1e-12)
+    with raises("end = -1.9 is behind v of", "= -2 for step = -0.125"):
+        ub.follow(scene, control, start=further)
 
 
 def test_load_control_says_what_turns():

@@ -27,6 +27,7 @@ from ufl_beam.terms.term import Term
 
 MOST_DOUBLINGS = 30  # largest number of doublings of a step in searches for a dissipated energy
 ONSET_FRACTION = 1e-6  # dissipated energy at the onset, as a fraction of the energy in the step
+AT_END = 1e-6  # distance from the end of a path that counts as none, as a fraction of a step
 CONTROL_TOLERANCE = 1e-9  # largest error of the equation of the control, as a fraction of a step
 
 
@@ -328,6 +329,10 @@ class Control:
         """
         return np.asarray(corrector.weights * direction / corrector.length(direction))
 
+    def shortened(self, corrector: PathCorrector, fraction: float) -> float:
+        """Return the fraction of a step to the end of the path, at most ``fraction``; 0 there."""
+        return fraction
+
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return a positive number if the path continues along ``direction``.
 
@@ -450,10 +455,11 @@ class DisplacementControl(Control):
         place: Place of a beam.
         component: "u", "v" or "psi".
         step: Change of the component; m or rad.
+        end: Displacement or rotation at which the path ends, with shorter last steps; m or rad.
 
     Raises:
-        ArgumentError: ``place`` is not a place of a beam, ``component`` is unknown, or ``step`` is
-            zero.
+        ArgumentError: ``place`` is not a place of a beam, ``component`` is unknown, ``step`` is
+            zero, or the path begins at ``end`` or beyond it.
 
     Example:
         >>> control = ub.DisplacementControl(beam.end, "v", -0.05)
@@ -465,6 +471,8 @@ class DisplacementControl(Control):
     place: Place
     component: str
     step: float
+    _: KW_ONLY
+    end: float | None = None
     factor = math.inf
 
     def __post_init__(self) -> None:
@@ -474,6 +482,8 @@ class DisplacementControl(Control):
                 f"DisplacementControl: component = {self.component!r} must be one of "
                 f"{', '.join(COMPONENTS)}"
             )
+        if self.end is not None:
+            require_number(self.end, "DisplacementControl: end")
         super().__post_init__()
 
     def require(self, scene: Scene) -> None:
@@ -487,6 +497,23 @@ class DisplacementControl(Control):
     def quantity(self) -> str:  # type: ignore[override]
         """Name of the component and the place."""
         return f"{self.component} of {self.place}"
+
+    def shortened(self, corrector: PathCorrector, fraction: float) -> float:
+        """Return the fraction of a step to :attr:`end`, at most ``fraction``; 0 at the end."""
+        if self.end is None:
+            return fraction
+        component = COMPONENTS.index(self.component)
+        now = float(corrector.simulation.displacement(self.place)[component])
+        left = (self.end - now) / self.step
+        if abs(left) <= AT_END * max(1.0, abs(self.end / self.step)):
+            return 0.0
+        if left < 0:
+            raise ArgumentError(
+                f"DisplacementControl: end = {self.end:g} is behind {self.quantity} = {now:g} for "
+                f"step = {self.step:g}; give an end ahead, or the opposite step"
+            )
+        # A rest that is much shorter than the step before would be solved less accurately.
+        return left if left <= (1.0 + AT_END) * fraction else min(fraction, left / 2)
 
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
         """Return the gradient of the component, with the sign of ``step``."""
