@@ -422,7 +422,7 @@ def test_load_control_says_what_turns():
 
 
 def test_the_snap_back_of_a_second_hinge_is_told_apart_from_a_softening_that_is_gentle():
-    """[closed] The tops turn back if the hinge softens faster than the stiffness 3 EI/h of a column.
+    """[closed] The tops turn back if the hinge softens faster than a column resists, 3 EI/h.
 
     The first hinge hardly softens, so that the second one opens while the first one flows.
     """
@@ -445,10 +445,10 @@ def test_the_snap_back_of_a_second_hinge_is_told_apart_from_a_softening_that_is_
     gentle = path(2 * critical).factor
     assert gentle.max() == pytest.approx(1.5 * M, rel=1e-3)  # (M/2 + M)/h, less the softening
     assert gentle[-1] < M
-    with pytest.raises(ub.ConvergenceError, match=r": u of beam.*turns back, where") as failure:
+    begins = r"no equilibrium after [^:]*: u of beam.end \(0, 1\) turns back, where"
+    with pytest.raises(ub.ConvergenceError, match=begins) as failure:
         path(critical / 2)
     assert failure.value.time == pytest.approx(1.5 * M, rel=1e-3)
-    assert "mechanism" not in str(failure.value)
     assert "perhaps" not in str(failure.value)
 
 

@@ -118,8 +118,7 @@ def no_equilibrium(
     if end != t:
         where = f"after {named.at(t, '.9g')}, even with {named.step.format(end - t)}"
     why = ""
-    # Without a value of a function there is no tangent; a reversal is a reason by itself.
-    if not isinstance(failure, NoNumber | TurnsBack):
+    if not isinstance(failure, NoNumber):  # without a value of a function there is no tangent
         probe = _probe_state(equation, q0, q1)
         why = _singularity(equation, q1)
         # If the latest tangent is regular, an earlier, nearly singular tangent may have caused the
@@ -127,10 +126,13 @@ def no_equilibrium(
         if not why and probe is not q0 and equation.evaluate(probe):
             why = _singularity(equation, probe)
         why = why or _limit_point(equation, solution, q0, probe)
-    said = f"{failure} ({sizes})" if sizes else str(failure)
+    reasons = [why, f"{failure} ({sizes})" if sizes else str(failure)]
+    if isinstance(failure, TurnsBack):
+        reasons.reverse()
     return ConvergenceError(
-        f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=t, dt=end - t,
-        solution=solution, residuals=failure.residuals, forces=forces, reason=failure.reason,
+        f"no equilibrium {where}: {'; '.join(filter(None, reasons))}. {advice}", time=t,
+        dt=end - t, solution=solution, residuals=failure.residuals, forces=forces,
+        reason=failure.reason,
     )  # fmt: skip
 
 
