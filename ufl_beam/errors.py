@@ -93,6 +93,16 @@ class NoNumber(StepFailed, ModelError):
     """Error of a function of the scene without a finite value; a shorter step may avoid it."""
 
 
+class TurnsBack(StepFailed):
+    """Reversal of the quantity that a path control increases in every step."""
+
+    def __init__(self, quantity: str) -> None:
+        super().__init__(
+            f"{quantity} turns back, where this control cannot follow; use ArcLength, or "
+            "DissipationControl if hinges, cells or springs soften"
+        )
+
+
 class ConvergenceError(RuntimeError):
     """Failure to find equilibrium in a step, even in substeps; ``solution`` has the results so far.
 

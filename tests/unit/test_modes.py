@@ -303,6 +303,30 @@ def test_the_largest_displacement_of_a_mode_is_one(shared_path, on_first_rank):
         found.shape(3, scene.beams[0].end)
 
 
+@pytest.mark.parametrize("degree", [1, 3])
+@pytest.mark.parametrize("kind", ["vibration", "buckling"])
+def test_a_mode_that_passes_through_its_state_shows_the_diagrams_of_the_state(kind, degree):
+    """[closed] A quarter of a period after the largest displacement only the state is left."""
+    scene = cantilever(cells=3)
+    beam, mesh = scene.beams[0], ub.Mesh(degree=degree)
+    across = [ub.LineLoad(beam, force=(0, -3.0)), ub.Pressure(beam, normal=1.0)]
+    weight = ub.Gravity((-10.0, 0.0))  # along the beam
+    loaded = replace(scene, loads=[weight] + across * (kind == "vibration"))
+    state = ub.simulate(loaded, ub.Static(), t=(0, 1), dt=1.0, mesh=mesh)
+    if kind == "vibration":
+        found = ub.modes(loaded, 1, at=state)
+    else:
+        pushed = replace(scene, loads=[weight, ub.PointLoad(beam.end, force=(-1.0, 0))])
+        found = ub.buckling(pushed, 1, at=state)
+    motion, of_state = found.motion(0, amplitude=0.01, count=4), np.array(state.diagram(beam))
+    size = np.abs(of_state[1:]).max()  # tolerance: stresses of the state are subtracted
+    np.testing.assert_allclose(motion.diagram(beam, 1), of_state, rtol=0, atol=1e-9 * size)
+    # [closed] EI u'' of the first mode at the clamped end is 3.52 EI u/L²; buckling: π²/4.
+    bends = abs(motion.diagram(beam, 0).M - of_state[3]).max()
+    curvature = (3.52 if kind == "vibration" else math.pi**2 / 4) * 0.02 / 4
+    assert bends == pytest.approx(20 * curvature, rel=0.3)  # of three cells
+
+
 @pytest.mark.serial
 def test_modes_have_pictures(tmp_path):
     scene = cantilever(loads=[])

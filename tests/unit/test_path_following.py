@@ -3,11 +3,13 @@
 
 import itertools
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import ufl
+from helpers import raises
 from scenes import clamped
 
 import ufl_beam as ub
@@ -392,6 +394,21 @@ def test_displacement_control_in_any_unit_of_the_load():
         np.testing.assert_allclose(factors, [force(s * LIMIT - HEIGHT) for s in (1, -1)], rtol=1e-9)
 
 
+def test_displacement_control_ends_where_it_is_told_to():
+    """Limit points within the path shift its steps, but not its end; round-off is left."""
+    apex, scene = truss()
+    control = ub.DisplacementControl(apex, "v", -0.125, end=-1.9)
+    path = ub.follow(scene, control)
+    v = path.displacement(apex)[:, 1]
+    assert len(path.critical) == 2
+    assert v[-1] == pytest.approx(-1.9, rel=1e-12)
+    assert np.diff(v).min() >= -0.125 * (1 + 1e-9)
+    further = ub.follow(scene, replace(control, end=-2.0), start=path)
+    assert further.displacement(apex)[-1, 1] == pytest.approx(-2.0, rel=1e-12)
+    with raises("end = -1.9 is behind v of", "= -2 for step = -0.125"):
+        ub.follow(scene, control, start=further)
+
+
 def test_load_control_says_what_turns():
     """At the opening of a spring the load factor turns, and nothing else is said of it."""
     _, scene = softening_row(1)
@@ -402,6 +419,37 @@ def test_load_control_says_what_turns():
     assert "a change of the load factor by" in text
     assert " s," not in text
     assert "dt =" not in text
+
+
+def test_the_snap_back_of_a_second_hinge_is_told_apart_from_a_softening_that_is_gentle():
+    """[closed] The tops turn back if the hinge softens faster than a column resists, 3 EI/h.
+
+    The first hinge hardly softens, so that the second one opens while the first one flows.
+    """
+    EI, M = 1e5, 100.0  # N m², N m; columns of 1 m
+    critical = M**2 / (6 * EI)  # J
+    section = ub.Section(EA=1e8, GA=1e8, EI=EI)
+
+    def path(energy):
+        laws = ub.LinearSoftening(M / 2, 1e3), ub.LinearSoftening(M, energy)
+        columns = [
+            ub.Beam((x, 0), (x, 1), section, cells=1, hinges={0.0: law})
+            for x, law in enumerate(laws)
+        ]
+        top, other = (column.end for column in columns)
+        feet = [ub.Clamped(column.start) for column in columns]
+        push = ub.PointLoad(top, force=(1, 0), amplitude=growing)
+        scene = ub.Scene(columns, joints=[ub.Link(top, other)], supports=feet, loads=[push])
+        return ub.follow(scene, ub.DisplacementControl(top, "u", 2e-5), steps=60)
+
+    gentle = path(2 * critical).factor
+    assert gentle.max() == pytest.approx(1.5 * M, rel=1e-3)  # (M/2 + M)/h, less the softening
+    assert gentle[-1] < M
+    begins = r"no equilibrium after [^:]*: u of beam.end \(0, 1\) turns back, where"
+    with pytest.raises(ub.ConvergenceError, match=begins) as failure:
+        path(critical / 2)
+    assert failure.value.time == pytest.approx(1.5 * M, rel=1e-3)
+    assert "perhaps" not in str(failure.value)
 
 
 # -- words and pictures -------------------------------------------------------------------------

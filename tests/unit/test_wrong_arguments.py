@@ -554,6 +554,7 @@ TABLE = {
     "DisplacementControl": call(
         ub.DisplacementControl,
         place=PLACE, component=V("u", [*TEXT, "w", "", "uv"]), step=V(1.0, [*NUMBER, 0.0]),
+        end=V(None, optional(NUMBER)),
     ),
     "DissipationControl": call(
         ub.DissipationControl, step=V(1.0, POSITIVE), otherwise=V(ub.ArcLength(1.0), OBJECT)

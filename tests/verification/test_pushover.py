@@ -78,6 +78,18 @@ def test_slope_and_limit_load_are_those_of_plastic_theory(weight, pattern, sign)
     assert not curve.failure
 
 
+@pytest.mark.parametrize("law", [PLASTIC, ub.LinearSoftening(M_P, 3e4)])
+@pytest.mark.parametrize(("weight", "target", "steps"), [(0.0, 0.1, 25), (P, -0.1, 7)])
+def test_the_curve_ends_at_the_target(law, weight, target, steps):
+    """Limit points and openings within the path shift the steps; round-off is left."""
+    curve = pushed(portal(weight, law), target, steps)
+    assert curve.displacement[-1] == pytest.approx(target, rel=1e-12)
+    moved = np.diff(curve.path.displacement(curve.place)[[0, -1], 0])
+    assert moved == pytest.approx(target, rel=1e-12)
+    assert np.abs(np.diff(curve.displacement)).max() <= (1 + 1e-9) * abs(target) / steps
+    assert not curve.failure
+
+
 def test_base_shear_is_the_sum_of_reactions():
     scene = portal(P, rhoA=50.0)
     curve = pushed(scene, pattern="mode")

@@ -61,6 +61,8 @@ class Shapes(Rich, ABC):
             1; in a mode without displacements, the largest rotation is 1.
         section_law: b and D of the section forces b + D e of cells for strains e, at p integration
             points; (num_cells, 3 p), (num_cells, 9 p).
+        resultants: Resultants of the cells in the state, ``cell_number`` of loops.h; zero in an
+            unloaded scene; (9, num_cells).
     """
 
     scene: Scene
@@ -68,6 +70,7 @@ class Shapes(Rich, ABC):
     q: Array
     shapes: Array | Complex
     section_law: tuple[Array, Array]
+    resultants: Array
 
     word = "shape"
 
@@ -99,6 +102,9 @@ class Shapes(Rich, ABC):
     def motion(self, k: int, *, amplitude: float = AMPLITUDE, count: int = 24) -> Solution:
         """Return one period of the k-th mode as a solution, for :func:`animate` or :func:`plot`.
 
+        Section forces are the forces of the state plus changes of the stresses.  The loads of the
+        state stay constant, and the mode has no inertia forces.
+
         Args:
             k: Index of the mode.
             amplitude: Largest displacement, as a fraction of the size of the scene.
@@ -120,12 +126,13 @@ class Shapes(Rich, ABC):
         for function, values in zip((forms.b, forms.D), self.section_law, strict=True):
             form.put(function, values)
         cell_forces = CellForces(subdomain, [InCells(lambda: form, lib.STRESS, fields.order)])
-        cells = []
-        for q in states:
+        stresses = []
+        for q in (self.q, *states):
             form.add(q, r)
             cell_forces.accept()
-            cells.append(cell_forces(q, q))
-        history = {"t": times, "q": states, "every": np.array([1]), FORCES: np.array(cells)}
+            stresses.append(cell_forces(q, q))
+        cells = self.resultants + np.array(stresses[1:]) - stresses[0]
+        history = {"t": times, "q": states, "every": np.array([1]), FORCES: cells}
         solution = Solution(self.scene, self.numbering)
         solution.resume(history)
         return solution
@@ -345,8 +352,8 @@ def computed_modes(
         raise ArgumentError("modes: nothing that can move has mass; give sections rho or rhoA")
     warn_of_masses(scene)
     exponents, shapes = small.exponents(n, damped=damped)
-    law = section_law(small.beams, small.numbering)
-    return Modes(scene, small.numbering, small.q, shapes, law, exponents)
+    stresses = _stresses(small, at)
+    return Modes(scene, small.numbering, small.q, shapes, *stresses, exponents)
 
 
 def buckling(
@@ -412,8 +419,14 @@ def buckling(
             "nodes instead of along beams, give at= a state closer to buckling, follow the "
             "path with ub.follow, or find where a frequency of modes(..., at=) vanishes"
         )
-    law = section_law(small.beams, small.numbering)
-    return Buckling(scene, small.numbering, small.q, shapes, law, factors, errors)
+    stresses = _stresses(small, at)
+    return Buckling(scene, small.numbering, small.q, shapes, *stresses, factors, errors)
+
+
+def _stresses(small: SmallMotions, at: Solution | None) -> tuple[tuple[Array, Array], Array]:
+    """Return the law and the resultants of the cells in the last state of ``at``, or without it."""
+    law, count = section_law(small.beams, small.numbering), len(small.numbering.cells)
+    return law, np.zeros((lib.CELL_NUMBERS, count)) if at is None else at.cell_resultants(-1)
 
 
 def _checked_count(what: str, scene: Scene, n: int, at: Solution | None, mesh: Mesh | None) -> int:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ufl_beam.analysis.critical_points import Stiffness
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ArgumentError, StepFailed, require_kind, require_number
+from ufl_beam.errors import ArgumentError, StepFailed, TurnsBack, require_kind, require_number
 from ufl_beam.mechanics.time_scheme import Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.scene import Scene
@@ -27,6 +27,7 @@ from ufl_beam.terms.term import Term
 
 MOST_DOUBLINGS = 30  # largest number of doublings of a step in searches for a dissipated energy
 ONSET_FRACTION = 1e-6  # dissipated energy at the onset, as a fraction of the energy in the step
+AT_END = 1e-6  # distance from the end of a path that counts as none, as a fraction of a step
 CONTROL_TOLERANCE = 1e-9  # largest error of the equation of the control, as a fraction of a step
 
 
@@ -135,9 +136,23 @@ class PathCorrector:
         if self.dissipates or not (whole := self.dissipation(q + motion)) > 0:
             return None
         increment = self._length_to(ONSET_FRACTION * whole, q, motion, (0.0, 1.0), 40) * step
-        q, t = q + increment[:-1], self.simulation.t + increment[-1]
+        return increment, self.direction_beyond(increment)
+
+    def direction_beyond(self, step: Array) -> Array:
+        """Return the direction at the end of ``step`` in which dissipation grows."""
+        q, t = self.simulation.q + step[:-1], self.simulation.t + step[-1]
         _, direction = self.direction_at(q, t)
-        return increment, -direction if self.dissipation_side(q, direction) < 0 else direction
+        return -direction if self.dissipation_side(q, direction) < 0 else direction
+
+    def reverses(self, normal: Array, step: Array) -> bool:
+        """Return whether the quantity with the gradient ``normal`` falls beyond ``step``.
+
+        The result is true if a hinge or spring opens in the step beside others that flow already,
+        so that more dissipation needs a motion against ``normal``.
+        """
+        with suppress(StepFailed):
+            return self.dissipates and self.along(normal, self.direction_beyond(step)) < 0
+        return False
 
     def until(self, energy: float, increment: Array, direction: Array) -> Array:
         """Extend a step from ``increment`` along a direction until it dissipates ``energy`` (J)."""
@@ -314,6 +329,10 @@ class Control:
         """
         return np.asarray(corrector.weights * direction / corrector.length(direction))
 
+    def shortened(self, corrector: PathCorrector, fraction: float) -> float:
+        """Return the fraction of a step to the end of the path, at most ``fraction``; 0 there."""
+        return fraction
+
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return a positive number if the path continues along ``direction``.
 
@@ -334,15 +353,15 @@ class Control:
             normal = self.normal(corrector, direction)
             speed = corrector.along(normal, direction)
             if not speed > 0:
-                raise StepFailed(
-                    f"{self.quantity} turns back, where this control cannot follow; use ArcLength"
-                )
+                raise TurnsBack(self.quantity)
             step = increment + rest / speed * direction
             try:
                 return corrector.attempt(step, normal, target_change, hold=hold)
             except StepFailed as failure:
                 kink = corrector.kink(step) if hold else None
                 if kink is None and hold and self.quantity:
+                    if corrector.reverses(normal, step):
+                        raise TurnsBack(self.quantity) from None
                     raise StepFailed(
                         f"{failure}; perhaps {self.quantity} turns back here, where this control "
                         "cannot follow: use ArcLength",
@@ -436,10 +455,11 @@ class DisplacementControl(Control):
         place: Place of a beam.
         component: "u", "v" or "psi".
         step: Change of the component; m or rad.
+        end: Displacement or rotation at which the path ends, with shorter last steps; m or rad.
 
     Raises:
-        ArgumentError: ``place`` is not a place of a beam, ``component`` is unknown, or ``step`` is
-            zero.
+        ArgumentError: ``place`` is not a place of a beam, ``component`` is unknown, ``step`` is
+            zero, or the path begins at ``end`` or beyond it.
 
     Example:
         >>> control = ub.DisplacementControl(beam.end, "v", -0.05)
@@ -451,6 +471,8 @@ class DisplacementControl(Control):
     place: Place
     component: str
     step: float
+    _: KW_ONLY
+    end: float | None = None
     factor = math.inf
 
     def __post_init__(self) -> None:
@@ -460,6 +482,8 @@ class DisplacementControl(Control):
                 f"DisplacementControl: component = {self.component!r} must be one of "
                 f"{', '.join(COMPONENTS)}"
             )
+        if self.end is not None:
+            require_number(self.end, "DisplacementControl: end")
         super().__post_init__()
 
     def require(self, scene: Scene) -> None:
@@ -473,6 +497,23 @@ class DisplacementControl(Control):
     def quantity(self) -> str:  # type: ignore[override]
         """Name of the component and the place."""
         return f"{self.component} of {self.place}"
+
+    def shortened(self, corrector: PathCorrector, fraction: float) -> float:
+        """Return the fraction of a step to :attr:`end`, at most ``fraction``; 0 at the end."""
+        if self.end is None:
+            return fraction
+        component = COMPONENTS.index(self.component)
+        now = float(corrector.simulation.displacement(self.place)[component])
+        left = (self.end - now) / self.step
+        if abs(left) <= AT_END * max(1.0, abs(self.end / self.step)):
+            return 0.0
+        if left < 0:
+            raise ArgumentError(
+                f"DisplacementControl: end = {self.end:g} is behind {self.quantity} = {now:g} for "
+                f"step = {self.step:g}; give an end ahead, or the opposite step"
+            )
+        # A rest that is much shorter than the step before would be solved less accurately.
+        return left if left <= (1.0 + AT_END) * fraction else min(fraction, left / 2)
 
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
         """Return the gradient of the component, with the sign of ``step``."""

@@ -278,6 +278,7 @@ class PathStepper:
         """
         while True:
             iterations = self._simulation.iterations
+            self._fraction = self._control.shortened(self.corrector, self._fraction)
             try:
                 candidate = self._seek(self._fraction)
                 break
@@ -289,7 +290,8 @@ class PathStepper:
         self._fraction = min(1.0, fraction * min(2.0, TARGET_ITERATIONS / max(count, 1)))
         self._accept(candidate, fraction)
         self.steps = self.progress = self.steps + 1
-        self.finished = self.steps == self._most
+        at_end = self._control.shortened(self.corrector, 1.0) == 0.0
+        self.finished = at_end or self.steps == self._most
         if keep:
             self._simulation.keep()
 

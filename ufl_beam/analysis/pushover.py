@@ -44,7 +44,6 @@ from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.output.history import Events
 from ufl_beam.quadrature import gauss_rule
 from ufl_beam.simulation.initial_state import mesh_of
-from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
 
@@ -55,7 +54,7 @@ are large, because on the path the base shear (N) takes the place of time."""
 
 MODES = 6  # number of modes among which the one with the largest effective mass is chosen
 LEAST_MOTION = 1e-6  # of the control place, as a fraction of the largest motion of the scene
-SAME = 1e-9  # fraction of the target that a step may miss by round-off
+SAME = 2e-6  # fraction of the target that the end of a path may miss, twice AT_END
 NAMED_FROM = 0.99  # fraction of its limit that a hinge bears which is named if the path ends early
 MOST_STEPS = 20  # largest number of steps of a path, in multiples of the steps asked for
 Shape = Callable[[AttachmentPoint], float]
@@ -324,25 +323,21 @@ def _follow(
     **options: Any,
 ) -> tuple[Path, Events, str]:  # fmt: skip
     """Follow the path to the target; return it, its events, and the reason of an early end."""
-    axis, sign = COMPONENTS.index(control.component), math.copysign(1.0, target)
-    events, before = Events(), 0.0 if start is None else start.displacement(control.place)[-1, axis]
-
-    def reached(now: Simulation) -> bool:
-        moved = sign * float(now.displacement(control.place)[axis] - before)
-        return moved >= abs(target) * (1.0 - SAME)
-
+    axis, events = COMPONENTS.index(control.component), Events()
+    before = 0.0 if start is None else float(start.displacement(control.place)[-1, axis])
+    control = replace(control, end=before + target)
     try:
         path = follow(
-            scene, control, until=reached, steps=MOST_STEPS * steps, start=start, record=events,
-            **options,
-        )  # fmt: skip
+            scene, control, steps=MOST_STEPS * steps, start=start, record=events, **options
+        )
     except ConvergenceError as error:
         path = error.solution
         if len(path) < 2:
             raise
         return path, events, str(error)
-    moved = sign * float(path.displacement(control.place)[-1, axis] - before)
-    return path, events, "" if moved >= abs(target) * (1.0 - SAME) else "too many steps"
+    left = before + target - float(path.displacement(control.place)[-1, axis])
+    missed = abs(left) > SAME * max(abs(target), abs(before + target))
+    return path, events, "too many steps" if missed else ""
 
 
 def _at_limit(path: Path) -> list[Place]:

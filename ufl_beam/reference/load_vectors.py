@@ -341,6 +341,8 @@ class FrameForce(LoadForce):
     """Centrifugal forces, which have a potential, and Coriolis forces, which do no work.
 
     The frame rotates at a constant rate, so its rotation adds no moments of rotary inertia.
+    :meth:`equilibrium` has no Coriolis forces: they do no work, statics has none, and schemes
+    without a mean velocity, which need the forces of the initial state, refuse the frame.
     """
 
     def __init__(self, frame: RotatingFrame, setting: Setting, mass: Mass) -> None:

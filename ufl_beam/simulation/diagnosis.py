@@ -13,7 +13,14 @@ from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.errors import ArgumentError, ConvergenceError, ModelError, NoNumber, StepFailed
+from ufl_beam.errors import (
+    ArgumentError,
+    ConvergenceError,
+    ModelError,
+    NoNumber,
+    StepFailed,
+    TurnsBack,
+)
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
 from ufl_beam.model.connector_laws import (
@@ -119,10 +126,13 @@ def no_equilibrium(
         if not why and probe is not q0 and equation.evaluate(probe):
             why = _singularity(equation, probe)
         why = why or _limit_point(equation, solution, q0, probe)
-    said = f"{failure} ({sizes})" if sizes else str(failure)
+    reasons = [why, f"{failure} ({sizes})" if sizes else str(failure)]
+    if isinstance(failure, TurnsBack):
+        reasons.reverse()
     return ConvergenceError(
-        f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=t, dt=end - t,
-        solution=solution, residuals=failure.residuals, forces=forces, reason=failure.reason,
+        f"no equilibrium {where}: {'; '.join(filter(None, reasons))}. {advice}", time=t,
+        dt=end - t, solution=solution, residuals=failure.residuals, forces=forces,
+        reason=failure.reason,
     )  # fmt: skip
 
 
