@@ -72,6 +72,26 @@ def test_combinations_are_runs_of_the_scene():
     assert drop.low < 2.5 * drop.high  # elastic: 2
 
 
+@pytest.mark.parametrize("place", [0.3, 0.5])
+def test_loads_between_vertices_are_in_the_envelope(place):
+    """[closed] Forces and ends of line loads are vertices, here in one of two combinations each.
+
+    Deflections are 1e-7 of the length, as above; the force at 0.5 is at a vertex of both.
+    """
+    cases = {
+        "P": [ub.PointLoad(BEAM.at(place), force=(0, -2.0))],
+        "q": [ub.LineLoad(BEAM, force=(0, -1.0), span=(0.0, 0.7))],
+    }
+    combinations = {"1": {"P": 1.0}, "2": {"q": 1.0}}
+    found = ub.load_combinations(SCENE, cases, combinations, progress=False)
+    (s,) = {tuple(one.diagram(BEAM).s) for one in found.solutions.values()}
+    arms = [np.maximum(end * L - np.array(s) * L, 0) for end in (place, 0.7)]
+    moments = -2.0 * arms[0], -(arms[1] ** 2) / 2  # N m
+    reached = found.section_forces(BEAM)
+    np.testing.assert_allclose(reached.low[:, 2], np.minimum(*moments), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(reached.high[:, 2], np.maximum(*moments), rtol=1e-6, atol=1e-6)
+
+
 def test_a_combination_without_equilibrium_is_named_and_left_out():
     """The hinge bears 1e5 N m, so that the tip bears 5e4 N."""
     hinge = ub.Softening(limit=1e5, fracture_energy=1e3)  # N m, J

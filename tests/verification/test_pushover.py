@@ -127,6 +127,23 @@ def test_loads_of_a_user_give_the_same_curve(plain):
     assert curve.gamma == pytest.approx(1.0, rel=1e-5)
 
 
+@pytest.mark.parametrize("weight", [0.0, P])
+def test_loads_of_a_user_may_begin_between_vertices(weight):
+    """The base shear is the sum of reactions, up to the tolerance of Newton's method; the slope of
+    the first step is that of the linear deflection, up to the drift 1e-4 of this step."""
+    scene = portal(weight=weight)
+    left = scene["left"]
+    push = [
+        ub.LineLoad(left, (1.0, 0), span=(0.1, 0.83)),
+        ub.PointLoad(left.at(0.37), (2.0, 0)),
+    ]
+    curve = pushed(scene, target=0.002, steps=5, pattern=push)
+    reactions = sum(curve.path.reaction(support)[1:, 0] for support in scene.supports)
+    np.testing.assert_allclose(curve.base_shear[1:], -reactions, rtol=1e-8)
+    slope = curve.base_shear[1] / curve.displacement[1]
+    assert curve.stiffness == pytest.approx(slope, rel=1e-4)
+
+
 def design(T):
     """Spectrum with a plateau of 10 m/s² up to 0.5 s."""
     return 10 * min(1.0, 0.5 / T)

@@ -85,13 +85,14 @@ def loaded_state(
 ) -> tuple[Scene, Solution | None]:
     """Return the scene with constant loads, and a run to its equilibrium at rest, at 0 s.
 
-    The equilibrium is None if the scene has no loads.
+    The equilibrium is None if no load acts on the scene.
 
     Raises:
         ConvergenceError: There is no equilibrium; the message begins with ``what``.
     """
-    if not scene.loads:
-        return scene, None
+    steady = replace(scene, loads=[constant(load) for load in scene.loads])
+    if not any(size_of(load) for load in scene.loads):
+        return steady, None
     growing = replace(scene, loads=[grown(load) for load in scene.loads])
     try:
         state = simulate(
@@ -104,4 +105,4 @@ def loaded_state(
             f"{what}: no equilibrium beyond {fraction:.3g} times the loads of the scene: {error}",
         )
         raise
-    return replace(scene, loads=[constant(load) for load in scene.loads]), state
+    return steady, state

@@ -46,7 +46,8 @@ def load_combinations(
     loads of its cases grow together from zero to the factor times their value at t = 1 s.  Loads
     and motions of the scene itself act in every combination, unchanged.  They grow so slowly that
     dampers and viscous laws bear nothing.  Only if loads or motions of the scene depend on time, a
-    run is from 0 to 1 s in real time.  Damping of the scene is ignored.
+    run is from 0 to 1 s in real time.  Damping of the scene is ignored.  All runs have the same
+    vertices, also where loads of other combinations begin or end.
 
     Args:
         scene: Model.
@@ -87,7 +88,7 @@ def load_combinations(
             )
     scene = replace(scene, damping=())
     span = duration(scene)
-    factors, scenes = dict[str, dict[str, float]](), dict[str, Scene]()
+    factors = dict[str, dict[str, float]]()
     for name, combination in _named(combinations, f"{what}: combinations").items():
         where = f"{what}: combinations[{name!r}]"
         factors[name] = row = {}
@@ -95,9 +96,13 @@ def load_combinations(
             if case not in loads:
                 raise ArgumentError(f"{where}: {case!r} is not a case; cases: {', '.join(loads)}")
             row[case] = require_number(factor, f"{where}[{case!r}]")
+    # Loads begin and end at vertices, which must be the same in all runs
+    used = [case for case in loads if any(case in row for row in factors.values())]
+    scenes = dict[str, Scene]()
+    for name, row in factors.items():
         growing = [
-            grown(load, factor, end=AT, span=span)
-            for case, factor in row.items()
+            grown(load, row.get(case, 0.0), end=AT, span=span)
+            for case in used
             for load in loads[case]
         ]
         scenes[name] = replace(scene, loads=[*scene.loads, *growing])

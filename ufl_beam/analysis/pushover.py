@@ -38,6 +38,7 @@ from ufl_beam.errors import (
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint, Place
 from ufl_beam.model.connectors import law_of, place_of
+from ufl_beam.model.functions import Constant
 from ufl_beam.model.loads import Gravity, LineLoad, Load, PointLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
@@ -143,7 +144,10 @@ def pushover(
                 f"pushover: {owner} depends on time, and a pushover has none; make it constant, or "
                 "use ub.follow"
             )
-    axis, scene = COMPONENTS.index(component), replace(scene, damping=())
+    axis = COMPONENTS.index(component)
+    # Loads begin and end at vertices, which must be the same in all steps below
+    placed = [with_amplitude(load, Constant(0.0)) for load in loads]
+    scene = replace(scene, damping=(), loads=[*scene.loads, *placed])
     steady, start = loaded_state(scene, "pushover", mesh, newton)
     numbering = DofNumbering(scene, mesh_of(start, mesh))
     masses = mass_points(numbering, axis)
