@@ -320,3 +320,27 @@ def test_n2_refuses_a_curve_that_has_fallen_too_far():
     for upto in (0.5, 0.59):
         with pytest.raises(ub.ArgumentError, match=f"give upto at most {peak:.4g} m"):
             curve.n2(lambda T: 6.0, 0.5, upto=upto)
+
+
+def test_springs_that_yield_or_break_are_in_the_sequence_of_hinges():
+    """The sequence and the table of hinges have the same connectors and states."""
+    laws = [
+        ub.Spring(5e7, law=ub.ElastoPlastic(M_P, isotropic=1e6)),
+        ub.IbarraKrawinkler(5e7, ub.Backbone(1.2 * M_P, capping=0.03)),
+        ub.Spring(5e7, softening=ub.Softening(1.4 * M_P, 1e5)),
+    ]
+    column = ub.Section(EA=1e12, GA=1e12, EI=EI, rhoA=0.0)
+    beams = [ub.Beam((x, 0), (x, H), column, cells=1) for x in (0.0, L, 2 * L)]
+    feet = [
+        ub.Turn(ub.ground(*x.start.point), x.start, law) for x, law in zip(beams, laws, strict=True)
+    ]
+    tops = [ub.Link(beams[0].end, beams[1].end), ub.Link(beams[1].end, beams[2].end)]
+    scene = ub.Scene(
+        beams, joints=tops, supports=[ub.Pinned(beam.start) for beam in beams], connectors=feet,
+        masses=[ub.PointMass(beam.end, MASS) for beam in beams],
+    )  # fmt: skip
+    result = ub.pushover(scene, beams[0].end, 0.1, pattern="uniform", mesh=CUBIC, progress=False)
+    assert [hinge.what for hinge in result.hinges] == ["yields", "yields", "opens"]
+    first = {hinge.where: hinge.n for hinge in reversed(result.hinges)}
+    assert first == {row.where: row.n for row in result.path.hinges().rows}
+    assert list(first) == feet[::-1]

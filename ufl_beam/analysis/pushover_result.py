@@ -118,8 +118,7 @@ class Pushover(Rich):
         target: Displacement asked for; m.
         displacement: Displacement of the control place since the loads of the scene; (n+1,); m.
         base_shear: Sum of the pushing forces in the direction of the component; (n+1,); N.
-        hinges: Events in the order of the path.  Connectors that yield have none; they are in
-            the table ``path.hinges()``.
+        hinges: Events in the order of the path.
         stiffness: Base shear over displacement of the first, elastic step; N/m.
         mass: Mass of the scene without point masses at supports; kg.
         equivalent_mass: m* = Σ m φ, with the shape φ of the pattern, 1 at the control place; kg.

@@ -22,10 +22,10 @@ from ufl_beam.errors import (
     shorten,
 )
 from ufl_beam.model.bodies import AttachmentPoint, Member, Place, require_place
-from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector, place_of
 from ufl_beam.model.scene import Scene, attachment_points
+from ufl_beam.output.history import OWN_LAW_YIELDS, can_yield
 from ufl_beam.output.state_rows import HINGE, PLASTIC, Columns
 from ufl_beam.output.states import States
 
@@ -202,10 +202,6 @@ def _largest(values: Array) -> Any:
 
 # -- hinges ----------------------------------------------------------------------------------------
 
-OWN_LAW_YIELDS = 1e-3
-"""Dissipated fraction of the largest work on a :class:`ConnectorLaw` at which it counts as yielded.
-Smaller losses may be errors of the trapezoidal rule."""
-
 
 class HingeState(NamedTuple):
     """Largest rotations and dissipated energy of a hinge in a run.
@@ -302,11 +298,11 @@ def hinges_of(
         law, history = connector.law, states.connector(connector)
         if isinstance(law, RigidPlastic):
             add(connector, history.motion, history.motion, history.dissipated)
-        elif isinstance(law, Spring) and (law.law is not None or law.softening is not None):
+        elif isinstance(law, Spring) and can_yield(connector):
             plastic = history.motion - history.force / law.stiffness
             at_yield = _limit(scene, connector) / law.stiffness
             add(connector, history.motion, plastic, history.dissipated, at_yield)
-        elif isinstance(law, ConnectorLaw) and law.variables:
+        elif can_yield(connector):
             least = OWN_LAW_YIELDS * float(np.abs(history.work).max())
             unknown = np.full(len(states), math.nan)
             add(connector, history.motion, unknown, history.dissipated, least=least)

@@ -25,13 +25,14 @@ from ufl_beam.errors import (
 from ufl_beam.file_system import require_path
 from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.bodies import AttachmentPoint, Place, require_place
-from ufl_beam.model.connector_laws import Coulomb, Stop
-from ufl_beam.model.connectors import Connector, law_of
+from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_laws import Coulomb, HingeLaw, RigidPlastic, Spring, Stop
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import OutputFile, beside, changed, require_arrays
 from ufl_beam.output.recorder import Restartable, StateView
-from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC, connector_indices
+from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC, WORK, connector_indices
 from ufl_beam.parallel import on_first
 
 # -- table -----------------------------------------------------------------------------------------
@@ -256,6 +257,26 @@ KINDS = (*IN_CELLS, *(kind for pair in CONNECTOR_EVENTS.values() for kind in pai
 Row = tuple[float, int, str]  # time, number of the cell or connector, kind of event
 BROKEN_FRACTION = 0.999  # dissipated fraction of the fracture energy of a hinge that "is free"
 
+OWN_LAW_YIELDS = 1e-3
+"""Dissipated fraction of the largest work on a :class:`ConnectorLaw` at which it counts as yielded.
+Smaller losses may be errors of the trapezoidal rule."""
+
+
+def can_yield(connector: Connector) -> bool:
+    """Return whether the law of a rotational connector may yield or break."""
+    law = connector.law
+    if isinstance(law, Spring):
+        return connector.is_rotation and (law.law is not None or law.softening is not None)
+    own = isinstance(law, ConnectorLaw) and bool(law.variables)
+    return connector.is_rotation and (own or isinstance(law, RigidPlastic))
+
+
+def _breaking_law(law: object) -> HingeLaw | None:
+    """Return the law of a hinge, or the softening of a spring that only breaks, or None."""
+    if isinstance(law, RigidPlastic):
+        return law.law
+    return law.softening if isinstance(law, Spring) and law.law is None else None
+
 
 class Event(NamedTuple):
     """Event in a step: yielding, opening of a hinge, contact or sliding.
@@ -263,7 +284,7 @@ class Event(NamedTuple):
     Attributes:
         time: End of the step, s; in path following, its load factor.
         where: Middle of a cell, place of a plastic hinge, or connector.
-        what: "yields", "opens", "is free" in a cell or a hinge;
+        what: "yields", "opens", "is free" in a cell, a hinge or a rotational connector;
             "touches", "lets go", "slides", "sticks".
         parameter: Name and text formats of ``time``.
 
@@ -291,8 +312,8 @@ class Events(Restartable):
     """Recorder of events, for scenes with hinges, inelastic material, stops or friction.
 
     A hinge "is free" when it has dissipated 99.9 % of its fracture energy; a hardening hinge
-    "yields".  Contact and sliding may begin and end repeatedly; all other events occur once in a
-    cell or hinge.
+    "yields".  So do rotational connectors with a law of yielding or softening.  Contact and sliding
+    may begin and end repeatedly; all other events occur once in a cell or hinge.
 
     Args:
         tell: Function, such as ``print``, that the first process calls with each event when the
@@ -320,26 +341,36 @@ class Events(Restartable):
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Begin with the initial state, or continue from the events of a :meth:`state`."""
         self.found, self._rows = [], []
-        if state is not None:
-            rows = [(float(t), int(n), KINDS[int(kind)]) for t, n, kind in state["events"]]
-            self._add(simulation, rows)
-        # Energies from which on hinges are free; connectors to follow; events before the run
         numbering = simulation.numbering
         in_cells = [law for beam in simulation.scene.beams for law in numbering.hinges(beam)]
-        laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
+        connectors, hinges = simulation.scene.all_connectors, len(simulation.scene.hinges)
+        first = len(connectors) - hinges
+        # Hinges, which are the last connectors, and connectors that yield or break
+        self._hinges = [*range(first, len(connectors))]
+        self._hinges += [i for i, c in enumerate(connectors[:first]) if can_yield(c)]
+        ends = [connectors[i].law for i in self._hinges]
+        self._own = np.array([isinstance(law, ConnectorLaw) for law in ends], dtype=bool)
+        self._work = np.zeros(len(ends))
+        laws = [*in_cells, *map(_breaking_law, ends)]
+        # Energies from which on hinges are free
         breaking = [law is not None and law.limit > 0 for law in laws]
         energies = np.array([law.fracture_energy if law is not None else np.inf for law in laws])
         self._enough = np.where(breaking, BROKEN_FRACTION * energies, np.inf)
         self._breaks = np.isfinite(energies)
-        connectors = simulation.scene.all_connectors
         self._followed = [i for i, c in enumerate(connectors) if type(c.law) in CONNECTOR_EVENTS]
-        self._in_cells, self._on = self._look(simulation)
+        self._in_cells, self._on = self._look(simulation)  # events before the run
+        if state is not None:
+            rows = [(float(t), int(n), KINDS[int(kind)]) for t, n, kind in state["events"]]
+            self._add(simulation, rows)
 
     def _look(self, simulation: StateView) -> tuple[Flags, Flags]:
         """Return flags of events in cells and hinges, (n, 3), and of contact or sliding, (m,)."""
         plastic, broken = np.max(simulation.now.points_of(0)[:, :, [PLASTIC, HINGE]], axis=1).T
-        if hinges := len(simulation.scene.hinges):
-            lost, breaks = simulation.connections()[-hinges:, DISSIPATED], self._breaks[-hinges:]
+        if hinges := len(self._hinges):
+            rows, breaks = simulation.connections()[self._hinges], self._breaks[-hinges:]
+            self._work = np.maximum(self._work, np.abs(rows[:, WORK]))
+            least = np.where(self._own, OWN_LAW_YIELDS * self._work, 0.0)
+            lost = np.where(rows[:, DISSIPATED] > least, rows[:, DISSIPATED], 0.0)
             plastic = np.append(plastic, np.where(breaks, 0.0, lost))
             broken = np.append(broken, np.where(breaks, lost, 0.0))
         in_cells = np.column_stack([plastic > 0, broken > 0, broken >= self._enough])
@@ -364,10 +395,17 @@ class Events(Restartable):
             on_first(simulation.comm, lambda: [*map(self._tell, events)])
 
     def _add(self, simulation: StateView, rows: list[Row]) -> list[Event]:
-        connectors, place_of = simulation.scene.all_connectors, simulation.numbering.place_of
+        connectors, numbering = simulation.scene.all_connectors, simulation.numbering
+        cells, hinges = len(numbering.cells), len(simulation.scene.hinges)
         events = []
         for t, number, what in rows:
-            where = place_of(number) if what in IN_CELLS else connectors[number]
+            where: Place | Connector
+            if what not in IN_CELLS:
+                where = connectors[number]
+            elif number < cells + hinges:
+                where = numbering.place_of(number)
+            else:
+                where = connectors[self._hinges[number - cells]]
             events.append(Event(t, where, what, simulation.parameter))
         self._rows += rows
         self.found += events
