@@ -25,7 +25,7 @@ from ufl_beam.model.bodies import (
 )
 from ufl_beam.model.checks import require_kind, require_vector
 from ufl_beam.model.connector_law import ConnectorLaw, require_connector_law
-from ufl_beam.model.connector_laws import HingeLaw, Law, RigidPlastic
+from ufl_beam.model.connector_laws import HingeLaw, Law, RigidPlastic, Spring
 from ufl_beam.model.functions import Point
 from ufl_beam.model.records import Record, Vector
 
@@ -350,6 +350,15 @@ def plastic_hinges(
             before, after = (beyond, place) if place.s == 1.0 else (place, beyond)
             hinges.append(Component("Hinge", "turning", before, after, RigidPlastic(law)))
     return tuple(hinges)
+
+
+def can_yield(connector: Connector) -> bool:
+    """Return whether the law of a rotational connector may yield or break."""
+    law = connector.law
+    if isinstance(law, Spring):
+        return connector.is_rotation and (law.law is not None or law.softening is not None)
+    own = isinstance(law, ConnectorLaw) and bool(law.variables)
+    return connector.is_rotation and (own or isinstance(law, RigidPlastic))
 
 
 def law_of(connector: Connector) -> HingeLaw:

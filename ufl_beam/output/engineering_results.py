@@ -23,10 +23,9 @@ from ufl_beam.errors import (
 )
 from ufl_beam.model.bodies import AttachmentPoint, Member, Place, require_place
 from ufl_beam.model.connector_laws import RigidPlastic, Spring
-from ufl_beam.model.connectors import Connector, place_of
+from ufl_beam.model.connectors import Connector, can_yield, place_of
 from ufl_beam.model.scene import Scene, attachment_points
-from ufl_beam.output.history import OWN_LAW_YIELDS, can_yield
-from ufl_beam.output.state_rows import HINGE, PLASTIC, Columns
+from ufl_beam.output.state_rows import HINGE, OWN_LAW_YIELDS, PLASTIC, Columns
 from ufl_beam.output.states import States
 
 # -- storeys ---------------------------------------------------------------------------------------

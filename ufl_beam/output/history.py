@@ -27,12 +27,20 @@ from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.bodies import AttachmentPoint, Place, require_place
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import Coulomb, HingeLaw, RigidPlastic, Spring, Stop
-from ufl_beam.model.connectors import Connector
+from ufl_beam.model.connectors import Connector, can_yield
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import OutputFile, beside, changed, require_arrays
 from ufl_beam.output.recorder import Restartable, StateView
-from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC, WORK, connector_indices
+from ufl_beam.output.state_rows import (
+    DISSIPATED,
+    FORCE,
+    HINGE,
+    OWN_LAW_YIELDS,
+    PLASTIC,
+    WORK,
+    connector_indices,
+)
 from ufl_beam.parallel import on_first
 
 # -- table -----------------------------------------------------------------------------------------
@@ -256,19 +264,6 @@ CONNECTOR_EVENTS = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}
 KINDS = (*IN_CELLS, *(kind for pair in CONNECTOR_EVENTS.values() for kind in pair))  # all events
 Row = tuple[float, int, str]  # time, number of the cell or connector, kind of event
 BROKEN_FRACTION = 0.999  # dissipated fraction of the fracture energy of a hinge that "is free"
-
-OWN_LAW_YIELDS = 1e-3
-"""Dissipated fraction of the largest work on a :class:`ConnectorLaw` at which it counts as yielded.
-Smaller losses may be errors of the trapezoidal rule."""
-
-
-def can_yield(connector: Connector) -> bool:
-    """Return whether the law of a rotational connector may yield or break."""
-    law = connector.law
-    if isinstance(law, Spring):
-        return connector.is_rotation and (law.law is not None or law.softening is not None)
-    own = isinstance(law, ConnectorLaw) and bool(law.variables)
-    return connector.is_rotation and (own or isinstance(law, RigidPlastic))
 
 
 def _breaking_law(law: object) -> HingeLaw | None:

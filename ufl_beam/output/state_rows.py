@@ -79,6 +79,10 @@ def connection(values: Array) -> Connection:
 FORCE, WORK, DISSIPATED = map(Connection._fields.index, ("force", "work", "dissipated"))
 """Indices of fields of :class:`Connection`, and so of numbers of the column "connectors"."""
 
+OWN_LAW_YIELDS = 1e-3
+"""Dissipated fraction of the largest work on a :class:`ConnectorLaw` at which it counts as yielded.
+Smaller losses may be errors of the trapezoidal rule."""
+
 
 JUMP, PLASTIC, HINGE = 3, 4, 5
 """Indices of fields in the column "material": (N, V, M), jump, plastic, hinge of
