@@ -93,7 +93,7 @@ class NoNumber(StepFailed, ModelError):
     """Error of a function of the scene without a finite value; a shorter step may avoid it."""
 
 
-class TurnsBack(StepFailed):
+class Reversal(StepFailed):
     """Reversal of the quantity that a path control increases in every step."""
 
     def __init__(self, quantity: str) -> None:

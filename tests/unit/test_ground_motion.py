@@ -112,8 +112,8 @@ TIMED = "0.00 1\n0.01 2\n0.02 3\n0.03 4\n0.04 5\n"
         (NEW.replace("      7", "      8"), {}, ": 7 accelerations, but NPTS = 8 in the head"),
         (NEW.replace(".3000000E+00", "*"), {}, ", line 5: no numbers"),
         (NEW, {"dt": 0.02}, ": dt = 0.02 s, but the file has 0.01 s"),
-        (NEW, {"unit": "m/s2"}, ": unit = 'm/s2', but the file has G; omit unit="),
-        (OLD, {"unit": "g"}, ": unit = 'g', but the file has CM/S/S; omit unit="),
+        (NEW, {"unit": "m/s2"}, ": unit = 'm/s2', but the file has G; omit unit"),
+        (OLD, {"unit": "g"}, ": unit = 'g', but the file has CM/S/S; omit unit"),
     ],
 )
 def test_a_wrong_file_is_refused_with_its_line(written, text, options, message):

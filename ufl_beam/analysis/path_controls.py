@@ -16,7 +16,7 @@ import numpy as np
 
 from ufl_beam.analysis.critical_points import Stiffness
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ArgumentError, StepFailed, TurnsBack, require_kind, require_number
+from ufl_beam.errors import ArgumentError, Reversal, StepFailed, require_kind, require_number
 from ufl_beam.mechanics.time_scheme import Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.scene import Scene
@@ -353,7 +353,7 @@ class Control:
             normal = self.normal(corrector, direction)
             speed = corrector.along(normal, direction)
             if not speed > 0:
-                raise TurnsBack(self.quantity)
+                raise Reversal(self.quantity)
             step = increment + rest / speed * direction
             try:
                 return corrector.attempt(step, normal, target_change, hold=hold)
@@ -361,7 +361,7 @@ class Control:
                 kink = corrector.kink(step) if hold else None
                 if kink is None and hold and self.quantity:
                     if corrector.reverses(normal, step):
-                        raise TurnsBack(self.quantity) from None
+                        raise Reversal(self.quantity) from None
                     raise StepFailed(
                         f"{failure}; perhaps {self.quantity} turns back here, where this control "
                         "cannot follow: use ArcLength",

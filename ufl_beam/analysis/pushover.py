@@ -340,8 +340,8 @@ def _follow(
             raise
         return path, events, str(error)
     left = before + target - float(path.displacement(control.place)[-1, axis])
-    missed = abs(left) > SAME * max(abs(target), abs(before + target))
-    return path, events, "too many steps" if missed else ""
+    ended_early = abs(left) > SAME * max(abs(target), abs(before + target))
+    return path, events, "too many steps" if ended_early else ""
 
 
 def _at_limit(path: Path) -> list[Place]:

@@ -359,12 +359,12 @@ def interaction_diagram(
     reached = np.empty((4, steps, points))  # N, M, strain and curvature
     for step in range(steps):
         state.begin(1.0)
-        part = (step + 1) / steps
-        r, _ = state.response(strain * part, curvature * part)
+        fraction = (step + 1) / steps
+        r, _ = state.response(strain * fraction, curvature * fraction)
         if not np.isfinite(r).all():
             raise ArgumentError(f"{what}: a law has no stress in a step; increase steps = {steps}")
         state.accept()
-        reached[:, step] = r[:, 0], r[:, 2], strain * part, curvature * part
+        reached[:, step] = r[:, 0], r[:, 2], strain * fraction, curvature * fraction
     # Segments between adjacent planes, and between adjacent steps
     begins, ends = (reached, reached[:, :-1]), (np.roll(reached, -1, axis=2), reached[:, 1:])
     first, last = (np.hstack([x.reshape(4, -1) for x in pair]) for pair in (begins, ends))

@@ -117,7 +117,7 @@ class DofNumbering:
         places = [place_of(hinge) for hinge in hinges]
         at = np.array([self.vertex(place) for place in places], dtype=np.int64)
         vertices = range(len(self.points), len(self.points) + len(at))
-        beyond = [h.a if h.b is near else h.b for h, near in zip(hinges, places, strict=True)]
+        beyond = [h.a if h.b is place else h.b for h, place in zip(hinges, places, strict=True)]
         self._beyond = dict(zip(beyond, vertices, strict=True))
         self.points = np.concatenate([self.points, self.points[at]])
         self.cells_at_hinges = np.array([self.cell(place) for place in places], dtype=np.int64)

@@ -252,9 +252,9 @@ def _rows(
 ) -> Iterator[tuple[object, Row]]:
     """Iterate over (owner, constraint) for connectors that ``acts`` selects, and ``supports``."""
     for connector in filter(acts, scene.all_connectors):
-        turn = 1.0 if connector.is_rotation else 1 / scene.size
+        scale = 1.0 if connector.is_rotation else 1 / scene.size
         ends = zip((connector.a, connector.b), connector.rigidly(), strict=True)
-        yield connector, [(node(end), (x, y, z * turn)) for end, (x, y, z) in ends]
+        yield connector, [(node(end), (x, y, z * scale)) for end, (x, y, z) in ends]
     for support in supports:
         cos, sin = math.cos(support.angle), math.sin(support.angle)
         turned = (cos, sin, 0.0), (-sin, cos, 0.0), (0.0, 0.0, 1.0)

@@ -159,18 +159,18 @@ class GroundMotion(Record):
             lines = file.read_text("utf-8-sig", errors="replace").splitlines()
         except OSError as error:
             raise ModelError(f"GroundMotion.read: {file}: {error.strerror}") from None
-        head, first, count, stated = "\n".join(lines[:4]), 0, None, None
+        head, first, count, unit_in_file = "\n".join(lines[:4]), 0, None, None
         if header := next(filter(None, (re.search(x, head, re.I | re.M) for x in PEER)), None):
             first, count, step = 4, int(header[1]), _number(header[2])
             if dt is not None and not math.isclose(dt, step, rel_tol=1e-9):
                 raise ModelError(f"{file}: dt = {dt:g} s, but the file has {step:g} s")
             dt = step
-            if unit_in_file := re.search(r"UNITS\s+OF\s+(\S+)", head, re.I):
-                stated = unit_in_file[1].strip(".,")
-        unit = stated if unit is None else unit
+            if named := re.search(r"UNITS\s+OF\s+(\S+)", head, re.I):
+                unit_in_file = named[1].strip(".,")
+        unit = unit_in_file if unit is None else unit
         size, size_in_file = (
             UNITS.get(re.sub(r"/s(ec)?(/s(ec)?|\^2|²)$", "/s2", str(name).lower()))
-            for name in (unit, stated)
+            for name in (unit, unit_in_file)
         )
         if size is None:
             wrong = (
@@ -178,7 +178,7 @@ class GroundMotion(Record):
             )
             raise ModelError(f"{file}: {wrong}; give unit= one of {', '.join(UNITS)}")
         if size_in_file not in (None, size):
-            raise ModelError(f"{file}: unit = {unit!r}, but the file has {stated}; omit unit=")
+            raise ModelError(f"{file}: unit = {unit!r}, but the file has {unit_in_file}; omit unit")
         rows = [*_rows(file, lines, first)]
         if not rows:
             raise ModelError(f"{file}: the file has no numbers")

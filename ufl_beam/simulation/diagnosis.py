@@ -18,8 +18,8 @@ from ufl_beam.errors import (
     ConvergenceError,
     ModelError,
     NoNumber,
+    Reversal,
     StepFailed,
-    TurnsBack,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
@@ -127,7 +127,7 @@ def no_equilibrium(
             why = _singularity(equation, probe)
         why = why or _limit_point(equation, solution, q0, probe)
     reasons = [why, f"{failure} ({sizes})" if sizes else str(failure)]
-    if isinstance(failure, TurnsBack):
+    if isinstance(failure, Reversal):
         reasons.reverse()
     return ConvergenceError(
         f"no equilibrium {where}: {'; '.join(filter(None, reasons))}. {advice}", time=t,

@@ -410,9 +410,9 @@ class RigidPlasticLaws(Response):
         self._storage = np.zeros((n, len(inputs)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(inputs)}
         laws = [law_of(connector) for connector in connectors]
-        of_laws = {id(one): parameters(one) for one in laws}  # hinges of a frame share a law
-        for i, one in enumerate(laws):
-            for name, value in of_laws[id(one)].items():
+        numbers = {id(x): parameters(x) for x in laws}  # hinges of a frame share a law
+        for i, x in enumerate(laws):
+            for name, value in numbers[id(x)].items():
                 self._at[name][i] = value
         self._at["θ"][:], self._at["dt"][:] = scheme.theta, 1.0
         self._initial_limit = self._at["number yield_limit" if self._hardens else "number limit"]
