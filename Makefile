@@ -89,7 +89,7 @@ docs-pictures: docs ## pictures in docs/pictures: of pages, demos, stored measur
 extremes: ## results at extreme parameters, as tables in docs/extremes.md
 	@./env python3 benchmarks/extremes
 
-collection: ## models that are hard to converge, as docs/collection.md; half an hour with OpenSees
+collection: ## models that are hard to converge, as docs/collection.md; five to thirty minutes with OpenSees
 	@./env python3 benchmarks/collection
 
 study: ## cost and error of each setting, as docs/study.md; twenty minutes, `make study only=--quick` two
