@@ -2,6 +2,7 @@
 """Bodies, joints and connectors: what is refused, what is shared, what solutions say."""
 
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -97,9 +98,9 @@ def test_wrong_scenes_are_refused():
 
 def test_bodies_need_mass_in_dynamics():
     scene = ub.Scene(bodies=[ub.Body((0, 0), name="ghost")])
-    with raises("ghost: mass = 0, but dynamics needs it to be positive"):
+    with raises("mass or resistance for every motion: ghost", "without mass"):
         run(scene)
-    with raises("ghost: inertia = 0"):
+    with raises("mass or resistance for every motion: ghost", "can turn", "inertia"):
         run(ub.Scene(bodies=[ub.Body((0, 0), mass=1.0, name="ghost")]))
 
 
@@ -111,8 +112,52 @@ def test_what_is_carried_or_moved_needs_no_mass():
     )
     assert run(scene).displacement(one.start)[-1, 2] == pytest.approx(0.1)
     run(ub.Scene([one], joints=[ub.Rigid(hub.middle, one.start)], bodies=[hub]))
-    with raises("hub: inertia = 0"):
+    with raises("hub", "can turn"):
         run(ub.Scene([one], joints=[ub.Revolute(hub.middle, one.start)], bodies=[hub]))
+
+
+def panel_zone(mass):
+    """Joint of a frame whose panel is two bodies with arms, a pin and a spring; pushed by 1 kN."""
+    section = ub.Section.rectangle(b=0.2, h=0.3, E=210e9, nu=0.3, rho=7850.0)
+    lower = ub.Beam((0, -2), (0, -0.3), section, cells=2, name="lower")
+    upper = ub.Beam((0, 0.3), (0, 2), section, cells=2, name="upper")
+    girder = ub.Beam((0.2, 0), (4, 0), section, cells=2, name="girder")
+    parts = [ub.Body((0, 0), mass=mass, inertia=mass, name=f"panel {n}") for n in range(2)]
+    joints = [
+        ub.Rigid(lower.end, parts[0].at(0, -0.3)), ub.Rigid(upper.start, parts[0].at(0, 0.3)),
+        ub.Rigid(girder.start, parts[1].at(0.2, 0)), ub.Revolute(*(x.middle for x in parts)),
+    ]  # fmt: skip
+    turn = ub.Turn(*(x.middle for x in parts), ub.Spring(6e7))
+    supports = [ub.Pinned(lower.start), ub.Roller(girder.end)]
+    push = ub.PointLoad(upper.end, force=(1e3, 0), amplitude=lambda t: min(t / 0.05, 1.0))
+    members = [lower, upper, girder]
+    return ub.Scene(
+        members, bodies=parts, joints=joints, connectors=[turn], supports=supports, loads=[push]
+    )
+
+
+@pytest.mark.parametrize(
+    "scheme",
+    [ub.EnergyMomentum(), ub.EnergyMomentumDecaying(0.8), ub.GeneralizedAlpha(0.8)],
+    ids=lambda scheme: type(scheme).__name__,
+)
+def test_bodies_that_carry_beams_need_no_mass(scheme):
+    """The motion and the ledger are those with 1e-6 kg."""
+    ends = []
+    for mass in (0.0, 1e-6):
+        scene = panel_zone(mass)
+        solution = ub.simulate(scene, scheme, t=(0, 0.2), dt=2e-3, progress=False)
+        ends.append(solution.displacement(scene.beams[1].end))
+        if not isinstance(scheme, ub.GeneralizedAlpha):
+            assert solution.energy.worst < 1e-9
+    assert np.allclose(*ends, rtol=0.0, atol=1e-6 * np.abs(ends[0]).max())
+
+
+def test_modes_with_bodies_without_mass():
+    frequencies = [
+        ub.modes(replace(panel_zone(mass), loads=()), 6).frequencies for mass in (0.0, 1e-6)
+    ]
+    assert np.allclose(*frequencies, rtol=1e-6)
 
 
 def parallelogram(cranks):

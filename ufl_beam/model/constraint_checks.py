@@ -44,26 +44,6 @@ DENSE = 90
 """Largest number of unknowns for which the null space comes from a dense decomposition."""
 
 
-def require_masses(scene: Scene) -> None:
-    """Raise :class:`ModelError` if a body without mass or inertia moves or turns freely.
-
-    Displacements and rotations that a body shares with a beam need no mass or inertia of the body.
-    """
-    if not scene.bodies:
-        return
-    same, determined = scene.representatives, _fixed(scene)
-    for alike in scene.shared_by_joints:
-        determined |= {same[dof] for dof in alike if not isinstance(dof[0], Body)}
-    for body in scene.bodies:
-        for name, components in (("mass", (0, 1)), ("inertia", (2,))):
-            free = any(same[body, component] not in determined for component in components)
-            if free and getattr(body, name) == 0.0:
-                raise ModelError(
-                    f"{body.name}: {name} = 0, but dynamics needs it to be positive; use RigidLink "
-                    "or Link for a rod without mass"
-                )
-
-
 def require_inertia(scene: Scene) -> None:
     """Raise :class:`ModelError` if a beam or body can move with neither inertia nor resistance.
 
@@ -96,8 +76,8 @@ def require_inertia(scene: Scene) -> None:
     moving = "; ".join(_moving(scene, mode)[:4])
     raise ModelError(
         f"dynamics needs mass or resistance for every motion: {moving}, without mass (rhoA or "
-        "mass = 0), and nothing determines this motion. Give the part mass (a section rho or "
-        "rhoA), hold it by a support, or join it"
+        "mass = 0) or inertia, and nothing determines this motion. Give the part mass (a section "
+        "rho or rhoA) and inertia, hold it by a support, or join it"
     )
 
 

@@ -29,7 +29,6 @@ from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.constraint_checks import (
     require_independent,
     require_inertia,
-    require_masses,
     require_no_mechanism,
     require_no_prestress,
     require_rates,
@@ -53,7 +52,6 @@ def checked_numbering(
     require_kind(scene, Scene, "scene")
     require_scheme(scheme, "scheme")
     if has_inertia(scheme):
-        require_masses(scene)
         require_inertia(scene)
         warn_of_masses(scene)
         if scene.initial:
