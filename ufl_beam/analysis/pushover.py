@@ -56,7 +56,7 @@ are large, because on the path the base shear (N) takes the place of time."""
 MODES = 6  # number of modes among which the one with the largest effective mass is chosen
 LEAST_MOTION = 1e-6  # of the control place, as a fraction of the largest motion of the scene
 SAME = 2e-6  # fraction of the target that the end of a path may miss, twice AT_END
-NAMED_FROM = 0.99  # fraction of its limit that a hinge bears which is named if the path ends early
+NAMED_FROM = 0.99  # hinges with this fraction of their limit are named if the path ends early
 MOST_STEPS = 20  # largest number of steps of a path, in multiples of the steps asked for
 Shape = Callable[[AttachmentPoint], float]
 """Function of a place: its displacement in a mode, with any factor."""
@@ -77,9 +77,9 @@ def pushover(
     """Push a structure to a target displacement under constant loads of the scene.
 
     The loads of the scene act first, with their values at t = 1 s, and then stay constant.  Forces
-    with a constant distribution grow, controlled by the displacement of a place.  Patterns
-    with a name act on the masses of beams and on point masses.  Damping, dampers and viscosity have
-    no effect.
+    with a constant distribution grow, controlled by the displacement of a place.  Patterns with
+    a name act on the masses of beams and on point masses.  Damping, dampers and viscosity have no
+    effect.
 
     Args:
         scene: Model with its permanent loads.
@@ -104,9 +104,8 @@ def pushover(
 
     Raises:
         ArgumentError: The call is wrong, a pattern needs mass and there is none, the pattern does
-            not move the control place, the forces
-            along the component have no sum, or a prescribed motion or connector force depends on
-            time.
+            not move the control place, the forces along the component have no sum, or a prescribed
+            motion or connector force depends on time.
         ConvergenceError: There is no equilibrium under the loads of the scene, or no first step.
 
     Warns:
