@@ -447,3 +447,25 @@ def test_the_last_step_of_cells_that_the_first_process_does_not_have():
     assert np.array_equal(*(one.q for one in runs))
     for one in runs:
         one.close()
+
+
+def test_events_of_connector_laws_go_on(path):
+    """A spring with a law of its own unloads before the restart and yields after it."""
+    section = ub.Section.rectangle(0.05, 0.1, E=210e9, nu=0.3, rho=7850.0)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2)
+    law = ub.IbarraKrawinkler(1e5, ub.Backbone(2e3, capping=0.05, overstrength=1.5))
+    foot = ub.Turn(ub.ground(0, 0), beam.start, law)
+    table = ub.Table((0.0, 0.5, 1.0, 2.0), (0.0, 1.9e3, 0.0, 2.1e3))
+    push = ub.PointLoad(beam.end, moment=1.0, amplitude=table)
+    pushed = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[foot], loads=[push])
+
+    def events(t, **more):
+        recorder = ub.Events()
+        run = ub.simulate(pushed, ub.Static(), t=(0, t), dt=0.1, record=recorder, **more)
+        return run, [(event.time, event.where, event.what) for event in recorder.found]
+
+    whole, expected = events(2.0)
+    _, before = events(1.0, checkpoint=ub.Checkpoint(path, every=1))
+    _, after = events(2.0, checkpoint=ub.Checkpoint(path, every=1))
+    (row,) = whole.hinges().rows
+    assert (before, after) == ([], expected) == ([], [(row.time, foot, "yields")])

@@ -65,7 +65,7 @@ class Studies:
 class Checkpoints:
     """A checkpoint, from which the run goes on to a later end."""
 
-    format = "checkpoint of ufl_beam, 5"
+    format = "checkpoint of ufl_beam, 6"
     advice = "Delete the file to begin anew, or name another"
 
     def write(self, path):

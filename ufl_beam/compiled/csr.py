@@ -185,7 +185,7 @@ class Product:
     def places(self, A: Csr) -> tuple[Index, ...]:
         """Return the index in ``A.data``, and the index in the row of ``A``, of each entry.
 
-        The order is that of :attr:`data`.  ``A`` must have these entries.
+        The entries have the order of :attr:`data`.  ``A`` must have these entries.
         """
         return _places(*self._runs, A.indptr, A.indices)
 

@@ -213,7 +213,7 @@ class HingeState(NamedTuple):
         rotation: Rotation of largest magnitude; rad.
         plastic: Plastic rotation of largest magnitude; rad.
         ductility: Magnitude of ``rotation`` divided by the yield rotation, if there is one.
-        dissipated: Dissipated energy at the end, also that of runs before ``start=``; J.
+        dissipated: Dissipated energy at the end, of runs before ``start=``, too; J.
         state: Name of the acceptance limit that the hinge satisfies, "elastic", or "beyond ...".
     """
 
@@ -275,7 +275,7 @@ def hinges_of(
 
     def add(
         where: Place | Connector, motion: Array, plastic: Array, lost: Array,
-        at_yield: float = math.nan, least: float = 0.0,
+        at_yield: float = math.nan, least: Array | float = 0.0,
     ) -> None:  # fmt: skip
         yielded = np.flatnonzero(lost > least)
         n = int(yielded[0]) if len(yielded) else -1
@@ -302,7 +302,7 @@ def hinges_of(
             at_yield = _limit(scene, connector) / law.stiffness
             add(connector, history.motion, plastic, history.dissipated, at_yield)
         elif can_yield(connector):
-            least = OWN_LAW_YIELDS * float(np.abs(history.work).max())
+            least = OWN_LAW_YIELDS * np.maximum.accumulate(np.abs(history.work))
             unknown = np.full(len(states), math.nan)
             add(connector, history.motion, unknown, history.dissipated, least=least)
     for beam in (x for x in scene.beams if x in chosen):

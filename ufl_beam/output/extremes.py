@@ -183,7 +183,7 @@ class ExtremesInC:
     def extents(self) -> list[Extent]:
         """Return the extremes of section forces, (num_cells, points, 3), and motions, (size,).
 
-        If processes share the scene, the extremes are those of the latest :meth:`gather`.
+        If processes share the scene, the latest :meth:`gather` has computed the extremes.
         """
         if self._subdomain.alone:
             self.gather()

@@ -345,7 +345,10 @@ class Events(Restartable):
         self._hinges += [i for i, c in enumerate(connectors[:first]) if can_yield(c)]
         ends = [connectors[i].law for i in self._hinges]
         self._own = np.array([isinstance(law, ConnectorLaw) for law in ends], dtype=bool)
-        self._work = np.zeros(len(ends))
+        self._work: Array = np.zeros(len(ends))  # largest works on connector laws so far
+        if state is not None:
+            require_arrays(state, {"work": self._work.shape})
+            self._work = state["work"].copy()
         laws = [*in_cells, *map(_breaking_law, ends)]
         # Energies from which on hinges are free
         breaking = [law is not None and law.limit > 0 for law in laws]
@@ -408,4 +411,5 @@ class Events(Restartable):
 
     def state(self) -> State:
         """Return the events so far: time, number of the cell or connector, and kind."""
-        return {"events": np.array([(t, n, KINDS.index(what)) for t, n, what in self._rows])}
+        events = np.array([(t, n, KINDS.index(what)) for t, n, what in self._rows])
+        return {"events": events, "work": self._work}

@@ -80,7 +80,7 @@ FORCE, WORK, DISSIPATED = map(Connection._fields.index, ("force", "work", "dissi
 """Indices of fields of :class:`Connection`, and so of numbers of the column "connectors"."""
 
 OWN_LAW_YIELDS = 1e-3
-"""Dissipated fraction of the largest work on a :class:`ConnectorLaw` at which it counts as yielded.
+"""Dissipated fraction of the largest work so far at which a :class:`ConnectorLaw` has yielded.
 Smaller losses may be errors of the trapezoidal rule."""
 
 

@@ -407,7 +407,7 @@ class TangentRayleighForce(DampingForce):
 def positive(D: Array, C: Array) -> Array:
     """Return the symmetric part of D without its negative eigenvalues.
 
-    The eigenvalues are those of D scaled by the stiffnesses C.  D is (n, 3, 3), C (n, 3).
+    The eigenvalues belong to D scaled by the stiffnesses C.  D is (n, 3, 3), C (n, 3).
     """
     scale, symmetric = np.sqrt(C[:, :, None] * C[:, None, :]), (D + D.transpose(0, 2, 1)) / 2
     values, vectors = np.linalg.eigh(symmetric / scale)
