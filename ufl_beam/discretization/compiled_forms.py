@@ -236,6 +236,23 @@ class Kernel:
         rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
         self._packed[:, columns] = in_batches(rows, self.batch_size)
 
+    def get(self, function: fem.Function) -> Array:
+        """Return the values of ``function`` in the cells; (num_cells, dofs per cell)."""
+        columns = self._packed[:, self._columns[id(function)]]
+        by_cell = columns.transpose(0, 2, 1).reshape(-1, columns.shape[1])
+        return by_cell[: len(self._dofs)].copy()
+
+    @property
+    def coefficients(self) -> list[fem.Function]:
+        """Coefficients of the form, without the unknown."""
+        return [f for f in self._form.coefficients if id(f) in self._columns]
+
+    def copies_from(self, source: Kernel) -> Index:
+        """Return positions in ``source``, positions here and lengths of the common coefficients."""
+        pairs = ((source._columns[k], at) for k, at in self._columns.items())
+        copies = [(x.start, at.start, at.stop - at.start) for x, at in pairs]
+        return np.array(copies, dtype=np.int32).reshape(-1, 3)
+
     def reuse_values(self, source: Kernel) -> bool:
         """Use the packed values of ``source``, if these contain this form's values as one block.
 

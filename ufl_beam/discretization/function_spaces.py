@@ -269,11 +269,14 @@ class Strains:
     """Strains (Σ, Γ, K) at the quadrature points of the cells.
 
     Attributes:
-        weights: Quadrature weight of each strain of a cell; the kernel includes these factors.
+        form: Form of the strains times their quadrature weights.
+        kernel: The form on all cells.
+        weights: Quadrature weight of each strain of a cell.
     """
 
     def __init__(self, fields: Fields) -> None:
-        self.kernel = fields.kernel(_weighted_strains(fields.element), fields.element.q1)
+        self.form = _weighted_strains(fields.element)
+        self.kernel = fields.kernel(self.form, fields.element.q1)
         self.weights = np.repeat(fields.subdomain.numbering.mesh.point_weights, 3)
         self.shape = (len(fields.order), len(self.weights))
 

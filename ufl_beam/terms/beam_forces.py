@@ -28,6 +28,7 @@ from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.fibres import SectionPoints
+from ufl_beam.terms.derivatives import Each, Neighbours, form_derivative, form_derivatives, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.imposed_strains import (
     CellStrains,
@@ -49,7 +50,7 @@ class FormForces(Term):
         tangent: Kernel | None = None,
     ) -> None:  # fmt: skip
         self._q0, self._q1 = fields.element.q0, fields.element.q1
-        self._fields, self._A, self._ledger = fields, A, ledger
+        self._fields, self._A, self._ledger, self._work_form = fields, A, ledger, work
         if tangent is None:
             self._force, tangent = fields.force_and_tangent(work, self._q1, A)
         else:
@@ -64,6 +65,13 @@ class FormForces(Term):
         ]
         if losses:
             ledger.lost[self._entry] += 0.0
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        kernel = partial(self._fields.kernel, unknown=self._q1)
+        return form_derivatives(
+            self._work_form, lambda term: term._force, kernel, self._q0, neighbours
+        )
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the cells that begin and accept a step."""
@@ -254,7 +262,7 @@ class ElasticBeams(FormForces, Cells):
                 at_e=tangent.position(e),
             )  # fmt: skip
         super().__init__(forms.work, forms.losses, fields, A, ledger, tangent)
-        self._work_form, self._stored = forms.work, fields.kernel(forms.stored, q1)
+        self._stored = fields.kernel(forms.stored, q1)
         self._stored.reuse_values(self._force)
         if tangent is not None:
             self._step_kernels.append(tangent)
@@ -359,6 +367,7 @@ class InelasticBeams(Cells):
         self._force, self._tangent = (
             fields.kernel(form, self._q1) for form in (forms.work, forms.tangent)
         )
+        self._force_form, self._r = forms.work, forms.r
         self._tangent.place(A)
         self.must_dissipate = section_points.kind.law.must_dissipate
 
@@ -402,6 +411,16 @@ class InelasticBeams(Cells):
         change = loop("change_of_points", c)
         admits = loop("points_dissipate", c) if self.must_dissipate else None
         return Phases(begin, *ends, change, opens, admits)
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        kernel, strains = partial(self._fields.kernel, unknown=self._q1), self._strains
+        by_q1 = form_derivative(strains.form, strains.kernel, kernel, self._q1)
+        at = {"cells": self._in_c, "strains": by_q1}
+        points = self.points.derivatives(neighbours, lambda term: term.points, **at)
+        force = partial(form_derivative, self._force_form, self._force, kernel)
+        by_r = force(self._r, direction=points.r, stride=0)
+        return [in_c("points", points), in_c("form", by_r), in_c("form", force(self._q0))]
 
     # -- the step ------------------------------------------------------------------------------
 

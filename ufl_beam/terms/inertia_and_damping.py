@@ -7,7 +7,7 @@ Coefficients of a scheme are cached, because steps have only a few different len
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
@@ -17,7 +17,7 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, struct
-from ufl_beam.compiled.csr import Csr, StepProduct
+from ufl_beam.compiled.csr import Csr, Product, StepProduct
 from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.function_spaces import (
     Element,
@@ -44,6 +44,7 @@ from ufl_beam.mechanics.time_scheme import (
 )
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
 from ufl_beam.terms.beam_forces import FormForces, InelasticBeams
+from ufl_beam.terms.derivatives import Each, Neighbours, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, fields_of_forms
 
@@ -146,13 +147,22 @@ class Inertia(Term):
         """Mass matrix; a new object."""
         return self._times.matrix()
 
+    @property
+    def step_product(self) -> Any:
+        """``step_product`` of loops.h of the mass matrix."""
+        return self._times.c
+
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the matrix and the velocities."""
         lost = self._ledger.lost.pointer("numerical") if self.loses_energy else ffi.NULL
         kinetic = self._ledger.state.pointer("kinetic")
-        c = self.times(self._times, kept=kinetic, lost=lost)
+        c = self._in_steps = self.times(self._times, kept=kinetic, lost=lost)
         begin, accept = loop("begin_product", c), loop("accept_inertia", c)
         return Phases([begin], [accept], [loop("add_kinetic_energy", c)])
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        return product_derivative(neighbours, self._in_steps, lambda term: term.M)
 
     # -- the rates -----------------------------------------------------------------------------
 
@@ -215,6 +225,18 @@ class Inertia(Term):
         v_before = archive.at_dofs(BEFORE, self.v_before)
         self.commit(v, v_before, archive.number("step of velocity", self.c.last_dt))
         self.carry_on(archive, int(archive.number("further rates", len(self.more))))
+
+
+def product_derivative(
+    neighbours: Neighbours, matrix: Any, matrix_of: Callable[[Any], Csr]
+) -> list[Each]:
+    """Return the derivative of a constant matrix times rates, for :meth:`Term.derivatives`."""
+    A = matrix_of(neighbours.term)
+    changes = neighbours.differences(lambda term: matrix_of(term).data)
+    products = [Product(Csr(x, A.indices, A.indptr)).c if x.any() else ffi.NULL for x in changes]
+    neighbours.alive.append(products)
+    change = ffi.new("constant_matrix *[]", products)
+    return [in_c("product", struct("product_derivative", matrix=matrix, change=change))]
 
 
 # -- damping ---------------------------------------------------------------------------------------
@@ -299,8 +321,13 @@ class RayleighForces(Term):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the matrix and the velocities."""
-        c = self._rates.times(self._times, damps=1, lost=self._ledger.lost.pointer("damping"))
+        lost = self._ledger.lost.pointer("damping")
+        c = self._in_steps = self._rates.times(self._times, damps=1, lost=lost)
         return Phases([loop("begin_product", c)], [loop("accept_rayleigh", c)])
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        return product_derivative(neighbours, self._in_steps, lambda term: term._times.matrix())
 
 
 @cached_forms

@@ -41,6 +41,7 @@ from ufl_beam.model.loads import (
     Pressure,
     RotatingFrame,
 )
+from ufl_beam.terms.derivatives import Each, Neighbours, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term
 
@@ -179,6 +180,17 @@ class DeadLoads(_AtDofs):
             weight_of_before=self._scheme.weight_of_before,
         )  # fmt: skip
         return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)])
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        parameters, number = neighbours.weights.shape
+        now, end, before = np.zeros((3, parameters, self._size))
+        loads = ffi.new("dead_loads *[]", [x._c for some in neighbours.terms for x in some])
+        c = struct(
+            "load_derivatives", parameters=parameters, size=self._size, neighbours=number,
+            neighbour=loads, weight=neighbours.weights, now=now, end=end, before=before,
+        )  # fmt: skip
+        return [in_c("load", c)]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them."""

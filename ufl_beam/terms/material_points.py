@@ -47,6 +47,7 @@ from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Kind, SectionPoints
 from ufl_beam.model.material_law import traced
 from ufl_beam.model.softening_laws import SofteningLaw
+from ufl_beam.terms.derivatives import Neighbours
 from ufl_beam.terms.energy_ledger import Ledger
 
 
@@ -120,6 +121,7 @@ class PointForms:
         self, inputs: tuple[str, ...], kind: Kind, softening: SofteningLaw | None, scheme: Scheme
     ) -> None:
         self._pointwise = pointwise = Pointwise(inputs)
+        self._kind, self._softening = kind, softening
         self._equations = equations = PointEquations(kind, softening, scheme)
         law = kind.law
         self._strains = rows(law, "strain")
@@ -169,6 +171,32 @@ class PointForms:
             "end_loop": self._pointwise.compile_loop(*end),
             "answers": np.zeros(max(2 * len(law), len(end))),
         }
+
+    @cached_property
+    def table(self) -> tuple[Any, int, list[str]]:
+        """Derivatives of the outputs of a point with respect to its inputs, see loops.h.
+
+        Returns:
+            A C function, the number of its outputs, and the inputs by which it differentiates.
+        """
+        inputs, equations, law = self._pointwise.at, self._equations, self._kind.law
+        fixed = "direction", "traction", "flows", "theta", "dt"
+        new = prefixed("new", law.variables) if law.solves else ()
+        first = ("growth", *new)
+        by = [*first, *(name for name in inputs if name not in (*fixed, *first))]
+        at = inputs | {name: ufl.variable(inputs[name]) for name in by}
+        with traced(law):
+            stress = tuple(map(ufl.as_ufl, equations.stress(at)))
+            end = equations.end(at)
+            unknowns = tuple(map(ufl.as_ufl, equations.residuals(at))) if law.solves else ()
+        if self._softening is not None:
+            with traced(self._softening):
+                resistance = equations.resistance(at, at["growth"])
+            unknowns = (at["direction"] * stress[0] - resistance, *unknowns)
+        outputs = (*stress, *end.changes, ufl.as_ufl(end.stress[0]), *unknowns)
+        derivatives = [ufl.diff(ufl.as_ufl(f), at[name]) for f in outputs for name in by]
+        values = [*derivatives, *stress]
+        return self._pointwise.compile(*values), len(values), by
 
     @cached_property
     def elastic(self) -> Any:
@@ -292,6 +320,31 @@ class Points:
         if predicts and self._components == 1 and self._yields:
             lines = np.zeros((2, cells, per_cell, int(lib.LINE)))
             fill(self.c, line=lines[0], predicted=lines[1])
+
+    def derivatives(
+        self, neighbours: Neighbours, points_of: Callable[[Any], Points], **fields: Any
+    ) -> Any:
+        """Return ``point_derivatives`` of loops.h, with further ``fields``."""
+        table, outputs, by = self._forms.table
+        cells, per_cell, width = self._storage.shape
+        change = neighbours.differences(lambda term: points_of(term)._storage)
+        strains, variables = self._components, len(self._section_points.kind.law.variables)
+        c = struct(
+            "point_derivatives", points=self.c, table=table, outputs=outputs, columns=len(by),
+            equations=strains + variables + 1,
+            unknown=self.names.index(by[1]) if by[1].startswith("new ") else 0,
+            column=np.array([self.names.index(name) for name in by], dtype=np.int32),
+            J=np.zeros((cells, per_cell, outputs)), w=change,
+            e0=np.zeros((len(neighbours), cells, 3)), r=np.zeros((cells, 3)),
+            e1=np.zeros((cells, 3)), **fields,
+        )  # fmt: skip
+        for field, name in (("B", "strains"), ("weight", "weights"), ("rest", "rest")):
+            values = neighbours.differences(
+                lambda term, name=name: getattr(points_of(term)._section_points, name)
+            )
+            if values.any():
+                fill(c, **{field: np.ascontiguousarray(values)})
+        return c
 
     def __getitem__(self, name: str) -> Array:
         """Return a view of the values of the input ``name`` at the points; (cells, n)."""

@@ -116,6 +116,14 @@ class Term(ABC):
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if a law generates energy in the step to ``q1``."""
 
+    def derivatives(self, neighbours: Any) -> list[Any] | None:
+        """Return the derivatives of the term by parameters; None if there are none.
+
+        ``neighbours`` are :class:`~ufl_beam.terms.derivatives.Neighbours` of the term; each
+        derivative has the fields of ``term_derivative`` of loops.h.
+        """
+        return None
+
     def start(self, q: Array) -> None:
         """Set the accepted configuration to ``q``, without a step."""
 

@@ -1023,7 +1023,8 @@ enum { MOST_SUBSTEPS = 4096 }; /* largest number of substeps of a step */
 
 /* Reasons why a step is not accepted. */
 enum failure {
-  SUCCEEDS, RAISED, NO_EQUILIBRIUM, APPLIED_TOO_FAST, TURNS_TOO_FAR, GIVES_ENERGY, LEAVES_MECHANISM, LEAPS
+  SUCCEEDS, RAISED, NO_EQUILIBRIUM, APPLIED_TOO_FAST, TURNS_TOO_FAR, GIVES_ENERGY, LEAVES_MECHANISM, LEAPS,
+  NO_DERIVATIVE
 };
 
 /* Numbers of a state and their place in its row. They are contiguous, or are added from the indices
@@ -1033,6 +1034,8 @@ typedef struct {
   int number, first;     /* first: index in the row, if the numbers are contiguous */
   const int32_t *at, *to; /* indices, or none */
 } group_columns;
+
+typedef struct derivatives derivatives;
 
 /* The time loop of a scene: its state, and all terms of the equation. */
 typedef struct {
@@ -1077,6 +1080,7 @@ typedef struct {
    * it. */
   int applies;
   double begin_of_run, applied_by, applying_turn, short_part;
+  derivatives *derivatives; /* or none */
 } time_loop;
 
 phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
@@ -1097,6 +1101,89 @@ int attempt_step(time_loop *m, double t1, double end);
 int accept_step(time_loop *m);
 int step_or_subdivide(time_loop *m, double end);
 int take_steps(time_loop *m, int steps, const double *ends, double seconds, int keeps, double *rows);
+
+/* -- derivatives of a run by parameters, see derivatives.c --------------------------------------------- */
+
+enum { MOST_LANES = 16 }; /* largest number of cells in a batch */
+
+/* Derivatives of a term in a step: tables at the end of the step; derivatives of its forces by parameter
+ * p at constant unknowns; derivatives of its state at the end of the step. `linearize` and `accept` may
+ * be none. */
+typedef struct {
+  void *self;
+  void (*linearize)(void *self, const time_step *step, const double *q1);
+  void (*add)(void *self, const derivatives *d, int p, double *r);
+  void (*accept)(void *self, const derivatives *d, int p);
+} term_derivative;
+
+/* Derivatives of the state of a run. Arrays have a row for each parameter. */
+struct derivatives {
+  int parameters, size, terms;
+  const term_derivative *term;
+  double *q0, *q1;        /* of the configuration at both ends of the step */
+  double *rates[MOST_RATES], *new_rates; /* of the rates, from 1 on; in dynamics */
+  const step_product *inertia;           /* in dynamics */
+  double *reactions;      /* of the forces of supports, in their axes */
+  int neighbours;         /* scenes with other values of a parameter, for differences */
+  const double *weight;   /* parameters x neighbours: weights of the differences */
+  const time_function *const *motion; /* parameters x neighbours: motions of supports */
+  const int32_t *indices; /* columns of the tangent */
+  double *tangent, *r, *v, *s, *space;
+  int kept;               /* number of stored states */
+  double *kept_q, *kept_v, *kept_reactions;
+};
+
+/* Forces of a form differentiated by one of its coefficients, with a table of each cell. */
+typedef struct {
+  const cells *form, *table;
+  int columns, copies, stride;
+  const int32_t *copy;      /* of each block of coefficients: its positions in both forms, its length */
+  const double *direction;  /* derivatives of the coefficient, `stride` numbers apart for each parameter;
+                             * or none: the coefficient is the configuration before the step */
+} form_derivative;
+
+/* Derivatives of material points by all their inputs. The columns of a table are the growth, the
+ * variables that a law solves for, then the other inputs; its rows are the stresses, the changes of the
+ * variables, the stress at the end of the step, and the equations of the unknowns. The stresses follow. */
+typedef struct {
+  points *points;
+  inelastic *cells;               /* or none */
+  const connectors *springs;      /* or none */
+  form_derivative *strains;       /* strains of the sections, or motions of the springs, by q1 */
+  kernel *table;
+  int outputs, columns, equations, unknown; /* unknown: index in w of the first variable at the end */
+  const int32_t *column;          /* index in w of each column */
+  double *J;                      /* tables of all points */
+  double *w, *e0;                 /* derivatives of the data of the points, and of the strains before the step */
+  const double *B, *weight, *rest; /* of the geometry of the sections; or none */
+  double *r, *e1, *row;           /* of one parameter: of resultants and strains; of the rows of springs */
+} point_derivatives;
+
+/* Matrix of rates, with its derivative by each parameter, or none. */
+typedef struct {
+  const matrix_of_rates *matrix;
+  const constant_matrix *const *change;
+} product_derivative;
+
+/* Derivatives of dead loads, from the loads of scenes with other values of a parameter. */
+typedef struct {
+  int parameters, size, neighbours;
+  const dead_loads *const *neighbour;
+  const double *weight;
+  double *now, *end, *before; /* in the equation, at the end of this step, at the end of the last step */
+} load_derivatives;
+
+int differentiate_step(derivatives *d, time_loop *m);
+void keep_derivatives(derivatives *d, const time_loop *m);
+void add_form_derivative(void *self, const derivatives *d, int p, double *r);
+void add_points_derivative(void *self, const derivatives *d, int p, double *r);
+void add_product_derivative(void *self, const derivatives *d, int p, double *r);
+void add_load_derivative(void *self, const derivatives *d, int p, double *r);
+void accept_points_derivative(void *self, const derivatives *d, int p);
+void accept_load_derivative(void *self, const derivatives *d, int p);
+void tabulate_derivative(void *self, const time_step *step, const double *q1);
+void tabulate_points(void *self, const time_step *step, const double *q1);
+void differentiate_loads(void *self, const time_step *step, const double *q1);
 
 /* -- oscillators, see oscillators.c --------------------------------------------------------------- */
 

@@ -361,6 +361,7 @@ int step_or_subdivide(time_loop *m, double end)
     const int solved = attempt_step(m, t1, end);
     if (m->path) rejected = m->path->rejected;
     if (solved) {
+      if (m->derivatives && !differentiate_step(m->derivatives, m)) return fails(m, NO_DERIVATIVE);
       if (!accept_step(m)) return 0;
       done += some;
       /* Double the substep at the times where a larger one would begin. */
@@ -410,6 +411,7 @@ int take_steps(time_loop *m, int steps, const double *ends, double seconds, int 
       if (!step_or_subdivide(m, stop)) return k;
     } while (m->t != ends[k]);
     if (keeps) keep_state(m, rows + (size_t)k * m->width);
+    if (m->derivatives) keep_derivatives(m->derivatives, m);
     m->substeps_of_last = m->substeps - before;
     if (m->substeps_of_last > 1 || (steps > 1 && seconds_now() > end)) return k + 1;
   }

@@ -1,0 +1,369 @@
+/* SPDX-License-Identifier: MIT */
+/* Derivatives of the state of a run by parameters: direct differentiation of each solved step, see
+ * analysis/derivatives.py.
+ *
+ * In the step equation R(q1; q0, rates, internal variables, parameters) = 0, all but q1 has a known
+ * derivative. Its product with R at constant q1 is the sum of the terms' forces; the tangent at the
+ * solution then gives the derivative of q1. All arrays of directions have one row for each parameter.
+ */
+
+/* -- forms ------------------------------------------------------------------------------------------- */
+
+/* Copy the coefficients of a form to the form of its derivative, and compute the entries of all cells. */
+void tabulate_derivative(void *self, const time_step *step, const double *q1)
+{
+  const form_derivative *f = self;
+  const cells *table = f->table;
+  const int n = table->batch_size, batches = (table->number + n - 1) / n;
+  for (int b = 0; b < batches; ++b) {
+    const double *from = f->form->w + (size_t)b * n * f->form->width;
+    double *to = table->w + (size_t)b * n * table->width;
+    for (int k = 0; k < f->copies; ++k)
+      memcpy(to + f->copy[3 * k + 1] * n, from + f->copy[3 * k] * n, f->copy[3 * k + 2] * n * sizeof *to);
+  }
+  add_cells((void *)table, q1, 0);
+}
+
+/* Product of the table of each cell with values of the cell, or with a vector q at its degrees of
+ * freedom if `values` is null. The product is added to out, at the degrees of freedom or, if `apart`,
+ * cell after cell. */
+static void multiply_tables(const form_derivative *f, const double *values, const double *q, int apart, double *out)
+{
+  const cells *table = f->table;
+  const int n = table->batch_size, columns = f->columns, rows = table->rows / columns;
+  double x[MOST_LANES * MOST_ENTRIES], sum[MOST_LANES];
+  for (int first = 0; first < table->number; first += n) {
+    const double *entry = table->each + (size_t)first * table->rows;
+    const int some = table->number - first < n ? table->number - first : n;
+    const int32_t *dofs = table->dofs + (size_t)first * table->of_cell;
+    memset(x, 0, columns * n * sizeof *x);
+    for (int l = 0; l < some; ++l)
+      for (int j = 0; j < columns; ++j)
+        x[j * n + l] = values ? values[(size_t)(first + l) * columns + j] : q[dofs[l * table->of_cell + j]];
+    for (int i = 0; i < rows; ++i) {
+      memset(sum, 0, n * sizeof *sum);
+      for (int j = 0; j < columns; ++j, entry += n)
+        for (int l = 0; l < n; ++l) sum[l] += entry[l] * x[j * n + l];
+      for (int l = 0; l < some; ++l)
+        out[apart ? (first + l) * rows + i : dofs[l * table->of_cell + i]] += sum[l];
+    }
+  }
+}
+
+void add_form_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const form_derivative *f = self;
+  const double *values = f->direction ? f->direction + (size_t)p * f->stride : 0;
+  multiply_tables(f, values, d->q0 + (size_t)p * d->size, 0, r);
+}
+
+/* -- material points --------------------------------------------------------------------------------- */
+
+/* Response of the points to the end of the step, and its derivatives by all inputs of the points. */
+void tabulate_points(void *self, const time_step *step, const double *q1)
+{
+  const point_derivatives *m = self;
+  points *p = m->points;
+  if (m->cells) {
+    m->cells->latest[0] = NAN;
+    p->predicts = 0;
+    respond_at(m->cells, q1);
+    tabulate_derivative((void *)m->strains, step, q1);
+  } else {
+    find_motions(m->springs, q1);
+    respond_springs(m->springs);
+  }
+  for (int i = 0; i < p->cells * p->of_cell; ++i)
+    ask(m->table, p->w + (size_t)i * p->width, m->outputs, m->J + (size_t)i * m->outputs);
+}
+
+/* Derivative of row `row` of a point's table in the direction dw of its inputs. */
+static inline double along(const point_derivatives *m, const double *J, int row, const double *dw)
+{
+  double sum = 0;
+  J += row * m->columns;
+  for (int j = 0; j < m->columns; ++j) sum += J[j] * dw[m->column[j]];
+  return sum;
+}
+
+/* Complete the direction dw of the inputs of a point by the derivatives of its unknowns: the growth of
+ * its discontinuity if it opens, and the variables of a law that solves for them. */
+static void find_unknowns(const point_derivatives *m, const double *w, const double *J, double *dw)
+{
+  const points *p = m->points;
+  const int opens = w[DIRECTION] != 0, variables = p->solves ? p->variables : 0, size = opens + variables;
+  double A[(1 + MOST_VARIABLES) * (1 + MOST_VARIABLES)], b[1 + MOST_VARIABLES];
+  const int first = m->equations + (p->resistance && !opens); /* the equation of the growth comes first */
+  dw[GROWTH] = 0;
+  for (int k = 0; k < variables; ++k) dw[m->unknown + k] = 0;
+  if (!size) return;
+  for (int i = 0; i < size; ++i) {
+    b[i] = -along(m, J, first + i, dw);
+    for (int j = 0; j < size; ++j) {
+      const int by = opens && j == 0 ? 0 : 1 + j - opens; /* the first columns belong to the unknowns */
+      A[i * size + j] = J[(first + i) * m->columns + by];
+    }
+  }
+  solve_dense(size, A, 1, b);
+  if (opens) dw[GROWTH] = b[0];
+  for (int k = 0; k < variables; ++k) dw[m->unknown + k] = b[opens + k];
+}
+
+/* Set the derivative of the strains of a point, from strains e of its section and their derivative. */
+static inline void set_strain_direction(const point_derivatives *m, int q, int i, const double *e,
+                                        const double *de, double *strain)
+{
+  const points *p = m->points;
+  const int d = p->components, one = 3 * d * p->of_cell;
+  find_strains(d, p->B + 3 * d * i, de, strain);
+  if (m->B)
+    for (int a = 0; a < d; ++a)
+      for (int k = 0; k < 3; ++k) strain[a] += m->B[(size_t)q * one + 3 * (d * i + a) + k] * e[k];
+}
+
+/* Derivatives of the resultants of parameter q, or of the new state if `end`. */
+static void differentiate_points(const point_derivatives *m, int q, const double *de1, double *dr, int end)
+{
+  const points *p = m->points;
+  const int d = p->components, width = p->width, per_cell = p->of_cell, one = 3 * d * per_cell;
+  const double θ = p->theta, *B = p->B, none[3] = {0};
+  double *dw = m->w + (size_t)q * p->cells * per_cell * width, *de0 = m->e0 + (size_t)q * 3 * p->cells;
+  double *w = p->w, *J = m->J, out[POINT_OUTPUTS + 3 + MOST_VARIABLES];
+  for (int c = 0; c < p->cells; ++c) {
+    const double *e0 = p->e0 + 3 * c, *e1 = p->e1 + 3 * c, *de = de1 ? de1 + 3 * c : none;
+    for (int k = 0; dr && k < 3; ++k) {
+      dr[3 * c + k] = p->rest[k] * ((1 - θ) * de0[3 * c + k] + θ * de[k]);
+      if (m->rest) dr[3 * c + k] += m->rest[3 * q + k] * ((1 - θ) * e0[k] + θ * e1[k]);
+    }
+    for (int i = 0; i < per_cell; ++i, w += width, dw += width, J += m->outputs) {
+      double *strain = dw + p->strain;
+      set_strain_direction(m, q, i, e1, de, strain);
+      set_strain_direction(m, q, i, e0, de0 + 3 * c, strain + d);
+      find_unknowns(m, w, J, dw);
+      for (int a = 0; dr && a < d; ++a) {
+        const double ds = along(m, J, a, dw);
+        const double s = J[m->outputs - d + a]; /* the stress */
+        for (int k = 0; k < 3; ++k) {
+          const double b = B[3 * (d * i + a) + k];
+          dr[3 * c + k] += p->weight[i] * ds * b;
+          if (m->weight) dr[3 * c + k] += m->weight[q * per_cell + i] * s * b;
+          if (m->B) dr[3 * c + k] += p->weight[i] * s * m->B[(size_t)q * one + 3 * (d * i + a) + k];
+        }
+      }
+      if (!end) continue;
+      double change[MOST_VARIABLES];
+      for (int j = 0; j < p->variables; ++j) change[j] = along(m, J, d + j, dw);
+      for (int j = 0; j < p->variables; ++j) strain[3 * d + j] += change[j];
+      dw[JUMP] += w[DIRECTION] * dw[GROWTH];
+      dw[OPENING] += dw[GROWTH];
+      if (w[TRACTION] < INFINITY) {
+        ask(p->end, w, POINT_OUTPUTS + d + p->variables, out);
+        if (out[RESISTANCE] == 0) { /* see commit: the discontinuity takes over the elastic strain */
+          const double C = w[p->strain + 2], L = w[LENGTH], dC = strain[2], dL = dw[LENGTH];
+          const double s = out[POINT_OUTPUTS], ds = along(m, J, d + p->variables, dw);
+          dw[JUMP] += (ds * L + s * dL) / C - s * L * dC / (C * C);
+        }
+      }
+      for (int a = 0; a < d; ++a) strain[d + a] = strain[a];
+      dw[GROWTH] = 0;
+    }
+    if (end) memcpy(de0 + 3 * c, de, 3 * sizeof *de0);
+  }
+}
+
+/* Derivatives of the resultants at constant unknowns, for the form of the forces. */
+void add_points_derivative(void *self, const derivatives *d, int q, double *r)
+{
+  const point_derivatives *m = self;
+  differentiate_points(m, q, 0, m->r, 0);
+  if (m->springs)
+    for (int i = 0; i < m->points->cells; ++i) m->row[3 * i + 2] = m->r[3 * i];
+}
+
+/* Derivatives of the strains, and of the state of the points, at the end of the step. */
+void accept_points_derivative(void *self, const derivatives *d, int q)
+{
+  const point_derivatives *m = self;
+  const points *p = m->points;
+  const double *q1 = d->q1 + (size_t)q * d->size;
+  memset(m->e1, 0, 3 * (size_t)p->cells * sizeof *m->e1);
+  if (m->cells) {
+    multiply_tables(m->strains, 0, q1, 1, m->e1);
+    for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
+  } else {
+    memset(m->r, 0, p->cells * sizeof *m->r);
+    multiply_tables(m->strains, 0, q1, 1, m->r);
+    for (int i = 0; i < p->cells; ++i) m->e1[3 * i] = m->r[i];
+  }
+  differentiate_points(m, q, m->e1, 0, 1);
+}
+
+/* -- inertia and damping ----------------------------------------------------------------------------- */
+
+/* Derivative of the step of the nodes by the configuration at its end, times x. */
+static void scale_rotations(const step_product *p, double *x)
+{
+  for (int k = 0; k < p->rotations; ++k) x[p->rotation[k]] *= 1 + p->half[k] * p->half[k];
+}
+
+void add_product_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const product_derivative *m = self;
+  const step_product *product = m->matrix->product;
+  const rates *of = m->matrix->rates;
+  const double *row = m->matrix->damps ? of->now->velocity : of->now->inertia, *q0 = d->q0 + (size_t)p * d->size;
+  double *x = d->space;
+  for (int i = 0; i < d->size; ++i) x[i] = -row[0] * q0[i];
+  scale_rotations(product, x);
+  for (int j = 1; j < of->number; ++j)
+    if (row[j] != 0) {
+      const double *rate = d->rates[j] + (size_t)p * d->size;
+      for (int i = 0; i < d->size; ++i) x[i] += row[j] * rate[i];
+    }
+  add_product(product->A, x, r);
+  if (m->change[p]) add_product(m->change[p], product->rate, r);
+}
+
+/* Derivatives of the rates after the step. */
+static void advance_rates(const derivatives *d, const time_loop *m, const step_product *product)
+{
+  const rates *of = m->rates;
+  const scheme_numbers *now = of->now;
+  const size_t all = (size_t)d->parameters * d->size;
+  for (int p = 0; p < d->parameters; ++p) {
+    const size_t at = (size_t)p * d->size;
+    double *s = d->space;
+    for (int i = 0; i < d->size; ++i) s[i] = d->q1[at + i] - d->q0[at + i];
+    scale_rotations(product, s);
+    for (int k = 0; k < m->multipliers; ++k) s[m->multiplier[k]] = 0;
+    for (int k = 0; k <= now->gives; ++k)
+      for (int i = 0; i < d->size; ++i) {
+        double sum = now->rates[k][0] * s[i];
+        for (int j = 1; j < of->number; ++j)
+          if (now->rates[k][j] != 0) sum += now->rates[k][j] * d->rates[j][at + i];
+        d->new_rates[k * all + at + i] = sum;
+      }
+  }
+  memcpy(d->rates[2], d->rates[1], all * sizeof *d->space); /* velocities before the last step */
+  memcpy(d->rates[1], d->new_rates, all * sizeof *d->space);
+  for (int k = 1; k <= now->gives; ++k) memcpy(d->rates[2 + k], d->new_rates + k * all, all * sizeof *d->space);
+}
+
+/* -- loads and prescribed motions ---------------------------------------------------------------------- */
+
+void differentiate_loads(void *self, const time_step *step, const double *q1)
+{
+  const load_derivatives *l = self;
+  for (int p = 0; p < l->parameters; ++p) {
+    double *end = l->end + (size_t)p * l->size;
+    const double *before = l->before + (size_t)p * l->size;
+    memset(end, 0, l->size * sizeof *end);
+    for (int k = 0; k < l->neighbours; ++k) {
+      const dead_loads *one = l->neighbour[p * l->neighbours + k];
+      for (int j = 0; j < one->vectors; ++j) {
+        const double factor = l->weight[p * l->neighbours + k] * value_at(one->factor + j, step->load_time);
+        for (int i = 0; i < one->size; ++i) end[one->dof[i]] += factor * one->vector[j][i];
+      }
+    }
+    for (int i = 0; i < l->size; ++i) {
+      end[i] = before[i] + step->fraction * (end[i] - before[i]);
+      l->now[(size_t)p * l->size + i] = before[i] + step->at * (end[i] - before[i]);
+    }
+  }
+}
+
+void add_load_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const load_derivatives *l = self;
+  for (int i = 0; i < l->size; ++i) r[i] -= l->now[(size_t)p * l->size + i];
+}
+
+void accept_load_derivative(void *self, const derivatives *d, int p)
+{
+  const load_derivatives *l = self;
+  memcpy(l->before + (size_t)p * l->size, l->end + (size_t)p * l->size, l->size * sizeof *l->end);
+}
+
+/* Derivatives of the prescribed motions at the end of the step, in the axes of supports; else zero. */
+static void move_supports(const derivatives *d, const time_loop *m, int p, double *v)
+{
+  const equation *e = m->equation;
+  memset(v, 0, d->size * sizeof *v);
+  memcpy(d->space, d->q0 + (size_t)p * d->size, d->size * sizeof *v);
+  turn_axes(e->turned, e->axes, d->space, 1);
+  for (int k = 0; k < m->supports->moving; ++k) {
+    const int i = m->supports->dof[k];
+    double wanted = 0;
+    for (int j = 0; j < d->neighbours; ++j)
+      wanted += d->weight[p * d->neighbours + j] * value_at(d->motion[p * d->neighbours + j] + k, m->step.motion_time);
+    v[i] = d->space[i] + m->step.fraction * (wanted - d->space[i]);
+  }
+}
+
+/* -- the step ------------------------------------------------------------------------------------------ */
+
+/* y += K x for the tangent before supports hold it */
+static void add_tangent_product(const derivatives *d, const equation *e, const double *x, double *y)
+{
+  for (int i = 0; i < e->size; ++i) {
+    double sum = 0;
+    for (int k = e->indptr[i]; k < e->indptr[i + 1]; ++k) sum += d->tangent[k] * x[d->indices[k]];
+    y[i] += sum;
+  }
+}
+
+/* Differentiate the solved step, before it is accepted; returns 0 if the tangent is singular. */
+int differentiate_step(derivatives *d, time_loop *m)
+{
+  equation *e = m->equation;
+  const int n = d->size;
+  const step_product *product = m->rates ? d->inertia : 0;
+  int failed = 0;
+  memcpy(d->s, m->s, n * sizeof *d->s); /* solutions may write into this array */
+  restart(e, EXACT);
+  residual(e, e->unknowns, e->residual, e->f);
+  fill_tangent(e, m->x);
+  memcpy(d->tangent, e->tangent, e->indptr[e->size] * sizeof *d->tangent);
+  hold_tangent(e);
+  for (int k = 0; k < d->terms; ++k)
+    if (d->term[k].linearize) d->term[k].linearize(d->term[k].self, &m->step, m->x);
+  for (int p = 0; p < d->parameters && !failed; ++p) {
+    double *r = e->residual, *q1 = d->q1 + (size_t)p * n, *reactions = d->reactions + (size_t)p * e->held;
+    memset(d->r, 0, n * sizeof *r);
+    for (int k = 0; k < d->terms; ++k) d->term[k].add(d->term[k].self, d, p, d->r);
+    memcpy(r, d->r, n * sizeof *r);
+    move_supports(d, m, p, d->v);
+    if (m->supports->moving) {
+      memcpy(q1, d->v, n * sizeof *q1);
+      turn_axes(e->turned, e->axes, q1, -1);
+      add_tangent_product(d, e, q1, r);
+    }
+    turn_axes(e->turned, e->axes, r, 1);
+    for (int k = 0; k < e->held; ++k) r[e->hold[k]] = 0;
+    if (p == 0 && (factor_tangent(e, &failed) || failed)) break;
+    if (solve_tangent(e, p == 0)) failed = 1;
+    for (int i = 0; i < n; ++i) q1[i] = d->v[i] - e->change[i];
+    for (int k = 0; k < e->held; ++k) q1[e->hold[k]] = d->v[e->hold[k]];
+    turn_axes(e->turned, e->axes, q1, -1);
+    add_tangent_product(d, e, q1, d->r);
+    turn_axes(e->turned, e->axes, d->r, 1);
+    for (int k = 0; k < e->held; ++k) reactions[k] = d->r[e->hold[k]];
+  }
+  memcpy(m->s, d->s, n * sizeof *d->s);
+  if (failed) return 0;
+  for (int k = 0; k < d->terms; ++k)
+    for (int p = 0; d->term[k].accept && p < d->parameters; ++p) d->term[k].accept(d->term[k].self, d, p);
+  if (product) advance_rates(d, m, product);
+  memcpy(d->q0, d->q1, (size_t)d->parameters * n * sizeof *d->q0);
+  return 1;
+}
+
+/* Store the derivatives at the end of a step. */
+void keep_derivatives(derivatives *d, const time_loop *m)
+{
+  const size_t all = (size_t)d->parameters * d->size, held = (size_t)d->parameters * m->equation->held;
+  memcpy(d->kept_q + d->kept * all, d->q0, all * sizeof *d->q0);
+  if (m->rates) memcpy(d->kept_v + d->kept * all, d->rates[1], all * sizeof *d->q0);
+  memcpy(d->kept_reactions + d->kept * held, d->reactions, held * sizeof *d->q0);
+  ++d->kept;
+}
