@@ -30,6 +30,7 @@ from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_law import State, traced
 from ufl_beam.terms.connector_rows import Response, Setting
+from ufl_beam.terms.derivatives import Each, Neighbours
 from ufl_beam.terms.term import Callbacks
 
 # -- energy and resistance -------------------------------------------------------------------------
@@ -68,6 +69,20 @@ class LawForms:
             old = State({name: at[f"state {name}"] for name in law.variables})
             parameters = {name: at[f"number {name}"] for name in law.parameters()}
             self.limit = self._compile(ufl.as_ufl(law.with_parameters(parameters).limit(old)))
+
+    @cached_property
+    def table(self) -> tuple[int, Any, list[str]]:
+        """Number of outputs, C function of their derivatives, and the inputs they are taken by.
+
+        The outputs are the forces and the variables at the end of a step.
+        """
+        by = [name for name in self._at if name not in ("dt", "theta")]
+        at = self._at | {name: ufl.variable(self._pointwise.at[name]) for name in by}
+        with traced(self._law):
+            step = law_step(self._law, at, self._scheme)
+        outputs = (*step.forces, *step.variables)
+        slopes = [ufl.diff(ufl.as_ufl(x), at[name]) for x in outputs for name in by]
+        return len(outputs), self._pointwise.compile(*slopes), by
 
     @cached_property
     def frozen(self) -> tuple[Any, Any]:
@@ -135,6 +150,16 @@ class CompiledLaws(Response):
             self._limits = np.zeros(n)
             places = [doubles(self._limits) + i for i in range(n)]
             self._rub(places, laws=self._c, limit_of_law=self._forms.limit)
+
+    def derivatives(
+        self, neighbours: Neighbours, term: Any, motions: Any, row: Array
+    ) -> list[Each] | None:
+        """See the base class."""
+        if self._law.holds:
+            return None
+        storage = lambda laws: laws._w  # noqa: E731
+        table = self._table_in_c(neighbours, self._forms.table, inputs(self._law), storage)
+        return self._derivatives_in_c(neighbours, term, motions, row, **table)
 
     def bind_term(self, term: Any) -> None:
         """Store the array of the latest rows of the laws."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ from ufl_beam.terms.connector_rows import (
     Setting,
     Springs,
 )
+from ufl_beam.terms.derivatives import Each, Neighbours, form_derivative, in_c
 from ufl_beam.terms.term import Callbacks, Phases, Term, beginning
 
 
@@ -167,7 +168,7 @@ class ConnectorForces(ConnectorTerm):
         step_forms = forms.work, forms.tangent, forms.motion
         work, tangent, value = (self._form(form) for form in step_forms)
         tangent.place(A)
-        self._step_kernels = work, tangent
+        self._step_kernels, self._motion_kernel = (work, tangent), value
         self._now, self.latest_rows = np.zeros(n), np.zeros((n, k + 2))
         self.motions = self._e, self._now
         self.latest_rows[:, 0] = 1.0  # constraints, unless laws change them
@@ -202,11 +203,12 @@ class ConnectorForces(ConnectorTerm):
         law_fields = response.in_steps(callbacks)
         fields = {name for name, _ in ffi.typeof("connector_term").fields}
         mine = {name: x for name, x in law_fields.items() if name in fields}
-        points = struct(
+        points = self._points = struct(
             "inelastic_term", points=response.in_c.get("points", ffi.NULL), springs=self._in_c,
             **{k: x for k, x in law_fields.items() if k not in fields},
         )  # fmt: skip
         c = struct("connector_term", connectors=self._in_c, points=points, **mine)
+        self._term_in_c = c
 
         begin = beginning(self._step_kernels, self.forms.q0)
         phases = ("begin_connectors", "accept_connectors", "add_energy_of_connectors")
@@ -224,6 +226,20 @@ class ConnectorForces(ConnectorTerm):
         if response.in_c.keys() & {"rigid_plastic", "friction", "asked"}:
             again = loop("begin_connectors_again", c)
         return Phases([*begin, *first], accept, state, change, response.opens, admits, again)
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        forms, work, value = self.forms, self._step_kernels[0], self._motion_kernel
+        by_q1 = form_derivative(forms.motion, value, self._form, forms.q1)
+        row = np.zeros((self._cells, forms.row.x.array.size))
+        own = self.response.derivatives(neighbours, self, by_q1, row)
+        if own is None or neighbours.differences(lambda term: term._geometry).any():
+            return None
+        force = partial(form_derivative, forms.work, work, self._form)
+        made = [in_c("form", force(forms.row, direction=row.ravel(), stride=0))] if own else []
+        if work.uses(forms.q0):
+            made.append(in_c("form", force(forms.q0)))
+        return [*own, *made]
 
     # -- the step ------------------------------------------------------------------------------
 

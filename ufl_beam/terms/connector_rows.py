@@ -44,6 +44,7 @@ from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.softening_laws import SofteningLaw
+from ufl_beam.terms.derivatives import Each, Neighbours, in_c
 from ufl_beam.terms.energy_ledger import LEDGER_ENTRIES, Account, Ledger
 from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS, Points, create_entries
 from ufl_beam.terms.term import Callbacks
@@ -203,6 +204,46 @@ class Response:
     def freeze(self) -> None:
         """Make all responses elastic from now on, without further yielding or breaking."""
 
+    def derivatives(
+        self, neighbours: Neighbours, term: Any, motions: Any, row: Array
+    ) -> list[Each] | None:
+        """Return the derivatives of the rows by parameters; None if there are none.
+
+        Args:
+            neighbours: The :class:`ConnectorForces` ``term`` in neighbouring scenes.
+            term: The term of these connectors.
+            motions: ``form_derivative`` of loops.h: the motions by the unknowns.
+            row: Array to which C writes the derivatives of the rows by one parameter.
+        """
+        return None
+
+    def _derivatives_in_c(
+        self, neighbours: Neighbours, term: Any, motions: Any, row: Array, **fields: Any
+    ) -> list[Each]:
+        """Return ``connector_derivatives`` of loops.h with further ``fields``."""
+        parameters, number = neighbours.weights.shape
+        e0, (e1, dt) = np.zeros((parameters, len(row))), np.zeros((2, len(self._connectors)))
+        c = struct(
+            "connector_derivatives", parameters=parameters, neighbours=number,
+            weight=neighbours.weights, term=term._term_in_c, motions=motions, row=row, dt=dt,
+            e0=np.zeros((parameters, len(self._connectors))), e1=e1, **fields,
+        )  # fmt: skip
+        return [in_c("connectors", c)]
+
+    def _table_in_c(
+        self, neighbours: Neighbours, table: Any, inputs: Sequence[str],
+        storage: Callable[[Any], Array],
+    ) -> dict[str, Any]:  # fmt: skip
+        """Return the fields of ``connector_derivatives`` for compiled laws with some inputs."""
+        rows, function, by = table
+        column = np.array([inputs.index(name) for name in by], dtype=np.int32)
+        changes = neighbours.differences(lambda term: storage(term.response))
+        tables = np.zeros((len(self._connectors), rows, len(by)))
+        return {
+            "table": function, "rows": rows, "columns": len(by), "column": column, "J": tables,
+            "w": changes,
+        }  # fmt: skip
+
 
 # -- laws that prescribe a motion or a force -------------------------------------------------------
 
@@ -250,6 +291,29 @@ class PrescribedLaws(Response):
                         setting.requested_forces(connector),
                     )
                 self._in_steps["wanted_force"] = wanted
+
+
+    def derivatives(
+        self, neighbours: Neighbours, term: Any, motions: Any, row: Array
+    ) -> list[Each] | None:
+        """See the base class."""
+        fields: dict[str, Any] = {}
+        shape = len(neighbours), len(self._connectors)
+        if "viscosity" in self._in_steps:
+            fields["viscosity"] = neighbours.differences(
+                lambda term: term.response._in_steps["viscosity"]
+            )
+        elif self._time_functions:
+            now, end, reached = np.zeros((3, *shape))
+            others = [x._term_in_c for some in neighbours.terms for x in some]
+            fields = {"now": now, "end": end, "neighbour": ffi.new("connector_term *[]", others)}
+            if "wanted_force" in self._time_functions:
+                fields["reached"] = reached
+        elif self._in_steps:
+            return None  # friction, controllers
+        else:
+            return []  # constraints
+        return self._derivatives_in_c(neighbours, term, motions, row, **fields)
 
 
 # -- springs ---------------------------------------------------------------------------------------
@@ -312,6 +376,16 @@ class Springs(Response):
         """Restore the variables of :meth:`state`."""
         self.points.restore(rows)
 
+    def derivatives(
+        self, neighbours: Neighbours, term: Any, motions: Any, row: Array
+    ) -> list[Each] | None:
+        """See the base class."""
+        c = self.points.derivatives(
+            neighbours, lambda term: term.response.points, springs=term._in_c, strains=motions,
+            row=row,
+        )  # fmt: skip
+        return [in_c("points", c)]
+
     def start(self, e: Array) -> None:
         """Set the accepted motions to ``e``, without a step."""
         self.points.start(self._at(e))
@@ -341,6 +415,7 @@ class RigidPlasticForms:
 
     def __init__(self, law: SofteningLaw | ElastoPlastic, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise((*INPUTS, *parameters(law)))
+        self._law, self._scheme = law, scheme
         at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
         with traced(law):
             end = rigid_plastic_step(law, at, scheme)._asdict()
@@ -349,6 +424,17 @@ class RigidPlasticForms:
         self._response = force, slope
         self.force = pointwise.compile(*self._response)
         self.end = pointwise.compile(*in_order("slip_output", end, "slip_"))
+
+    @cached_property
+    def table(self) -> tuple[int, Any, list[str]]:
+        """Number of outputs, C function of their derivatives, and the inputs they are taken by."""
+        inputs = self._pointwise.at
+        by = [name for name in inputs if name not in ("direction", "θ", "dt")]
+        at = inputs | {name: ufl.variable(inputs[name]) for name in by}
+        with traced(self._law):
+            force = rigid_plastic_step(self._law, at, self._scheme).force
+        slopes = [ufl.diff(force, at[name]) for name in by]
+        return 1, self._pointwise.compile(*slopes), by
 
     @cached_property
     def spent(self) -> Any:
@@ -450,6 +536,15 @@ class RigidPlasticLaws(Response):
         """
         arrays = doubles(e1), doubles(np.ascontiguousarray(λ))
         return float(lib.dissipation_of_rigid_plastic(self._c, *arrays))
+
+    def derivatives(
+        self, neighbours: Neighbours, term: Any, motions: Any, row: Array
+    ) -> list[Each] | None:
+        """See the base class."""
+        table = self._table_in_c(
+            neighbours, self._forms.table, tuple(self._at), lambda laws: laws._storage
+        )
+        return self._derivatives_in_c(neighbours, term, motions, row, **table)
 
     def state(self) -> Array:
         """Return the internal variables; (num_connectors, 7)."""

@@ -101,8 +101,11 @@ def form_derivatives(
     return made
 
 
-LINEARIZE = {"form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads"}
-ACCEPT = {"points": "accept_points_derivative", "load": "accept_load_derivative"}
+LINEARIZE = {
+    "form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads",
+    "connectors": "tabulate_connectors",
+}  # fmt: skip
+ACCEPT = {name: f"accept_{name}_derivative" for name in ("points", "load", "connectors")}
 
 
 def in_c(kind: str, data: Any) -> Each:

@@ -59,6 +59,15 @@ void add_form_derivative(void *self, const derivatives *d, int p, double *r)
 
 /* -- material points --------------------------------------------------------------------------------- */
 
+/* Compute a table. Derivatives by infinite numbers, such as the limit of an elastic law, are not finite;
+ * such numbers do not change. */
+static void ask_table(kernel *table, const double *w, int outputs, double *J)
+{
+  ask(table, w, outputs, J);
+  for (int k = 0; k < outputs; ++k)
+    if (!isfinite(J[k])) J[k] = 0;
+}
+
 /* Response of the points to the end of the step, and its derivatives by all inputs of the points. */
 void tabulate_points(void *self, const time_step *step, const double *q1)
 {
@@ -74,7 +83,7 @@ void tabulate_points(void *self, const time_step *step, const double *q1)
     respond_springs(m->springs);
   }
   for (int i = 0; i < p->cells * p->of_cell; ++i)
-    ask(m->table, p->w + (size_t)i * p->width, m->outputs, m->J + (size_t)i * m->outputs);
+    ask_table(m->table, p->w + (size_t)i * p->width, m->outputs, m->J + (size_t)i * m->outputs);
 }
 
 /* Derivative of row `row` of a point's table in the direction dw of its inputs. */
@@ -196,6 +205,109 @@ void accept_points_derivative(void *self, const derivatives *d, int q)
     for (int i = 0; i < p->cells; ++i) m->e1[3 * i] = m->r[i];
   }
   differentiate_points(m, q, m->e1, 0, 1);
+}
+
+/* -- connectors -------------------------------------------------------------------------------------- */
+
+/* Motions at the end of the step, their derivatives by the unknowns, and the derivatives of laws. */
+void tabulate_connectors(void *self, const time_step *step, const double *q1)
+{
+  const connector_derivatives *m = self;
+  const connector_term *t = m->term;
+  const connectors *c = t->connectors;
+  *m->dt = step->dt;
+  find_motions(c, q1);
+  tabulate_derivative((void *)m->motions, step, q1);
+  for (int i = 0; i < c->number && m->table; ++i) {
+    double *w = c->laws ? c->laws->w + i * c->laws->width : c->rigid_plastic->w + i * c->rigid_plastic->width;
+    if (c->laws) memcpy(w, c->e1 + c->components * i, c->components * sizeof *w);
+    else set_slip(w, c->e1[i] - w[SLIP_START], c->rigid_plastic->direction[i]);
+    ask_table(m->table, w, m->rows * m->columns, m->J + (size_t)i * m->rows * m->columns);
+  }
+  for (int k = 0; k < m->parameters * c->number && (t->wanted_motion || t->wanted_force); ++k) {
+    const int p = k / c->number, i = k % c->number;
+    const time_step s = *step;
+    double wanted = 0;
+    for (int j = 0; j < m->neighbours; ++j) {
+      const connector_term *one = m->neighbour[p * m->neighbours + j];
+      const double value = t->wanted_motion ? value_at(one->wanted_motion + i, s.motion_time)
+                                            : -value_at(one->wanted_force + i, s.load_time);
+      wanted += m->weight[p * m->neighbours + j] * value;
+    }
+    const double before = t->wanted_motion ? m->e0[k] : m->reached[k];
+    m->end[k] = before + s.fraction * (wanted - before);
+    m->now[k] = t->wanted_motion ? m->end[k] : before + s.at * (m->end[k] - before);
+  }
+}
+
+/* Set the derivative of the slip of a rigid-plastic connector from that of its motion. */
+static void set_slip_direction(const double *w, double de1, double *dw)
+{
+  dw[SLIP] = w[SLIP] > 0 ? w[SLIP_DIRECTION] * (de1 - dw[SLIP_START]) : 0;
+}
+
+static double product_with_row(const connector_derivatives *m, int i, int row, const double *dw)
+{
+  const double *J = m->J + ((size_t)i * m->rows + row) * m->columns;
+  double sum = 0;
+  for (int j = 0; j < m->columns; ++j) sum += J[j] * dw[m->column[j]];
+  return sum;
+}
+
+/* Derivatives of the rows of the laws at constant unknowns, for the form of the forces. */
+void add_connectors_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const connector_derivatives *m = self;
+  const connector_term *t = m->term;
+  const connectors *c = t->connectors;
+  const int n = c->components;
+  const double *e0 = m->e0 + (size_t)p * n * c->number;
+  for (int i = 0; i < c->number; ++i) {
+    double *row = m->row + n * (n + 2) * i + n + 1; /* the last number of the first row */
+    if (c->laws) {
+      double *dw = m->w + ((size_t)p * c->number + i) * c->laws->width;
+      memset(dw, 0, n * sizeof *dw);
+      memcpy(dw + n, e0 + n * i, n * sizeof *dw);
+      for (int j = 0; j < n; ++j) row[j * (n + 2)] = product_with_row(m, i, j, dw);
+    } else if (c->rigid_plastic) {
+      const rigid_plastic *of = c->rigid_plastic;
+      double *dw = m->w + ((size_t)p * c->number + i) * of->width;
+      set_slip_direction(of->w + i * of->width, 0, dw);
+      *row = of->direction[i] ? -product_with_row(m, i, 0, dw) / of->slope[i] : dw[SLIP_START];
+    } else if (t->viscosity) {
+      const double dt = *m->dt;
+      *row = (m->viscosity[p * c->number + i] * (c->e1[i] - c->e0[i]) - t->viscosity[i] * e0[i]) / dt;
+    } else if (m->now) *row = m->now[p * c->number + i];
+  }
+}
+
+void accept_connectors_derivative(void *self, const derivatives *d, int p)
+{
+  const connector_derivatives *m = self;
+  const connector_term *t = m->term;
+  const connectors *c = t->connectors;
+  const int n = c->components, all = n * c->number;
+  double *e0 = m->e0 + (size_t)p * all;
+  memset(m->e1, 0, all * sizeof *e0);
+  multiply_tables(m->motions, 0, d->q1 + (size_t)p * d->size, 1, m->e1);
+  for (int i = 0; i < c->number; ++i) {
+    if (c->laws) {
+      const int variables = c->laws->variables;
+      double *dw = m->w + ((size_t)p * c->number + i) * c->laws->width, end[MOST_VARIABLES];
+      memcpy(dw, m->e1 + n * i, n * sizeof *dw);
+      memcpy(dw + n, e0 + n * i, n * sizeof *dw);
+      for (int j = 0; j < variables; ++j) end[j] = product_with_row(m, i, n + j, dw);
+      memcpy(dw + 2 * n + 2, end, variables * sizeof *dw);
+    } else if (c->rigid_plastic) {
+      const rigid_plastic *of = c->rigid_plastic;
+      double *dw = m->w + ((size_t)p * c->number + i) * of->width;
+      set_slip_direction(of->w + i * of->width, m->e1[i], dw);
+      dw[SLIPPED] += dw[SLIP];
+      dw[SLIP_START] += of->direction[i] * dw[SLIP];
+    }
+  }
+  memcpy(e0, m->e1, all * sizeof *e0);
+  if (m->reached) memcpy(m->reached + (size_t)p * all, m->end + (size_t)p * all, all * sizeof *e0);
 }
 
 /* -- inertia and damping ----------------------------------------------------------------------------- */

@@ -1159,6 +1159,23 @@ typedef struct {
   double *r, *e1, *row;           /* of one parameter: of resultants and strains; of the rows of springs */
 } point_derivatives;
 
+/* Derivatives of the laws of connectors. Compiled laws have a table: columns are inputs of the law, rows
+ * its forces and its variables at the end of a step. Arrays have a row for each parameter. */
+typedef struct {
+  int parameters, neighbours;
+  const connector_term *term;
+  form_derivative *motions;      /* motions of the connectors by q1 */
+  kernel *table;                 /* or none */
+  int rows, columns;
+  const int32_t *column;         /* index of each column in the inputs of a law */
+  double *J, *w;                 /* tables; derivatives of the inputs of all laws */
+  double *e0, *e1, *row, *dt;    /* e0: of the motions before the step; of one parameter: motions, rows */
+  const double *viscosity;       /* of dampers; or none */
+  const connector_term *const *neighbour; /* of motors and actuators: the same in neighbouring scenes */
+  const double *weight;          /* see derivatives */
+  double *now, *end, *reached;   /* of motors: motions; of actuators: forces; or none */
+} connector_derivatives;
+
 /* Matrix of rates, with its derivative by each parameter, or none. */
 typedef struct {
   const matrix_of_rates *matrix;
@@ -1176,12 +1193,15 @@ typedef struct {
 int differentiate_step(derivatives *d, time_loop *m);
 void keep_derivatives(derivatives *d, const time_loop *m);
 void add_form_derivative(void *self, const derivatives *d, int p, double *r);
+void add_connectors_derivative(void *self, const derivatives *d, int p, double *r);
 void add_points_derivative(void *self, const derivatives *d, int p, double *r);
 void add_product_derivative(void *self, const derivatives *d, int p, double *r);
 void add_load_derivative(void *self, const derivatives *d, int p, double *r);
+void accept_connectors_derivative(void *self, const derivatives *d, int p);
 void accept_points_derivative(void *self, const derivatives *d, int p);
 void accept_load_derivative(void *self, const derivatives *d, int p);
 void tabulate_derivative(void *self, const time_step *step, const double *q1);
+void tabulate_connectors(void *self, const time_step *step, const double *q1);
 void tabulate_points(void *self, const time_step *step, const double *q1);
 void differentiate_loads(void *self, const time_step *step, const double *q1);
 
