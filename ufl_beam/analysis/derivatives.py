@@ -53,12 +53,13 @@ class _StepDerivatives:
         equation, self._alive = simulation.equation, list[Any]([neighbours])
         terms = list[Any]()
         for i, term in enumerate(equation.terms):
-            own = Neighbours(term, [[x.equation.terms[i] for x in some] for some in neighbours], weights)
+            others = [[x.equation.terms[i] for x in some] for some in neighbours]
+            own = Neighbours(term, others, weights, size)
             if (made := term.derivatives(own)) is None:
                 raise ArgumentError(f"differentiate: {type(term).__name__} has no derivatives")
             terms += made
             self._alive += [own, made]
-        self.scene = Neighbours(simulation, neighbours, weights)
+        self.scene = Neighbours(simulation, neighbours, weights, size)
         held, A = len(equation.supports.dofs), equation.A
         q, v = (np.zeros((states, P, size)) for _ in range(2))
         self.q, self.v, self.reactions = q, v, np.zeros((states, P, held))
@@ -85,6 +86,15 @@ class _StepDerivatives:
             self._alive.append(rates)
         c.kept = 1
         fill(simulation.time_loop, derivatives=c)
+
+
+def _alike(one: Simulation, other: Simulation) -> bool:
+    """Return whether two simulations have the same unknowns and the same kinds of terms."""
+    a, b = one.numbering, other.numbering
+    names = "cells", "dofs", "dofs_of_bodies", "multipliers"
+    same = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
+    terms = [[type(term) for term in x.equation.terms] for x in (one, other)]
+    return same and terms[0] == terms[1] and np.array_equal(one.supports.dofs, other.supports.dofs)
 
 
 class Derivatives:
@@ -131,6 +141,12 @@ def differentiate(
             raise ArgumentError(f"differentiate: {name}: no neighbouring value has a scene")
     run = simulation(at)
     number = step_count(t1 - t0, dt)
+    for name, some in zip(at, neighbours, strict=True):
+        if not all(_alike(run, other) for other in some):
+            raise ArgumentError(
+                f"differentiate: {name} changes the cells, unknowns or parts of the scene, so that "
+                "it has no derivative; keep beams, cells and attached points on the same vertices"
+            )
     steps = _StepDerivatives(run, neighbours, np.array(weights), number + 1)
     run.solution.every = 1
     with running(run, [], [], begin):

@@ -212,7 +212,8 @@ class Response:
         Args:
             neighbours: The :class:`ConnectorForces` ``term`` in neighbouring scenes.
             term: The term of these connectors.
-            motions: ``form_derivative`` of loops.h: the motions by the unknowns.
+            motions: ``form_derivative`` of loops.h: the motions by the unknowns, "strains", and
+                by the geometry of the connectors, "by_geometry".
             row: Array to which C writes the derivatives of the rows by one parameter.
         """
         return None
@@ -225,7 +226,8 @@ class Response:
         e0, (e1, dt) = np.zeros((parameters, len(row))), np.zeros((2, len(self._connectors)))
         c = struct(
             "connector_derivatives", parameters=parameters, neighbours=number,
-            weight=neighbours.weights, term=term._term_in_c, motions=motions, row=row, dt=dt,
+            weight=neighbours.weights, term=term._term_in_c, row=row, dt=dt,
+            motions=motions["strains"], by_geometry=motions["by_geometry"],
             e0=np.zeros((parameters, len(self._connectors))), e1=e1, **fields,
         )  # fmt: skip
         return [in_c("connectors", c)]
@@ -381,8 +383,7 @@ class Springs(Response):
     ) -> list[Each] | None:
         """See the base class."""
         c = self.points.derivatives(
-            neighbours, lambda term: term.response.points, springs=term._in_c, strains=motions,
-            row=row,
+            neighbours, lambda term: term.response.points, springs=term._in_c, row=row, **motions,
         )  # fmt: skip
         return [in_c("points", c)]
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import ufl
+from ufl.algorithms import expand_derivatives
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import ffi, lib, struct
@@ -31,10 +32,14 @@ class Neighbours:
         terms: The same term in the neighbouring scenes; for each parameter a list.
         weights: Weights of the neighbours in the derivative by a parameter, (parameters, n).  The
             weight of the scene itself makes their sum zero.
+        size: Number of degrees of freedom.
+        alive: Data that C refers to.
     """
 
-    def __init__(self, term: Any, terms: Sequence[Sequence[Any]], weights: Array) -> None:
-        self.term, self.terms, self.weights = term, terms, weights
+    def __init__(
+        self, term: Any, terms: Sequence[Sequence[Any]], weights: Array, size: int
+    ) -> None:
+        self.term, self.terms, self.weights, self.size = term, terms, weights, size
         self.alive = list[Any]()
 
     def __len__(self) -> int:
@@ -55,16 +60,18 @@ class Neighbours:
 
 
 @cached_forms
-def _derivative(form: ufl.Form, coefficient: fem.Function) -> ufl.Form:
+def _derivative(form: ufl.Form, coefficient: fem.Function) -> ufl.Form | None:
+    """Return the derivative of a form by a coefficient; None if it is zero."""
     trial = ufl.TrialFunction(coefficient.function_space)
-    return ufl.derivative(form, coefficient, trial)
+    derivative = ufl.derivative(form, coefficient, trial)
+    return None if expand_derivatives(derivative).empty() else derivative
 
 
 def form_derivative(
     form: ufl.Form, kernel: Kernel, compile_form: Callable[[ufl.Form], Kernel],
     coefficient: fem.Function, **direction: Any,
 ) -> Any:  # fmt: skip
-    """Return ``form_derivative`` of loops.h for the derivative of a form by a coefficient.
+    """Return ``form_derivative`` of loops.h for a form and a coefficient; None if it is zero.
 
     Args:
         form: Linear form in cells.
@@ -73,7 +80,9 @@ def form_derivative(
         coefficient: Coefficient of the form, or its unknown.
         direction: Fields ``direction`` and ``stride``; none if the coefficient is q0.
     """
-    table = compile_form(_derivative(form, coefficient))
+    if (derivative := _derivative(form, coefficient)) is None:
+        return None
+    table = compile_form(derivative)
     table.keep_entries()
     copies = table.copies_from(kernel)
     return struct(
@@ -88,24 +97,49 @@ def form_derivatives(
     q0: fem.Function, neighbours: Neighbours, without: Sequence[fem.Function] = (),
 ) -> list[Each]:  # fmt: skip
     """Return derivatives of a form by q0, and by coefficients that depend on parameters."""
-    kernel, made = kernel_of(neighbours.term), list[Each]()
+    kernel, made = kernel_of(neighbours.term), list[Any]()
     for coefficient in kernel.coefficients:
         if coefficient is q0:
-            made.append(in_c("form", form_derivative(form, kernel, compile_form, q0)))
+            made.append(form_derivative(form, kernel, compile_form, q0))
         elif not any(coefficient is x for x in without):
             change = neighbours.differences(lambda x, c=coefficient: kernel_of(x).get(c))
             if change.any():
                 direction = {"direction": change.ravel(), "stride": change[0].size}
-                f = form_derivative(form, kernel, compile_form, coefficient, **direction)
-                made.append(in_c("form", f))
-    return made
+                made.append(form_derivative(form, kernel, compile_form, coefficient, **direction))
+    return [in_c("form", f) for f in made if f is not None] + shape_derivatives(kernel_of, neighbours)
+
+
+def shape_derivative(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours, size: int) -> Any:
+    """Return ``shape_derivative`` of loops.h for a form with ``size`` values; null if it is zero."""
+    kernel, coordinates = kernel_of(neighbours.term), list[Any]()
+    for some in neighbours.terms:
+        found = [kernel_of(term).cells.coordinates for term in some]
+        moves = any(not np.array_equal(kernel_of(x).coordinates, kernel.coordinates) for x in some)
+        coordinates += found if moves else [ffi.NULL] * len(found)
+    if not any(coordinates):
+        return ffi.NULL
+    parameters, number = neighbours.weights.shape
+    return struct(
+        "shape_derivative", form=kernel.cells, parameters=parameters, neighbours=number,
+        coordinates=ffi.new("double *[]", coordinates), weight=neighbours.weights, size=size,
+        space=np.zeros(size),
+    )  # fmt: skip
+
+
+def shape_derivatives(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours) -> list[Each]:
+    """Return the derivatives of the forces of a form by coordinates, if these change."""
+    found = shape_derivative(kernel_of, neighbours, neighbours.size)
+    return [in_c("shape", found)] if found else []
 
 
 LINEARIZE = {
     "form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads",
-    "connectors": "tabulate_connectors",
+    "connectors": "tabulate_connectors", "second_differences": "tabulate_second_differences",
 }  # fmt: skip
-ACCEPT = {name: f"accept_{name}_derivative" for name in ("points", "load", "connectors")}
+ACCEPT = {
+    name: f"accept_{name}_derivative"
+    for name in ("points", "load", "connectors", "second_differences")
+}
 
 
 def in_c(kind: str, data: Any) -> Each:

@@ -57,6 +57,59 @@ void add_form_derivative(void *self, const derivatives *d, int p, double *r)
   multiply_tables(f, values, d->q0 + (size_t)p * d->size, 0, r);
 }
 
+/* Derivative of the values of a form at q by the coordinates that depend on parameter p. */
+static void add_shape(const shape_derivative *s, const double *q, int p, double *out)
+{
+  const double *const *coordinates = s->coordinates + p * s->neighbours;
+  if (!*coordinates) return;
+  cells one = *s->form;
+  one.each = 0;
+  double all = 0;
+  for (int k = 0; k <= s->neighbours; ++k) {
+    /* The weight of the scene itself makes the sum of the weights zero. */
+    const double weight = k < s->neighbours ? s->weight[p * s->neighbours + k] : -all;
+    all += weight;
+    one.coordinates = k < s->neighbours ? coordinates[k] : s->form->coordinates;
+    memset(s->space, 0, s->size * sizeof *s->space);
+    add_cells(&one, q, s->space);
+    for (int i = 0; i < s->size; ++i) out[i] += weight * s->space[i];
+  }
+}
+
+void add_shape_derivative(void *self, const derivatives *d, int p, double *r) { add_shape(self, d->x, p, r); }
+
+/* -- second differences of strains --------------------------------------------------------------------- */
+
+void tabulate_second_differences(void *self, const time_step *step, const double *q1)
+{
+  second_difference_derivatives *m = self;
+  tabulate_derivative(m->strains, step, q1);
+  tabulate_derivative(m->force, step, q1);
+  m->ratio = fmin(1, step->dt / *m->differences->last_dt);
+}
+
+void add_second_differences_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const second_difference_derivatives *m = self;
+  const int all = m->differences->strains->number * m->differences->of_cell;
+  for (int i = 0; i < all; ++i) m->direction[i] = m->ratio * m->change[(size_t)p * all + i];
+  multiply_tables(m->force, m->direction, 0, 0, r);
+}
+
+void accept_second_differences_derivative(void *self, const derivatives *d, int p)
+{
+  const second_difference_derivatives *m = self;
+  const int n = m->differences->of_cell, all = m->differences->strains->number * n;
+  double *e0 = m->e0 + (size_t)p * all, *change = m->change + (size_t)p * all;
+  memset(m->e1, 0, all * sizeof *e0);
+  multiply_tables(m->strains, 0, d->q1 + (size_t)p * d->size, 1, m->e1);
+  if (m->shape) add_shape(m->shape, d->x, p, m->e1);
+  for (int i = 0; i < all; ++i) {
+    const double e1 = m->e1[i] / m->differences->weight[i % n];
+    change[i] = e1 - e0[i], e0[i] = e1;
+  }
+}
+
 /* -- material points --------------------------------------------------------------------------------- */
 
 /* Compute a table. Derivatives by infinite numbers, such as the limit of an elastic law, are not finite;
@@ -77,10 +130,12 @@ void tabulate_points(void *self, const time_step *step, const double *q1)
     m->cells->latest[0] = NAN;
     p->predicts = 0;
     respond_at(m->cells, q1);
-    tabulate_derivative((void *)m->strains, step, q1);
+    tabulate_derivative(m->strains, step, q1);
   } else {
     find_motions(m->springs, q1);
     respond_springs(m->springs);
+    tabulate_derivative(m->strains, step, q1);
+    if (m->by_geometry) tabulate_derivative(m->by_geometry, step, q1);
   }
   for (int i = 0; i < p->cells * p->of_cell; ++i)
     ask_table(m->table, p->w + (size_t)i * p->width, m->outputs, m->J + (size_t)i * m->outputs);
@@ -135,11 +190,11 @@ static void differentiate_points(const point_derivatives *m, int q, const double
 {
   const points *p = m->points;
   const int d = p->components, width = p->width, per_cell = p->of_cell, one = 3 * d * per_cell;
-  const double θ = p->theta, *B = p->B, none[3] = {0};
+  const double θ = p->theta, *B = p->B;
   double *dw = m->w + (size_t)q * p->cells * per_cell * width, *de0 = m->e0 + (size_t)q * 3 * p->cells;
   double *w = p->w, *J = m->J, out[POINT_OUTPUTS + 3 + MOST_VARIABLES];
   for (int c = 0; c < p->cells; ++c) {
-    const double *e0 = p->e0 + 3 * c, *e1 = p->e1 + 3 * c, *de = de1 ? de1 + 3 * c : none;
+    const double *e0 = p->e0 + 3 * c, *e1 = p->e1 + 3 * c, *de = de1 + 3 * c;
     for (int k = 0; dr && k < 3; ++k) {
       dr[3 * c + k] = p->rest[k] * ((1 - θ) * de0[3 * c + k] + θ * de[k]);
       if (m->rest) dr[3 * c + k] += m->rest[3 * q + k] * ((1 - θ) * e0[k] + θ * e1[k]);
@@ -180,11 +235,31 @@ static void differentiate_points(const point_derivatives *m, int q, const double
   }
 }
 
+/* Derivatives of the strains by parameter q, at constant unknowns or, with dq, along these. */
+static void find_strain_directions(const point_derivatives *m, const derivatives *d, int q, const double *dq)
+{
+  const points *p = m->points;
+  memset(m->e1, 0, 3 * (size_t)p->cells * sizeof *m->e1);
+  if (m->cells) {
+    if (dq) multiply_tables(m->strains, 0, dq, 1, m->e1);
+    if (m->shape) add_shape(m->shape, d->x, q, m->e1);
+    for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
+    return;
+  }
+  if (!dq) return; /* the form of the forces has the derivative by geometry at constant unknowns */
+  memset(m->r, 0, p->cells * sizeof *m->r);
+  multiply_tables(m->strains, 0, dq, 1, m->r);
+  const form_derivative *g = m->by_geometry;
+  if (g) multiply_tables(g, g->direction + (size_t)q * g->stride, 0, 1, m->r);
+  for (int i = 0; i < p->cells; ++i) m->e1[3 * i] = m->r[i];
+}
+
 /* Derivatives of the resultants at constant unknowns, for the form of the forces. */
 void add_points_derivative(void *self, const derivatives *d, int q, double *r)
 {
   const point_derivatives *m = self;
-  differentiate_points(m, q, 0, m->r, 0);
+  find_strain_directions(m, d, q, 0);
+  differentiate_points(m, q, m->e1, m->r, 0);
   if (m->springs)
     for (int i = 0; i < m->points->cells; ++i) m->row[3 * i + 2] = m->r[3 * i];
 }
@@ -193,17 +268,7 @@ void add_points_derivative(void *self, const derivatives *d, int q, double *r)
 void accept_points_derivative(void *self, const derivatives *d, int q)
 {
   const point_derivatives *m = self;
-  const points *p = m->points;
-  const double *q1 = d->q1 + (size_t)q * d->size;
-  memset(m->e1, 0, 3 * (size_t)p->cells * sizeof *m->e1);
-  if (m->cells) {
-    multiply_tables(m->strains, 0, q1, 1, m->e1);
-    for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
-  } else {
-    memset(m->r, 0, p->cells * sizeof *m->r);
-    multiply_tables(m->strains, 0, q1, 1, m->r);
-    for (int i = 0; i < p->cells; ++i) m->e1[3 * i] = m->r[i];
-  }
+  find_strain_directions(m, d, q, d->q1 + (size_t)q * d->size);
   differentiate_points(m, q, m->e1, 0, 1);
 }
 
@@ -217,7 +282,8 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
   const connectors *c = t->connectors;
   *m->dt = step->dt;
   find_motions(c, q1);
-  tabulate_derivative((void *)m->motions, step, q1);
+  tabulate_derivative(m->motions, step, q1);
+  if (m->by_geometry) tabulate_derivative(m->by_geometry, step, q1);
   for (int i = 0; i < c->number && m->table; ++i) {
     double *w = c->laws ? c->laws->w + i * c->laws->width : c->rigid_plastic->w + i * c->rigid_plastic->width;
     if (c->laws) memcpy(w, c->e1 + c->components * i, c->components * sizeof *w);
@@ -254,7 +320,7 @@ static double product_with_row(const connector_derivatives *m, int i, int row, c
   return sum;
 }
 
-/* Derivatives of the rows of the laws at constant unknowns, for the form of the forces. */
+/* Derivatives of the rows of the laws at constant motions, for the form of the forces. */
 void add_connectors_derivative(void *self, const derivatives *d, int p, double *r)
 {
   const connector_derivatives *m = self;
@@ -288,8 +354,10 @@ void accept_connectors_derivative(void *self, const derivatives *d, int p)
   const connectors *c = t->connectors;
   const int n = c->components, all = n * c->number;
   double *e0 = m->e0 + (size_t)p * all;
+  const form_derivative *g = m->by_geometry;
   memset(m->e1, 0, all * sizeof *e0);
   multiply_tables(m->motions, 0, d->q1 + (size_t)p * d->size, 1, m->e1);
+  if (g) multiply_tables(g, g->direction + (size_t)p * g->stride, 0, 1, m->e1);
   for (int i = 0; i < c->number; ++i) {
     if (c->laws) {
       const int variables = c->laws->variables;
@@ -431,6 +499,7 @@ int differentiate_step(derivatives *d, time_loop *m)
   const int n = d->size;
   const step_product *product = m->rates ? d->inertia : 0;
   int failed = 0;
+  d->x = m->x;
   memcpy(d->s, m->s, n * sizeof *d->s); /* solutions may write into this array */
   restart(e, EXACT);
   residual(e, e->unknowns, e->residual, e->f);

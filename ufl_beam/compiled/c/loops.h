@@ -16,7 +16,9 @@ part add_calls, add_cells, add_static_tangent, subtract_vector, subtract_followe
 
 /* -- forms and constant matrices --------------------------------------------------------------- */
 
-enum { MOST_ENTRIES = 144 }; /* entries of the vector or matrix of a cell, at most: 12 unknowns of degree 3 */
+/* Entries of the vector or matrix of a cell, at most: 12 unknowns of degree 3 need 144; the 9 unknowns of
+ * a bushing, differentiated by its geometry, need 216. */
+enum { MOST_ENTRIES = 216 };
 enum { SOME = 128 };         /* cells of a block whose data stay in the processor's cache between loops */
 
 /* A compiled form on some cells. w holds the packed coefficients of a cell without its unknowns,
@@ -1127,6 +1129,7 @@ struct derivatives {
   int neighbours;         /* scenes with other values of a parameter, for differences */
   const double *weight;   /* parameters x neighbours: weights of the differences */
   const time_function *const *motion; /* parameters x neighbours: motions of supports */
+  const double *x;        /* configuration at the end of the step */
   const int32_t *indices; /* columns of the tangent */
   double *tangent, *r, *v, *s, *space;
   int kept;               /* number of stored states */
@@ -1142,6 +1145,27 @@ typedef struct {
                              * or none: the coefficient is the configuration before the step */
 } form_derivative;
 
+/* Derivatives of forms by the coordinates of the cells, as differences: the values of a form with the
+ * coordinates of neighbouring scenes. */
+typedef struct {
+  const cells *form;
+  int parameters, neighbours;
+  const double *const *coordinates; /* parameters x neighbours; none of a parameter that moves no vertex */
+  const double *weight;
+  int size;             /* number of values of the form */
+  double *space;
+} shape_derivative;
+
+/* Derivatives of second differences of strains, see SecondDifferences. */
+typedef struct {
+  const second_differences *differences;
+  form_derivative *strains, *force; /* strains by q1; force by the change of the strains in the last step */
+  const shape_derivative *shape;    /* of the strains; or none */
+  double *e0, *change;              /* derivatives of strains and of their changes in the last step */
+  double *e1, *direction;           /* of one parameter */
+  double ratio;
+} second_difference_derivatives;
+
 /* Derivatives of material points by all their inputs. The columns of a table are the growth, the
  * variables that a law solves for, then the other inputs; its rows are the stresses, the changes of the
  * variables, the stress at the end of the step, and the equations of the unknowns. The stresses follow. */
@@ -1150,6 +1174,9 @@ typedef struct {
   inelastic *cells;               /* or none */
   const connectors *springs;      /* or none */
   form_derivative *strains;       /* strains of the sections, or motions of the springs, by q1 */
+  const shape_derivative *shape;  /* strains of the sections by coordinates; or none */
+  form_derivative *by_geometry;   /* motions of the springs by their geometry; or none */
+  double *fixed;                  /* derivatives of the strains at constant unknowns */
   kernel *table;
   int outputs, columns, equations, unknown; /* unknown: index in w of the first variable at the end */
   const int32_t *column;          /* index in w of each column */
@@ -1165,6 +1192,7 @@ typedef struct {
   int parameters, neighbours;
   const connector_term *term;
   form_derivative *motions;      /* motions of the connectors by q1 */
+  form_derivative *by_geometry;  /* by the geometry of the connectors; or none */
   kernel *table;                 /* or none */
   int rows, columns;
   const int32_t *column;         /* index of each column in the inputs of a law */
@@ -1196,12 +1224,16 @@ void add_form_derivative(void *self, const derivatives *d, int p, double *r);
 void add_connectors_derivative(void *self, const derivatives *d, int p, double *r);
 void add_points_derivative(void *self, const derivatives *d, int p, double *r);
 void add_product_derivative(void *self, const derivatives *d, int p, double *r);
+void add_shape_derivative(void *self, const derivatives *d, int p, double *r);
+void add_second_differences_derivative(void *self, const derivatives *d, int p, double *r);
 void add_load_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_connectors_derivative(void *self, const derivatives *d, int p);
 void accept_points_derivative(void *self, const derivatives *d, int p);
+void accept_second_differences_derivative(void *self, const derivatives *d, int p);
 void accept_load_derivative(void *self, const derivatives *d, int p);
 void tabulate_derivative(void *self, const time_step *step, const double *q1);
 void tabulate_connectors(void *self, const time_step *step, const double *q1);
+void tabulate_second_differences(void *self, const time_step *step, const double *q1);
 void tabulate_points(void *self, const time_step *step, const double *q1);
 void differentiate_loads(void *self, const time_step *step, const double *q1);
 
