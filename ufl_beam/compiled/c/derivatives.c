@@ -405,7 +405,7 @@ void add_product_derivative(void *self, const derivatives *d, int p, double *r)
 }
 
 /* Derivatives of the rates after the step. */
-static void advance_rates(const derivatives *d, const time_loop *m, const step_product *product)
+static void advance_rates(const derivatives *d, const time_loop *m, const step_product *product, int initial)
 {
   const rates *of = m->rates;
   const scheme_numbers *now = of->now;
@@ -424,8 +424,10 @@ static void advance_rates(const derivatives *d, const time_loop *m, const step_p
         d->new_rates[k * all + at + i] = sum;
       }
   }
-  memcpy(d->rates[2], d->rates[1], all * sizeof *d->space); /* velocities before the last step */
-  memcpy(d->rates[1], d->new_rates, all * sizeof *d->space);
+  if (!initial) {
+    memcpy(d->rates[2], d->rates[1], all * sizeof *d->space); /* velocities before the last step */
+    memcpy(d->rates[1], d->new_rates, all * sizeof *d->space);
+  }
   for (int k = 1; k <= now->gives; ++k) memcpy(d->rates[2 + k], d->new_rates + k * all, all * sizeof *d->space);
 }
 
@@ -492,8 +494,9 @@ static void add_tangent_product(const derivatives *d, const equation *e, const d
   }
 }
 
-/* Differentiate the solved step, before it is accepted; returns 0 if the tangent is singular. */
-int differentiate_step(derivatives *d, time_loop *m)
+/* Differentiate the solved step, before it is accepted; returns 0 if the tangent is singular. The short
+ * step from which the `initial` rates of a scheme are taken changes only these. */
+int differentiate_step(derivatives *d, time_loop *m, int initial)
 {
   equation *e = m->equation;
   const int n = d->size;
@@ -532,9 +535,10 @@ int differentiate_step(derivatives *d, time_loop *m)
   }
   memcpy(m->s, d->s, n * sizeof *d->s);
   if (failed) return 0;
+  if (product) advance_rates(d, m, product, initial);
+  if (initial) return 1;
   for (int k = 0; k < d->terms; ++k)
     for (int p = 0; d->term[k].accept && p < d->parameters; ++p) d->term[k].accept(d->term[k].self, d, p);
-  if (product) advance_rates(d, m, product);
   memcpy(d->q0, d->q1, (size_t)d->parameters * n * sizeof *d->q0);
   return 1;
 }

@@ -1218,7 +1218,7 @@ typedef struct {
   double *now, *end, *before; /* in the equation, at the end of this step, at the end of the last step */
 } load_derivatives;
 
-int differentiate_step(derivatives *d, time_loop *m);
+int differentiate_step(derivatives *d, time_loop *m, int initial);
 void keep_derivatives(derivatives *d, const time_loop *m);
 void add_form_derivative(void *self, const derivatives *d, int p, double *r);
 void add_connectors_derivative(void *self, const derivatives *d, int p, double *r);
