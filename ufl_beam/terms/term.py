@@ -116,6 +116,11 @@ class Term(ABC):
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if a law generates energy in the step to ``q1``."""
 
+    @property
+    def effect(self) -> str:
+        """Description of the effect in messages."""
+        return type(self).__name__
+
     def derivatives(self, neighbours: Any) -> list[Any] | None:
         """Return the derivatives of the term by parameters; None if there are none.
 

@@ -1102,6 +1102,7 @@ int solve_begun_step(time_loop *m, int hold);
 int attempt_step(time_loop *m, double t1, double end);
 int accept_step(time_loop *m);
 int step_or_subdivide(time_loop *m, double end);
+int repeat_steps(time_loop *m, int steps, const double *ends, const double *configurations, double *rows);
 int take_steps(time_loop *m, int steps, const double *ends, double seconds, int keeps, double *rows);
 
 /* -- derivatives of a run by parameters, see derivatives.c --------------------------------------------- */
