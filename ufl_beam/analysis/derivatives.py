@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from functools import partial
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from mpi4py import MPI
 
@@ -22,6 +22,7 @@ import numpy.typing as npt
 from ufl_beam.arrays import Array, State
 from ufl_beam.compiled.c_library import doubles, ffi, fill, struct
 from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.display import in_one_line
 from ufl_beam.errors import (
     ArgumentError,
     ModelWarning,
@@ -249,15 +250,19 @@ class StepDerivatives:
         equation, A = simulation.equation, simulation.equation.A
         scene, terms = Neighbours(simulation, neighbours, weights, size), list[Any]()
         self._alive = list[Any]([neighbours, terms])  # data of C
+        self._owners = list[Any]()  # terms, by their index in C
         for i, term in enumerate(equation.terms):
             others = [[x.equation.terms[i] for x in some] for some in neighbours]
             own = Neighbours(term, others, weights, size)
             if (found := term.derivatives(own)) is None:
                 raise ArgumentError(f"differentiate: {term.effect} has no derivatives")
             terms += found
+            self._owners += [term] * len(found)
             self._alive.append(own)
         held = len(equation.supports.dofs)
         self.q, self.v = np.zeros((2, states, P, size))
+        self._change, self._time = np.full(P, np.inf), np.full(P, np.nan)
+        self._term, self._place = np.zeros((2, P), dtype=np.int32)
         self.held, self.reactions = equation.supports.dofs, np.zeros((states, P, held))
         q0 = scene.differences(lambda x: x.q)
         motions = [x.time_loop.supports.motion for some in neighbours for x in some]
@@ -267,10 +272,12 @@ class StepDerivatives:
             reactions=np.zeros((P, held)), neighbours=weights.shape[1], weight=weights,
             motion=ffi.new("time_function *[]", motions), indices=A.indices,
             tangent=np.zeros(len(A.data)), r=np.zeros(size), v=np.zeros(size), s=np.zeros(size),
-            space=np.zeros(size), kept=1, kept_q=self.q, kept_v=self.v,
+            space=np.zeros(size), range=self._change, range_time=self._time,
+            range_term=self._term, range_place=self._place, kept=1, kept_q=self.q, kept_v=self.v,
             kept_reactions=self.reactions,
         )  # fmt: skip
         self.q[0] = q0
+        self._equation = equation
         if equation.inertia is not None:
             rates = np.zeros((equation.inertia.c.number, P, size))
             rates[V] = rates[V + 1] = self.v[0] = scene.differences(lambda x: x.inertia.v)
@@ -281,12 +288,42 @@ class StepDerivatives:
         fill(simulation.time_loop, derivatives=c)
 
 
+    def ranges(self) -> list[Range]:
+        """Return the range of each derivative."""
+        return [
+            Range(change, t, self._owners[term].describe(place) if np.isfinite(change) else "")
+            for change, t, term, place in zip(
+                self._change.tolist(), self._time.tolist(), self._term, self._place, strict=True
+            )
+        ]
+
+
+@in_one_line
+class Range(NamedTuple):
+    """Range of a parameter in which a derivative holds, to first order.
+
+    The run is smooth until one more point, hinge or connector yields, opens, closes or unloads in a
+    step, or one less.
+
+    Attributes:
+        change: Change of the parameter, in its unit, at the nearest of these switches; infinite if
+            there is none.
+        time: Time of this switch; s.
+        place: Cell or connector of this switch.
+    """
+
+    change: float
+    time: float
+    place: str
+
+
 class Derivatives:
     """Derivatives of a run by parameters of its model; made by :func:`differentiate`.
 
     Attributes:
         solution: The run.
         at: Values of the parameters by name, in the order of the derivatives.
+        ranges: :class:`Range` of each parameter by name.
 
     Example:
         >>> def swing(length):
@@ -303,7 +340,7 @@ class Derivatives:
     ) -> None:
         self.solution, self.at, self._case, self._mesh = solution, case.at, case, mesh
         self._q, self._v, self._reactions = steps.q, steps.v, steps.reactions
-        self._held = steps.held
+        self._held, self.ranges = steps.held, dict(zip(case.at, steps.ranges(), strict=True))
         self._shifted: list[list[Solution]] = []
         self._repeated: list[list[Solution]] = []
         for p, name in enumerate(self.at):

@@ -305,7 +305,7 @@ class Kernel:
         return value
 
 
-def _with_shared_nodes(expressions: Sequence[Expr]) -> tuple[Expr, ...]:
+def with_shared_nodes(expressions: Sequence[Expr]) -> tuple[Expr, ...]:
     """Return expressions in which equal nodes are the same object.
 
     The time in which UFL compares two equal nodes grows exponentially with their depth.
@@ -361,7 +361,7 @@ class Pointwise:
 
     def _compiled(self, outputs: Sequence[Expr]) -> tuple[Any, Path]:
         """Return a C function that computes the outputs, and the C file that FFCx wrote for it."""
-        outputs = _with_shared_nodes(outputs)
+        outputs = with_shared_nodes(outputs)
         z = ufl.TestFunction(self._values(len(outputs)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
         form, source = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)

@@ -420,6 +420,11 @@ class InelasticBeams(Cells):
         admits = loop("points_dissipate", c) if self.must_dissipate else None
         return Phases(begin, *ends, change, opens, admits)
 
+    def describe(self, place: int) -> str:
+        """Return the cell of a material point."""
+        points, numbering = self.points.c.of_cell, self._fields.subdomain.numbering
+        return numbering.describe_cell(self._cells[place // points // numbering.mesh.degree])
+
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
         kernel, strains = partial(self._fields.kernel, unknown=self._q1), self._strains

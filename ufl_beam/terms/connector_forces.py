@@ -88,6 +88,10 @@ class ConnectorTerm(Term):
     def motion(self, q: Array) -> Array:
         """Return the relative motions at ``q``; (num_connectors,); m or rad."""
 
+    def describe(self, place: int) -> str:
+        """Return the name of a connector."""
+        return str(self.connectors[place])
+
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add forces and residuals of laws; raise exceptions of functions of a user."""
         with self._callbacks.raising():

@@ -14,11 +14,17 @@ from typing import Any
 import numpy as np
 import ufl
 from ufl.algorithms import expand_derivatives
+from ufl.classes import AndCondition, BinaryCondition, Conditional, OrCondition
+from ufl.core.expr import Expr
+from ufl.corealg.traversal import unique_post_traversal
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import ffi, lib, struct
 from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.dolfinx_compat import fem
+
+FAR = 1e300
+"""Margin of a comparison that does not matter."""
 
 Each = tuple[Any, ...]
 """Fields of ``term_derivative`` of loops.h."""
@@ -53,7 +59,8 @@ class Neighbours:
         for some, weights in zip(self.terms, self.weights, strict=True):
             total = np.zeros(np.shape(here))
             for other, weight in zip(some, weights, strict=True):
-                change = values(other) - here
+                with np.errstate(invalid="ignore"):  # infinite numbers do not change
+                    change = values(other) - here
                 total += weight * np.where(np.isfinite(change), change, 0.0)
             rows.append(total)
         return np.array(rows)
@@ -65,6 +72,40 @@ def _derivative(form: ufl.Form, coefficient: fem.Function) -> ufl.Form | None:
     trial = ufl.TrialFunction(coefficient.function_space)
     derivative = ufl.derivative(form, coefficient, trial)
     return None if expand_derivatives(derivative).empty() else derivative
+
+
+def margins(outputs: Sequence[Expr]) -> list[Expr]:
+    """Return the differences of both sides of all comparisons on which expressions depend.
+
+    A comparison in a branch that is not taken has the margin :data:`FAR`.
+    """
+    weights: dict[Expr, Expr | float] = dict.fromkeys(outputs, 1.0)
+    order, found = list[Expr](), list[Expr]()
+    seen = set[int]()
+    for output in outputs:
+        for node in unique_post_traversal(output):
+            if id(node) not in seen:
+                seen.add(id(node))
+                order.append(node)
+    active = {id(node): weights.get(node, 0.0) for node in order}
+    for node in reversed(order):  # parents come before their operands
+        weight = active[id(node)]
+        shares = [weight] * len(node.ufl_operands)
+        if isinstance(node, Conditional):
+            condition, *_ = node.ufl_operands
+            shares[1:] = [
+                ufl.conditional(condition, *pair) * weight for pair in ((1.0, 0.0), (0.0, 1.0))
+            ]
+        elif isinstance(node, BinaryCondition) and not isinstance(node, AndCondition | OrCondition):
+            left, right = node.ufl_operands
+            margin = left - right
+            if not isinstance(weight, float):
+                margin = ufl.conditional(ufl.gt(weight, 0.0), margin, FAR)
+            found.append(margin)
+        for operand, share in zip(node.ufl_operands, shares, strict=True):
+            if id(operand) in active:
+                active[id(operand)] = share + active[id(operand)]
+    return found
 
 
 def form_derivative(

@@ -121,6 +121,10 @@ class Term(ABC):
         """Description of the effect in messages."""
         return type(self).__name__
 
+    def describe(self, place: int) -> str:
+        """Return the name of a material point or connector of the term, by its index."""
+        return self.effect
+
     def derivatives(self, neighbours: Any) -> list[Any] | None:
         """Return the derivatives of the term by parameters; None if there are none.
 

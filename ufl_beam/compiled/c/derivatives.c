@@ -7,6 +7,16 @@
  * solution then gives the derivative of q1. All arrays of directions have one row for each parameter.
  */
 
+/* Note the margin by which a term in the step is on one side of a switch, and its derivative by parameter
+ * p. The run has another piece where the margin vanishes. */
+static void note_margin(const derivatives *d, int p, int place, double margin, double change)
+{
+  const double far = fabs(margin / change);
+  if (!(far < d->range[p])) return;
+  d->range[p] = far, d->range_time[p] = d->t;
+  d->range_term[p] = d->now, d->range_place[p] = place;
+}
+
 /* -- forms ------------------------------------------------------------------------------------------- */
 
 /* Copy the coefficients of a form to the form of its derivative, and compute the entries of all cells. */
@@ -186,7 +196,8 @@ static inline void set_strain_direction(const point_derivatives *m, int q, int i
 }
 
 /* Derivatives of the resultants of parameter q, or of the new state if `end`. */
-static void differentiate_points(const point_derivatives *m, int q, const double *de1, double *dr, int end)
+static void differentiate_points(const point_derivatives *m, const derivatives *of, int q, const double *de1,
+                                 double *dr, int end)
 {
   const points *p = m->points;
   const int d = p->components, width = p->width, per_cell = p->of_cell, one = 3 * d * per_cell;
@@ -206,7 +217,7 @@ static void differentiate_points(const point_derivatives *m, int q, const double
       find_unknowns(m, w, J, dw);
       for (int a = 0; dr && a < d; ++a) {
         const double ds = along(m, J, a, dw);
-        const double s = J[m->outputs - d + a]; /* the stress */
+        const double s = J[m->outputs - d - m->margins + a]; /* the stress */
         for (int k = 0; k < 3; ++k) {
           const double b = B[3 * (d * i + a) + k];
           dr[3 * c + k] += p->weight[i] * ds * b;
@@ -220,7 +231,14 @@ static void differentiate_points(const point_derivatives *m, int q, const double
       for (int j = 0; j < p->variables; ++j) strain[3 * d + j] += change[j];
       dw[JUMP] += w[DIRECTION] * dw[GROWTH];
       dw[OPENING] += dw[GROWTH];
+      const int place = c * per_cell + i;
+      for (int k = 0; k < m->margins; ++k)
+        note_margin(of, q, place, J[m->outputs - m->margins + k], along(m, J, m->margin + k, dw));
       if (w[TRACTION] < INFINITY) {
+        const double stress = J[m->outputs - d - m->margins], traction = w[TRACTION];
+        if (w[DIRECTION] != 0) note_margin(of, q, place, w[GROWTH], dw[GROWTH]);
+        else note_margin(of, q, place, fabs(stress) - traction, copysign(1, stress) * along(m, J, 0, dw) - dw[TRACTION]);
+        dw[TRACTION] = along(m, J, d + p->variables + 1, dw);
         ask(p->end, w, POINT_OUTPUTS + d + p->variables, out);
         if (out[RESISTANCE] == 0) { /* see commit: the discontinuity takes over the elastic strain */
           const double C = w[p->strain + 2], L = w[LENGTH], dC = strain[2], dL = dw[LENGTH];
@@ -259,7 +277,7 @@ void add_points_derivative(void *self, const derivatives *d, int q, double *r)
 {
   const point_derivatives *m = self;
   find_strain_directions(m, d, q, 0);
-  differentiate_points(m, q, m->e1, m->r, 0);
+  differentiate_points(m, d, q, m->e1, m->r, 0);
   if (m->springs)
     for (int i = 0; i < m->points->cells; ++i) m->row[3 * i + 2] = m->r[3 * i];
 }
@@ -269,7 +287,7 @@ void accept_points_derivative(void *self, const derivatives *d, int q)
 {
   const point_derivatives *m = self;
   find_strain_directions(m, d, q, d->q1 + (size_t)q * d->size);
-  differentiate_points(m, q, m->e1, 0, 1);
+  differentiate_points(m, d, q, m->e1, 0, 1);
 }
 
 /* -- connectors -------------------------------------------------------------------------------------- */
@@ -288,7 +306,7 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
     double *w = c->laws ? c->laws->w + i * c->laws->width : c->rigid_plastic->w + i * c->rigid_plastic->width;
     if (c->laws) memcpy(w, c->e1 + c->components * i, c->components * sizeof *w);
     else set_slip(w, c->e1[i] - w[SLIP_START], c->rigid_plastic->direction[i]);
-    ask_table(m->table, w, m->rows * m->columns, m->J + (size_t)i * m->rows * m->columns);
+    ask_table(m->table, w, m->outputs, m->J + (size_t)i * m->outputs);
   }
   for (int k = 0; k < m->parameters * c->number && (t->wanted_motion || t->wanted_force); ++k) {
     const int p = k / c->number, i = k % c->number;
@@ -314,7 +332,7 @@ static void set_slip_direction(const double *w, double de1, double *dw)
 
 static double product_with_row(const connector_derivatives *m, int i, int row, const double *dw)
 {
-  const double *J = m->J + ((size_t)i * m->rows + row) * m->columns;
+  const double *J = m->J + (size_t)i * m->outputs + row * m->columns;
   double sum = 0;
   for (int j = 0; j < m->columns; ++j) sum += J[j] * dw[m->column[j]];
   return sum;
@@ -365,11 +383,21 @@ void accept_connectors_derivative(void *self, const derivatives *d, int p)
       memcpy(dw, m->e1 + n * i, n * sizeof *dw);
       memcpy(dw + n, e0 + n * i, n * sizeof *dw);
       for (int j = 0; j < variables; ++j) end[j] = product_with_row(m, i, n + j, dw);
+      for (int k = 0; k < m->margins; ++k)
+        note_margin(d, p, n * i, m->J[(size_t)(i + 1) * m->outputs - m->margins + k],
+                    product_with_row(m, i, m->rows - m->margins + k, dw));
       memcpy(dw + 2 * n + 2, end, variables * sizeof *dw);
     } else if (c->rigid_plastic) {
       const rigid_plastic *of = c->rigid_plastic;
       double *dw = m->w + ((size_t)p * c->number + i) * of->width;
-      set_slip_direction(of->w + i * of->width, m->e1[i], dw);
+      const double force = d->x[c->force[i]] - of->back_force[i], *w = of->w + i * of->width;
+      double *limit = m->limit + (size_t)p * all + i, *back_force = m->back_force + (size_t)p * all + i;
+      set_slip_direction(w, m->e1[i], dw);
+      if (of->direction[i]) note_margin(d, p, i, w[SLIP], dw[SLIP]);
+      else
+        note_margin(d, p, i, fabs(force) - of->limit[i],
+                    copysign(1, force) * (d->q1[(size_t)p * d->size + c->force[i]] - *back_force) - *limit);
+      *limit = product_with_row(m, i, 1, dw), *back_force = product_with_row(m, i, 2, dw);
       dw[SLIPPED] += dw[SLIP];
       dw[SLIP_START] += of->direction[i] * dw[SLIP];
     }
@@ -537,8 +565,11 @@ int differentiate_step(derivatives *d, time_loop *m, int initial)
   if (failed) return 0;
   if (product) advance_rates(d, m, product, initial);
   if (initial) return 1;
-  for (int k = 0; k < d->terms; ++k)
-    for (int p = 0; d->term[k].accept && p < d->parameters; ++p) d->term[k].accept(d->term[k].self, d, p);
+  d->t = m->step.t1;
+  for (d->now = 0; d->now < d->terms; ++d->now) {
+    const term_derivative *term = d->term + d->now;
+    for (int p = 0; term->accept && p < d->parameters; ++p) term->accept(term->self, d, p);
+  }
   memcpy(d->q0, d->q1, (size_t)d->parameters * n * sizeof *d->q0);
   return 1;
 }

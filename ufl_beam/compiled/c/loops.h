@@ -1133,6 +1133,12 @@ struct derivatives {
   const double *x;        /* configuration at the end of the step */
   const int32_t *indices; /* columns of the tangent */
   double *tangent, *r, *v, *s, *space;
+  /* Nearest switch of each parameter to another piece of the run, to first order: change of the parameter;
+   * time; index of the term, and of the point or connector in it. */
+  double *range, *range_time;
+  int32_t *range_term, *range_place;
+  double t;               /* end of the step */
+  int now;                /* index of the term */
   int kept;               /* number of stored states */
   double *kept_q, *kept_v, *kept_reactions;
 };
@@ -1169,7 +1175,8 @@ typedef struct {
 
 /* Derivatives of material points by all their inputs. The columns of a table are the growth, the
  * variables that a law solves for, then the other inputs; its rows are the stresses, the changes of the
- * variables, the stress at the end of the step, and the equations of the unknowns. The stresses follow. */
+ * variables, the stress and the resistance at the end of the step, the equations of the unknowns, and the
+ * margins of the conditions in the law. The stresses and the margins follow. */
 typedef struct {
   points *points;
   inelastic *cells;               /* or none */
@@ -1179,7 +1186,8 @@ typedef struct {
   form_derivative *by_geometry;   /* motions of the springs by their geometry; or none */
   double *fixed;                  /* derivatives of the strains at constant unknowns */
   kernel *table;
-  int outputs, columns, equations, unknown; /* unknown: index in w of the first variable at the end */
+  int outputs, columns, equations, margin, margins; /* equations, margin: their first rows; margins: number */
+  int unknown;                    /* index in w of the first variable at the end of the step */
   const int32_t *column;          /* index in w of each column */
   double *J;                      /* tables of all points */
   double *w, *e0;                 /* derivatives of the data of the points, and of the strains before the step */
@@ -1188,14 +1196,17 @@ typedef struct {
 } point_derivatives;
 
 /* Derivatives of the laws of connectors. Compiled laws have a table: columns are inputs of the law, rows
- * its forces and its variables at the end of a step. Arrays have a row for each parameter. */
+ * its forces, its variables at the end of a step, and the margins of its conditions; the margins follow.
+ * Rigid-plastic laws have the limit and the back force instead of variables, and no margins. Arrays have
+ * a row for each parameter. */
 typedef struct {
   int parameters, neighbours;
   const connector_term *term;
   form_derivative *motions;      /* motions of the connectors by q1 */
   form_derivative *by_geometry;  /* by the geometry of the connectors; or none */
   kernel *table;                 /* or none */
-  int rows, columns;
+  int rows, columns, margins, outputs;
+  double *limit, *back_force;    /* of rigid-plastic laws */
   const int32_t *column;         /* index of each column in the inputs of a law */
   double *J, *w;                 /* tables; derivatives of the inputs of all laws */
   double *e0, *e1, *row, *dt;    /* e0: of the motions before the step; of one parameter: motions, rows */
