@@ -82,14 +82,17 @@ class LawForms:
         at = self._at | {name: ufl.variable(self._pointwise.at[name]) for name in by}
         with traced(self._law):
             step = law_step(self._law, at, self._scheme)
-        ends = with_shared_nodes([*map(ufl.as_ufl, (*step.forces, *step.variables))])
+            old = State({name: at[f"state {name}"] for name in self._law.variables})
+            numbers = {name: at[f"number {name}"] for name in self._law.parameters()}
+            limits = [self._law.with_parameters(numbers).limit(old)] * self._law.holds
+        ends = with_shared_nodes([*map(ufl.as_ufl, (*step.forces, *step.variables, *limits))])
         conditions = margins(ends)
         slopes = [ufl.diff(x, at[name]) for x in (*ends, *conditions) for name in by]
-        numbers = {
+        sizes = {
             "rows": len(ends) + len(conditions), "columns": len(by), "margins": len(conditions),
             "outputs": len(slopes) + len(conditions),
         }  # fmt: skip
-        return self._pointwise.compile(*slopes, *conditions), by, numbers
+        return self._pointwise.compile(*slopes, *conditions), by, sizes
 
     @cached_property
     def frozen(self) -> tuple[Any, Any]:
@@ -162,10 +165,13 @@ class CompiledLaws(Response):
         self, neighbours: Neighbours, term: Any, motions: Any, row: Array
     ) -> list[Each] | None:
         """See the base class."""
-        if self._law.holds:
-            return None
         storage = lambda laws: laws._w  # noqa: E731
         table = self._table_in_c(neighbours, self._forms.table, inputs(self._law), storage)
+        if self._law.holds:
+            limits = np.zeros((len(neighbours), len(self._connectors)))
+            if (friction := self._friction_in_c(neighbours, term, motions, limits)) is None:
+                return None
+            table |= friction
         return self._derivatives_in_c(neighbours, term, motions, row, **table)
 
     def bind_term(self, term: Any) -> None:

@@ -44,7 +44,7 @@ from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.softening_laws import SofteningLaw
-from ufl_beam.terms.derivatives import Each, Neighbours, in_c
+from ufl_beam.terms.derivatives import Each, Neighbours, form_derivative, in_c
 from ufl_beam.terms.energy_ledger import LEDGER_ENTRIES, Account, Ledger
 from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS, Points, create_entries
 from ufl_beam.terms.term import Callbacks
@@ -232,6 +232,23 @@ class Response:
         )  # fmt: skip
         return [in_c("connectors", c)]
 
+    def _friction_in_c(
+        self, neighbours: Neighbours, term: Any, motions: Any, limits: Array
+    ) -> dict[str, Any] | None:
+        """Return fields of ``connector_derivatives`` for friction with derivatives of its limits.
+
+        The result is None if a parameter changes the geometry of the connectors in dynamics.
+        """
+        fields = {"limit": limits, "way": np.zeros(limits.shape)}
+        if self._setting.rates is None:
+            return fields
+        if motions["by_geometry"]:
+            return None
+        forms, rate = term.forms, term.motion_rate
+        by = {"rate_by_v": forms.u, "rate_by_q0": forms.q1}
+        found = {k: form_derivative(forms.rate, rate, term._form, f) for k, f in by.items()}
+        return fields | {k: f for k, f in found.items() if f is not None}
+
     def _table_in_c(
         self, neighbours: Neighbours, table: Any, inputs: Sequence[str],
         storage: Callable[[Any], Array],
@@ -302,16 +319,23 @@ class PrescribedLaws(Response):
             fields["viscosity"] = neighbours.differences(
                 lambda term: term.response._in_steps["viscosity"]
             )
-        elif self._time_functions:
+        elif self._time_functions:  # motors and actuators
             now, end, reached = np.zeros((3, *shape))
             others = [x._term_in_c for some in neighbours.terms for x in some]
             fields = {"now": now, "end": end, "neighbour": ffi.new("connector_term *[]", others)}
             if "wanted_force" in self._time_functions:
                 fields["reached"] = reached
-        elif self._in_steps:
-            return None  # friction, controllers
-        else:
+        elif self.sticks is not None and not any(law.joint for law in self._laws):
+            limits = neighbours.differences(
+                lambda term: np.array([law.force for law in term.response._laws])
+            )
+            if (found := self._friction_in_c(neighbours, term, motions, limits)) is None:
+                return None
+            fields = found
+        elif self.sticks is None and not self._in_steps:
             return []  # constraints
+        else:
+            return None
         return self._derivatives_in_c(neighbours, term, motions, row, **fields)
 
 

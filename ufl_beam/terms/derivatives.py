@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import ufl
 from ufl.algorithms import expand_derivatives
-from ufl.classes import AndCondition, BinaryCondition, Conditional, OrCondition
+from ufl.classes import EQ, GE, GT, LE, LT, NE, Conditional
 from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_post_traversal
 
@@ -25,6 +25,9 @@ from ufl_beam.dolfinx_compat import fem
 
 FAR = 1e300
 """Margin of a comparison that does not matter."""
+
+MOST_MARGINS = 12
+"""Largest number of comparisons in a law that the ranges of derivatives take into account."""
 
 Each = tuple[Any, ...]
 """Fields of ``term_derivative`` of loops.h."""
@@ -75,37 +78,35 @@ def _derivative(form: ufl.Form, coefficient: fem.Function) -> ufl.Form | None:
 
 
 def margins(outputs: Sequence[Expr]) -> list[Expr]:
-    """Return the differences of both sides of all comparisons on which expressions depend.
+    """Return the differences of both sides of the comparisons on which expressions depend.
 
-    A comparison in a branch that is not taken has the margin :data:`FAR`.
+    A comparison in a branch that is not taken has the margin :data:`FAR`.  The result is empty for
+    more than :data:`MOST_MARGINS` comparisons, whose derivatives would take minutes to compile.
     """
-    weights: dict[Expr, Expr | float] = dict.fromkeys(outputs, 1.0)
-    order, found = list[Expr](), list[Expr]()
-    seen = set[int]()
+    order: dict[int, Expr] = {}
     for output in outputs:
-        for node in unique_post_traversal(output):
-            if id(node) not in seen:
-                seen.add(id(node))
-                order.append(node)
-    active = {id(node): weights.get(node, 0.0) for node in order}
-    for node in reversed(order):  # parents come before their operands
-        weight = active[id(node)]
-        shares = [weight] * len(node.ufl_operands)
+        order |= {id(node): node for node in unique_post_traversal(output) if id(node) not in order}
+    # Conditions, and whether they hold, in all branches that contain a node
+    branches: dict[int, dict[int, tuple[Expr, bool]]] = {id(output): {} for output in outputs}
+    found = dict[str, Expr]()
+    for node in reversed(order.values()):  # parents come before their operands
+        mine = branches[id(node)]
+        inside = [mine] * len(node.ufl_operands)
         if isinstance(node, Conditional):
-            condition, *_ = node.ufl_operands
-            shares[1:] = [
-                ufl.conditional(condition, *pair) * weight for pair in ((1.0, 0.0), (0.0, 1.0))
-            ]
-        elif isinstance(node, BinaryCondition) and not isinstance(node, AndCondition | OrCondition):
+            condition = node.ufl_operands[0]
+            inside[1:] = [mine | {id(condition): (condition, holds)} for holds in (True, False)]
+        elif isinstance(node, EQ | NE | LE | LT | GE | GT):
             left, right = node.ufl_operands
             margin = left - right
-            if not isinstance(weight, float):
-                margin = ufl.conditional(ufl.gt(weight, 0.0), margin, FAR)
-            found.append(margin)
-        for operand, share in zip(node.ufl_operands, shares, strict=True):
-            if id(operand) in active:
-                active[id(operand)] = share + active[id(operand)]
-    return found
+            for condition, holds in mine.values():
+                pair = (margin, FAR) if holds else (FAR, margin)
+                margin = ufl.conditional(condition, *pair)
+            found.setdefault(repr(id(left)) + repr(id(right)), margin)
+        for operand, some in zip(node.ufl_operands, inside, strict=True):
+            if (known := branches.get(id(operand))) is not None:
+                some = {k: x for k, x in known.items() if some.get(k) == x}
+            branches[id(operand)] = some
+    return [*found.values()] if len(found) <= MOST_MARGINS else []
 
 
 def form_derivative(

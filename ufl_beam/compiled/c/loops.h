@@ -1197,8 +1197,8 @@ typedef struct {
 
 /* Derivatives of the laws of connectors. Compiled laws have a table: columns are inputs of the law, rows
  * its forces, its variables at the end of a step, and the margins of its conditions; the margins follow.
- * Rigid-plastic laws have the limit and the back force instead of variables, and no margins. Arrays have
- * a row for each parameter. */
+ * Rigid-plastic laws have the limit and the back force instead of variables, and no margins; laws with a
+ * limit have it after the variables. Arrays have a row for each parameter. */
 typedef struct {
   int parameters, neighbours;
   const connector_term *term;
@@ -1206,7 +1206,9 @@ typedef struct {
   form_derivative *by_geometry;  /* by the geometry of the connectors; or none */
   kernel *table;                 /* or none */
   int rows, columns, margins, outputs;
-  double *limit, *back_force;    /* of rigid-plastic laws */
+  double *limit, *back_force;    /* of rigid-plastic laws; limit: also of friction */
+  form_derivative *rate_by_v, *rate_by_q0; /* rates of motions for friction in dynamics; or none */
+  double *way;                   /* of friction: derivatives of the motion in a step that leads to rest */
   const int32_t *column;         /* index of each column in the inputs of a law */
   double *J, *w;                 /* tables; derivatives of the inputs of all laws */
   double *e0, *e1, *row, *dt;    /* e0: of the motions before the step; of one parameter: motions, rows */
