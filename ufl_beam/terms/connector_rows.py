@@ -223,12 +223,12 @@ class Response:
     ) -> list[Each]:
         """Return ``connector_derivatives`` of loops.h with further ``fields``."""
         parameters, number = neighbours.weights.shape
-        e0, (e1, dt) = np.zeros((parameters, len(row))), np.zeros((2, len(self._connectors)))
+        e1, dt = np.zeros((2, len(self._connectors)))
         c = struct(
             "connector_derivatives", parameters=parameters, neighbours=number,
             weight=neighbours.weights, term=term._term_in_c, row=row, dt=dt,
             motions=motions["strains"], by_geometry=motions["by_geometry"],
-            e0=np.zeros((parameters, len(self._connectors))), e1=e1, **fields,
+            e0=neighbours.state(np.zeros((parameters, len(self._connectors)))), e1=e1, **fields,
         )  # fmt: skip
         return [in_c("connectors", c)]
 
@@ -258,7 +258,7 @@ class Response:
         column = np.array([inputs.index(name) for name in by], dtype=np.int32)
         changes = neighbours.differences(lambda term: storage(term.response))
         tables = np.zeros((len(self._connectors), numbers["outputs"]))
-        return {"table": function, **numbers, "column": column, "J": tables, "w": changes}
+        return {"table": function, **numbers, "column": column, "J": tables, "w": neighbours.state(changes)}
 
 
 # -- laws that prescribe a motion or a force -------------------------------------------------------
@@ -320,7 +320,7 @@ class PrescribedLaws(Response):
                 lambda term: term.response._in_steps["viscosity"]
             )
         elif self._time_functions:  # motors and actuators
-            now, end, reached = np.zeros((3, *shape))
+            now, end, reached = neighbours.state(np.zeros((3, *shape)))
             others = [x._term_in_c for some in neighbours.terms for x in some]
             fields = {"now": now, "end": end, "neighbour": ffi.new("connector_term *[]", others)}
             if "wanted_force" in self._time_functions:
@@ -575,7 +575,8 @@ class RigidPlasticLaws(Response):
             neighbours, self._forms.table, tuple(self._at), lambda laws: laws._storage
         )
         for field, name in (("limit", "_limit"), ("back_force", "_back_force")):
-            table[field] = neighbours.differences(lambda x, name=name: getattr(x.response, name))
+            changes = neighbours.differences(lambda x, name=name: getattr(x.response, name))
+            table[field] = neighbours.state(changes)
         return self._derivatives_in_c(neighbours, term, motions, row, **table)
 
     def state(self) -> Array:

@@ -39,21 +39,29 @@ class Neighbours:
     Attributes:
         term: The term in the scene itself.
         terms: The same term in the neighbouring scenes; for each parameter a list.
+        positions: Changes of the parameters in the neighbouring scenes; (parameters, n).
         weights: Weights of the neighbours in the derivative by a parameter, (parameters, n).  The
             weight of the scene itself makes their sum zero.
         size: Number of degrees of freedom.
         alive: Data that C refers to.
+        states: Derivatives of the state of the term, see :meth:`state`.
     """
 
     def __init__(
-        self, term: Any, terms: Sequence[Sequence[Any]], weights: Array, size: int
+        self, term: Any, terms: Sequence[Sequence[Any]], positions: Array, weights: Array, size: int
     ) -> None:
-        self.term, self.terms, self.weights, self.size = term, terms, weights, size
-        self.alive = list[Any]()
+        self.term, self.terms, self.size = term, terms, size
+        self.positions, self.weights = positions, weights
+        self.alive, self.states = list[Any](), list[Array]()
 
     def __len__(self) -> int:
         """Number of parameters."""
         return len(self.terms)
+
+    def state(self, values: Array) -> Array:
+        """Return ``values``, and store them as derivatives of the state of the term."""
+        self.states.append(values)
+        return values
 
     def differences(self, values: Callable[[Any], Array]) -> Array:
         """Return the derivatives of an array of the term; (parameters, *shape of the array)."""

@@ -339,8 +339,8 @@ class Points:
             "point_derivatives", points=self.c, table=table, **numbers,
             unknown=self.names.index(by[1]) if by[1].startswith("new ") else 0,
             column=np.array([self.names.index(name) for name in by], dtype=np.int32),
-            J=np.zeros((cells, per_cell, numbers["outputs"])), w=change,
-            e0=np.zeros((len(neighbours), cells, 3)), r=np.zeros((cells, 3)),
+            J=np.zeros((cells, per_cell, numbers["outputs"])), w=neighbours.state(change),
+            e0=neighbours.state(np.zeros((len(neighbours), cells, 3))), r=np.zeros((cells, 3)),
             e1=np.zeros((cells, 3)), **fields,
         )  # fmt: skip
         for field, name in (("B", "strains"), ("weight", "weights"), ("rest", "rest")):
