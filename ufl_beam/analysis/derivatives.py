@@ -30,7 +30,6 @@ from ufl_beam.errors import (
     require_function,
     require_kind,
     require_number,
-    shorten,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia
 from ufl_beam.model.beams import Mesh
@@ -57,7 +56,7 @@ STEP_OF_QUANTITIES = 2.0**-17
 It is small because quantities, such as largest values, may be smooth in pieces only.  The round-off
 is 1e-11 of the quantity."""
 
-STENCILS = {
+STENCILS: dict[tuple[int, ...], tuple[float, ...]] = {
     (-2, -1, 1, 2): (1 / 12, -8 / 12, 8 / 12, -1 / 12),
     (1, 2, 3, 4): (4.0, -3.0, 4 / 3, -1 / 4),
     (-1, -2, -3, -4): (-4.0, 3.0, -4 / 3, 1 / 4),
@@ -189,7 +188,7 @@ class _Case:
     def scene(self, changes: Mapping[str, float]) -> Scene:
         """Return the scene for the values :attr:`at` with ``changes``."""
         try:
-            scene = self._model(**self.at | changes)
+            scene = self._model(**{**self.at, **changes})
         except TypeError as error:
             if "argument" not in str(error):
                 raise
@@ -199,7 +198,8 @@ class _Case:
 
     def simulation(self, changes: Mapping[str, float]) -> Simulation:
         """Return a simulation in its initial state."""
-        return self.create(self.scene(changes))
+        simulation: Simulation = self.create(self.scene(changes))
+        return simulation
 
     def _step(self, name: str, fraction: float) -> float:
         return fraction * (abs(self.at[name]) or 1.0)
@@ -318,12 +318,12 @@ class StepDerivatives:
 
     def ranges(self) -> list[Range]:
         """Return the range of each derivative."""
-        return [
-            Range(change, t, self._owners[term].describe(place) if np.isfinite(change) else "")
-            for change, t, term, place in zip(
-                self._change.tolist(), self._time.tolist(), self._term, self._place, strict=True
-            )
-        ]
+        found = []
+        for p, change in enumerate(map(float, self._change)):
+            owner, place = self._owners[self._term[p]], int(self._place[p])
+            name = owner.describe(place) if np.isfinite(change) else ""
+            found.append(Range(change, float(self._time[p]), name))
+        return found
 
 
 @in_one_line
@@ -405,21 +405,21 @@ class Derivatives:
                 divided steps.
         """
         require_function(quantity, "of: quantity", "a Solution")
-        here = np.asarray(quantity(self.solution), dtype=np.float64)
+        reference = np.asarray(quantity(self.solution), dtype=np.float64)
         try:
-            rows = [self._differences(quantity, here, some) for some in self._motions()]
+            changes = [self._differences(quantity, reference, some) for some in self._motions()]
         except _Unknown:
-            rows = [self._differences(quantity, here, some) for some in self._runs()]
+            changes = [self._differences(quantity, reference, some) for some in self._runs()]
         found = [
             np.tensordot(self._case.weights(name, STEP_OF_QUANTITIES), row, axes=1)
-            for name, row in zip(self.at, rows, strict=True)
+            for name, row in zip(self.at, changes, strict=True)
         ]
         return np.stack(found, axis=-1)
 
     def _differences(
-        self, quantity: Callable[[Solution], npt.ArrayLike], here: Array, some: list[Solution]
+        self, quantity: Callable[[Solution], npt.ArrayLike], reference: Array, some: list[Solution]
     ) -> Array:
-        rows = []
+        changes = []
         for other in some:
             try:
                 value = np.asarray(quantity(other), dtype=np.float64)
@@ -428,10 +428,10 @@ class Derivatives:
                     f"{error}. If the model makes new beams at each call, find places in the scene "
                     "of the solution, as in lambda s: s.displacement(s.scene.beams[0].end)"
                 ) from error
-            if value.shape != here.shape:
+            if value.shape != reference.shape:
                 raise ArgumentError("of: the shape of the quantity depends on the parameters")
-            rows.append(value - here)
-        return np.array(rows)
+            changes.append(value - reference)
+        return np.array(changes)
 
     def _states(self, p: int, change: float) -> State:
         """Return motions and reactions if parameter ``p`` grows by ``change``."""
@@ -474,7 +474,6 @@ class Derivatives:
                         found.append(self._repeat(simulation, p, change))
                 self._repeated.append(found)
         return self._repeated
-
 
     def _repeat(self, simulation: Simulation, p: int, change: float) -> Solution:
         """Return the states of a simulation whose motion follows from a change of a parameter."""

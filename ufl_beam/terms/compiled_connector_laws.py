@@ -458,14 +458,14 @@ class UserLaws(Response):
             law, force, state = self._each[i], 0.0, np.zeros(dstate.shape[2])
             pairs = zip(neighbours.positions[p], neighbours.weights[p], strict=True)
             t, dt = law.known["t"], law.known["dt"]
-            here = law.end(self._e1[i])
+            reference = law.end(self._e1[i])
             for other, (h, weight) in zip(neighbours.terms[p], pairs, strict=True):
                 mine = other.response._each[i]
                 mine.state[:] = law.state + h * dstate[p, i]
                 mine.begin(self._e0[i] + h * de0, t, dt)
-                there = mine.end(self._e1[i] + h * de1)
-                force += weight * (there[0] - here[0])
-                state += weight * (there[1] - here[1])
+                neighbour = mine.end(self._e1[i] + h * de1)
+                force += weight * (neighbour[0] - reference[0])
+                state += weight * (neighbour[1] - reference[1])
             return force, state
 
         def rows(p: int) -> None:

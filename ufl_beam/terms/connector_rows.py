@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -258,7 +259,13 @@ class Response:
         column = np.array([inputs.index(name) for name in by], dtype=np.int32)
         changes = neighbours.differences(lambda term: storage(term.response))
         tables = np.zeros((len(self._connectors), numbers["outputs"]))
-        return {"table": function, **numbers, "column": column, "J": tables, "w": neighbours.state(changes)}
+        return {
+            "table": function,
+            **numbers,
+            "column": column,
+            "J": tables,
+            "w": neighbours.state(changes),
+        }
 
 
 # -- laws that prescribe a motion or a force -------------------------------------------------------
@@ -307,7 +314,6 @@ class PrescribedLaws(Response):
                         setting.requested_forces(connector),
                     )
                 self._in_steps["wanted_force"] = wanted
-
 
     def derivatives(
         self, neighbours: Neighbours, term: Any, motions: Any, row: Array
@@ -404,7 +410,7 @@ class Springs(Response):
     ) -> list[Each] | None:
         """See the base class."""
         c = self.points.derivatives(
-            neighbours, lambda term: term.response.points, springs=term._in_c, row=row, **motions,
+            neighbours, "response.points", springs=term._in_c, row=row, **motions,
         )  # fmt: skip
         return [in_c("points", c)]
 
@@ -575,8 +581,8 @@ class RigidPlasticLaws(Response):
             neighbours, self._forms.table, tuple(self._at), lambda laws: laws._storage
         )
         for field, name in (("limit", "_limit"), ("back_force", "_back_force")):
-            changes = neighbours.differences(lambda x, name=name: getattr(x.response, name))
-            table[field] = neighbours.state(changes)
+            values = neighbours.differences(attrgetter(f"response.{name}"))
+            table[field] = neighbours.state(values)
         return self._derivatives_in_c(neighbours, term, motions, row, **table)
 
     def state(self) -> Array:

@@ -9,6 +9,7 @@ derivatives.c for the derivatives of a step.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -65,16 +66,14 @@ class Neighbours:
 
     def differences(self, values: Callable[[Any], Array]) -> Array:
         """Return the derivatives of an array of the term; (parameters, *shape of the array)."""
-        here = values(self.term)
-        rows = []
-        for some, weights in zip(self.terms, self.weights, strict=True):
-            total = np.zeros(np.shape(here))
-            for other, weight in zip(some, weights, strict=True):
+        reference = values(self.term)
+        derivatives = np.zeros((len(self), *np.shape(reference)))
+        for p, some in enumerate(self.terms):
+            for k, term in enumerate(some):
                 with np.errstate(invalid="ignore"):  # infinite numbers do not change
-                    change = values(other) - here
-                total += weight * np.where(np.isfinite(change), change, 0.0)
-            rows.append(total)
-        return np.array(rows)
+                    change = values(term) - reference
+                derivatives[p] += self.weights[p, k] * np.where(np.isfinite(change), change, 0.0)
+        return derivatives
 
 
 @cached_forms
@@ -142,6 +141,10 @@ def form_derivative(
     )  # fmt: skip
 
 
+def _values(kernel_of: Callable[[Any], Kernel], coefficient: fem.Function, term: Any) -> Array:
+    return kernel_of(term).get(coefficient)
+
+
 def form_derivatives(
     form: ufl.Form, kernel_of: Callable[[Any], Kernel], compile_form: Callable[[ufl.Form], Kernel],
     q0: fem.Function, neighbours: Neighbours, without: Sequence[fem.Function] = (),
@@ -152,15 +155,17 @@ def form_derivatives(
         if coefficient is q0:
             made.append(form_derivative(form, kernel, compile_form, q0))
         elif not any(coefficient is x for x in without):
-            change = neighbours.differences(lambda x, c=coefficient: kernel_of(x).get(c))
+            change = neighbours.differences(partial(_values, kernel_of, coefficient))
             if change.any():
                 direction = {"direction": change.ravel(), "stride": change[0].size}
                 made.append(form_derivative(form, kernel, compile_form, coefficient, **direction))
-    return [in_c("form", f) for f in made if f is not None] + shape_derivatives(kernel_of, neighbours)
+    return [in_c("form", f) for f in made if f is not None] + shape_derivatives(
+        kernel_of, neighbours
+    )
 
 
 def shape_derivative(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours, size: int) -> Any:
-    """Return ``shape_derivative`` of loops.h for a form with ``size`` values; null if it is zero."""
+    """Return ``shape_derivative`` of loops.h for a form with ``size`` values; null if zero."""
     kernel, coordinates = kernel_of(neighbours.term), list[Any]()
     for some in neighbours.terms:
         found = [kernel_of(term).cells.coordinates for term in some]
@@ -202,4 +207,3 @@ def all_in_c(terms: Sequence[Each]) -> dict[str, Any]:
     """Return the fields ``terms`` and ``term`` of ``derivatives`` of loops.h."""
     array = ffi.new("term_derivative[]", terms)
     return {"terms": len(terms), "term": array}
-

@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -198,10 +199,10 @@ class PointForms:
         conditions = margins(with_shared_nodes([*stress, *map(ufl.as_ufl, end.changes)]))
         outputs = (*stress, *ends, *unknowns, *conditions)
         derivatives = [ufl.diff(ufl.as_ufl(f), at[name]) for f in outputs for name in by]
-        values, first = [*derivatives, *stress, *conditions], len(stress) + len(ends)
+        values, first_equation = [*derivatives, *stress, *conditions], len(stress) + len(ends)
         numbers = {
-            "outputs": len(values), "columns": len(by), "equations": first,
-            "margin": first + len(unknowns), "margins": len(conditions),
+            "outputs": len(values), "columns": len(by), "equations": first_equation,
+            "margin": first_equation + len(unknowns), "margins": len(conditions),
         }  # fmt: skip
         return self._pointwise.compile(*values), by, numbers
 
@@ -328,13 +329,14 @@ class Points:
             lines = np.zeros((2, cells, per_cell, int(lib.LINE)))
             fill(self.c, line=lines[0], predicted=lines[1])
 
-    def derivatives(
-        self, neighbours: Neighbours, points_of: Callable[[Any], Points], **fields: Any
-    ) -> Any:
-        """Return ``point_derivatives`` of loops.h, with further ``fields``."""
+    def derivatives(self, neighbours: Neighbours, path: str, **fields: Any) -> Any:
+        """Return ``point_derivatives`` of loops.h, with further ``fields``.
+
+        ``path`` is the attribute of a term that has its points.
+        """
         table, by, numbers = self._forms.table
-        cells, per_cell, width = self._storage.shape
-        change = neighbours.differences(lambda term: points_of(term)._storage)
+        cells, per_cell, _ = self._storage.shape
+        change = neighbours.differences(attrgetter(f"{path}._storage"))
         c = struct(
             "point_derivatives", points=self.c, table=table, **numbers,
             unknown=self.names.index(by[1]) if by[1].startswith("new ") else 0,
@@ -344,9 +346,7 @@ class Points:
             e1=np.zeros((cells, 3)), **fields,
         )  # fmt: skip
         for field, name in (("B", "strains"), ("weight", "weights"), ("rest", "rest")):
-            values = neighbours.differences(
-                lambda term, name=name: getattr(points_of(term)._section_points, name)
-            )
+            values = neighbours.differences(attrgetter(f"{path}._section_points.{name}"))
             if values.any():
                 fill(c, **{field: np.ascontiguousarray(values)})
         return c
