@@ -214,7 +214,8 @@ class Response:
             neighbours: The :class:`ConnectorForces` ``term`` in neighbouring scenes.
             term: The term of these connectors.
             motions: ``form_derivative`` of loops.h: the motions by the unknowns, "strains", and
-                by the geometry of the connectors, "by_geometry".
+                by the geometry of the connectors, "by_geometry"; and "row_bar", the derivatives
+                of the adjoint by the rows.
             row: Array to which C writes the derivatives of the rows by one parameter.
         """
         return None
