@@ -29,7 +29,6 @@ from ufl_beam.analysis.critical_points import Branch as Branch
 from ufl_beam.analysis.critical_points import CriticalPoint as CriticalPoint
 from ufl_beam.analysis.derivatives import Derivatives as Derivatives
 from ufl_beam.analysis.derivatives import differentiate as differentiate
-from ufl_beam.analysis.gradient import gradient as gradient
 from ufl_beam.analysis.free_decay import (
     Decay as Decay,
 )
@@ -43,6 +42,7 @@ from ufl_beam.analysis.free_decay import (
     logarithmic_decrement,
     peaks,
 )
+from ufl_beam.analysis.gradient import gradient as gradient
 from ufl_beam.analysis.imperfections import imperfect
 from ufl_beam.analysis.incremental_dynamics import incremental_dynamic_analysis
 from ufl_beam.analysis.incremental_dynamics_result import DemandCurves as DemandCurves

@@ -167,9 +167,7 @@ def checked_case(
         raise ArgumentError(f"{call}: at has no parameters")
     for name, value in at.items():
         require_number(value, f"{call}: at[{name!r}]")
-    create = partial(
-        Simulation, scheme=scheme, t0=t0, newton=newton, mesh=mesh, comm=MPI.COMM_SELF
-    )
+    create = partial(Simulation, scheme=scheme, t0=t0, newton=newton, mesh=mesh, comm=MPI.COMM_SELF)
     return Case(call, model, {name: float(value) for name, value in at.items()}, create)
 
 

@@ -18,7 +18,7 @@ from ufl_beam.analysis.derivatives import (
     checked_case,
 )
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ArgumentError, StepFailed, require_function, require_number
 from ufl_beam.mechanics.time_scheme import Scheme
@@ -62,14 +62,20 @@ def gradient(
     number of parameters.  :func:`differentiate` is cheaper for up to about ten parameters, and has
     derivatives of any quantity.
 
-    The steps are recorded, in parts of the run that fit into the given memory; each part is computed
-    again.
+    The steps are recorded in parts of the run that fit into the given memory.  Each part is
+    computed twice.
 
     Args:
-        model, at, scheme, t, dt, newton, mesh: As in :func:`differentiate`.
+        model: Function that returns the scene for values of its parameters.
+        at: Values of the parameters by name.
+        scheme: Time scheme: :class:`Static`, or a scheme without accelerations.
+        t: Beginning and end; s.
+        dt: Time step; s.
         of: Function of a :class:`Solution` that returns a history of its motion, (n+1,) or
             (n+1, k): each value depends on displacements and velocities at its time only.
         reduce: Function that returns the number for the history; by default its last value.
+        newton: Tolerances and options of Newton's method.
+        mesh: Discretization; by default the cells of the beams.
         memory: Memory for recorded steps; bytes.
 
     Returns:
@@ -81,7 +87,8 @@ def gradient(
 
     Example:
         >>> def frame(**EI):
-        ...     sections = [ub.Section(EA=2e9, GA=7e8, EI=x, rhoA=60.0, rhoI=0.1) for x in EI.values()]
+        ...     shape = {"EA": 2e9, "GA": 7e8, "rhoA": 60.0, "rhoI": 0.1}
+        ...     sections = [ub.Section(EI=x, **shape) for x in EI.values()]
         ...     a, b = (ub.Beam((k, 0), (k + 1, 0), s, cells=2) for k, s in enumerate(sections))
         ...     joints, supports = [ub.Rigid(a.end, b.start)], [ub.Clamped(a.start)]
         ...     return ub.Scene([a, b], joints, supports=supports, loads=[ub.Gravity()])
@@ -117,7 +124,7 @@ class _Adjoint:
 
     def __init__(self, simulation: Simulation, steps: StepDerivatives, memory: float) -> None:
         self._simulation, self._steps = simulation, steps
-        c, equation, A = steps.c, simulation.equation, simulation.equation.A
+        c, A = steps.c, simulation.equation.A
         scheme, inertia = simulation.scheme, simulation.equation.inertia
         if inertia is None and scheme.load_weight != 1.0:
             raise ArgumentError(f"gradient: {scheme} has no adjoint; use Static()")
@@ -231,8 +238,7 @@ def _derivatives_by_motion(
             changed = reference.copy()
             changed.flat[k] += position * h
             by_history[k] += weight / h * (reduce(changed) - reduce(reference))
-    by_history = by_history.reshape(len(solution), -1)
-    found = []
+    by_rows, found = by_history.reshape(len(solution), -1), []
     for name, x in (("q", states["q"]), ("v", states["v"])):
         h, bar = STEP * max(float(np.abs(x).max()), 1e-300), np.zeros_like(x)
         pending = [np.arange(x.shape[1])]
@@ -249,6 +255,6 @@ def _derivatives_by_motion(
             for position, weight in zip(positions, weights, strict=True):
                 change[:, dofs] = position * h
                 slope += weight / h * (history(**{name: change}) - reference)
-            bar[:, dofs[0]] = np.sum(by_history * slope.reshape(len(x), -1), axis=1)
+            bar[:, dofs[0]] = np.sum(by_rows * slope.reshape(len(x), -1), axis=1)
         found.append(bar)
     return found[0], found[1]

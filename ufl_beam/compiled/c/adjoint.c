@@ -331,7 +331,7 @@ int go_back(adjoint *a, time_loop *m)
         const int i = m->supports->dof[k];
         double wanted = 0;
         for (int j = 0; j < d->neighbours; ++j)
-          wanted += d->weight[p * d->neighbours + j] * value_at(d->motion[p * d->neighbours + j] + k, m->step.motion_time);
+          wanted += d->weight[p * d->neighbours + j] * change_of_motion(d, m, p * d->neighbours + j, k);
         a->gradient[p] += (d->v[i] + d->r[i]) * wanted;
       }
   }

@@ -316,9 +316,10 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
     double wanted = 0;
     for (int j = 0; j < m->neighbours; ++j) {
       const connector_term *one = m->neighbour[p * m->neighbours + j];
-      const double value = t->wanted_motion ? value_at(one->wanted_motion + i, s.motion_time)
-                                            : -value_at(one->wanted_force + i, s.load_time);
-      wanted += m->weight[p * m->neighbours + j] * value;
+      const double change = t->wanted_motion
+        ? value_at(one->wanted_motion + i, s.motion_time) - value_at(t->wanted_motion + i, s.motion_time)
+        : value_at(t->wanted_force + i, s.load_time) - value_at(one->wanted_force + i, s.load_time);
+      wanted += m->weight[p * m->neighbours + j] * change;
     }
     const double before = t->wanted_motion ? m->e0[k] : m->reached[k];
     m->end[k] = before + s.fraction * (wanted - before);
@@ -505,6 +506,14 @@ static void advance_rates(const derivatives *d, const time_loop *m, const step_p
 
 /* -- loads and prescribed motions ---------------------------------------------------------------------- */
 
+/* Add `weight` times the forces of a vector of loads at the time of the step. */
+static void add_loads(const dead_loads *l, int vector, const time_step *step, double weight, double *out)
+{
+  if (vector >= l->vectors) return;
+  const double factor = weight * value_at(l->factor + vector, step->load_time);
+  for (int i = 0; i < l->size; ++i) out[l->dof[i]] += factor * l->vector[vector][i];
+}
+
 void differentiate_loads(void *self, const time_step *step, const double *q1)
 {
   const load_derivatives *l = self;
@@ -514,9 +523,10 @@ void differentiate_loads(void *self, const time_step *step, const double *q1)
     memset(end, 0, l->size * sizeof *end);
     for (int k = 0; k < l->neighbours; ++k) {
       const dead_loads *one = l->neighbour[p * l->neighbours + k];
-      for (int j = 0; j < one->vectors; ++j) {
-        const double factor = l->weight[p * l->neighbours + k] * value_at(one->factor + j, step->load_time);
-        for (int i = 0; i < one->size; ++i) end[one->dof[i]] += factor * one->vector[j][i];
+      const double weight = l->weight[p * l->neighbours + k];
+      for (int j = 0; j < one->vectors || j < l->loads->vectors; ++j) { /* equal loads give exact zeros */
+        add_loads(one, j, step, weight, end);
+        add_loads(l->loads, j, step, -weight, end);
       }
     }
     for (int i = 0; i < l->size; ++i) {
@@ -538,6 +548,13 @@ void accept_load_derivative(void *self, const derivatives *d, int p)
   memcpy(l->before + (size_t)p * l->size, l->end + (size_t)p * l->size, l->size * sizeof *l->end);
 }
 
+/* Difference of the prescribed motion k between a neighbouring scene and the scene itself. */
+static double change_of_motion(const derivatives *d, const time_loop *m, int neighbour, int k)
+{
+  const double t = m->step.motion_time;
+  return value_at(d->motion[neighbour] + k, t) - value_at(m->supports->motion + k, t);
+}
+
 /* Derivatives of the prescribed motions at the end of the step, in the axes of supports; else zero. */
 static void move_supports(const derivatives *d, const time_loop *m, int p, double *v)
 {
@@ -549,7 +566,7 @@ static void move_supports(const derivatives *d, const time_loop *m, int p, doubl
     const int i = m->supports->dof[k];
     double wanted = 0;
     for (int j = 0; j < d->neighbours; ++j)
-      wanted += d->weight[p * d->neighbours + j] * value_at(d->motion[p * d->neighbours + j] + k, m->step.motion_time);
+      wanted += d->weight[p * d->neighbours + j] * change_of_motion(d, m, p * d->neighbours + j, k);
     v[i] = d->space[i] + m->step.fraction * (wanted - d->space[i]);
   }
 }
