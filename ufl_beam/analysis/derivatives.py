@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from functools import partial
+from inspect import signature
 from typing import Any, NamedTuple, NoReturn
 
 from mpi4py import MPI
@@ -167,6 +168,10 @@ def checked_case(
         raise ArgumentError(f"{call}: at has no parameters")
     for name, value in at.items():
         require_number(value, f"{call}: at[{name!r}]")
+    try:
+        signature(model).bind(**at)
+    except TypeError as error:
+        raise ArgumentError(f"{call}: model has other parameters than at: {error}") from None
     create = partial(Simulation, scheme=scheme, t0=t0, newton=newton, mesh=mesh, comm=MPI.COMM_SELF)
     return Case(call, model, {name: float(value) for name, value in at.items()}, create)
 
@@ -187,12 +192,7 @@ class Case:
 
     def scene(self, changes: Mapping[str, float]) -> Scene:
         """Return the scene for the values :attr:`at` with ``changes``."""
-        try:
-            scene = self._model(**{**self.at, **changes})
-        except TypeError as error:
-            if "argument" not in str(error):
-                raise
-            raise ArgumentError(f"{self._call}: model: {error}") from error
+        scene = self._model(**{**self.at, **changes})
         require_kind(scene, Scene, f"{self._call}: the result of model")
         return scene
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from ufl_beam.analysis.derivatives import (
     STENCILS,
+    STEP_OF_QUANTITIES,
     Model,
     MotionOnly,
     StepDerivatives,
@@ -31,8 +32,7 @@ from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.derivatives import recorded, transposes
 
 STEP = 2.0**-12
-"""Step of differences of motions, as a fraction of the size of the scene or in rad, and of the
-values of a history, as a fraction of the largest."""
+"""Step of differences of a history by motions, as a fraction of the largest motion."""
 
 MEMORY = 2.0**28
 """Memory for recorded steps; bytes."""
@@ -91,7 +91,7 @@ def gradient(
         ...     sections = [ub.Section(EI=x, **shape) for x in EI.values()]
         ...     a, b = (ub.Beam((k, 0), (k + 1, 0), s, cells=2) for k, s in enumerate(sections))
         ...     joints, supports = [ub.Rigid(a.end, b.start)], [ub.Clamped(a.start)]
-        ...     return ub.Scene([a, b], joints, supports=supports, loads=[ub.Gravity()])
+        ...     return ub.Scene([a, b], joints=joints, supports=supports, loads=[ub.Gravity()])
         >>> tip = lambda s: s.displacement(s.scene.beams[-1].end)[:, 1]
         >>> at = {"EI_0": 4e6, "EI_1": 4e6}
         >>> sag = ub.gradient(frame, at, ub.EnergyMomentum(), t=(0, 0.1), dt=2e-3, of=tip)
@@ -135,7 +135,7 @@ class _Adjoint:
             )
         terms, blocks = list[Any](), [(A.data, A.data.nbytes)]
         for (kind, data), owner in zip(steps.terms, steps.owners, strict=True):
-            if (found := transposes(kind)) is None:
+            if (found := transposes(kind, data)) is None:
                 raise ArgumentError(f"gradient: {owner.effect} has no adjoint; use differentiate")
             terms.append(found)
             blocks += recorded(kind, data)
@@ -232,13 +232,15 @@ def _derivatives_by_motion(
             f"gradient: of returns an array of shape {reference.shape}, and must return a history "
             f"with one row for each of the {len(solution)} states; put the rest into reduce"
         )
-    h, by_history = STEP * np.abs(reference).max() or STEP, np.zeros(reference.size)
-    for k in range(reference.size):
+    rows = reference.reshape(len(solution), -1)
+    by_rows, found = np.zeros(rows.shape), []
+    for (n, k), value in np.ndenumerate(rows):
+        h = STEP_OF_QUANTITIES * (np.abs(rows[:, k]).max() or 1.0)
         for position, weight in zip(positions, weights, strict=True):
-            changed = reference.copy()
-            changed.flat[k] += position * h
-            by_history[k] += weight / h * (reduce(changed) - reduce(reference))
-    by_rows, found = by_history.reshape(len(solution), -1), []
+            changed = rows.copy()
+            changed[n, k] = value + position * h
+            change = reduce(changed.reshape(reference.shape)) - reduce(reference)
+            by_rows[n, k] += weight / h * change
     for name, x in (("q", states["q"]), ("v", states["v"])):
         h, bar = STEP * max(float(np.abs(x).max()), 1e-300), np.zeros_like(x)
         pending = [np.arange(x.shape[1])]

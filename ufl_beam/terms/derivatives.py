@@ -217,16 +217,19 @@ TRANSPOSES = {
     "form": ("", "transpose_form", "finish_form"),
     "points": ("transpose_points_state", "transpose_points", "finish_points"),
     "product": ("", "transpose_product", ""),
+    "connectors": ("transpose_connectors_state", "transpose_connectors", "finish_connectors"),
     "load": ("", "transpose_loads", ""),
     "shape": ("", "transpose_shape", ""),
 }
 """Functions of ``term_transposes`` of loops.h by the kind of a derivative."""
 
 
-def transposes(kind: str) -> list[Any] | None:
-    """Return the functions of ``term_transposes`` of loops.h; None if a kind has no adjoint."""
+def transposes(kind: str, data: Any) -> list[Any] | None:
+    """Return the functions of ``term_transposes`` of loops.h; None if there is no adjoint."""
     if kind not in TRANSPOSES:
         return None
+    if kind == "connectors" and (data.limit and data.way or data.rows_of_user):
+        return None  # friction, and laws of users
     return [ffi.addressof(lib, name) if name else ffi.NULL for name in TRANSPOSES[kind]]
 
 
@@ -250,6 +253,16 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         product = data.matrix.product
         rate = ffi.addressof(product, "rate")  # C exchanges the vectors at this address
         return [(rate, 8 * product.size), (product.half, 8 * product.rotations)]
+    if kind == "connectors":
+        c, blocks = data.term.connectors, [table(data.motions), (data.dt, 8)]
+        if data.by_geometry:
+            blocks.append(table(data.by_geometry))
+        laws = c.laws or c.rigid_plastic
+        if laws:
+            blocks += [(data.J, 8 * c.number * data.outputs), (laws.w, 8 * c.number * laws.width)]
+        if c.rigid_plastic:
+            blocks.append((c.rigid_plastic.direction, 4 * c.number))
+        return [*blocks, *((x, 8 * c.number * c.components) for x in (c.e0, c.e1))]
     if kind == "points":
         points, blocks = data.points, [table(data.strains)]
         number = points.cells * points.of_cell

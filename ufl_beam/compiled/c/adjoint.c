@@ -211,6 +211,99 @@ void finish_points(void *self, adjoint *a)
   }
 }
 
+/* -- connectors ---------------------------------------------------------------------------------------- */
+
+static void add_row_of_law(const connector_derivatives *m, int i, int row, double factor, double *x_bar)
+{
+  const double *J = m->J + (size_t)i * m->outputs + row * m->columns;
+  for (int j = 0; j < m->columns; ++j) x_bar[m->column[j]] += factor * J[j];
+}
+
+/* From the slip of a rigid-plastic connector to the motion at the end and at the beginning of the slip. */
+static void enter_slip(const double *w, double slip_bar, double *motion_bar, double *w_bar)
+{
+  if (!(w[SLIP] > 0)) return;
+  if (motion_bar) *motion_bar += w[SLIP_DIRECTION] * slip_bar;
+  w_bar[SLIP_START] -= w[SLIP_DIRECTION] * slip_bar;
+}
+
+void transpose_connectors_state(void *self, adjoint *a)
+{
+  const connector_derivatives *m = self;
+  const connectors *c = m->term->connectors;
+  const int n = c->components, all = n * c->number;
+  double *x = a->values;
+  memcpy(m->e1, m->e0_bar, all * sizeof *m->e1);
+  memset(m->e0_bar, 0, all * sizeof *m->e1);
+  for (int i = 0; i < c->number; ++i) {
+    if (c->laws) {
+      const int width = c->laws->width;
+      double *w_bar = m->w_bar + (size_t)i * width, *state = w_bar + 2 * n + 2;
+      memset(x, 0, width * sizeof *x);
+      for (int j = 0; j < c->laws->variables; ++j) add_row_of_law(m, i, n + j, state[j], x), state[j] = 0;
+      for (int j = 0; j < n; ++j) m->e1[n * i + j] += x[j], m->e0_bar[n * i + j] += x[n + j];
+      for (int j = 2 * n; j < width; ++j) w_bar[j] += x[j];
+    } else if (c->rigid_plastic) {
+      const double *w = c->rigid_plastic->w + (size_t)i * c->rigid_plastic->width;
+      double *w_bar = m->w_bar + (size_t)i * c->rigid_plastic->width;
+      enter_slip(w, w_bar[SLIPPED] + w[SLIP_DIRECTION] * w_bar[SLIP_START], m->e1 + i, w_bar);
+    }
+  }
+  transpose_tables(m->motions, m->e1, 0, 0, a->q1);
+  if (m->by_geometry) transpose_tables(m->by_geometry, m->e1, 0, m->by_geometry->bar, 0);
+}
+
+void transpose_connectors(void *self, adjoint *a, const double *λ)
+{
+  const connector_derivatives *m = self;
+  const connector_term *t = m->term;
+  const connectors *c = t->connectors;
+  const int n = c->components;
+  double *x = a->values;
+  if (m->now) find_prescribed(m, a->step);
+  for (int i = 0; i < c->number; ++i) {
+    const double *row_bar = m->row_bar + n * (n + 2) * i + n + 1;
+    if (c->laws) {
+      const int width = c->laws->width;
+      double *w_bar = m->w_bar + (size_t)i * width;
+      memset(x, 0, width * sizeof *x);
+      for (int j = 0; j < n; ++j) add_row_of_law(m, i, j, row_bar[j * (n + 2)], x);
+      for (int j = 0; j < n; ++j) m->e0_bar[n * i + j] += x[n + j];
+      for (int j = 2 * n; j < width; ++j) w_bar[j] += x[j];
+    } else if (c->rigid_plastic) {
+      const rigid_plastic *of = c->rigid_plastic;
+      const double *w = of->w + (size_t)i * of->width;
+      double *w_bar = m->w_bar + (size_t)i * of->width;
+      if (!of->direction[i]) w_bar[SLIP_START] += *row_bar;
+      else {
+        memset(x, 0, of->width * sizeof *x);
+        add_row_of_law(m, i, 0, -*row_bar / of->slope[i], x);
+        enter_slip(w, x[SLIP], 0, w_bar);
+        x[SLIP] = 0;
+        for (int j = 0; j < of->width; ++j) w_bar[j] += x[j];
+      }
+    } else if (t->viscosity) {
+      m->viscosity_bar[i] += *row_bar * (c->e1[i] - c->e0[i]) / *m->dt;
+      m->e0_bar[i] -= *row_bar * t->viscosity[i] / *m->dt;
+    } else if (m->now)
+      for (int p = 0; p < a->parameters; ++p) a->gradient[p] += *row_bar * m->now[p * c->number + i];
+  }
+}
+
+void finish_connectors(void *self, adjoint *a)
+{
+  const connector_derivatives *m = self;
+  const connectors *c = m->term->connectors;
+  const size_t width = c->laws ? c->laws->width : c->rigid_plastic ? c->rigid_plastic->width : 0, all = width * c->number;
+  const form_derivative *g = m->by_geometry;
+  for (int p = 0; p < a->parameters; ++p) {
+    double sum = all ? dot(all, m->w_bar, m->w + p * all) : 0;
+    if (m->viscosity) sum += dot(c->number, m->viscosity_bar, m->viscosity + (size_t)p * c->number);
+    if (g) sum += dot(g->stride, g->bar, g->direction + (size_t)p * g->stride);
+    a->gradient[p] += sum;
+  }
+}
+
 /* -- inertia, damping, loads ----------------------------------------------------------------------------- */
 
 /* The matrices are symmetric. */

@@ -292,6 +292,26 @@ void accept_points_derivative(void *self, const derivatives *d, int q)
 
 /* -- connectors -------------------------------------------------------------------------------------- */
 
+/* Derivatives of the motions of motors and of the forces of actuators in the step. */
+static void find_prescribed(const connector_derivatives *m, const time_step *step)
+{
+  const connector_term *t = m->term;
+  for (int k = 0; m->now && k < m->parameters * t->connectors->number; ++k) {
+    const int p = k / t->connectors->number, i = k % t->connectors->number;
+    double wanted = 0;
+    for (int j = 0; j < m->neighbours; ++j) {
+      const connector_term *one = m->neighbour[p * m->neighbours + j];
+      const double change = t->wanted_motion
+        ? value_at(one->wanted_motion + i, step->motion_time) - value_at(t->wanted_motion + i, step->motion_time)
+        : value_at(t->wanted_force + i, step->load_time) - value_at(one->wanted_force + i, step->load_time);
+      wanted += m->weight[p * m->neighbours + j] * change;
+    }
+    const double before = t->wanted_motion ? m->e0[k] : m->reached[k];
+    m->end[k] = before + step->fraction * (wanted - before);
+    m->now[k] = t->wanted_motion ? m->end[k] : before + step->at * (m->end[k] - before);
+  }
+}
+
 /* Motions at the end of the step, their derivatives by the unknowns, and the derivatives of laws. */
 void tabulate_connectors(void *self, const time_step *step, const double *q1)
 {
@@ -310,21 +330,7 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
     else set_slip(w, c->e1[i] - w[SLIP_START], c->rigid_plastic->direction[i]);
     ask_table(m->table, w, m->outputs, m->J + (size_t)i * m->outputs);
   }
-  for (int k = 0; k < m->parameters * c->number && (t->wanted_motion || t->wanted_force); ++k) {
-    const int p = k / c->number, i = k % c->number;
-    const time_step s = *step;
-    double wanted = 0;
-    for (int j = 0; j < m->neighbours; ++j) {
-      const connector_term *one = m->neighbour[p * m->neighbours + j];
-      const double change = t->wanted_motion
-        ? value_at(one->wanted_motion + i, s.motion_time) - value_at(t->wanted_motion + i, s.motion_time)
-        : value_at(t->wanted_force + i, s.load_time) - value_at(one->wanted_force + i, s.load_time);
-      wanted += m->weight[p * m->neighbours + j] * change;
-    }
-    const double before = t->wanted_motion ? m->e0[k] : m->reached[k];
-    m->end[k] = before + s.fraction * (wanted - before);
-    m->now[k] = t->wanted_motion ? m->end[k] : before + s.at * (m->end[k] - before);
-  }
+  find_prescribed(m, step);
 }
 
 /* Set the derivative of the slip of a rigid-plastic connector from that of its motion. */

@@ -1220,6 +1220,7 @@ typedef struct {
   const connector_term *const *neighbour; /* of motors and actuators: the same in neighbouring scenes */
   const double *weight;          /* see derivatives */
   double *now, *end, *reached;   /* of motors: motions; of actuators: forces; or none */
+  double *w_bar, *e0_bar, *row_bar, *viscosity_bar; /* of the adjoint */
   void (*rows_of_user)(void *handle, int p), (*end_of_user)(void *handle, int p); /* of laws of users */
   void *rows_handle, *end_handle;
 } connector_derivatives;
@@ -1270,6 +1271,9 @@ int record_step(adjoint *a, time_loop *m);
 int go_back(adjoint *a, time_loop *m);
 void finish_adjoint(adjoint *a, time_loop *m);
 void transpose_points_state(void *self, adjoint *a);
+void transpose_connectors_state(void *self, adjoint *a);
+void transpose_connectors(void *self, adjoint *a, const double *lambda);
+void finish_connectors(void *self, adjoint *a);
 void transpose_form(void *self, adjoint *a, const double *lambda);
 void transpose_points(void *self, adjoint *a, const double *lambda);
 void transpose_product(void *self, adjoint *a, const double *lambda);
