@@ -73,11 +73,8 @@ class Inputs:
             more = self.prescribed_names[before[1] :]
             names += [_accelerated(name) for name in more]
             kinds += [True] * len(more)
-        for name in (name for i, name in enumerate(names) if name in names[:i]):
-            twice = names.count(name)
-            if any(x is y for i, x in enumerate(given) for y in given[:i]) or twice:
-                raise ArgumentError(f"linearize: inputs: {name} occurs {twice} times")
-        self.names, motion = names, np.array(kinds, dtype=bool)
+        _require_once(given, self.prescribed_names)
+        self.names, motion = _unique(names), np.array(kinds, dtype=bool)
         self.order: Index = np.where(
             motion, np.cumsum(motion) - 1 + np.sum(~motion), np.cumsum(~motion) - 1
         )
@@ -172,6 +169,24 @@ def _accelerated(name: str) -> str:
     return f"d2{first}/dt2 {rest} [{unit}/s2]"
 
 
+def _require_once(given: Sequence[Any], motions: Sequence[str]) -> None:
+    """Raise if two inputs are the same load, connector or motion of a support."""
+    objects = [x[0] if isinstance(x, tuple) else x for x in given]
+    for i, x in enumerate(objects):
+        if any(x is y for y in objects[:i]) and not isinstance(x, Support):
+            raise ArgumentError(f"linearize: inputs: {x} occurs twice")
+    for name in (name for i, name in enumerate(motions) if name in motions[:i]):
+        raise ArgumentError(f"linearize: inputs: {name} occurs twice")
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    """Number equal names, such as those of two springs between the same places."""
+    return [
+        f"{name} ({names[:i].count(name) + 1})" if name in names[:i] else name
+        for i, name in enumerate(names)
+    ]
+
+
 class Outputs:
     """Outputs of a linear model: rows for the unknowns, their rates and accelerations.
 
@@ -198,8 +213,7 @@ class Outputs:
             what = f"linearize: outputs[{n}]"
             kind, x, components = _require_output(output, what)
             getattr(self, f"_add_{kind}")(x, components, what, kind)
-        for name in (name for i, name in enumerate(self.names) if name in self.names[:i]):
-            raise ArgumentError(f"linearize: outputs: {name} occurs twice")
+        self.names = _unique(self.names)
         self.rows = tuple(csr_array(vstack(rows)) for rows in self._rows)
         self.direct = np.array(self._direct).reshape(len(self.names), -1)
         self.motions = csr_array(vstack([csr_array((0, size)), *self._motions]))
@@ -273,7 +287,7 @@ class Outputs:
             length, unit = ("rad", "N m") if connector.is_rotation else ("m", "N")
             for c in components:
                 name = KINDS["connector"][c]
-                title = f"{name} {connector} [{(length, f'{length}/s', unit)[c]}]"
+                title = f"{name} {connector}, {type(connector.law).__name__} [{(length, f'{length}/s', unit)[c]}]"
                 rows = ([motion, None, None], [None, motion, None], [force, None, None])[c]
                 self._enter(title, rows, motion=None if c == 2 else motion)
 
@@ -316,9 +330,10 @@ class Outputs:
             rows[:2] -= sign * float(q[0, λ]) * change
             rows[:2, λ] -= sign * d
         for c in components:
+            turns = any(holder.is_rotation for holder in held)
+            if c == 2 and not turns and len(components) > 1:
+                continue  # the moment is zero, or with shared rotations not known
             if c == 2 and 2 in x.shared:
-                if len(components) > 1:
-                    continue  # the moment of shared rotations is not known
                 raise ArgumentError(f"{what}: {x} shares its rotation; its moment is not known")
             self._enter(f"{FORCE[c]} {x} [{('N', 'N', 'N m')[c]}]", [rows[[c]], None, None])
 

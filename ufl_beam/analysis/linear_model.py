@@ -283,9 +283,9 @@ class LinearModel(Rich):
             n: Number of modes; fewer if the scene has fewer.
         """
         n, small, nu = require_count(n, "reduced: n"), self._small, self._inputs.number_of_motions
-        values, x, *_ = small.undamped(n, (small.K + small.K.T) / 2, definite=True)
+        values, x, _, zero, _ = small.undamped(n, (small.K + small.K.T) / 2, definite=True)
         order = np.argsort(np.abs(values), kind="stable")[:n]
-        values, x = values[order], x[:, order]
+        values, x = np.where(zero, 0.0, values)[order], x[:, order]
         x = x @ np.linalg.inv(np.linalg.cholesky(x.T @ (small.M @ x))).T
         lowest = np.abs(values[np.abs(values) > HELD * small.squares.min()]).min(
             initial=small.squares.max()
@@ -299,7 +299,7 @@ class LinearModel(Rich):
         model._basis = x, P
         hertz = np.sqrt(np.abs(values)) / (2 * np.pi)
         model._mode_names = [f"mode {k} ({f:.4g} Hz)" for k, f in enumerate(hertz)]
-        model._correction = (self._response(s) - model.transfer_function(s)[:, :, 0]).real
+        model._correction = (self._response(complex(s)) - model.transfer_function(s)[:, :, 0]).real
         vars(model).pop("_space")
         return model
 
@@ -546,29 +546,44 @@ def _free(combination: Array, motions: Array, names: Sequence[str]) -> str:
 
 
 def require_free(small: SmallMotions, inputs: Inputs, outputs: Outputs) -> None:
-    """Raise if constraints hold an output, or the motions on which an input works."""
-    rows = small._constraint_rows
-    y, μ = np.flatnonzero(~rows), np.flatnonzero(rows)
-    D = diags_array(small.lengths[small.left[y]])
-    names = [f"outputs: {x}" for x in outputs.motion_names]
-    names += [f"inputs: {name}" for name in inputs.force_names]
-    forces = small._Z.T @ inputs.condensed
-    W = np.hstack([(small._Z.T @ outputs.motions.T).toarray()[y], forces.toarray()[y]])
-    whole = np.hstack([outputs.motions.T.toarray(), inputs.condensed.toarray()])
-    whole = np.linalg.norm(small.lengths[:, None] * whole, axis=0)
-    W = D @ W
+    """Raise if constraints hold an output, or the motions on which an input works.
+
+    Prescribed motions that are inputs do not hold outputs.
+    """
+    forces, motions = inputs.condensed.toarray(), outputs.motions.T.toarray()
+    moved = inputs.prescribed[small.left].tocsr()[np.flatnonzero(small._constraint_rows)]
+    fixed = np.ones(moved.shape[0], dtype=bool) if not moved.nnz else abs(moved).sum(axis=1) == 0
+    by_supports = abs(outputs.motions @ inputs.motions).sum(axis=1) > 0
+    free = _allowed(small, motions, fixed) | by_supports
+    for name in [x for x, able in zip(outputs.motion_names, free, strict=True) if not able][:1]:
+        raise ArgumentError(
+            f"linearize: outputs: {name}: supports or constraints hold this motion, so that it "
+            "does not change; choose another place, or one component, as (..., place, 'u')"
+        )
+    works = _allowed(small, forces, fixed | True)
+    for name in [x for x, able in zip(inputs.force_names, works, strict=True) if not able][:1]:
+        raise ArgumentError(
+            f"linearize: inputs: {name}: supports or constraints hold the motion on which it "
+            "works, so that it moves nothing; choose another place or direction"
+        )
+
+
+def _allowed(
+    small: SmallMotions, vectors: Array, chosen: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.bool_]:
+    """Return which columns, rows of motions or forces, the ``chosen`` constraints leave free.
+
+    A column is free if its part in the motions that the constraints allow is not round-off.
+    """
+    y, μ = np.flatnonzero(~small._constraint_rows), np.flatnonzero(small._constraint_rows)[chosen]
+    whole = np.linalg.norm(small.lengths[:, None] * vectors, axis=0)
+    W = small.lengths[small.left[y], None] * (small._Z.T @ vectors)[y]
     if len(μ) and W.size:
-        G = csr_array(small.K)[μ][:, y] @ D
+        G = csr_array(small.K)[μ][:, y] @ diags_array(small.lengths[small.left[y]])
         G = diags_array(1 / np.sqrt((G * G).sum(axis=1))) @ G
         system = block_array([[eye_array(len(y)), G.T], [G, None]])
         W = splu(csc_array(system)).solve(np.vstack([W, np.zeros((len(μ), W.shape[1]))]))[: len(y)]
-    held = np.linalg.norm(W, axis=0) <= HELD * whole
-    for name in [name for name, one in zip(names, held, strict=True) if one][:1]:
-        raise ArgumentError(
-            f"linearize: {name}: supports or constraints hold this motion, so that it "
-            + ("does not change" if name.startswith("outputs") else "has no effect on the motion")
-            + "; choose another place, or one component, as (..., place, 'u')"
-        )
+    return np.asarray(np.linalg.norm(W, axis=0) > HELD * whole)
 
 
 def require_equilibrium(small: SmallMotions, at: Solution | None) -> None:
