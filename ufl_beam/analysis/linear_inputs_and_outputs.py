@@ -102,9 +102,9 @@ class Inputs:
                 raise ArgumentError(f"{what}: {x} is not in the scene")
             if isinstance(x, RotatingFrame):
                 raise ArgumentError(f"{what}: forces of a RotatingFrame have no factor")
-            before, before_in_cells = self._residual()
+            before, before_in_cells = self._small.forces()
             self._factors[id(x)].change = 1.0
-            after, in_cells = self._residual()
+            after, in_cells = self._small.forces()
             self._factors[id(x)].change = 0.0
             self._enter_force(f"factor of {x} [1]", before - after, in_cells - before_in_cells)
         elif isinstance(x, Connector):
@@ -155,11 +155,6 @@ class Inputs:
         self.force_names.append(name)
         self._forces.append(force)
         self.in_cells.append(in_cells)
-
-    def _residual(self) -> tuple[Array, Array]:
-        small = self._small
-        residual, _ = small._linearized(small.q)
-        return residual, small.forces_of_cells()
 
 
 def _accelerated(name: str) -> str:
@@ -371,7 +366,7 @@ class Outputs:
             return along(np.array([cell]), at, resultants[:, [cell]], q[None])[0, 0]
 
         unique, matrices = np.unique(dofs), np.zeros((3, 3, small.numbering.size))
-        base = small.forces_of_cells()
+        _, base = small.forces()
         for dof in unique:
             turned_q = q + IMAGINARY * 1j * (dofs == dof)
             by_axes = np.imag(forces(base, turned_q)) / IMAGINARY

@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import structural_rank
 from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import ffi, lib
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import cached_forms
 from ufl_beam.discretization.dof_numbering import DofNumbering
@@ -258,15 +258,15 @@ class Linearization:
         """Return a degree of freedom with the unit of the motion of a connector."""
         return int(self.numbering.node(connector.b)[2 if connector.is_rotation else 0])
 
-    def forces_of_cells(self) -> Array:
-        """Return the forces on the ends of cells in the latest residual, without inertia.
+    def forces(self) -> tuple[Array, Array]:
+        """Return all forces except inertia, (size,), and those on the ends of cells.
 
-        They are ordered as ``cell_number`` of loops.h; (9, num_cells).
+        The latter are ordered as ``cell_number`` of loops.h; (9, num_cells).
         """
+        residual, _ = self._linearized(self.q)
         cells = self._simulation.equation.cell_forces
-        cells.c.initial = ffi.NULL
         cells.accept()
-        return cells(self.q, self.q)
+        return residual, cells(self.q, self.q)
 
     def changes_of_cells(self, dof: int) -> tuple[Array, Array, Array]:
         """Return derivatives of forces on cells by a motion, its rate and acceleration; (9, n).
