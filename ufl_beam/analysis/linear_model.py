@@ -48,6 +48,7 @@ SINGULAR = 1e-12  # eigenvalue or pivot that is zero, as a fraction of the large
 HELD = 1e-9  # fraction of a motion that constraints allow, below which they hold it
 ABSENT = 1e-9  # coefficient of a derivative that is round-off, as a fraction of its terms
 QUASI_STATIC = 1e-2  # exponent of the static correction, as a fraction of the lowest frequency
+ITERATIONS = 4  # of the static motions of a reduced model
 MOST_STATES = 4000  # largest number of states without modal reduction
 NAMED = 3  # largest number of unbalanced forces in a message
 
@@ -291,8 +292,13 @@ class LinearModel(Rich):
             initial=small.squares.max()
         )
         s = QUASI_STATIC * float(lowest) ** 0.5
-        still = splu(csc_array(small.K + s**2 * small.M))
-        P = still.solve(self._loads[1][0].toarray()) if nu else np.zeros((len(x), 0))
+        # Static motions P with K P = B; K may be singular, and an iteration reduces the error of the
+        # shifted matrix by the factor QUASI_STATIC² each time.
+        P = np.zeros((len(x), nu))
+        if nu:
+            shifted = splu(csc_array(small.K + s**2 * small.M))
+            for _ in range(ITERATIONS):
+                P = shifted.solve(self._loads[1][0].toarray() + s**2 * (small.M @ P))
         model = copy.copy(self)
         for name in ("_space", "states"):
             vars(model).pop(name, None)
