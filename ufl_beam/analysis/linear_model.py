@@ -88,6 +88,7 @@ class LinearModel(Rich):
         self.inputs, self.outputs = inputs.names, outputs.names
         self._basis: tuple[Array, Array] | None = None  # modes and motions with unit inputs
         self._correction: Array | float = 0.0  # of D in a reduced model
+        self._squares: Array = np.zeros(0)  # squared frequencies of the modes
         self._mode_names: list[str] = []
         require_free(small, inputs, outputs)
 
@@ -284,10 +285,11 @@ class LinearModel(Rich):
             n: Number of modes; fewer if the scene has fewer.
         """
         n, small, nu = require_count(n, "reduced: n"), self._small, self._inputs.number_of_motions
-        values, x, _, zero, _ = small.undamped(n, (small.K + small.K.T) / 2, definite=True)
+        _, x, works, zero, _ = small.undamped(n, (small.K + small.K.T) / 2, definite=True)
+        masses = np.sum(x * (small.M @ x), axis=0)
+        values = np.where(zero, 0.0, works / masses)
         order = np.argsort(np.abs(values), kind="stable")[:n]
-        values, x = np.where(zero, 0.0, values)[order], x[:, order]
-        x = x @ np.linalg.inv(np.linalg.cholesky(x.T @ (small.M @ x))).T
+        values, x = values[order], (x / np.sqrt(masses))[:, order]
         lowest = np.abs(values[np.abs(values) > HELD * small.squares.min()]).min(
             initial=small.squares.max()
         )
@@ -303,6 +305,7 @@ class LinearModel(Rich):
         for name in ("_space", "states"):
             vars(model).pop(name, None)
         model._basis = x, P
+        model._squares = values
         hertz = np.sqrt(np.abs(values)) / (2 * np.pi)
         model._mode_names = [f"mode {k} ({f:.4g} Hz)" for k, f in enumerate(hertz)]
         model._correction = (self._response(complex(s)) - model.transfer_function(s)[:, :, 0]).real
@@ -389,6 +392,8 @@ class LinearModel(Rich):
             N, P = self._basis[0][y], self._basis[1][y]
         k = N.shape[1]
         Mr, Cr, Kr = (N.T @ (A[y][:, y] @ N) for A in (M, Cd, K))
+        if self._basis is not None and abs(K - K.T).max() <= ROUND_OFF * abs(K).max():
+            Kr = np.diag(self._squares)  # quotients of works, more accurate than products with K
         Ps = [N.T @ (A[y].toarray() - B[y][:, y] @ P) for A, B in zip(moved, (K, Cd, M), strict=True)]
         if self._basis is None:
             sizes = np.einsum("ij,ij->j", np.abs(N), abs(M[y][:, y]) @ np.abs(N))
