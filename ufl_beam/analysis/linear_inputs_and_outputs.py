@@ -65,15 +65,14 @@ class Inputs:
         self._still = np.zeros((9, cells))
         columns: dict[str, list[Any]] = {"motions": [], "prescribed": [], "read": []}
         names, kinds = list[str](), list[bool]()
-        for n, x in enumerate(given):
+        for x, components in given:
             before = len(self.force_names), len(self.prescribed_names)
-            self._add(x, f"linearize: inputs[{n}]", columns)
+            self._add(x, components, columns)
             names += [f"{name}" for name in self.force_names[before[0] :]]
             kinds += [False] * (len(self.force_names) - before[0])
             more = self.prescribed_names[before[1] :]
             names += [_accelerated(name) for name in more]
             kinds += [True] * len(more)
-        _require_once(given, self.prescribed_names)
         self.names, motion = _unique(names), np.array(kinds, dtype=bool)
         self.order: Index = np.where(
             motion, np.cumsum(motion) - 1 + np.sum(~motion), np.cumsum(~motion) - 1
@@ -90,31 +89,16 @@ class Inputs:
         self.read = csr_array(read.T)
         self.number_of_motions = self.motions.shape[1]
 
-    def _add(self, given: Any, what: str, columns: dict[str, list[Any]]) -> None:
-        x, component = given if isinstance(given, tuple) and len(given) == 2 else (given, None)
-        scene, size = self._scene, self._small.numbering.size
-        if component is not None and not isinstance(x, Support):
-            raise ArgumentTypeError(
-                f"{what} = {shorten(given)} is a pair, which is for supports; give the object"
-            )
+    def _add(self, x: Any, components: Sequence[int], columns: dict[str, list[Any]]) -> None:
+        scene, size, T = self._scene, self._small.numbering.size, self._small.tangent
         if isinstance(x, Load):
-            if x not in scene.loads:
-                raise ArgumentError(f"{what}: {x} is not in the scene")
-            if isinstance(x, RotatingFrame):
-                raise ArgumentError(f"{what}: forces of a RotatingFrame have no factor")
             before, before_in_cells = self._small.forces()
             self._factors[id(x)].change = 1.0
             after, in_cells = self._small.forces()
             self._factors[id(x)].change = 0.0
             self._enter_force(f"factor of {x} [1]", before - after, in_cells - before_in_cells)
         elif isinstance(x, Connector):
-            indices = connector_indices(scene, x)
-            if not isinstance(x.law, PrescribedForce | Controller | PrescribedMotion):
-                raise ArgumentError(
-                    f"{what}: {x} has the law {type(x.law).__name__}; an input has a "
-                    "PrescribedForce, a Controller or a PrescribedMotion"
-                )
-            row, T = int(self._small.numbering.multipliers[indices[0]]), self._small.tangent
+            row = int(self._small.numbering.multipliers[connector_indices(scene, x)[0]])
             if not isinstance(x.law, PrescribedMotion):
                 force = np.zeros(size)
                 force[row] = -T[row, row]  # λ resists the growth of the motion
@@ -126,30 +110,13 @@ class Inputs:
             columns["read"].append(T[[row]].toarray()[0])
             unit = "rad" if x.is_rotation else "m"
             self.prescribed_names.append(f"motion of {x} [{unit}]")
-        elif isinstance(x, Support):
-            if x not in scene.supports:
-                raise ArgumentError(f"{what}: {x} is not in the scene")
-            if component is not None and component not in COMPONENTS:
-                raise ArgumentError(
-                    f"{what}: component {shorten(component)} must be 'u', 'v' or 'psi'"
-                )
-            chosen = sorted(x.held) if component is None else [COMPONENTS.index(component)]
-            for c in chosen:
-                if c not in x.held:
-                    raise ArgumentError(
-                        f"{what}: {x} does not hold {COMPONENTS[c]}, so that it cannot move it; "
-                        "give a PrescribedDisplacement, or a load as an input"
-                    )
+        else:
+            for c in components:
                 unit = self._small._axes[:, [self._small.numbering.node(x.place)[c]]].toarray()
                 columns["motions"].append(unit[:, 0])
                 columns["prescribed"].append(np.zeros(size))
                 columns["read"].append(unit[:, 0])
                 self.prescribed_names.append(f"{COMPONENTS[c]} of {x} [{UNITS[c]}]")
-        else:
-            raise ArgumentTypeError(
-                f"{what} = {shorten(given)} must be a load, connector or support of the scene, or "
-                "(support, component)"
-            )
 
     def _enter_force(self, name: str, force: Array, in_cells: Array) -> None:
         self.force_names.append(name)
@@ -164,14 +131,53 @@ def _accelerated(name: str) -> str:
     return f"d2{first}/dt2 {rest} [{unit}/s2]"
 
 
-def _require_once(given: Sequence[Any], motions: Sequence[str]) -> None:
-    """Raise if two inputs are the same load, connector or motion of a support."""
-    objects = [x[0] if isinstance(x, tuple) else x for x in given]
-    for i, x in enumerate(objects):
-        if any(x is y for y in objects[:i]) and not isinstance(x, Support):
-            raise ArgumentError(f"linearize: inputs: {x} occurs twice")
-    for name in (name for i, name in enumerate(motions) if name in motions[:i]):
-        raise ArgumentError(f"linearize: inputs: {name} occurs twice")
+def checked_inputs(scene: Scene, given: Sequence[Any]) -> list[tuple[Any, list[int]]]:
+    """Return the objects of inputs, with the components of supports, or raise."""
+    checked = list[tuple[Any, list[int]]]()
+    for n, one in enumerate(given):
+        what = f"linearize: inputs[{n}]"
+        x, component = one if isinstance(one, tuple) and len(one) == 2 else (one, None)
+        if component is not None and not isinstance(x, Support):
+            raise ArgumentTypeError(
+                f"{what} = {shorten(one)} is a pair, which is for supports; give the object"
+            )
+        components = list[int]()
+        if isinstance(x, Load):
+            if x not in scene.loads:
+                raise ArgumentError(f"{what}: {x} is not in the scene")
+            if isinstance(x, RotatingFrame):
+                raise ArgumentError(f"{what}: forces of a RotatingFrame have no factor")
+        elif isinstance(x, Connector):
+            connector_indices(scene, x)
+            if not isinstance(x.law, PrescribedForce | Controller | PrescribedMotion):
+                raise ArgumentError(
+                    f"{what}: {x} has the law {type(x.law).__name__}; an input has a "
+                    "PrescribedForce, a Controller or a PrescribedMotion"
+                )
+        elif isinstance(x, Support):
+            if x not in scene.supports:
+                raise ArgumentError(f"{what}: {x} is not in the scene")
+            if component is not None and component not in [*COMPONENTS]:
+                raise ArgumentError(
+                    f"{what}: component {shorten(component)} must be 'u', 'v' or 'psi'"
+                )
+            components = sorted(x.held) if component is None else [COMPONENTS.index(component)]
+            for c in components:
+                if c not in x.held:
+                    raise ArgumentError(
+                        f"{what}: {x} does not hold {COMPONENTS[c]}, so that it cannot move it; "
+                        "give a PrescribedDisplacement, or a load as an input"
+                    )
+        else:
+            raise ArgumentTypeError(
+                f"{what} = {shorten(one)} must be a load, connector or support of the scene, or "
+                "(support, component)"
+            )
+        for y, others in checked:
+            if x is y and (not components or {*components} & {*others}):
+                raise ArgumentError(f"{what}: {x} occurs twice")
+        checked.append((x, components))
+    return checked
 
 
 def _unique(names: Sequence[str]) -> list[str]:
@@ -204,10 +210,8 @@ class Outputs:
         size = small.numbering.size
         self._none = csr_array((1, size))
         self._identity = eye_array(size, format="csr")
-        for n, output in enumerate(wanted):
-            what = f"linearize: outputs[{n}]"
-            kind, x, components = _require_output(output, what)
-            getattr(self, f"_add_{kind}")(x, components, what, kind)
+        for kind, x, components in wanted:
+            getattr(self, f"_add_{kind}")(x, components, kind)
         self.names = _unique(self.names)
         self.rows = tuple(csr_array(vstack(rows)) for rows in self._rows)
         self.direct = np.array(self._direct).reshape(len(self.names), -1)
@@ -256,8 +260,7 @@ class Outputs:
                 rows[[0, 1, 2], numbering.dofs[at]] += weight
         return csr_array(rows)
 
-    def _add_motion(self, x: Any, components: Sequence[int], what: str, kind: str) -> None:
-        require_place(x, what)
+    def _add_motion(self, x: Any, components: Sequence[int], kind: str) -> None:
         order = ("displacement", "velocity", "acceleration").index(kind)
         before, after = (("", ""), ("d", "/dt"), ("d2", "/dt2"))[order]
         per = ("", "/s", "/s2")[order]
@@ -271,8 +274,7 @@ class Outputs:
 
     # -- forces --------------------------------------------------------------------------------
 
-    def _add_connector(self, x: Any, components: Sequence[int], what: str, kind: str) -> None:
-        _require(x, Connector, what)
+    def _add_connector(self, x: Any, components: Sequence[int], kind: str) -> None:
         numbering, T = self._small.numbering, self._small.tangent
         for index in connector_indices(self._scene, x):
             connector, λ = self._scene.all_connectors[index], int(numbering.multipliers[index])
@@ -286,25 +288,15 @@ class Outputs:
                 rows = ([motion, None, None], [None, motion, None], [force, None, None])[c]
                 self._enter(title, rows, motion=None if c == 2 else motion)
 
-    def _add_joint(self, x: Any, components: Sequence[int], what: str, kind: str) -> None:
+    def _add_joint(self, x: Any, components: Sequence[int], kind: str) -> None:
         """Add the force of a joint on its second place, see :meth:`States.joint`."""
-        _require(x, Joint, what)
         small, numbering = self._small, self._small.numbering
         indices, (a, b, *_) = connector_indices(self._scene, x), x.places
         held = [holder for holder in x.holders if {holder.a, holder.b} == {a, b}]
-        if not held:
-            raise ArgumentError(
-                f"{what}: {x} shares unknowns, so that its force is not known; make it with "
-                "multipliers=True"
-            )
-        size = numbering.size
-        rows = np.zeros((3, size))
-        q = small.q[None]
+        rows = np.zeros((3, numbering.size))
         for index, holder in zip(indices, x.holders, strict=True):
             if holder not in held:
                 continue
-            if isinstance(holder.law, Guide):
-                raise ArgumentError(f"{what}: {x}: the force of a guide is no output")
             λ, sign = int(numbering.multipliers[index]), 1.0 if holder.b == b else -1.0
             if holder.is_rotation:
                 rows[2, λ] -= sign
@@ -322,7 +314,7 @@ class Outputs:
                 angle = np.array([by_a @ small.q])
                 d = turned(holder.axis, angle)[0]
                 change = np.outer([-d[1], d[0]], by_a)
-            rows[:2] -= sign * float(q[0, λ]) * change
+            rows[:2] -= sign * small.q[λ] * change
             rows[:2, λ] -= sign * d
         for c in components:
             turns = any(holder.is_rotation for holder in held)
@@ -332,10 +324,7 @@ class Outputs:
                 raise ArgumentError(f"{what}: {x} shares its rotation; its moment is not known")
             self._enter(f"{FORCE[c]} {x} [{('N', 'N', 'N m')[c]}]", [rows[[c]], None, None])
 
-    def _add_reaction(self, x: Any, components: Sequence[int], what: str, kind: str) -> None:
-        _require(x, Support, what)
-        if x not in self._scene.supports:
-            raise ArgumentError(f"{what}: {x} is not in the scene")
+    def _add_reaction(self, x: Any, components: Sequence[int], kind: str) -> None:
         small, dofs = self._small, self._small.numbering.node(x.place)
         matrices = small.condensed_tangent, small.condensed_damping, small.masses
         axes = small._axes[dofs][:, dofs].toarray()
@@ -350,11 +339,8 @@ class Outputs:
 
     # -- section forces ------------------------------------------------------------------------
 
-    def _add_section_forces_at(
-        self, x: Any, components: Sequence[int], what: str, kind: str
-    ) -> None:
+    def _add_section_forces_at(self, x: Any, components: Sequence[int], kind: str) -> None:
         """Add section forces in equilibrium with inertia, damping and loads of the cell."""
-        _require(x, Place, what)
         small, inputs = self._small, self._inputs
         cell, fraction = small.numbering.cell_and_fraction(x)
         along = ForcesAlongCells(small.numbering)
@@ -389,23 +375,58 @@ def _position(small: Linearization, place: AttachmentPoint) -> Array:
     return np.asarray(place.point + moved[:2])
 
 
-def _require(x: Any, kind: type, what: str) -> None:
-    if not isinstance(x, kind):
-        raise ArgumentTypeError(f"{what}: {shorten(x)} must be a {kind.__name__}")
+def checked_outputs(scene: Scene, wanted: Sequence[Any]) -> list[tuple[str, Any, list[int]]]:
+    """Return kinds, objects and indices of the components of outputs, or raise."""
+    return [_checked_output(scene, x, f"linearize: outputs[{n}]") for n, x in enumerate(wanted)]
 
 
-def _require_output(output: Any, what: str) -> tuple[str, Any, list[int]]:
-    """Return kind, object and indices of the components of an output, or raise."""
+OBJECTS: Mapping[str, type] = {
+    "section_forces_at": Place, "connector": Connector, "joint": Joint, "reaction": Support,
+}  # fmt: skip
+"""Classes of the objects of outputs other than motions."""
+
+
+def _checked_output(scene: Scene, output: Any, what: str) -> tuple[str, Any, list[int]]:
     if not isinstance(output, tuple) or len(output) not in (2, 3) or output[0] not in [*KINDS]:
         raise ArgumentTypeError(
             f"{what} = {shorten(output)} must be a tuple such as ('displacement', place, 'v'), "
             f"which begins with {', '.join(map(repr, KINDS))}"
         )
-    names = KINDS[output[0]]
-    if len(output) == 2:
-        return output[0], output[1], [*range(len(names))]
-    if output[2] not in [*names]:
+    kind, x, *rest = output
+    names = KINDS[kind]
+    if rest and rest[0] not in [*names]:
         raise ArgumentError(
-            f"{what}: component {shorten(output[2])} must be one of {', '.join(map(repr, names))}"
+            f"{what}: component {shorten(rest[0])} must be one of {', '.join(map(repr, names))}"
         )
-    return output[0], output[1], [names.index(output[2])]
+    if kind not in OBJECTS:
+        require_place(x, what)
+    elif not isinstance(x, OBJECTS[kind]):
+        raise ArgumentTypeError(f"{what}: {shorten(x)} must be a {OBJECTS[kind].__name__}")
+    missing = False
+    if isinstance(x, Place):
+        missing = x.beam not in scene.beams
+    elif isinstance(x, BodyPoint):
+        missing = x.body not in scene.rigid_bodies
+    elif isinstance(x, Support):
+        missing = x not in scene.supports
+    if missing:
+        raise ArgumentError(f"{what}: {x} is not in the scene")
+    if isinstance(x, Connector):
+        connector_indices(scene, x)
+    elif isinstance(x, Joint):
+        _require_known_force(scene, x, rest, what)
+    return kind, x, [names.index(rest[0])] if rest else [*range(len(names))]
+
+
+def _require_known_force(scene: Scene, joint: Joint, rest: Sequence[str], what: str) -> None:
+    """Raise unless the force of a joint between its first two places is an unknown."""
+    connector_indices(scene, joint)
+    if not any({holder.a, holder.b} == {*joint.places[:2]} for holder in joint.holders):
+        raise ArgumentError(
+            f"{what}: {joint} shares unknowns, so that its force is not known; make it with "
+            "multipliers=True"
+        )
+    if any(isinstance(holder.law, Guide) for holder in joint.holders):
+        raise ArgumentError(f"{what}: {joint}: the force of a guide is no output")
+    if rest and rest[0] == "moment" and 2 in joint.shared:
+        raise ArgumentError(f"{what}: {joint} shares its rotation; its moment is not known")

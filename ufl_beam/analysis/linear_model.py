@@ -15,7 +15,12 @@ from scipy.linalg import lstsq, qr, solve, svd
 from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array, hstack
 from scipy.sparse.linalg import splu
 
-from ufl_beam.analysis.linear_inputs_and_outputs import Inputs, Outputs
+from ufl_beam.analysis.linear_inputs_and_outputs import (
+    Inputs,
+    Outputs,
+    checked_inputs,
+    checked_outputs,
+)
 from ufl_beam.analysis.modes import require_state
 from ufl_beam.analysis.small_motions import SmallMotions
 from ufl_beam.arrays import Array, Complex
@@ -35,6 +40,7 @@ from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.connector_laws import Controller, Coulomb
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import Constant
+from ufl_beam.model.loads import Load
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.output.states import States
@@ -346,6 +352,8 @@ class LinearModel(Rich):
         small, inputs = self._small, self._inputs
         if not now.numbering.agrees(small.numbering):
             raise ArgumentError("state: run has other beams, joints or cells than the model")
+        if not len(now):
+            raise ArgumentError("state: run has no state; give simulation, or simulation.snapshot()")
         q = now.q[-1] - small.q
         v = now.v[-1] if len(now.v) else np.zeros(len(q))
         y = ~small._constraint_rows
@@ -569,7 +577,7 @@ def require_free(small: SmallMotions, inputs: Inputs, outputs: Outputs) -> None:
     for name in [x for x, able in zip(outputs.motion_names, free, strict=True) if not able][:1]:
         raise ArgumentError(
             f"linearize: outputs: {name}: supports or constraints hold this motion, so that it "
-            "does not change; choose another place, or one component, as (..., place, 'u')"
+            "does not change; choose another place, or one component that moves, as (..., 'u') or (..., 'force')"
         )
     works = _allowed(small, forces, fixed | True)
     for name in [x for x, able in zip(inputs.force_names, works, strict=True) if not able][:1]:
@@ -606,16 +614,17 @@ def require_equilibrium(small: SmallMotions, at: Solution | None) -> None:
     apart[apart <= UNBALANCED * np.max(terms * weights, initial=0.0)] = 0.0
     apart[np.abs(r) <= round_off] = 0.0
     worst = numbering.worst(apart)
-    worst |= {f"gap of {x}": gap for x, gap in small.gaps().items() if abs(gap) > UNBALANCED}
+    worst |= {f"gap of {x}": gap for x, gap in small.gaps().items() if gap > UNBALANCED}
     if worst:
         listed = ", ".join(f"{name}: {value:.3g}" for name, value in [*worst.items()][:NAMED])
         remedy = (
-            "its loads or motions have changed; give the last state of a static run of this scene"
+            "loads or motions have changed, or dampers still bear forces; give the last state of a "
+            "static run of this scene in which nothing changes"
             if at is not None
-            else "the undeformed scene is no equilibrium under its loads, except inputs; give "
+            else "the undeformed scene is not in equilibrium with its loads, except inputs; give "
             "at=simulate(scene, Static(), ...)"
         )
-        raise ArgumentError(f"linearize: unbalanced forces (N, N m) at {listed}: {remedy}")
+        raise ArgumentError(f"linearize: no equilibrium; unbalanced forces (N) at {listed}: {remedy}")
     if at is None or not len(at.v):
         return
     fast = np.abs(at.v[-1]) * numbering.scales
@@ -629,9 +638,8 @@ def require_equilibrium(small: SmallMotions, at: Solution | None) -> None:
 
 def warn_of_omissions(small: SmallMotions, inputs: Sequence[Any]) -> None:
     """Warn of controllers and sliding friction, which the linear model leaves out."""
-    given = [x[0] if isinstance(x, tuple) else x for x in inputs]
     for connector in small.scene.all_connectors:
-        if isinstance(connector.law, Controller) and connector not in given:
+        if isinstance(connector.law, Controller) and connector not in inputs:
             warn(f"linearize: {connector}: the force of the controller is constant")
     for group in small._simulation.equation.connector_terms:
         if isinstance(group.connectors[0].law, Coulomb):
@@ -692,8 +700,13 @@ def linearize(
         >>> print(abs(model.frequency_response(1e-3)[0, 1]).round(6))  # as the support
         [1.]
     """
-    scene, given, wanted = _checked(scene, inputs, outputs, at, mesh)
-    unit = [x for x in given if x in scene.loads]
+    require_state("linearize", scene, at, mesh)
+    sequences = {"inputs": inputs, "outputs": outputs}
+    for name, some in sequences.items():
+        if not require_sequence(some, f"linearize: {name}"):
+            raise ArgumentError(f"linearize: {name} is empty; give at least one")
+    given, wanted = checked_inputs(scene, inputs), checked_outputs(scene, outputs)
+    unit = [x for x, _ in given if isinstance(x, Load)]
     factors = {id(load): _Amplitude(load.amplitude if at else Constant(0.0)) for load in unit}
     loads = [
         replace(x, amplitude=factors[id(x)]) if id(x) in factors else x for x in scene.loads
@@ -703,7 +716,7 @@ def linearize(
         raise ArgumentError("linearize: nothing that can move has mass; give sections rho or rhoA")
     require_equilibrium(small, at)
     warn_of_masses(scene)
-    warn_of_omissions(small, given)
+    warn_of_omissions(small, [x for x, _ in given])
     driven = Inputs(small, scene, given, factors)
     return LinearModel(small, scene, driven, Outputs(small, scene, wanted, driven))
 
@@ -717,14 +730,3 @@ class _Amplitude:
     def __call__(self, t: float) -> float:
         return float(self.function(t)) + self.change
 
-
-def _checked(
-    scene: Scene, inputs: Any, outputs: Any, at: Solution | None, mesh: Mesh | None
-) -> tuple[Scene, tuple[Any, ...], tuple[Any, ...]]:
-    require_state("linearize", scene, at, mesh)
-    given = require_sequence(inputs, "linearize: inputs")
-    wanted = require_sequence(outputs, "linearize: outputs")
-    for name, some in (("inputs", given), ("outputs", wanted)):
-        if not some:
-            raise ArgumentError(f"linearize: {name} is empty; give at least one")
-    return scene, given, wanted

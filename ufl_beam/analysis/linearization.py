@@ -238,20 +238,21 @@ class Linearization:
         return r, sums, BALANCED * self.scene.size * abs(T).max(axis=1).toarray().ravel()
 
     def gaps(self) -> dict[str, float]:
-        """Return the gaps of constraints and prescribed motions in the state, by name; m or rad."""
+        """Return gaps of constraints and prescribed motions by name; rad or size of the scene."""
         r, t = self._linearized(self.q)[0], self._simulation.t
-        gaps = {}
+        gaps = dict[str, float]()
         for connector, force in zip(
             self.scene.all_connectors, self.numbering.multipliers, strict=True
         ):
             if force not in self._laws:
-                gaps[str(connector)] = float(r[force] / self.lengths[self._motion_of(connector)])
+                gap = abs(r[force]) / self.lengths[self._motion_of(connector)]
+                gaps[str(connector)] = max(float(gap), gaps.get(str(connector), 0.0))
         at = self._axes.T @ self.q
         for support in self.scene.supports:
             for component, motion in support.held.items():
                 dof = self.numbering.node(support.place)[component]
-                gap = at[dof] - value_at(motion, t, support)
-                gaps[str(support)] = float(gap / self.lengths[dof])
+                gap = abs(at[dof] - value_at(motion, t, support)) / self.lengths[dof]
+                gaps[str(support)] = max(float(gap), gaps.get(str(support), 0.0))
         return gaps
 
     def _motion_of(self, connector: Connector) -> int:
