@@ -340,10 +340,20 @@ def test_state_must_be_at_rest():
     push = ub.PointLoad(BEAM.end, force=(1, 0), amplitude=still)
     with raises("at moves", "u of beam", "give a state at rest"):
         model_of(replace(free, loads=[push]), [push], at=run)
-    kick = ub.PointLoad(BEAM.end, force=(0, 1.0))
-    damped = replace(SCENE, loads=[kick], damping=[ub.KelvinVoigt(0.1)])
-    run = ub.simulate(damped, ub.EnergyMomentum(alpha=0.5), t=(0, 60), dt=0.05)
-    model_of(damped, [kick], at=run)  # no error
+    body = ub.Body((0, 0), mass=1.0, inertia=1.0)
+    kick = ub.PointLoad(body.middle, force=(1.0, 0))
+    laws = [
+        ub.Slide(ub.ground(0, 0), body.middle, law, axis=(1, 0))
+        for law in (ub.Spring(4.0), ub.Damper(2.0))
+    ]
+    held = ub.PrescribedDisplacement(body.middle, v=0.0, psi=0.0)
+    damped = ub.Scene([], bodies=[body], supports=[held], connectors=laws, loads=[kick])
+    output = ("displacement", body.middle, "u")
+    with raises("unbalanced", "u of body"):
+        run = ub.simulate(damped, ub.EnergyMomentum(), t=(0, 10), dt=0.1)
+        model_of(damped, [kick], [output], at=run)
+    run = ub.simulate(damped, ub.EnergyMomentum(), t=(0, 20), dt=0.1)  # exp(-20) is left
+    model_of(damped, [kick], [output], at=run)
 
 
 def test_held_outputs_and_inputs_are_refused():
