@@ -14,7 +14,6 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import turned, values_at
 from ufl_beam.errors import ArgumentError, ArgumentTypeError, shorten
 from ufl_beam.model.bodies import GROUND, AttachmentPoint, BodyPoint, Place, arm, node
-from ufl_beam.model.bodies import require_place
 from ufl_beam.model.connector_laws import Controller, Guide, PrescribedForce, PrescribedMotion
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
@@ -398,10 +397,9 @@ def _checked_output(scene: Scene, output: Any, what: str) -> tuple[str, Any, lis
         raise ArgumentError(
             f"{what}: component {shorten(rest[0])} must be one of {', '.join(map(repr, names))}"
         )
-    if kind not in OBJECTS:
-        require_place(x, what)
-    elif not isinstance(x, OBJECTS[kind]):
-        raise ArgumentTypeError(f"{what}: {shorten(x)} must be a {OBJECTS[kind].__name__}")
+    if not isinstance(x, OBJECTS.get(kind, Place | BodyPoint)):
+        name = OBJECTS[kind].__name__ if kind in OBJECTS else "Place or BodyPoint, as beam.end"
+        raise ArgumentTypeError(f"{what}: {shorten(x)} must be a {name}")
     missing = False
     if isinstance(x, Place):
         missing = x.beam not in scene.beams
