@@ -2,8 +2,9 @@
 # # Inverted flexible pendulum: a controller designed by a linear model
 #
 # A thin steel strip with a damping layer and a mass at its top stands on a cart.  The strip is
-# hinged to the cart, so it falls.  A motor that moves the cart can hold it upright.  The force of the motor is computed
-# every 2 ms from three measured displacements: of the cart, of the hinge and of the top.
+# hinged to the cart, so it falls.  A motor that moves the cart can hold it upright.  The force of
+# the motor is computed every 2 ms from three measured displacements: of the cart, of the hinge and
+# of the top.
 #
 # This demo shows
 #
@@ -201,7 +202,7 @@ with ub.picture((10.5, 7.5)) as figure:
     top.legend()
     tilt_ax.legend()
     for k, at in enumerate((0.0, 0.1, 0.2, 0.3, 0.5, 0.8, 3.9)):
-        n = int(round(at / sample))
+        n = round(at / sample)
         shape = run.shape(pole, n)
         shade = str(0.75 - 0.75 * k / 6)
         scene_ax.plot(*shape.T, color=shade, lw=2)

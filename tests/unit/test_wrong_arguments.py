@@ -776,7 +776,8 @@ TABLE |= {
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Coefficients", "Connector", "CriticalPoint", "Cycles", "Decay",
     "DemandCurves", "Diagram", "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film",
-    "Governing", "HingeFormation", "InteractionDiagram", "Joint", "LinearModel", "LoadCombinations", "Modes",
+    "Governing", "HingeFormation", "InteractionDiagram", "Joint", "LinearModel",
+    "LoadCombinations", "Modes",
     "MomentCurvature", "Path", "Pushover", "Solution", "SpectralResponse", "Step", "Study",
     "Support", "TargetDisplacement", "Tradeoff",
 }  # fmt: skip

@@ -46,7 +46,10 @@ def beam_on_cart(mass):
     scene = ub.Scene(
         [mast],
         bodies=[cart],
-        joints=[ub.Rigid(mast.start, cart.middle), ub.Prismatic(ub.ground(0, 0), cart.middle, axis=(1, 0))],
+        joints=[
+            ub.Rigid(mast.start, cart.middle),
+            ub.Prismatic(ub.ground(0, 0), cart.middle, axis=(1, 0)),
+        ],
         connectors=[jack],
     )
     return scene, mast, cart, jack
@@ -89,7 +92,9 @@ def test_beam_on_a_cart():
     between = [(3.0, 12.0), (18.0, 40.0)]
     poles = [brentq(lambda x: 1 / mast_response(x, mass)[1], *ends) for ends in between]
     s = exponents(model)
-    assert np.abs(s[:2]).max() < 1e-2 * poles[0]  # rigid motion: a double zero, whose round-off is a root
+    assert (
+        np.abs(s[:2]).max() < 1e-2 * poles[0]
+    )  # rigid motion: a double zero, whose round-off is a root
     np.testing.assert_allclose(s[2:4].imag, poles, rtol=2e-5)
 
 
@@ -108,7 +113,12 @@ def slider_crank(law, stiffness=30.0):
     scene = ub.Scene(
         [],
         bodies=[crank, rod, slider],
-        joints=[ub.Revolute(o, crank.middle), ub.Revolute(crank.at(*pin), rod.at(*pin)), wrist, guide],
+        joints=[
+            ub.Revolute(o, crank.middle),
+            ub.Revolute(crank.at(*pin), rod.at(*pin)),
+            wrist,
+            guide,
+        ],
         connectors=[motor, spring],
     )
     # Derivatives by the angle: rod angle φ with sin φ = -r/L sin θ, slider, centre of the rod
@@ -301,9 +311,9 @@ def require_second_order(scene, outputs, inputs, drive, at=None, *, power=1, ste
     factor by the amplitude; 1 % is left to them, because amplitudes are below 1 % of the size of
     the scene and of a radian.  Differences below 1e-9 of the output are round-off of steps.
     """
-    outputs = [
-        (*x, c) for x in outputs for c in (COMPONENTS[x[0]] if len(x) == 2 else [])
-    ] + [x for x in outputs if len(x) == 3]
+    outputs = [(*x, c) for x in outputs for c in (COMPONENTS[x[0]] if len(x) == 2 else [])] + [
+        x for x in outputs if len(x) == 3
+    ]
     drive(0.0)
     dt = 0.01
     model = ub.linearize(scene, inputs=inputs, outputs=outputs, at=at)
@@ -459,9 +469,7 @@ def test_step_of_a_frame_with_a_load_beside_a_body():
     top = ub.Body((0, 2), mass=2.0, inertia=0.3, name="top")
     joint, drive = ub.Rigid(post.end, top.middle, multipliers=True), Drive()
     damper = ub.Stretch(ub.ground(1.5, 0), top.at(0, 1.8), ub.Damper(4.0))
-    load = ub.PointLoad(
-        top.at(0.4, 2.2), force=(1.0, -2.0), moment=0.3, amplitude=drive.load(1e5)
-    )
+    load = ub.PointLoad(top.at(0.4, 2.2), force=(1.0, -2.0), moment=0.3, amplitude=drive.load(1e5))
     scene = ub.Scene(
         [post], bodies=[top], joints=[joint], supports=[ub.Clamped(post.start)],
         connectors=[damper], loads=[load],

@@ -283,7 +283,8 @@ class Outputs:
             length, unit = ("rad", "N m") if connector.is_rotation else ("m", "N")
             for c in components:
                 name = KINDS["connector"][c]
-                title = f"{name} {connector}, {type(connector.law).__name__} [{(length, f'{length}/s', unit)[c]}]"
+                law, units = type(connector.law).__name__, (length, f"{length}/s", unit)
+                title = f"{name} {connector}, {law} [{units[c]}]"
                 rows = ([motion, None, None], [None, motion, None], [force, None, None])[c]
                 self._enter(title, rows, motion=None if c == 2 else motion)
 
@@ -318,9 +319,7 @@ class Outputs:
         for c in components:
             turns = any(holder.is_rotation for holder in held)
             if c == 2 and not turns and len(components) > 1:
-                continue  # the moment is zero, or with shared rotations not known
-            if c == 2 and 2 in x.shared:
-                raise ArgumentError(f"{what}: {x} shares its rotation; its moment is not known")
+                continue  # the moment is zero, or with a shared rotation not known
             self._enter(f"{FORCE[c]} {x} [{('N', 'N', 'N m')[c]}]", [rows[[c]], None, None])
 
     def _add_reaction(self, x: Any, components: Sequence[int], kind: str) -> None:

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import lstsq, qr, solve, svd
 from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array, hstack
 from scipy.sparse.linalg import splu
 
@@ -21,8 +20,22 @@ from ufl_beam.analysis.linear_inputs_and_outputs import (
     checked_inputs,
     checked_outputs,
 )
+from ufl_beam.analysis.linear_model_checks import (
+    HELD,
+    require_equilibrium,
+    require_free,
+    warn_of_omissions,
+)
 from ufl_beam.analysis.modes import require_state
 from ufl_beam.analysis.small_motions import SmallMotions
+from ufl_beam.analysis.state_space import (
+    Coordinates,
+    Motion,
+    constraint_forces,
+    first_order,
+    independent_coordinates,
+    jumps,
+)
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.display import Rich
@@ -33,11 +46,9 @@ from ufl_beam.errors import (
     require_kind,
     require_sequence,
     shorten,
-    warn,
 )
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint
-from ufl_beam.model.connector_laws import Controller, Coulomb
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import Constant
 from ufl_beam.model.loads import Load
@@ -48,15 +59,9 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.eigensolvers import ROUND_OFF
 
-UNBALANCED = 1e-6  # unbalanced force that is an error, as a fraction of the largest force
-MOVING = 1e-6  # velocity that is an error, as a fraction of lowest frequency times size
-SINGULAR = 1e-12  # eigenvalue or pivot that is zero, as a fraction of the largest one
-HELD = 1e-9  # fraction of a motion that constraints allow, below which they hold it
-ABSENT = 1e-9  # coefficient of a derivative that is round-off, as a fraction of its terms
 QUASI_STATIC = 1e-2  # exponent of the static correction, as a fraction of the lowest frequency
 ITERATIONS = 4  # of the static motions of a reduced model
 MOST_STATES = 4000  # largest number of states without modal reduction
-NAMED = 3  # largest number of unbalanced forces in a message
 
 
 class LinearModel(Rich):
@@ -92,6 +97,8 @@ class LinearModel(Rich):
     def __init__(self, small: SmallMotions, scene: Scene, inputs: Inputs, outputs: Outputs) -> None:
         self.scene, self._small, self._inputs, self._outputs = scene, small, inputs, outputs
         self.inputs, self.outputs = inputs.names, outputs.names
+        rows = small._constraint_rows
+        self._free, self._held = np.flatnonzero(~rows), np.flatnonzero(rows)  # rows of K
         self._basis: tuple[Array, Array] | None = None  # modes and motions with unit inputs
         self._correction: Array | float = 0.0  # of D in a reduced model
         self._squares: Array = np.zeros(0)  # squared frequencies of the modes
@@ -195,28 +202,32 @@ class LinearModel(Rich):
         small, (P0, P1, P2) = self._small, self._outputs.rows
         F, moved = self._loads
         n, nu = small.K.shape[0], self._inputs.number_of_motions
-        y, μ = np.flatnonzero(~small._constraint_rows), np.flatnonzero(small._constraint_rows)
+        y, μ = self._free, self._held
         M, Cd, K, Z = small.M, self._damping, small.K, small._Z
         S, one = self._inputs.motions, eye_array(nu)
         I, none = eye_array(len(y)), None
+
+        def zeros(rows: int, columns: int) -> csr_array:
+            return csr_array((rows, columns))
+
         E = block_array([
             [I, none, none, none, none, none],
             [none, I, none, none, none, none],
-            [csr_array((n, len(y))), none, csr_array((n, len(y))), csr_array((n, len(μ))), none, none],
+            [zeros(n, len(y)), none, zeros(n, len(y)), zeros(n, len(μ)), none, none],
             [none, none, none, none, one, none],
             [none, none, none, none, none, one],
         ])  # fmt: skip
         A = block_array([
-            [csr_array((len(y), len(y))), I, none, none, none, none],
-            [none, csr_array((len(y), len(y))), I, none, none, none],
+            [zeros(len(y), len(y)), I, none, none, none, none],
+            [none, zeros(len(y), len(y)), I, none, none, none],
             [-K[:, y], -Cd[:, y], -M[:, y], -K[:, μ], moved[0], moved[1]],
-            [none, none, none, none, csr_array((nu, nu)), one],
-            [none, none, none, none, none, csr_array((nu, nu))],
+            [none, none, none, none, zeros(nu, nu), one],
+            [none, none, none, none, none, zeros(nu, nu)],
         ])  # fmt: skip
         nf = F.shape[1]
         B = block_array([
-            [csr_array((2 * len(y), nf)), csr_array((2 * len(y), nu))], [F, moved[2]],
-            [csr_array((nu, nf)), csr_array((nu, nu))], [csr_array((nu, nf)), one],
+            [zeros(2 * len(y), nf), zeros(2 * len(y), nu)], [F, moved[2]],
+            [zeros(nu, nf), zeros(nu, nu)], [zeros(nu, nf), one],
         ])  # fmt: skip
         C = hstack([P0 @ Z[:, y], P1 @ Z[:, y], P2 @ Z[:, y], P0 @ Z[:, μ], P0 @ S, P1 @ S])
         order = self._inputs.order
@@ -268,7 +279,9 @@ class LinearModel(Rich):
         try:
             factors = splu(csc_array(small.K + s * self._damping + s**2 * small.M))
         except RuntimeError:
-            raise ArgumentError(f"transfer_function: s = {s:g} is an exponent of the model") from None
+            raise ArgumentError(
+                f"transfer_function: s = {s:g} is an exponent of the model"
+            ) from None
         u = 1 / s**2 if nu else 0.0
         load = np.hstack([F.toarray(), u * sum(s**k * A.toarray() for k, A in enumerate(moved))])
         X = small._Z @ factors.solve(load.astype(complex)) + np.hstack(
@@ -300,15 +313,15 @@ class LinearModel(Rich):
             initial=small.squares.max()
         )
         s = QUASI_STATIC * float(lowest) ** 0.5
-        # Static motions P with K P = B; K may be singular, and an iteration reduces the error of the
-        # shifted matrix by the factor QUASI_STATIC² each time.
+        # Static motions P with K P = B; K may be singular, and an iteration reduces the error of
+        # the shifted matrix by the factor QUASI_STATIC² each time.
         P = np.zeros((len(x), nu))
         if nu:
             shifted = splu(csc_array(small.K + s**2 * small.M))
             for _ in range(ITERATIONS):
                 P = shifted.solve(self._loads[1][0].toarray() + s**2 * (small.M @ P))
         model = copy.copy(self)
-        for name in ("_space", "states"):
+        for name in ("_motion", "_space", "states"):
             vars(model).pop(name, None)
         model._basis = x, P
         model._squares = values
@@ -330,14 +343,26 @@ class LinearModel(Rich):
             ArgumentError: The model is too large; nothing determines a motion; or an output is the
                 rate of a motion without mass that follows an input at once.
         """
-        *matrices, _ = self._space
-        A, B, C, D = (matrix.copy() for matrix in matrices)
+        A, B, C, D = (matrix.copy() for matrix in self._space)
         return A, B, C, D
 
     @cached_property
     def states(self) -> list[str]:
         """Names of the states of :meth:`state_space`."""
-        return self._space[4][0]
+        motion, names = self._motion, self._names_of_motions
+
+        def named(row: Array) -> str:
+            """Name the motion that a row reads, or the largest one of several."""
+            largest = names[int(np.abs(row).argmax())]
+            return largest if np.count_nonzero(row) == 1 else f"motion with {largest}"
+
+        prescribed = self._inputs.prescribed_names
+        count = motion.states - len(motion.read) - 2 * len(prescribed)
+        read = self._mode_names or [named(row) for row in motion.read]
+        return [
+            *read, *(f"d/dt {name}" for name in read[:count]),
+            *prescribed, *(f"d/dt {name}" for name in prescribed),
+        ]  # fmt: skip
 
     def state(self, run: Solution | Simulation) -> Array:
         """Return the states of the last state of a solution or simulation; (num_states,).
@@ -353,14 +378,16 @@ class LinearModel(Rich):
         if not now.numbering.agrees(small.numbering):
             raise ArgumentError("state: run has other beams, joints or cells than the model")
         if not len(now):
-            raise ArgumentError("state: run has no state; give simulation, or simulation.snapshot()")
+            raise ArgumentError(
+                "state: run has no state; give simulation, or simulation.snapshot()"
+            )
         q = now.q[-1] - small.q
         v = now.v[-1] if len(now.v) else np.zeros(len(q))
-        y = ~small._constraint_rows
-        from_axes, (read, rate), P = small._axes.T, self._space[4][1], self._space[4][2]
+        read, P = self._motion.read, self._motion.P
+        count = self._motion.states - len(read) - 2 * inputs.number_of_motions
         u, du = (np.asarray(inputs.read @ x) for x in (q, v))
-        z, dz = ((from_axes @ x)[small.left[y]] - P @ w for x, w in ((q, u), (v, du)))
-        return np.concatenate([read @ z, rate @ dz, u, du])
+        z, dz = ((small._axes.T @ x)[small.left[self._free]] - P @ w for x, w in ((q, u), (v, du)))
+        return np.concatenate([read @ z, read[:count] @ dz, u, du])
 
     def to_control(self) -> Any:
         """Return the state space as a ``StateSpace`` of python-control, with names.
@@ -375,277 +402,73 @@ class LinearModel(Rich):
         # Dots separate names of systems and signals there
         names = [[x.replace(".", "_") for x in names]
                  for names in (self.states, self.inputs, self.outputs)]  # fmt: skip
-        return control.ss(
-            *self.state_space(), states=names[0], inputs=names[1], outputs=names[2]
-        )
+        return control.ss(*self.state_space(), states=names[0], inputs=names[1], outputs=names[2])
 
     @cached_property
-    def _space(self) -> tuple[Array, Array, Array, Array, Any]:
-        """A, B, C, D; and names of states, matrices that read them, particular motions."""
-        small, inputs = self._small, self._inputs
-        rows = small._constraint_rows
-        y, μ = np.flatnonzero(~rows), np.flatnonzero(rows)
+    def _motion(self) -> Motion:
+        """Motions as functions of states and inputs."""
+        small, y = self._small, self._free
+        M, C, K = (csr_array(A[y][:, y]) for A in (small.M, self._damping, small.K.tocsr()))
         F, moved = self._loads
-        nf, nu = F.shape[1], inputs.number_of_motions
-        Z, D = small._Z, small.lengths[small.left[y]]
-        K, M, Cd = small.K.tocsr(), small.M.tocsr(), self._damping
+        more = None
         if self._basis is None:
             if 2 * len(y) > MOST_STATES:
                 raise ArgumentError(
                     f"state_space: {2 * len(y)} states are too many for dense matrices; use "
                     "reduced(n), or descriptor() and frequency_response(omega)"
                 )
-            N, P, kept = _independent(K[μ][:, y], moved[0][μ].toarray(), D)
+            J, h = small.K.tocsr()[self._held][:, y], moved[0][self._held].toarray()
+            coordinates = independent_coordinates(M, J, h, small.lengths[small.left[y]])
         else:
             N, P = self._basis[0][y], self._basis[1][y]
-        k = N.shape[1]
-        Mr, Cr, Kr = (N.T @ (A[y][:, y] @ N) for A in (M, Cd, K))
-        if self._basis is not None and abs(K - K.T).max() <= ROUND_OFF * abs(K).max():
-            Kr = np.diag(self._squares)  # quotients of works, more accurate than products with K
-        Ps = [N.T @ (A[y].toarray() - B[y][:, y] @ P) for A, B in zip(moved, (K, Cd, M), strict=True)]
-        if self._basis is None:
-            sizes = np.einsum("ij,ij->j", np.abs(N), abs(M[y][:, y]) @ np.abs(N))
-            V1, V0 = _with_mass(Mr, D[kept], sizes)
-        else:
-            V1, V0 = np.eye(k), np.zeros((k, 0))
-        W1, W0, U1, U0, viscosity = _damped(V0.T @ Cr @ V0)
-        na, nb = V1.shape[1], W1.shape[1]
-        # Linear functions of states (a, b1, a', u, u') and inputs (f, u''), one column each
-        widths = [na, nb, na, nu, nu, nf, nu]
-        at = np.cumsum([0, *widths])
-        a, b1, da, u, du, f, ddu = (np.eye(at[-1])[i:j] for i, j in zip(at, at[1:], strict=False))
-        forces = N.T @ (F[y] @ f) + Ps[0] @ u + Ps[1] @ du + Ps[2] @ ddu
-        known = V1 @ a + V0 @ (W1 @ b1)
-        stiffness = U0.T @ V0.T @ Kr @ V0 @ W0
-        if stiffness.size and np.linalg.cond(stiffness) > 1 / SINGULAR:
-            name = _free(svd(stiffness)[2][-1], N @ V0 @ W0 / D[:, None], self._motions(y))
-            raise ArgumentError(f"state_space: neither mass, damper nor stiffness determines {name}")
-        b0 = np.zeros((0, at[-1]))
-        if stiffness.size:
-            b0 = solve(stiffness, U0.T @ (V0.T @ (forces - Kr @ known - Cr @ (V1 @ da))))
-        z = known + V0 @ (W0 @ b0)
-        db1 = (U1.T @ (V0.T @ (forces - Kr @ z - Cr @ (V1 @ da)))) / viscosity[:, None]
-        dz = V1 @ da + V0 @ (W1 @ db1)  # without rates of b0, which meet neither mass nor damping
-        dda = solve(V1.T @ Mr @ V1, V1.T @ (forces - Kr @ z - Cr @ dz), assume_a="pos")
-        rates = np.vstack([da, db1, dda, du, ddu])
-        ns = at[5]
-        A, B = rates[:, :ns], rates[:, ns:]
-        motion = N @ z + P @ u
-        X = Z[:, y] @ motion + inputs.motions @ u
-        if self._basis is None:
-            velocity, acceleration = N @ dz + P @ du, N @ (V1 @ dda) + P @ ddu
-            rest = F[y] @ f + moved[0][y] @ u + moved[1][y] @ du + moved[2][y] @ ddu
-            rest -= K[y][:, y] @ motion + Cd[y][:, y] @ velocity + M[y][:, y] @ acceleration
-            borne = _least_squares(D[:, None] * K[y][:, μ].toarray(), D[:, None] * rest)
-        else:
-            borne = self._basis[0][μ] @ z + self._basis[1][μ] @ u
-        out = self._outputs
-        Y = out.rows[0] @ (X + Z[:, μ] @ borne)
-        Y[:, ns : ns + nf] += out.direct
-        first = self._rate(out.rows[1], X, rates, ns)
-        dX = X[:, :ns] @ rates
-        Y += first + self._rate(out.rows[2], dX, rates, ns, (abs(X[:, :ns]) @ abs(rates)))
-        C, Dm = Y[:, :ns], Y[:, ns:] + 0.0
-        Dm = Dm[:, inputs.order] + self._correction
-        inverse = np.linalg.inv(np.hstack([V1, V0]))
-        if self._basis is None:
-            pick = np.zeros((k, len(y)))
-            pick[np.arange(k), kept] = 1.0
-        else:
-            pick = N.T @ M[y][:, y]
-        coordinates = inverse @ pick
-        read = np.vstack([coordinates[:na], W1.T @ coordinates[na:]])
-        names = self._state_names(V1, V0 @ W1, None if self._basis else kept, y)
-        return A, B[:, inputs.order], C, Dm, (names, (read, coordinates[:na]), P)
+            n = N.shape[1]
+            coordinates = Coordinates(N, P, np.eye(n), np.zeros((n, 0)), N.T @ M)
+            if abs(K - K.T).max() <= ROUND_OFF * abs(K).max():
+                more = np.diag(self._squares)  # quotients of works, without round-off of K
+        names, sizes = self._names_of_motions, small.lengths[small.left[y]]
+        return first_order(
+            coordinates, M, C, K, F[y], tuple(B[y].toarray() for B in moved),
+            lambda motion: names[int(np.abs(motion / sizes).argmax())], more,
+        )  # fmt: skip
 
-    def _rate(
-        self, rows: csr_array, X: Array, rates: Array, ns: int, terms: Array | None = None
-    ) -> Array:
-        """Return rows times the derivative of X, a function of states and inputs."""
-        sizes = abs(rows) @ (np.abs(X) if terms is None else terms)
-        through = np.abs(rows @ X)
-        jumps = through[:, ns:] > ABSENT * (sizes[:, ns:] + sizes[:, :ns].max(axis=1, initial=0)[:, None])
-        wrong = jumps & (through[:, ns:] > 0)
-        for i, j in np.argwhere(wrong)[:1]:
-            names = [self.inputs[k] for k in np.argsort(self._inputs.order)]
-            raise ArgumentError(
-                f"state_space: {self.outputs[i]} depends on the rate of {names[j]}, because the "
-                "motion has no mass; give it mass, use another output, or frequency_response"
+    @cached_property
+    def _space(self) -> tuple[Array, Array, Array, Array]:
+        """A, B, C and D with inputs in the order of the user."""
+        small, inputs, out, motion = self._small, self._inputs, self._outputs, self._motion
+        y, μ, ns = self._free, self._held, motion.states
+        F, moved = self._loads
+        K, Z = small.K.tocsr(), small._Z
+        if self._basis is None:
+            # Forces of constraints bear what the equation of the motions misses
+            rest = F[y] @ motion.f - K[y][:, y] @ motion.y
+            rest -= (
+                self._damping[y][:, y] @ motion.velocity + small.M[y][:, y] @ motion.acceleration
             )
-        return np.asarray(rows @ (X[:, :ns] @ rates))
-
-    def _motions(self, y: npt.NDArray[Any]) -> list[str]:
-        return [f"{self.unknowns[i][1]} {self.unknowns[i][0]}" for i in y]
-
-    def _state_names(self, V1: Array, V: Array, kept: Any, y: npt.NDArray[Any]) -> list[str]:
-        """Return names of states: motions by their place, combinations by their largest part."""
-        if kept is None:
-            motions, slow = self._mode_names, list[str]()
+            for B, x in zip(moved, (motion.u, motion.du, motion.ddu), strict=True):
+                rest += B[y] @ x
+            sizes = small.lengths[small.left[y]]
+            borne = constraint_forces(K[y][:, μ].toarray(), rest, sizes)
         else:
-            names = [self._motions(y)[i] for i in kept]
+            borne = self._basis[0][μ] @ motion.z + self._basis[1][μ] @ motion.u
+        X = Z[:, y] @ motion.y + inputs.motions @ motion.u
+        dX, terms = X[:, :ns] @ motion.rates, np.abs(X[:, :ns]) @ np.abs(motion.rates)
+        for rows, x, of_x in ((out.rows[1], X, np.abs(X)), (out.rows[2], X, np.abs(X)),
+                              (out.rows[2], dX, terms)):  # fmt: skip
+            for i, j in jumps(rows, x, of_x, ns)[:1]:
+                name = self.inputs[int(np.flatnonzero(inputs.order == j)[0])]
+                raise ArgumentError(
+                    f"state_space: {self.outputs[i]} depends on the rate of {name}, because the "
+                    "motion has no mass; give it mass, use another output, or frequency_response"
+                )
+        Y = out.rows[0] @ (X + Z[:, μ] @ borne)
+        Y[:, ns : ns + F.shape[1]] += out.direct
+        Y += out.rows[1] @ dX + out.rows[2] @ (dX[:, :ns] @ motion.rates)
+        A, B = motion.rates[:, :ns], motion.rates[:, ns:]
+        return A, B[:, inputs.order], Y[:, :ns], Y[:, ns:][:, inputs.order] + self._correction
 
-            def named(column: Array) -> str:
-                largest = names[int(np.abs(column).argmax())]
-                return largest if np.count_nonzero(column) == 1 else f"motion with {largest}"
-
-            motions, slow = ([named(column) for column in matrix.T] for matrix in (V1, V))
-        prescribed = self._inputs.prescribed_names
-        return [
-            *motions, *slow, *(f"d/dt {name}" for name in motions),
-            *prescribed, *(f"d/dt {name}" for name in prescribed),
-        ]  # fmt: skip
-
-
-# -- elimination -----------------------------------------------------------------------------------
-
-
-def _independent(G: csr_array, h: Array, sizes: Array) -> tuple[Array, Array, npt.NDArray[Any]]:
-    """Solve constraints ``G y = h u``: y = N y[kept] + P u, with independent motions ``kept``.
-
-    ``sizes`` make motions dimensionless.  N has unit rows, and P zero rows, for ``kept``.
-    """
-    n, (m, nu) = G.shape[1], h.shape
-    if not m:
-        return np.eye(n), np.zeros((n, nu)), np.arange(n)
-    scaled = G.toarray() * sizes
-    lengths = np.linalg.norm(scaled, axis=1)
-    scaled, h = scaled / lengths[:, None], h / lengths[:, None]
-    Q, R, order = qr(scaled, mode="economic", pivoting=True)
-    rank = int(np.sum(np.abs(R.diagonal()) > SINGULAR * abs(R[0, 0])))
-    dependent, kept = order[:rank], np.sort(order[rank:])
-    position = np.argsort(order[rank:])
-    R1, R2 = R[:rank, :rank], R[:rank, rank:][:, position]
-    N, P = np.zeros((n, n - rank)), np.zeros((n, nu))
-    N[kept, np.arange(n - rank)] = 1.0
-    N[dependent] = sizes[dependent, None] * -solve(R1, R2) / sizes[kept]
-    P[dependent] = sizes[dependent, None] * solve(R1, (Q.T @ h)[:rank])
-    return N, P, kept
-
-
-def _with_mass(M: Array, sizes: Array, terms: Array) -> tuple[Array, Array]:
-    """Return bases of the motions with mass and of those without; unit vectors where possible.
-
-    ``terms`` are sums of magnitudes of the terms of the diagonal of M.
-    """
-    massive = M.diagonal() > ROUND_OFF * terms
-    I = np.eye(len(M))
-    V1, V0 = I[:, massive], I[:, ~massive] * sizes[~massive]
-    scale = 1 / np.sqrt(M.diagonal()[massive])
-    values, vectors = np.linalg.eigh(M[np.ix_(massive, massive)] * np.outer(scale, scale))
-    if values.min(initial=1.0) < SINGULAR:
-        light = values < SINGULAR
-        V0 = np.hstack([V0, V1 @ (scale[:, None] * vectors[:, light])])
-        V1 = V1 @ (scale[:, None] * vectors[:, ~light])
-    return V1, V0
-
-
-def _damped(C: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Split motions by their damping: right bases with and without, left bases, viscosities."""
-    if not C.size or not C.any():
-        n = len(C)
-        return np.zeros((n, 0)), np.eye(n), np.zeros((n, 0)), np.eye(n), np.zeros(0)
-    U, s, Vt = svd(C)
-    r = int(np.sum(s > SINGULAR * s[0]))
-    return Vt[:r].T, Vt[r:].T, U[:, :r], U[:, r:], s[:r]
-
-
-def _least_squares(A: Array, b: Array) -> Array:
-    """Return the least-squares solution of A x = b with scaled columns."""
-    if not A.size:
-        return np.zeros((A.shape[1], b.shape[1]))
-    lengths = np.linalg.norm(A, axis=0)
-    return np.asarray(lstsq(A / lengths, b, lapack_driver="gelsy")[0] / lengths[:, None])
-
-
-def _free(combination: Array, motions: Array, names: Sequence[str]) -> str:
-    return names[int(np.abs(motions @ combination).argmax())]
-
-
-# -- checks ----------------------------------------------------------------------------------------
-
-
-def require_free(small: SmallMotions, inputs: Inputs, outputs: Outputs) -> None:
-    """Raise if constraints hold an output, or the motions on which an input works.
-
-    Prescribed motions that are inputs do not hold outputs.
-    """
-    forces, motions = inputs.condensed.toarray(), outputs.motions.T.toarray()
-    moved = inputs.prescribed[small.left].tocsr()[np.flatnonzero(small._constraint_rows)]
-    fixed = np.ones(moved.shape[0], dtype=bool) if not moved.nnz else abs(moved).sum(axis=1) == 0
-    by_supports = abs(outputs.motions @ inputs.motions).sum(axis=1) > 0
-    free = _allowed(small, motions, fixed) | by_supports
-    for name in [x for x, able in zip(outputs.motion_names, free, strict=True) if not able][:1]:
-        raise ArgumentError(
-            f"linearize: outputs: {name}: supports or constraints hold this motion, so that it "
-            "does not change; choose another place, or one component that moves, as (..., 'u') or (..., 'force')"
-        )
-    works = _allowed(small, forces, fixed | True)
-    for name in [x for x, able in zip(inputs.force_names, works, strict=True) if not able][:1]:
-        raise ArgumentError(
-            f"linearize: inputs: {name}: supports or constraints hold the motion on which it "
-            "works, so that it moves nothing; choose another place or direction"
-        )
-
-
-def _allowed(
-    small: SmallMotions, vectors: Array, chosen: npt.NDArray[np.bool_]
-) -> npt.NDArray[np.bool_]:
-    """Return which columns, rows of motions or forces, the ``chosen`` constraints leave free.
-
-    A column is free if its part in the motions that the constraints allow is not round-off.
-    """
-    y, μ = np.flatnonzero(~small._constraint_rows), np.flatnonzero(small._constraint_rows)[chosen]
-    whole = np.linalg.norm(small.lengths[:, None] * vectors, axis=0)
-    W = small.lengths[small.left[y], None] * (small._Z.T @ vectors)[y]
-    if len(μ) and W.size:
-        G = csr_array(small.K)[μ][:, y] @ diags_array(small.lengths[small.left[y]])
-        G = diags_array(1 / np.sqrt((G * G).sum(axis=1))) @ G
-        system = block_array([[eye_array(len(y)), G.T], [G, None]])
-        W = splu(csc_array(system)).solve(np.vstack([W, np.zeros((len(μ), W.shape[1]))]))[: len(y)]
-    return np.asarray(np.linalg.norm(W, axis=0) > HELD * whole)
-
-
-def require_equilibrium(small: SmallMotions, at: Solution | None) -> None:
-    """Raise unless the state is an equilibrium at rest."""
-    r, terms, round_off = small.imbalance()
-    numbering = small.numbering
-    weights = 1 / np.where(np.isin(np.arange(len(r)), numbering.rotations), small.scene.size, 1.0)
-    apart = np.abs(r) * weights
-    apart[apart <= UNBALANCED * np.max(terms * weights, initial=0.0)] = 0.0
-    apart[np.abs(r) <= round_off] = 0.0
-    worst = numbering.worst(apart)
-    worst |= {f"gap of {x}": gap for x, gap in small.gaps().items() if gap > UNBALANCED}
-    if worst:
-        listed = ", ".join(f"{name}: {value:.3g}" for name, value in [*worst.items()][:NAMED])
-        remedy = (
-            "loads or motions have changed, or dampers still bear forces; give the last state of a "
-            "static run of this scene in which nothing changes"
-            if at is not None
-            else "the undeformed scene is not in equilibrium with its loads, except inputs; give "
-            "at=simulate(scene, Static(), ...)"
-        )
-        raise ArgumentError(f"linearize: no equilibrium; unbalanced forces (N) at {listed}: {remedy}")
-    if at is None or not len(at.v):
-        return
-    fast = np.abs(at.v[-1]) * numbering.scales
-    fast[fast <= MOVING * float(small.squares.min()) ** 0.5] = 0.0
-    for name, rate in [*numbering.worst(fast).items()][:1]:
-        raise ArgumentError(
-            f"linearize: at moves: {name} by {rate:.3g} 1/s of the size of the scene; give a state "
-            "at rest, as the last state of a static run, or of a run with more damping"
-        )
-
-
-def warn_of_omissions(small: SmallMotions, inputs: Sequence[Any]) -> None:
-    """Warn of controllers and sliding friction, which the linear model leaves out."""
-    for connector in small.scene.all_connectors:
-        if isinstance(connector.law, Controller) and connector not in inputs:
-            warn(f"linearize: {connector}: the force of the controller is constant")
-    for group in small._simulation.equation.connector_terms:
-        if isinstance(group.connectors[0].law, Coulomb):
-            for connector, sticks in zip(group.connectors, group.response.sticks, strict=True):
-                if not sticks:
-                    warn(f"linearize: {connector}: sliding friction is left out")
+    @cached_property
+    def _names_of_motions(self) -> list[str]:
+        return [f"{self.unknowns[i][1]} {self.unknowns[i][0]}" for i in self._free]
 
 
 # -- the function ----------------------------------------------------------------------------------
@@ -692,9 +515,8 @@ def linearize(
     Example:
         >>> push = ub.PointLoad(beam.end, force=(0, 1.0))
         >>> arm = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-        >>> model = ub.linearize(
-        ...     arm, inputs=[push, (arm.supports[0], "v")], outputs=[("acceleration", beam.end, "v")]
-        ... )
+        >>> tip = ("acceleration", beam.end, "v")
+        >>> model = ub.linearize(arm, inputs=[push, (arm.supports[0], "v")], outputs=[tip])
         >>> print(model.inputs[1])
         d2v/dt2 of Clamped at beam.start (0, 0) [m/s2]
         >>> print(abs(model.frequency_response(1e-3)[0, 1]).round(6))  # as the support
@@ -708,9 +530,7 @@ def linearize(
     given, wanted = checked_inputs(scene, inputs), checked_outputs(scene, outputs)
     unit = [x for x, _ in given if isinstance(x, Load)]
     factors = {id(load): _Amplitude(load.amplitude if at else Constant(0.0)) for load in unit}
-    loads = [
-        replace(x, amplitude=factors[id(x)]) if id(x) in factors else x for x in scene.loads
-    ]
+    loads = [replace(x, amplitude=factors[id(x)]) if id(x) in factors else x for x in scene.loads]
     small = SmallMotions(replace(scene, loads=loads) if unit else scene, at, mesh=mesh)
     if not small.M.data.any():
         raise ArgumentError("linearize: nothing that can move has mass; give sections rho or rhoA")
@@ -729,4 +549,3 @@ class _Amplitude:
 
     def __call__(self, t: float) -> float:
         return float(self.function(t)) + self.change
-

@@ -63,7 +63,8 @@ class Linearization:
     the time ``t`` (s), by default the time of the state.  Masses of moving loads are left out.
 
     Attributes:
-        tangent, masses: Derivative of forces with respect to all unknowns, and masses; (size, size).
+        tangent: Derivative of forces with respect to all unknowns; (size, size).
+        masses: Masses of all unknowns; (size, size).
         K, M, C: Stiffness, mass and damping of free motions and scaled forces of constraints.
         left: Degrees of freedom of the rows of K, in the axes of supports.
         scale: Factors of the unknowns of K; (size,).

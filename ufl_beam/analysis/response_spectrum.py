@@ -6,22 +6,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from mpi4py import MPI
-
 import numpy as np
 import numpy.typing as npt
-import ufl
 
 from ufl_beam.analysis.linearization import Linearization, linear_forces_of_cells
 from ufl_beam.analysis.modes import Modes, modes
 from ufl_beam.analysis.spectra import Spectrum, spectral_accelerations
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import lib
-from ufl_beam.discretization.compiled_forms import cached_forms
-from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel
-from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Rich
-from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import (
     ArgumentError,
     require_count,
@@ -31,7 +23,6 @@ from ufl_beam.errors import (
     shorten,
     warn,
 )
-from ufl_beam.mechanics.time_schemes import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint, Member
 from ufl_beam.model.imposed_strains import ImposedStrain
@@ -39,9 +30,6 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.section_forces import Diagram, ForcesAlongCells
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.beam_forces import inelastic_forms
-from ufl_beam.terms.cell_forces import CellForces
-from ufl_beam.terms.term import InCells
 
 RULES = "CQC", "SRSS"
 LEAST_MASS = 0.9  # fraction of the mass that modes should have; EN 1998-1:2004, 4.3.3.3.1
