@@ -55,7 +55,11 @@ class Inputs:
     """
 
     def __init__(
-        self, small: Linearization, scene: Scene, given: Sequence[Any], factors: Mapping[int, Any]
+        self,
+        small: Linearization,
+        scene: Scene,
+        requested: Sequence[Any],
+        factors: Mapping[int, Any],
     ) -> None:
         self._small, self._scene, self._factors = small, scene, factors
         self.force_names, self.prescribed_names = list[str](), list[str]()
@@ -64,7 +68,7 @@ class Inputs:
         self._still = np.zeros((9, cells))
         columns: dict[str, list[Any]] = {"motions": [], "prescribed": [], "read": []}
         names, kinds = list[str](), list[bool]()
-        for x, components in given:
+        for x, components in requested:
             before = len(self.force_names), len(self.prescribed_names)
             self._add(x, components, columns)
             names += [f"{name}" for name in self.force_names[before[0] :]]
@@ -111,10 +115,10 @@ class Inputs:
             self.prescribed_names.append(f"motion of {x} [{unit}]")
         else:
             for c in components:
-                unit = self._small._axes[:, [self._small.numbering.node(x.place)[c]]].toarray()
-                columns["motions"].append(unit[:, 0])
+                axis = self._small._axes[:, [self._small.numbering.node(x.place)[c]]].toarray()
+                columns["motions"].append(axis[:, 0])
                 columns["prescribed"].append(np.zeros(size))
-                columns["read"].append(unit[:, 0])
+                columns["read"].append(axis[:, 0])
                 self.prescribed_names.append(f"{COMPONENTS[c]} of {x} [{UNITS[c]}]")
 
     def _enter_force(self, name: str, force: Array, in_cells: Array) -> None:
@@ -130,15 +134,15 @@ def _accelerated(name: str) -> str:
     return f"d2{first}/dt2 {rest} [{unit}/s2]"
 
 
-def checked_inputs(scene: Scene, given: Sequence[Any]) -> list[tuple[Any, list[int]]]:
+def checked_inputs(scene: Scene, requested: Sequence[Any]) -> list[tuple[Any, list[int]]]:
     """Return the objects of inputs, with the components of supports, or raise."""
     checked = list[tuple[Any, list[int]]]()
-    for n, one in enumerate(given):
+    for n, item in enumerate(requested):
         what = f"linearize: inputs[{n}]"
-        x, component = one if isinstance(one, tuple) and len(one) == 2 else (one, None)
+        x, component = item if isinstance(item, tuple) and len(item) == 2 else (item, None)
         if component is not None and not isinstance(x, Support):
             raise ArgumentTypeError(
-                f"{what} = {shorten(one)} is a pair, which is for supports; give the object"
+                f"{what} = {shorten(item)} is a pair, which is for supports; give the object"
             )
         components = list[int]()
         if isinstance(x, Load):
@@ -169,7 +173,7 @@ def checked_inputs(scene: Scene, given: Sequence[Any]) -> list[tuple[Any, list[i
                     )
         else:
             raise ArgumentTypeError(
-                f"{what} = {shorten(one)} must be a load, connector or support of the scene, or "
+                f"{what} = {shorten(item)} must be a load, connector or support of the scene, or "
                 "(support, component)"
             )
         for y, others in checked:
@@ -224,10 +228,10 @@ class Outputs:
         x, rate, acceleration = (self._none if row is None else csr_array(row) for row in rows)
         direct = np.zeros(inputs.forces.shape[1]) if direct is None else direct
         laws = small._laws
-        if len(laws) and (law_part := x[:, laws]).nnz:
+        if len(laws) and (on_laws := x[:, laws]).nnz:
             # Row of a law: T x + C x' = f, with T diagonal for the forces of laws
             T, C = small.tangent, small.damping
-            factors = csr_array(law_part / T.diagonal()[laws])
+            factors = csr_array(on_laws / T.diagonal()[laws])
             direct = direct + (factors @ inputs.forces[laws]).toarray()[0]
             x, rate = x - factors @ T[laws], rate - factors @ C[laws]
             x = x.tolil()
@@ -235,7 +239,7 @@ class Outputs:
         self.names.append(name)
         for rows_of_kind, row in zip(self._rows, (x, rate, acceleration), strict=True):
             rows_of_kind.append(csr_array(row))
-        self._direct.append(direct)
+        self._direct.append(np.asarray(direct))
         if motion is not None:
             self._motions.append(csr_array(motion))
             self.motion_names.append(name)
@@ -292,10 +296,10 @@ class Outputs:
         """Add the force of a joint on its second place, see :meth:`States.joint`."""
         small, numbering = self._small, self._small.numbering
         indices, (a, b, *_) = connector_indices(self._scene, x), x.places
-        held = [holder for holder in x.holders if {holder.a, holder.b} == {a, b}]
+        holders = [holder for holder in x.holders if {holder.a, holder.b} == {a, b}]
         rows = np.zeros((3, numbering.size))
         for index, holder in zip(indices, x.holders, strict=True):
-            if holder not in held:
+            if holder not in holders:
                 continue
             λ, sign = int(numbering.multipliers[index]), 1.0 if holder.b == b else -1.0
             if holder.is_rotation:
@@ -317,8 +321,8 @@ class Outputs:
             rows[:2] -= sign * small.q[λ] * change
             rows[:2, λ] -= sign * d
         for c in components:
-            turns = any(holder.is_rotation for holder in held)
-            if c == 2 and not turns and len(components) > 1:
+            resists_rotation = any(holder.is_rotation for holder in holders)
+            if c == 2 and not resists_rotation and len(components) > 1:
                 continue  # the moment is zero, or with a shared rotation not known
             self._enter(f"{FORCE[c]} {x} [{('N', 'N', 'N m')[c]}]", [rows[[c]], None, None])
 

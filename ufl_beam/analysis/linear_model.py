@@ -98,7 +98,7 @@ class LinearModel(Rich):
         self.scene, self._small, self._inputs, self._outputs = scene, small, inputs, outputs
         self.inputs, self.outputs = inputs.names, outputs.names
         rows = small._constraint_rows
-        self._free, self._held = np.flatnonzero(~rows), np.flatnonzero(rows)  # rows of K
+        self._free, self._constraints = np.flatnonzero(~rows), np.flatnonzero(rows)  # rows of K
         self._basis: tuple[Array, Array] | None = None  # modes and motions with unit inputs
         self._correction: Array | float = 0.0  # of D in a reduced model
         self._squares: Array = np.zeros(0)  # squared frequencies of the modes
@@ -147,22 +147,22 @@ class LinearModel(Rich):
 
     @cached_property
     def M(self) -> csr_array:
-        """Mass."""
+        """Mass matrix of the unknowns."""
         return self._unscaled(self._small.M)
 
     @cached_property
     def C(self) -> csr_array:
-        """Damping."""
+        """Symmetric part of the velocity-dependent forces."""
         return self._unscaled((self._damping + self._damping.T) / 2)
 
     @cached_property
     def G(self) -> csr_array:
-        """Gyroscopic forces."""
+        """Skew-symmetric part of the velocity-dependent forces."""
         return self._unscaled((self._damping - self._damping.T) / 2)
 
     @cached_property
     def K(self) -> csr_array:
-        """Tangent stiffness."""
+        """Tangent stiffness with rows of constraints."""
         return self._unscaled(self._small.K)
 
     @cached_property
@@ -173,8 +173,8 @@ class LinearModel(Rich):
         C = small.C.tocoo()
         i, j = C.coords
         noise = ROUND_OFF * np.sqrt(rows[i] * rows[j] / small.squares.max())
-        kept = np.abs(C.data) > noise
-        return csr_array((C.data[kept], (i[kept], j[kept])), shape=C.shape)
+        above = np.abs(C.data) > noise
+        return csr_array((C.data[above], (i[above], j[above])), shape=C.shape)
 
     @property
     def _loads(self) -> tuple[csr_array, tuple[csr_array, csr_array, csr_array]]:
@@ -202,9 +202,9 @@ class LinearModel(Rich):
         small, (P0, P1, P2) = self._small, self._outputs.rows
         F, moved = self._loads
         n, nu = small.K.shape[0], self._inputs.number_of_motions
-        y, μ = self._free, self._held
+        y, μ = self._free, self._constraints
         M, Cd, K, Z = small.M, self._damping, small.K, small._Z
-        S, one = self._inputs.motions, eye_array(nu)
+        S, unity = self._inputs.motions, eye_array(nu)
         I, none = eye_array(len(y)), None
 
         def zeros(rows: int, columns: int) -> csr_array:
@@ -214,20 +214,20 @@ class LinearModel(Rich):
             [I, none, none, none, none, none],
             [none, I, none, none, none, none],
             [zeros(n, len(y)), none, zeros(n, len(y)), zeros(n, len(μ)), none, none],
-            [none, none, none, none, one, none],
-            [none, none, none, none, none, one],
+            [none, none, none, none, unity, none],
+            [none, none, none, none, none, unity],
         ])  # fmt: skip
         A = block_array([
             [zeros(len(y), len(y)), I, none, none, none, none],
             [none, zeros(len(y), len(y)), I, none, none, none],
             [-K[:, y], -Cd[:, y], -M[:, y], -K[:, μ], moved[0], moved[1]],
-            [none, none, none, none, zeros(nu, nu), one],
+            [none, none, none, none, zeros(nu, nu), unity],
             [none, none, none, none, none, zeros(nu, nu)],
         ])  # fmt: skip
         nf = F.shape[1]
         B = block_array([
             [zeros(2 * len(y), nf), zeros(2 * len(y), nu)], [F, moved[2]],
-            [zeros(nu, nf), zeros(nu, nu)], [zeros(nu, nf), one],
+            [zeros(nu, nf), zeros(nu, nu)], [zeros(nu, nf), unity],
         ])  # fmt: skip
         C = hstack([P0 @ Z[:, y], P1 @ Z[:, y], P2 @ Z[:, y], P0 @ Z[:, μ], P0 @ S, P1 @ S])
         order = self._inputs.order
@@ -417,7 +417,7 @@ class LinearModel(Rich):
                     f"state_space: {2 * len(y)} states are too many for dense matrices; use "
                     "reduced(n), or descriptor() and frequency_response(omega)"
                 )
-            J, h = small.K.tocsr()[self._held][:, y], moved[0][self._held].toarray()
+            J, h = small.K.tocsr()[self._constraints][:, y], moved[0][self._constraints].toarray()
             coordinates = independent_coordinates(M, J, h, small.lengths[small.left[y]])
         else:
             N, P = self._basis[0][y], self._basis[1][y]
@@ -435,7 +435,7 @@ class LinearModel(Rich):
     def _space(self) -> tuple[Array, Array, Array, Array]:
         """A, B, C and D with inputs in the order of the user."""
         small, inputs, out, motion = self._small, self._inputs, self._outputs, self._motion
-        y, μ, ns = self._free, self._held, motion.states
+        y, μ, ns = self._free, self._constraints, motion.states
         F, moved = self._loads
         K, Z = small.K.tocsr(), small._Z
         if self._basis is None:
@@ -527,18 +527,19 @@ def linearize(
     for name, some in sequences.items():
         if not require_sequence(some, f"linearize: {name}"):
             raise ArgumentError(f"linearize: {name} is empty; give at least one")
-    given, wanted = checked_inputs(scene, inputs), checked_outputs(scene, outputs)
-    unit = [x for x, _ in given if isinstance(x, Load)]
+    requested, wanted = checked_inputs(scene, inputs), checked_outputs(scene, outputs)
+    unit = [x for x, _ in requested if isinstance(x, Load)]
     factors = {id(load): _Amplitude(load.amplitude if at else Constant(0.0)) for load in unit}
-    loads = [replace(x, amplitude=factors[id(x)]) if id(x) in factors else x for x in scene.loads]
+    loads: list[Any] = [*scene.loads]
+    loads = [replace(x, amplitude=factors[id(x)]) if id(x) in factors else x for x in loads]
     small = SmallMotions(replace(scene, loads=loads) if unit else scene, at, mesh=mesh)
     if not small.M.data.any():
         raise ArgumentError("linearize: nothing that can move has mass; give sections rho or rhoA")
     require_equilibrium(small, at)
     warn_of_masses(scene)
-    warn_of_omissions(small, [x for x, _ in given])
-    driven = Inputs(small, scene, given, factors)
-    return LinearModel(small, scene, driven, Outputs(small, scene, wanted, driven))
+    warn_of_omissions(small, [x for x, _ in requested])
+    model_inputs = Inputs(small, scene, requested, factors)
+    return LinearModel(small, scene, model_inputs, Outputs(small, scene, wanted, model_inputs))
 
 
 class _Amplitude:

@@ -104,7 +104,7 @@ def warn_of_omissions(small: Linearization, inputs: Sequence[Any]) -> None:
         if isinstance(connector.law, Controller) and connector not in inputs:
             warn(f"linearize: {connector}: the force of the controller is constant")
     for group in small._simulation.equation.connector_terms:
-        if isinstance(group.connectors[0].law, Coulomb):
+        if isinstance(group.connectors[0].law, Coulomb) and group.response.sticks is not None:
             for connector, sticks in zip(group.connectors, group.response.sticks, strict=True):
                 if not sticks:
                     warn(f"linearize: {connector}: sliding friction is left out")

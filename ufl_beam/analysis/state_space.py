@@ -61,30 +61,30 @@ def independent_coordinates(M: csr_array, J: csr_array, h: Array, sizes: Array) 
     combinations of them have no mass.
     """
     n, (m, nu) = J.shape[1], h.shape
-    N, P, kept = np.eye(n), np.zeros((n, nu)), np.arange(n)
+    N, P, independent = np.eye(n), np.zeros((n, nu)), np.arange(n)
     if m:
         scaled = J.toarray() * sizes
         lengths = np.linalg.norm(scaled, axis=1)[:, None]
         Q, R, order = qr(scaled / lengths, mode="economic", pivoting=True)
         rank = int(np.sum(np.abs(R.diagonal()) > SINGULAR * abs(R[0, 0])))
-        dependent, kept = order[:rank], np.sort(order[rank:])
+        dependent, independent = order[:rank], np.sort(order[rank:])
         R2 = R[:rank, rank:][:, np.argsort(order[rank:])]
-        N = N[:, kept]
-        N[dependent] = sizes[dependent, None] * -solve(R[:rank, :rank], R2) / sizes[kept]
+        N = N[:, independent]
+        N[dependent] = sizes[dependent, None] * -solve(R[:rank, :rank], R2) / sizes[independent]
         P[dependent] = sizes[dependent, None] * solve(R[:rank, :rank], (Q.T @ (h / lengths))[:rank])
     reduced = N.T @ (M @ N)
     terms = np.sum(np.abs(N) * (abs(M) @ np.abs(N)), axis=0)
     massive = reduced.diagonal() > ROUND_OFF * terms
-    identity = np.eye(len(kept))
-    V1, V0 = identity[:, massive], identity[:, ~massive] * sizes[kept[~massive]]
+    identity = np.eye(len(independent))
+    V1, V0 = identity[:, massive], identity[:, ~massive] * sizes[independent[~massive]]
     scale = 1 / np.sqrt(reduced.diagonal()[massive])
     values, vectors = np.linalg.eigh(reduced[np.ix_(massive, massive)] * np.outer(scale, scale))
     if values.min(initial=1.0) < SINGULAR:
         heavy = values >= SINGULAR
         turned = V1 @ (scale[:, None] * vectors)
         V1, V0 = turned[:, heavy], np.hstack([V0, turned[:, ~heavy]])
-    pick = np.zeros((len(kept), n))
-    pick[np.arange(len(kept)), kept] = 1.0
+    pick = np.zeros((len(independent), n))
+    pick[np.arange(len(independent)), independent] = 1.0
     return Coordinates(N, P, V1, V0, np.linalg.solve(np.hstack([V1, V0]), pick))
 
 
