@@ -481,3 +481,82 @@ def test_step_of_a_frame_with_a_load_beside_a_body():
         ("section_forces_at", post.at(0.2)),
     ]  # fmt: skip
     require_second_order(scene, outputs, [load], drive, at)
+
+
+# -- static runs -----------------------------------------------------------------------------------
+
+SOFT = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-2)
+GIRDER = ub.Beam((0, 0), (2, 0.5), SOFT, cells=3, name="girder")
+FOOT = ub.Clamped(GIRDER.start)
+
+
+def hung(amplitude):
+    """Link that bears a force: its direction turns with its ends."""
+    link = ub.Link(ub.ground(3, 1.5), GIRDER.end)
+    load = ub.PointLoad(GIRDER.at(1 / 3), force=(1.0, -5.0), amplitude=amplitude)
+    scene = ub.Scene([GIRDER], supports=[ub.Pinned(GIRDER.start)], joints=[link], loads=[load])
+    return scene, [("joint", link, "x"), ("joint", link, "y"), ("displacement", GIRDER.end)]
+
+
+def sliding(amplitude):
+    """Slider whose rail turns with a loaded beam."""
+    arm = ub.Beam((2, 0.5), (3, 0.3), SOFT, cells=2, name="arm")
+    rail = ub.Prismatic(GIRDER.end, arm.start, axis=(2, 0.5))
+    spring = ub.Slide(GIRDER.end, arm.start, ub.Spring(30.0), axis=(2, 0.5))
+    load = ub.PointLoad(arm.end, force=(1.0, -2.0), amplitude=amplitude)
+    scene = ub.Scene(
+        [GIRDER, arm], supports=[FOOT], joints=[rail], connectors=[spring], loads=[load]
+    )
+    outputs = [("joint", rail, "x"), ("joint", rail, "y"), ("displacement", arm.end),
+               ("connector", spring, "motion"), ("connector", spring, "force")]  # fmt: skip
+    return scene, outputs
+
+
+def linked(amplitude):
+    """Rigid link with an arm that turns."""
+    arm = ub.Beam((2, 0.9), (3, 0.9), SOFT, cells=2, name="arm")
+    link = ub.RigidLink(GIRDER.end, arm.start)
+    load = ub.PointLoad(arm.end, force=(1.0, -2.0), amplitude=amplitude)
+    scene = ub.Scene([GIRDER, arm], supports=[FOOT], joints=[link], loads=[load])
+    return scene, [("joint", link, "x"), ("joint", link, "y"), ("reaction", FOOT)]
+
+
+def crossed(amplitude):
+    """Moving load between the nodes of a cell; section forces on both sides of it."""
+    load = ub.MovingLoad([GIRDER], force=(0, -3.0), position=lambda t: 0.77, amplitude=amplitude)
+    scene = ub.Scene([GIRDER], supports=[FOOT], loads=[load])
+    places = [GIRDER.at(s) for s in (0.1, 0.35, 0.6)]
+    return scene, [("section_forces_at", place) for place in places]
+
+
+def heated(amplitude):
+    """Imposed strains of a propped beam, with section forces inside a cell."""
+    load = ub.ImposedStrain(GIRDER, curvature=0.1, axial=1e-3, amplitude=amplitude)
+    scene = ub.Scene([GIRDER], supports=[FOOT, ub.Pinned(GIRDER.end)], loads=[load])
+    return scene, [("section_forces_at", GIRDER.at(0.4)), ("reaction", FOOT)]
+
+
+@pytest.mark.parametrize("build", [hung, sliding, linked, crossed, heated])
+def test_static_gains_about_a_loaded_state(build):
+    """[calc] Difference quotients of static runs: the step 1e-3 leaves a millionth of the gain."""
+    factor = [0.0]
+    scene, outputs = build(lambda t: t * (1 + factor[0]))
+    outputs = [(*x, c) for x in outputs for c in (COMPONENTS[x[0]] if len(x) == 2 else [None])]
+    outputs = [x[:3] if x[-1] is None else x for x in outputs]
+
+    def run():
+        return ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, newton=ub.Newton(rtol=1e-13))
+
+    model = ub.linearize(scene, inputs=[scene.loads[0]], outputs=outputs, at=run())
+    ends = []
+    for factor[0] in (1e-3, -1e-3):
+        loaded = run()
+        ends.append(np.array([measured(loaded, *x)[-1] for x in outputs]))
+    quotient = (ends[0] - ends[1]) / 2e-3
+    sizes = np.maximum(np.abs(quotient), 1e-3 * np.abs(quotient).max())
+    A, B, C, D = model.state_space()
+    for gain in (
+        model.frequency_response(0.0)[:, 0, 0].real,
+        (D - C @ np.linalg.solve(A, B))[:, 0],
+    ):
+        assert (np.abs(gain - quotient) <= 5e-6 * sizes).all()
