@@ -106,6 +106,8 @@ def test_text_names_inputs_and_outputs():
     reduced = model.reduced(2)
     assert reduced.states[0].startswith("mode 0 (0.88")
     assert str(reduced).startswith("linear model with 6 states")
+    assert repr(reduced) == "<LinearModel: 6 states, 2 inputs, 3 outputs>"
+    assert repr(model_of()) == "<LinearModel: 12 unknowns, 1 input, 1 output>"
 
 
 # -- equal forms -----------------------------------------------------------------------------------
@@ -196,6 +198,7 @@ def test_states_of_a_run():
     assert not model.state(static)[12:].any()
 
 
+@pytest.mark.filterwarnings("ignore:::control")  # what a new NumPy says about python-control
 def test_python_control():
     control = pytest.importorskip("control")
     model = model_of(inputs=[PUSH, (FOOT, "v")]).reduced(3)

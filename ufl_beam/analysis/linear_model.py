@@ -38,7 +38,7 @@ from ufl_beam.analysis.state_space import (
 )
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.discretization.model_warnings import warn_of_masses
-from ufl_beam.display import Rich
+from ufl_beam.display import Rich, counted
 from ufl_beam.errors import (
     ArgumentError,
     require_array,
@@ -106,16 +106,21 @@ class LinearModel(Rich):
         require_free(small, inputs, outputs)
 
     def __str__(self) -> str:
-        size = f"{len(self.states)} states" if self._basis else f"{len(self.unknowns)} unknowns"
-        lines = [f"linear model with {size}", "inputs"]
+        lines = [f"linear model with {self._size}", "inputs"]
         lines += [f"  {name}" for name in self.inputs]
         return "\n".join([*lines, "outputs", *(f"  {name}" for name in self.outputs)])
 
     def __repr__(self) -> str:
-        return (
-            f"<LinearModel: {len(self.unknowns)} unknowns, {len(self.inputs)} inputs, "
-            f"{len(self.outputs)} outputs>"
-        )
+        inputs, outputs = len(self.inputs), len(self.outputs)
+        both = counted((inputs, "input", "inputs"), (outputs, "output", "outputs"))
+        return f"<LinearModel: {self._size}, {both}>"
+
+    @property
+    def _size(self) -> str:
+        """Number of states of a reduced model, else number of unknowns."""
+        if self._basis is not None:
+            return f"{len(self.states)} states"
+        return counted((len(self.unknowns), "unknown", "unknowns"))
 
     # -- matrices ------------------------------------------------------------------------------
 
@@ -529,7 +534,9 @@ def linearize(
             raise ArgumentError(f"linearize: {name} is empty; give at least one")
     requested, wanted = checked_inputs(scene, inputs), checked_outputs(scene, outputs)
     unit = [x for x, _ in requested if isinstance(x, Load)]
-    factors = {id(load): _Amplitude(load.amplitude if at else Constant(0.0)) for load in unit}
+    factors = {
+        id(load): _Amplitude(load.amplitude if at is not None else Constant(0.0)) for load in unit
+    }
     loads: list[Any] = [*scene.loads]
     loads = [replace(x, amplitude=factors[id(x)]) if id(x) in factors else x for x in loads]
     small = SmallMotions(replace(scene, loads=loads) if unit else scene, at, mesh=mesh)
