@@ -161,6 +161,10 @@ def test_reduced_model_is_exact_for_slow_inputs():
     s = 5.0 + 90.0j
     full, every = (m.transfer_function(s)[:, :, 0] for m in (model, all_modes))
     np.testing.assert_allclose(every, full, rtol=1e-6)
+    again, before = reduced.reduced(3), reduced.state_space()[0]
+    np.testing.assert_array_equal(again.state_space()[0], model.reduced(3).state_space()[0])
+    np.testing.assert_array_equal(again.state_space()[3], model.reduced(3).state_space()[3])
+    np.testing.assert_array_equal(reduced.state_space()[0], before)
     E, A, *_ = reduced.descriptor()
     assert (np.eye(18) != E).sum() == 0
     np.testing.assert_array_equal(A.toarray(), reduced.state_space()[0])
@@ -317,6 +321,26 @@ def test_modes_of_free_scenes_are_states():
     assert [x[:14] for x in model.reduced(5).states[:4]] == [
         "mode 0 (0 Hz)", "mode 1 (0 Hz)", "mode 2 (0 Hz)", model.reduced(5).states[3][:14],
     ]  # fmt: skip
+
+
+def test_follower_force_makes_the_stiffness_unsymmetric():
+    """Beyond Beck's load the column flutters: exponents of `modes`, also with two modes.
+
+    Without damping the modes span an invariant space, so that their exponents are exact.
+    """
+    column = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e5, GA=1e5, EI=1.0, rhoA=1.0), cells=12)
+    thrust = ub.FollowerLoad(column.end, force=(-22.0, 0), amplitude=lambda t: t)
+    push = ub.PointLoad(column.end, force=(0, 1.0), amplitude=still)
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start)], loads=[thrust, push])
+    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
+    model = model_of(scene, [push], [("displacement", column.end, "v")], at=at)
+    assert abs(model.K - model.K.T).max() > 1.0
+    expected = ub.modes(scene, 1, at=at).exponents[0]
+    assert abs(expected.real) > 0.1
+    for form, tolerance in ((model, 1e-6), (model.reduced(2), 1e-6)):
+        s = np.linalg.eigvals(form.state_space()[0])
+        apart = np.abs(np.abs(s.real) - abs(expected.real)) + np.abs(s.imag - expected.imag)
+        assert apart.min() <= tolerance * abs(expected)
 
 
 # -- refused calls ---------------------------------------------------------------------------------

@@ -302,22 +302,18 @@ class LinearModel(Rich):
         """Return a model of the first n undamped modes, with static corrections of the outputs.
 
         The modes are those nearest to zero frequency, rigid motions included.  Damping and
-        gyroscopic forces couple them.  Prescribed motions keep their states; the scene follows them
-        as in statics.  The correction, a part of D, makes the response to slow inputs exact.
+        gyroscopic forces couple them.  With an unsymmetric stiffness, as of a follower force, the
+        real and imaginary parts of the first n modes of :func:`modes` are the basis.  Prescribed
+        motions keep their states; the scene follows them as in statics.  The correction, a part of
+        D, makes the response to slow inputs exact.
 
         Args:
             n: Number of modes; fewer if the scene has fewer.
         """
         n, small, nu = require_count(n, "reduced: n"), self._small, self._inputs.number_of_motions
-        _, x, works, zero, _ = small.undamped(n, (small.K + small.K.T) / 2, definite=True)
-        masses = np.sum(x * (small.M @ x), axis=0)
-        values = np.where(zero, 0.0, works / masses)
-        order = np.argsort(np.abs(values), kind="stable")[:n]
-        values, x = values[order], (x / np.sqrt(masses))[:, order]
-        lowest = np.abs(values[np.abs(values) > HELD * small.squares.min()]).min(
-            initial=small.squares.max()
-        )
-        s = QUASI_STATIC * float(lowest) ** 0.5
+        x, squares, names = self._modes(n)
+        moving = np.abs(squares)[np.abs(squares) > HELD * small.squares.min()]
+        s = QUASI_STATIC * float(moving.min(initial=small.squares.max())) ** 0.5
         # Static motions P with K P = B; K may be singular, and an iteration reduces the error of
         # the shifted matrix by the factor QUASI_STATIC² each time.
         P = np.zeros((len(x), nu))
@@ -329,12 +325,39 @@ class LinearModel(Rich):
         for name in ("_motion", "_space", "states"):
             vars(model).pop(name, None)
         model._basis = x, P
-        model._squares = values
-        hertz = np.sqrt(np.abs(values)) / (2 * np.pi)
-        model._mode_names = [f"mode {k} ({f:.4g} Hz)" for k, f in enumerate(hertz)]
+        model._squares, model._mode_names = squares, names
+        model._correction = 0.0
         model._correction = (self._response(complex(s)) - model.transfer_function(s)[:, :, 0]).real
         vars(model).pop("_space")
         return model
+
+    def _modes(self, n: int) -> tuple[Array, Array, list[str]]:
+        """Return n modes with unit masses, their squared frequencies (rad²/s²), and their names."""
+        small = self._small
+        K, M = small.K, small.M
+        if self._symmetric:
+            _, x, works, zero, _ = small.undamped(n, (K + K.T) / 2, definite=True)
+            masses = np.sum(x * (M @ x), axis=0)
+            values = np.where(zero, 0.0, works / masses)
+            order = np.argsort(np.abs(values), kind="stable")[:n]
+            squares, x = values[order], (x / np.sqrt(masses))[:, order]
+            hertz = np.sqrt(np.abs(squares)) / (2 * np.pi)
+            return x, squares, [f"mode {k} ({f:.4g} Hz)" for k, f in enumerate(hertz)]
+        # Real and imaginary parts of the modes, made orthogonal
+        exponents, shapes = small.exponents(n)
+        x = (small._axes.T @ shapes)[small.left] / small.scale[small.left, None]
+        x = np.hstack([x.real, x.imag])
+        masses = np.sum(x * (M @ x), axis=0)
+        x = (x / np.sqrt(np.where(masses > 0.0, masses, 1.0)))[:, masses > HELD * masses.max()]
+        values, mix = np.linalg.eigh(x.T @ (M @ x))
+        chosen = values > HELD * values.max()
+        x = x @ (mix[:, chosen] / np.sqrt(values[chosen]))
+        return x, np.abs(exponents) ** 2, [f"part {k} of the modes" for k in range(x.shape[1])]
+
+    @property
+    def _symmetric(self) -> bool:
+        K = self._small.K
+        return bool(abs(K - K.T).max() <= ROUND_OFF * abs(K).max())
 
     # -- state space ---------------------------------------------------------------------------
 
@@ -428,7 +451,7 @@ class LinearModel(Rich):
             N, P = self._basis[0][y], self._basis[1][y]
             n = N.shape[1]
             coordinates = Coordinates(N, P, np.eye(n), np.zeros((n, 0)), N.T @ M)
-            if abs(K - K.T).max() <= ROUND_OFF * abs(K).max():
+            if self._symmetric:
                 more = np.diag(self._squares)  # quotients of works, without round-off of K
         names, sizes = self._names_of_motions, small.lengths[small.left[y]]
         return first_order(
