@@ -424,6 +424,24 @@ def test_step_of_a_slider_crank(law):
     require_second_order(scene, outputs, [motor], drive, power=int(forced), steps=40)
 
 
+def test_step_of_a_beam_on_a_cart():
+    """A leaning mast on a cart that a growing force pushes; without the lean, order three."""
+    mast = ub.Beam((0, 0), (0.3, 1), STEEL, cells=3, name="mast")
+    cart = ub.Body((0, 0), mass=0.7, inertia=1.0, name="cart")
+    drive = Drive()
+    jack = ub.Slide(
+        ub.ground(-1, 0), cart.middle, ub.PrescribedForce(drive.load(0.0, base=0.0)), axis=(1, 0)
+    )
+    weld = ub.Rigid(mast.start, cart.middle, multipliers=True)
+    rail = ub.Prismatic(ub.ground(0, 0), cart.middle, axis=(1, 0))
+    scene = ub.Scene([mast], bodies=[cart], joints=[weld, rail], connectors=[jack])
+    outputs = [
+        ("displacement", mast.end), ("displacement", cart.middle, "u"), ("acceleration", mast.end),
+        ("section_forces_at", mast.at(0.2)), ("joint", weld), ("joint", rail, "y"),
+    ]  # fmt: skip
+    require_second_order(scene, outputs, [jack], drive)
+
+
 def test_step_of_a_support():
     """A clamp at an angle is accelerated, under a load that bends the beam."""
     b = ub.Beam((0, 0), (2, 0.3), STEEL, cells=3)
