@@ -47,6 +47,8 @@ from ufl_beam.analysis.imperfections import imperfect
 from ufl_beam.analysis.incremental_dynamics import incremental_dynamic_analysis
 from ufl_beam.analysis.incremental_dynamics_result import DemandCurves as DemandCurves
 from ufl_beam.analysis.incremental_dynamics_result import Fragility as Fragility
+from ufl_beam.analysis.linear_model import LinearModel as LinearModel
+from ufl_beam.analysis.linear_model import linearize
 from ufl_beam.analysis.load_combinations import load_combinations
 from ufl_beam.analysis.load_combinations_result import Governing as Governing
 from ufl_beam.analysis.load_combinations_result import LoadCombinations as LoadCombinations
@@ -323,6 +325,7 @@ __all__ = [
     "incremental_dynamic_analysis",
     "interaction_diagram",
     "law_functions",
+    "linearize",
     "load_combinations",
     "logarithmic_decrement",
     "modes",
@@ -345,8 +348,8 @@ __all__ = [
 RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "DemandCurves",
     "Diagram", "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film", "Fragility",
-    "Governing", "HingeFormation", "HingeTable", "InteractionDiagram", "LoadCombinations",
-    "Modes", "MomentCurvature", "Path", "Place", "Pushover", "ResponseSpectrum",
+    "Governing", "HingeFormation", "HingeTable", "InteractionDiagram", "LinearModel",
+    "LoadCombinations", "Modes", "MomentCurvature", "Path", "Place", "Pushover", "ResponseSpectrum",
     "SpectralResponse", "Storeys", "TargetDisplacement", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""

@@ -8,6 +8,8 @@ from functools import partial
 import numpy as np
 from balance_of_parts import Balance
 from combination_case import DIGITS, SAME, check, difference, only
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
 import ufl_beam as ub
 from ufl_beam.model.bodies import GROUND, node
@@ -227,6 +229,7 @@ def modes(case):
     place = max(places, key=lambda p: _way(shapes, p))  # nodes, so that the mesh stays
     push = ub.PointLoad(place, force=1e-5 * 100 * np.array([0.6, 0.8]), amplitude=lambda t: 1.0)
     arguments = {"t": (t0, t0 + 4 * period), "dt": period / 40, "mesh": names["mesh"]}
+    _require_linear_model(still, held, push, place, state, shapes)
     run = ub.simulate(
         replace(still, loads=[*held, push]), ub.EnergyMomentum(), start=state,
         comm=case.comm, newton=ub.Newton(rtol=DIGITS), **arguments,
@@ -239,6 +242,32 @@ def modes(case):
     left = moved - basis @ np.linalg.lstsq(basis, moved, rcond=1e-10)[0]
     missing = np.abs(left).max() / np.ptp(moved, axis=0).max()
     assert missing < 1e-2, missing
+
+
+def _require_linear_model(still, held, push, place, state, shapes):
+    """The linear model has the exponents of the modes, and one response in all its forms.
+
+    LAPACK finds exponents from first-order equations with an error of 1e-14 of the largest one;
+    an error of the square of a small exponent counts.
+    """
+    push = replace(push, force=(0.6, 0.8), amplitude=lambda t: float(t > state.times[-1]))
+    model = ub.linearize(
+        replace(still, loads=[*held, push]), inputs=[push], at=state,
+        outputs=[("displacement", place, "u"), ("velocity", place, "v")],
+    )  # fmt: skip
+    A, B, C, D = model.state_space()
+    s, few = np.linalg.eigvals(A), shapes.exponents[:6]
+    largest = np.abs(s).max()
+    for one in few:
+        near = np.abs(s**2 - one**2).min()
+        assert near <= 1e-11 * largest**2 + 1e-7 * abs(one) ** 2, (one, near)
+    at = 0.7 * abs(few[0]) * np.exp(1.9j)
+    full = model.transfer_function(at)[:, 0, 0]
+    by_states = (C @ np.linalg.solve(at * np.eye(len(A)) - A, B) + D)[:, 0]
+    E, A, B, C, D = model.descriptor()
+    by_descriptor = (C @ splu(csc_array(at * E - A)).solve(B.toarray().astype(complex)) + D)[:, 0]
+    for other in (by_states, by_descriptor):
+        assert np.abs(other - full).max() <= 1e-6 * np.abs(full).max()
 
 
 def _way(shapes, place):

@@ -48,7 +48,7 @@ RECORDED = {
 
 CALLED = {
     "Checkpoint", "LoadControl", "Simulation", "buckling", "follow",
-    "modes", "plot", "simulate",
+    "linearize", "modes", "plot", "simulate",
 }  # fmt: skip
 """Other names that checks use."""
 

@@ -12,7 +12,7 @@ from scenes import clamped
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
-from ufl_beam.analysis.linearization import SmallMotions
+from ufl_beam.analysis.small_motions import SmallMotions
 
 SECTION = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-3)
 

@@ -25,6 +25,9 @@ BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
 OTHER = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="other")
 BODY = ub.Body((2, 0), mass=1.0, inertia=1.0, name="hub")
 SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
+PUSHED = ub.Scene(
+    [BEAM], supports=[ub.Clamped(BEAM.start)], loads=[ub.PointLoad(BEAM.end, force=(0, 1))]
+)
 GROWING = ub.Scene(
     [BEAM],
     supports=[ub.Clamped(BEAM.start)],
@@ -567,6 +570,15 @@ TABLE = {
         scene=V(SCENE, OBJECT), n=V(1, COUNT), t=V(1.0, NUMBER), at=V(None, optional(OBJECT)),
         **MESH,
     ),
+    "linearize": call(
+        ub.linearize,
+        scene=V(PUSHED, OBJECT), inputs=V([PUSHED.loads[0]], [*LIST, [None], [1.0], []]),
+        outputs=V(
+            [("displacement", BEAM.end, "v")],
+            [*LIST, [], ["v"], [("displacement", BEAM.end, "x")], [("displacement", 1.0)]],
+        ),
+        at=V(None, optional(OBJECT)), **MESH,
+    ),
     "imperfect": call(
         ub.imperfect,
         scene=V(SCENE, OBJECT), sway=V(0.01, NUMBER),
@@ -764,7 +776,8 @@ TABLE |= {
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Coefficients", "Connector", "CriticalPoint", "Cycles", "Decay",
     "DemandCurves", "Diagram", "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film",
-    "Governing", "HingeFormation", "InteractionDiagram", "Joint", "LoadCombinations", "Modes",
+    "Governing", "HingeFormation", "InteractionDiagram", "Joint", "LinearModel",
+    "LoadCombinations", "Modes",
     "MomentCurvature", "Path", "Pushover", "Solution", "SpectralResponse", "Step", "Study",
     "Support", "TargetDisplacement", "Tradeoff",
 }  # fmt: skip

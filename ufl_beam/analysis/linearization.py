@@ -1,40 +1,46 @@
 # SPDX-License-Identifier: MIT
-"""Linearized equations about a state: matrices and eigenvalues of small motions."""
+"""Linearized equations about a state: mass, damping and stiffness matrices of small motions."""
 
 from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
-from typing import TypeVar
+from functools import cached_property
 
 from mpi4py import MPI
 
 import numpy as np
-import numpy.typing as npt
+import ufl
 from scipy.sparse import block_array, csr_array, diags_array, eye_array
 from scipy.sparse.csgraph import structural_rank
 from scipy.sparse.linalg import splu
 
-from ufl_beam.arrays import Array, Complex
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.compiled_forms import cached_forms
+from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ArgumentError, ModelWarning
 from ufl_beam.mechanics.time_scheme import Coefficients, Step
-from ufl_beam.mechanics.time_schemes import Newmark
+from ufl_beam.mechanics.time_schemes import Newmark, Static
 from ufl_beam.model.beams import Mesh
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import MovingLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.solvers import eigensolvers
-from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
+from ufl_beam.terms.beam_forces import inelastic_forms, section_law
+from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.term import InCells
 
-V = TypeVar("V", Array, Complex)
-
-MODAL_TOLERANCE = 1e-9  # coupling below this fraction of the largest damping is neglected
 BALANCED = 1e-13  # forces below this fraction of the stiffness times the scene's size are round-off
+CHANGE = 1e-6  # change for difference quotients; rad, or fraction of the size of the scene
 AT_REST = 1e150  # time step after which rates vanish; its square does not overflow; s
 
 
@@ -50,11 +56,19 @@ class _Standstill(Newmark):
         return Coefficients(own.inertia, (1 / dt, 0.0, 0.0), own.rates[:1])
 
 
-class SmallMotions:
+class Linearization:
     """Matrices of small motions about a state, without degrees of freedom constrained by supports.
 
     The state is the last state of ``at``, by default the undeformed scene.  Loads are evaluated at
     the time ``t`` (s), by default the time of the state.  Masses of moving loads are left out.
+
+    Attributes:
+        tangent: Derivative of forces with respect to all unknowns; (size, size).
+        masses: Masses of all unknowns; (size, size).
+        K, M, C: Stiffness, mass and damping of free motions and scaled forces of constraints.
+        left: Degrees of freedom of the rows of K, in the axes of supports.
+        scale: Factors of the unknowns of K; (size,).
+        most: Largest number of modes.
     """
 
     def __init__(
@@ -95,15 +109,16 @@ class SmallMotions:
         left[simulation.supports.dofs] = left[self._laws] = False
         scale = np.ones(self.numbering.size)
         scale[constraints] = abs(T.data).max()  # rows of constraints become as large as stiffnesses
+        self.left, self.scale = np.flatnonzero(left), scale
         # Columns: unit motions that supports allow, and unit forces of constraints.
-        self._Z = (self._axes @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
+        self._Z = (self._axes @ diags_array(scale, format="csr"))[:, self.left]
         masses = self._matrix(simulation.inertia.M.data)
         self.tangent, self.masses = T, masses  # of all degrees of freedom
         self.K, self.M = self._reduced(T), self._reduced(masses)
         # Number of modes: a constraint removes its force and one motion; a mode needs mass.  A
         # constraint between motions without mass, as of a hinge, removes one of these.
         massless = self.M.diagonal() == 0.0
-        self._constraint_rows = rows = np.isin(np.flatnonzero(left), constraints)
+        self._constraint_rows = rows = np.isin(self.left, constraints)
         between = self.K[np.flatnonzero(rows)][:, np.flatnonzero(massless & ~rows)]
         removed = structural_rank(between) if min(between.shape) else 0
         self.most = self.K.shape[0] - len(constraints) - int(massless.sum()) + int(removed)
@@ -119,13 +134,36 @@ class SmallMotions:
         r, data = simulation.equation.linearize(q, step)
         return r, self._matrix(data)
 
-    def _reduced(self, T: csr_array) -> csr_array:
-        """Reduce a matrix to columns of ``_Z``; eliminate forces that follow from force laws."""
+    def _condensed(self, T: csr_array) -> csr_array:
+        """Eliminate forces that follow from force laws; their rows and columns become zero."""
         laws = self._laws
         if len(laws):
             flexibility = diags_array(1 / (T.diagonal()[laws] + (T.diagonal()[laws] == 0.0)))
             T = T - T[:, laws] @ flexibility @ T[laws, :]
-        return csr_array(self._Z.T @ T @ self._Z)
+        return T
+
+    def _reduced(self, T: csr_array) -> csr_array:
+        """Reduce a matrix to columns of ``_Z``; eliminate forces that follow from force laws."""
+        return csr_array(self._Z.T @ self._condensed(T) @ self._Z)
+
+    @cached_property
+    def squares(self) -> Array:
+        """Squared frequencies of single degrees of freedom with mass and stiffness; rad²/s²."""
+        heavy = (self.M.diagonal() > 0) & (self.K.diagonal() != 0)
+        squares = np.abs(self.K.diagonal()[heavy]) / self.M.diagonal()[heavy]
+        return np.asarray(squares if heavy.any() else np.ones(1))
+
+    @cached_property
+    def _in_short_step(self) -> tuple[float, csr_array]:
+        """Shortest period over 2π, and the tangent in a step of this length; s."""
+        τ = float(self.squares.max()) ** -0.5
+        return τ, self._linearized(self.q, τ)[1]
+
+    @cached_property
+    def C(self) -> csr_array:
+        """Derivative of forces with respect to velocities, reduced as K."""
+        τ, T = self._in_short_step
+        return (self._reduced(T) - self.K) * τ
 
     def participation(self, direction: Array) -> tuple[Array, float]:
         """Return M r for a translation r of all nodes along a unit vector, and the moving mass.
@@ -161,6 +199,118 @@ class SmallMotions:
             x[laws] = -(self.tangent[laws] @ x) / self.tangent.diagonal()[laws][:, None]
         return np.asarray(self.tangent @ x - self.masses @ x * omega**2)
 
+    # -- forces of the state -------------------------------------------------------------------
+
+    @cached_property
+    def damping(self) -> csr_array:
+        """Derivative of forces with respect to velocities of all unknowns; (size, size)."""
+        τ, T = self._in_short_step
+        return csr_array((T - self.tangent) * τ)
+
+    @cached_property
+    def condensed_tangent(self) -> csr_array:
+        """Derivative of forces of all unknowns, without forces that follow from force laws."""
+        return self._condensed(self.tangent)
+
+    @cached_property
+    def condensed_damping(self) -> csr_array:
+        """Derivative with respect to velocities, without forces that follow from force laws."""
+        τ, T = self._in_short_step
+        return csr_array((self._condensed(T) - self.condensed_tangent) * τ)
+
+    @property
+    def lengths(self) -> Array:
+        """Size of the scene for displacements, 1 for rotations and forces; (size,)."""
+        scales = self.numbering.scales
+        return np.divide(1.0, scales, out=np.ones(len(scales)), where=scales > 0)
+
+    def imbalance(self) -> tuple[Array, Array, Array]:
+        """Return unbalanced forces at free motions, sums of magnitudes, round-off; (size,) each."""
+        r, T = self._linearized(self.q)
+        laws, multipliers = self._laws, self.numbering.multipliers
+        sums = np.zeros(len(r))
+        for term in self._simulation.equation.terms:
+            if term.kind != "inertia":
+                forces = np.zeros(len(r))
+                term.add_residual(self.q, forces)
+                sums += np.abs(forces)
+        r = self._axes.T @ (r - T[:, laws] @ (r[laws] / T.diagonal()[laws]))
+        r[self._simulation.supports.dofs] = r[multipliers] = sums[multipliers] = 0.0
+        return r, sums, BALANCED * self.scene.size * abs(T).max(axis=1).toarray().ravel()
+
+    def gaps(self) -> dict[str, float]:
+        """Return gaps of constraints and prescribed motions by name; rad or size of the scene."""
+        r, t = self._linearized(self.q)[0], self._simulation.t
+        gaps = dict[str, float]()
+        for connector, force in zip(
+            self.scene.all_connectors, self.numbering.multipliers, strict=True
+        ):
+            if force not in self._laws:
+                gap = abs(r[force]) / self.lengths[self._motion_of(connector)]
+                gaps[str(connector)] = max(float(gap), gaps.get(str(connector), 0.0))
+        at = self._axes.T @ self.q
+        for support in self.scene.supports:
+            for component, motion in support.held.items():
+                dof = self.numbering.node(support.place)[component]
+                gap = abs(at[dof] - value_at(motion, t, support)) / self.lengths[dof]
+                gaps[str(support)] = max(float(gap), gaps.get(str(support), 0.0))
+        return gaps
+
+    def _motion_of(self, connector: Connector) -> int:
+        """Return a degree of freedom with the unit of the motion of a connector."""
+        return int(self.numbering.node(connector.b)[2 if connector.is_rotation else 0])
+
+    def forces(self) -> tuple[Array, Array]:
+        """Return all forces except inertia, (size,), and those on the ends of cells.
+
+        The latter are ordered as ``cell_number`` of loops.h; (9, num_cells).
+        """
+        residual, _ = self._linearized(self.q)
+        cells = self._simulation.equation.cell_forces
+        cells.accept()
+        return residual, cells(self.q, self.q)
+
+    def changes_of_cells(self, dof: int) -> tuple[Array, Array, Array]:
+        """Return derivatives of forces on cells by a motion, its rate and acceleration; (9, n).
+
+        Stress and inertia are linearized exactly; damping, loads and works of cells by differences.
+        """
+        unit, still = np.zeros((2, self.numbering.size))
+        unit[dof] = 1.0
+        by_motion = self._linear_in_cells(unit, still)
+        by_acceleration = self._linear_in_cells(still, unit)
+        by_rate = np.zeros_like(by_motion)
+        if self._others_in_cells is not None:
+            change, (τ, _) = CHANGE * self.lengths[dof], self._in_short_step
+            derivatives = []
+            for dt in (AT_REST, τ):
+                ends = []
+                for sign in (1.0, -1.0):
+                    q = self.q + sign * change * unit
+                    self._linearized(q, dt)
+                    self._others_in_cells.accept()
+                    ends.append(self._others_in_cells(q, self.q))
+                derivatives.append((ends[0] - ends[1]) / (2 * change))
+            by_motion = by_motion + derivatives[0]
+            by_rate = τ * (derivatives[1] - derivatives[0])
+        return by_motion, by_rate, by_acceleration
+
+    @cached_property
+    def _linear_in_cells(self) -> Callable[[Array, Array], Array]:
+        law = section_law(self.beams, self.numbering)
+        return linear_forces_of_cells(self.numbering, self.q, law)
+
+    @cached_property
+    def _others_in_cells(self) -> CellForces | None:
+        """Forces on cells besides stress, inertia and dead loads; None if there are none."""
+        others = [
+            forces
+            for term in self._simulation.equation.terms
+            if term.kind not in ("beams", "inertia")
+            for forces in term.in_cells
+        ]
+        return CellForces(self._simulation.subdomain, others) if others else None
+
     def unbalanced(self) -> str:
         """Return a warning of works, connectors, supports that disturb the equilibrium, or ""."""
         t = self._simulation.t
@@ -180,120 +330,6 @@ class SmallMotions:
             f"modes: {', '.join(names)}: the undeformed scene is no equilibrium with these; for "
             "vibrations about the equilibrium give at=simulate(scene, Static(), ...)"
         )
-
-    # -- frequencies ---------------------------------------------------------------------------
-
-    def exponents(self, n: int, *, damped: bool = True) -> tuple[Complex, Array | Complex]:
-        """Compute up to n exponents nearest to zero, and their shapes; (n,), 1/s; (size, n).
-
-        With ``damped=False`` forces that depend on velocities are left out.
-        """
-        K, M = self.K, self.M
-        heavy = (M.diagonal() > 0) & (K.diagonal() != 0)
-        squares = np.abs(K.diagonal()[heavy]) / M.diagonal()[heavy]
-        highest, low = (squares.max(), squares.min()) if heavy.any() else (1.0, 1.0)
-        τ = highest**-0.5
-        C = (self._reduced(self._linearized(self.q, τ)[1]) - K) * τ
-        round_off = ROUND_OFF * abs(K).max()
-        symmetric = abs(K - K.T).max() <= round_off
-        matrix = (K + K.T) / 2 if symmetric else K
-        solve = partial(eigensolvers.linear, matrix, M, n, most=self.most, definite=symmetric)
-        values, x = solve(shift=-SHIFT * low)
-        works, zero = self._works(x)
-        first = np.abs(values[~zero]).min(initial=highest)
-        if zero.any():
-            # A second shift is far from zero eigenvalues, whose huge inverses cost digits.
-            values, x = solve(shift=-first / 2)
-            works, zero = self._works(x)
-        if symmetric and (not damped or abs(C).max() <= round_off * τ):
-            values = works / np.sum(x * (M @ x), axis=0)
-            values[zero] = 0.0
-            s, motions = np.sqrt((-values).astype(complex)), x.astype(complex)
-        else:
-            s, motions = self._damped(C, x[:, zero], n, first**0.5)
-        finite = (np.abs(s) ** 2 <= 1e3 * highest) & (s.imag >= 0)
-        return self._nearest(n, s[finite], motions[:, finite])
-
-    def _works(self, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-        """Return works xᵀ K x (J) of the columns of x, and whether each may be round-off."""
-        right, left = self._with_laws()
-        works = self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
-        sizes = np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
-        return works, np.asarray(np.abs(works) <= ZERO * sizes)
-
-    def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
-        """Compute at least n exponents and motions with velocity-dependent forces C.
-
-        Columns of ``free`` are the motions without stiffness; ``lowest`` is the lowest undamped
-        frequency of the other motions; rad/s.
-        """
-        # Motions without stiffness may have the double exponent zero, which no solver finds
-        # accurately.  Motions N among them with C N = M N Λ have the exponent 0 and the eigenvalues
-        # of -Λ as exponents.  Constraints exclude N from the eigenvalue problem.
-        N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
-        Λ = N.T @ (C @ N)
-        _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
-        W = rows[sizes <= MODAL_TOLERANCE * abs(C).max() * np.abs(N).max(initial=0.0)].T
-        N, Λ = N @ W, W.T @ Λ @ W
-        B = csr_array(self.M @ N * (abs(self.K).max() / abs(self.M).max() ** 0.5))
-        K = csr_array(block_array([[self.K, B], [B.T, csr_array((B.shape[1],) * 2)]]))
-        C, M = C.copy(), self.M.copy()
-        for A in (C, M):
-            A.resize(K.shape)
-        most = 2 * (self.most - B.shape[1])
-        s, x = eigensolvers.quadratic(K, C, M, 2 * n, most=most, shift=lowest)
-        # Nearly zero exponents of the motions without stiffness become exact zeros.
-        x = x[: len(free)]
-        momentum, mass = free.T @ (self.M @ x), np.sum(x.conj() * (self.M @ x), axis=0).real
-        own = np.linalg.solve(free.T @ (self.M @ free), momentum)
-        fraction = np.sum(momentum.conj() * own, axis=0).real / mass
-        noise = 16 * ROUND_OFF * np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0) / mass
-        elastic = (fraction < 0.5) | (np.abs(s) ** 2 > noise)
-        decay, mix = np.linalg.eig(-Λ)
-        decay = np.where(np.abs(decay.imag) <= MODAL_TOLERANCE * np.abs(decay), decay.real, decay)
-        nonzero = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
-        exponents = np.concatenate([np.zeros(free.shape[1]), s[elastic], decay[nonzero]])
-        return exponents, np.hstack([free, x[:, elastic], N @ mix[:, nonzero]])
-
-    # -- buckling ------------------------------------------------------------------------------
-
-    def buckling(self, n: int) -> tuple[Array, Array | Complex, Array]:
-        """Compute up to n buckling factors nearest to zero, their shapes, and estimated errors.
-
-        The shapes are (n,), (size, n) and (n,).  At a factor λ the stiffness of the shape would
-        vanish if the stiffness changed linearly.  The error is the stiffness of the shape in the
-        configuration q + λ u of the linear path u, divided by its stiffness in the state q.
-        """
-        u = self.linear_change("buckling")
-        right, left = self._with_laws()
-        change = csr_array(
-            left @ self._matrix(self._simulation.equation.tangent_change(self.q, u)) @ right
-        )
-        factors, x = eigensolvers.linear(self.K, -change, n, most=self.K.shape[0], definite=False)
-        x = x[:, np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)]
-        # Solve again in the space of these shapes, because works are more accurate than matrices.
-        works = self._simulation.equation.tangent_works(self.q, u, right @ x, left.T @ x)
-        factors, mix = eigensolvers.small(works[0], -works[1])
-        order = np.argsort(np.abs(factors), kind="stable")[:n]
-        factors, x = factors[order], (x @ mix)[:, order]
-        errors = []
-        for factor, y in zip(factors, x.T, strict=True):
-            T, after = (self._linearized(q)[1] for q in (self.q, self.q + factor * u))
-            errors.append(abs(((y @ left) @ after @ (right @ y)) / ((y @ left) @ T @ (right @ y))))
-        return *self._nearest(n, factors, x.astype(complex)), np.array(errors)
-
-    def _with_laws(self) -> tuple[csr_array, csr_array]:
-        """Return the matrices R and L that reduce the tangent T of all unknowns to K = L T R.
-
-        Columns of R and rows of L are motions with the forces that follow from force laws.  The
-        derivative of K is L T' R.
-        """
-        (_, T), laws, Z = self._linearized(self.q), self._laws, self._Z
-        flexibility = diags_array(1 / T.diagonal()[laws])
-        columns = eye_array(self.numbering.size, format="csr")[:, laws]
-        right = Z - columns @ (flexibility @ (T[laws, :] @ Z))
-        left = Z.T - ((Z.T @ T[:, laws]) @ flexibility) @ columns.T
-        return csr_array(right), csr_array(left)
 
     def linear_change(self, call: str) -> Array:
         """Compute the linear change of the configuration due to loads and prescribed motions.
@@ -318,21 +354,43 @@ class SmallMotions:
         except RuntimeError:
             raise ArgumentError(f"{call}: the scene is free to move in its state") from None
 
-    # -- shapes --------------------------------------------------------------------------------
 
-    def _nearest(self, n: int, values: V, x: Complex) -> tuple[V, Array | Complex]:
-        """Return the n eigenvalues nearest to zero, and shapes with a largest displacement of 1."""
-        order = np.argsort(np.abs(values), kind="stable")[:n]
-        shapes = self._Z @ x[:, order]
-        rotations = self._simulation.subdomain.rotations
-        sizes = np.abs(shapes)
-        sizes[self.numbering.multipliers] = 0.0
-        turning = sizes[rotations].max(axis=0, initial=0.0)
-        sizes[rotations] = 0.0
-        # If only rotations move, the largest rotation is 1.
-        only = sizes.max(axis=0, initial=0.0) <= 1e-9 * self.scene.size * turning
-        sizes[np.ix_(rotations, only)] = np.abs(shapes[np.ix_(rotations, only)])
-        largest = shapes[sizes.argmax(axis=0), np.arange(shapes.shape[1])]
-        shapes = shapes / largest
-        real = np.abs(shapes.imag).max(initial=0.0) <= 1e-8
-        return values[order], np.asarray(shapes.real if real else shapes)
+@cached_forms
+def _linear_forces(element: Element) -> tuple[ufl.Form, fem.Function]:
+    """Return the forces of cells, linearized about a configuration, and this configuration."""
+    about = element.configuration()
+    work = ufl.replace(inelastic_forms(element, Static()).around, {element.q1: about})
+    return ufl.derivative(work, about, element.q1), about
+
+
+def linear_forces_of_cells(
+    numbering: DofNumbering, q: Array, section_law: tuple[Array, Array]
+) -> Callable[[Array, Array], Array]:
+    """Return a function of a small motion from ``q``, and of its acceleration; (size,) each.
+
+    The function computes the forces of stress and inertia on the ends of cells, ``cell_number`` of
+    loops.h; (9, num_cells).  For ``section_law`` see :class:`Shapes`.
+    """
+    subdomain = Subdomain(numbering, MPI.COMM_SELF)
+    fields, space = Fields(subdomain), np.zeros(subdomain.size)
+    form, about = _linear_forces(fields.element)
+    stress, inertia = fields.kernel(form, fields.element.q1), mass_kernel(fields)
+    cells = CellForces(
+        subdomain,
+        [
+            InCells(lambda: stress, lib.STRESS, fields.order),
+            InCells(lambda: inertia, lib.DENSITY, fields.order),
+        ],
+    )
+    stress.set(about, q)
+    forms = inelastic_forms(fields.element, Static())
+    for function, values in zip((forms.b, forms.D), section_law, strict=True):
+        stress.put(function, values)
+
+    def forces(x: Array, acceleration: Array) -> Array:
+        stress.add(x, space)
+        inertia.add(acceleration, space)
+        cells.accept()
+        return cells(x, x)
+
+    return forces

@@ -15,7 +15,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.analysis.constant_loads import AT, duration
-from ufl_beam.analysis.linearization import SmallMotions
+from ufl_beam.analysis.small_motions import SmallMotions
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import DofNumbering, velocity_at
@@ -323,7 +323,10 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         >>> print(shapes.frequencies.round(1))  # Hz
         [ 41.5 250.6 646.8]
     """
-    return computed_modes(scene, _checked_count("modes", scene, n, at, mesh), at, mesh)
+    require_kind(scene, Scene, "modes: scene")
+    n = require_count(n, "modes: n")
+    require_state("modes", scene, at, mesh)
+    return computed_modes(scene, n, at, mesh)
 
 
 def computed_modes(
@@ -388,7 +391,9 @@ def buckling(
         >>> print(f"{critical / (np.pi**2 * section.EI / (2 * 2) ** 2):.2f}")  # times Euler's load
         1.00
     """
-    n = _checked_count("buckling", scene, n, at, mesh)
+    require_kind(scene, Scene, "buckling: scene")
+    n = require_count(n, "buckling: n")
+    require_state("buckling", scene, at, mesh)
     require_number(t, "buckling: t")
     for load in (*scene.loads, *scene.works):
         if isinstance(load, VirtualWork) or (isinstance(load, Load) and not load.dead):
@@ -429,17 +434,18 @@ def _stresses(small: SmallMotions, at: Solution | None) -> tuple[tuple[Array, Ar
     return law, np.zeros((lib.CELL_NUMBERS, count)) if at is None else at.cell_resultants(-1)
 
 
-def _checked_count(what: str, scene: Scene, n: int, at: Solution | None, mesh: Mesh | None) -> int:
-    """Check the arguments of the function ``what``, and return the number ``n`` of modes."""
+def require_state(what: str, scene: Scene, at: Solution | None, mesh: Mesh | None) -> None:
+    """Raise unless the last state of ``at``, or without it the undeformed scene, is a state.
+
+    ``what`` is the function that needs the state.
+    """
     require_kind(scene, Scene, f"{what}: scene")
-    n = require_count(n, f"{what}: n")
     if at is None:
         require_no_prestress(scene, what, "give at=, a static solution")
-        return n
+        return
     require_kind(at, Solution, f"{what}: at")
     if not DofNumbering(scene, mesh_of(at, mesh)).agrees(at.numbering):
         raise ArgumentError(
             f"{what}: at is a solution of other beams, joints or cells; use the same Beam "
             "objects, joined alike, and the same Mesh"
         )
-    return n

@@ -17,7 +17,7 @@ from ufl_beam.analysis.constant_loads import (
     size_of,
     with_amplitude,
 )
-from ufl_beam.analysis.linearization import SmallMotions
+from ufl_beam.analysis.linearization import Linearization
 from ufl_beam.analysis.modes import computed_modes
 from ufl_beam.analysis.path_controls import DisplacementControl
 from ufl_beam.analysis.path_following import Path, follow
@@ -168,7 +168,7 @@ def pushover(
         )
     unit = [with_amplitude(load, Proportional(size_of(load) / sum_of_forces)) for load in loads]
     loaded = replace(steady, loads=[*steady.loads, *unit])
-    linear = SmallMotions(loaded, start, abs(sum_of_forces), mesh).linear_change("pushover")
+    linear = Linearization(loaded, start, abs(sum_of_forces), mesh).linear_change("pushover")
     moved = float(values_at(numbering, place, linear[None])[0, axis])
     if not abs(moved) > LEAST_MOTION * np.abs(linear[numbering.dofs[:, :2]]).max():
         raise ArgumentError(

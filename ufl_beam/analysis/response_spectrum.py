@@ -6,22 +6,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from mpi4py import MPI
-
 import numpy as np
 import numpy.typing as npt
-import ufl
 
-from ufl_beam.analysis.linearization import SmallMotions
+from ufl_beam.analysis.linearization import Linearization, linear_forces_of_cells
 from ufl_beam.analysis.modes import Modes, modes
 from ufl_beam.analysis.spectra import Spectrum, spectral_accelerations
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import lib
-from ufl_beam.discretization.compiled_forms import cached_forms
-from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel
-from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Rich
-from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import (
     ArgumentError,
     require_count,
@@ -31,7 +23,6 @@ from ufl_beam.errors import (
     shorten,
     warn,
 )
-from ufl_beam.mechanics.time_schemes import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint, Member
 from ufl_beam.model.imposed_strains import ImposedStrain
@@ -39,9 +30,6 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.section_forces import Diagram, ForcesAlongCells
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.beam_forces import inelastic_forms
-from ufl_beam.terms.cell_forces import CellForces
-from ufl_beam.terms.term import InCells
 
 RULES = "CQC", "SRSS"
 LEAST_MASS = 0.9  # fraction of the mass that modes should have; EN 1998-1:2004, 4.3.3.3.1
@@ -241,7 +229,7 @@ def response_spectrum_analysis(
     undamped = replace(scene, damping=())
     basis = modes(undamped, n, at=at, mesh=mesh)
     _require_vibration(basis, what)
-    small = SmallMotions(undamped if at else replace(undamped, loads=()), at, mesh=mesh)
+    small = Linearization(undamped if at else replace(undamped, loads=()), at, mesh=mesh)
     shapes, omega = np.asarray(basis.shapes.real), basis.omega
     toward, mass = small.participation(np.array([x, y]) / size)
     own = np.einsum("ik,ik->k", shapes, small.masses @ shapes)
@@ -290,36 +278,11 @@ def cqc(omega: Array, damping: float) -> Array:
     return np.asarray(above / below)
 
 
-@cached_forms
-def _linear_forces(element: Element) -> tuple[ufl.Form, fem.Function]:
-    """Return the forces of cells, linearized about a configuration, and this configuration."""
-    about = element.configuration()
-    work = ufl.replace(inelastic_forms(element, Static()).around, {element.q1: about})
-    return ufl.derivative(work, about, element.q1), about
-
-
 def _resultants(basis: Modes, sizes: Array) -> Array:
     """Return the peak forces of stress and inertia on the ends of cells; (n, 9, num_cells)."""
-    subdomain = Subdomain(basis.numbering, MPI.COMM_SELF)
-    fields, space = Fields(subdomain), np.zeros(subdomain.size)
-    form, about = _linear_forces(fields.element)
-    stress, inertia = fields.kernel(form, fields.element.q1), mass_kernel(fields)
-    cells = CellForces(
-        subdomain,
-        [
-            InCells(lambda: stress, lib.STRESS, fields.order),
-            InCells(lambda: inertia, lib.DENSITY, fields.order),
-        ],
-    )
-    stress.set(about, basis.q)
-    forms = inelastic_forms(fields.element, Static())
-    for function, values in zip((forms.b, forms.D), basis.section_law, strict=True):
-        stress.put(function, values)
+    forces = linear_forces_of_cells(basis.numbering, basis.q, basis.section_law)
     peaks = []
     for shape, size, omega in zip(basis.shapes.real.T, sizes, basis.omega, strict=True):
         x = np.ascontiguousarray(size * shape)
-        stress.add(x, space)
-        inertia.add(-(omega**2) * x, space)
-        cells.accept()
-        peaks.append(cells(x, x))
+        peaks.append(forces(x, -(omega**2) * x))
     return np.array(peaks)

@@ -62,6 +62,7 @@ class DofNumbering:
         size: Number of degrees of freedom, including the forces of connectors.
         cells_at_hinges: Cell at each plastic hinge of zero length; shape (num_hinges,).
         vertices_at_hinges: First vertex at each of these hinges; shape (num_hinges,).
+        beyond: Second vertex of each of these hinges, by the place beyond the hinge.
     """
 
     def __init__(self, scene: Scene, mesh: Mesh | None = None) -> None:
@@ -118,7 +119,7 @@ class DofNumbering:
         at = np.array([self.vertex(place) for place in places], dtype=np.int64)
         vertices = range(len(self.points), len(self.points) + len(at))
         beyond = [h.a if h.b is place else h.b for h, place in zip(hinges, places, strict=True)]
-        self._beyond = dict(zip(beyond, vertices, strict=True))
+        self.beyond = dict(zip(beyond, vertices, strict=True))
         self.points = np.concatenate([self.points, self.points[at]])
         self.cells_at_hinges = np.array([self.cell(place) for place in places], dtype=np.int64)
         for place, number, cell in zip(places, vertices, self.cells_at_hinges, strict=True):
@@ -145,7 +146,7 @@ class DofNumbering:
         independent = slots == np.arange(len(slots))
         inner = self.nodes_of_cells[:, 2:]
         position = np.arange(nodes + len(rigid_bodies), dtype=np.float64)
-        position[list(self._beyond.values())] = self.vertices_at_hinges
+        position[list(self.beyond.values())] = self.vertices_at_hinges
         position[inner] = position[self.cells[:, :1]] + self.mesh.nodes[1:-1]
         ordered = (3 * np.argsort(position)[:, None] + np.arange(3)).ravel()
         groups = independent & ~shared, independent & shared
@@ -334,7 +335,7 @@ class DofNumbering:
     def vertex(self, place: Place) -> int:
         """Return the vertex at a place; beyond a plastic hinge, its second vertex."""
         if place.beyond:
-            return self._beyond[place]
+            return self.beyond[place]
         i = self._index(place.beam)
         if place.s == 0.0:
             return int(self.first_vertices[i])

@@ -160,7 +160,7 @@ class ForcesAlongCells:
             return x @ slopes, y @ slopes
 
         angle = np.outer(start, 1 - fractions) + np.outer(end, fractions)
-        angle += ψ @ mesh.weights(fractions).T
+        angle = angle + ψ @ mesh.weights(fractions).T  # complex for derivatives
         at = section_force(resultants[:, :, None], tangent, works=self._works)(fractions)
         forces = at if in_plane else in_section(at, np.cos(angle), np.sin(angle))
         return np.stack(forces, axis=2)

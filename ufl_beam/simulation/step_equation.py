@@ -40,7 +40,7 @@ from ufl_beam.terms.inertia_and_damping import (
     SecondDifferences,
     damping_forces,
 )
-from ufl_beam.terms.load_forces import DeadLoads, LoadTerm, load_terms
+from ufl_beam.terms.load_forces import DeadLoads, FrameForces, LoadTerm, load_terms
 from ufl_beam.terms.material_points import create_entries
 from ufl_beam.terms.term import Callbacks, Term
 from ufl_beam.terms.user_forces import Works
@@ -355,6 +355,8 @@ class StepEquation:
                 if term.kind != "inertia":
                     term.add_residual(q, r)
                     term.add_tangent(q)
+                if isinstance(term, FrameForces):  # for the forces of cells
+                    term.put_accelerations(self._begun[0], q)
         return r, self.A.data.copy()
 
     def tangent_change(self, q: Array, u: Array) -> Array:

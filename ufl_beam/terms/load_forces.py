@@ -577,6 +577,10 @@ class FrameForces(LoadTerm):
         lib.accept_frame(self._c, step, doubles(q), doubles(still))
         return self._force.copy()
 
+    def put_accelerations(self, step: Any, q: Array) -> None:
+        """Compute the accelerations of cells in the latest residual; ``step`` is of loops.h."""
+        lib.accept_frame(self._c, step, doubles(q), doubles(np.zeros(len(q))))
+
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the forces of the last step, and the load factor at its end."""
         self._force[:] = self._before[:] = archive.added("rotating frame", self._before)

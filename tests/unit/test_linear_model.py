@@ -1,0 +1,485 @@
+# SPDX-License-Identifier: MIT
+"""Linear models: matrices, names, inputs, outputs, states, reduction, and calls that are refused.
+
+Their responses are in verification/test_linear_models.py.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers import raises
+from scipy.sparse import issparse
+
+import ufl_beam as ub
+
+SECTION = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-3)
+BEAM = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
+FOOT = ub.Clamped(BEAM.start)
+
+
+def still(t):
+    return 0.0
+
+
+PUSH = ub.PointLoad(BEAM.end, force=(0, 1.0), amplitude=still)
+SCENE = ub.Scene([BEAM], supports=[FOOT], loads=[PUSH], damping=[ub.KelvinVoigt(1e-3)])
+TIP = ("displacement", BEAM.end, "v")
+
+
+def model_of(scene=SCENE, inputs=(PUSH,), outputs=(TIP,), **more):
+    return ub.linearize(scene, inputs=inputs, outputs=outputs, **more)
+
+
+def pendulum(law=None):
+    """Cart on a rail with a pole, hanging or standing by its axis, and a jack."""
+    cart = ub.Body((0, 0), mass=2.0, inertia=0.1, name="cart")
+    pole = ub.Beam((0, 0), (0, -1), SECTION, cells=3, name="pole")
+    rail = ub.Prismatic(ub.ground(0, 0), cart.middle, axis=(1, 0))
+    pin = ub.Revolute(cart.middle, pole.start, multipliers=True)
+    jack = ub.Slide(ub.ground(-1, 0), cart.middle, law or ub.PrescribedForce(still), axis=(1, 0))
+    scene = ub.Scene([pole], bodies=[cart], joints=[rail, pin], connectors=[jack])
+    return scene, cart, pole, rail, pin, jack
+
+
+# -- matrices and names ----------------------------------------------------------------------------
+
+
+def test_matrices_have_the_exponents_of_the_modes():
+    """(K + s (C + G) + s² M) x = 0 is singular at an exponent: 1e-12 are the digits of LAPACK."""
+    model = model_of()
+    matrices = model.M, model.C, model.G, model.K
+    assert all(issparse(A) and A.shape == (12, 12) for A in matrices)
+    M, C, G, K = (A.toarray() for A in matrices)
+    np.testing.assert_array_equal(G, 0.0)
+    np.testing.assert_array_equal(C, C.T)
+    np.testing.assert_allclose(C, 1e-3 * K, atol=1e-9 * np.abs(C).max())
+    s = ub.modes(SCENE, 1).exponents[0]
+    values = np.linalg.svd(K + s * C + s**2 * M, compute_uv=False)
+    assert values[-1] <= 1e-10 * values[0]
+    eigenvalues = np.linalg.eigvals(model.state_space()[0])
+    assert np.abs(eigenvalues - s).min() <= 1e-9 * abs(s)
+    assert len(eigenvalues) == sum(1 + (s.imag > 0) for s in ub.modes(SCENE, 100).exponents)
+
+
+def test_unknowns_are_places_components_and_forces():
+    scene, cart, pole, _, _, jack = pendulum(ub.PrescribedMotion(still))
+    model = model_of(scene, [jack], [("displacement", pole.end, "u")], mesh=ub.Mesh(degree=2))
+    unknowns = model.unknowns
+    assert len(unknowns) == model.K.shape[0]
+    assert (pole.at(1 / 6), "v") in unknowns  # between two vertices
+    assert (cart.middle, "psi") not in unknowns  # shared with the ground by the rail
+    assert unknowns[-1] == (jack, "force")
+    row = model.K.toarray()[-1]  # the jack's motion by the unknowns
+    assert row[unknowns.index((cart.middle, "u"))] == pytest.approx(1.0, rel=1e-15)
+    assert np.count_nonzero(row) == 1
+    hinged = ub.Beam((0, 0), (2, 0), SECTION, cells=4, hinges={0.5: ub.Softening(5.0, 1.0)})
+    load = ub.PointLoad(hinged.end, force=(0, 1.0))
+    scene = ub.Scene([hinged], supports=[ub.Clamped(hinged.start)], loads=[load])
+    rotations = [p for p, c in model_of(scene, [load], [("displacement", hinged.end, "v")]).unknowns
+                 if c == "psi" and getattr(p, "s", None) == 0.5]  # fmt: skip
+    assert [place.beyond for place in rotations] in ([False, True], [True, False])
+
+
+def test_text_names_inputs_and_outputs():
+    outputs = [TIP, ("section_forces_at", BEAM.start, "M"), ("reaction", FOOT, "moment")]
+    model = model_of(inputs=[PUSH, (FOOT, "v")], outputs=outputs)
+    assert str(model).splitlines() == [
+        "linear model with 12 unknowns",
+        "inputs",
+        "  factor of PointLoad at beam.end (2, 0) [1]",
+        "  d2v/dt2 of Clamped at beam.start (0, 0) [m/s2]",
+        "outputs",
+        "  v beam.end (2, 0) [m]",
+        "  M beam.start (0, 0) [N m]",
+        "  moment Clamped at beam.start (0, 0) [N m]",
+    ]
+    assert repr(model) == "<LinearModel: 12 unknowns, 2 inputs, 3 outputs>"
+    assert model.states[0] == "u beam.at(0.25) (0.5, 0)"
+    assert model.states[-2:] == [
+        "v of Clamped at beam.start (0, 0) [m]",
+        "d/dt v of Clamped at beam.start (0, 0) [m]",
+    ]
+    twice = model_of(outputs=[TIP, TIP])
+    assert twice.outputs == ["v beam.end (2, 0) [m]", "v beam.end (2, 0) [m] (2)"]
+    reduced = model.reduced(2)
+    assert reduced.states[0].startswith("mode 0 (0.88")
+    assert str(reduced).startswith("linear model with 6 states")
+    assert repr(reduced) == "<LinearModel: 6 states, 2 inputs, 3 outputs>"
+    assert repr(model_of()) == "<LinearModel: 12 unknowns, 1 input, 1 output>"
+
+
+# -- equal forms -----------------------------------------------------------------------------------
+
+
+def test_inputs_keep_their_order():
+    """A motion before a force; each form of the model has the columns in this order."""
+    one, other = model_of(inputs=[PUSH, (FOOT, "v")]), model_of(inputs=[(FOOT, "v"), PUSH])
+    for form in (
+        lambda m: m.transfer_function(2j)[:, :, 0],
+        lambda m: m.state_space()[1],
+        lambda m: m.state_space()[3],
+        lambda m: m.descriptor()[2].toarray(),
+        lambda m: m.reduced(3).state_space()[3],
+    ):
+        np.testing.assert_array_equal(form(one), form(other)[:, ::-1])
+    assert one.inputs == other.inputs[::-1]
+
+
+def test_descriptor_and_state_space_have_one_response():
+    """Tolerance: round-off 1e-16 times the ratio of the highest squared frequency to s²."""
+    scene, _, pole, _, pin, jack = pendulum(ub.PrescribedMotion(still))
+    load = ub.PointLoad(pole.end, force=(1.0, 0.3))
+    scene = replace(scene, loads=[load])
+    outputs = [("displacement", pole.end, "u"), ("acceleration", pole.at(1 / 3), "u"),
+               ("joint", pin), ("connector", jack)]  # fmt: skip
+    model = model_of(scene, [load, jack], outputs)
+    s = 3.0 + 20.0j
+    A, B, C, D = model.state_space()
+    E, A2, B2, C2, D2 = (x.toarray() if issparse(x) else x for x in model.descriptor())
+    expected = model.transfer_function(s)[:, :, 0]
+    sizes = 1e-8 * np.abs(expected).max(axis=1, keepdims=True)
+    by_states = C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D
+    by_descriptor = C2 @ np.linalg.solve(s * E - A2, B2) + D2
+    assert (np.abs(by_states - expected) <= sizes).all()
+    assert (np.abs(by_descriptor - expected) <= sizes).all()
+    np.testing.assert_array_equal(model.frequency_response([2.0]), model.transfer_function([2j]))
+
+
+def test_reduced_model_is_exact_for_slow_inputs():
+    """The error of n modes is the square of s over the first frequency left out, (1/130)²."""
+    outputs = [TIP, ("section_forces_at", BEAM.at(0.4), "M"), ("reaction", FOOT, "y"),
+               ("velocity", BEAM.at(0.5), "psi")]  # fmt: skip
+    model = model_of(inputs=[PUSH, (FOOT, "v")], outputs=outputs)
+    reduced = model.reduced(8)
+    assert len(reduced.states) == 18
+    s = 0.1 + 1.0j
+    full, few = (m.transfer_function(s)[:, :, 0] for m in (model, reduced))
+    np.testing.assert_allclose(few, full, rtol=6e-5)
+    all_modes = model.reduced(12)
+    s = 5.0 + 90.0j
+    full, every = (m.transfer_function(s)[:, :, 0] for m in (model, all_modes))
+    np.testing.assert_allclose(every, full, rtol=1e-6)
+    again, before = reduced.reduced(3), reduced.state_space()[0]
+    np.testing.assert_array_equal(again.state_space()[0], model.reduced(3).state_space()[0])
+    np.testing.assert_array_equal(again.state_space()[3], model.reduced(3).state_space()[3])
+    np.testing.assert_array_equal(reduced.state_space()[0], before)
+    E, A, *_ = reduced.descriptor()
+    assert (np.eye(18) != E).sum() == 0
+    np.testing.assert_array_equal(A.toarray(), reduced.state_space()[0])
+
+
+def test_states_of_a_run():
+    """States that are read from a run predict its next steps by the midpoint rule.
+
+    Changes of second order are the amplitude of 2e-4 m divided by the length.  Eight of twelve
+    modes leave out motions of (0.9/150)² of the first one.
+    """
+    tiny = ub.PointLoad(BEAM.end, force=(0, 1.0), amplitude=lambda t: 3e-3 * (t < 0.05))
+    scene, dt = replace(SCENE, loads=[tiny]), 0.005
+    model = model_of(scene, [tiny])
+    simulation = ub.Simulation(scene, ub.EnergyMomentum(), newton=ub.Newton(rtol=1e-12))
+    forms, begun, tips = (model, model.reduced(8)), [], []
+    for k in range(40):
+        simulation.step_to((k + 1) * dt)
+        if k in (19, 39):
+            tips.append(simulation.displacement(BEAM.end)[1])
+            begun.append([form.state(simulation) for form in forms])
+    assert abs(tips[0]) < 2e-3
+    for k, (form, tolerance) in enumerate(zip(forms, (2e-4, 2e-3), strict=True)):
+        A, _, C, _ = form.state_space()
+        I = np.eye(len(A))
+        step = np.linalg.solve(I - dt / 2 * A, I + dt / 2 * A)
+        w = np.linalg.matrix_power(step, 20) @ begun[0][k]
+        assert (C @ begun[0][k])[0] == pytest.approx(tips[0], rel=tolerance)
+        assert (C @ w)[0] == pytest.approx(tips[1], rel=tolerance)
+    np.testing.assert_array_equal(model.state(simulation.snapshot()), begun[1][0])
+    with raises("state: run has no state"):
+        model.state(simulation.solution)
+    simulation.close()
+    static = ub.simulate(replace(scene, damping=()), ub.Static(), t=(0, 0.01), dt=0.01)
+    assert not model.state(static)[12:].any()
+
+
+@pytest.mark.filterwarnings("ignore:::control")  # what a new NumPy says about python-control
+def test_python_control():
+    control = pytest.importorskip("control")
+    model = model_of(inputs=[PUSH, (FOOT, "v")]).reduced(3)
+    system = model.to_control()
+    assert isinstance(system, control.StateSpace)
+    assert (system.nstates, system.ninputs, system.noutputs) == (8, 2, 1)
+    found = np.reshape(system(3.0j), (1, 2))
+    # Two ways of inverting a matrix of order 8 whose condition number is about 1e6
+    np.testing.assert_allclose(found, model.frequency_response(3.0)[:, :, 0], rtol=1e-9)
+
+
+# -- parts of a scene ------------------------------------------------------------------------------
+
+
+def test_controller_is_an_input_like_a_force():
+    forced = pendulum()
+    controlled = pendulum(ub.Controller(lambda now: 0.0))
+    found = [
+        model_of(p[0], [p[5]], [("displacement", p[1].middle, "u")]).frequency_response(3.0)
+        for p in (forced, controlled)
+    ]
+    np.testing.assert_array_equal(*found)
+
+
+def test_controller_that_is_no_input_is_constant():
+    scene, cart, pole, *_ = pendulum(ub.Controller(lambda now: 0.0))
+    load = ub.PointLoad(pole.end, force=(1.0, 0))
+    with pytest.warns(ub.ModelWarning, match="the force of the controller is constant"):
+        model_of(replace(scene, loads=[load]), [load], [("displacement", cart.middle, "u")])
+
+
+def test_sliding_friction_is_left_out():
+    body = ub.Body((0, 0), mass=1.0, inertia=1.0)
+    pull = ub.PointLoad(body.middle, force=(1.0, 0), amplitude=lambda t: 2.0)
+    rub = ub.Slide(ub.ground(0, 0), body.middle, ub.Coulomb(1.0), axis=(1, 0))
+    spring = ub.Slide(ub.ground(0, 0), body.middle, ub.Spring(3.0), axis=(1, 0))
+    held = ub.PrescribedDisplacement(body.middle, v=0.0, psi=0.0)
+    scene = ub.Scene([], bodies=[body], supports=[held], connectors=[rub, spring], loads=[pull])
+    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
+    with pytest.warns(ub.ModelWarning, match="sliding friction is left out"):
+        model = model_of(scene, [pull], [("displacement", body.middle, "u")], at=at)
+    np.testing.assert_allclose(model.frequency_response(0.0).real, [[[1 / 3]]], rtol=1e-14)
+
+
+def test_yielded_spring_unloads_elastically():
+    """The tangent of a plastic spring is its elastic stiffness, as in `modes`."""
+    body = ub.Body((0, 0), mass=1.0, inertia=1.0)
+    pull = ub.PointLoad(body.middle, force=(1.0, 0), amplitude=lambda t: 2.5 * t)
+    law = ub.Spring(8.0, ub.ElastoPlastic(yield_limit=2.0, isotropic=1.0))
+    spring = ub.Slide(ub.ground(0, 0), body.middle, law, axis=(1, 0))
+    held = ub.PrescribedDisplacement(body.middle, v=0.0, psi=0.0)
+    scene = ub.Scene([], bodies=[body], supports=[held], connectors=[spring], loads=[pull])
+    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
+    model = model_of(scene, [pull], [("displacement", body.middle, "u")], at=at)
+    np.testing.assert_allclose(model.frequency_response(0.0).real, [[[1 / 8]]], rtol=1e-12)
+
+
+def test_rate_of_a_motion_without_mass_is_refused():
+    """It follows a force at once; its displacement, and responses, are outputs."""
+    light = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.0)
+    beam = ub.Beam((0, 0), (2, 0), light, cells=2)
+    mass = ub.PointMass(beam.end, 1.0)
+    middle = ub.PointLoad(beam.at(0.5), force=(0, 1.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], masses=[mass], loads=[middle])
+    model = model_of(scene, [middle], [("displacement", beam.at(0.5), "v")])
+    A, B, C, D = model.state_space()
+    assert len(A) == 4  # u and v of the mass
+    assert D[0, 0] > 0
+    static = model.frequency_response(0.0)[0, 0, 0].real
+    assert D[0, 0] - (C @ np.linalg.solve(A, B))[0, 0] == pytest.approx(static, rel=1e-10)
+    model = model_of(scene, [middle], [("velocity", beam.at(0.5), "v")])
+    assert model.frequency_response(1.0).shape == (1, 1, 1)
+    with raises("dv/dt beam.at(0.5)", "depends on the rate of factor of PointLoad", "no mass"):
+        model.state_space()
+
+
+def test_moving_support_is_an_output_and_no_constraint():
+    model = model_of(inputs=[(FOOT, "v")], outputs=[("acceleration", BEAM.start, "v"),
+                                                    ("displacement", BEAM.start, "v")])  # fmt: skip
+    *_, D = model.state_space()
+    np.testing.assert_array_equal(D, [[1.0], [0.0]])
+    s = 2.0 + 1.0j
+    np.testing.assert_allclose(model.transfer_function(s)[:, 0, 0], [1.0, 1 / s**2], rtol=1e-14)
+
+
+def test_clamp_without_a_component_moves_in_each():
+    model = model_of(inputs=[FOOT], outputs=[TIP])
+    assert [name[:3] for name in model.inputs] == ["d2u", "d2v", "d2p"]
+    # A slow rotation turns the beam as a rigid body: v = 2 ψ
+    slow = model.frequency_response(1e-3)[0, :, 0] * -1e-6
+    np.testing.assert_allclose(slow.real, [0.0, 1.0, 2.0], atol=1e-6)
+
+
+def test_large_model_is_sparse_and_reducible():
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=800)
+    push = ub.PointLoad(beam.end, force=(0, 1.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    model = model_of(scene, [push], [("displacement", beam.end, "v")])
+    with raises("4800 states are too many", "reduced(n)"):
+        model.state_space()
+    found = np.linalg.eigvals(model.reduced(3).state_space()[0]).imag
+    expected = ub.modes(scene, 3).omega
+    np.testing.assert_allclose(np.sort(found)[3:], expected, rtol=1e-9)
+    assert model.descriptor()[1].nnz < 100 * model.K.shape[0]
+
+
+def test_modes_of_free_scenes_are_states():
+    """Three rigid motions of a free beam; a force accelerates its mass of 1 kg."""
+    push = ub.PointLoad(BEAM.at(0.5), force=(0, 1.0))
+    scene = ub.Scene([BEAM], loads=[push])
+    outputs = [("acceleration", BEAM.at(0.5), "v")]
+    model = model_of(scene, [push], outputs)
+    slow = 1e-2 * ub.modes(scene, 4).omega[3]
+    for form in (model, model.reduced(5)):
+        assert form.frequency_response(slow)[0, 0, 0].real == pytest.approx(1.0, rel=1e-3)
+    assert [x[:14] for x in model.reduced(5).states[:4]] == [
+        "mode 0 (0 Hz)", "mode 1 (0 Hz)", "mode 2 (0 Hz)", model.reduced(5).states[3][:14],
+    ]  # fmt: skip
+
+
+def test_follower_force_makes_the_stiffness_unsymmetric():
+    """Beyond Beck's load the column flutters: exponents of `modes`, also with two modes.
+
+    Without damping the modes span an invariant space, so that their exponents are exact.
+    """
+    column = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e5, GA=1e5, EI=1.0, rhoA=1.0), cells=12)
+    thrust = ub.FollowerLoad(column.end, force=(-22.0, 0), amplitude=lambda t: t)
+    push = ub.PointLoad(column.end, force=(0, 1.0), amplitude=still)
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start)], loads=[thrust, push])
+    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
+    model = model_of(scene, [push], [("displacement", column.end, "v")], at=at)
+    assert abs(model.K - model.K.T).max() > 1.0
+    expected = ub.modes(scene, 1, at=at).exponents[0]
+    assert abs(expected.real) > 0.1
+    for form, tolerance in ((model, 1e-6), (model.reduced(2), 1e-6)):
+        s = np.linalg.eigvals(form.state_space()[0])
+        apart = np.abs(np.abs(s.real) - abs(expected.real)) + np.abs(s.imag - expected.imag)
+        assert apart.min() <= tolerance * abs(expected)
+
+
+# -- refused calls ---------------------------------------------------------------------------------
+
+
+def test_state_must_be_an_equilibrium():
+    weight = replace(SCENE, loads=[ub.Gravity(), PUSH])
+    with raises("unbalanced forces", "v of beam", "not in equilibrium", "at=simulate"):
+        model_of(weight)
+    at = ub.simulate(replace(weight, damping=()), ub.Static(), t=(0, 1), dt=0.5)
+    model_of(weight, at=at)
+    heavier = replace(weight, loads=[ub.Gravity((0, -20.0)), PUSH])
+    with raises("unbalanced forces", "loads or motions have changed"):
+        model_of(heavier, at=at)
+    moved = ub.PrescribedDisplacement(BEAM.start, u=0.0, v=0.1, psi=0.0)
+    with raises("gap of PrescribedDisplacement at beam.start"):
+        model_of(replace(SCENE, supports=[moved]))
+
+
+def test_state_must_be_at_rest():
+    """A free flight is in equilibrium of forces, and moves; a vibration that has decayed rests."""
+    free = ub.Scene([BEAM], initial=[ub.Velocity([BEAM], (1.0, 0.0))])
+    run = ub.simulate(free, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05)
+    push = ub.PointLoad(BEAM.end, force=(1, 0), amplitude=still)
+    with raises("at moves", "u of beam", "give a state at rest"):
+        model_of(replace(free, loads=[push]), [push], at=run)
+    body = ub.Body((0, 0), mass=1.0, inertia=1.0)
+    kick = ub.PointLoad(body.middle, force=(1.0, 0))
+    laws = [
+        ub.Slide(ub.ground(0, 0), body.middle, law, axis=(1, 0))
+        for law in (ub.Spring(4.0), ub.Damper(2.0))
+    ]
+    held = ub.PrescribedDisplacement(body.middle, v=0.0, psi=0.0)
+    damped = ub.Scene([], bodies=[body], supports=[held], connectors=laws, loads=[kick])
+    output = ("displacement", body.middle, "u")
+    with raises("unbalanced", "u of body"):
+        run = ub.simulate(damped, ub.EnergyMomentum(), t=(0, 10), dt=0.1)
+        model_of(damped, [kick], [output], at=run)
+    run = ub.simulate(damped, ub.EnergyMomentum(), t=(0, 20), dt=0.1)  # exp(-20) is left
+    model_of(damped, [kick], [output], at=run)
+
+
+def test_held_outputs_and_inputs_are_refused():
+    with raises("outputs: v beam.start (0, 0)", "supports or constraints hold this motion"):
+        model_of(outputs=[("displacement", BEAM.start, "v")])
+    scene, cart, pole, _, _, jack = pendulum()
+    with raises("outputs: v cart (0, 0)", "hold this motion"):
+        model_of(scene, [jack], [("displacement", cart.middle)])
+    down = ub.PointLoad(cart.middle, force=(0, -1.0))
+    tip = ("displacement", pole.end, "u")
+    with raises("inputs: factor of PointLoad at cart", "moves nothing"):
+        model_of(replace(scene, loads=[down]), [down], [tip])
+    at_foot = ub.PointLoad(BEAM.start, force=(1.0, 0))
+    with raises("inputs: factor of PointLoad at beam.start", "moves nothing"):
+        model_of(replace(SCENE, loads=[at_foot]), [at_foot])
+    roller = ub.Roller(BEAM.end)
+    with raises("inputs[0]", "does not hold u"):
+        model_of(replace(SCENE, supports=[FOOT, roller]), [(roller, "u")])
+
+
+OTHER = ub.Beam((0, 0), (0, 1), SECTION, name="other")
+SPRING = ub.Slide(ub.ground(2, 0), BEAM.end, ub.Spring(1.0), axis=(0, 1))
+PIN = ub.Revolute(BEAM.end, OTHER.start)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "message"),
+    [
+        ([], "inputs is empty"),
+        (["push"], "inputs[0] = 'push' must be a load, connector or support"),
+        ([BEAM], "inputs[0]"),
+        ([PUSH, PUSH], "inputs[1]: PointLoad at beam.end (2, 0) occurs twice"),
+        ([FOOT, (FOOT, "u")], "inputs[1]: Clamped at beam.start (0, 0) occurs twice"),
+        ([ub.PointLoad(BEAM.end, force=(0, 1))], "inputs[0]: PointLoad at beam.end (2, 0) is not"),
+        ([ub.Clamped(BEAM.start)], "is not in the scene"),
+        ([(FOOT, "x")], "inputs[0]: component 'x' must be 'u', 'v' or 'psi'"),
+        ([(PUSH, "u")], "is a pair, which is for supports"),
+        ([SPRING], "has the law Spring; an input has a PrescribedForce"),
+        ([ub.Slide(ub.ground(2, 0), BEAM.end, ub.Spring(1.0), axis=(1, 0))], "is not in the scene"),
+    ],
+)
+def test_inputs_that_are_refused(inputs, message):
+    with raises(message):
+        model_of(replace(SCENE, connectors=[SPRING]), inputs)
+
+
+@pytest.mark.parametrize(
+    ("output", "message"),
+    [
+        ("v", "outputs[0] = 'v' must be a tuple such as ('displacement', place, 'v')"),
+        (("speed", BEAM.end), "which begins with 'displacement', 'velocity'"),
+        (("displacement", BEAM.end, "w"), "component 'w' must be one of 'u', 'v', 'psi'"),
+        (("displacement", BEAM), "outputs[0]"),
+        (("displacement", OTHER.end), "outputs[0]: other.end (0, 1) is not in the scene"),
+        (("section_forces_at", BEAM.end, "u"), "must be one of 'N', 'V', 'M'"),
+        (("section_forces_at", ub.ground(0, 0)), "must be a Place"),
+        (("connector", PUSH), "must be a Connector"),
+        (("reaction", BEAM.start), "must be a Support"),
+        (("reaction", ub.Clamped(BEAM.start)), "is not in the scene"),
+        (("joint", SPRING), "must be a Joint"),
+        (("joint", PIN), "is not in the scene"),
+    ],
+)
+def test_outputs_that_are_refused(output, message):
+    with raises(message):
+        model_of(outputs=[output])
+
+
+def test_joint_without_multipliers_has_no_force():
+    arm = ub.Beam((2, 0), (3, 0), SECTION, name="arm")
+    pin = ub.Revolute(BEAM.end, arm.start)
+    scene = ub.Scene([BEAM, arm], supports=[FOOT], joints=[pin], loads=[PUSH])
+    with raises("shares unknowns", "multipliers=True"):
+        model_of(scene, outputs=[("joint", pin)])
+
+
+def test_other_refused_calls():
+    with raises("nothing that can move has mass"):
+        light = ub.Beam((0, 0), (2, 0), ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.0))
+        push = ub.PointLoad(light.end, force=(0, 1.0))
+        foot = ub.Clamped(light.start)
+        model_of(ub.Scene([light], supports=[foot], loads=[push]), [push],
+                 [("displacement", light.end, "v")])  # fmt: skip
+    frame = ub.RotatingFrame(1.0)
+    scene = ub.Scene([BEAM], supports=[FOOT], loads=[frame, PUSH])
+    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
+    with raises("forces of a RotatingFrame have no factor"):
+        model_of(scene, [frame], at=at)
+    model = model_of()
+    with raises("s = ", "must be finite"):
+        model.transfer_function([math.nan])
+    with raises("s = 0: a prescribed motion grows without bound"):
+        model_of(inputs=[FOOT]).frequency_response(0.0)
+    with raises("reduced: n"):
+        model.reduced(0)
+    with raises("frequency_response: omega"):
+        model.frequency_response(["a"])
+    other = ub.Scene([OTHER], supports=[ub.Clamped(OTHER.start)])
+    with raises("state: run has other beams"):
+        model.state(ub.simulate(other, ub.Static(), t=(0, 1), dt=1))
+    with raises("state: run"):
+        model.state(1.0)

@@ -1,0 +1,582 @@
+# SPDX-License-Identifier: MIT
+"""Linear models: matrices, state spaces and frequency responses about an equilibrium."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array, hstack
+from scipy.sparse.linalg import splu
+
+from ufl_beam.analysis.linear_inputs_and_outputs import (
+    Inputs,
+    Outputs,
+    checked_inputs,
+    checked_outputs,
+)
+from ufl_beam.analysis.linear_model_checks import (
+    HELD,
+    require_equilibrium,
+    require_free,
+    warn_of_omissions,
+)
+from ufl_beam.analysis.modes import require_state
+from ufl_beam.analysis.small_motions import SmallMotions
+from ufl_beam.analysis.state_space import (
+    Coordinates,
+    Motion,
+    constraint_forces,
+    first_order,
+    independent_coordinates,
+    jumps,
+)
+from ufl_beam.arrays import Array, Complex
+from ufl_beam.discretization.model_warnings import warn_of_masses
+from ufl_beam.display import Rich, counted
+from ufl_beam.errors import (
+    ArgumentError,
+    require_array,
+    require_count,
+    require_kind,
+    require_sequence,
+    shorten,
+)
+from ufl_beam.model.beams import Mesh
+from ufl_beam.model.bodies import AttachmentPoint
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.functions import Constant
+from ufl_beam.model.loads import Load
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import COMPONENTS
+from ufl_beam.output.states import States
+from ufl_beam.simulation.simulation import Simulation
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.solvers.eigensolvers import ROUND_OFF
+
+QUASI_STATIC = 1e-2  # exponent of the static correction, as a fraction of the lowest frequency
+ITERATIONS = 4  # of the static motions of a reduced model
+MOST_STATES = 4000  # largest number of states without modal reduction
+
+
+class LinearModel(Rich):
+    """Small motions about an equilibrium with inputs and outputs; made by :func:`linearize`.
+
+    All values are changes from the equilibrium.  The equations are ``M x'' + (C + G) x' + K x = f``
+    for the free motions and the forces of constraints, x.  A prescribed motion u is an input by its
+    acceleration; u and u' are states.  docs/linear_models.md derives the state space.
+
+    Attributes:
+        scene: Model.
+        unknowns: Place and component ("u", "v", "psi") of each unknown x, or the constraint and
+            "force".  At supports with turned axes, u and v are along and across the axis.
+        M: Mass; sparse, (n, n), symmetric; zero in rows of constraints.
+        C: Symmetric part of the derivative of forces with respect to velocities: damping.
+        G: Skew-symmetric part of this derivative: gyroscopic forces.
+        K: Tangent stiffness, with rows and columns of constraints; it is symmetric unless a
+            follower force or a force law makes it unsymmetric.
+        inputs: Names of the inputs, with units.
+        outputs: Names of the outputs, with units.
+
+    Example:
+        >>> push = ub.PointLoad(beam.end, force=(0, 1.0))
+        >>> arm = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+        >>> model = ub.linearize(arm, inputs=[push], outputs=[("displacement", beam.end, "v")])
+        >>> print(model.outputs, model.frequency_response(0.0).real.shape)
+        ['v beam.end (2, 0) [m]'] (1, 1, 1)
+        >>> A, B, C, D = model.reduced(3).state_space()
+        >>> print(A.shape, np.sort(np.linalg.eigvals(A).imag / (2 * np.pi)).round()[3:])  # Hz
+        (6, 6) [ 42. 286. 651.]
+    """
+
+    def __init__(self, small: SmallMotions, scene: Scene, inputs: Inputs, outputs: Outputs) -> None:
+        self.scene, self._small, self._inputs, self._outputs = scene, small, inputs, outputs
+        self.inputs, self.outputs = inputs.names, outputs.names
+        rows = small._constraint_rows
+        self._free, self._constraints = np.flatnonzero(~rows), np.flatnonzero(rows)  # rows of K
+        self._basis: tuple[Array, Array] | None = None  # modes and motions with unit inputs
+        self._correction: Array | float = 0.0  # of D in a reduced model
+        self._squares: Array = np.zeros(0)  # squared frequencies of the modes
+        self._mode_names: list[str] = []
+        require_free(small, inputs, outputs)
+
+    def __str__(self) -> str:
+        lines = [f"linear model with {self._size}", "inputs"]
+        lines += [f"  {name}" for name in self.inputs]
+        return "\n".join([*lines, "outputs", *(f"  {name}" for name in self.outputs)])
+
+    def __repr__(self) -> str:
+        inputs, outputs = len(self.inputs), len(self.outputs)
+        both = counted((inputs, "input", "inputs"), (outputs, "output", "outputs"))
+        return f"<LinearModel: {self._size}, {both}>"
+
+    @property
+    def _size(self) -> str:
+        """Number of states of a reduced model, else number of unknowns."""
+        if self._basis is not None:
+            return f"{len(self.states)} states"
+        return counted((len(self.unknowns), "unknown", "unknowns"))
+
+    # -- matrices ------------------------------------------------------------------------------
+
+    @cached_property
+    def unknowns(self) -> list[tuple[AttachmentPoint | Connector, str]]:
+        """Place and component of each unknown."""
+        numbering, small = self._small.numbering, self._small
+        where: dict[int, tuple[Any, str]] = {}
+        for body, dofs in zip(self.scene.rigid_bodies, numbering.dofs_of_bodies, strict=True):
+            where.update((int(d), (body.middle, c)) for d, c in zip(dofs, COMPONENTS, strict=True))
+        for beam in self.scene.beams:
+            s, inner = numbering.parameters(beam), numbering.mesh.nodes[1:-1]
+            between = s[:-1, None] + inner * np.diff(s)[:, None]
+            at = np.append(np.column_stack([s[:-1], between]), s[-1])
+            for place, node in zip(at, numbering.nodes_along(beam), strict=True):
+                dofs = zip(numbering.dofs[node], COMPONENTS, strict=True)
+                where.update((int(d), (beam.at(float(place)), c)) for d, c in dofs)
+        for place, node in numbering.beyond.items():
+            dofs = zip(numbering.dofs[node], COMPONENTS, strict=True)
+            where.update((int(d), (place, c)) for d, c in dofs)
+        forces = zip(numbering.multipliers, self.scene.all_connectors, strict=True)
+        where.update((int(d), (connector, "force")) for d, connector in forces)
+        return [where[int(dof)] for dof in small.left]
+
+    def _unscaled(self, A: csr_array) -> csr_array:
+        """Undo the scaling of the rows and columns of constraints."""
+        scale = diags_array(1 / self._small.scale[self._small.left])
+        return csr_array(scale @ A @ scale)
+
+    @cached_property
+    def M(self) -> csr_array:
+        """Mass matrix of the unknowns."""
+        return self._unscaled(self._small.M)
+
+    @cached_property
+    def C(self) -> csr_array:
+        """Symmetric part of the velocity-dependent forces."""
+        return self._unscaled((self._damping + self._damping.T) / 2)
+
+    @cached_property
+    def G(self) -> csr_array:
+        """Skew-symmetric part of the velocity-dependent forces."""
+        return self._unscaled((self._damping - self._damping.T) / 2)
+
+    @cached_property
+    def K(self) -> csr_array:
+        """Tangent stiffness with rows of constraints."""
+        return self._unscaled(self._small.K)
+
+    @cached_property
+    def _damping(self) -> csr_array:
+        """Derivative of forces with respect to velocities, without round-off of the tangent."""
+        small = self._small
+        rows = abs(small.K).max(axis=1).toarray().ravel()
+        C = small.C.tocoo()
+        i, j = C.coords
+        noise = ROUND_OFF * np.sqrt(rows[i] * rows[j] / small.squares.max())
+        above = np.abs(C.data) > noise
+        return csr_array((C.data[above], (i[above], j[above])), shape=C.shape)
+
+    @property
+    def _loads(self) -> tuple[csr_array, tuple[csr_array, csr_array, csr_array]]:
+        """Forces of unit inputs f, and those of unit u, u', u'' of prescribed motions."""
+        small, inputs = self._small, self._inputs
+        S = inputs.motions
+        moved = [
+            csr_array(-(small._Z.T @ (A @ S)))
+            for A in (small.condensed_tangent, small.condensed_damping, small.masses)
+        ]
+        return csr_array(small._Z.T @ inputs.condensed), (
+            csr_array(moved[0] + small._Z.T @ inputs.prescribed), moved[1], moved[2],
+        )  # fmt: skip
+
+    def descriptor(self) -> tuple[csr_array, csr_array, csr_array, csr_array, Array]:
+        """Return sparse E, A, B, C and dense D of ``E w' = A w + B i``, ``y = C w + D i``.
+
+        The variables w are the free motions, their velocities and accelerations, the forces of
+        constraints, then u and u' of the prescribed motions.  i are the inputs, y the outputs.  E
+        is singular.  A reduced model returns the state space with a unit matrix E.
+        """
+        if self._basis is not None:
+            A, B, C, D = self.state_space()
+            return csr_array(np.eye(len(A))), csr_array(A), csr_array(B), csr_array(C), D
+        small, (P0, P1, P2) = self._small, self._outputs.rows
+        F, moved = self._loads
+        n, nu = small.K.shape[0], self._inputs.number_of_motions
+        y, μ = self._free, self._constraints
+        M, Cd, K, Z = small.M, self._damping, small.K, small._Z
+        S, unity = self._inputs.motions, eye_array(nu)
+        I, none = eye_array(len(y)), None
+
+        def zeros(rows: int, columns: int) -> csr_array:
+            return csr_array((rows, columns))
+
+        E = block_array([
+            [I, none, none, none, none, none],
+            [none, I, none, none, none, none],
+            [zeros(n, len(y)), none, zeros(n, len(y)), zeros(n, len(μ)), none, none],
+            [none, none, none, none, unity, none],
+            [none, none, none, none, none, unity],
+        ])  # fmt: skip
+        A = block_array([
+            [zeros(len(y), len(y)), I, none, none, none, none],
+            [none, zeros(len(y), len(y)), I, none, none, none],
+            [-K[:, y], -Cd[:, y], -M[:, y], -K[:, μ], moved[0], moved[1]],
+            [none, none, none, none, zeros(nu, nu), unity],
+            [none, none, none, none, none, zeros(nu, nu)],
+        ])  # fmt: skip
+        nf = F.shape[1]
+        B = block_array([
+            [zeros(2 * len(y), nf), zeros(2 * len(y), nu)], [F, moved[2]],
+            [zeros(nu, nf), zeros(nu, nu)], [zeros(nu, nf), unity],
+        ])  # fmt: skip
+        C = hstack([P0 @ Z[:, y], P1 @ Z[:, y], P2 @ Z[:, y], P0 @ Z[:, μ], P0 @ S, P1 @ S])
+        order = self._inputs.order
+        D = np.hstack([self._outputs.direct, (P2 @ S).toarray()])[:, order]
+        return csr_array(E), csr_array(A), csr_array(csr_array(B)[:, order]), csr_array(C), D
+
+    # -- responses -----------------------------------------------------------------------------
+
+    def transfer_function(self, s: npt.ArrayLike) -> Complex:
+        """Return outputs for inputs ``exp(s t)``; (num_outputs, num_inputs, len(s)).
+
+        Args:
+            s: Complex exponents; 1/s.  Zero and other exponents of the model are poles.
+        """
+        values = np.atleast_1d(np.asarray(s, dtype=complex))
+        if values.ndim != 1 or not np.isfinite(values).all():
+            raise ArgumentError(f"transfer_function: s = {shorten(s)} must be finite, (n,)")
+        response = np.zeros((len(self.outputs), len(self.inputs), len(values)), dtype=complex)
+        if self._basis is not None:
+            A, B, C, D = self.state_space()
+            for k, at in enumerate(values):
+                response[:, :, k] = C @ np.linalg.solve(at * np.eye(len(A)) - A, B) + D
+            return response
+        for k, at in enumerate(values):
+            response[:, :, k] = self._response(at)
+        return response
+
+    def frequency_response(self, omega: npt.ArrayLike) -> Complex:
+        """Return amplitudes of outputs for harmonic inputs of amplitude 1.
+
+        Displacements per force are receptances, velocities per force mobilities.
+
+        Args:
+            omega: Circular frequencies; rad/s.
+
+        Returns:
+            Complex amplitudes; (num_outputs, num_inputs, len(omega)).
+        """
+        values = require_array(np.atleast_1d(np.asarray(omega)), "frequency_response: omega")
+        return self.transfer_function(1j * values)
+
+    def _response(self, s: complex) -> Complex:
+        """Return outputs for inputs ``exp(s t)`` of the full model; (num_outputs, num_inputs)."""
+        small, (P0, P1, P2), S = self._small, self._outputs.rows, self._inputs.motions
+        F, moved = self._loads
+        nu = S.shape[1]
+        if nu and s == 0:
+            raise ArgumentError("transfer_function: s = 0: a prescribed motion grows without bound")
+        try:
+            factors = splu(csc_array(small.K + s * self._damping + s**2 * small.M))
+        except RuntimeError:
+            raise ArgumentError(
+                f"transfer_function: s = {s:g} is an exponent of the model"
+            ) from None
+        u = 1 / s**2 if nu else 0.0
+        load = np.hstack([F.toarray(), u * sum(s**k * A.toarray() for k, A in enumerate(moved))])
+        X = small._Z @ factors.solve(load.astype(complex)) + np.hstack(
+            [np.zeros((S.shape[0], F.shape[1])), u * S.toarray()]
+        )
+        Y = P0 @ X + s * (P1 @ X) + s**2 * (P2 @ X)
+        Y[:, : F.shape[1]] += self._outputs.direct
+        return np.asarray(Y[:, self._inputs.order])
+
+    # -- modal reduction -----------------------------------------------------------------------
+
+    def reduced(self, n: int) -> LinearModel:
+        """Return a model of the first n undamped modes, with static corrections of the outputs.
+
+        The modes are those nearest to zero frequency, rigid motions included.  Damping and
+        gyroscopic forces couple them.  With an unsymmetric stiffness, as of a follower force, the
+        real and imaginary parts of the first n modes of :func:`modes` are the basis.  Prescribed
+        motions keep their states; the scene follows them as in statics.  The correction, a part of
+        D, makes the response to slow inputs exact.
+
+        Args:
+            n: Number of modes; fewer if the scene has fewer.
+        """
+        n, small, nu = require_count(n, "reduced: n"), self._small, self._inputs.number_of_motions
+        x, squares, names = self._modes(n)
+        moving = np.abs(squares)[np.abs(squares) > HELD * small.squares.min()]
+        s = QUASI_STATIC * float(moving.min(initial=small.squares.max())) ** 0.5
+        # Static motions P with K P = B; K may be singular, and an iteration reduces the error of
+        # the shifted matrix by the factor QUASI_STATIC² each time.
+        P = np.zeros((len(x), nu))
+        if nu:
+            shifted = splu(csc_array(small.K + s**2 * small.M))
+            for _ in range(ITERATIONS):
+                P = shifted.solve(self._loads[1][0].toarray() + s**2 * (small.M @ P))
+        model = copy.copy(self)
+        for name in ("_motion", "_space", "states"):
+            vars(model).pop(name, None)
+        model._basis = x, P
+        model._squares, model._mode_names = squares, names
+        model._correction = 0.0
+        model._correction = (self._response(complex(s)) - model.transfer_function(s)[:, :, 0]).real
+        vars(model).pop("_space")
+        return model
+
+    def _modes(self, n: int) -> tuple[Array, Array, list[str]]:
+        """Return n modes with unit masses, their squared frequencies (rad²/s²), and their names."""
+        small = self._small
+        K, M = small.K, small.M
+        if self._symmetric:
+            _, x, works, zero, _ = small.undamped(n, (K + K.T) / 2, definite=True)
+            masses = np.sum(x * (M @ x), axis=0)
+            values = np.where(zero, 0.0, works / masses)
+            order = np.argsort(np.abs(values), kind="stable")[:n]
+            squares, x = values[order], (x / np.sqrt(masses))[:, order]
+            hertz = np.sqrt(np.abs(squares)) / (2 * np.pi)
+            return x, squares, [f"mode {k} ({f:.4g} Hz)" for k, f in enumerate(hertz)]
+        # Real and imaginary parts of the modes, made orthogonal
+        exponents, shapes = small.exponents(n)
+        x = (small._axes.T @ shapes)[small.left] / small.scale[small.left, None]
+        x = np.hstack([x.real, x.imag])
+        masses = np.sum(x * (M @ x), axis=0)
+        x = (x / np.sqrt(np.where(masses > 0.0, masses, 1.0)))[:, masses > HELD * masses.max()]
+        values, mix = np.linalg.eigh(x.T @ (M @ x))
+        chosen = values > HELD * values.max()
+        x = x @ (mix[:, chosen] / np.sqrt(values[chosen]))
+        return x, np.abs(exponents) ** 2, [f"part {k} of the modes" for k in range(x.shape[1])]
+
+    @property
+    def _symmetric(self) -> bool:
+        K = self._small.K
+        return bool(abs(K - K.T).max() <= ROUND_OFF * abs(K).max())
+
+    # -- state space ---------------------------------------------------------------------------
+
+    def state_space(self) -> tuple[Array, Array, Array, Array]:
+        """Return A, B, C, D of ``w' = A w + B i``, ``y = C w + D i``; dense.
+
+        The states are independent motions, motions of dampers without mass, velocities, then u and
+        u' of prescribed motions; :attr:`states` names them.
+
+        Raises:
+            ArgumentError: The model is too large; nothing determines a motion; or an output is the
+                rate of a motion without mass that follows an input at once.
+        """
+        A, B, C, D = (matrix.copy() for matrix in self._space)
+        return A, B, C, D
+
+    @cached_property
+    def states(self) -> list[str]:
+        """Names of the states of :meth:`state_space`."""
+        motion, names = self._motion, self._names_of_motions
+
+        def named(row: Array) -> str:
+            """Name the motion that a row reads, or the largest one of several."""
+            largest = names[int(np.abs(row).argmax())]
+            return largest if np.count_nonzero(row) == 1 else f"motion with {largest}"
+
+        prescribed = self._inputs.prescribed_names
+        count = motion.states - len(motion.read) - 2 * len(prescribed)
+        read = self._mode_names or [named(row) for row in motion.read]
+        return [
+            *read, *(f"d/dt {name}" for name in read[:count]),
+            *prescribed, *(f"d/dt {name}" for name in prescribed),
+        ]  # fmt: skip
+
+    def state(self, run: Solution | Simulation) -> Array:
+        """Return the states of the last state of a solution or simulation; (num_states,).
+
+        Deviations from the equilibrium are taken as small.  Velocities are zero in statics.
+
+        Raises:
+            ArgumentError: The run has other unknowns.
+        """
+        require_kind(run, (Solution, Simulation), "state: run")
+        now: States = run.now if isinstance(run, Simulation) else run
+        small, inputs = self._small, self._inputs
+        if not now.numbering.agrees(small.numbering):
+            raise ArgumentError("state: run has other beams, joints or cells than the model")
+        if not len(now):
+            raise ArgumentError(
+                "state: run has no state; give simulation, or simulation.snapshot()"
+            )
+        q = now.q[-1] - small.q
+        v = now.v[-1] if len(now.v) else np.zeros(len(q))
+        read, P = self._motion.read, self._motion.P
+        count = self._motion.states - len(read) - 2 * inputs.number_of_motions
+        u, du = (np.asarray(inputs.read @ x) for x in (q, v))
+        z, dz = ((small._axes.T @ x)[small.left[self._free]] - P @ w for x, w in ((q, u), (v, du)))
+        return np.concatenate([read @ z, read[:count] @ dz, u, du])
+
+    def to_control(self) -> Any:
+        """Return the state space as a ``StateSpace`` of python-control, with names.
+
+        Raises:
+            ImportError: python-control is not installed.
+        """
+        try:
+            import control
+        except ImportError as error:  # pragma: no cover - depends on the machine
+            raise ImportError("to_control needs python-control: pip install control") from error
+        # Dots separate names of systems and signals there
+        names = [[x.replace(".", "_") for x in names]
+                 for names in (self.states, self.inputs, self.outputs)]  # fmt: skip
+        return control.ss(*self.state_space(), states=names[0], inputs=names[1], outputs=names[2])
+
+    @cached_property
+    def _motion(self) -> Motion:
+        """Motions as functions of states and inputs."""
+        small, y = self._small, self._free
+        M, C, K = (csr_array(A[y][:, y]) for A in (small.M, self._damping, small.K.tocsr()))
+        F, moved = self._loads
+        more = None
+        if self._basis is None:
+            if 2 * len(y) > MOST_STATES:
+                raise ArgumentError(
+                    f"state_space: {2 * len(y)} states are too many for dense matrices; use "
+                    "reduced(n), or descriptor() and frequency_response(omega)"
+                )
+            J, h = small.K.tocsr()[self._constraints][:, y], moved[0][self._constraints].toarray()
+            coordinates = independent_coordinates(M, J, h, small.lengths[small.left[y]])
+        else:
+            N, P = self._basis[0][y], self._basis[1][y]
+            n = N.shape[1]
+            coordinates = Coordinates(N, P, np.eye(n), np.zeros((n, 0)), N.T @ M)
+            if self._symmetric:
+                more = np.diag(self._squares)  # quotients of works, without round-off of K
+        names, sizes = self._names_of_motions, small.lengths[small.left[y]]
+        return first_order(
+            coordinates, M, C, K, F[y], tuple(B[y].toarray() for B in moved),
+            lambda motion: names[int(np.abs(motion / sizes).argmax())], more,
+        )  # fmt: skip
+
+    @cached_property
+    def _space(self) -> tuple[Array, Array, Array, Array]:
+        """A, B, C and D with inputs in the order of the user."""
+        small, inputs, out, motion = self._small, self._inputs, self._outputs, self._motion
+        y, μ, ns = self._free, self._constraints, motion.states
+        F, moved = self._loads
+        K, Z = small.K.tocsr(), small._Z
+        if self._basis is None:
+            # Forces of constraints bear what the equation of the motions misses
+            rest = F[y] @ motion.f - K[y][:, y] @ motion.y
+            rest -= (
+                self._damping[y][:, y] @ motion.velocity + small.M[y][:, y] @ motion.acceleration
+            )
+            for B, x in zip(moved, (motion.u, motion.du, motion.ddu), strict=True):
+                rest += B[y] @ x
+            sizes = small.lengths[small.left[y]]
+            borne = constraint_forces(K[y][:, μ].toarray(), rest, sizes)
+        else:
+            borne = self._basis[0][μ] @ motion.z + self._basis[1][μ] @ motion.u
+        X = Z[:, y] @ motion.y + inputs.motions @ motion.u
+        dX, terms = X[:, :ns] @ motion.rates, np.abs(X[:, :ns]) @ np.abs(motion.rates)
+        for rows, x, of_x in ((out.rows[1], X, np.abs(X)), (out.rows[2], X, np.abs(X)),
+                              (out.rows[2], dX, terms)):  # fmt: skip
+            for i, j in jumps(rows, x, of_x, ns)[:1]:
+                name = self.inputs[int(np.flatnonzero(inputs.order == j)[0])]
+                raise ArgumentError(
+                    f"state_space: {self.outputs[i]} depends on the rate of {name}, because the "
+                    "motion has no mass; give it mass, use another output, or frequency_response"
+                )
+        Y = out.rows[0] @ (X + Z[:, μ] @ borne)
+        Y[:, ns : ns + F.shape[1]] += out.direct
+        Y += out.rows[1] @ dX + out.rows[2] @ (dX[:, :ns] @ motion.rates)
+        A, B = motion.rates[:, :ns], motion.rates[:, ns:]
+        return A, B[:, inputs.order], Y[:, :ns], Y[:, ns:][:, inputs.order] + self._correction
+
+    @cached_property
+    def _names_of_motions(self) -> list[str]:
+        return [f"{self.unknowns[i][1]} {self.unknowns[i][0]}" for i in self._free]
+
+
+# -- the function ----------------------------------------------------------------------------------
+
+
+def linearize(
+    scene: Scene,
+    *,
+    inputs: Sequence[Any],
+    outputs: Sequence[Any],
+    at: Solution | None = None,
+    mesh: Mesh | None = None,
+) -> LinearModel:
+    """Linearize a scene about an equilibrium, with inputs and outputs for control or vibration.
+
+    The equilibrium is the last state of ``at``, or the undeformed scene.  Inputs and outputs are
+    changes from it.  As in :func:`modes`, all material responds elastically, hinges keep their
+    openings, and sticking friction is a constraint.  Sliding friction is ignored, forces of
+    controllers that are no inputs are constant, and moving masses are left out.
+
+    Args:
+        scene: Model.
+        inputs: Each is a load of the scene: the change of its amplitude; a connector with a
+            :class:`PrescribedForce` or :class:`Controller`: the change of its force (N, N m); a
+            connector with a :class:`PrescribedMotion`: the acceleration of its motion; a support
+            or ``(support, "u")``: the acceleration of one of the components "u", "v", "psi" that
+            it holds, by default of each.
+        outputs: Each is a tuple of the name of a method of :class:`Solution`, its argument, and
+            optionally a component: ``("displacement", place)``, ``("velocity", place)``,
+            ``("acceleration", place)`` with the components "u", "v", "psi";
+            ``("section_forces_at", place)`` with "N", "V", "M"; ``("connector", connector)`` with
+            "motion", "rate", "force"; ``("joint", joint)`` and ``("reaction", support)`` with "x",
+            "y", "moment".  Without a component, each component is an output.
+        at: Solution of the same beams with equal joints, which ends in equilibrium at rest.
+        mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
+
+    Raises:
+        ArgumentError: The call is wrong, the state is no equilibrium, or constraints hold an
+            input or output.
+
+    Warns:
+        ModelWarning: Some beams have no mass, or a controller or sliding friction is left out.
+
+    Example:
+        >>> push = ub.PointLoad(beam.end, force=(0, 1.0))
+        >>> arm = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+        >>> tip = ("acceleration", beam.end, "v")
+        >>> model = ub.linearize(arm, inputs=[push, (arm.supports[0], "v")], outputs=[tip])
+        >>> print(model.inputs[1])
+        d2v/dt2 of Clamped at beam.start (0, 0) [m/s2]
+        >>> print(abs(model.frequency_response(1e-3)[0, 1]).round(6))  # as the support
+        [1.]
+    """
+    require_state("linearize", scene, at, mesh)
+    sequences = {"inputs": inputs, "outputs": outputs}
+    for name, some in sequences.items():
+        if not require_sequence(some, f"linearize: {name}"):
+            raise ArgumentError(f"linearize: {name} is empty; give at least one")
+    requested, wanted = checked_inputs(scene, inputs), checked_outputs(scene, outputs)
+    unit = [x for x, _ in requested if isinstance(x, Load)]
+    factors = {
+        id(load): _Amplitude(load.amplitude if at is not None else Constant(0.0)) for load in unit
+    }
+    loads: list[Any] = [*scene.loads]
+    loads = [replace(x, amplitude=factors[id(x)]) if id(x) in factors else x for x in loads]
+    small = SmallMotions(replace(scene, loads=loads) if unit else scene, at, mesh=mesh)
+    if not small.M.data.any():
+        raise ArgumentError("linearize: nothing that can move has mass; give sections rho or rhoA")
+    require_equilibrium(small, at)
+    warn_of_masses(scene)
+    warn_of_omissions(small, [x for x, _ in requested])
+    model_inputs = Inputs(small, scene, requested, factors)
+    return LinearModel(small, scene, model_inputs, Outputs(small, scene, wanted, model_inputs))
+
+
+class _Amplitude:
+    """Time function of a load plus a change."""
+
+    def __init__(self, function: Any) -> None:
+        self.function, self.change = function, 0.0
+
+    def __call__(self, t: float) -> float:
+        return float(self.function(t)) + self.change

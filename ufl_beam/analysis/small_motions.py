@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: MIT
+"""Eigenvalues of linearized equations: exponents of vibrations, and buckling factors."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import block_array, csr_array, diags_array, eye_array
+
+from ufl_beam.analysis.linearization import Linearization
+from ufl_beam.arrays import Array, Complex
+from ufl_beam.solvers import eigensolvers
+from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
+
+V = TypeVar("V", Array, Complex)
+
+MODAL_TOLERANCE = 1e-9  # coupling below this fraction of the largest damping is neglected
+
+
+class SmallMotions(Linearization):
+    """Eigenvalues and eigenvectors of the matrices of small motions."""
+
+    # -- frequencies ---------------------------------------------------------------------------
+
+    def exponents(self, n: int, *, damped: bool = True) -> tuple[Complex, Array | Complex]:
+        """Compute up to n exponents nearest to zero, and their shapes; (n,), 1/s; (size, n).
+
+        With ``damped=False`` forces that depend on velocities are left out.
+        """
+        K, C, M, highest = self.K, self.C, self.M, self.squares.max()
+        τ = highest**-0.5
+        round_off = ROUND_OFF * abs(K).max()
+        symmetric = abs(K - K.T).max() <= round_off
+        matrix = (K + K.T) / 2 if symmetric else K
+        _, x, works, zero, first = self.undamped(n, matrix, definite=symmetric)
+        if symmetric and (not damped or abs(C).max() <= round_off * τ):
+            values = works / np.sum(x * (M @ x), axis=0)
+            values[zero] = 0.0
+            s, motions = np.sqrt((-values).astype(complex)), x.astype(complex)
+        else:
+            s, motions = self._damped(C, x[:, zero], n, first**0.5)
+        finite = (np.abs(s) ** 2 <= 1e3 * highest) & (s.imag >= 0)
+        return self._nearest(n, s[finite], motions[:, finite])
+
+    def undamped(
+        self, n: int, matrix: csr_array, *, definite: bool
+    ) -> tuple[Array, Array, Array, npt.NDArray[np.bool_], float]:
+        """Compute at least n motions nearest to zero with a stiffness ``matrix``, undamped.
+
+        Returns squared frequencies (rad²/s²), motions x in columns, their works xᵀ K x (J), whether
+        each work may be round-off, and the least squared frequency of the other motions.
+        """
+        solve = partial(eigensolvers.linear, matrix, self.M, n, most=self.most, definite=definite)
+        values, x = solve(shift=-SHIFT * self.squares.min())
+        works, zero = self._works(x)
+        first = np.abs(values[~zero]).min(initial=self.squares.max())
+        if zero.any():
+            # A second shift is far from zero eigenvalues, whose huge inverses cost digits.
+            values, x = solve(shift=-first / 2)
+            works, zero = self._works(x)
+        return values, x, works, zero, first
+
+    def _works(self, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+        """Return works xᵀ K x (J) of the columns of x, and whether each may be round-off."""
+        right, left = self._with_laws()
+        works = self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
+        sizes = np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
+        return works, np.asarray(np.abs(works) <= ZERO * sizes)
+
+    def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
+        """Compute at least n exponents and motions with velocity-dependent forces C.
+
+        Columns of ``free`` are the motions without stiffness; ``lowest`` is the lowest undamped
+        frequency of the other motions; rad/s.
+        """
+        # Motions without stiffness may have the double exponent zero, which no solver finds
+        # accurately.  Motions N among them with C N = M N Λ have the exponent 0 and the eigenvalues
+        # of -Λ as exponents.  Constraints exclude N from the eigenvalue problem.
+        N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
+        Λ = N.T @ (C @ N)
+        _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
+        W = rows[sizes <= MODAL_TOLERANCE * abs(C).max() * np.abs(N).max(initial=0.0)].T
+        N, Λ = N @ W, W.T @ Λ @ W
+        B = csr_array(self.M @ N * (abs(self.K).max() / abs(self.M).max() ** 0.5))
+        K = csr_array(block_array([[self.K, B], [B.T, csr_array((B.shape[1],) * 2)]]))
+        C, M = C.copy(), self.M.copy()
+        for A in (C, M):
+            A.resize(K.shape)
+        most = 2 * (self.most - B.shape[1])
+        s, x = eigensolvers.quadratic(K, C, M, 2 * n, most=most, shift=lowest)
+        # Nearly zero exponents of the motions without stiffness become exact zeros.
+        x = x[: len(free)]
+        momentum, mass = free.T @ (self.M @ x), np.sum(x.conj() * (self.M @ x), axis=0).real
+        own = np.linalg.solve(free.T @ (self.M @ free), momentum)
+        fraction = np.sum(momentum.conj() * own, axis=0).real / mass
+        noise = 16 * ROUND_OFF * np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0) / mass
+        elastic = (fraction < 0.5) | (np.abs(s) ** 2 > noise)
+        decay, mix = np.linalg.eig(-Λ)
+        decay = np.where(np.abs(decay.imag) <= MODAL_TOLERANCE * np.abs(decay), decay.real, decay)
+        nonzero = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
+        exponents = np.concatenate([np.zeros(free.shape[1]), s[elastic], decay[nonzero]])
+        return exponents, np.hstack([free, x[:, elastic], N @ mix[:, nonzero]])
+
+    # -- buckling ------------------------------------------------------------------------------
+
+    def buckling(self, n: int) -> tuple[Array, Array | Complex, Array]:
+        """Compute up to n buckling factors nearest to zero, their shapes, and estimated errors.
+
+        The shapes are (n,), (size, n) and (n,).  At a factor λ the stiffness of the shape would
+        vanish if the stiffness changed linearly.  The error is the stiffness of the shape in the
+        configuration q + λ u of the linear path u, divided by its stiffness in the state q.
+        """
+        u = self.linear_change("buckling")
+        right, left = self._with_laws()
+        change = csr_array(
+            left @ self._matrix(self._simulation.equation.tangent_change(self.q, u)) @ right
+        )
+        factors, x = eigensolvers.linear(self.K, -change, n, most=self.K.shape[0], definite=False)
+        x = x[:, np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)]
+        # Solve again in the space of these shapes, because works are more accurate than matrices.
+        works = self._simulation.equation.tangent_works(self.q, u, right @ x, left.T @ x)
+        factors, mix = eigensolvers.small(works[0], -works[1])
+        order = np.argsort(np.abs(factors), kind="stable")[:n]
+        factors, x = factors[order], (x @ mix)[:, order]
+        errors = []
+        for factor, y in zip(factors, x.T, strict=True):
+            T, after = (self._linearized(q)[1] for q in (self.q, self.q + factor * u))
+            errors.append(abs(((y @ left) @ after @ (right @ y)) / ((y @ left) @ T @ (right @ y))))
+        return *self._nearest(n, factors, x.astype(complex)), np.array(errors)
+
+    def _with_laws(self) -> tuple[csr_array, csr_array]:
+        """Return the matrices R and L that reduce the tangent T of all unknowns to K = L T R.
+
+        Columns of R and rows of L are motions with the forces that follow from force laws.  The
+        derivative of K is L T' R.
+        """
+        (_, T), laws, Z = self._linearized(self.q), self._laws, self._Z
+        flexibility = diags_array(1 / T.diagonal()[laws])
+        columns = eye_array(self.numbering.size, format="csr")[:, laws]
+        right = Z - columns @ (flexibility @ (T[laws, :] @ Z))
+        left = Z.T - ((Z.T @ T[:, laws]) @ flexibility) @ columns.T
+        return csr_array(right), csr_array(left)
+
+    # -- shapes --------------------------------------------------------------------------------
+
+    def _nearest(self, n: int, values: V, x: Complex) -> tuple[V, Array | Complex]:
+        """Return the n eigenvalues nearest to zero, and shapes with a largest displacement of 1."""
+        order = np.argsort(np.abs(values), kind="stable")[:n]
+        shapes = self._Z @ x[:, order]
+        rotations = self._simulation.subdomain.rotations
+        sizes = np.abs(shapes)
+        sizes[self.numbering.multipliers] = 0.0
+        turning = sizes[rotations].max(axis=0, initial=0.0)
+        sizes[rotations] = 0.0
+        # If only rotations move, the largest rotation is 1.
+        only = sizes.max(axis=0, initial=0.0) <= 1e-9 * self.scene.size * turning
+        sizes[np.ix_(rotations, only)] = np.abs(shapes[np.ix_(rotations, only)])
+        largest = shapes[sizes.argmax(axis=0), np.arange(shapes.shape[1])]
+        shapes = shapes / largest
+        real = np.abs(shapes.imag).max(initial=0.0) <= 1e-8
+        return values[order], np.asarray(shapes.real if real else shapes)

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT
+"""First-order equations of small motions with constraints and motions without mass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import lstsq, qr, solve, svd
+from scipy.sparse import csr_array
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.errors import ArgumentError
+from ufl_beam.solvers.eigensolvers import ROUND_OFF
+
+SINGULAR = 1e-12  # eigenvalue or pivot that is zero, as a fraction of the largest one
+ABSENT = 1e-9  # coefficient that is round-off, as a fraction of the sum of its terms
+
+
+class Coordinates(NamedTuple):
+    """Coordinates of the motions y that constraints allow: y = N (V1 a + V0 b) + P u.
+
+    The motions u are prescribed, a have mass, and b have none.
+    """
+
+    N: Array
+    P: Array
+    V1: Array
+    V0: Array
+    read: Array  # matrix that returns (a, b) for y - P u
+
+
+class Motion(NamedTuple):
+    """Motions as linear functions of states and inputs; one column each.
+
+    The states are a, the part of b that a damper resists, a', u and u'.  The inputs are forces f,
+    and u''.  ``velocity`` and ``acceleration`` lack the part of b that follows at once from the
+    others: neither mass nor damping acts on it.
+    """
+
+    states: int  # number of states, which are the first columns
+    rates: Array  # of the states
+    y: Array
+    velocity: Array
+    acceleration: Array
+    z: Array  # V1 a + V0 b
+    u: Array
+    du: Array
+    ddu: Array
+    f: Array
+    read: Array  # matrix that returns a and the damped part of b for y - P u
+    P: Array
+
+
+def independent_coordinates(M: csr_array, J: csr_array, h: Array, sizes: Array) -> Coordinates:
+    """Solve constraints ``J y = h u`` for dependent motions, and separate motions without mass.
+
+    ``sizes`` make motions dimensionless.  Coordinates are independent motions themselves, unless
+    combinations of them have no mass.
+    """
+    n, (m, nu) = J.shape[1], h.shape
+    N, P, independent = np.eye(n), np.zeros((n, nu)), np.arange(n)
+    if m:
+        scaled = J.toarray() * sizes
+        lengths = np.linalg.norm(scaled, axis=1)[:, None]
+        Q, R, order = qr(scaled / lengths, mode="economic", pivoting=True)
+        rank = int(np.sum(np.abs(R.diagonal()) > SINGULAR * abs(R[0, 0])))
+        dependent, independent = order[:rank], np.sort(order[rank:])
+        R2 = R[:rank, rank:][:, np.argsort(order[rank:])]
+        N = N[:, independent]
+        N[dependent] = sizes[dependent, None] * -solve(R[:rank, :rank], R2) / sizes[independent]
+        P[dependent] = sizes[dependent, None] * solve(R[:rank, :rank], (Q.T @ (h / lengths))[:rank])
+    reduced = N.T @ (M @ N)
+    terms = np.sum(np.abs(N) * (abs(M) @ np.abs(N)), axis=0)
+    massive = reduced.diagonal() > ROUND_OFF * terms
+    identity = np.eye(len(independent))
+    V1, V0 = identity[:, massive], identity[:, ~massive] * sizes[independent[~massive]]
+    scale = 1 / np.sqrt(reduced.diagonal()[massive])
+    values, vectors = np.linalg.eigh(reduced[np.ix_(massive, massive)] * np.outer(scale, scale))
+    if values.min(initial=1.0) < SINGULAR:
+        heavy = values >= SINGULAR
+        turned = V1 @ (scale[:, None] * vectors)
+        V1, V0 = turned[:, heavy], np.hstack([V0, turned[:, ~heavy]])
+    pick = np.zeros((len(independent), n))
+    pick[np.arange(len(independent)), independent] = 1.0
+    return Coordinates(N, P, V1, V0, np.linalg.solve(np.hstack([V1, V0]), pick))
+
+
+def first_order(
+    coordinates: Coordinates, M: csr_array, C: csr_array, K: csr_array, F: csr_array,
+    moved: tuple[Array, Array, Array], name_of: Callable[[Array], str], Kr: Array | None = None,
+) -> Motion:  # fmt: skip
+    """Solve ``M y'' + C y' + K y = F f + B0 u + B1 u' + B2 u''`` for the rates of states.
+
+    Args:
+        coordinates: Coordinates of the motions; constraint forces do no work on them.
+        M: Mass of the motions y.
+        C: Their damping and gyroscopic forces.
+        K: Their stiffness.
+        F: Forces of unit inputs.
+        moved: B0, B1, B2.
+        name_of: Function that names the largest of the motions y, for an error.
+        Kr: Stiffness of the coordinates, if it is known more accurately than its product.
+
+    Raises:
+        ArgumentError: Neither mass, damper nor stiffness determines a motion.
+    """
+    N, P, V1, V0, read = coordinates
+    Mr, Cr, product = (N.T @ (A @ N) for A in (M, C, K))
+    Kr = product if Kr is None else Kr
+    by_motions = [N.T @ (B - A @ P) for B, A in zip(moved, (K, C, M), strict=True)]
+    # Bases of the motions without mass, with damping (W1) and without it (W0), and of their forces
+    light = V0.T @ Cr @ V0
+    identity = np.eye(len(light))
+    U, viscosity, W = svd(light) if light.any() else (identity, np.zeros(len(light)), identity)
+    r = int(np.sum(viscosity > SINGULAR * viscosity.max(initial=0.0)))
+    U1, U0, W1, W0 = U[:, :r], U[:, r:], W[:r].T, W[r:].T
+    if np.abs(Cr @ V0 @ W0).max(initial=0.0) > ABSENT * np.abs(Cr @ V0).max(initial=0.0):
+        raise ArgumentError(
+            "state_space: rates of motions without mass cause forces on other motions only; use "
+            "descriptor() or frequency_response(omega)"
+        )
+    na, nu, nf = V1.shape[1], P.shape[1], F.shape[1]
+    at = np.cumsum([0, na, r, na, nu, nu, nf, nu])
+    a, damped, da, u, du, f, ddu = (np.eye(at[-1])[i:j] for i, j in pairwise(at))
+    external = N.T @ (F @ f) + by_motions[0] @ u + by_motions[1] @ du + by_motions[2] @ ddu
+    on_light = V0.T @ external
+    # Round-off of forces on motions without mass would be an effect of rates of inputs.
+    terms = np.abs(V0).T @ (np.abs(N).T @ (abs(F) @ f))
+    on_light[(np.abs(on_light) <= ABSENT * terms) & (terms > 0.0)] = 0.0
+    z = V1 @ a + V0 @ (W1 @ damped)
+    stiffness = U0.T @ V0.T @ Kr @ V0 @ W0
+    if stiffness.size:
+        if np.linalg.cond(stiffness) > 1 / SINGULAR:
+            free = N @ (V0 @ (W0 @ svd(stiffness)[2][-1]))
+            raise ArgumentError(
+                f"state_space: neither mass, damper nor stiffness determines {name_of(free)}"
+            )
+        z = z + V0 @ (W0 @ solve(stiffness, U0.T @ (on_light - V0.T @ (Kr @ z + Cr @ (V1 @ da)))))
+    rate = (U1.T @ (on_light - V0.T @ (Kr @ z + Cr @ (V1 @ da)))) / viscosity[:r, None]
+    dz = V1 @ da + V0 @ (W1 @ rate)
+    dda = solve(V1.T @ Mr @ V1, V1.T @ (external - Kr @ z - Cr @ dz), assume_a="pos")
+    rates = np.vstack([da, rate, dda, du, ddu])
+    return Motion(
+        int(at[5]), rates, N @ z + P @ u, N @ dz + P @ du, N @ (V1 @ dda) + P @ ddu,
+        z, u, du, ddu, f, np.vstack([read[:na], W1.T @ read[na:]]), P,
+    )  # fmt: skip
+
+
+def constraint_forces(G: Array, forces: Array, sizes: Array) -> Array:
+    """Return the least-squares solution λ of ``G λ = forces`` for dimensionless motions."""
+    if not G.size:
+        return np.zeros((G.shape[1], forces.shape[1]))
+    scaled = sizes[:, None] * G
+    lengths = np.linalg.norm(scaled, axis=0)
+    λ = lstsq(scaled / lengths, sizes[:, None] * forces, lapack_driver="gelsy")[0]
+    return np.asarray(λ / lengths[:, None])
+
+
+def jumps(rows: csr_array, X: Array, terms: Array, states: int) -> Index:
+    """Return (row, input) where an input enters ``rows @ X``, whose rate then needs its rate.
+
+    ``terms`` are sums of magnitudes of the terms of X.
+    """
+    through = np.abs(rows @ X)[:, states:]
+    sizes = (abs(rows) @ terms)[:, states:]
+    return np.argwhere((through > ABSENT * sizes) & (through > 0.0))
