@@ -2,6 +2,7 @@
 """The adjoint of runs, against direct differentiation of the same runs."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -72,16 +73,16 @@ def machine(viscosity=3.0, force=20.0, stroke=0.2, stiffness=500.0, EI=100.0, le
     section = ub.Section(EA=1e4, GA=4e3, EI=EI, rhoA=1.0, rhoI=0.01)
     a = ub.Beam((0, 0), (length, 0), section, cells=3)
     b = ub.Beam((length, 0), (length, 1.0), section, cells=3)
-    cushion = ub.Stop(stiffness, low=-0.05, high=0.05) if hasattr(ub, "Stop") else ub.Spring(stiffness)
+    motor = ub.PrescribedMotion(lambda t: stroke * math.sin(8 * t))
     return ub.Scene(
         [a, b],
         joints=[ub.Revolute(a.end, b.start, multipliers=True)],
         supports=[ub.Pinned(a.start)],
         connectors=[
-            ub.Turn(ub.ground(0, 0), a.start, ub.PrescribedMotion(lambda t: stroke * math.sin(8 * t))),
+            ub.Turn(ub.ground(0, 0), a.start, motor),
             ub.Turn(a.end, b.start, ub.Damper(viscosity)),
             ub.Stretch(ub.ground(0, 1.0), b.end, ub.PrescribedForce(lambda t: force * t)),
-            ub.Turn(a.end, b.start, cushion),
+            ub.Turn(a.end, b.start, ub.Stop(stiffness, low=-0.05, high=0.05)),
         ],
     )
 
@@ -172,7 +173,7 @@ def test_stiffness_of_each_cell():
             ub.Beam((0, 0.125 * k), (0, 0.125 * (k + 1)), section, cells=1)
             for k, section in enumerate(sections)
         ]
-        joints = [ub.Rigid(a.end, b.start) for a, b in zip(beams, beams[1:], strict=False)]
+        joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
         push = ub.PointLoad(beams[-1].end, force=(1e4, 0.0), amplitude=pulse)
         return ub.Scene(beams, joints=joints, supports=[ub.Clamped(beams[0].start)], loads=[push])
 

@@ -239,8 +239,8 @@ def _derivatives_by_motion(
         for position, weight in zip(positions, weights, strict=True):
             changed = rows.copy()
             changed[n, k] = value + position * h
-            change = reduce(changed.reshape(reference.shape)) - reduce(reference)
-            by_rows[n, k] += weight / h * change
+            growth = reduce(changed.reshape(reference.shape)) - reduce(reference)
+            by_rows[n, k] += weight / h * growth
     for name, x in (("q", states["q"]), ("v", states["v"])):
         h, bar = STEP * max(float(np.abs(x).max()), 1e-300), np.zeros_like(x)
         pending = [np.arange(x.shape[1])]

@@ -230,7 +230,8 @@ class Response:
             "connector_derivatives", parameters=parameters, neighbours=number,
             weight=neighbours.weights, term=term._term_in_c, row=row, dt=dt,
             e0_bar=np.zeros(len(self._connectors)), row_bar=motions["row_bar"],
-            viscosity_bar=np.zeros(len(self._connectors)), motions=motions["strains"], by_geometry=motions["by_geometry"],
+            viscosity_bar=np.zeros(len(self._connectors)), motions=motions["strains"],
+            by_geometry=motions["by_geometry"],
             e0=neighbours.state(np.zeros((parameters, len(self._connectors)))), e1=e1, **fields,
         )  # fmt: skip
         return [in_c("connectors", c)]

@@ -228,7 +228,7 @@ def transposes(kind: str, data: Any) -> list[Any] | None:
     """Return the functions of ``term_transposes`` of loops.h; None if there is no adjoint."""
     if kind not in TRANSPOSES:
         return None
-    if kind == "connectors" and (data.limit and data.way or data.rows_of_user):
+    if kind == "connectors" and ((data.limit and data.way) or data.rows_of_user):
         return None  # friction, and laws of users
     return [ffi.addressof(lib, name) if name else ffi.NULL for name in TRANSPOSES[kind]]
 
