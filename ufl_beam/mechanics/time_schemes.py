@@ -17,7 +17,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ArgumentError, require_number
+from ufl_beam.errors import ArgumentError, require_count, require_number
 from ufl_beam.mechanics import functional, kinematics
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_scheme import Coefficients, Constant
@@ -433,6 +433,15 @@ class _Velocities(MidpointDynamics):
         return self.beta, 1 / 12 + self.alpha
 
 
+_FIFTH = 1 / (4 - 4 ** (1 / 3))
+
+SUZUKI = (_FIFTH, _FIFTH, 1 - 4 * _FIFTH, _FIFTH, _FIFTH)
+"""Lengths of the stages of Suzuki's composition of order 4, as fractions of the step.
+
+Their sum is 1, and the sum of their cubes is 0, so that the errors of third order cancel.
+"""
+
+
 @dataclass(frozen=True)
 class EnergyMomentum(EnergyMomentumBase, _Velocities):
     """Midpoint rule that conserves energy and momentum exactly, with dissipation on request.
@@ -468,12 +477,26 @@ class EnergyMomentum(EnergyMomentumBase, _Velocities):
 
     alpha: float = 0.0
     beta: float = 0.0
+    order: int = 2
 
     def __post_init__(self) -> None:
         for name in ("alpha", "beta"):
             require_number(
                 getattr(self, name), f"EnergyMomentum: {name}", at_least=0.0, at_most=0.5
             )
+        if require_count(self.order, "EnergyMomentum: order", at_least=2) not in (2, 4):
+            raise ArgumentError(f"EnergyMomentum: order = {self.order:g} must be 2 or 4")
+        if self.order == 4 and (self.alpha or self.beta):
+            name = "alpha" if self.alpha else "beta"
+            raise ArgumentError(
+                f"EnergyMomentum: {name} = {getattr(self, name):g} dissipates, and with order=4 a "
+                f"stage of each step goes backward; give {name}=0 or order=2"
+            )
+
+    @property
+    def stages(self) -> tuple[float, ...]:
+        """Lengths of the stages of a step, as fractions of the step."""
+        return SUZUKI if self.order == 4 else (1.0,)
 
 
 @dataclass(frozen=True)
