@@ -229,7 +229,9 @@ class StateWriter:
             self._copy(self._place(ffi.addressof(time_loop, "t")), at["t"].start, 1)
         now = ffi.addressof(time_loop, "q")
         velocity = [ffi.addressof(time_loop.rates, "rate", V)] if moving else []
-        last_stage = [ffi.addressof(time_loop.prediction, "q_before")] if time_loop.stages > 1 else []
+        last_stage = list[Any]()
+        if time_loop.stages > 1:
+            last_stage = [ffi.addressof(time_loop.prediction, "q_before")]
         self._gathered = list[tuple[Any, slice]]()
         first = at["q"].start
         for place in (now, *velocity, *last_stage, *vectors):

@@ -277,13 +277,13 @@ class Solver(PresentState):
             self.supports.before = self.supports.reactions
             for group in self.connectors:
                 group.before = q1[group.forces_at]
-        begun: list[float] = []  # times at which stages have begun; s
+        t0, begun = self.t, list[float]()  # begun: times at which stages have begun; s
         try:
             for fraction in np.cumsum(stages_of(self.scheme)[:-1]):
-                t0, t = self.t, (begun or [self.t])[0] + fraction * (t1 - (begun or [self.t])[0])
-                step = Step.create(self.scheme, t0, t, t, self.q)
+                t = t0 + fraction * (t1 - t0)
+                step = Step.create(self.scheme, self.t, t, t, self.q)
                 self._accept(step, *self._solve(step))
-                begun.append(t0)
+                begun.append(step.t0)
             step = Step.create(self.scheme, self.t, t1, end, self.q)
             self._finish(step, end, at_rest)
         except StepFailed:
