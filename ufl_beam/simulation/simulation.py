@@ -355,6 +355,7 @@ class Simulation(Stepper):
 
     def end(self) -> None:
         """Store the last state, and the data for ``start=``, in the solution; gather extremes."""
+        self.take_back()
         self.comparison.synchronize()
         if self.t not in self.solution.times[-1:]:
             self.keep()

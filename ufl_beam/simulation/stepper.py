@@ -348,6 +348,17 @@ class Stepper(StateView):
         self.solver.follow(None)
         return self._trial(solved)
 
+    def take_back(self) -> None:
+        """Return to the state before the latest :meth:`attempt`, if its step has several stages."""
+        with self._in_c():
+            lib.take_back(self.time_loop)
+
+    def stage_end(self, stage: int) -> Array:
+        """Return the configuration after a stage of the latest :meth:`attempt`; not the last."""
+        size = self.subdomain.size
+        end = np.frombuffer(ffi.buffer(self.time_loop.begun + (stage + 1) * size, 8 * size)).copy()
+        return self.supports.in_plane(end)
+
     def accept(self, trial: Trial) -> None:
         """Accept the step of the latest :meth:`attempt` or :meth:`attempt_along`."""
         self.time_loop.step.t1 = trial.step.t1
