@@ -12,7 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed, require_number, require_sequence
-from ufl_beam.mechanics.time_scheme import nodal_step, stages_of
+from ufl_beam.mechanics.time_scheme import nodal_step, order_of, stages_of
 from ufl_beam.quadrature import gauss_rule
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
@@ -157,8 +157,7 @@ class AdaptiveSteps:
         masses = np.bincount(M.rows(), weights=np.abs(M.data), minlength=subdomain.size)
         self._massless = np.flatnonzero(masses == 0.0)
         self.steps, self.error = 0, 0.0
-        stages = stages_of(simulation.scheme)
-        self._order = 4 if len(stages) > 1 else 2
+        self._order, stages = order_of(simulation.scheme), stages_of(simulation.scheme)
         self._rule = composition_error(stages) if len(stages) > 1 else MIDPOINT_ERROR
 
     @property
