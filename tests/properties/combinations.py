@@ -22,7 +22,7 @@ STATICS = ("Static()", "EnergyMomentumStatic()", "Static()", "EnergyMomentumStat
 DYNAMICS = (
     "EnergyMomentum()", "EnergyMomentum(0.05, 0.1)", "EnergyMomentumDecaying()",
     "EnergyMomentumPrinted()", "Newmark()",
-    "Newmark(0.6, 0.36)", "GeneralizedAlpha(0.8)", "Weighted(0.55)", "EnergyMomentum()",
+    "Newmark(0.6, 0.36)", "GeneralizedAlpha(0.8)", "Weighted(0.55)", "EnergyMomentum(order=4)",
 )  # fmt: skip
 SCHEMES = (*STATICS, *DYNAMICS)
 
@@ -34,6 +34,11 @@ HOLDING = (
     "RigidPlastic", "hinges=", "PrescribedDisplacement", "Roller", "Body",
 )  # fmt: skip
 """Constraints, at which accelerations of undamped Newmark oscillate."""
+
+DISSIPATING = (
+    "Rayleigh", "KelvinVoigt", "Damper", "Coulomb", "RigidPlastic", "hinges=", "law=", "Section(EA",
+)  # fmt: skip
+"""Parts that fourth order refuses, because they dissipate or have kinks."""
 
 BASES = ("cantilever", "chain", "portal")
 
@@ -169,6 +174,8 @@ class Draft:
         text = "\n".join(lines)
         if scheme == "Newmark()" and any(word in text for word in HOLDING):
             scheme = "Newmark(0.6, 0.36)"
+        if scheme == "EnergyMomentum(order=4)" and any(word in text for word in DISSIPATING):
+            scheme = "EnergyMomentum()"
         return text + (
             f"\n)\nscheme = {ours}{scheme}\nt, dt = (0.0, {self.end}), {self.step}\n"
             f"mesh, newton = {self.mesh}, {self.newton}\n"

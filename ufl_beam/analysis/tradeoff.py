@@ -305,8 +305,8 @@ class _Runs:
     def setting(self, refinement: Refinement) -> Setting:
         """Return the setting of a refinement.
 
-        The error of an adaptive step is proportional to its length cubed.  So the number of steps
-        is proportional to the cube root of 1/tolerance.
+        The error of an adaptive step is proportional to its length to the power 1 + order of the
+        scheme.  So doubling the number of steps divides the tolerance by 2 to this power.
         """
         family, refine, level, newton = refinement
         coarsest = replace(self.families[family], newton=self.newtons[newton])
@@ -314,7 +314,8 @@ class _Runs:
             return coarsest  # unchanged, so that simulate checks the user's arguments
         dt, mesh, duration = coarsest.dt, coarsest.mesh, self.t[1] - self.t[0]
         if isinstance(dt, Adaptive):
-            dt = replace(dt, tolerance=dt.tolerance / 8**level)
+            power = 1 + order_of(coarsest.scheme)
+            dt = replace(dt, tolerance=dt.tolerance / 2 ** (power * level))
         else:
             number = max(1, math.ceil(duration / dt * (1 - 1e-9)))
             dt = duration / round(number * 2**level)
