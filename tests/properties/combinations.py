@@ -35,10 +35,13 @@ HOLDING = (
 )  # fmt: skip
 """Constraints, at which accelerations of undamped Newmark oscillate."""
 
-DISSIPATING = (
-    "Rayleigh", "KelvinVoigt", "Damper", "Coulomb", "RigidPlastic", "hinges=", "law=", "Section(EA",
+FOURTH = "EnergyMomentum(order=4)"
+
+ROUGH = (
+    "damper", "force_law", "connector_law", "cushion", "moving_load", "virtual_work", "rayleigh",
+    "kelvin_voigt",
 )  # fmt: skip
-"""Parts that fourth order refuses, because they dissipate or have kinks."""
+"""Features that are elastic but dissipate or have kinks, so that fourth order refuses them."""
 
 BASES = ("cantilever", "chain", "portal")
 
@@ -174,8 +177,6 @@ class Draft:
         text = "\n".join(lines)
         if scheme == "Newmark()" and any(word in text for word in HOLDING):
             scheme = "Newmark(0.6, 0.36)"
-        if scheme == "EnergyMomentum(order=4)" and any(word in text for word in DISSIPATING):
-            scheme = "EnergyMomentum()"
         return text + (
             f"\n)\nscheme = {ours}{scheme}\nt, dt = (0.0, {self.end}), {self.step}\n"
             f"mesh, newton = {self.mesh}, {self.newton}\n"
@@ -293,6 +294,8 @@ def draw(seed):
 def _allows(one, scheme, base):
     if base == "column":
         return one.name in COLUMN and scheme in STATICS
+    if scheme == FOURTH and (not one.elastic or one.name in ROUGH):
+        return False
     static, at_end = scheme in STATICS, scheme.startswith(("Newmark", "Generalized"))
     return one.statics if static else (one.dynamics and (one.at_end or not at_end))
 
