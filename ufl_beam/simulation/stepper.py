@@ -350,8 +350,9 @@ class Stepper(StateView):
 
     def take_back(self) -> None:
         """Return to the state before the latest :meth:`attempt`, if its step has several stages."""
-        with self._in_c():
-            lib.take_back(self.time_loop)
+        if self.time_loop.taken:
+            with self._in_c():
+                lib.take_back(self.time_loop)
 
     def stage_end(self, stage: int) -> Array:
         """Return the configuration after a stage of the latest :meth:`attempt`; not the last."""
@@ -457,7 +458,7 @@ class Stepper(StateView):
     @property
     def q_before(self) -> Array:
         """Configuration at the beginning of the last step; (size,); m, rad."""
-        if self._begun_at is not None and not self.time_loop.substeps:  # no step accepted since
+        if self._begun_at is not None and self.cell_forces.c.initial:  # nothing accepted since
             return self._begun_at
         return self._copy(self.time_loop.prediction.q_before)
 
