@@ -88,7 +88,9 @@ def rows(make):
     for scheme in SCHEMES:
         runs = [run(make, scheme, stages(scheme) * dt) for dt in STEPS]
         errors = [np.linalg.norm(ends(one) - exact, axis=1).max() for one in runs]
-        free = round(RELEASE / STEPS[0] / stages(scheme)) + 1  # the first state that no load leads to
+        free = (
+            round(RELEASE / STEPS[0] / stages(scheme)) + 1
+        )  # the first state that no load leads to
         energy = runs[0].energy.total[free:]
         momentum = runs[0].momentum()[free:, 2]
         drifts = [energy[-1] / energy[0] - 1, momentum[-1] / momentum[0] - 1]

@@ -11,6 +11,7 @@ import json
 import math
 import runpy
 import statistics
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -122,7 +123,7 @@ def time_to(kept, target):
         for one in kept["runs"]
         if one["wall"] and one["error"] > 0
     ]
-    for (t0, e0), (t1, e1) in zip(points, points[1:], strict=False):
+    for (t0, e0), (t1, e1) in pairwise(points):
         if e0 >= target > e1:
             return t0 * (t1 / t0) ** (math.log(e0 / target) / math.log(e0 / e1))
     return math.nan

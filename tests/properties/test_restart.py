@@ -24,7 +24,6 @@ SCRIPT = Path(__file__).with_name("restart_scenes.py")
 RUNS = {
     "midpoint": (machine, ub.EnergyMomentum(0.05, 0.02), 0.2, 0.005),
     "adaptive": (machine, ub.EnergyMomentum(0.05, 0.02), 0.1, ub.Adaptive(1e-4)),
-    "fourth order": (bend, ub.EnergyMomentum(order=4), 5.0, 0.1),
     "decaying": (bend, ub.EnergyMomentumDecaying(), 5.0, 0.1),
     "Newmark": (bend, ub.Newmark(0.6, 0.35), 5.0, 0.1),
     "generalized-alpha": (bend, ub.GeneralizedAlpha(), 5.0, 0.1),

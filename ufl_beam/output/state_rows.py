@@ -118,8 +118,9 @@ class Columns:
     ) -> Columns:  # fmt: skip
         """Make the columns of a scene.
 
-        If ``moving``, a row has velocities, and if ``before``, the column BEFORE.  ``ledger`` has names of entries, as "lost: plastic".
-        ``record`` is the length of the column "record"; if None, the row has forces of cells.
+        If ``moving``, a row has velocities, and if ``before``, the column BEFORE.  ``ledger`` has
+        names of entries, as "lost: plastic".  ``record`` is the length of the
+        column "record"; if None, the row has forces of cells.
         """
         size, scene = numbering.size, numbering.scene
         return cls({

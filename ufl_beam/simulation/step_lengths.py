@@ -203,8 +203,7 @@ class AdaptiveSteps:
 
     def _solve_and_estimate_error(self, stop: float) -> tuple[Trial, float]:
         """Solve the next step and estimate its error, as defined by :class:`Adaptive`."""
-        simulation, supports = self._simulation, self._simulation.supports
-        inertia = simulation.inertia
+        simulation, inertia = self._simulation, self._simulation.inertia
         left = stop - simulation.t
         # Two equal steps to a stop, because a longer step could leave a tiny one
         dt = left if self._dt >= left else min(self._dt, left / 2)
