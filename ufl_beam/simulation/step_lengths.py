@@ -236,7 +236,7 @@ class AdaptiveSteps:
         """
         simulation = self._simulation
         inertia, t, q, v = simulation.inertia, simulation.t, simulation.q, simulation.inertia.v
-        dt, first = t1 - t, simulation.scheme.stages[0]
+        dt, first = t1 - t, stages_of(simulation.scheme)[0]
         trial = simulation.attempt(t1)
         q_early = simulation.stage_end(0)
         early = 2 / (first * dt) * nodal_step(simulation.scheme, q, q_early, self._rotations) - v
