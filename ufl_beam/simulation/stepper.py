@@ -354,10 +354,10 @@ class Stepper(StateView):
             with self._in_c():
                 lib.take_back(self.time_loop)
 
-    def stage_end(self, stage: int) -> Array:
+    def stage_end(self, index: int) -> Array:
         """Return the configuration after a stage of the latest :meth:`attempt`; not the last."""
         size = self.subdomain.size
-        end = np.frombuffer(ffi.buffer(self.time_loop.begun + (stage + 1) * size, 8 * size)).copy()
+        end = np.frombuffer(ffi.buffer(self.time_loop.begun + (index + 1) * size, 8 * size)).copy()
         return self.supports.in_plane(end)
 
     def accept(self, trial: Trial) -> None:
