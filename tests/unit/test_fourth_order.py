@@ -392,3 +392,26 @@ def test_adaptive_steps_end_at_kinks_and_resolve_loads():
     scene = held(beam, loads=[ub.PointLoad(beam.end, force=(0, 5), amplitude=table)])
     run = go(scene, dt=ub.Adaptive(1e-5))
     assert {0.3, 0.6} <= set(run.times)
+
+
+def test_an_adaptive_run_that_ends_between_solving_and_accepting_ends_in_the_last_whole_step():
+    """The estimate of errors asks for loads at other times than the stages."""
+    begun = []
+
+    def late(t):
+        if begun and t > begun[0]:
+            raise RuntimeError("no value")
+        return 1.0
+
+    beam = arm()
+    scene = held(beam, loads=[ub.Gravity(amplitude=late)])
+    steps = ub.Adaptive(1e-4, first=0.1, longest=0.1)
+    whole = go(scene, t=(0, 0.4), dt=steps)
+    begun.append(0.385)  # the last sample of Gauss's rule in the step from 0.3 s is at 0.3887 s
+    with pytest.raises(RuntimeError, match="no value") as error:
+        go(scene, t=(0, 0.4), dt=steps)
+    solution = error.value.solution
+    assert solution.times[-1] in whole.times
+    assert solution.energy.worst < SAME
+    n = len(solution) - 1
+    np.testing.assert_allclose(solution.q[-1], whole.q[n], rtol=0, atol=SAME)
