@@ -4,7 +4,8 @@
 Run by ``make bench-steps``.  The push rises until 1.25 s and falls until 2.5 s, at ends of steps.
 Every program is compared with its own limit for short steps on this mesh, extrapolated from its two
 shortest steps, so that errors of meshes and elements do not count.  Every run is a process of its
-own with one thread; all programs run in turn.
+own with one thread; all programs run in turn.  Times are of the processor, so that other programs
+on the machine disturb them little.
 """
 
 import json
@@ -103,13 +104,13 @@ def measured(run, peers):
             if "limit" in kept and m.first <= steps <= m.last
         ]
         for _, kept in some:
-            kept["runs"].append({"steps": steps, "wall": [], "error": math.nan})
+            kept["runs"].append({"steps": steps, "cpu": [], "error": math.nan})
         for _ in range(ROUNDS):
             for method, kept in some:
                 result = run(Run(method.program, "P2", settings_of(method, steps)), peers)
                 if "failed" not in result:
                     one = kept["runs"][-1]
-                    one["wall"].append(result["wall"])
+                    one["cpu"].append(result["cpu"])
                     one["error"] = float(np.abs(ends(result) - kept["limit"]).max())
         for method, kept in some:
             print(f"{steps:6d} {method.title:50s} {kept['runs'][-1]}", flush=True)
@@ -119,9 +120,9 @@ def measured(run, peers):
 def time_to(kept, target):
     """Return the time to an error, between runs by powers of the time; s, NaN beyond the runs."""
     points = [
-        (statistics.median(one["wall"]), one["error"])
+        (statistics.median(one["cpu"]), one["error"])
         for one in kept["runs"]
-        if one["wall"] and one["error"] > 0
+        if one["cpu"] and one["error"] > 0
     ]
     for (t0, e0), (t1, e1) in pairwise(points):
         if e0 >= target > e1:
@@ -141,8 +142,8 @@ def save(records, of_machine):
         for n in STEPS:
             one = by_steps.get(n)
             said = ""
-            if one and one["wall"]:
-                said = f"{one['error']:.1e} ({1e3 * statistics.median(one['wall']):.3g})"
+            if one and one["cpu"]:
+                said = f"{one['error']:.1e} ({1e3 * statistics.median(one['cpu']):.3g})"
             cells.append(said)
         errors.append(cells if "limit" in kept else [kept["title"], kept["failed"][:60]])
     head = ("scheme", *(f"{target:g} m" for target in TARGETS))
@@ -158,8 +159,8 @@ def save(records, of_machine):
     page = PAGE.read_text()
     before, after = page.split(BEGIN)[0], page.split(END)[1]
     text = "\n".join([
-        about, "", "Error of the end positions (m), and in brackets the time of the loop (ms):", "",
-        *table(wide, errors), "", "Time of the loop (ms) to an error:", "", *table(head, times), "",
+        about, "", "Error of the end positions (m), and in brackets the processor time of the loop (ms):", "",
+        *table(wide, errors), "", "Processor time of the loop (ms) to an error:", "", *table(head, times), "",
     ])  # fmt: skip
     PAGE.write_text(before + BEGIN + "\n" + text + "\n" + END + after)
 
