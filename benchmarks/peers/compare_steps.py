@@ -158,10 +158,12 @@ def save(records, of_machine):
     )
     page = PAGE.read_text()
     before, after = page.split(BEGIN)[0], page.split(END)[1]
-    text = "\n".join([
-        about, "", "Error of the end positions (m), and in brackets the processor time of the loop (ms):", "",
-        *table(wide, errors), "", "Processor time of the loop (ms) to an error:", "", *table(head, times), "",
-    ])  # fmt: skip
+    errors_and = (
+        "Error of the end positions (m), and in brackets the processor time of the loop (ms):"
+    )
+    times_to = "Processor time of the loop (ms) to an error:"
+    lines = [about, "", errors_and, "", *table(wide, errors), "", times_to, "", *table(head, times)]
+    text = "\n".join([*lines, ""])
     PAGE.write_text(before + BEGIN + "\n" + text + "\n" + END + after)
 
 
