@@ -415,3 +415,23 @@ def test_an_adaptive_run_that_ends_between_solving_and_accepting_ends_in_the_las
     assert solution.energy.worst < SAME
     n = len(solution) - 1
     np.testing.assert_allclose(solution.q[-1], whole.q[n], rtol=0, atol=SAME)
+
+
+# -- speed and accuracy --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("dt", "least"), [(0.2, 3.5), (ub.Adaptive(1e-4), 3.0)], ids=str)
+def test_a_trade_off_extrapolates_with_the_order_of_the_scheme(dt, least):
+    """A level halves steps; errors of adaptive runs vary with the steps that the control chooses."""
+    beam = arm()
+    found = ub.tradeoff(
+        held(beam), {"tip": lambda run: run.displacement(beam.end)[-1, :2]}, scheme=FOURTH,
+        t=(0, 1.6), dt=dt, tolerance={"tip": 3e-6}, mesh=ub.Mesh(degree=3),
+        newton=ub.Newton(rtol=1e-12), progress=False,
+    )  # fmt: skip
+    steps = found.convergence["tip"].steps
+    assert steps.method == 4
+    assert least < steps.order < 5
+    assert found.ratio(found.best) <= 1
+    run = ub.simulate(held(beam), **found.recommended)
+    assert run.substeps == len(run) - 1
