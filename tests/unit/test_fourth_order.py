@@ -420,9 +420,10 @@ def test_an_adaptive_run_that_ends_between_solving_and_accepting_ends_in_the_las
 # -- speed and accuracy --------------------------------------------------------------------------
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(("dt", "least"), [(0.2, 3.5), (ub.Adaptive(1e-4), 3.0)], ids=str)
 def test_a_trade_off_extrapolates_with_the_order_of_the_scheme(dt, least):
-    """A level halves steps; errors of adaptive runs vary with the steps that the control chooses."""
+    """A level halves steps; errors of adaptive runs vary with the steps that are chosen."""
     beam = arm()
     found = ub.tradeoff(
         held(beam), {"tip": lambda run: run.displacement(beam.end)[-1, :2]}, scheme=FOURTH,
