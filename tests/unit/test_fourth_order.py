@@ -180,12 +180,14 @@ def orders(make):
     return list(np.log2(changes / finer))
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("part", PARTS)
 def test_smooth_scenes_are_of_fourth_order(part):
     """The next term of the error is of sixth order: a few per cent of the differences."""
     assert orders(PARTS[part]) == pytest.approx([4, 4], abs=0.1)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("part", HELD)
 def test_motions_with_constraints_are_of_fourth_order_and_velocities_of_second(part):
     motions, velocities = orders(HELD[part])
