@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links test-notebook check-docs docs-pictures accelerations bench bench-test bench-compare bench-peers bench-structures collection extremes schemes study
+.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links test-notebook check-docs docs-pictures accelerations bench bench-test bench-compare bench-peers bench-steps bench-structures collection extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -117,6 +117,9 @@ bench-compare: ## benchmarks of two commits in turn: `make bench-compare with=CO
 
 bench-peers: ## time, memory and error beside Exudyn, OpenSees and a C loop, as docs/peers.md
 	@./env python3 benchmarks/peers
+
+bench-steps: ## error of the time steps beside Exudyn and OpenSees, as docs/peers.md
+	@./env python3 benchmarks/peers/compare_steps.py
 
 bench-structures: ## sections, a column, hinges and a frame beside OpenSees, as docs/peers.md
 	@./env python3 benchmarks/peers/compare_structures.py

@@ -155,7 +155,7 @@ def roll_up(cells, turns, newton, solver):
     return {"steps": p.steps} | result | {"values": {"tip": model.where(nodes[-1])}}
 
 
-def flying_beam(cells, dt, newton, solver, steps=None, rho=1.0):
+def flying_beam(cells, dt, newton, solver, steps=None, rho=1.0, pulse="sudden"):
     p = PROBLEMS["P2"]
     model = Model(p.chains(cells))
     (nodes,) = model.nodes
@@ -163,6 +163,8 @@ def flying_beam(cells, dt, newton, solver, steps=None, rho=1.0):
     def factor(t):
         """1 until the push ends, 1/2 there, then 0; 3/2 at the first step, where the trapezoidal
         impulse lacks the first half, because no initial accelerations are computed."""
+        if pulse == "triangle":
+            return most(real(0.0), least(t, p.until - t)) * (2 / p.until)
         on = most(real(0.0), least(real(1.0), (p.until - t) * (500 / dt) + 0.5))
         return on + 0.5 * most(real(0.0), 1.0 - exu.symbolic.abs(t - dt) * (1000 / dt))
 

@@ -129,7 +129,7 @@ def roll_up(cells, turns, load_steps=PROBLEMS["P1"].steps, steps=None):
     return followed(model, tip, steps or load_steps)
 
 
-def flying_beam(cells, dt, newton="full", integrator="newmark", steps=None):
+def flying_beam(cells, dt, newton="full", integrator="newmark", steps=None, pulse="sudden"):
     p = PROBLEMS["P2"]
     (chain,) = p.chains(cells)
     model = Model("euler", spatial=True)
@@ -137,10 +137,12 @@ def flying_beam(cells, dt, newton="full", integrator="newmark", steps=None):
     model.finish()
     e = 1e-6 * dt  # the push is 1, at its end 1/2, then 0: an exact impulse
     times, factors = (-1.0, p.until - e, p.until, p.until + e, 1e3), (1.0, 1.0, 0.5, 0.0, 0.0)
+    if pulse == "triangle":
+        times, factors = (-1.0, 0.0, p.until / 2, p.until, 1e3), (0.0, 0.0, 1.0, 0.0, 0.0)
     path = ("Path", 1, "-time", *times, "-values", *factors)
     model.load(tags[0], path, fx=p.force, moment=p.moment)
     m, J = model.masses[tags[0]]
-    for c, acceleration in ((1, p.force / m), (6, p.moment / J)):
+    for c, acceleration in ((1, p.force / m), (6, p.moment / J)) if pulse == "sudden" else ():
         ops.setNodeAccel(tags[0], c, acceleration, "-commit")
     tolerance = 1e-8 if cells <= 64 else 1e-5  # it does not reach less on fine meshes
     analyse(newton, INTEGRATORS[integrator], tolerance=tolerance)

@@ -62,12 +62,11 @@ def where(now, place):
     return np.add(place.point, now.displacement(place)[:2]).tolist()
 
 
-def flying_beam(cells, dt, steps=None, **dials):
+def flying_beam(cells, dt, steps=None, pulse="sudden", **dials):
     p = PROBLEMS["P2"]
     (beam,) = beams_of(p.chains(cells))
-    push = ub.PointLoad(
-        beam.start, force=(p.force, 0), moment=p.moment, amplitude=lambda t: float(t < p.until)
-    )
+    time = p.triangle if pulse == "triangle" else lambda t: float(t < p.until)
+    push = ub.PointLoad(beam.start, force=(p.force, 0), moment=p.moment, amplitude=time)
     n = steps or round(p.end / dt)
     now, _, result = run(ub.Scene([beam], loads=[push]), discretised(**dials), n * dt, n)
     return result | {"values": {"ends": [where(now, at) for at in (beam.start, beam.end)]}}

@@ -102,6 +102,10 @@ class FlyingBeam:
     def chains(self, cells):
         return [Chain((6, 0), (0, 8), self.section, cells)]
 
+    def triangle(self, t):
+        """Factor of the push for the error of the steps: it rises and falls until 2.5 s."""
+        return max(0.0, min(t, self.until - t)) * 2 / self.until
+
     def measures(self, values):
         """Distance of both ends from the reference, root of the mean square; m."""
         away = [math.dist(a, b) for a, b in zip(values["ends"], self.reference, strict=True)]

@@ -22,7 +22,7 @@ STATICS = ("Static()", "EnergyMomentumStatic()", "Static()", "EnergyMomentumStat
 DYNAMICS = (
     "EnergyMomentum()", "EnergyMomentum(0.05, 0.1)", "EnergyMomentumDecaying()",
     "EnergyMomentumPrinted()", "Newmark()",
-    "Newmark(0.6, 0.36)", "GeneralizedAlpha(0.8)", "Weighted(0.55)", "EnergyMomentum()",
+    "Newmark(0.6, 0.36)", "GeneralizedAlpha(0.8)", "Weighted(0.55)", "EnergyMomentum(order=4)",
 )  # fmt: skip
 SCHEMES = (*STATICS, *DYNAMICS)
 
@@ -34,6 +34,14 @@ HOLDING = (
     "RigidPlastic", "hinges=", "PrescribedDisplacement", "Roller", "Body",
 )  # fmt: skip
 """Constraints, at which accelerations of undamped Newmark oscillate."""
+
+FOURTH = "EnergyMomentum(order=4)"
+
+ROUGH = (
+    "damper", "force_law", "connector_law", "cushion", "moving_load", "virtual_work", "rayleigh",
+    "kelvin_voigt",
+)  # fmt: skip
+"""Features that are elastic but dissipate or have kinks, so that fourth order refuses them."""
 
 BASES = ("cantilever", "chain", "portal")
 
@@ -286,6 +294,8 @@ def draw(seed):
 def _allows(one, scheme, base):
     if base == "column":
         return one.name in COLUMN and scheme in STATICS
+    if scheme == FOURTH and (not one.elastic or one.name in ROUGH):
+        return False
     static, at_end = scheme in STATICS, scheme.startswith(("Newmark", "Generalized"))
     return one.statics if static else (one.dynamics and (one.at_end or not at_end))
 

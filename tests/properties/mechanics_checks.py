@@ -100,7 +100,8 @@ def momentum(case):
     """
     words = case.combination
     only(
-        words.has("ub.EnergyMomentum(", "ub.EnergyMomentumDecaying", "Weighted"),
+        words.has("ub.EnergyMomentum(", "ub.EnergyMomentumDecaying", "Weighted")
+        and not words.has("order=4"),
         "other means of forces",
     )
     only(

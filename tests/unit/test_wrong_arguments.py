@@ -507,7 +507,8 @@ TABLE = {
     ),
     # schemes, discretisation, solver, steps
     "EnergyMomentum": call(
-        ub.EnergyMomentum, alpha=V(0.0, [*FROM_ZERO, 0.6]), beta=V(0.0, [*FROM_ZERO, 0.6])
+        ub.EnergyMomentum, alpha=V(0.0, [*FROM_ZERO, 0.6]), beta=V(0.0, [*FROM_ZERO, 0.6]),
+        order=V(2, [*NUMBER, 1, 3, 2.5]),
     ),
     "EnergyMomentumDecaying": call(ub.EnergyMomentumDecaying, rho_inf=V(0.5, [*NUMBER, 0.1, 1.1])),
     "Newmark": call(ub.Newmark, gamma=V(0.5, [*NUMBER, 0.4]), beta=V(0.25, [*NUMBER, 0.1])),

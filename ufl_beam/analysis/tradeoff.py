@@ -30,7 +30,7 @@ from ufl_beam.errors import (
     require_switch,
     require_text,
 )
-from ufl_beam.mechanics.time_scheme import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme, order_of
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import alone, communicator, progress_bar
@@ -55,7 +55,6 @@ MOST_UNCERTAINTY = 1 - LEAST_USED
 # of the limit.
 NEGLIGIBLE = (1 - math.sqrt(LEAST_USED)) / 4
 NOISE = 1e-9  # noise as a fraction of a quantity: Newton's method leaves residuals of 1e-10
-STEP_ORDER = 2.0  # largest order of the schemes; the order of cells is twice their degree
 FURTHER = 2  # most levels from one base of the search to the next
 REACH = 8  # most levels from the finest run to a setting; second-order errors fall by 2**16
 SETTINGS_PER_LEVEL = 8  # between two settings a second-order error changes by a factor of 2**(2/8)
@@ -306,8 +305,8 @@ class _Runs:
     def setting(self, refinement: Refinement) -> Setting:
         """Return the setting of a refinement.
 
-        The error of an adaptive step is proportional to its length cubed.  So the number of steps
-        is proportional to the cube root of 1/tolerance.
+        The error of an adaptive step is proportional to its length to the power 1 + order of the
+        scheme.  So doubling the number of steps divides the tolerance by 2 to this power.
         """
         family, refine, level, newton = refinement
         coarsest = replace(self.families[family], newton=self.newtons[newton])
@@ -315,7 +314,8 @@ class _Runs:
             return coarsest  # unchanged, so that simulate checks the user's arguments
         dt, mesh, duration = coarsest.dt, coarsest.mesh, self.t[1] - self.t[0]
         if isinstance(dt, Adaptive):
-            dt = replace(dt, tolerance=dt.tolerance / 8**level)
+            power = 1 + order_of(coarsest.scheme)
+            dt = replace(dt, tolerance=dt.tolerance / 2 ** (power * level))
         else:
             number = max(1, math.ceil(duration / dt * (1 - 1e-9)))
             dt = duration / round(number * 2**level)
@@ -517,7 +517,8 @@ class _Search:
                 [first, second, third] if needed and third in self._runs.runs else [first, second]
                 for second, third, needed in zip(others, thirds, matter, strict=True)
             ]
-            orders = 2.0 * self._runs.families[self.family].mesh.degree, STEP_ORDER
+            family = self._runs.families[self.family]
+            orders = 2.0 * family.mesh.degree, float(order_of(family.scheme))
             for name in self.units:
                 cells, steps = (
                     Convergence.estimate(

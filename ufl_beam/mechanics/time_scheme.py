@@ -183,6 +183,19 @@ def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
     return scheme.dynamic
 
 
+def stages_of(scheme: Scheme) -> tuple[float, ...]:
+    """Return the lengths of the stages of a step, as fractions of the step; their sum is 1.
+
+    A scheme with several stages has them in an attribute ``stages``; some may go backward.
+    """
+    return getattr(scheme, "stages", (1.0,))
+
+
+def order_of(scheme: Scheme) -> int:
+    """Return the largest order of the errors of a scheme: 4 for a composition of stages, else 2."""
+    return 4 if len(stages_of(scheme)) > 1 else 2
+
+
 def acting(scheme: Scheme, before: Array, now: Array) -> Array:
     """Return the forces that do the work of a step: a mean of forces ``before`` and ``now``."""
     w = scheme.weight_of_before

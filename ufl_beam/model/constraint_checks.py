@@ -15,10 +15,11 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body, Member, Node, NodeDof, node
-from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connector_laws import (
     HOLDING,
     RESISTING,
+    Controller,
     Coulomb,
     Damper,
     RigidPlastic,
@@ -29,10 +30,11 @@ from ufl_beam.model.connector_laws import (
 )
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import Point
-from ufl_beam.model.loads import RotatingFrame
+from ufl_beam.model.loads import MovingLoad, RotatingFrame
 from ufl_beam.model.material_law import initial_state
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
+from ufl_beam.model.works import VirtualWork
 
 INSTEAD = "Add supports or joints, or run dynamics (EnergyMomentum)"
 """Advice if statics has no unique answer."""
@@ -387,4 +389,40 @@ def require_rates(scene: Scene, scheme: Rated) -> None:
         raise ModelError(
             f"{name}: {prescribed[0]} prescribes a motion, whose accelerations oscillate for ever "
             "without numerical damping; use GeneralizedAlpha(0.8), or EnergyMomentum()"
+        )
+
+
+def require_smooth(scene: Scene, scheme: object) -> None:
+    """Raise :class:`ModelError` if a part of a scene dissipates or has kinks.
+
+    A scheme whose stages go backward in time needs motions that are the same in both directions of
+    time, and smooth in a step.
+    """
+    wrong = [(type(x).__name__, "dissipates") for x in scene.damping]
+    for beam in scene.beams:
+        if beam.section.section_points(beam.section.hinge):
+            wrong.append((beam.name, "may yield or break"))
+    for connector in scene.all_connectors:
+        law, name = connector.law, f"{type(connector.law).__name__} of {connector}"
+        if isinstance(law, Damper | Coulomb):
+            wrong.append((name, "dissipates"))
+        elif isinstance(law, RigidPlastic) or (
+            isinstance(law, Spring) and (law.law is not None or law.softening is not None)
+        ):
+            wrong.append((name, "may yield or break"))
+        elif isinstance(law, ConnectorLaw | ForceLaw | Controller):
+            wrong.append((name, "may dissipate, and may have kinks"))
+    for load in scene.loads:
+        if isinstance(load, MovingLoad):
+            wrong.append((str(load), "has a kink in time where it passes from a cell to the next"))
+    for work in scene.works:
+        if isinstance(work, VirtualWork) and not {"q0", "q1", "v", "dt"}.isdisjoint(
+            work.used_arguments
+        ):
+            wrong.append((str(work), "depends on the direction of time by q0, q1, v or dt"))
+    if wrong:
+        owner, fault = wrong[0]
+        raise ModelError(
+            f"{type(scheme).__name__} of fourth order: {owner} {fault}, and a stage of each step "
+            "goes backward in time; use EnergyMomentum() of second order, or leave the part out"
         )

@@ -113,12 +113,14 @@ class Columns:
 
     @classmethod
     def create(
-        cls, numbering: DofNumbering, *, moving: bool, ledger: Iterable[str], record: int | None
-    ) -> Columns:
+        cls, numbering: DofNumbering, *, moving: bool, ledger: Iterable[str], record: int | None,
+        before: bool = False,
+    ) -> Columns:  # fmt: skip
         """Make the columns of a scene.
 
-        If ``moving``, a row has velocities.  ``ledger`` has names of entries, as "lost: plastic".
-        ``record`` is the length of the column "record"; if None, the row has forces of cells.
+        If ``moving``, a row has velocities, and if ``before``, the column BEFORE.  ``ledger`` has
+        names of entries, as "lost: plastic".  ``record`` is the length of the
+        column "record"; if None, the row has forces of cells.
         """
         size, scene = numbering.size, numbering.scene
         return cls({
@@ -132,6 +134,7 @@ class Columns:
             **dict.fromkeys(ledger, ()),  # J
             "q": (size,),  # configuration, all degrees of freedom in the order of the numbering
             **({"v": (size,)} if moving else {}),  # velocities
+            **({BEFORE: (size,)} if before else {}),
             **({FORCES: (lib.CELL_NUMBERS, len(numbering.cells))} if record is None
                else {RECORD: (record,)}),
         })  # fmt: skip
@@ -220,15 +223,19 @@ class StateWriter:
             numbering, moving=moving,
             record=numbering.size * len(vectors) + sum(n for _, n in others),
             ledger=[f"{p}: {n}" for p, names in zip(LEDGER, accounts, strict=True) for n in names],
+            before=time_loop.stages > 1,
         )  # fmt: skip
         at = columns.at
         if subdomain.comm.rank == 0:
             self._copy(self._place(ffi.addressof(time_loop, "t")), at["t"].start, 1)
         now = ffi.addressof(time_loop, "q")
         velocity = [ffi.addressof(time_loop.rates, "rate", V)] if moving else []
+        last_stage = list[Any]()
+        if time_loop.stages > 1:
+            last_stage = [ffi.addressof(time_loop.prediction, "q_before")]
         self._gathered = list[tuple[Any, slice]]()
         first = at["q"].start
-        for place in (now, *velocity, *vectors):
+        for place in (now, *velocity, *last_stage, *vectors):
             if subdomain.alone:
                 self._copy(place, first, numbering.size)
             else:

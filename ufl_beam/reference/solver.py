@@ -22,7 +22,7 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering, turned
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, has_inertia, nodal_step
+from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, has_inertia, nodal_step, stages_of
 from ufl_beam.model.connector_laws import Controller, Coulomb, has_friction
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import friction_repeats
@@ -277,7 +277,25 @@ class Solver(PresentState):
             self.supports.before = self.supports.reactions
             for group in self.connectors:
                 group.before = q1[group.forces_at]
-        step = Step.create(self.scheme, self.t, t1, end, self.q)
+        t0, begun = self.t, list[float]()  # begun: times at which stages have begun; s
+        try:
+            for fraction in np.cumsum(stages_of(self.scheme)[:-1]):
+                t = t0 + fraction * (t1 - t0)
+                step = Step.create(self.scheme, self.t, t, t, self.q)
+                self._accept(step, *self._solve(step))
+                begun.append(step.t0)
+            step = Step.create(self.scheme, self.t, t1, end, self.q)
+            self._finish(step, end, at_rest)
+        except StepFailed:
+            for t in reversed(begun):  # the equation is the same in both directions of time
+                step = Step.create(self.scheme, self.t, t, t, self.q)
+                self._accept(step, *self._solve(step))
+            self.substeps -= 2 * len(begun)
+            raise
+        self.substeps -= len(begun)  # stages are no substeps
+
+    def _finish(self, step: Step, end: float, at_rest: float | None) -> None:
+        """Solve and accept a step, or the last stage of a step; see :meth:`_attempt`."""
         if at_rest is not None:
             step = step._replace(load_time=at_rest, motion_time=at_rest)
         q1, s = self._solve(step)

@@ -23,7 +23,7 @@ from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.discretization.work_forms import statement
 from ufl_beam.errors import ArgumentError, require_kind, shorten, warn
-from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia
+from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import DEFAULT_MESH, Mesh
 from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.constraint_checks import (
@@ -32,6 +32,7 @@ from ufl_beam.model.constraint_checks import (
     require_no_mechanism,
     require_no_prestress,
     require_rates,
+    require_smooth,
 )
 from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
@@ -57,6 +58,8 @@ def checked_numbering(
         if scene.initial:
             warn_of_origin(scene)
         require_rates(scene, scheme)
+        if len(stages_of(scheme)) > 1:
+            require_smooth(scene, scheme)
     else:
         free_motion = require_no_mechanism(scene)
         warn_of_rates(scene)

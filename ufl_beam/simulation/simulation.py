@@ -211,10 +211,11 @@ class Simulation(Stepper):
                     self._fail()
                 c.prediction.dt = math.inf  # the next step is not extrapolated from this step
             if keep:
+                columns = self._writer.columns
+                lacks_start = solution.needs_start and BEFORE not in columns.at
                 if self.subdomain.alone and (
-                    not solution.needs_start or solution.substeps_of_last == self.substeps
+                    not lacks_start or solution.substeps_of_last == self.substeps
                 ):
-                    columns = self._writer.columns
                     space = solution.free_rows(
                         columns, min(number, 1 + MOST_VALUES // columns.width)
                     )
@@ -225,7 +226,7 @@ class Simulation(Stepper):
             if keep and taken:
                 # The row of a divided step lacks q at the beginning of the last substep, on which
                 # forces depend.  So `keep` writes this state instead.
-                divided = solution.needs_start and row_limit > 0 and c.substeps_of_last > 1
+                divided = lacks_start and row_limit > 0 and c.substeps_of_last > 1
                 if row_limit and taken > divided:
                     solution.grow(taken - divided)
                     solution.count(self.substeps - divided * c.substeps_of_last, self.iterations)
@@ -307,11 +308,12 @@ class Simulation(Stepper):
         if self._now is None:
             columns = self._writer.columns
             size = columns.width
-            (row,) = new_rows(1, size + self.solution.needs_start * self.numbering.size)
+            if self.solution.needs_start and BEFORE not in columns.at:
+                columns = columns.plus(BEFORE, (self.numbering.size,))
+            (row,) = new_rows(1, columns.width)
             self._writer.write(row[:size])
             if self.solution.needs_start:
-                row[size:] = self.subdomain.gather(self.q_before)
-                columns = columns.plus(BEFORE, (self.numbering.size,))
+                columns.column_of(BEFORE, row)[:] = self.subdomain.gather(self.q_before)
             self._now = States(self.numbering, self.solution, Block(columns, row[None], 1))
             if not self.subdomain.alone or self._lacks_record:
                 self._now.forces_from_record = partial(self._gathered_forces, self.substeps)
@@ -346,7 +348,8 @@ class Simulation(Stepper):
         """Append the state to ``solution``, by default :attr:`solution`; all processes call it."""
         solution = self.solution if solution is None else solution
         columns = self._writer.columns
-        follows = not solution.needs_start or solution.substeps_of_last == self.substeps - 1
+        follows = not solution.needs_start or BEFORE in columns.at
+        follows = follows or solution.substeps_of_last == self.substeps - 1
         if self.substeps and follows and not self._lacks_record:
             (row,) = solution.free_rows(columns)
             self._writer.write(row)
@@ -377,6 +380,7 @@ class Simulation(Stepper):
 
     def end(self) -> None:
         """Store the last state, and the data for ``start=``, in the solution; gather extremes."""
+        self.take_back()
         self.comparison.synchronize()
         if self.t not in self.solution.times[-1:]:
             self.keep()

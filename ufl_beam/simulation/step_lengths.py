@@ -10,7 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed, require_number, require_sequence
+from ufl_beam.mechanics.time_scheme import nodal_step, order_of, stages_of
+from ufl_beam.quadrature import gauss_rule
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
 
@@ -20,9 +23,22 @@ GROWTH = 1.5
 MOST = 2**14
 """Largest number of steps of one call of C, which returns earlier if steps take long."""
 
-SAMPLES = (0.01, 0.5, 0.99)
-"""Fractions of a step at which functions of time are sampled, to estimate the error of the
-midpoint rule.  The ends are left out, because functions may jump there."""
+Rule = tuple[Array, Array]
+"""Fractions of a step at which a function is sampled, and weights of the samples; both (n,)."""
+
+MIDPOINT_ERROR: Rule = np.array([0.01, 0.5, 0.99]), np.array([1.0, -2.0, 1.0]) / 6
+"""Error of the midpoint rule: its difference to Simpson's rule.  The ends of a step are left out,
+because functions may jump there."""
+
+
+def composition_error(stages: Sequence[float]) -> Rule:
+    """Return the difference of Gauss's rule of order 6 to the midpoint rule of all stages."""
+    points, weights = gauss_rule(3)
+    lengths = np.array(stages)
+    return (
+        np.concatenate([points, np.cumsum(lengths) - lengths / 2]),
+        np.concatenate([weights, -lengths]),
+    )
 
 
 def step_count(time: float, dt: float) -> int:
@@ -69,7 +85,8 @@ class Adaptive:
     """Adaptive time steps with a limited error of each step, for the argument ``dt``.
 
     The error of a step is estimated from its acceleration, from the change of the acceleration
-    since the last step, and from the midpoint rule for loads and prescribed motions.  As in other
+    since the last step, and from the midpoint rule for loads and prescribed motions.  At fourth
+    order it is estimated from velocities at both ends of the step and between stages.  As in other
     integrators, the tolerance applies to one step; the sum over a run is
     :attr:`Solution.time_error`.  Errors of the spatial discretization are not included.
 
@@ -140,6 +157,8 @@ class AdaptiveSteps:
         masses = np.bincount(M.rows(), weights=np.abs(M.data), minlength=subdomain.size)
         self._massless = np.flatnonzero(masses == 0.0)
         self.steps, self.error = 0, 0.0
+        self._order, stages = order_of(simulation.scheme), stages_of(simulation.scheme)
+        self._rule = composition_error(stages) if len(stages) > 1 else MIDPOINT_ERROR
 
     @property
     def finished(self) -> bool:
@@ -153,17 +172,18 @@ class AdaptiveSteps:
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
         """Take one step whose error is below the tolerance; ``keep`` stores its end."""
-        simulation = self._simulation
-        stop = next(t for t in self._stops if t > simulation.t)
+        simulation, t = self._simulation, self._simulation.t
+        stop = next(stop for stop in self._stops if stop > t)
         stop = simulation.controllers.next_sample(simulation.t, stop)
         while True:
             try:
                 trial, error = self._solve_and_estimate_error(stop)
-                dt = trial.step.dt
-                change = 0.9 * (self._tolerance / max(error, 1e-300)) ** (1 / 3)
+                dt = trial.step.t1 - t
+                change = 0.9 * (self._tolerance / max(error, 1e-300)) ** (1 / (1 + self._order))
                 if error <= self._tolerance:
                     break
                 self._dt = dt * max(change, 0.1)
+                simulation.take_back()
                 failure = StepFailed(
                     f"the error {error:.1e} of the step is above the tolerance "
                     f"{self._tolerance:.1e}; if a load or a motion jumps, name the time in `stops`"
@@ -171,7 +191,7 @@ class AdaptiveSteps:
             except StepFailed as reason:
                 failure, self._dt = reason, self._dt / 4
             if self._dt < self._shortest:
-                simulation.give_up(failure, simulation.t + self._dt)
+                simulation.give_up(failure, t + self._dt)
         simulation.accept(trial)
         self.error += error
         self.steps += 1
@@ -183,11 +203,12 @@ class AdaptiveSteps:
 
     def _solve_and_estimate_error(self, stop: float) -> tuple[Trial, float]:
         """Solve the next step and estimate its error, as defined by :class:`Adaptive`."""
-        simulation, supports = self._simulation, self._simulation.supports
-        inertia = simulation.inertia
+        simulation, inertia = self._simulation, self._simulation.inertia
         left = stop - simulation.t
         # Two equal steps to a stop, because a longer step could leave a tiny one
         dt = left if self._dt >= left else min(self._dt, left / 2)
+        if self._order == 4:
+            return self._compare_velocities(stop if dt == left else simulation.t + dt)
         if self._fresh:
             # Without an earlier step, accelerations in half of the step and in the whole step are
             # compared.
@@ -204,6 +225,30 @@ class AdaptiveSteps:
         c2, c3 = inertia.scheme.error_weights()
         error = c2 * dt**2 * a + c3 * dt**3 * jerk
         error[self._rotations] += (trial.q1 - simulation.q - trial.s)[self._rotations]
+        return trial, self._largest_error(error, simulation.t, dt)
+
+    def _compare_velocities(self, t1: float) -> tuple[Trial, float]:
+        """Solve the next step, of fourth order, to ``t1`` and estimate its error.
+
+        The motion in the step is compared with an integral of velocities, by a rule that is exact
+        for polynomials of degree 3.  Its points are both ends of the step, and the ends of the
+        first stage and of the stage before the last, where errors of second order cancel.
+        """
+        simulation = self._simulation
+        inertia, t, q, v = simulation.inertia, simulation.t, simulation.q, simulation.inertia.v
+        dt, first = t1 - t, stages_of(simulation.scheme)[0]
+        trial = simulation.attempt(t1)
+        q_early = simulation.stage_end(0)
+        early = 2 / (first * dt) * nodal_step(simulation.scheme, q, q_early, self._rotations) - v
+        late, last = inertia.v, inertia.after(trial.s, trial.step.dt)[0]
+        inside = 1 / 12 / (1 / 4 - (1 / 2 - first) ** 2)
+        ends = 1 / 2 - inside
+        error = trial.q1 - q - dt * (ends * (v + last) + inside * (early + late))
+        return trial, self._largest_error(error, t, dt)
+
+    def _largest_error(self, error: Array, t: float, dt: float) -> float:
+        """Return the largest of the errors of motions, and of loads in the step from ``t`` on."""
+        simulation, supports = self._simulation, self._simulation.supports
         supports.into_axes(error)
         error[supports.dofs] = 0.0
         # Motions without inertia follow the other motions, and jump with a load.
@@ -211,22 +256,23 @@ class AdaptiveSteps:
         supports.into_plane(error)
         moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
         rotations = np.abs(error[self._rotations]).max(initial=0.0)
-        load_error = simulation.together(self._load_error, dt)
-        return trial, simulation.subdomain.largest(
+        load_error = simulation.together(self._load_error, t, dt)
+        return simulation.subdomain.largest(
             float(max(moves / simulation.scene.size, rotations, load_error))
         )
 
-    def _load_error(self, dt: float) -> float:
-        """Return the largest error of the midpoint rule for the integral of a load over the step.
+    def _load_error(self, t: float, dt: float) -> float:
+        """Return the largest error of the scheme's rule for the integral of a load over the step.
 
         Each error is divided by the largest value of the load so far times the duration of the run.
         """
-        error, t = 0.0, self._simulation.t
+        at, weights = self._rule
+        error = 0.0
         for i, function in enumerate(self._functions):
-            before, middle, after = (float(function(t + fraction * dt)) for fraction in SAMPLES)
-            self._largest[i] = max(self._largest[i], abs(before), abs(middle), abs(after))
-            error = max(error, abs(before - 2 * middle + after) / (self._largest[i] or 1.0))
-        return error / 6 * dt / (self._t1 - self._t0)  # Simpson's rule minus midpoint rule
+            values = np.array([float(function(t + fraction * dt)) for fraction in at])
+            self._largest[i] = max(self._largest[i], float(np.abs(values).max()))
+            error = max(error, abs(float(weights @ values)) / (self._largest[i] or 1.0))
+        return error * dt / (self._t1 - self._t0)
 
     def state(self) -> dict[str, float]:
         """Return the data that determine the next step, the number of steps, and the error sum."""

@@ -22,7 +22,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ModelError, StepFailed, warn
-from ufl_beam.mechanics.time_scheme import Step, with_half_tangents
+from ufl_beam.mechanics.time_scheme import Step, stages_of, with_half_tangents
 from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.output.recorder import StateView
 from ufl_beam.output.states import States
@@ -52,11 +52,17 @@ class Prediction:
         c: ``prediction`` of loops.h; C writes to it when a step is accepted.
     """
 
-    def __init__(self, subdomain: Subdomain, q: Array, weights: Array, *, in_motion: bool) -> None:
+    def __init__(
+        self, subdomain: Subdomain, q: Array, weights: Array, *, in_motion: bool, several: bool
+    ) -> None:
         self._subdomain, self._in_motion = subdomain, in_motion
         self.c = struct("prediction", size=subdomain.size, dt=math.inf)
         self._q_before = q.copy()
         fill(self.c, q_before=self._q_before)
+        self._past = np.zeros((several * lib.MOST_KNOWN_ENDS, subdomain.size))
+        if several:
+            fill(self.c, past=self._past)
+            self.c.place = list(range(lib.MOST_KNOWN_ENDS))
         if in_motion:
             self._second = np.zeros(subdomain.size)
             size = {"scene": subdomain.numbering.scene.size, "unknowns": subdomain.numbering.size}
@@ -73,6 +79,13 @@ class Prediction:
             self.c.repeated = archive.number("part that repeats itself", self.c.repeated)
             self.c.now = archive.number("square of the second difference", self.c.now)
             self._second[:] = archive.at_dofs("second difference", self._second)
+        if len(self._past):
+            known = min(self.c.known, lib.POINTS_OF_GUESS)
+            self.c.known = int(archive.number("known ends of stages", known))
+            for k in range(self.c.known):
+                self.c.time[k] = archive.number(f"time of end {k}", self.c.time[k])
+                past = self._past[self.c.place[k]]
+                past[:] = archive.at_dofs(f"q at end {k}", past)
 
 
 # -- check of static steps -------------------------------------------------------------------------
@@ -169,7 +182,10 @@ class Stepper(StateView):
         in_motion, phases = equation.inertia is not None, equation.phases
         self._begun_at: Array | None = None  # `q_before` of the initial state
         self.substeps = 0
-        self.prediction = Prediction(subdomain, q, equation.weights, in_motion=in_motion)
+        stages = stages_of(scheme)
+        self.prediction = Prediction(
+            subdomain, q, equation.weights, in_motion=in_motion, several=len(stages) > 1
+        )
 
         again = [phase.again for phase in phases if phase.again is not None]
         self._again = equation.c.again.call = ffi.new("phase_call[]", again)
@@ -201,6 +217,8 @@ class Stepper(StateView):
             admissions=len(admits), admission=ffi.new("admission_call[]", admits),
             checks_laws=int(subdomain.largest(float(bool(admits)))),
             applying_turn=APPLYING_ROTATION, short_part=SHORT_SUBSTEP,
+            stages=len(stages), stage=np.cumsum(stages),
+            begun=np.zeros((len(stages) - 1, subdomain.size)), stage_begin=np.zeros(len(stages)),
         )  # fmt: skip
         if self.time_loop.opens:
             fill(self.time_loop, found=np.zeros(subdomain.size))
@@ -330,6 +348,18 @@ class Stepper(StateView):
         self.solver.follow(None)
         return self._trial(solved)
 
+    def take_back(self) -> None:
+        """Return to the state before the latest :meth:`attempt`, if its step has several stages."""
+        if self.time_loop.taken:
+            with self._in_c():
+                lib.take_back(self.time_loop)
+
+    def stage_end(self, index: int) -> Array:
+        """Return the configuration after a stage of the latest :meth:`attempt`; not the last."""
+        size = self.subdomain.size
+        end = np.frombuffer(ffi.buffer(self.time_loop.begun + (index + 1) * size, 8 * size)).copy()
+        return self.supports.in_plane(end)
+
     def accept(self, trial: Trial) -> None:
         """Accept the step of the latest :meth:`attempt` or :meth:`attempt_along`."""
         self.time_loop.step.t1 = trial.step.t1
@@ -428,7 +458,7 @@ class Stepper(StateView):
     @property
     def q_before(self) -> Array:
         """Configuration at the beginning of the last step; (size,); m, rad."""
-        if self._begun_at is not None and not self.time_loop.substeps:  # no step accepted since
+        if self._begun_at is not None and self.cell_forces.c.initial:  # nothing accepted since
             return self._begun_at
         return self._copy(self.time_loop.prediction.q_before)
 

@@ -652,6 +652,10 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 
 /* -- prediction of the end of a step, see steps.c ------------------------------------------------- */
 
+/* Points of the polynomial that predicts the end of a stage; known ends of stages, also after the
+ * stages of a step are taken back. A polynomial through more points needs more iterations. */
+enum { POINTS_OF_GUESS = 3, MOST_KNOWN_ENDS = 8 };
+
 /* The last steps. `second` is the second difference of the configuration; in dynamics only. */
 typedef struct {
   int size, equal;   /* equal: number of last steps with the same length, up to three */
@@ -665,6 +669,11 @@ typedef struct {
   double both, now, before;
   double step;              /* square of the last step */
   double repeated;          /* fraction of `second` that the next step is expected to repeat */
+  /* Compositions only: the last ends of stages, the latest one first, each with its time and its
+   * configuration; `place` has their places in `past`. */
+  int known, place[MOST_KNOWN_ENDS];
+  double time[MOST_KNOWN_ENDS];
+  double *past;
 } prediction;
 
 void predict(const prediction *p, double dt, const double *q, double *out);
@@ -1065,6 +1074,11 @@ typedef struct {
   int states;
   double *state;      /* entries of the ledger that are functions of the state, contiguous */
   time_step step;
+  /* A composition solves a step in several stages, of which some go backward. */
+  int stages, taken;      /* taken: number of stages that are accepted, of a step that is not */
+  const double *stage;    /* ends of the stages, as fractions of the step */
+  double *begun;          /* unknowns at the beginnings of the stages, in the axes of supports */
+  double *stage_begin;    /* times of these beginnings; s */
   int num_groups, width, sums; /* groups of numbers of a state; length of a row, and of its first part, in
                            * which numbers are added */
   const group_columns *groups;
@@ -1102,6 +1116,7 @@ double value_at(const time_function *f, double t);
 void keep_state(const time_loop *m, double *row);
 int solve_begun_step(time_loop *m, int hold);
 int attempt_step(time_loop *m, double t1, double end);
+void take_back(time_loop *m);
 int accept_step(time_loop *m);
 int step_or_subdivide(time_loop *m, double end);
 int repeat_steps(time_loop *m, int steps, const double *ends, const double *configurations, double *rows);

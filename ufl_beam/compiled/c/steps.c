@@ -14,7 +14,7 @@ static const double FAR = 1. / 8;
  * differences of times have fewer digits than the times. */
 static int as_last(const prediction *p, double dt)
 {
-  return fabs(dt - p->dt) <= 1e-6 * dt;
+  return fabs(dt - p->dt) <= 1e-6 * fabs(dt);
 }
 
 /* Extrapolate from q at the velocity of the last step. After steps of equal length, add the
@@ -27,6 +27,40 @@ void predict(const prediction *p, double dt, const double *q, double *out)
     for (int i = 0; i < p->size; ++i) out[i] = q[i] + ratio * (q[i] - before[i]) + again * second[i];
   else
     for (int i = 0; i < p->size; ++i) out[i] = q[i] + ratio * (q[i] - before[i]);
+}
+
+/* Guess the end of a stage at the time t by the polynomial through the last ends of stages, between
+ * which it may lie. */
+static void predict_stage(const prediction *p, double t, double *out)
+{
+  const int points = POINTS_OF_GUESS;
+  memset(out, 0, p->size * sizeof *out);
+  for (int k = 0; k < points; ++k) {
+    const double *q = p->past + (size_t)p->place[k] * p->size;
+    double weight = 1;
+    for (int j = 0; j < points; ++j)
+      if (j != k) weight *= (t - p->time[j]) / (p->time[k] - p->time[j]);
+    for (int i = 0; i < p->size; ++i) out[i] += weight * q[i];
+  }
+}
+
+/* Enter the end q of a stage at the time t. */
+static void enter_stage(prediction *p, double t, const double *q)
+{
+  const int last = p->known < MOST_KNOWN_ENDS ? p->known++ : MOST_KNOWN_ENDS - 1, free = p->place[last];
+  for (int k = last; k > 0; --k) p->place[k] = p->place[k - 1], p->time[k] = p->time[k - 1];
+  p->place[0] = free, p->time[0] = t;
+  memcpy(p->past + (size_t)free * p->size, q, p->size * sizeof *q);
+}
+
+/* Forget the last ends of stages. */
+static void forget_ends(prediction *p, int number)
+{
+  for (; number > 0 && p->known > 0; --number, --p->known) {
+    const int free = p->place[0];
+    for (int k = 1; k < MOST_KNOWN_ENDS; ++k) p->place[k - 1] = p->place[k], p->time[k - 1] = p->time[k];
+    p->place[MOST_KNOWN_ENDS - 1] = free;
+  }
 }
 
 /* Enter a step from q to q1; products are sums over the degrees of freedom that this process
@@ -90,7 +124,8 @@ static void guess(time_loop *m)
   const moving_supports *p = m->supports;
   const equation *e = m->equation;
   const double *q = m->q;
-  predict(m->prediction, m->step.dt, q, m->guess);
+  if (m->prediction->known >= POINTS_OF_GUESS) predict_stage(m->prediction, m->step.t1, m->guess);
+  else predict(m->prediction, m->step.dt, q, m->guess);
   turn_axes(e->turned, e->axes, m->guess, 1);
   if (p->moving && e->turned) {
     memcpy(e->plane, q, m->size * sizeof *q);
@@ -274,6 +309,79 @@ static int solve_to(time_loop *m, double t1, double end)
   return fails(m, RAISED);
 }
 
+/* Accept the end of a step, or of a stage of it, as the state of all terms. Returns 0 if a function
+ * of a user has raised an exception. The step is accepted nevertheless, because some terms have
+ * accepted it already. */
+static int accept_end(time_loop *m)
+{
+  equation *e = m->equation;
+  prediction *p = m->prediction;
+  run(&m->accept, &m->step, m->x, m->s);
+  if (m->path) {
+    memcpy(m->path->force, e->inner_force, m->size * sizeof *m->path->force);
+    m->path->rejected = 0;
+  }
+  accept_cell_forces(m->cell_forces);
+  accept_supports(m);
+  memset(m->state, 0, m->states * sizeof *m->state);
+  run(&m->add_state, &m->step, m->x, m->s);
+  enter_step(p, m->step.dt, m->q, m->x);
+  if (m->rates) {
+    const enum agreement how[] = {TOTAL, TOTAL, TOTAL};
+    double products[] = {p->both, p->now, p->step};
+    agree(e, 3, how, products);
+    p->both = products[0], p->now = products[1], p->step = products[2];
+  }
+  compare_differences(p);
+  double *spare = p->q_before;
+  p->q_before = m->q, m->q = spare;
+  memcpy(m->q, m->x, m->size * sizeof *m->q);
+  m->t = m->step.t1;
+  m->failure = SUCCEEDS;
+  return raised_anywhere(e) == NOTHING || fails(m, RAISED);
+}
+
+/* -- steps of several stages ---------------------------------------------------------------------- */
+
+/* Take back the accepted stages of a step that is not accepted. A step of such a scheme is the same
+ * in both directions of time, so the beginning of a stage, which is known, is its end in a stage
+ * that goes back. All terms accept this stage; no equation is solved. */
+void take_back(time_loop *m)
+{
+  equation *e = m->equation;
+  const int raised = e->raised, error = e->error, failure = m->failure;
+  if (!m->taken) return;
+  forget_ends(m->prediction, m->taken);
+  e->raised = NOTHING;
+  for (; m->taken > 0; --m->taken) {
+    const int k = m->taken - 1;
+    set_step(m, m->stage_begin[k], m->stage_begin[k]);
+    run(&m->begin, &m->step, 0, 0);
+    go_to(e, m->begun + (size_t)k * m->size, EXACT);
+    residual_at(e, e->unknowns);
+    measure(m);
+    accept_end(m);
+  }
+  e->raised = raised, e->error = error, m->failure = failure;
+}
+
+/* Take all stages of the step to t1 but the last one, in which the state of the terms goes on. */
+static int take_stages(time_loop *m, double t1)
+{
+  const double begin = m->t;
+  if (!m->prediction->known) enter_stage(m->prediction, m->t, m->q);
+  while (m->taken + 1 < m->stages) {
+    double *begun = m->begun + (size_t)m->taken * m->size;
+    if (!solve_to(m, begin + m->stage[m->taken] * (t1 - begin), t1)) return 0;
+    memcpy(begun, m->q, m->size * sizeof *begun);
+    turn_axes(m->equation->turned, m->equation->axes, begun, 1);
+    m->stage_begin[m->taken++] = m->t;
+    if (!accept_end(m)) return 0;
+    enter_stage(m->prediction, m->t, m->q);
+  }
+  return 1;
+}
+
 /* Fraction of the first step after which the acceleration is taken as the initial one. Shorter
  * trial steps come closer to it, but amplify velocities of supports that do not fit the initial
  * velocities. */
@@ -283,12 +391,16 @@ static const double FIRST_TRIAL = 1. / 16;
 int attempt_step(time_loop *m, double t1, double end)
 {
   m->equation->raised = NOTHING;
+  take_back(m); /* an attempt that was not accepted */
   if (m->rates && m->prepare && !m->rates->ready) {
     if (!solve_to(m, m->t + FIRST_TRIAL * (t1 - m->t), t1)) return 0;
     if (m->derivatives && !differentiate_step(m->derivatives, m, 1)) return fails(m, NO_DERIVATIVE);
     m->prepare(m->handle);
   }
-  return solve_to(m, t1, end);
+  if (m->stages <= 1) return solve_to(m, t1, end);
+  if (take_stages(m, t1) && solve_to(m, t1, end)) return 1;
+  take_back(m);
+  return 0;
 }
 
 /* Solve a step of a path that Python has set. */
@@ -317,38 +429,16 @@ static void watch_forces(force_watch *w, const time_loop *m)
   }
 }
 
-/* Accept the end of the step as the state. Returns 0 if a function of a user has raised an
- * exception. The step is accepted nevertheless, because some terms have accepted it already. */
+/* Accept the end of the step as the state, and show it to watches; see accept_end. */
 int accept_step(time_loop *m)
 {
-  equation *e = m->equation;
-  prediction *p = m->prediction;
-  run(&m->accept, &m->step, m->x, m->s);
-  if (m->path) {
-    memcpy(m->path->force, e->inner_force, m->size * sizeof *m->path->force);
-    m->path->rejected = 0;
-  }
-  accept_cell_forces(m->cell_forces);
-  accept_supports(m);
-  memset(m->state, 0, m->states * sizeof *m->state);
-  run(&m->add_state, &m->step, m->x, m->s);
-  enter_step(p, m->step.dt, m->q, m->x);
-  if (m->rates) {
-    const enum agreement how[] = {TOTAL, TOTAL, TOTAL};
-    double products[] = {p->both, p->now, p->step};
-    agree(e, 3, how, products);
-    p->both = products[0], p->now = products[1], p->step = products[2];
-  }
-  compare_differences(p);
-  double *spare = p->q_before;
-  p->q_before = m->q, m->q = spare;
-  memcpy(m->q, m->x, m->size * sizeof *m->q);
-  m->t = m->step.t1;
-  m->failure = SUCCEEDS;
+  const int accepted = accept_end(m);
+  m->taken = 0;
+  if (m->stages > 1) enter_stage(m->prediction, m->t, m->q);
   ++m->substeps;
   if (m->forces && !isinf(m->step.dt)) watch_forces(m->forces, m);
-  for (int k = 0; k < m->watches; ++k) watch_step(m->watch[k], 1, m->t, p->q_before, m->q);
-  return raised_anywhere(e) == NOTHING || fails(m, RAISED);
+  for (int k = 0; k < m->watches; ++k) watch_step(m->watch[k], 1, m->t, m->prediction->q_before, m->q);
+  return accepted;
 }
 
 /* Go to a time in one step or, if that fails, in substeps; returns whether the time is reached. */
