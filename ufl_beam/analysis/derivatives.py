@@ -32,7 +32,7 @@ from ufl_beam.errors import (
     require_kind,
     require_number,
 )
-from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia
+from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia, order_of
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.state_rows import Block, Column, Columns
@@ -162,6 +162,11 @@ def checked_case(
             f"{call}: dt = Adaptive(...) chooses steps that depend on the parameters; give a number"
         )
     require_number(dt, f"{call}: dt", positive=True)
+    if order_of(scheme) > 2:
+        raise ArgumentError(
+            f"{call}: {scheme} has stages, which are not differentiated; use order=2, with a "
+            "smaller dt"
+        )
     require_plain(newton or Newton(), call)
     require_kind(at, Mapping, f"{call}: at")
     if not at:

@@ -414,6 +414,9 @@ class Stepper(StateView):
                 f"a node turns by {c.turn:.3g} rad in the step, more than the limit of 0.75 π; "
                 "reduce dt"
             )
+        if failure == lib.NO_DERIVATIVE:
+            at = f"{c.step.t1:.9g} s"
+            raise ModelError(f"the tangent at t = {at} is singular: the step has no derivative")
         if failure == lib.APPLIED_TOO_FAST:
             raise StepFailed("a node turns too far while the loads at the beginning are applied")
         if failure == lib.GIVES_ENERGY:
