@@ -25,6 +25,9 @@ from ufl_beam import dolfinx_compat  # noqa: F401 - first: its errors explain mi
 
 # isort: split
 
+from ufl_beam.analysis.calibration import calibrate
+from ufl_beam.analysis.calibration_result import Calibration as Calibration
+from ufl_beam.analysis.calibration_result import Measurement
 from ufl_beam.analysis.critical_points import Branch as Branch
 from ufl_beam.analysis.critical_points import CriticalPoint as CriticalPoint
 from ufl_beam.analysis.free_decay import (
@@ -254,6 +257,7 @@ __all__ = [
     "Lognormal",
     "Mander",
     "MaterialLaw",
+    "Measurement",
     "MenegottoPinto",
     "Mesh",
     "MidpointDynamics",
@@ -311,6 +315,7 @@ __all__ = [
     "Weibull",
     "animate",
     "buckling",
+    "calibrate",
     "damping",
     "damping_ratio",
     "fit_decay",
