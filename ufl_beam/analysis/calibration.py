@@ -7,7 +7,7 @@ import inspect
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -69,6 +69,8 @@ WIDE = 1.0
 """Half width of an interval beyond which a warning is issued, in the search variables: a factor of
 2.7 for positive parameters."""
 
+HALVINGS = 8  # most attempts to find a start at which all runs succeed
+
 AT_BOUND = 1e-4  # distance from a bound that counts as zero, in the search variables
 
 FAILURES = ConvergenceError, ArgumentError  # of runs during a search
@@ -105,7 +107,8 @@ def calibrate(
             bound is positive.
         measured: Measurements.
         starts: Number of searches: from the start given, and from random starts within the bounds,
-            a Latin hypercube.  Under ``mpirun`` each of several searches runs on one process.
+            a Latin hypercube.  A random start at which a run fails is moved halfway to the start
+            given, repeatedly.  Under ``mpirun`` each of several searches runs on one process.
         seed: Seed of the random starts.
         progress: Show a progress bar in a terminal or notebook.
         comm: Processes; by default all.
@@ -160,9 +163,9 @@ def calibrate(
     problem = Problem(model, variables, measurements, sigma, comm)
     with _quiet():
         _require_effects(problem)
-        ends = _search_all(problem, points, progress, comm)
-        costs = np.array([end.cost for end in ends])
-        x = problem.settle(ends[int(np.nanargmin(costs))].x)
+        found = _search_all(problem, points, progress, comm)
+        costs = np.array([search.cost for search in found])
+        x = problem.settle(found[int(np.nanargmin(costs))].x)
         computed, jacobian = problem.linearize(x)
     values = variables.values(x)
     solutions = tuple(problem.simulate(m, values) for m in measurements)
@@ -192,11 +195,11 @@ def calibrate(
         sigma=tuple(problem.sigma),
         residuals=tuple(residuals),
         cost=0.5 * float(np.sum((np.concatenate(residuals) / stacked) ** 2)),
-        starts=np.array([[*variables.values(x).values()] for x in points]),
-        ends=np.array([[*variables.values(end.x).values()] for end in ends]),
+        starts=np.array([[*variables.values(search.start).values()] for search in found]),
+        ends=np.array([[*variables.values(search.x).values()] for search in found]),
         end_costs=costs,
-        runs=problem.runs + sum(end.runs for end in ends),
-        failed=problem.failed + sum(end.failed for end in ends),
+        runs=problem.runs + sum(search.runs for search in found),
+        failed=problem.failed + sum(search.failed for search in found),
         solutions=solutions,
         warnings=tuple(_faults(variables, x, widths, correlations, undetermined)),
     )
@@ -310,9 +313,10 @@ def _start_points(variables: Variables, starts: int, seed: int) -> Array:
 # -- search ----------------------------------------------------------------------------------------
 
 
-class End(NamedTuple):
-    """End of a search, NaN if it failed, with the number of its runs."""
+class Search(NamedTuple):
+    """Start and end of a search, with its numbers of runs; the end is NaN if the search failed."""
 
+    start: Array
     x: Array
     cost: float
     runs: int
@@ -415,18 +419,23 @@ class Problem:
             self.failed += 1
             return np.full(sum(map(len, self.measured)), math.nan)
 
-    def search(self, x: Array) -> tuple[Array, float]:
-        """Return the minimum that a search from x finds, and its cost."""
+    def search(self, x: Array) -> tuple[Array, Array, float]:
+        """Search for a minimum from x; return the start of the search, its end, and the cost there.
+
+        A start at which a run fails is moved halfway to zero, the start given, until runs succeed.
+        """
         sigma = np.concatenate(self.sigma)
         values = np.concatenate([m.values for m in self.measured])
-        if not np.isfinite(self._or_nan(x)).all():
-            return np.full_like(x, math.nan), math.nan
+        for _ in range(HALVINGS):
+            if np.isfinite(self._or_nan(x)).all():
+                break
+            x = x / 2
         end = scipy.optimize.least_squares(
             lambda x: (self._or_nan(x) - values) / sigma, x,
             lambda x: self.linearize(x)[1] / sigma[:, None],
             bounds=self.variables.bounds(), method="trf", **TOLERANCES,
         )  # fmt: skip
-        return end.x, float(end.cost)
+        return x, end.x, float(end.cost)
 
     def settle(self, x: Array) -> Array:
         """Return the minimum near x with estimated standard deviations, which become final.
@@ -452,7 +461,7 @@ class Problem:
                     self.sigma[k] = np.full(len(values), estimate)
             if max(changes) < SETTLED or len(self.measured) == 1:
                 break  # the minimum of one measurement does not depend on its deviation
-            x = self.search(x)[0]
+            _, x, _ = self.search(x)
         return x
 
 
@@ -475,28 +484,27 @@ def _require_effects(problem: Problem) -> None:
 
 def _search_all(
     problem: Problem, points: Array, progress: bool, comm: MPI.Intracomm
-) -> list[End]:
+) -> list[Search]:
     """Search from each point; several searches are the members of a study."""
+    if len(points) == 1:
+        return [Search(*problem.search(points[0]), 0, 0)]
 
     def member(start: list[float]) -> dict[str, Any]:
         own = replace(problem, comm=None, runs=0, failed=0)
-        with _quiet():
-            try:
-                x, cost = own.search(np.array(start))
-            except FAILURES:
-                x, cost = np.full(len(start), math.nan), math.nan
-        return {"x": x, "cost": cost, "runs": own.runs, "failed": own.failed}
+        begin, end, cost = np.array(start), np.full(len(start), math.nan), math.nan
+        with _quiet(), suppress(*FAILURES):
+            begin, end, cost = own.search(begin)
+        return dict(zip(Search._fields, (begin, end, cost, own.runs, own.failed), strict=True))
 
-    if len(points) == 1:
-        x, cost = problem.search(points[0])
-        return [End(x, cost, 0, 0)]
     member.__name__ = WHAT
     cases = [{"start": [*map(float, point)]} for point in points]
     found = study(member, cases, progress=progress, comm=comm)
     if np.isnan(found["cost"]).all():
-        raise ArgumentError(f"{WHAT}: the searches from all {len(points)} starts failed")
-    rows = zip(*(found[name] for name in End._fields), strict=True)
-    return [End(x, float(cost), int(runs), int(failed)) for x, cost, runs, failed in rows]
+        raise ArgumentError(
+            f"{WHAT}: all searches failed; give narrower bounds around the start"
+        )
+    rows = zip(*(found[name] for name in Search._fields), strict=True)
+    return [Search(begin, end, float(c), int(n), int(m)) for begin, end, c, n, m in rows]
 
 
 # -- what data determine ---------------------------------------------------------------------------
