@@ -164,40 +164,39 @@ def calibrate(
     with _quiet():
         _require_effects(problem)
         found = _search_all(problem, points, progress, comm)
-        costs = np.array([search.cost for search in found])
-        x = problem.settle(found[int(np.nanargmin(costs))].x)
+        x = problem.settle(found[int(np.nanargmin([search.cost for search in found]))].end)
         computed, jacobian = problem.linearize(x)
     values = variables.values(x)
     solutions = tuple(problem.simulate(m, values) for m in measurements)
 
     stacked = np.concatenate(problem.sigma)
-    scaled, splits = jacobian / stacked[:, None], np.cumsum([*map(len, measurements)])[:-1]
+    residuals = np.concatenate([m.values for m in measurements]) - computed
+    scaled, splits = jacobian / stacked[:, None], problem.splits
     covariance, undetermined = _covariance(scaled)
-    q = scipy.special.ndtri(0.5 + LEVEL / 2)
-    if any(m.sigma is None for m in measurements):
-        q = scipy.special.stdtrit(number - p, 0.5 + LEVEL / 2)
-    slopes, widths = variables.slopes(x), q * np.sqrt(covariance.diagonal())
     alone = [_covariance(part)[0].diagonal() for part in np.split(scaled, splits)]
     deviations = np.sqrt(covariance.diagonal())
     with np.errstate(invalid="ignore"):
         correlations = covariance / np.outer(deviations, deviations)
     np.fill_diagonal(correlations, 1.0)
-    low, high = (variables.values(x + w) for w in (-widths, widths))
-    residuals = [m.values - c for m, c in zip(measurements, np.split(computed, splits), strict=True)]
+    quantile = scipy.special.ndtri(0.5 + LEVEL / 2)
+    if least > p:
+        quantile = scipy.special.stdtrit(number - p, 0.5 + LEVEL / 2)
+    slopes, widths = variables.slopes(x), quantile * deviations
+    low, high = (variables.values(x + change) for change in (-widths, widths))
     result = Calibration(
         parameters=values,
         intervals={name: (low[name], high[name]) for name in values},
         covariance=covariance * np.outer(slopes, slopes),
         correlations=correlations,
         half_widths=widths * slopes,
-        half_widths_alone=q * np.sqrt(alone) * slopes,
+        half_widths_alone=quantile * np.sqrt(alone) * slopes,
         measured=measurements,
         sigma=tuple(problem.sigma),
-        residuals=tuple(residuals),
-        cost=0.5 * float(np.sum((np.concatenate(residuals) / stacked) ** 2)),
+        residuals=tuple(np.split(residuals, splits)),
+        cost=0.5 * float(np.sum((residuals / stacked) ** 2)),
         starts=np.array([[*variables.values(search.start).values()] for search in found]),
-        ends=np.array([[*variables.values(search.x).values()] for search in found]),
-        end_costs=costs,
+        ends=np.array([[*variables.values(search.end).values()] for search in found]),
+        end_costs=np.array([search.cost for search in found]),
         runs=problem.runs + sum(search.runs for search in found),
         failed=problem.failed + sum(search.failed for search in found),
         solutions=solutions,
@@ -217,13 +216,19 @@ class Variables:
     """Search variables x, which are zero at the start.
 
     A positive parameter is ``start exp(x)``, another one ``start + scale x``.
+
+    Attributes:
+        names: Names of the parameters; p in number.
+        positive: True for positive parameters; (p,).
+        start, scale: Numbers of the formulas above; (p,).
+        lower, upper: Bounds of the parameters, which may be infinite; (p,).
     """
 
     names: tuple[str, ...]
-    positive: Index  # True or False; (p,)
+    positive: Index
     start: Array
     scale: Array
-    lower: Array  # bounds of the parameters, may be infinite
+    lower: Array
     upper: Array
 
     @classmethod
@@ -252,16 +257,16 @@ class Variables:
                 positive, scale = low > 0, (high - low) / 2
                 if not low <= start <= high or not low < high:
                     raise ArgumentError(
-                        f"{what}: the start {start:g} is not between the bounds {low:g} and {high:g}"
+                        f"{what}: {start:g} is not between its bounds {low:g} and {high:g}"
                     )
             rows.append((positive, start, start if positive else scale, low, high))
-        positive, *numbers = zip(*rows, strict=True)
-        return cls(tuple(parameters), np.array(positive), *map(np.array, numbers))
+        return cls(tuple(parameters), *map(np.array, zip(*rows, strict=True)))
 
     def values(self, x: Array) -> dict[str, float]:
-        """Return the parameters by name, within their bounds up to round-off."""
+        """Return the parameters by name, within their bounds."""
         with np.errstate(over="ignore"):
             p = np.where(self.positive, self.start * np.exp(x), self.start + self.scale * x)
+        p = np.clip(p, self.lower, self.upper)
         return dict(zip(self.names, map(float, p), strict=True))
 
     def slopes(self, x: Array) -> Array:
@@ -317,7 +322,7 @@ class Search(NamedTuple):
     """Start and end of a search, with its numbers of runs; the end is NaN if the search failed."""
 
     start: Array
-    x: Array
+    end: Array
     cost: float
     runs: int
     failed: int
@@ -358,6 +363,11 @@ class Problem:
     failed: int = 0
     _last: tuple[bytes, Array] = (b"", np.empty(0))  # variables and computed values of a run
 
+    @property
+    def splits(self) -> Index:
+        """Index of the first value of each measurement but the first."""
+        return np.cumsum([*map(len, self.measured)])[:-1]
+
     def simulate(self, measurement: Measurement, values: dict[str, float]) -> Solution:
         """Run the model of a measurement."""
         self.runs += 1
@@ -379,8 +389,7 @@ class Problem:
     def linearize(self, x: Array) -> tuple[Array, Array]:
         """Return the computed values and their derivatives by the variables; (N,), (N, p)."""
         base = self.computed(x)
-        splits = np.cumsum([*map(len, self.measured)])[:-1]
-        pieces = zip(self.measured, np.split(base, splits), strict=True)
+        pieces = zip(self.measured, np.split(base, self.splits), strict=True)
         return base, np.concatenate([self._differentiate(m, x, own) for m, own in pieces])
 
     def _differentiate(self, measurement: Measurement, x: Array, base: Array) -> Array:
@@ -391,10 +400,11 @@ class Problem:
         Raises:
             ConvergenceError, ArgumentError: The runs on both sides failed.
         """
-        columns = []
-        for i, ends in enumerate(np.clip(x + [[-STEP], [STEP]], *self.variables.bounds()).T):
-            known, errors = [], []
-            for end in ends:
+        columns, (low, high) = [], self.variables.bounds()
+        for i in range(len(x)):
+            known: list[tuple[float, Array]] = []
+            errors: list[Exception] = []
+            for end in max(x[i] - STEP, low[i]), min(x[i] + STEP, high[i]):
                 moved = x.copy()
                 moved[i] = end
                 try:
@@ -427,9 +437,11 @@ class Problem:
         sigma = np.concatenate(self.sigma)
         values = np.concatenate([m.values for m in self.measured])
         for _ in range(HALVINGS):
-            if np.isfinite(self._or_nan(x)).all():
+            if not np.isnan(self._or_nan(x)).any():
                 break
-            x = x / 2
+            x = np.divide(x, 2.0)
+        else:
+            raise ArgumentError(f"{WHAT}: runs fail at all points between two starts")
         end = scipy.optimize.least_squares(
             lambda x: (self._or_nan(x) - values) / sigma, x,
             lambda x: self.linearize(x)[1] / sigma[:, None],
@@ -444,22 +456,20 @@ class Problem:
         its part h of the trace of the hat matrix; the sum of h is p.
         """
         unknown = [k for k, m in enumerate(self.measured) if m.sigma is None]
-        splits = np.cumsum([*map(len, self.measured)])[:-1]
+        splits = self.splits
         for _ in range(ROUNDS if unknown else 0):
             computed, jacobian = self.linearize(x)
             orthogonal = np.linalg.qr(jacobian / np.concatenate(self.sigma)[:, None])[0]
-            changes = [0.0]
-            for k, (c, h) in enumerate(zip(np.split(computed, splits), np.split(orthogonal, splits))):
-                if k in unknown:
-                    values = self.measured[k].values
-                    free = max(len(values) - float(np.sum(h**2)), 1.0)
-                    estimate = max(
-                        math.sqrt(np.sum((values - c) ** 2) / free),
-                        ROUND_OFF * (np.abs(values).max() or 1.0),
-                    )
-                    changes.append(abs(self.sigma[k][0] / estimate - 1.0))
-                    self.sigma[k] = np.full(len(values), estimate)
-            if max(changes) < SETTLED or len(self.measured) == 1:
+            rows, parts = np.split(computed, splits), np.split(orthogonal, splits)
+            change = 0.0
+            for k in unknown:
+                values = self.measured[k].values
+                free = max(len(values) - float(np.sum(parts[k] ** 2)), 1.0)
+                least = ROUND_OFF * (np.abs(values).max() or 1.0)
+                estimate = max(math.sqrt(np.sum((values - rows[k]) ** 2) / free), least)
+                change = max(change, abs(self.sigma[k][0] / estimate - 1.0))
+                self.sigma[k] = np.full(len(values), estimate)
+            if change < SETTLED or len(self.measured) == 1:
                 break  # the minimum of one measurement does not depend on its deviation
             _, x, _ = self.search(x)
         return x
@@ -491,7 +501,8 @@ def _search_all(
 
     def member(start: list[float]) -> dict[str, Any]:
         own = replace(problem, comm=None, runs=0, failed=0)
-        begin, end, cost = np.array(start), np.full(len(start), math.nan), math.nan
+        begin: Array = np.array(start)
+        end, cost = np.full_like(begin, math.nan), math.nan
         with _quiet(), suppress(*FAILURES):
             begin, end, cost = own.search(begin)
         return dict(zip(Search._fields, (begin, end, cost, own.runs, own.failed), strict=True))
@@ -500,9 +511,7 @@ def _search_all(
     cases = [{"start": [*map(float, point)]} for point in points]
     found = study(member, cases, progress=progress, comm=comm)
     if np.isnan(found["cost"]).all():
-        raise ArgumentError(
-            f"{WHAT}: all searches failed; give narrower bounds around the start"
-        )
+        raise ArgumentError(f"{WHAT}: all searches failed; give narrower bounds around the start")
     rows = zip(*(found[name] for name in Search._fields), strict=True)
     return [Search(begin, end, float(c), int(n), int(m)) for begin, end, c, n, m in rows]
 
@@ -528,9 +537,9 @@ def _covariance(jacobian: Array) -> tuple[Array, list[list[int]]]:
     triangle[: len(r)] = r
     _, s, directions = np.linalg.svd(triangle)
     weak = s <= SINGULAR * s[0]
-    undetermined = [[*np.flatnonzero(np.abs(row) > INVOLVED)] for row in directions[weak]]
+    undetermined = [[*np.flatnonzero(row > INVOLVED)] for row in np.abs(directions[weak])]
     rows = directions[~weak] / s[~weak, None] / lengths
-    covariance = rows.T @ rows
+    covariance: Array = rows.T @ rows
     for i in sorted({i for group in undetermined for i in group}):
         covariance[i] = covariance[:, i] = math.nan
         covariance[i, i] = math.inf
@@ -542,7 +551,7 @@ def _faults(
     undetermined: list[list[int]],
 ) -> Iterator[str]:  # fmt: skip
     """Yield a sentence for each parameter, or group of them, that the data do not determine."""
-    names, values = variables.names, variables.values(x)
+    names, values, (low, high) = variables.names, variables.values(x), variables.bounds()
     remedy = "fix a parameter, or add a measurement that depends on it in another way"
     for group in undetermined:
         one = names[group[0]]
@@ -562,13 +571,13 @@ def _faults(
                     f"{correlations[i, j]:.4f}; {remedy}"
                 )
         if WIDE < widths[i] < math.inf:
-            low, high = (variables.values(x + sign * widths)[name] for sign in (-1, 1))
+            least, most = (variables.values(x + sign * widths)[name] for sign in (-1, 1))
             yield (
-                f"the data hardly determine {name}: its 95 % interval is {low:.3g} to {high:.3g}; "
-                f"{remedy}"
+                f"the data hardly determine {name}: its 95 % interval is {least:.3g} to "
+                f"{most:.3g}; {remedy}"
             )
-        for word, bound in zip(("lower", "upper"), variables.bounds(), strict=True):
-            if abs(x[i] - bound[i]) < AT_BOUND:
+        for word, bound in ("lower", low[i]), ("upper", high[i]):
+            if abs(x[i] - bound) < AT_BOUND:
                 yield (
                     f"{name} = {values[name]:.4g} is at its {word} bound, so that its interval and "
                     "those of others do not hold; give wider bounds, or fix it"

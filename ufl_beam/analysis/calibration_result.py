@@ -97,8 +97,9 @@ class Measurement(Record):
             differ, a standard deviation is not positive, or another argument is wrong.
 
     Example:
-        >>> swing = ub.Measurement(
-        ...     [0.1, 0.2], [-0.8e-3, -2.4e-3], lambda run: run.displacement(run.scene["beam"].end)[:, 1],
+        >>> def deflection(run):
+        ...     return run.displacement(run.scene["beam"].end)[:, 1]
+        >>> swing = ub.Measurement([0.1, 0.2], [-0.8e-3, -2.4e-3], deflection,
         ...     scheme=ub.EnergyMomentum(), t=(0, 0.2), dt=0.01, sigma=1e-5,
         ...     labels=("time (s)", "deflection (m)"))
         >>> len(swing)
@@ -229,8 +230,8 @@ class Calibration(Rich):
 
     Attributes:
         parameters: Fitted values by name.
-        intervals: Ends of the 95 % interval of each parameter by name; Student's distribution if a
-            standard deviation was estimated.
+        intervals: Ends of the 95 % interval of each parameter by name, within the bounds; with
+            Student's distribution if a standard deviation was estimated.
         covariance: Covariance of the parameters; (p, p).  It is infinite where the data do not
             determine a parameter.
         correlations: Correlations of the parameters; (p, p).
