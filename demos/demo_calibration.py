@@ -125,9 +125,8 @@ except ub.ArgumentError as error:
     ub.print_once(refused, "\n")
 
 # %% [markdown]
-# With the first part of the pushover, before the connection opens, the fit of limit and stiffness
-# would warn in the same way.  The elastic free decay with two springs in series is another case:
-# its frequency depends on a combination of both stiffnesses, and the fit warns that it cannot
+# A fit of two stiffnesses to the free decay, of the column and of the connection, is another case.
+# The frequency depends on their sum as springs in series, and the fit warns that it cannot
 # distinguish them.
 
 

@@ -164,7 +164,7 @@ def calibrate(
     with _quiet():
         _require_effects(problem)
         found = _search_all(problem, points, progress, comm)
-        x = problem.settle(found[int(np.nanargmin([search.cost for search in found]))].end)
+        x = problem.reweight(found[int(np.nanargmin([search.cost for search in found]))].end)
         computed, jacobian = problem.linearize(x)
     values = variables.values(x)
     solutions = tuple(problem.simulate(m, values) for m in measurements)
@@ -238,13 +238,14 @@ class Variables:
         if not parameters:
             raise ArgumentError(f"{WHAT}: parameters is empty")
         rows = []
-        for name, given in parameters.items():
-            what = f"{WHAT}: parameter {name}"
+        for name, entry in parameters.items():
+            require_kind(name, str, f"{WHAT}: parameters: name")
+            what = f"{WHAT}: parameters[{name!r}]"
             try:
-                start, low, high = given if isinstance(given, Sequence) else (given, None, None)
+                start, low, high = entry if isinstance(entry, Sequence) else (entry, None, None)
             except ValueError:
                 raise ArgumentError(
-                    f"{what} = {shorten(given)} must be a start, or (start, lower, upper)"
+                    f"{what} = {shorten(entry)} must be a start, or (start, lower, upper)"
                 ) from None
             start = require_number(start, what)
             if low is None or high is None:
@@ -253,11 +254,11 @@ class Variables:
                 if not start:
                     raise ArgumentError(f"{what} = 0 has no scale; give (start, lower, upper)")
             else:
-                low, high = (require_number(x, f"{what}, bound") for x in (low, high))
+                low, high = (require_number(x, f"{what}: bound") for x in (low, high))
                 positive, scale = low > 0, (high - low) / 2
                 if not low <= start <= high or not low < high:
                     raise ArgumentError(
-                        f"{what}: {start:g} is not between its bounds {low:g} and {high:g}"
+                        f"{what}: {start:g} is not between the bounds {low:g} and {high:g}"
                     )
             rows.append((positive, start, start if positive else scale, low, high))
         return cls(tuple(parameters), *map(np.array, zip(*rows, strict=True)))
@@ -296,7 +297,8 @@ def _require_arguments(model: Model, variables: Variables, measurement: Measurem
         signature.bind(**dict.fromkeys(variables.names), **measurement.arguments)
     except TypeError as error:
         raise ArgumentError(
-            f"{WHAT}: model: {error}; it has the arguments {', '.join(signature.parameters)}"
+            f"{WHAT}: parameters do not fit the model: {error}; its arguments are "
+            f"{', '.join(signature.parameters)}"
         ) from None
 
 
@@ -449,7 +451,7 @@ class Problem:
         )  # fmt: skip
         return x, end.x, float(end.cost)
 
-    def settle(self, x: Array) -> Array:
+    def reweight(self, x: Array) -> Array:
         """Return the minimum near x with estimated standard deviations, which become final.
 
         The estimate of a measurement is sqrt(S/(m - h)) with the sum S of its squared residuals and
@@ -460,11 +462,11 @@ class Problem:
         for _ in range(ROUNDS if unknown else 0):
             computed, jacobian = self.linearize(x)
             orthogonal = np.linalg.qr(jacobian / np.concatenate(self.sigma)[:, None])[0]
-            rows, parts = np.split(computed, splits), np.split(orthogonal, splits)
+            rows, blocks = np.split(computed, splits), np.split(orthogonal, splits)
             change = 0.0
             for k in unknown:
                 values = self.measured[k].values
-                free = max(len(values) - float(np.sum(parts[k] ** 2)), 1.0)
+                free = max(len(values) - float(np.sum(blocks[k] ** 2)), 1.0)
                 least = ROUND_OFF * (np.abs(values).max() or 1.0)
                 estimate = max(math.sqrt(np.sum((values - rows[k]) ** 2) / free), least)
                 change = max(change, abs(self.sigma[k][0] / estimate - 1.0))
@@ -554,15 +556,11 @@ def _faults(
     names, values, (low, high) = variables.names, variables.values(x), variables.bounds()
     remedy = "fix a parameter, or add a measurement that depends on it in another way"
     for group in undetermined:
-        one = names[group[0]]
-        if len(group) == 1:
-            yield f"the data do not determine {one}: it has no effect at the minimum; {remedy}"
-        else:
-            several = ", ".join(names[i] for i in group[:-1]) + f" and {names[group[-1]]}"
-            yield (
-                f"the data do not determine {several}: they have the same effect on all computed "
-                f"values; {remedy}"
-            )
+        several = " and ".join(names[i] for i in group)
+        effect = "it has no effect at the minimum"
+        if len(group) > 1:
+            effect = "they have the same effect on all computed values"
+        yield f"the data do not determine {several}: {effect}; {remedy}"
     for i, name in enumerate(names):
         for j in range(i):
             if abs(correlations[i, j]) > CORRELATED:

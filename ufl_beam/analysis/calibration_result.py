@@ -16,6 +16,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.display import TIME, Rich
 from ufl_beam.errors import (
     ArgumentError,
+    require_all,
     require_array,
     require_function,
     require_kind,
@@ -54,10 +55,9 @@ def _require_sigma(value: Any, what: str) -> Any:
 
 def _require_labels(value: Any, what: str) -> tuple[str, str]:
     """Return two texts as a tuple, or raise."""
-    if isinstance(value, str) or len(texts := tuple(value)) != 2:
+    texts = require_all(value, what, str)
+    if len(texts) != 2:
         raise ArgumentError(f"{what} = {shorten(value)} must be two texts, for the axes")
-    for text in texts:
-        require_kind(text, str, what)
     return texts
 
 
@@ -138,7 +138,7 @@ class Measurement(Record):
             raise ArgumentError(f"{what}: values is empty")
         if self.sigma is not None and np.shape(self.sigma) not in {(), (len(self),)}:
             raise ArgumentError(
-                f"{what}: {len(self)} values and {len(self.sigma)} standard deviations"
+                f"{what}: sigma has {len(self.sigma)} standard deviations for {len(self)} values"
             )
         if self.times is None:
             return
@@ -151,11 +151,10 @@ class Measurement(Record):
             raise ArgumentError(
                 f"{what}: times must increase, but {times[k + 1]:g} follows {times[k]:g}"
             )
-        outside = times[(times < t0) | (times > t1)]
-        if len(outside):
+        for k in np.flatnonzero((times < t0) | (times > t1)):
             raise ArgumentError(
-                f"{what}: the time {outside[0]:g} is outside the run from {t0:g} to {t1:g}; change "
-                "t=, or leave out the value"
+                f"{what}: times[{k}] = {times[k]:g} is outside the run from {t0:g} to {t1:g}; "
+                "change t=, or leave out the value"
             )
 
     def __len__(self) -> int:
