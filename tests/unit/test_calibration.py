@@ -339,7 +339,7 @@ def test_results_are_shown_as_text_table_and_picture():
         (("must come after",), {"t": (1, 0)}),
         (("dt", "must be positive"), {"dt": 0.0}),
         (("dt", "not a number"), {"dt": ub.Adaptive(1e-3)}),
-        (("labels", "two texts"), {"labels": "time"}),
+        (("labels", "two texts"), {"labels": ("time",)}),
         (("arguments",), {"arguments": 1}),
         (("mesh",), {"mesh": 1}),
         (("newton",), {"newton": 1}),

@@ -805,9 +805,9 @@ TABLE |= {
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Calibration", "Coefficients", "Connector", "CriticalPoint", "Cycles",
     "Decay", "DemandCurves", "Diagram", "DolfinxView", "Energy", "Envelope", "Event", "Extent",
-    "Film", "Governing", "HingeFormation", "InteractionDiagram", "Joint", "LoadCombinations", "Modes",
-    "MomentCurvature", "Path", "Pushover", "Solution", "SpectralResponse", "Step", "Study",
-    "Support", "TargetDisplacement", "Tradeoff",
+    "Film", "Governing", "HingeFormation", "InteractionDiagram", "Joint", "LoadCombinations",
+    "Modes", "MomentCurvature", "Path", "Pushover", "Solution", "SpectralResponse", "Step",
+    "Study", "Support", "TargetDisplacement", "Tradeoff",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""
 

@@ -137,7 +137,7 @@ def calibrate(
         ...     scheme=ub.Static(), t=(0, 1), dt=0.5, sigma=1e-6)
         >>> fit = ub.calibrate(cantilever, {"E": (100e9, 50e9, 500e9)}, [bent], starts=3)
         >>> print(f"{fit.parameters['E'] / 1e9:.0f} GPa, {fit.same_minimum} of 3 starts")
-        211 GPa, 3 of 3 starts
+        207 GPa, 3 of 3 starts
     """
     comm = communicator(comm, f"{WHAT}: comm")
     require_function(model, f"{WHAT}: model", "the parameters")

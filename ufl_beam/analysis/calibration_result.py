@@ -262,7 +262,7 @@ class Calibration(Rich):
         ...     scheme=ub.Static(), t=(0, 1), dt=0.5)
         >>> fit = ub.calibrate(cantilever, {"E": 100e9}, [bent])
         >>> print(f"{fit.parameters['E'] / 1e9:.0f} GPa")
-        211 GPa
+        207 GPa
         >>> figure = ub.plot(fit)
     """
 
