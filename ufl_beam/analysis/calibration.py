@@ -67,7 +67,7 @@ CORRELATED = 0.99  # correlation above which a warning is issued
 
 WIDE = 1.0
 """Half width of an interval beyond which a warning is issued, in the search variables: a factor of
-2.7 for positive parameters."""
+e for positive parameters."""
 
 HALVINGS = 8  # most attempts to find a start at which all runs succeed
 
@@ -384,9 +384,14 @@ class Problem:
         """Return the computed values of all measurements; (N,)."""
         if self._last[0] != x.tobytes():
             values = self.variables.values(x)
-            rows = [m.computed(self.simulate(m, values)) for m in self.measured]
+            rows = [self._computed(m, values) for m in self.measured]
             self._last = x.tobytes(), np.concatenate(rows)
         return self._last[1]
+
+    def _computed(self, measurement: Measurement, values: dict[str, float]) -> Array:
+        """Return the computed values of a measurement; the same bits on all processes; (m,)."""
+        row = measurement.computed(self.simulate(measurement, values))
+        return row if self.comm is None else self.comm.bcast(row)
 
     def linearize(self, x: Array) -> tuple[Array, Array]:
         """Return the computed values and their derivatives by the variables; (N,), (N, p)."""
@@ -410,8 +415,7 @@ class Problem:
                 moved = x.copy()
                 moved[i] = end
                 try:
-                    run = self.simulate(measurement, self.variables.values(moved))
-                    known.append((end, measurement.computed(run)))
+                    known.append((end, self._computed(measurement, self.variables.values(moved))))
                 except FAILURES as error:
                     self.failed += 1
                     errors.append(error)
