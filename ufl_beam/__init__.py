@@ -25,6 +25,9 @@ from ufl_beam import dolfinx_compat  # noqa: F401 - first: its errors explain mi
 
 # isort: split
 
+from ufl_beam.analysis.calibration import calibrate
+from ufl_beam.analysis.calibration_result import Calibration as Calibration
+from ufl_beam.analysis.calibration_result import Measurement
 from ufl_beam.analysis.critical_points import Branch as Branch
 from ufl_beam.analysis.critical_points import CriticalPoint as CriticalPoint
 from ufl_beam.analysis.derivatives import Derivatives as Derivatives
@@ -259,6 +262,7 @@ __all__ = [
     "Lognormal",
     "Mander",
     "MaterialLaw",
+    "Measurement",
     "MenegottoPinto",
     "Mesh",
     "MidpointDynamics",
@@ -316,6 +320,7 @@ __all__ = [
     "Weibull",
     "animate",
     "buckling",
+    "calibrate",
     "damping",
     "damping_ratio",
     "fit_decay",

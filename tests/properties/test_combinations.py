@@ -69,7 +69,7 @@ ELSEWHERE = {
         "incremental_dynamic_analysis", "load_combinations", "pushover",
         "response_spectrum_analysis",
     },
-    "many runs": {"Study", "TradeoffError", "study", "tradeoff"},
+    "many runs": {"Measurement", "Study", "TradeoffError", "calibrate", "study", "tradeoff"},
     "other geometry of ordinary scenes": {"imperfect"},
     "errors and words": {"ConvergenceError", "ProcessesDiffer", "ModelWarning", "ArgumentError",
         "ArgumentTypeError", "ModelError", "print_once"},

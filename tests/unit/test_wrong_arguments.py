@@ -774,13 +774,53 @@ TABLE |= {
     ),
 }
 
+BENT = ub.Measurement(
+    [0.5, 1.0], [1.0, 2.0], lambda run: run.displacement(BEAM.end)[:, 0],
+    scheme=ub.Static(), t=(0, 1), dt=0.5,
+)  # fmt: skip
+
+
+def stretched(force):
+    """The beam under a growing force."""
+    load = ub.PointLoad(BEAM.end, force=(force, 0), amplitude=lambda t: t)
+    return ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[load])
+
+
+TABLE |= {
+    "Measurement": call(
+        ub.Measurement,
+        times=V([0.5, 1.0], [*optional(SERIES), [1.0, 0.5], [0.5, 2.0], [0.5]]),
+        values=V([1.0, 2.0], [*SERIES, [], [1.0]]),
+        quantity=V(lambda run: run.times, FUNCTION),
+        scheme=V(ub.Static(), OBJECT),
+        t=V((0, 1), [*VECTOR, (1, 0), (0, 0.5)]),
+        dt=V(0.5, [*POSITIVE, ub.Adaptive(1e-3)]),
+        sigma=V(None, [*(x for x in optional(POSITIVE) if x is not ARRAY), [1.0, 0.0], [1.0]]),
+        arguments=V({}, optional(LIST)),
+        name=V("bent", TEXT),
+        labels=V(("t", "x"), [None, 1.0, "ab", "abc", ("a",), ("a", 1)]),
+        newton=V(None, optional(OBJECT)),
+        **MESH,
+    ),
+    "calibrate": call(
+        ub.calibrate,
+        model=V(stretched, [*FUNCTION, lambda force: None, lambda: SCENE]),
+        parameters=V({"force": 1.0}, [*LIST, {}, {"load": 1.0}, {1: 1.0}, {"force": (1.0, 2.0)},
+                     {"force": (3.0, 1.0, 2.0)}, *({"force": x} for x in [*NUMBER, 0.0])]),
+        measured=V([BENT], [*LIST, []]),
+        starts=V(1, [*COUNT, 2]),
+        seed=V(0, SEED),
+        progress=V(False, SWITCH),
+        comm=V(None, optional(OBJECT)),
+    ),
+}  # fmt: skip
+
 RECORDS_OF_RUNS = {
-    "Branch", "Buckling", "Coefficients", "Connector", "CriticalPoint", "Cycles", "Decay",
-    "DemandCurves", "Diagram", "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film",
-    "Governing", "HingeFormation", "InteractionDiagram", "Joint", "LinearModel",
-    "LoadCombinations", "Modes",
-    "MomentCurvature", "Path", "Pushover", "Solution", "SpectralResponse", "Step", "Study",
-    "Support", "TargetDisplacement", "Tradeoff",
+    "Branch", "Buckling", "Calibration", "Coefficients", "Connector", "CriticalPoint", "Cycles",
+    "Decay", "DemandCurves", "Derivatives", "Diagram", "DolfinxView", "Energy", "Envelope",
+    "Event", "Extent", "Film", "Governing", "HingeFormation", "InteractionDiagram", "Joint",
+    "LinearModel", "LoadCombinations", "Modes", "MomentCurvature", "Path", "Pushover", "Solution",
+    "SpectralResponse", "Step", "Study", "Support", "TargetDisplacement", "Tradeoff",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""
 

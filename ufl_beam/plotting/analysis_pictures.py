@@ -4,17 +4,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ufl_beam.analysis.calibration_result import Calibration
 from ufl_beam.analysis.incremental_dynamics_result import PERCENT, DemandCurves
 from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.analysis.pushover_result import Pushover, TargetDisplacement
 from ufl_beam.arrays import Array
+from ufl_beam.display import html_page
 from ufl_beam.errors import ArgumentError, require_all
-from ufl_beam.plotting import style
+from ufl_beam.plotting import notebook, style
 from ufl_beam.plotting.frame_pictures import (
     MOST,
     PointLabel,
@@ -158,6 +161,41 @@ def _draw_curve(axes: Axes, demand: Array, im: Array, limit: float, **options: A
     if end < len(demand) and np.isinf(demand[end]):
         x, y = np.append(x, limit), np.append(y, im[end])
     axes.plot(x, y, **options)
+
+
+def draw_calibration(fit: Calibration) -> Figure:
+    """Draw measured and computed values of each measurement, and below the residuals.
+
+    Residuals are divided by the standard deviations; a band of two of them is grey.
+    """
+    number = len(fit.measured)
+    with style.picture((max(6.0, 5.0 * number), 5.5)) as figure:
+        rows = figure.subplots(2, number, sharex="col", squeeze=False, height_ratios=(3, 1))
+        data = zip(fit.measured, fit.solutions, fit.residuals, fit.sigma, strict=True)
+        for (above, below), (m, run, residuals, sigma) in zip(rows.T, data, strict=True):
+            at = np.arange(len(m)) if m.times is None else np.asarray(m.times)
+            if m.times is None:
+                above.plot(at, m.values - residuals, "_", color=BLUE, ms=14.0, label="computed")
+            else:
+                above.plot(run.times, np.asarray(m.quantity(run)), color=BLUE, label="computed")
+            above.plot(at, m.values, ".", color=shade(RED), ms=5.0, zorder=3, label="measured")
+            above.set_title(m.name, loc="left")
+            above.set_ylabel(m.labels[1])
+            above.legend(fontsize=style.font_size(9.0))
+            below.axhspan(-2.0, 2.0, color=GREY, alpha=0.3, lw=0)
+            below.axhline(0.0, color=BLUE, lw=1.0)
+            below.plot(at, residuals / sigma, ".", color=shade(RED), ms=4.0)
+            below.set(xlabel="value" if m.times is None else m.labels[0], ylabel="residual / σ")
+    return figure
+
+
+@html_page.register
+def calibration_page(fit: Calibration) -> str:
+    """Write a calibration as HTML: its parameters, remarks, and a picture."""
+    head, *rows = fit.table()
+    text = notebook.lines(repr(fit)[1:-1]) + notebook.table(head, rows)
+    text += notebook.lines(*fit.remarks())
+    return text + notebook.image("measured and computed values", partial(draw_calibration, fit))
 
 
 def _on_frame(

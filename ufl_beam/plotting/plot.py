@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from ufl_beam.analysis.calibration_result import Calibration
 from ufl_beam.analysis.incremental_dynamics_result import DemandCurves
 from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.analysis.modes import Shapes
@@ -25,6 +26,7 @@ from ufl_beam.output.engineering_results import Storeys
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
 from ufl_beam.plotting.analysis_pictures import (
+    draw_calibration,
     draw_combinations,
     draw_dynamics,
     draw_pushover,
@@ -86,6 +88,7 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     SpectralResponse: {name: partial(draw_response, quantity=name) for name in ("M", "N", "V")},
     LoadCombinations: {name: partial(draw_combinations, quantity=name) for name in ("M", "N", "V")},
     DemandCurves: {"curves": draw_dynamics},
+    Calibration: {"fit": draw_calibration},
     GroundMotion: {"motion": draw_motion},
     ResponseSpectrum: {name: partial(draw_spectrum, quantity=name) for name in SPECTRA},
 }
@@ -125,6 +128,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     SpectralResponse    "M", "N", "V"       combined section force, with both signs; ``ax``
     DemandCurves        "curves"            intensity over demand, fragility; ``labels``
     LoadCombinations    "M", "N", "V"       envelope over the combinations; ``ax``
+    Calibration         "fit"               measured and computed values, and the residuals
     ==================  ==================  ========================================================
 
     Args:

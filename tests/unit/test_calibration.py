@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: MIT
+"""Calibration: linear problems in closed form, intervals, warnings, failed runs, wrong calls.
+
+The reaction of a beam under two forces that grow with t and t² is a linear function of both forces
+to round-off, so that estimates and covariances have closed forms.
+"""
+
+import contextlib
+import warnings
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+from helpers import raises
+from scipy.stats import norm, t
+
+import ufl_beam as ub
+from ufl_beam.analysis.calibration_result import _interpolate
+
+STEEL = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+TIMES = np.linspace(0.0, 1.0, 41)
+SIGMA = 0.1  # N
+
+
+def pushed(a, b, factor=1.0):
+    """A cantilever under the force a t + b t²; N."""
+    beam = ub.Beam((0, 0), (1, 0), STEEL, cells=1, name="beam")
+    forces = (
+        ub.PointLoad(beam.end, force=(factor * a, 0), amplitude=lambda s: s),
+        ub.PointLoad(beam.end, force=(factor * b, 0), amplitude=lambda s: s * s),
+    )
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=forces)
+
+
+def force(run):
+    """Force on the support of a run; N."""
+    return -run.reaction(run.scene.supports[0])[:, 0]
+
+
+def truth(a=2.0, b=-3.0, factor=1.0, times=TIMES):
+    return factor * (a * times + b * times**2)
+
+
+def measurement(values=None, *, times=TIMES, seed=0, **options):
+    """Noisy values of the force by default, from steps that end at their times."""
+    if values is None:
+        noise = np.random.default_rng(seed).normal(size=len(times))
+        values = truth(factor=options.get("arguments", {}).get("factor", 1.0), times=times)
+        values = values + SIGMA * noise
+    options = {"quantity": force, "scheme": ub.Static(), "t": (0, 1), "dt": 0.025, **options}
+    return ub.Measurement(times, values, **options)
+
+
+WITHIN = {"a": (1.0, -10.0, 10.0), "b": (1.0, -10.0, 10.0)}
+
+
+def fit(measured, parameters=WITHIN, model=pushed, **options):
+    several = [measured] if isinstance(measured, ub.Measurement) else measured
+    return ub.calibrate(model, parameters, several, progress=False, **options)
+
+
+def warned(pattern):
+    """A context in which the first process warns."""
+    first = MPI.COMM_WORLD.rank == 0
+    return pytest.warns(ub.ModelWarning, match=pattern) if first else contextlib.nullcontext()
+
+
+def design(times=TIMES):
+    """Matrix of the linear problem."""
+    return np.stack([times, times**2], axis=1)
+
+
+def test_estimates_and_covariance_of_a_linear_problem_are_those_of_least_squares():
+    known, measured = fit(measurement(sigma=SIGMA)), measurement()
+    A, y = design(), np.asarray(measured.values)
+    best = np.linalg.lstsq(A, y, rcond=None)[0]
+    # The search ends when a step changes variables, in units of 10 N, by less than 1e-10.
+    np.testing.assert_allclose([*known.parameters.values()], best, rtol=1e-8)
+    covariance = SIGMA**2 * np.linalg.inv(A.T @ A)
+    # Derivatives are differences with the round-off of runs, 1e-12, over the step 2**-16.
+    np.testing.assert_allclose(known.covariance, covariance, rtol=1e-6)
+    deviations = np.sqrt(covariance.diagonal())
+    np.testing.assert_allclose(
+        known.correlations, covariance / np.outer(deviations, deviations), rtol=1e-6
+    )
+    rest = y - A @ best
+    np.testing.assert_allclose(known.residuals[0], rest, atol=1e-8)
+    assert known.cost == pytest.approx(0.5 * np.sum(rest**2) / SIGMA**2)
+    estimated = fit(measured)
+    s = np.sqrt(np.sum(rest**2) / (len(y) - 2))
+    np.testing.assert_allclose(estimated.sigma[0], s, rtol=1e-8)
+    for result, sigma, quantile in (
+        (known, SIGMA, norm.ppf(0.975)),
+        (estimated, s, t.ppf(0.975, len(y) - 2)),
+    ):
+        half = quantile * sigma / SIGMA * deviations
+        np.testing.assert_allclose(result.half_widths, half, rtol=1e-6)
+        for (low, high), p, w in zip(result.intervals.values(), best, half, strict=True):
+            np.testing.assert_allclose((low, high), (p - w, p + w), rtol=1e-6)
+    # no warning is issued
+
+
+def test_weights_of_several_measurements_agree_with_their_estimated_deviations():
+    """A fixed point: deviations from residuals, and the minimum with these deviations."""
+    rng = np.random.default_rng(3)
+    late = np.linspace(0.5, 1.0, 21)
+    first = measurement(truth() + 0.1 * rng.normal(size=len(TIMES)))
+    second = measurement(
+        truth(times=late) + 0.5 * rng.normal(size=len(late)), times=late, name="late"
+    )
+    result = fit([first, second])
+    A, y = [design(), design(late)], [np.asarray(m.values) for m in (first, second)]
+    s = np.array([1.0, 1.0])
+    for _ in range(100):
+        W = np.concatenate([rows / d for rows, d in zip(A, s, strict=True)])
+        scaled = np.concatenate([v / d for v, d in zip(y, s, strict=True)])
+        p = np.linalg.lstsq(W, scaled, rcond=None)[0]
+        C = np.linalg.inv(W.T @ W)
+        s = np.array([
+            np.sqrt(np.sum((v - rows @ p) ** 2) / (len(v) - np.trace(rows @ C @ rows.T) / d**2))
+            for rows, v, d in zip(A, y, s, strict=True)
+        ])  # fmt: skip
+    # Rounds end when deviations change by less than 1e-3, and each round gains a factor of ten.
+    np.testing.assert_allclose([d[0] for d in result.sigma], s, rtol=1e-3)
+    deviations = np.sqrt(np.linalg.inv(W.T @ W).diagonal())
+    assert (np.abs(np.array([*result.parameters.values()]) - p) < 1e-3 * deviations).all()
+    alone = np.sqrt(np.linalg.inv(A[1].T @ A[1]).diagonal()) * s[1] * t.ppf(0.975, 60)
+    np.testing.assert_allclose(result.half_widths_alone[1], alone, rtol=1e-3)
+    assert result.identified_by == {"a": "measurement", "b": "measurement"}
+
+
+def test_intervals_of_positive_parameters_are_symmetric_in_their_logarithm():
+    values, times = np.exp([0.1, -0.1, 0.05]) * [0.5, 1.0, 1.5], np.array([0.5, 1.0, 1.5])
+    result = fit(
+        measurement(values, times=times, t=(0, 2), dt=0.5, sigma=0.1),
+        {"a": 3.0}, lambda a: pushed(a, 0.0),
+    )  # fmt: skip
+    a = times @ values / (times @ times)  # the force is a t
+    assert result.parameters["a"] == pytest.approx(a)
+    w = norm.ppf(0.975) * 0.1 / np.linalg.norm(times) / a
+    np.testing.assert_allclose(result.intervals["a"], a * np.exp([-w, w]), rtol=1e-6)
+    assert result.half_widths[0] == pytest.approx(w * a)
+
+
+def test_interpolation_is_exact_for_cubics_and_of_fourth_order():
+    times = np.array([0.0, 0.1, 0.3, 0.4, 0.7, 1.0])
+    at = np.linspace(0, 1, 23)
+    cubic = np.poly1d([1.0, -2.0, 0.5, 3.0])
+    np.testing.assert_allclose(_interpolate(at, times, cubic(times)), cubic(at), atol=1e-14)
+    assert np.array_equal(_interpolate(times, times, np.exp(times)), np.exp(times))
+    assert _interpolate(np.array([0.25]), times[:2], times[:2])[0] == 0.25  # two times: a line
+    h = np.array([0.02, 0.01])
+    at = np.linspace(0, 1, 997)
+    errors = [
+        np.abs(_interpolate(at, x, np.sin(9 * x)) - np.sin(9 * at)).max()
+        for x in (np.arange(0, 1 + d / 2, d) for d in h)
+    ]
+    assert np.log2(errors[0] / errors[1]) > 3.9
+
+
+def test_a_first_row_without_a_value_is_left_out():
+    def acceleration(run):
+        return run.acceleration(run.scene["beam"].end)[:, 0]
+
+    options = {"quantity": acceleration, "scheme": ub.EnergyMomentum(), "t": (0, 0.1), "dt": 1e-3}
+    times = np.array([0.01, 0.02, 0.03])
+    later = measurement([1.0, 2.0, 3.0], times=times, **options)
+    run = ub.simulate(pushed(2.0, 0.0), ub.EnergyMomentum(), t=(0, 0.1), dt=1e-3, progress=False)
+    np.testing.assert_allclose(later.computed(run), acceleration(run)[[10, 20, 30]], rtol=1e-9)
+    early = measurement([1.0, 2.0], times=[0.0, 0.1], **options)
+    with raises("quantity returned nan at the beginning", "before 0.001"):
+        early.computed(run)
+
+
+def test_values_without_times_are_compared_as_they_are():
+    def at_end(run):
+        return force(run)[-1]
+
+    result = fit(measurement([4.0], times=None, quantity=at_end, sigma=0.1), {"a": 1.0},
+                 lambda a: pushed(a, 0.0))  # fmt: skip
+    assert result.parameters["a"] == pytest.approx(4.0)
+    ub.plot(result)
+
+
+def test_arguments_distinguish_the_runs_of_measurements():
+    """The second test has ten times the force and the same errors, so its interval is a tenth."""
+    measured = [
+        measurement(sigma=SIGMA, name="small"),
+        measurement(sigma=SIGMA, name="large", arguments={"factor": 10.0}, seed=1),
+    ]
+    result = fit(measured)
+    small, large = result.half_widths_alone
+    np.testing.assert_allclose(small, 10 * large, rtol=1e-6)
+    assert result.identified_by == {"a": "large", "b": "large"}
+    assert "± by small" in str(result)
+
+
+def test_starts_end_at_the_same_minimum_and_others_are_reported():
+    """The force a² + a/5 has two minima, at the truth a = 1 and near -1.2 with a larger cost."""
+
+    def model(a, b):
+        return pushed(a * a + 0.2 * a, b)
+
+    measured = measurement(truth(1.2, 1.0), sigma=SIGMA)
+    bounds = {"a": (0.5, -0.8, 3.0), "b": (0.5, -5.0, 5.0)}
+    result = fit(measured, bounds, model, starts=12)
+    again = fit(measured, bounds, model, starts=12)
+    assert np.array_equal(result.end_costs, again.end_costs)
+    assert not np.array_equal(fit(measured, bounds, model, starts=12, seed=1).starts, result.starts)
+    assert result.parameters["a"] == pytest.approx(1.0, abs=1e-6)
+    assert result.starts[0].tolist() == [0.5, 0.5]
+    assert ((result.starts >= [-0.8, -5.0]) & (result.starts <= [3.0, 5.0])).all()
+    best = np.abs(result.ends[:, 0] - 1.0) < 1e-4
+    assert 6 <= best.sum() == result.same_minimum < 12  # the others are at the bound -0.8
+    np.testing.assert_allclose(result.ends[~best, 0], -0.8, atol=1e-3)
+    assert f"{best.sum()} of 12 starts end at the least cost" in str(result)
+    assert "times this cost, a = -0.8" in str(result)
+
+
+def test_parameters_that_act_alike_are_named():
+    measured = measurement(truth(2.0, 0.0), sigma=SIGMA)
+    with warned("do not determine a and b: they have the same effect"):
+        result = fit(measured, {"a": 1.0, "b": 3.0}, lambda a, b: pushed(a * b, 0.0))
+    assert np.isinf(result.half_widths).all()
+    assert result.identified_by["a"] == "all together"
+    assert result.parameters["a"] * result.parameters["b"] == pytest.approx(2.0)
+    assert len(result.warnings) == 1
+    assert result.warnings[0] in str(result)
+
+
+def test_parameters_that_act_almost_alike_are_named():
+    def model(a, b):
+        return pushed(a + b, 0.03 * b)
+
+    with warned("hardly distinguish a and b: .* -1.0000"):
+        fit(measurement(truth(2.0, 0.03), sigma=1e-4), {"a": 1.2, "b": 0.8}, model)
+
+
+def test_a_parameter_without_effect_at_the_minimum_is_named():
+    """The second force acts where the first one is above 2.5 N only."""
+
+    def model(a, b):
+        return pushed(a, max(a - 2.5, 0.0) * b)
+
+    measured = measurement(truth(2.0, 0.0), sigma=SIGMA)
+    with warned("do not determine b: it has no effect"):
+        result = fit(measured, {"a": 3.0, "b": 0.1}, model)
+    assert np.isfinite(result.half_widths).tolist() == [True, False]
+
+
+def test_wide_intervals_and_bounds_are_named():
+    measured = measurement(sigma=10.0)
+    with warned("hardly determine a: its 95 % interval is"):
+        fit(measured, {"a": 1.0}, lambda a: pushed(a, 0.0))
+    with warned("a = 1.5 is at its upper bound"):
+        result = fit(measurement(truth(2.0, 0.0), sigma=SIGMA), {"a": (1.0, 0.5, 1.5)},
+                     lambda a: pushed(a, 0.0))  # fmt: skip
+    assert result.parameters["a"] == pytest.approx(1.5, rel=1e-4)
+    assert result.intervals["a"][1] <= 1.5
+
+
+def test_failed_runs_shorten_the_step_of_the_search():
+    """A beam breaks under more than 2.5 N, where most random starts are."""
+    law = ub.Softening(limit=2.5, fracture_energy=1.0)
+
+    def model(a):
+        beam = ub.Beam((0, 0), (1, 0), STEEL, cells=4, name="beam", hinges={0.0: law})
+        loads = [ub.PointLoad(beam.end, force=(0, -a), amplitude=lambda s: s)]
+        return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads)
+
+    def moment(run):
+        return run.reaction(run.scene.supports[0])[:, 2]
+
+    options = {"quantity": moment, "scheme": ub.Static(), "t": (0, 1), "dt": 0.25, "sigma": 0.01}
+    run = ub.simulate(model(2.45), ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    measured = measurement(moment(run), times=run.times, **options)
+    result = fit(measured, {"a": (0.1, 0.01, 100.0)}, model, starts=4)
+    assert result.failed > 0
+    assert f"{result.failed} failed" in repr(result)
+    assert result.same_minimum == 4
+    assert result.parameters["a"] == pytest.approx(2.45, rel=1e-6)
+    with raises("calibrate: the run at the start failed; give another", kind=ub.ConvergenceError):
+        fit(measured, {"a": 50.0}, model)
+
+
+def test_data_without_errors_are_met():
+    result = fit(measurement(truth()))
+    np.testing.assert_allclose([*result.parameters.values()], [2.0, -3.0], rtol=1e-6)
+    assert result.cost < len(TIMES)
+
+
+def test_warnings_of_runs_in_the_search_are_not_repeated():
+    def model(a, b):
+        warnings.warn("odd", ub.ModelWarning, stacklevel=1)
+        return pushed(a, b)
+
+    with pytest.warns(ub.ModelWarning, match="odd") as found:
+        fit(measurement(sigma=SIGMA), model=model)
+    assert len(found) == 1  # of the final run
+
+
+def test_results_are_shown_as_text_table_and_picture():
+    result = fit([measurement(sigma=SIGMA, name="first"), measurement(seed=1, name="second")])
+    assert repr(result).startswith("<Calibration: 2 parameters, 2 measurements, ")
+    text = str(result)
+    for words in (
+        "95 % interval",
+        "± by first",
+        "correlations: b, a -0.9",
+        "0.1 (given)",
+        "(estim",
+    ):
+        assert words in text
+    page = result._repr_html_()
+    assert "<table>" in page
+    assert 'alt="measured and computed values"' in page
+    figure = ub.plot(result)
+    assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == ["first", "second"]
+    assert len(figure.axes) == 4
+    points = figure.axes[2].lines[1].get_ydata()
+    np.testing.assert_allclose(points, result.residuals[0] / SIGMA)
+
+
+@pytest.mark.parametrize(
+    ("words", "options"),
+    [
+        (("times[1] = 1.5 is outside the run from 0 to 1",), {"times": [0.5, 1.5]}),
+        (("times[0] = -0.5 is outside",), {"times": [-0.5, 0.5]}),
+        (("times must increase", "0.5 follows 0.5"), {"times": [0.5, 0.5]}),
+        (("3 times and 2 values",), {"times": [0.1, 0.2, 0.3]}),
+        (("values[1]", "not finite"), {"values": [1.0, np.nan]}),
+        (("values is empty",), {"times": [], "values": []}),
+        (("sigma", "must be positive"), {"sigma": 0.0}),
+        (("sigma must be a positive number, or one for each",), {"sigma": [1.0, -1.0]}),
+        (("sigma has 3 standard deviations for 2 values",), {"sigma": [1.0, 1.0, 1.0]}),
+        (("quantity", "must be a function"), {"quantity": 1.0}),
+        (("scheme",), {"scheme": "static"}),
+        (("must come after",), {"t": (1, 0)}),
+        (("dt", "must be positive"), {"dt": 0.0}),
+        (("dt", "not a number"), {"dt": ub.Adaptive(1e-3)}),
+        (("labels", "two texts"), {"labels": ("time",)}),
+        (("arguments",), {"arguments": 1}),
+        (("mesh",), {"mesh": 1}),
+        (("newton",), {"newton": 1}),
+    ],
+)
+def test_wrong_measurements_are_refused(words, options):
+    options = {"times": [0.5, 1.0], "values": [1.0, 2.0], **options}
+    with raises(*words):
+        measurement(options.pop("values"), **options)
+
+
+@pytest.mark.parametrize(
+    ("words", "options"),
+    [
+        (("the model: got an unexpected keyword argument 'c'", "arguments are a, b, factor"),
+         {"parameters": {"a": 1.0, "b": 1.0, "c": 1.0}}),
+        (("the model: missing a required argument: 'b'",), {"parameters": {"a": 1.0}}),
+        (("factor is a parameter, and an argument of <Measurement",),
+         {"parameters": {**WITHIN, "factor": 1.0},
+          "measured": measurement(arguments={"factor": 2.0})}),
+        (("parameters is empty",), {"parameters": {}}),
+        (("parameters",), {"parameters": [1.0]}),
+        (("parameters['a'] = (1.0, 2.0)", "(start, lower, upper)"),
+         {"parameters": {"a": (1.0, 2.0), "b": 1.0}}),
+        (("parameters['a']: 3 is not between the bounds 1 and 2",),
+         {"parameters": {"a": (3.0, 1.0, 2.0), "b": 1.0}}),
+        (("parameters['a'] = 0 has no scale",), {"parameters": {"a": 0.0, "b": 1.0}}),
+        (("2 measured values are too few for 2 parameters and a standard deviation",),
+         {"measured": measurement([1.0, 2.0], times=[0.5, 1.0])}),
+        (("1 measured values are too few for 2 parameters;",),
+         {"measured": measurement([1.0], times=[0.5], sigma=1.0)}),
+        (("measured[0]", "not a Measurement"), {"measured": [1.0]}),
+        (("5 starts need bounds of b",), {"parameters": {**WITHIN, "b": 1.0}, "starts": 5}),
+        (("starts",), {"starts": 0}),
+        (("seed",), {"seed": -1}),
+        (("model",), {"model": 1}),
+    ],
+)  # fmt: skip
+def test_wrong_calls_are_refused_before_any_run(words, options):
+    runs = []
+
+    def quantity(run):
+        runs.append(run)
+        return force(run)
+
+    options = {"measured": measurement(quantity=quantity), **options}
+    with raises(*words):
+        fit(**options)
+    assert not runs
+
+
+def test_parameters_without_effect_are_refused_before_the_search():
+    with raises("the parameter b has no effect on the computed values at its start"):
+        fit(measurement(), model=lambda a, b: pushed(a, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("words", "quantity"),
+    [
+        (("shape (41, 3)", "one number for each stored time", "(41,)"),
+         lambda run: run.displacement(run.scene["beam"].end)),
+        (("returned 'text', not numbers",), lambda run: "text"),
+        (("returned nan at index 40",), lambda run: np.append(force(run)[:-1], np.nan)),
+    ],
+)  # fmt: skip
+def test_wrong_quantities_are_named(words, quantity):
+    with raises("Measurement measurement: quantity", *words):
+        fit(measurement(quantity=quantity))

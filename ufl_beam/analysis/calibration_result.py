@@ -1,0 +1,379 @@
+# SPDX-License-Identifier: MIT
+"""Measurements, and the result of a calibration: parameters, intervals, residuals, minima."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.arrays import Array
+from ufl_beam.display import TIME, Rich
+from ufl_beam.errors import (
+    ArgumentError,
+    require_all,
+    require_array,
+    require_function,
+    require_kind,
+    require_number,
+    require_row,
+    shorten,
+)
+from ufl_beam.mechanics.time_scheme import Scheme
+from ufl_beam.model.beams import Mesh
+from ufl_beam.model.records import Record, Text
+from ufl_beam.simulation.initial_state import require_scheme
+from ufl_beam.simulation.run import require_times
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.solvers.newton_options import Newton
+
+Quantity = Callable[[Solution], npt.ArrayLike]
+
+SAME = 1e-8
+"""Largest difference of costs that count as one minimum, as a fraction of 1 + cost; a difference
+of the cost by 1/2 is one standard deviation."""
+
+STENCIL = 4  # number of stored states in an interpolation
+
+
+def _require_sigma(value: Any, what: str) -> Any:
+    """Return a standard deviation, or one for each value, as a float or an array; all positive."""
+    if value is None:
+        return None
+    array = require_array(value, what)
+    if array.ndim == 0:
+        return require_number(array, what, positive=True)
+    if array.ndim > 1 or not (array > 0).all():
+        raise ArgumentError(f"{what} must be a positive number, or one for each value")
+    return array
+
+
+def _require_labels(value: Any, what: str) -> tuple[str, str]:
+    """Return two texts as a tuple, or raise."""
+    texts = require_all(value, what, str)
+    if len(texts) != 2:
+        raise ArgumentError(f"{what} = {shorten(value)} must be two texts, for the axes")
+    return texts
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Measurement(Record):
+    """Measured values, and the run that computes them; an argument of :func:`calibrate`.
+
+    The computed history is interpolated at the measured times by cubic polynomials through the four
+    nearest stored states.  For smooth motions this error is of fourth order in the step and smaller
+    than the error of the steps, of second order.  Where a history jumps or has a kink, the
+    interpolation is linear at best; choose steps that end at the measured times.
+
+    In statics t is the parameter of loads and prescribed displacements.  A pushover curve is a run
+    in which ``PrescribedDisplacement(place, u=lambda t: t)`` moves a place, so that t is the
+    displacement, and the quantity is the reaction.
+
+    Args:
+        times: Increasing times of the values, within the run; (m,); s.  None if the quantity
+            returns values without times, such as a peak or a natural frequency.
+        values: Measured values; (m,), in the unit of the quantity.
+        quantity: Function of the solution that returns a history at the stored times; (n+1,).
+            Places are those of its scene: ``lambda run: run.displacement(run.scene["mast"].end)[:,
+            0]``.  Without times it returns m values.
+        scheme: Time scheme of the run.
+        t: Beginning and end of the run; s.
+        dt: Time step; s.  Steps are equal, so that results are smooth functions of parameters.
+        sigma: Standard deviation of the errors of measurement, a number or (m,), in the unit of the
+            values.  By default it is estimated from the residuals.  Errors are independent.
+        arguments: Further arguments of the model in this run, such as ``{"load": pulse}``.
+        name: Name in tables and pictures.
+        labels: Labels of the axes of times and values.
+        mesh: Discretization; by default the cells of the beams.
+        newton: Tolerances and options of Newton's method.
+
+    Raises:
+        ArgumentError: Times do not increase or are outside the run, numbers of times and values
+            differ, a standard deviation is not positive, or another argument is wrong.
+
+    Example:
+        >>> def deflection(run):
+        ...     return run.displacement(run.scene["beam"].end)[:, 1]
+        >>> swing = ub.Measurement([0.1, 0.2], [-0.8e-3, -2.4e-3], deflection,
+        ...     scheme=ub.EnergyMomentum(), t=(0, 0.2), dt=0.01, sigma=1e-5,
+        ...     labels=("time (s)", "deflection (m)"))
+        >>> len(swing)
+        2
+    """
+
+    times: npt.ArrayLike | None
+    values: Annotated[Any, require_row]
+    quantity: Quantity
+    _: KW_ONLY
+    scheme: Scheme
+    t: tuple[float, float]
+    dt: float
+    sigma: Annotated[Any, _require_sigma] = None
+    arguments: Mapping[str, Any] = MappingProxyType({})
+    name: Text = "measurement"
+    labels: Annotated[tuple[str, str], _require_labels] = (TIME.name, "value")
+    mesh: Mesh | None = None
+    newton: Newton | None = None
+
+    _refused: ClassVar[type[ArgumentError]] = ArgumentError
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        what = f"Measurement {self.name}"
+        require_function(self.quantity, f"{what}: quantity", "a solution")
+        require_scheme(self.scheme, f"{what}: scheme")
+        t0, t1 = require_times(self.t, what)
+        require_number(self.dt, f"{what}: dt", positive=True)
+        require_kind(self.arguments, Mapping, f"{what}: arguments")
+        if self.mesh is not None:
+            require_kind(self.mesh, Mesh, f"{what}: mesh")
+        if self.newton is not None:
+            require_kind(self.newton, Newton, f"{what}: newton")
+        if not len(self):
+            raise ArgumentError(f"{what}: values is empty")
+        if self.sigma is not None and np.shape(self.sigma) not in {(), (len(self),)}:
+            raise ArgumentError(
+                f"{what}: sigma has {len(self.sigma)} standard deviations for {len(self)} values"
+            )
+        if self.times is None:
+            return
+        times = require_row(self.times, f"{what}: times")
+        object.__setattr__(self, "times", times)
+        if len(times) != len(self):
+            raise ArgumentError(f"{what}: {len(times)} times and {len(self)} values")
+        if (np.diff(times) <= 0).any():
+            k = int(np.argmax(np.diff(times) <= 0))
+            raise ArgumentError(
+                f"{what}: times must increase, but {times[k + 1]:g} follows {times[k]:g}"
+            )
+        for k in np.flatnonzero((times < t0) | (times > t1)):
+            raise ArgumentError(
+                f"{what}: times[{k}] = {times[k]:g} is outside the run from {t0:g} to {t1:g}; "
+                "change t=, or leave out the value"
+            )
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __repr__(self) -> str:
+        return f"<Measurement {self.name}: {len(self)} values>"
+
+    def computed(self, solution: Solution) -> Array:
+        """Return the computed values of a run at the measured times; (m,).
+
+        Raises:
+            ArgumentError: The quantity returned another number of values, or no finite numbers.
+        """
+        what = f"Measurement {self.name}: quantity"
+        with np.errstate(all="ignore"):
+            returned = self.quantity(solution)
+        try:
+            values = np.asarray(returned, dtype=float)
+        except (TypeError, ValueError):
+            raise ArgumentError(f"{what} returned {shorten(returned)}, not numbers") from None
+        number, of = (len(self), "measured value") if self.times is None else (
+            len(solution), "stored time"
+        )  # fmt: skip
+        if self.times is None:
+            values = values.reshape(-1)
+        if values.shape != (number,):
+            raise ArgumentError(
+                f"{what} returned an array of shape {values.shape}; it must return one number for "
+                f"each {of}, of shape ({number},)"
+            )
+        finite = np.isfinite(values)
+        first = int(np.argmax(finite))  # the first row of accelerations and reactions may be NaN
+        if not finite[first:].all() or (self.times is None and first):
+            k = first + int(np.argmin(finite[first:])) if first < len(values) else 0
+            raise ArgumentError(f"{what} returned {values[k]} at index {k}, not a finite number")
+        if self.times is None:
+            return values
+        at: Any = self.times
+        stored = solution.times[first:]
+        if at[0] < stored[0]:
+            raise ArgumentError(
+                f"{what} returned {values[0]} at the beginning of the run; leave out the measured "
+                f"values before {stored[0]:g}"
+            )
+        return _interpolate(at, stored, values[first:])
+
+
+def _interpolate(at: Array, times: Array, values: Array) -> Array:
+    """Interpolate values by polynomials through the :data:`STENCIL` nearest times; (len(at),).
+
+    The result at a time of ``times`` is its value, to the last bit.
+    """
+    order = np.arange(min(STENCIL, len(times)))
+    first = np.searchsorted(times, at, side="right") - len(order) // 2
+    index = np.clip(first, 0, len(times) - len(order))[:, None] + order
+    nodes, result = times[index], np.zeros(len(at))
+    for k in order:
+        others = np.delete(nodes, k, axis=1)
+        weight = np.prod((at[:, None] - others) / (nodes[:, [k]] - others), axis=1)
+        result += weight * values[index[:, k]]
+    return result
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Rich):
+    """Parameters of a model fitted to measurements; made by :func:`calibrate`.
+
+    Rows and columns belong to parameters in their order, p in number.  Intervals and covariances
+    come from the derivatives at the minimum, in which the model is linear in the search variables:
+    log p of a positive parameter, the parameter itself otherwise.
+
+    Attributes:
+        parameters: Fitted values by name.
+        intervals: Ends of the 95 % interval of each parameter by name, within the bounds; with
+            Student's distribution if a standard deviation was estimated.
+        covariance: Covariance of the parameters; (p, p).  It is infinite where the data do not
+            determine a parameter.
+        correlations: Correlations of the parameters; (p, p).
+        half_widths: Half of the width of each interval, to first order; (p,).
+        half_widths_alone: The same if one measurement alone were used to fit all parameters;
+            infinite if it does not determine a parameter; (number of measurements, p).
+        measured: Measurements.
+        sigma: Standard deviation of each value, given or estimated, by measurement; (m,) each.
+        residuals: Measured minus computed values, by measurement; (m,) each.
+        cost: Half of the sum of squares of residuals divided by standard deviations.
+        starts: Values of the parameters at which searches began; (number of starts, p).
+        ends: Values of the parameters at which they ended, NaN for a search that failed;
+            (number of starts, p).
+        end_costs: Cost at each end, with the standard deviations that were assumed in the search;
+            NaN for a search that failed; (number of starts,).
+        runs: Number of runs.
+        failed: Number of runs that failed.
+        solutions: Run of each measurement with the fitted parameters.
+        warnings: Warnings on parameters that the data do not determine.
+
+    Example:
+        >>> def cantilever(E):
+        ...     steel = ub.Section.rectangle(b=0.1, h=0.2, E=E, nu=0.3, rho=7850.0)
+        ...     arm = ub.Beam((0, 0), (2, 0), steel, cells=4, name="arm")
+        ...     force = ub.PointLoad(arm.end, force=(0, -1e3), amplitude=lambda t: t)
+        ...     return ub.Scene([arm], supports=[ub.Clamped(arm.start)], loads=[force])
+        >>> bent = ub.Measurement([0.5, 1.0], [-0.095e-3, -0.192e-3],
+        ...     lambda run: run.displacement(run.scene["arm"].end)[:, 1],
+        ...     scheme=ub.Static(), t=(0, 1), dt=0.5)
+        >>> fit = ub.calibrate(cantilever, {"E": 100e9}, [bent])
+        >>> print(f"{fit.parameters['E'] / 1e9:.0f} GPa")
+        207 GPa
+        >>> figure = ub.plot(fit)
+    """
+
+    parameters: dict[str, float]
+    intervals: dict[str, tuple[float, float]]
+    covariance: Array
+    correlations: Array
+    half_widths: Array
+    half_widths_alone: Array
+    measured: tuple[Measurement, ...]
+    sigma: tuple[Array, ...]
+    residuals: tuple[Array, ...]
+    cost: float
+    starts: Array
+    ends: Array
+    end_costs: Array
+    runs: int
+    failed: int
+    solutions: tuple[Solution, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def identified_by(self) -> dict[str, str]:
+        """Name of the measurement with the narrowest interval alone, by parameter.
+
+        It is "all together" if no measurement alone determines the parameter.
+        """
+        best = np.argmin(self.half_widths_alone, axis=0)
+        return {
+            name: self.measured[k].name if np.isfinite(self.half_widths_alone[k, i])
+            else "all together"
+            for i, (name, k) in enumerate(zip(self.parameters, best, strict=True))
+        }  # fmt: skip
+
+    @property
+    def same_minimum(self) -> int:
+        """Number of starts that ended at the least cost, within 1e-8 of 1 + cost."""
+        least = np.nanmin(self.end_costs)
+        return int((self.end_costs <= least + SAME * (1.0 + least)).sum())
+
+    def table(self) -> list[list[str]]:
+        """Return a header and a row of texts for each parameter."""
+        several = len(self.measured) > 1
+        names = [m.name for m in self.measured] if several else []
+        rows = [["parameter", "value", "95 % interval", *(f"± by {name}" for name in names)]]
+        for i, (name, value) in enumerate(self.parameters.items()):
+            low, high = self.intervals[name]
+            alone = (_relative(w, value) for w in self.half_widths_alone[:, i] if several)
+            rows.append([name, f"{value:.5g}", f"{low:.4g} to {high:.4g}", *alone])
+        return rows
+
+    def remarks(self) -> list[str]:
+        """Return lines on correlations, residuals, minima and warnings."""
+        lines, names = [], [*self.parameters]
+        pairs = [
+            f"{a}, {b} {self.correlations[i, j]:.2f}"
+            for i, a in enumerate(names) for j, b in enumerate(names[:i])
+        ]  # fmt: skip
+        if pairs:
+            lines.append(f"correlations: {'; '.join(pairs)}")
+        for m, sigma, r in zip(self.measured, self.sigma, self.residuals, strict=True):
+            origin = "estimated" if m.sigma is None else "given"
+            size = f"{sigma.min():.4g}" + (f" to {sigma.max():.4g}" if np.ptp(sigma) else "")
+            root = math.sqrt(np.mean((r / sigma) ** 2))
+            lines.append(
+                f"{m.name}: {len(m)} values, standard deviation {size} ({origin}), residuals "
+                f"{root:.2f} times as large"
+            )
+        if len(self.starts) > 1:
+            lines += self._minima()
+        return [*lines, *self.warnings]
+
+    def _minima(self) -> list[str]:
+        """Return lines on the minima at which the searches ended, by increasing cost."""
+        known = np.flatnonzero(~np.isnan(self.end_costs))
+        order, lines = known[np.argsort(self.end_costs[known])], []
+        least = self.end_costs[order[0]]
+        lines.append(f"{self.same_minimum} of {len(self.starts)} starts end at the least cost")
+        while len(order := order[self.end_costs[order] > least + SAME * (1.0 + least)]):
+            least = self.end_costs[order[0]]
+            number = int((self.end_costs[order] <= least + SAME * (1.0 + least)).sum())
+            ratio = least / np.nanmin(self.end_costs)
+            end = ", ".join(
+                f"{n} = {x:.4g}" for n, x in zip(self.parameters, self.ends[order[0]], strict=True)
+            )
+            lines.append(f"  {number} at {ratio:.4g} times this cost, {end}")
+        if lost := len(self.starts) - len(known):
+            lines.append(f"  {lost} failed")
+        return lines
+
+    def __str__(self) -> str:
+        rows = self.table()
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        text = ["  ".join(map(str.rjust, row, widths)) for row in rows]
+        return "\n".join([repr(self)[1:-1], *text, *self.remarks()])
+
+    def __repr__(self) -> str:
+        failed = f", {self.failed} failed" if self.failed else ""
+        return (
+            f"<Calibration: {_counted(self.parameters, 'parameter')}, "
+            f"{_counted(self.measured, 'measurement')}, {self.runs} runs{failed}>"
+        )
+
+
+def _counted(things: Sequence[Any] | Mapping[str, Any], name: str) -> str:
+    """Write a number of things: "1 parameter", "2 parameters"."""
+    return f"{len(things)} {name}{'s' if len(things) != 1 else ''}"
+
+
+def _relative(width: float, value: float) -> str:
+    """Write a half width in per cent of the value, or a dash where it is infinite."""
+    if not math.isfinite(width):
+        return "-"
+    return f"{100 * width / abs(value):.2g} %" if value else f"{width:.2g}"
