@@ -8,7 +8,8 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 from mpi4py import MPI
@@ -17,6 +18,7 @@ import numpy as np
 import scipy  # its subpackages are loaded when they are used
 
 from ufl_beam.analysis.calibration_result import Calibration, Measurement
+from ufl_beam.analysis.derivatives import checked_case
 from ufl_beam.analysis.parameter_study import study
 from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import (
@@ -93,7 +95,8 @@ def calibrate(
     The sum of squares of all residuals, divided by their standard deviations, is minimised by
     SciPy's ``least_squares`` (trust regions, reflective within bounds).  The search variable of a
     positive parameter is its logarithm, that of others the parameter divided by a scale.
-    Derivatives are central differences of runs.  A run that fails during the search shortens the
+    Derivatives are exact, see :func:`differentiate`, or central differences of runs where the
+    scene or the quantity has none.  A run that fails during the search shortens the
     step of the search.
 
     Where no standard deviation is given, it is estimated from the residuals.  With several
@@ -364,6 +367,7 @@ class Problem:
     runs: int = 0
     failed: int = 0
     _last: tuple[bytes, Array] = (b"", np.empty(0))  # variables and computed values of a run
+    _refused: set[int] = field(default_factory=set)  # measurements whose runs have no derivatives
 
     @property
     def splits(self) -> Index:
@@ -401,6 +405,25 @@ class Problem:
 
     def _differentiate(self, measurement: Measurement, x: Array, base: Array) -> Array:
         """Return the derivatives of the values of a measurement, which are ``base`` at x; (m, p).
+
+        Raises:
+            ConvergenceError, ArgumentError: Runs failed.
+        """
+        if id(measurement) not in self._refused:
+            model = partial(self.model, **measurement.arguments)
+            (t0, t1), dt = measurement.t, measurement.dt
+            arguments = (measurement.scheme, t0, dt, measurement.newton, measurement.mesh)
+            try:
+                case = checked_case(WHAT, model, self.variables.values(x), *arguments)
+                row = case.run(t1, dt).of(measurement.computed) * self.variables.slopes(x)
+                self.runs += 1
+                return row if self.comm is None else self.comm.bcast(row)
+            except ArgumentError:  # an effect of the scene, or a quantity, has no derivatives
+                self._refused.add(id(measurement))
+        return self._differences(measurement, x, base)
+
+    def _differences(self, measurement: Measurement, x: Array, base: Array) -> Array:
+        """Return differences between runs for :meth:`_differentiate`.
 
         They are central differences, but one-sided at a bound, and where a run fails.
 

@@ -131,24 +131,9 @@ def differentiate(
                 f"differentiate: start ends at t = {start.solution.times[-1]:g} s with "
                 f"{start.at}; begin there, at the same values"
             )
-    begin = time.perf_counter()
-    run = case.simulation({})
-    neighbours, positions, weights = case.neighbours(run)
-    states = step_count(t1 - t0, dt) + 1
-    steps = StepDerivatives(run, neighbours, positions, weights, states)
-    fill(run.time_loop, derivatives=steps.c)
-    if start is not None:
-        run.save_or_restore(Archive(run.subdomain, start.end[0]))
-        steps.restore(start.end[1])
-    with running(run, [], [], begin):
-        bar = progress_bar(progress, MPI.COMM_WORLD, total=1.0)
-        take_steps(run, EqualSteps(run, t1, dt), [], bar)
-    for some in neighbours:
-        for other in some:
-            other.close()
-    archive = Archive(run.subdomain)
-    run.save_or_restore(archive)
-    return Derivatives(case, run.solution, steps, mesh, archive.state(), start)
+    found = case.run(t1, dt, start, progress=progress)
+    found.require_effects()
+    return found
 
 
 def checked_case(
@@ -178,7 +163,7 @@ def checked_case(
     except TypeError as error:
         raise ArgumentError(f"{call}: model has other parameters than at: {error}") from None
     create = partial(Simulation, scheme=scheme, t0=t0, newton=newton, mesh=mesh, comm=MPI.COMM_SELF)
-    return Case(call, model, {name: float(value) for name, value in at.items()}, create)
+    return Case(call, model, {name: float(value) for name, value in at.items()}, create, mesh)
 
 
 class Case:
@@ -187,12 +172,15 @@ class Case:
     Attributes:
         at: Values of the parameters.
         create: Function that creates a simulation of a scene.
+        mesh: Discretization; None for the cells of the beams.
     """
 
     def __init__(
-        self, call: str, model: Model, at: dict[str, float], create: Callable[..., Any]
-    ) -> None:
-        self._call, self._model, self.at, self.create = call, model, at, create
+        self, call: str, model: Model, at: dict[str, float], create: Callable[..., Any],
+        mesh: Mesh | None,
+    ) -> None:  # fmt: skip
+        self._call, self._model, self.at = call, model, at
+        self.create, self.mesh = create, mesh
         self._stencils: dict[str, tuple[int, ...]] = {}
 
     def scene(self, changes: Mapping[str, float]) -> Scene:
@@ -236,6 +224,29 @@ class Case:
     def weights(self, name: str, fraction: float) -> Array:
         """Return the weights of the scenes of :meth:`scenes` in a derivative."""
         return np.array(STENCILS[self._stencils[name]]) / self._step(name, fraction)
+
+    def run(
+        self, t1: float, dt: float, start: Derivatives | None = None, *, progress: bool = False
+    ) -> Derivatives:
+        """Simulate until ``t1`` (s) and differentiate each step, see :func:`differentiate`."""
+        begin = time.perf_counter()
+        run = self.simulation({})
+        neighbours, positions, weights = self.neighbours(run)
+        states = step_count(t1 - run.t, dt) + 1
+        steps = StepDerivatives(run, neighbours, positions, weights, states)
+        fill(run.time_loop, derivatives=steps.c)
+        if start is not None:
+            run.save_or_restore(Archive(run.subdomain, start.end[0]))
+            steps.restore(start.end[1])
+        with running(run, [], [], begin):
+            bar = progress_bar(progress, MPI.COMM_WORLD, total=1.0)
+            take_steps(run, EqualSteps(run, t1, dt), [], bar)
+        for some in neighbours:
+            for other in some:
+                other.close()
+        archive = Archive(run.subdomain)
+        run.save_or_restore(archive)
+        return Derivatives(self, run.solution, steps, archive.state(), start)
 
     def neighbours(self, run: Simulation) -> tuple[list[list[Simulation]], Array, Array]:
         """Return simulations at neighbouring values for differences of numbers of the scene.
@@ -393,24 +404,27 @@ class Derivatives:
     """
 
     def __init__(
-        self, case: Case, solution: Solution, steps: StepDerivatives, mesh: Mesh | None,
-        state: State, start: Derivatives | None,
+        self, case: Case, solution: Solution, steps: StepDerivatives, state: State,
+        start: Derivatives | None,
     ) -> None:  # fmt: skip
-        self.solution, self.at, self._case, self._mesh = solution, case.at, case, mesh
+        self.solution, self.at, self._case = solution, case.at, case
         self.end, self._start = (state, steps.states), start
         self._q, self._v, self._reactions = steps.q, steps.v, steps.reactions
         self._held, self.ranges = steps.held, dict(zip(case.at, steps.ranges(), strict=True))
         self._shifted: list[list[Solution]] = []
         self._repeated: list[list[Solution]] = []
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name} = {value:.6g}" for name, value in self.at.items())
+        return f"<Derivatives at {values}: {self.solution!r}>"
+
+    def require_effects(self) -> None:
+        """Raise :class:`ArgumentError` if a parameter changes neither motions nor reactions."""
         for p, name in enumerate(self.at):
             if not any(x[:, p].any() for x in (self._q, self._v, self._reactions)):
                 raise ArgumentError(
                     f"differentiate: {name} does not enter the motion or the reactions of the run"
                 )
-
-    def __repr__(self) -> str:
-        values = ", ".join(f"{name} = {value:.6g}" for name, value in self.at.items())
-        return f"<Derivatives at {values}: {self.solution!r}>"
 
     def of(self, quantity: Callable[[Solution], npt.ArrayLike]) -> Array:
         """Return the derivatives of a quantity of the run.
@@ -479,7 +493,7 @@ class Derivatives:
         if not self._shifted:
             for p, name in enumerate(self.at):
                 scenes = self._case.scenes(name, STEP_OF_QUANTITIES)
-                made = [DofNumbering(scene, mesh_of(None, self._mesh)) for scene in scenes]
+                made = [DofNumbering(scene, mesh_of(None, self._case.mesh)) for scene in scenes]
                 changes = self._case.positions(name, STEP_OF_QUANTITIES)
                 pairs = zip(made, changes, strict=True)
                 self._shifted.append([MotionOnly(n, self._states(p, x)) for n, x in pairs])
