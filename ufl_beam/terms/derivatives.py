@@ -101,17 +101,45 @@ def form_derivatives(
     return made
 
 
+def differences(neighbours: Neighbours, size: int) -> Each:
+    """Return the derivative of a term by numbers of the scene, as differences of its forces.
+
+    The term in the neighbouring scenes takes the steps of the run, so that functions of time of a
+    user and states that do not depend on the motion need no derivatives of their own.  Other
+    derivatives of the term are those by the configuration before the step and by rates.
+    """
+    made = list[Any]()
+    for term in (neighbours.term, *(x for some in neighbours.terms for x in some)):
+        phases = term.made_phases.begin, term.made_phases.accept
+        calls = [ffi.new("phase_call[]", list(some)) for some in phases]
+        neighbours.alive.append(calls)
+        both = [(len(some), call) for some, call in zip(phases, calls, strict=True)]
+        made.append((*both, term.loops[0]))
+    parameters, number = neighbours.weights.shape
+    c = struct(
+        "term_differences", parameters=parameters, neighbours=number, size=size,
+        term=ffi.new("term_in_steps[]", made), weight=neighbours.weights, here=np.zeros(size),
+    )  # fmt: skip
+    return in_c("differences", c)
+
+
 LINEARIZE = {
     "form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads",
-    "connectors": "tabulate_connectors",
+    "connectors": "tabulate_connectors", "differences": "begin_neighbours",
+    "moving_loads": "differentiate_moving_loads", "guides": "find_tangents_before",
+    "imposed": "find_imposed_directions",
 }  # fmt: skip
-ACCEPT = {name: f"accept_{name}_derivative" for name in ("points", "load", "connectors")}
+ACCEPT = {
+    name: f"accept_{name}_derivative"
+    for name in ("points", "load", "connectors", "differences", "moving_loads", "imposed")
+}
 
 
 def in_c(kind: str, data: Any) -> Each:
     """Return the fields of ``term_derivative`` of loops.h for data of a kind."""
     found = (LINEARIZE.get(kind), f"add_{kind}_derivative", ACCEPT.get(kind))
-    return data, *(ffi.addressof(lib, name) if name else ffi.NULL for name in found)
+    has = (name if name and hasattr(lib, name) else None for name in found)
+    return data, *(ffi.addressof(lib, name) if name else ffi.NULL for name in has)
 
 
 def all_in_c(terms: Sequence[Each]) -> dict[str, Any]:

@@ -44,7 +44,7 @@ from ufl_beam.mechanics.time_scheme import (
 )
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
 from ufl_beam.terms.beam_forces import FormForces, InelasticBeams
-from ufl_beam.terms.derivatives import Each, Neighbours, in_c
+from ufl_beam.terms.derivatives import Each, Neighbours, differences, form_derivative, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, fields_of_forms
 
@@ -282,6 +282,12 @@ class KelvinVoigtForces(FormForces):
             of_cell=len(self._rate.x.array), time=self._time, dt=self._dt,
         )  # fmt: skip
         return Phases([*begin, loop("begin_viscous_forms", c)], accept)
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        kernel = partial(self._fields.kernel, unknown=self._q1)
+        by_q0 = form_derivative(self._work_form, self._force, kernel, self._q0)
+        return [differences(neighbours, self._fields.subdomain.size), in_c("form", by_q0)]
 
 
 @cached_forms
