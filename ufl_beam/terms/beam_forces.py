@@ -452,7 +452,8 @@ class InelasticBeams(Cells):
         points = self.points.derivatives(neighbours, lambda term: term.points, **at)
         force = partial(form_derivative, self._force_form, self._force, kernel)
         by_r = force(self._r, direction=points.r, stride=0)
-        return [in_c("points", points), in_c("form", by_r), in_c("form", force(self._q0))]
+        by_q0 = [in_c("form", force(self._q0))] if self._force.uses(self._q0) else []
+        return [in_c("points", points), in_c("form", by_r), *by_q0]
 
     # -- the step ------------------------------------------------------------------------------
 

@@ -335,7 +335,7 @@ class Points:
             unknown=self.names.index(by[1]) if by[1].startswith("new ") else 0,
             column=np.array([self.names.index(name) for name in by], dtype=np.int32),
             J=np.zeros((cells, per_cell, outputs)), w=change,
-            e0=np.zeros((len(neighbours), cells, 3)), r=np.zeros((cells, 3)),
+            e0=neighbours.differences(lambda term: points_of(term)._e0), r=np.zeros((cells, 3)),
             e1=np.zeros((cells, 3)), **fields,
         )  # fmt: skip
         for field, name in (("B", "strains"), ("weight", "weights"), ("rest", "rest")):
