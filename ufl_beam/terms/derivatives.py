@@ -127,7 +127,7 @@ LINEARIZE = {
     "form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads",
     "connectors": "tabulate_connectors", "differences": "begin_neighbours",
     "moving_loads": "differentiate_moving_loads", "guides": "find_tangents_before",
-    "imposed": "find_imposed_directions",
+    "imposed": "find_imposed_directions", "damping": "tabulate_damping",
 }  # fmt: skip
 ACCEPT = {
     name: f"accept_{name}_derivative"

@@ -240,6 +240,8 @@ class Points:
         committed: Derivatives of (N, V, M) in the accepted state by the strains, with negative
             eigenvalues set to zero; (cells, 9).  None if no damping needs them, NaN until
             :meth:`start_tangents`.
+        tangents: Derivatives of ``committed`` by parameters, if they are asked for; (parameters,
+            cells, 9).
         recorded: For each cell: (N, V, M) in the accepted state, the jump of the last point, and
             the energies that plastic strains and discontinuities have dissipated since the
             beginning; (cells, 6); N, N, N m, rad or m, J, J.
@@ -344,6 +346,12 @@ class Points:
             )
             if values.any():
                 fill(c, **{field: np.ascontiguousarray(values)})
+        if self.committed is not None:
+            self.tangents = neighbours.differences(lambda term: points_of(term).committed)
+            elastic = neighbours.differences(lambda term: points_of(term)._elastic)
+            # An eighth of the neighbours' distance: far from the next switch, and 1e-12 of round-off
+            step = 1 / (8 * np.abs(neighbours.weights).max(axis=1))
+            fill(c, tangents=self.tangents, elastic=elastic, step=step)
         return c
 
     def __getitem__(self, name: str) -> Array:
@@ -424,6 +432,7 @@ class Points:
             elastic += (section_points.weights * self[name]) @ B**2
         self.committed = np.full((len(elastic), 9), np.nan)
         space = np.zeros(len(self.names))
+        self._elastic = elastic
         fill(self.c, committed=self.committed, elastic=elastic, inputs=space)
 
     def start_tangents(self) -> None:

@@ -200,6 +200,43 @@ void add_points_derivative(void *self, const derivatives *d, int q, double *r)
     for (int i = 0; i < m->points->cells; ++i) m->row[3 * i + 2] = m->r[3 * i];
 }
 
+/* Derivatives of the committed tangents, see keep_tangents, in the direction of the inputs of the points,
+ * by differences. */
+static void differentiate_tangents(const point_derivatives *m, int q)
+{
+  static const double at[4] = {-2, -1, 1, 2}, part[4] = {1. / 12, -8. / 12, 8. / 12, -1. / 12};
+  const points *p = m->points;
+  const int d = p->components, width = p->width, one = 3 * d * p->of_cell;
+  points at_end = *p;
+  at_end.tried = 0;
+  for (int c = 0; c < p->cells; ++c) {
+    const size_t number = (size_t)q * p->cells + c;
+    memset(m->tangents + 9 * number, 0, 9 * sizeof(double));
+    for (int k = 0; k < 4; ++k) {
+      const double h = at[k] * m->step[q], *w = p->w + (size_t)c * p->of_cell * width;
+      const double *dw = m->w + number * p->of_cell * width;
+      double D[9] = {0}, C[3], b[9], s[3 + 9], r[3] = {0};
+      for (int j = 0; j < 3; ++j) {
+        D[4 * j] = p->rest[j] + (m->rest ? h * m->rest[3 * q + j] : 0);
+        C[j] = p->elastic[3 * c + j] + h * m->elastic[3 * number + j];
+      }
+      for (int i = 0; i < p->of_cell; ++i, w += width, dw += width) {
+        double weight = p->weight[i] + (m->weight ? h * m->weight[q * p->of_cell + i] : 0);
+        for (int j = 0; j < width; ++j) p->inputs[j] = w[j] + h * dw[j];
+        for (int j = 0; j < 3 * d; ++j)
+          b[j] = p->B[3 * d * i + j] + (m->B ? h * m->B[(size_t)q * one + 3 * d * i + j] : 0);
+        if (!answer_at(&at_end, 1, p->inputs, s)) {
+          answer_at(&at_end, p->theta, p->inputs, s);
+          weight /= p->theta;
+        }
+        add_answer(d, b, weight, s, r, D);
+      }
+      remove_negative(C, D);
+      for (int j = 0; j < 9; ++j) m->tangents[9 * number + j] += part[k] / m->step[q] * D[j];
+    }
+  }
+}
+
 /* Derivatives of the strains, and of the state of the points, at the end of the step. */
 void accept_points_derivative(void *self, const derivatives *d, int q)
 {
@@ -215,6 +252,10 @@ void accept_points_derivative(void *self, const derivatives *d, int q)
     memset(m->r, 0, p->cells * sizeof *m->r);
     multiply_tables(m->strains, 0, q1, 1, m->r);
     for (int i = 0; i < p->cells; ++i) m->e1[3 * i] = m->r[i];
+  }
+  if (m->tangents) {
+    differentiate_points(m, q, m->e1, 0, 0);
+    differentiate_tangents(m, q);
   }
   differentiate_points(m, q, m->e1, 0, 1);
 }
@@ -662,6 +703,32 @@ void add_guides_derivative(void *self, const derivatives *d, int p, double *r)
     r[dofs[1]] -= force * change[1] * way;
     r[dofs[3]] += force * change[0] * way;
   }
+}
+
+/* -- damping by the tangent of the accepted state ------------------------------------------------------ */
+
+void tabulate_damping(void *self, const time_step *step, const double *q1)
+{
+  const damping_derivatives *m = self;
+  tabulate_derivative(m->by_q0, step, m->damping->damping->product->rate);
+}
+
+/* Derivative of the damping matrix times the rates; the forms are linear in the tangents of sections. */
+void add_damping_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const damping_derivatives *m = self;
+  const tangent_damping *of = m->damping;
+  memset(m->r, 0, d->size * sizeof *r);
+  multiply_tables(m->by_q0, 0, d->q0 + (size_t)p * d->size, 0, m->r);
+  set_cells(m->force, d->step->q0, m->at_q0);
+  for (int g = 0; g < of->groups; ++g) {
+    const committed_cells *group = of->group + g;
+    const double *change = m->tangents[g] + (size_t)p * group->number * group->numbers;
+    for (int c = 0; c < group->number; ++c)
+      put_in_cell(m->force, group->cell[c], m->at_tangents, group->numbers, change + group->numbers * c);
+  }
+  if (of->groups) add_cells((void *)m->force, of->damping->product->rate, m->r);
+  for (int i = 0; i < d->size; ++i) r[i] += of->factor * m->r[i];
 }
 
 /* -- imposed strains ------------------------------------------------------------------------------------- */

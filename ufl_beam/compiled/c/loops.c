@@ -132,7 +132,7 @@ void subtract_pressures(void *self, const double *q, double *r)
   memset(p->force, 0, p->size * sizeof *p->force);
   for (int k = 0; k < p->cells; ++k, e += 3 * n) {
     const int32_t *at = p->at + 2 * n * k;
-    double x[8]; /* of the four nodes of degree 3 */
+    double x[8] = {0}; /* of the four nodes of degree 3 */
     for (int i = 0; i < 2 * n; ++i) {
       const int dof = p->dof[at[i]];
       x[i] = p->place[2 * n * k + i] + p->q0[dof] + p->part * (q[dof] - p->q0[dof]);

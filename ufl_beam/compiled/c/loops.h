@@ -1158,6 +1158,10 @@ typedef struct {
   double *w, *e0;                 /* derivatives of the data of the points, and of the strains before the step */
   const double *B, *weight, *rest; /* of the geometry of the sections; or none */
   const double *imposed;          /* see imposed_derivatives; or none */
+  /* Of committed tangents, if a damping uses them: derivatives, also of the elastic stiffnesses; steps of
+   * parameters for differences. */
+  double *tangents;
+  const double *elastic, *step;
   double *r, *e1, *row;           /* of one parameter: of resultants and strains; of the rows of springs */
 } point_derivatives;
 
@@ -1221,6 +1225,17 @@ typedef struct {
   double *tangent;
 } guide_derivatives;
 
+/* Derivatives of the damping by the tangent of the accepted state, by the configuration in its forms and
+ * by the tangents of sections. */
+typedef struct {
+  const tangent_damping *damping;
+  form_derivative *by_q0;
+  const cells *force;            /* the form of the forces, for derivatives of the tangents */
+  int at_q0, at_tangents;        /* positions in its coefficients */
+  const double *const *tangents; /* of each group: derivatives, with a row for each parameter */
+  double *r;
+} damping_derivatives;
+
 /* Derivatives of imposed strains, for each group a row of `size` numbers for each parameter. */
 typedef struct {
   int parameters, neighbours;
@@ -1235,6 +1250,8 @@ int differentiate_step(derivatives *d, time_loop *m);
 void begin_neighbours(void *self, const time_step *step, const double *q1);
 void differentiate_moving_loads(void *self, const time_step *step, const double *q1);
 void find_tangents_before(void *self, const time_step *step, const double *q1);
+void tabulate_damping(void *self, const time_step *step, const double *q1);
+void add_damping_derivative(void *self, const derivatives *d, int p, double *r);
 void find_imposed_directions(void *self, const time_step *step, const double *q1);
 void add_differences_derivative(void *self, const derivatives *d, int p, double *r);
 void add_followers_derivative(void *self, const derivatives *d, int p, double *r);
