@@ -1,90 +1,320 @@
 # SPDX-License-Identifier: MIT
-"""Derivatives of runs by parameters of the model, by direct differentiation of each step."""
+"""Derivatives of runs by parameters of the model, by direct differentiation of each step.
+
+derivatives.c differentiates the equation of each step after its solution.  The derivatives are
+those of the discrete run, and not approximations of derivatives of the motion.
+"""
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple, NoReturn
 
 from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
-from ufl_beam.errors import ArgumentError, require_kind, require_number
-from ufl_beam.mechanics.time_scheme import FURTHER, Scheme, V
+from ufl_beam.arrays import Array, State
+from ufl_beam.compiled.c_library import doubles, ffi, fill, struct
+from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.display import in_one_line
+from ufl_beam.errors import (
+    ArgumentError,
+    ModelWarning,
+    require_function,
+    require_kind,
+    require_number,
+    shorten,
+)
+from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.state_rows import Block, Column, Columns
+from ufl_beam.parallel import progress_bar
+from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.run import require_times, running, take_steps
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_lengths import EqualSteps, step_count
-from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.simulation.step_lengths import Adaptive, EqualSteps, step_count
+from ufl_beam.solvers.newton_options import Newton, require_plain
 from ufl_beam.terms.derivatives import Neighbours
 
-STEP = 2.0**-10
-"""Relative step of differences of the numbers in a scene by a parameter, exact for polynomials of
-degree 4."""
+STEP_OF_NUMBERS = 2.0**-10
+"""Relative change of a parameter for differences of the numbers in a scene.
+
+Five-point differences are exact for polynomials of degree 4, and have a relative error of 1e-12 for
+other smooth functions."""
+
+STEP_OF_QUANTITIES = 2.0**-17
+"""Relative change of a parameter for differences of quantities.
+
+It is small because quantities, such as largest values, may be smooth in pieces only.  The round-off
+is 1e-11 of the quantity."""
 
 STENCILS = {
     (-2, -1, 1, 2): (1 / 12, -8 / 12, 8 / 12, -1 / 12),
     (1, 2, 3, 4): (4.0, -3.0, 4 / 3, -1 / 4),
     (-1, -2, -3, -4): (-4.0, 3.0, -4 / 3, 1 / 4),
 }
-"""Positions and weights of five-point differences: central, and to one side at the end of a range.
-The weight of the position 0 makes the sum zero."""
+"""Positions and weights of five-point differences: central ones, and one-sided ones at the end of
+the range of a parameter.  The weight of the position 0 makes the sum of the weights zero."""
 
 Model = Callable[..., Scene]
 
 
-class _StepDerivatives:
-    """Derivatives in C of the steps of a simulation, see derivatives.c."""
+def differentiate(
+    model: Model,
+    at: Mapping[str, float],
+    scheme: Scheme,
+    *,
+    t: tuple[float, float],
+    dt: float,
+    newton: Newton | None = None,
+    mesh: Mesh | None = None,
+    progress: bool = True,
+) -> Derivatives:
+    """Simulate a scene, and differentiate the run by parameters of the scene.
+
+    Each step is differentiated after its solution.  The forms of UFL are differentiated by their
+    coefficients, the laws by all their inputs.  Functions of time and numbers of the scene are
+    differentiated by five-point differences of the model.  A derivative costs about half of a plain
+    run, see docs/derivatives.md.
+
+    The run is piecewise smooth in its parameters: the pieces differ in the points that yield or
+    open in each step.  The derivative is that of the piece of the run.
+
+    Args:
+        model: Function that returns the scene for values of its parameters, which it has as
+            keywords.  Parameters may be any numbers of the scene: of sections, laws, loads,
+            initial velocities, and of the geometry, if the number of cells stays.
+        at: Values of the parameters by name.
+        scheme: Time scheme, as in :func:`simulate`.
+        t: Beginning and end; s.
+        dt: Time step; s.
+        newton: Tolerances and options of Newton's method.
+        mesh: Discretization; by default the cells of the beams.
+        progress: Show a progress bar in a terminal or notebook.
+
+    Raises:
+        ArgumentError: An argument is wrong; ``model`` lacks a parameter; a parameter changes the
+            cells or the unknowns, or does not enter the result; or an effect of the scene has no
+            derivatives, such as a controller.
+        ConvergenceError: As in :func:`simulate`.
+
+    Example:
+        >>> def cantilever(EI, force):
+        ...     section = ub.Section(EA=2e9, GA=7e8, EI=EI, rhoA=60.0, rhoI=0.1)
+        ...     beam = ub.Beam((0, 0), (2, 0), section, cells=4)
+        ...     push = ub.PointLoad(beam.end, force=(0, force))
+        ...     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+        >>> at = {"EI": 4e6, "force": -1e5}
+        >>> run = ub.differentiate(cantilever, at, ub.Static(), t=(0, 1), dt=1.0)
+        >>> tip = run.of(lambda s: s.displacement(s.scene.beams[0].end)[-1, 1])
+        >>> print((tip * [4e6, -1e5]).round(4))  # by relative changes of EI and of the force; m
+        [ 0.0656 -0.0656]
+    """
+    require_function(model, "differentiate: model", "the parameters")
+    t0, t1 = require_times(t, "differentiate")
+    if isinstance(dt, Adaptive):
+        raise ArgumentError(
+            "differentiate: dt = Adaptive(...) chooses steps that depend on the parameters; give a "
+            "number"
+        )
+    require_number(dt, "differentiate: dt", positive=True)
+    require_plain(newton or Newton(), "differentiate")
+    require_kind(at, Mapping, "differentiate: at")
+    if not at:
+        raise ArgumentError("differentiate: at has no parameters")
+    for name, value in at.items():
+        require_number(value, f"differentiate: at[{name!r}]")
+    values, begin = {name: float(value) for name, value in at.items()}, time.perf_counter()
+    case = _Case(model, values, partial(
+        Simulation, scheme=scheme, t0=t0, newton=newton, mesh=mesh, comm=MPI.COMM_SELF
+    ))  # fmt: skip
+    run = case.simulation({})
+    neighbours = [[*case.simulations(name, STEP_OF_NUMBERS)] for name in values]
+    for name, some in zip(values, neighbours, strict=True):
+        if not all(_alike(run, other) for other in some):
+            raise ArgumentError(
+                f"differentiate: {name} changes the cells, unknowns or parts of the scene, so that "
+                "the run has no derivative; keep beams, cells and attached points on the same "
+                "vertices"
+            )
+    weights = np.array([case.weights(name, STEP_OF_NUMBERS) for name in values])
+    steps = StepDerivatives(run, neighbours, weights, step_count(t1 - t0, dt) + 1)
+    with running(run, [], [], begin):
+        bar = progress_bar(progress, MPI.COMM_WORLD, total=1.0)
+        take_steps(run, EqualSteps(run, t1, dt), [], bar)
+    for some in neighbours:
+        for other in some:
+            other.close()
+    return Derivatives(case, run.solution, steps, mesh)
+
+
+class _Case:
+    """Scenes of a model at neighbouring values of its parameters.
+
+    Attributes:
+        at: Values of the parameters.
+        create: Function that creates a simulation of a scene.
+    """
+
+    def __init__(self, model: Model, at: dict[str, float], create: Callable[..., Any]) -> None:
+        self._model, self.at, self.create = model, at, create
+        self._stencils: dict[str, tuple[int, ...]] = {}
+
+    def scene(self, changes: Mapping[str, float]) -> Scene:
+        """Return the scene for the values :attr:`at` with ``changes``."""
+        try:
+            scene = self._model(**self.at | changes)
+        except TypeError as error:
+            if "argument" not in str(error):
+                raise
+            raise ArgumentError(f"differentiate: model: {error}") from error
+        require_kind(scene, Scene, "differentiate: the result of model")
+        return scene
+
+    def simulation(self, changes: Mapping[str, float]) -> Simulation:
+        """Return a simulation in its initial state."""
+        return self.create(self.scene(changes))
+
+    def _step(self, name: str, fraction: float) -> float:
+        return fraction * (abs(self.at[name]) or 1.0)
+
+    def scenes(self, name: str, fraction: float) -> Iterator[Scene]:
+        """Yield the scenes of a stencil for a parameter, whose steps are a ``fraction`` of it."""
+        for stencil in [self._stencils[name]] if name in self._stencils else STENCILS:
+            h = self._step(name, fraction)
+            try:
+                scenes = [self.scene({name: self.at[name] + k * h}) for k in stencil]
+            except ArgumentError as error:
+                refused = error
+                continue
+            self._stencils[name] = stencil
+            yield from scenes
+            return
+        raise refused
+
+    def simulations(self, name: str, fraction: float) -> Iterator[Simulation]:
+        """Yield simulations of :meth:`scenes`."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ModelWarning)
+            yield from map(self.create, [*self.scenes(name, fraction)])
+
+    def positions(self, name: str, fraction: float) -> Array:
+        """Return the changes of a parameter in the scenes of :meth:`scenes`."""
+        return self._step(name, fraction) * np.array(self._stencils[name])
+
+    def weights(self, name: str, fraction: float) -> Array:
+        """Return the weights of the scenes of :meth:`scenes` in a derivative."""
+        return np.array(STENCILS[self._stencils[name]]) / self._step(name, fraction)
+
+
+def _alike(one: Simulation, other: Simulation) -> bool:
+    """Return whether two simulations have the same unknowns and the same kinds of terms."""
+    a, b = one.numbering, other.numbering
+    names = "cells", "dofs", "dofs_of_bodies", "multipliers"
+    same = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
+    terms = [[type(term) for term in x.equation.terms] for x in (one, other)]
+    angles = [[support.angle for support in x.scene.supports] for x in (one, other)]
+    held = np.array_equal(one.supports.dofs, other.supports.dofs)
+    return same and terms[0] == terms[1] and angles[0] == angles[1] and held
+
+
+class StepDerivatives:
+    """Derivatives of the steps of a simulation, which derivatives.c computes.
+
+    Args:
+        simulation: Simulation in its initial state.
+        neighbours: For each parameter, simulations in scenes with neighbouring values of it.
+        weights: Weights of the neighbours in differences; (P, n).
+        states: Number of states of the run.
+
+    Attributes:
+        q, v: Derivatives of configurations and velocities by P parameters; (states, P, size).
+        held: Degrees of freedom that supports hold; (number,).
+        reactions: Derivatives of the forces of supports, in their axes; (states, P, number).
+        c: ``derivatives`` of loops.h.
+    """
 
     def __init__(
-        self, simulation: Simulation, neighbours: list[list[Simulation]], weights: Array, states: int
-    ) -> None:
+        self, simulation: Simulation, neighbours: list[list[Simulation]], weights: Array,
+        states: int,
+    ) -> None:  # fmt: skip
         P, size = len(neighbours), simulation.subdomain.size
-        self.weights = weights
-        equation, self._alive = simulation.equation, list[Any]([neighbours])
-        terms = list[Any]()
+        equation, A = simulation.equation, simulation.equation.A
+        scene, terms = Neighbours(simulation, neighbours, weights, size), list[Any]()
+        self._alive = list[Any]([neighbours, terms])  # data of C
+        self._owners = list[Any]()  # terms, by their index in C
         for i, term in enumerate(equation.terms):
-            own = Neighbours(term, [[x.equation.terms[i] for x in some] for some in neighbours], weights)
-            if (made := term.derivatives(own)) is None:
-                raise ArgumentError(f"differentiate: {type(term).__name__} has no derivatives")
-            terms += made
-            self._alive += [own, made]
-        self.scene = Neighbours(simulation, neighbours, weights)
-        held, A = len(equation.supports.dofs), equation.A
-        q, v = (np.zeros((states, P, size)) for _ in range(2))
-        self.q, self.v, self.reactions = q, v, np.zeros((states, P, held))
-        dq = self.scene.differences(lambda x: x.q)
+            others = [[x.equation.terms[i] for x in some] for some in neighbours]
+            own = Neighbours(term, others, weights, size)
+            if (found := term.derivatives(own)) is None:
+                raise ArgumentError(f"differentiate: {term.effect} has no derivatives")
+            terms += found
+            self._owners += [term] * len(found)
+            self._alive.append(own)
+        held = len(equation.supports.dofs)
+        self.q, self.v = np.zeros((2, states, P, size))
+        self._change, self._time = np.full(P, np.inf), np.full(P, np.nan)
+        self._term, self._place = np.zeros((2, P), dtype=np.int32)
+        self.held, self.reactions = equation.supports.dofs, np.zeros((states, P, held))
+        q0 = scene.differences(lambda x: x.q)
+        motions = [x.time_loop.supports.motion for some in neighbours for x in some]
         c = self.c = struct(
             "derivatives", parameters=P, size=size, terms=len(terms),
-            term=ffi.new("term_derivative[]", terms), q0=dq, q1=np.zeros((P, size)),
+            term=ffi.new("term_derivative[]", terms), q0=q0, q1=np.zeros((P, size)),
             reactions=np.zeros((P, held)), neighbours=weights.shape[1], weight=weights,
-            indices=A.indices, tangent=np.zeros(len(A.data)), r=np.zeros(size), v=np.zeros(size),
-            s=np.zeros(size), space=np.zeros(size), kept_q=q, kept_v=v,
+            motion=ffi.new("time_function *[]", motions), indices=A.indices,
+            tangent=np.zeros(len(A.data)), r=np.zeros(size), v=np.zeros(size), s=np.zeros(size),
+            space=np.zeros(size), range=self._change, range_time=self._time,
+            range_term=self._term, range_place=self._place, kept=1, kept_q=self.q, kept_v=self.v,
             kept_reactions=self.reactions,
         )  # fmt: skip
-        motions = [x.time_loop.supports.motion for some in neighbours for x in some]
-        fill(c, motion=ffi.new("time_function *[]", motions))
-        q[0] = dq
+        self.q[0] = q0
+        self._equation = equation
         if equation.inertia is not None:
-            number = equation.inertia.c.number
-            rates = np.zeros((number, P, size))
-            dv = self.scene.differences(lambda x: x.inertia.v)
-            rates[V] = rates[V + 1] = v[0] = dv
-            for k in range(1, number):
+            rates = np.zeros((equation.inertia.c.number, P, size))
+            rates[V] = rates[V + 1] = self.v[0] = scene.differences(lambda x: x.inertia.v)
+            for k in range(V, len(rates)):
                 c.rates[k] = doubles(rates[k])
-            fill(c, new_rates=np.zeros((number, P, size)), inertia=equation.inertia.step_product)
             self._alive.append(rates)
-        c.kept = 1
+            fill(c, new_rates=np.zeros(rates.shape), inertia=equation.inertia.step_product)
         fill(simulation.time_loop, derivatives=c)
+
+
+    def ranges(self) -> list[Range]:
+        """Return the range of each derivative."""
+        return [
+            Range(change, t, self._owners[term].describe(place) if np.isfinite(change) else "")
+            for change, t, term, place in zip(
+                self._change.tolist(), self._time.tolist(), self._term, self._place, strict=True
+            )
+        ]
+
+
+@in_one_line
+class Range(NamedTuple):
+    """Range of a parameter in which a derivative holds, to first order.
+
+    The run is smooth until one more point, hinge or connector yields, opens, closes or unloads in a
+    step, or one less.
+
+    Attributes:
+        change: Change of the parameter, in its unit, at the nearest of these switches; infinite if
+            there is none.
+        time: Time of this switch; s.
+        place: Cell or connector of this switch.
+    """
+
+    change: float
+    time: float
+    place: str
 
 
 class Derivatives:
@@ -92,53 +322,153 @@ class Derivatives:
 
     Attributes:
         solution: The run.
-        at: Values of the parameters.
-        q: Derivatives of the configurations; (n+1, P, size).
-        v: Derivatives of the velocities; (n+1, P, size).
-        reactions: Derivatives of the forces at the held degrees of freedom; (n+1, P, held).
+        at: Values of the parameters by name, in the order of the derivatives.
+        ranges: :class:`Range` of each parameter by name.
+
+    Example:
+        >>> def swing(length):
+        ...     beam = ub.Beam((0, 0), (length, 0), section, cells=4)
+        ...     return ub.Scene([beam], supports=[ub.Pinned(beam.start)], loads=[ub.Gravity()])
+        >>> run = ub.differentiate(swing, {"length": 2.0}, ub.EnergyMomentum(), t=(0, 1), dt=0.01)
+        >>> angle = run.of(lambda s: s.displacement(s.scene.beams[0].start)[:, 2])
+        >>> print(angle.shape, angle[-1].round(3))  # rad/m
+        (101, 1) [-0.162]
     """
 
-    def __init__(self, solution: Solution, at: dict[str, float], steps: _StepDerivatives) -> None:
-        self.solution, self.at = solution, at
-        self.q, self.v, self.reactions = steps.q, steps.v, steps.reactions
+    def __init__(
+        self, case: _Case, solution: Solution, steps: StepDerivatives, mesh: Mesh | None
+    ) -> None:
+        self.solution, self.at, self._case, self._mesh = solution, case.at, case, mesh
+        self._q, self._v, self._reactions = steps.q, steps.v, steps.reactions
+        self._held, self.ranges = steps.held, dict(zip(case.at, steps.ranges(), strict=True))
+        self._shifted: list[list[Solution]] = []
+        self._repeated: list[list[Solution]] = []
+        for p, name in enumerate(self.at):
+            if not any(x[:, p].any() for x in (self._q, self._v, self._reactions)):
+                raise ArgumentError(
+                    f"differentiate: {name} does not enter the motion or the reactions of the run"
+                )
 
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name} = {value:.6g}" for name, value in self.at.items())
+        return f"<Derivatives at {values}: {self.solution!r}>"
 
-def differentiate(
-    model: Model, at: Mapping[str, float], scheme: Scheme, *, t: tuple[float, float], dt: float,
-    newton: Newton | None = None, mesh: Mesh | None = None,
-) -> Derivatives:  # fmt: skip
-    """Simulate a scene, and differentiate the run by parameters of the scene."""
-    t0, t1 = require_times(t, "differentiate")
-    require_number(dt, "differentiate: dt", positive=True)
-    at, begin = {name: float(value) for name, value in at.items()}, time.perf_counter()
+    def of(self, quantity: Callable[[Solution], npt.ArrayLike]) -> Array:
+        """Return the derivatives of a quantity of the run.
 
-    def simulation(values: Mapping[str, float]) -> Simulation:
-        scene = model(**values)
-        require_kind(scene, Scene, "differentiate: the result of model")
-        return Simulation(scene, scheme, t0=t0, newton=newton, mesh=mesh, comm=MPI.COMM_SELF)
+        The quantity is differenced between states that are shifted along the derivatives of the
+        motion, without further solutions of steps.  If it needs more than motions and reactions,
+        the material and the energies follow the shifted motions once; this costs about as much as
+        two plain runs for each parameter.
 
-    neighbours, weights = list[list[Simulation]](), list[Array]()
-    for name, value in at.items():
-        h = STEP * (abs(value) or 1.0)
-        for stencil, w in STENCILS.items():
-            try:
-                neighbours.append([simulation({**at, name: value + k * h}) for k in stencil])
-            except ArgumentError:
-                continue
-            weights.append(np.array(w) / h)
-            break
-        else:
-            raise ArgumentError(f"differentiate: {name}: no neighbouring value has a scene")
-    run = simulation(at)
-    number = step_count(t1 - t0, dt)
-    steps = _StepDerivatives(run, neighbours, np.array(weights), number + 1)
-    run.solution.every = 1
-    with running(run, [], [], begin):
-        from ufl_beam.parallel import progress_bar
+        Args:
+            quantity: Function of a :class:`Solution` that returns a number or an array.  If the
+                model makes new beams, it finds places in the scene of the solution:
+                ``lambda s: s.displacement(s.scene.beams[0].end)``.
 
-        bar = progress_bar(False, MPI.COMM_SELF, total=1.0)
-        take_steps(run, EqualSteps(run, t1, dt), [], bar)
-    for some in neighbours:
+        Returns:
+            Derivatives; (*shape of the quantity, P), in the order of :attr:`at`.
+
+        Raises:
+            ArgumentError: The quantity fails, or it needs material or energies of a run with
+                divided steps.
+        """
+        require_function(quantity, "of: quantity", "a Solution")
+        here = np.asarray(quantity(self.solution), dtype=np.float64)
+        try:
+            rows = [self._differences(quantity, here, some) for some in self._motions()]
+        except _Unknown:
+            rows = [self._differences(quantity, here, some) for some in self._runs()]
+        found = [
+            np.tensordot(self._case.weights(name, STEP_OF_QUANTITIES), row, axes=1)
+            for name, row in zip(self.at, rows, strict=True)
+        ]
+        return np.stack(found, axis=-1)
+
+    def _differences(
+        self, quantity: Callable[[Solution], npt.ArrayLike], here: Array, some: list[Solution]
+    ) -> Array:
+        rows = []
         for other in some:
-            other.close()
-    return Derivatives(run.solution, at, steps)
+            try:
+                value = np.asarray(quantity(other), dtype=np.float64)
+            except ArgumentError as error:
+                raise ArgumentError(
+                    f"{error}. If the model makes new beams at each call, find places in the scene "
+                    "of the solution, as in lambda s: s.displacement(s.scene.beams[0].end)"
+                ) from error
+            if value.shape != here.shape:
+                raise ArgumentError("of: the shape of the quantity depends on the parameters")
+            rows.append(value - here)
+        return np.array(rows)
+
+    def _states(self, p: int, change: float) -> State:
+        """Return motions and reactions if parameter ``p`` grows by ``change``."""
+        solution = self.solution
+        states = {"t": solution.times, "q": solution.q + change * self._q[:, p]}
+        if has_inertia(solution.scheme):  # type: ignore[arg-type]
+            states["v"] = solution.v + change * self._v[:, p]
+        reactions = solution.column("reactions")[:,]
+        for k, support in enumerate(solution.scene.supports):
+            dofs, components = solution.numbering.node(support.place), [*support.held]
+            at = np.searchsorted(self._held, dofs[components])
+            reactions[:, k, components] += change * self._reactions[:, p, at]
+        return states | {"reactions": reactions}
+
+    def _motions(self) -> list[list[Solution]]:
+        """Return motions and reactions at neighbouring values of each parameter."""
+        if not self._shifted:
+            for p, name in enumerate(self.at):
+                scenes = self._case.scenes(name, STEP_OF_QUANTITIES)
+                made = [DofNumbering(scene, mesh_of(None, self._mesh)) for scene in scenes]
+                changes = self._case.positions(name, STEP_OF_QUANTITIES)
+                pairs = zip(made, changes, strict=True)
+                self._shifted.append([_Motion(n, self._states(p, x)) for n, x in pairs])
+        return self._shifted
+
+    def _runs(self) -> list[list[Solution]]:
+        """Return whole solutions at neighbouring values of each parameter."""
+        if not self._repeated:
+            if self.solution.substeps != len(self.solution) - 1:
+                raise ArgumentError(
+                    "of: this quantity needs material or energies, and steps of the run were "
+                    "divided; use a smaller dt, with which no step is divided"
+                )
+            for p, name in enumerate(self.at):
+                simulations = self._case.simulations(name, STEP_OF_QUANTITIES)
+                changes, found = self._case.positions(name, STEP_OF_QUANTITIES), list[Solution]()
+                for simulation, change in zip(simulations, changes, strict=True):
+                    with closing(simulation):
+                        q = self._states(p, change)["q"]
+                        simulation.repeat(self.solution.times[1:], q[1:])
+                        found.append(simulation.solution)
+                self._repeated.append(found)
+        return self._repeated
+
+
+class _Unknown(Exception):
+    """A quantity needs numbers that the derivatives of the motion do not have."""
+
+
+class _Motion(Solution):
+    """Motions and reactions of a run; other results are unknown."""
+
+    def __init__(self, numbering: DofNumbering, states: State) -> None:
+        super().__init__(numbering.scene, numbering)
+        columns = Columns({name: x.shape[1:] for name, x in states.items()})
+        rows = np.column_stack([x.reshape(len(x), -1) for x in states.values()])
+        self._blocks = [Block(columns, rows, len(rows))]
+
+    def column(self, name: str) -> Column:
+        """Return a column of the states."""
+        if name not in self._blocks[0].columns.at and name != "v":
+            raise _Unknown
+        return super().column(name)
+
+    def _row(self, name: str, n: int) -> Array:
+        return self.column(name)[n,]
+
+    def _refuse(self, *_: Any) -> NoReturn:
+        raise _Unknown
+
+    ledger = cell_resultants = _refuse  # type: ignore[assignment]

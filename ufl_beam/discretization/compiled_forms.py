@@ -130,6 +130,7 @@ class Kernel:
 
     Attributes:
         batch_size: Number of cells that are computed at once with SIMD; else 1.
+        coordinates: Vertices of the cells, in batches; m.
     """
 
     def __init__(
@@ -171,11 +172,11 @@ class Kernel:
             address = interleaved(ready.source, tabulate, sizes, (self._at, self._unknowns))
         if several is None or address is None:
             self.batch_size, self._tabulate_batch = 1, ffi.NULL
-            self._coordinates = in_batches(coordinates, 1)
+            self.coordinates = in_batches(coordinates, 1)
         else:
             self.batch_size = BATCH
             self._tabulate_batch = ffi.cast("tabulate_batch *", address)
-            self._coordinates = several
+            self.coordinates = several
 
     @cached_property
     def _packed(self) -> Array:
@@ -212,7 +213,7 @@ class Kernel:
             tabulate=self._form.tabulate, several=self._tabulate_batch, batch_size=self.batch_size,
             number=number, of_cell=cell_size, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
             width=packed.strides[0] // (packed.itemsize * self.batch_size), w=view_pointer(packed),
-            constants=self._form.constants, coordinates=self._coordinates, rows=self._num_values,
+            constants=self._form.constants, coordinates=self.coordinates, rows=self._num_values,
             coefficients=coefficients, all=np.empty(coefficients),
             is_functional=self._is_functional, **self._places,
         )  # fmt: skip
@@ -304,7 +305,7 @@ class Kernel:
         return value
 
 
-def _with_shared_nodes(expressions: Sequence[Expr]) -> tuple[Expr, ...]:
+def with_shared_nodes(expressions: Sequence[Expr]) -> tuple[Expr, ...]:
     """Return expressions in which equal nodes are the same object.
 
     The time in which UFL compares two equal nodes grows exponentially with their depth.
@@ -360,7 +361,7 @@ class Pointwise:
 
     def _compiled(self, outputs: Sequence[Expr]) -> tuple[Any, Path]:
         """Return a C function that computes the outputs, and the C file that FFCx wrote for it."""
-        outputs = _with_shared_nodes(outputs)
+        outputs = with_shared_nodes(outputs)
         z = ufl.TestFunction(self._values(len(outputs)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
         form, source = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)

@@ -237,6 +237,31 @@ class Simulation(Stepper):
             self.give_up(failure, float(c.failed_end))
         return taken
 
+    def repeat(self, ends: Array, configurations: Array) -> None:
+        """Accept given configurations at the ends of steps, without solutions; keep the states.
+
+        Args:
+            ends: Ends of the steps; (n,); s.
+            configurations: Configurations at these times; (n, size).
+
+        Raises:
+            StepFailed: A law or a function of a user fails in a step.
+        """
+        self.keep()
+        columns, both = self._writer.columns, (np.ascontiguousarray(x) for x in (ends, configurations))
+        ends, configurations = both
+        done = 0
+        while done < len(ends):
+            space = self.solution.free_rows(columns, min(len(ends) - done, 1 + MOST_VALUES // columns.width))
+            with self._in_c():
+                arrays = doubles(ends[done:]), doubles(configurations[done:]), doubles(space)
+                taken: int = lib.repeat_steps(self.time_loop, len(space), *arrays)
+            if taken < len(space):
+                self._fail()
+            self.solution.grow(taken)
+            done += taken
+        self.solution.count(self.substeps, self.iterations)
+
     def watch(self, fractions: Array) -> ExtremesInC:
         """Return extremes of motions, and of section forces at ``fractions`` of cells.
 

@@ -29,7 +29,15 @@ from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.fibres import SectionPoints
-from ufl_beam.terms.derivatives import Each, Neighbours, form_derivative, form_derivatives, in_c
+from ufl_beam.terms.derivatives import (
+    Each,
+    Neighbours,
+    form_derivative,
+    form_derivatives,
+    in_c,
+    shape_derivative,
+    shape_derivatives,
+)
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.imposed_strains import (
     CellStrains,
@@ -442,18 +450,26 @@ class InelasticBeams(Cells):
         admits = loop("points_dissipate", c) if self.must_dissipate else None
         return Phases(begin, *ends, change, opens, admits)
 
+    def describe(self, place: int) -> str:
+        """Return the cell of a material point."""
+        points, numbering = self.points.c.of_cell, self._fields.subdomain.numbering
+        return numbering.describe_cell(self._cells[place // points // numbering.mesh.degree])
+
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
         kernel, strains = partial(self._fields.kernel, unknown=self._q1), self._strains
         by_q1 = form_derivative(strains.form, strains.kernel, kernel, self._q1)
-        at = {"cells": self._in_c, "strains": by_q1}
+        strains_of, size = (lambda term: term._strains.kernel), self.points.r.size
+        shape = shape_derivative(strains_of, neighbours, size)
+        at = {"cells": self._in_c, "strains": by_q1, "shape": shape}
         if (imposed := imposed_directions(neighbours)) is not None:
             at["imposed"] = imposed
         points = self.points.derivatives(neighbours, lambda term: term.points, **at)
         force = partial(form_derivative, self._force_form, self._force, kernel)
         by_r = force(self._r, direction=points.r, stride=0)
-        by_q0 = [in_c("form", force(self._q0))] if self._force.uses(self._q0) else []
-        return [in_c("points", points), in_c("form", by_r), *by_q0]
+        by_q0 = [in_c("form", f) for f in [force(self._q0)] if f is not None]
+        moving = shape_derivatives(lambda term: term._force, neighbours)
+        return [in_c("points", points), in_c("form", by_r), *by_q0, *moving]
 
     # -- the step ------------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
-from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms
+from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms, with_shared_nodes
 from ufl_beam.errors import ModelError, NoNumber, shorten
 from ufl_beam.mechanics.connector_equations import law_step
 from ufl_beam.mechanics.time_scheme import Scheme
@@ -30,7 +30,7 @@ from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_law import State, traced
 from ufl_beam.terms.connector_rows import Response, Setting
-from ufl_beam.terms.derivatives import Each, Neighbours
+from ufl_beam.terms.derivatives import Each, Neighbours, margins
 from ufl_beam.terms.term import Callbacks
 
 # -- energy and resistance -------------------------------------------------------------------------
@@ -71,18 +71,25 @@ class LawForms:
             self.limit = self._compile(ufl.as_ufl(law.with_parameters(parameters).limit(old)))
 
     @cached_property
-    def table(self) -> tuple[int, Any, list[str]]:
-        """Number of outputs, C function of their derivatives, and the inputs they are taken by.
+    def table(self) -> tuple[Any, list[str], dict[str, int]]:
+        """Derivatives of forces and variables at the end with respect to the inputs, see loops.h.
 
-        The outputs are the forces and the variables at the end of a step.
+        Returns:
+            A C function, the inputs by which it differentiates, and numbers of
+            ``connector_derivatives`` of loops.h.
         """
         by = [name for name in self._at if name not in ("dt", "theta")]
         at = self._at | {name: ufl.variable(self._pointwise.at[name]) for name in by}
         with traced(self._law):
             step = law_step(self._law, at, self._scheme)
-        outputs = (*step.forces, *step.variables)
-        slopes = [ufl.diff(ufl.as_ufl(x), at[name]) for x in outputs for name in by]
-        return len(outputs), self._pointwise.compile(*slopes), by
+        ends = with_shared_nodes([*map(ufl.as_ufl, (*step.forces, *step.variables))])
+        conditions = margins(ends)
+        slopes = [ufl.diff(x, at[name]) for x in (*ends, *conditions) for name in by]
+        numbers = {
+            "rows": len(ends) + len(conditions), "columns": len(by), "margins": len(conditions),
+            "outputs": len(slopes) + len(conditions),
+        }  # fmt: skip
+        return self._pointwise.compile(*slopes, *conditions), by, numbers
 
     @cached_property
     def frozen(self) -> tuple[Any, Any]:

@@ -88,6 +88,10 @@ class ConnectorTerm(Term):
     def motion(self, q: Array) -> Array:
         """Return the relative motions at ``q``; (num_connectors,); m or rad."""
 
+    def describe(self, place: int) -> str:
+        """Return the name of a connector."""
+        return str(self.connectors[place])
+
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add forces and residuals of laws; raise exceptions of functions of a user."""
         with self._callbacks.raising():
@@ -232,14 +236,20 @@ class ConnectorForces(ConnectorTerm):
         forms, work, value = self.forms, self._step_kernels[0], self._motion_kernel
         by_q1 = form_derivative(forms.motion, value, self._form, forms.q1)
         row = np.zeros((self._cells, forms.row.x.array.size))
-        own = self.response.derivatives(neighbours, self, by_q1, row)
-        if own is None or neighbours.differences(lambda term: term._geometry).any():
-            return None
         force = partial(form_derivative, forms.work, work, self._form)
-        made = [in_c("form", force(forms.row, direction=row.ravel(), stride=0))] if own else []
-        if work.uses(forms.q0):
-            made.append(in_c("form", force(forms.q0)))
-        return [*own, *made]
+        geometry, change = ffi.NULL, neighbours.differences(lambda term: term._geometry)
+        direction = {"direction": change.ravel(), "stride": change[0].size}
+        if change.any():
+            form = form_derivative(forms.motion, value, self._form, forms.geometry, **direction)
+            geometry = ffi.NULL if form is None else form
+        motions = {"strains": by_q1, "by_geometry": geometry}
+        own = self.response.derivatives(neighbours, self, motions, row)
+        if own is None:
+            return None
+        made = [force(forms.row, direction=row.ravel(), stride=0)] if own else []
+        made += [force(forms.q0)] if work.uses(forms.q0) else []
+        made += [force(forms.geometry, **direction)] if change.any() else []
+        return [*own, *(in_c("form", f) for f in made if f is not None)]
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -357,7 +367,7 @@ class Guides(ConnectorTerm):
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
         c = struct("guide_derivatives", guides=self._c, tangent=np.zeros((len(self._curves), 2)))
-        return [differences(neighbours, self._A.size), in_c("guides", c)]
+        return [differences(neighbours), in_c("guides", c)]
 
     def _begin_again(self) -> None:
         """Discard iterates, and begin at the accepted points of the curves."""

@@ -212,7 +212,8 @@ class Response:
         Args:
             neighbours: The :class:`ConnectorForces` ``term`` in neighbouring scenes.
             term: The term of these connectors.
-            motions: ``form_derivative`` of loops.h: the motions by the unknowns.
+            motions: ``form_derivative`` of loops.h: the motions by the unknowns, "strains", and
+                by the geometry of the connectors, "by_geometry".
             row: Array to which C writes the derivatives of the rows by one parameter.
         """
         return None
@@ -225,7 +226,8 @@ class Response:
         e0, (e1, dt) = np.zeros((parameters, len(row))), np.zeros((2, len(self._connectors)))
         c = struct(
             "connector_derivatives", parameters=parameters, neighbours=number,
-            weight=neighbours.weights, term=term._term_in_c, motions=motions, row=row, dt=dt,
+            weight=neighbours.weights, term=term._term_in_c, row=row, dt=dt,
+            motions=motions["strains"], by_geometry=motions["by_geometry"],
             e0=np.zeros((parameters, len(self._connectors))), e1=e1, **fields,
         )  # fmt: skip
         return [in_c("connectors", c)]
@@ -235,14 +237,11 @@ class Response:
         storage: Callable[[Any], Array],
     ) -> dict[str, Any]:  # fmt: skip
         """Return the fields of ``connector_derivatives`` for compiled laws with some inputs."""
-        rows, function, by = table
+        function, by, numbers = table
         column = np.array([inputs.index(name) for name in by], dtype=np.int32)
         changes = neighbours.differences(lambda term: storage(term.response))
-        tables = np.zeros((len(self._connectors), rows, len(by)))
-        return {
-            "table": function, "rows": rows, "columns": len(by), "column": column, "J": tables,
-            "w": changes,
-        }  # fmt: skip
+        tables = np.zeros((len(self._connectors), numbers["outputs"]))
+        return {"table": function, **numbers, "column": column, "J": tables, "w": changes}
 
 
 # -- laws that prescribe a motion or a force -------------------------------------------------------
@@ -381,8 +380,7 @@ class Springs(Response):
     ) -> list[Each] | None:
         """See the base class."""
         c = self.points.derivatives(
-            neighbours, lambda term: term.response.points, springs=term._in_c, strains=motions,
-            row=row,
+            neighbours, lambda term: term.response.points, springs=term._in_c, row=row, **motions,
         )  # fmt: skip
         return [in_c("points", c)]
 
@@ -426,15 +424,22 @@ class RigidPlasticForms:
         self.end = pointwise.compile(*in_order("slip_output", end, "slip_"))
 
     @cached_property
-    def table(self) -> tuple[int, Any, list[str]]:
-        """Number of outputs, C function of their derivatives, and the inputs they are taken by."""
+    def table(self) -> tuple[Any, list[str], dict[str, int]]:
+        """Derivatives of force, limit and back force with respect to the inputs, see loops.h.
+
+        Returns:
+            A C function, the inputs by which it differentiates, and numbers of
+            ``connector_derivatives`` of loops.h.
+        """
         inputs = self._pointwise.at
         by = [name for name in inputs if name not in ("direction", "θ", "dt")]
         at = inputs | {name: ufl.variable(inputs[name]) for name in by}
         with traced(self._law):
-            force = rigid_plastic_step(self._law, at, self._scheme).force
-        slopes = [ufl.diff(force, at[name]) for name in by]
-        return 1, self._pointwise.compile(*slopes), by
+            step = rigid_plastic_step(self._law, at, self._scheme)
+        outputs = map(ufl.as_ufl, (step.force, step.limit, step.back_force))
+        slopes = [ufl.diff(x, at[name]) for x in outputs for name in by]
+        numbers = {"rows": 3, "columns": len(by), "outputs": len(slopes)}
+        return self._pointwise.compile(*slopes), by, numbers
 
     @cached_property
     def spent(self) -> Any:
@@ -504,6 +509,7 @@ class RigidPlasticLaws(Response):
         self._initial_limit = self._at["number yield_limit" if self._hardens else "number limit"]
         self._limit = self._initial_limit.copy()
         back_force, dissipated, excess = np.zeros((3, n))
+        self._back_force = back_force
         self.flow_direction, direction_before, free = np.zeros((3, n), dtype=np.int32)
         self.opens = {"number": n, "excess": doubles(excess), "free": integers(free)}
         self._stored = np.zeros(1)  # energy of hardening of all connectors together; J
@@ -544,6 +550,8 @@ class RigidPlasticLaws(Response):
         table = self._table_in_c(
             neighbours, self._forms.table, tuple(self._at), lambda laws: laws._storage
         )
+        for field, name in (("limit", "_limit"), ("back_force", "_back_force")):
+            table[field] = neighbours.differences(lambda x, name=name: getattr(x.response, name))
         return self._derivatives_in_c(neighbours, term, motions, row, **table)
 
     def state(self) -> Array:

@@ -13,11 +13,18 @@ from typing import Any
 
 import numpy as np
 import ufl
+from ufl.algorithms import expand_derivatives
+from ufl.classes import AndCondition, BinaryCondition, Conditional, OrCondition
+from ufl.core.expr import Expr
+from ufl.corealg.traversal import unique_post_traversal
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import ffi, lib, struct
 from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.dolfinx_compat import fem
+
+FAR = 1e300
+"""Margin of a comparison that does not matter."""
 
 Each = tuple[Any, ...]
 """Fields of ``term_derivative`` of loops.h."""
@@ -31,10 +38,14 @@ class Neighbours:
         terms: The same term in the neighbouring scenes; for each parameter a list.
         weights: Weights of the neighbours in the derivative by a parameter, (parameters, n).  The
             weight of the scene itself makes their sum zero.
+        size: Number of degrees of freedom.
+        alive: Data that C refers to.
     """
 
-    def __init__(self, term: Any, terms: Sequence[Sequence[Any]], weights: Array) -> None:
-        self.term, self.terms, self.weights = term, terms, weights
+    def __init__(
+        self, term: Any, terms: Sequence[Sequence[Any]], weights: Array, size: int
+    ) -> None:
+        self.term, self.terms, self.weights, self.size = term, terms, weights, size
         self.alive = list[Any]()
 
     def __len__(self) -> int:
@@ -48,23 +59,60 @@ class Neighbours:
         for some, weights in zip(self.terms, self.weights, strict=True):
             total = np.zeros(np.shape(here))
             for other, weight in zip(some, weights, strict=True):
-                change = values(other) - here
+                with np.errstate(invalid="ignore"):  # infinite numbers do not change
+                    change = values(other) - here
                 total += weight * np.where(np.isfinite(change), change, 0.0)
             rows.append(total)
         return np.array(rows)
 
 
 @cached_forms
-def _derivative(form: ufl.Form, coefficient: fem.Function) -> ufl.Form:
+def _derivative(form: ufl.Form, coefficient: fem.Function) -> ufl.Form | None:
+    """Return the derivative of a form by a coefficient; None if it is zero."""
     trial = ufl.TrialFunction(coefficient.function_space)
-    return ufl.derivative(form, coefficient, trial)
+    derivative = ufl.derivative(form, coefficient, trial)
+    return None if expand_derivatives(derivative).empty() else derivative
+
+
+def margins(outputs: Sequence[Expr]) -> list[Expr]:
+    """Return the differences of both sides of all comparisons on which expressions depend.
+
+    A comparison in a branch that is not taken has the margin :data:`FAR`.
+    """
+    weights: dict[Expr, Expr | float] = dict.fromkeys(outputs, 1.0)
+    order, found = list[Expr](), list[Expr]()
+    seen = set[int]()
+    for output in outputs:
+        for node in unique_post_traversal(output):
+            if id(node) not in seen:
+                seen.add(id(node))
+                order.append(node)
+    active = {id(node): weights.get(node, 0.0) for node in order}
+    for node in reversed(order):  # parents come before their operands
+        weight = active[id(node)]
+        shares = [weight] * len(node.ufl_operands)
+        if isinstance(node, Conditional):
+            condition, *_ = node.ufl_operands
+            shares[1:] = [
+                ufl.conditional(condition, *pair) * weight for pair in ((1.0, 0.0), (0.0, 1.0))
+            ]
+        elif isinstance(node, BinaryCondition) and not isinstance(node, AndCondition | OrCondition):
+            left, right = node.ufl_operands
+            margin = left - right
+            if not isinstance(weight, float):
+                margin = ufl.conditional(ufl.gt(weight, 0.0), margin, FAR)
+            found.append(margin)
+        for operand, share in zip(node.ufl_operands, shares, strict=True):
+            if id(operand) in active:
+                active[id(operand)] = share + active[id(operand)]
+    return found
 
 
 def form_derivative(
     form: ufl.Form, kernel: Kernel, compile_form: Callable[[ufl.Form], Kernel],
     coefficient: fem.Function, **direction: Any,
 ) -> Any:  # fmt: skip
-    """Return ``form_derivative`` of loops.h for the derivative of a form by a coefficient.
+    """Return ``form_derivative`` of loops.h for a form and a coefficient; None if it is zero.
 
     Args:
         form: Linear form in cells.
@@ -73,7 +121,9 @@ def form_derivative(
         coefficient: Coefficient of the form, or its unknown.
         direction: Fields ``direction`` and ``stride``; none if the coefficient is q0.
     """
-    table = compile_form(_derivative(form, coefficient))
+    if (derivative := _derivative(form, coefficient)) is None:
+        return None
+    table = compile_form(derivative)
     table.keep_entries()
     copies = table.copies_from(kernel)
     return struct(
@@ -88,20 +138,42 @@ def form_derivatives(
     q0: fem.Function, neighbours: Neighbours, without: Sequence[fem.Function] = (),
 ) -> list[Each]:  # fmt: skip
     """Return derivatives of a form by q0, and by coefficients that depend on parameters."""
-    kernel, made = kernel_of(neighbours.term), list[Each]()
+    kernel, made = kernel_of(neighbours.term), list[Any]()
     for coefficient in kernel.coefficients:
         if coefficient is q0:
-            made.append(in_c("form", form_derivative(form, kernel, compile_form, q0)))
+            made.append(form_derivative(form, kernel, compile_form, q0))
         elif not any(coefficient is x for x in without):
             change = neighbours.differences(lambda x, c=coefficient: kernel_of(x).get(c))
             if change.any():
                 direction = {"direction": change.ravel(), "stride": change[0].size}
-                f = form_derivative(form, kernel, compile_form, coefficient, **direction)
-                made.append(in_c("form", f))
-    return made
+                made.append(form_derivative(form, kernel, compile_form, coefficient, **direction))
+    return [in_c("form", f) for f in made if f is not None] + shape_derivatives(kernel_of, neighbours)
 
 
-def differences(neighbours: Neighbours, size: int) -> Each:
+def shape_derivative(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours, size: int) -> Any:
+    """Return ``shape_derivative`` of loops.h for a form with ``size`` values; null if it is zero."""
+    kernel, coordinates = kernel_of(neighbours.term), list[Any]()
+    for some in neighbours.terms:
+        found = [kernel_of(term).cells.coordinates for term in some]
+        moves = any(not np.array_equal(kernel_of(x).coordinates, kernel.coordinates) for x in some)
+        coordinates += found if moves else [ffi.NULL] * len(found)
+    if not any(coordinates):
+        return ffi.NULL
+    parameters, number = neighbours.weights.shape
+    return struct(
+        "shape_derivative", form=kernel.cells, parameters=parameters, neighbours=number,
+        coordinates=ffi.new("double *[]", coordinates), weight=neighbours.weights, size=size,
+        space=np.zeros(size),
+    )  # fmt: skip
+
+
+def shape_derivatives(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours) -> list[Each]:
+    """Return the derivatives of the forces of a form by coordinates, if these change."""
+    found = shape_derivative(kernel_of, neighbours, neighbours.size)
+    return [in_c("shape", found)] if found else []
+
+
+def differences(neighbours: Neighbours) -> Each:
     """Return the derivative of a term by numbers of the scene, as differences of its forces.
 
     The term in the neighbouring scenes takes the steps of the run, so that functions of time of a
@@ -116,6 +188,7 @@ def differences(neighbours: Neighbours, size: int) -> Each:
         both = [(len(some), call) for some, call in zip(phases, calls, strict=True)]
         made.append((*both, term.loops[0]))
     parameters, number = neighbours.weights.shape
+    size = neighbours.size
     c = struct(
         "term_differences", parameters=parameters, neighbours=number, size=size,
         term=ffi.new("term_in_steps[]", made), weight=neighbours.weights, here=np.zeros(size),
@@ -125,13 +198,17 @@ def differences(neighbours: Neighbours, size: int) -> Each:
 
 LINEARIZE = {
     "form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads",
-    "connectors": "tabulate_connectors", "differences": "begin_neighbours",
-    "moving_loads": "differentiate_moving_loads", "guides": "find_tangents_before",
-    "imposed": "find_imposed_directions", "damping": "tabulate_damping",
+    "connectors": "tabulate_connectors", "second_differences": "tabulate_second_differences",
+    "differences": "begin_neighbours", "moving_loads": "differentiate_moving_loads",
+    "guides": "find_tangents_before", "imposed": "find_imposed_directions",
+    "damping": "tabulate_damping",
 }  # fmt: skip
 ACCEPT = {
     name: f"accept_{name}_derivative"
-    for name in ("points", "load", "connectors", "differences", "moving_loads", "imposed")
+    for name in (
+        "points", "load", "connectors", "second_differences", "differences", "moving_loads",
+        "imposed",
+    )
 }
 
 

@@ -44,7 +44,15 @@ from ufl_beam.mechanics.time_scheme import (
 )
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
 from ufl_beam.terms.beam_forces import FormForces, InelasticBeams
-from ufl_beam.terms.derivatives import Each, Neighbours, differences, form_derivative, in_c
+from ufl_beam.terms.derivatives import (
+    Each,
+    Neighbours,
+    differences,
+    form_derivative,
+    form_derivatives,
+    in_c,
+    shape_derivative,
+)
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, fields_of_forms
 
@@ -287,7 +295,7 @@ class KelvinVoigtForces(FormForces):
         """See the base class."""
         kernel = partial(self._fields.kernel, unknown=self._q1)
         by_q0 = form_derivative(self._work_form, self._force, kernel, self._q0)
-        return [differences(neighbours, self._fields.subdomain.size), in_c("form", by_q0)]
+        return [differences(neighbours), in_c("form", by_q0)]
 
 
 @cached_forms
@@ -425,7 +433,7 @@ class TangentRayleighForces(Term):
         same = ffi.new("constant_matrix *[]", len(neighbours))
         by_rates = struct("product_derivative", matrix=own.damping, change=same)
         found = [in_c("product", by_rates), in_c("damping", c)]
-        return [differences(neighbours, fields.subdomain.size), *found]
+        return [differences(neighbours), *found]
 
 
 def damping_forces(
@@ -483,13 +491,32 @@ class SecondDifferences(FormForces):
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the cells and their strains."""
         begin, accept, *_ = super().phases(callbacks)
-        c = struct(
+        c = self._in_steps = struct(
             "second_differences", strains=self._strains.kernel.cells, weight=self._strains.weights,
             of_cell=len(self._strains.weights), **fields_of_forms(self._step_kernels, self._before),
             e=self._e, change=self._change, space=np.zeros(self._e.shape), last_dt=self._last_dt,
         )  # fmt: skip
         before, after = (loop(f"{name}_second_differences", c) for name in ("begin", "accept"))
         return Phases([*begin, before], [*accept, after])
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        kernel, strains = partial(self._fields.kernel, unknown=self._q1), self._strains
+        force = form_derivative(
+            self._work_form, self._force, kernel, self._before, direction=np.zeros(1), stride=0
+        )
+        by_q1 = form_derivative(strains.form, strains.kernel, kernel, self._q1)
+        e1, direction = np.zeros((2, *self._e.shape))
+        e0, change = np.zeros((2, len(neighbours), *self._e.shape))
+        c = struct(
+            "second_difference_derivatives", differences=self._in_steps, strains=by_q1,
+            force=force, e0=e0, change=change, e1=e1, direction=direction,
+            shape=shape_derivative(lambda x: x._strains.kernel, neighbours, e1.size),
+        )  # fmt: skip
+        others = form_derivatives(
+            self._work_form, lambda term: term._force, kernel, self._q0, neighbours, [self._before]
+        )
+        return [in_c("second_differences", c), *others]
 
     def start(self, q: Array) -> None:
         """Set the strains at the beginning of the step to the strains at ``q``."""

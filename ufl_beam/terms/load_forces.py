@@ -301,7 +301,7 @@ class FollowerLoads(_AtDofs):
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
-        return [differences(neighbours, self._size), in_c("followers", self._c)]
+        return [differences(neighbours), in_c("followers", self._c)]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them."""
@@ -373,7 +373,7 @@ class Pressures(_AtDofs):
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
-        return [differences(neighbours, self._size), in_c("pressures", self._c)]
+        return [differences(neighbours), in_c("pressures", self._c)]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them."""
@@ -604,7 +604,7 @@ class FrameForces(LoadTerm):
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
-        return [differences(neighbours, self._c.size), in_c("frame", self._c)]
+        return [differences(neighbours), in_c("frame", self._c)]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the forces before the next step to the forces at ``q``, and return them."""

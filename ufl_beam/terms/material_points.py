@@ -32,7 +32,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
 from ufl_beam.compiled.simd_kernels import BATCH
-from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms
+from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms, with_shared_nodes
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import (
     End,
@@ -47,7 +47,7 @@ from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Kind, SectionPoints
 from ufl_beam.model.material_law import traced
 from ufl_beam.model.softening_laws import SofteningLaw
-from ufl_beam.terms.derivatives import Neighbours
+from ufl_beam.terms.derivatives import Neighbours, margins
 from ufl_beam.terms.energy_ledger import Ledger
 
 
@@ -173,11 +173,12 @@ class PointForms:
         }
 
     @cached_property
-    def table(self) -> tuple[Any, int, list[str]]:
+    def table(self) -> tuple[Any, list[str], dict[str, int]]:
         """Derivatives of the outputs of a point with respect to its inputs, see loops.h.
 
         Returns:
-            A C function, the number of its outputs, and the inputs by which it differentiates.
+            A C function, the inputs by which it differentiates, and numbers of
+            ``point_derivatives`` of loops.h.
         """
         inputs, equations, law = self._pointwise.at, self._equations, self._kind.law
         fixed = "direction", "traction", "flows", "theta", "dt"
@@ -193,10 +194,16 @@ class PointForms:
             with traced(self._softening):
                 resistance = equations.resistance(at, at["growth"])
             unknowns = (at["direction"] * stress[0] - resistance, *unknowns)
-        outputs = (*stress, *end.changes, ufl.as_ufl(end.stress[0]), *unknowns)
+        ends = *end.changes, ufl.as_ufl(end.stress[0]), ufl.as_ufl(end.resistance)
+        conditions = margins(with_shared_nodes([*stress, *map(ufl.as_ufl, end.changes)]))
+        outputs = (*stress, *ends, *unknowns, *conditions)
         derivatives = [ufl.diff(ufl.as_ufl(f), at[name]) for f in outputs for name in by]
-        values = [*derivatives, *stress]
-        return self._pointwise.compile(*values), len(values), by
+        values, first = [*derivatives, *stress, *conditions], len(stress) + len(ends)
+        numbers = {
+            "outputs": len(values), "columns": len(by), "equations": first,
+            "margin": first + len(unknowns), "margins": len(conditions),
+        }  # fmt: skip
+        return self._pointwise.compile(*values), by, numbers
 
     @cached_property
     def elastic(self) -> Any:
@@ -327,16 +334,14 @@ class Points:
         self, neighbours: Neighbours, points_of: Callable[[Any], Points], **fields: Any
     ) -> Any:
         """Return ``point_derivatives`` of loops.h, with further ``fields``."""
-        table, outputs, by = self._forms.table
+        table, by, numbers = self._forms.table
         cells, per_cell, width = self._storage.shape
         change = neighbours.differences(lambda term: points_of(term)._storage)
-        strains, variables = self._components, len(self._section_points.kind.law.variables)
         c = struct(
-            "point_derivatives", points=self.c, table=table, outputs=outputs, columns=len(by),
-            equations=strains + variables + 1,
+            "point_derivatives", points=self.c, table=table, **numbers,
             unknown=self.names.index(by[1]) if by[1].startswith("new ") else 0,
             column=np.array([self.names.index(name) for name in by], dtype=np.int32),
-            J=np.zeros((cells, per_cell, outputs)), w=change,
+            J=np.zeros((cells, per_cell, numbers["outputs"])), w=change,
             e0=neighbours.differences(lambda term: points_of(term)._e0), r=np.zeros((cells, 3)),
             e1=np.zeros((cells, 3)), **fields,
         )  # fmt: skip

@@ -119,6 +119,15 @@ class Term(ABC):
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if a law generates energy in the step to ``q1``."""
 
+    @property
+    def effect(self) -> str:
+        """Description of the effect in messages."""
+        return type(self).__name__
+
+    def describe(self, place: int) -> str:
+        """Return the name of a material point or connector of the term, by its index."""
+        return self.effect
+
     def derivatives(self, neighbours: Any) -> list[Any] | None:
         """Return the derivatives of the term by parameters; None if there are none.
 

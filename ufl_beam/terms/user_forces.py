@@ -87,10 +87,9 @@ class Acting:
     def by_q0(self) -> list[Each]:
         """Return the derivative of the forces by the configuration before the step, if any."""
         q0, q1 = self._fields.element.q0, self._fields.element.q1
-        if not self.residual.uses(q0):
-            return []
         kernel = partial(self._fields.kernel, unknown=q1)
-        return [in_c("form", form_derivative(self._forms.residual, self.residual, kernel, q0))]
+        found = form_derivative(self._forms.residual, self.residual, kernel, q0)
+        return [] if found is None else [in_c("form", found)]
 
     def initial_forces(self, q: Array, past: Archive | None) -> Array:
         """Return the forces before the next step, from ``past`` or at ``q``, and store them."""
@@ -196,7 +195,7 @@ class Works(LoadTerm):
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
         found = [each for work in self._works for each in work.by_q0()]
-        return [differences(neighbours, self._c.size), *found]
+        return [differences(neighbours), *found]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the forces before the next step to the forces at ``q``, and return them."""

@@ -7,6 +7,16 @@
  * solution then gives the derivative of q1. All arrays of directions have one row for each parameter.
  */
 
+/* Note the margin by which a term in the step is on one side of a switch, and its derivative by parameter
+ * p. The run has another piece where the margin vanishes. */
+static void note_margin(const derivatives *d, int p, int place, double margin, double change)
+{
+  const double far = fabs(margin / change);
+  if (!(far < d->range[p])) return;
+  d->range[p] = far, d->range_time[p] = d->t;
+  d->range_term[p] = d->now, d->range_place[p] = place;
+}
+
 /* -- forms ------------------------------------------------------------------------------------------- */
 
 /* Copy the coefficients of a form to the form of its derivative, and compute the entries of all cells. */
@@ -57,6 +67,59 @@ void add_form_derivative(void *self, const derivatives *d, int p, double *r)
   multiply_tables(f, values, d->q0 + (size_t)p * d->size, 0, r);
 }
 
+/* Derivative of the values of a form at q by the coordinates that depend on parameter p. */
+static void add_shape(const shape_derivative *s, const double *q, int p, double *out)
+{
+  const double *const *coordinates = s->coordinates + p * s->neighbours;
+  if (!*coordinates) return;
+  cells one = *s->form;
+  one.each = 0;
+  double all = 0;
+  for (int k = 0; k <= s->neighbours; ++k) {
+    /* The weight of the scene itself makes the sum of the weights zero. */
+    const double weight = k < s->neighbours ? s->weight[p * s->neighbours + k] : -all;
+    all += weight;
+    one.coordinates = k < s->neighbours ? coordinates[k] : s->form->coordinates;
+    memset(s->space, 0, s->size * sizeof *s->space);
+    add_cells(&one, q, s->space);
+    for (int i = 0; i < s->size; ++i) out[i] += weight * s->space[i];
+  }
+}
+
+void add_shape_derivative(void *self, const derivatives *d, int p, double *r) { add_shape(self, d->x, p, r); }
+
+/* -- second differences of strains --------------------------------------------------------------------- */
+
+void tabulate_second_differences(void *self, const time_step *step, const double *q1)
+{
+  second_difference_derivatives *m = self;
+  tabulate_derivative(m->strains, step, q1);
+  tabulate_derivative(m->force, step, q1);
+  m->ratio = fmin(1, step->dt / *m->differences->last_dt);
+}
+
+void add_second_differences_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const second_difference_derivatives *m = self;
+  const int all = m->differences->strains->number * m->differences->of_cell;
+  for (int i = 0; i < all; ++i) m->direction[i] = m->ratio * m->change[(size_t)p * all + i];
+  multiply_tables(m->force, m->direction, 0, 0, r);
+}
+
+void accept_second_differences_derivative(void *self, const derivatives *d, int p)
+{
+  const second_difference_derivatives *m = self;
+  const int n = m->differences->of_cell, all = m->differences->strains->number * n;
+  double *e0 = m->e0 + (size_t)p * all, *change = m->change + (size_t)p * all;
+  memset(m->e1, 0, all * sizeof *e0);
+  multiply_tables(m->strains, 0, d->q1 + (size_t)p * d->size, 1, m->e1);
+  if (m->shape) add_shape(m->shape, d->x, p, m->e1);
+  for (int i = 0; i < all; ++i) {
+    const double e1 = m->e1[i] / m->differences->weight[i % n];
+    change[i] = e1 - e0[i], e0[i] = e1;
+  }
+}
+
 /* -- material points --------------------------------------------------------------------------------- */
 
 /* Compute a table. Derivatives by infinite numbers, such as the limit of an elastic law, are not finite;
@@ -77,10 +140,12 @@ void tabulate_points(void *self, const time_step *step, const double *q1)
     m->cells->latest[0] = NAN;
     p->predicts = 0;
     respond_at(m->cells, q1);
-    tabulate_derivative((void *)m->strains, step, q1);
+    tabulate_derivative(m->strains, step, q1);
   } else {
     find_motions(m->springs, q1);
     respond_springs(m->springs);
+    tabulate_derivative(m->strains, step, q1);
+    if (m->by_geometry) tabulate_derivative(m->by_geometry, step, q1);
   }
   for (int i = 0; i < p->cells * p->of_cell; ++i)
     ask_table(m->table, p->w + (size_t)i * p->width, m->outputs, m->J + (size_t)i * m->outputs);
@@ -131,15 +196,16 @@ static inline void set_strain_direction(const point_derivatives *m, int q, int i
 }
 
 /* Derivatives of the resultants of parameter q, or of the new state if `end`. */
-static void differentiate_points(const point_derivatives *m, int q, const double *de1, double *dr, int end)
+static void differentiate_points(const point_derivatives *m, const derivatives *of, int q, const double *de1,
+                                 double *dr, int end)
 {
   const points *p = m->points;
   const int d = p->components, width = p->width, per_cell = p->of_cell, one = 3 * d * per_cell;
-  const double θ = p->theta, *B = p->B, none[3] = {0};
+  const double θ = p->theta, *B = p->B;
   double *dw = m->w + (size_t)q * p->cells * per_cell * width, *de0 = m->e0 + (size_t)q * 3 * p->cells;
   double *w = p->w, *J = m->J, out[POINT_OUTPUTS + 3 + MOST_VARIABLES];
   for (int c = 0; c < p->cells; ++c) {
-    const double *e0 = p->e0 + 3 * c, *e1 = p->e1 + 3 * c, *de = de1 ? de1 + 3 * c : none;
+    const double *e0 = p->e0 + 3 * c, *e1 = p->e1 + 3 * c, *de = de1 + 3 * c;
     for (int k = 0; dr && k < 3; ++k) {
       dr[3 * c + k] = p->rest[k] * ((1 - θ) * de0[3 * c + k] + θ * de[k]);
       if (m->rest) dr[3 * c + k] += m->rest[3 * q + k] * ((1 - θ) * e0[k] + θ * e1[k]);
@@ -151,7 +217,7 @@ static void differentiate_points(const point_derivatives *m, int q, const double
       find_unknowns(m, w, J, dw);
       for (int a = 0; dr && a < d; ++a) {
         const double ds = along(m, J, a, dw);
-        const double s = J[m->outputs - d + a]; /* the stress */
+        const double s = J[m->outputs - d - m->margins + a]; /* the stress */
         for (int k = 0; k < 3; ++k) {
           const double b = B[3 * (d * i + a) + k];
           dr[3 * c + k] += p->weight[i] * ds * b;
@@ -165,7 +231,14 @@ static void differentiate_points(const point_derivatives *m, int q, const double
       for (int j = 0; j < p->variables; ++j) strain[3 * d + j] += change[j];
       dw[JUMP] += w[DIRECTION] * dw[GROWTH];
       dw[OPENING] += dw[GROWTH];
+      const int place = c * per_cell + i;
+      for (int k = 0; k < m->margins; ++k)
+        note_margin(of, q, place, J[m->outputs - m->margins + k], along(m, J, m->margin + k, dw));
       if (w[TRACTION] < INFINITY) {
+        const double stress = J[m->outputs - d - m->margins], traction = w[TRACTION];
+        if (w[DIRECTION] != 0) note_margin(of, q, place, w[GROWTH], dw[GROWTH]);
+        else note_margin(of, q, place, fabs(stress) - traction, copysign(1, stress) * along(m, J, 0, dw) - dw[TRACTION]);
+        dw[TRACTION] = along(m, J, d + p->variables + 1, dw);
         ask(p->end, w, POINT_OUTPUTS + d + p->variables, out);
         if (out[RESISTANCE] == 0) { /* see commit: the discontinuity takes over the elastic strain */
           const double C = w[p->strain + 2], L = w[LENGTH], dC = strain[2], dL = dw[LENGTH];
@@ -180,22 +253,33 @@ static void differentiate_points(const point_derivatives *m, int q, const double
   }
 }
 
-/* Subtract the derivatives of the imposed strains at the end of the step from those of the strains. */
-static void subtract_imposed_direction(const point_derivatives *m, int q)
+/* Derivatives of the strains by parameter q, at constant unknowns or, with dq, along these. */
+static void find_strain_directions(const point_derivatives *m, const derivatives *d, int q, const double *dq)
 {
-  const double *imposed = m->imposed + 6 * (size_t)q * m->points->cells;
-  for (int k = 0; k < 3 * m->points->cells; ++k) m->e1[k] -= imposed[k / 3 * 6 + 3 + k % 3];
+  const points *p = m->points;
+  memset(m->e1, 0, 3 * (size_t)p->cells * sizeof *m->e1);
+  if (m->cells) {
+    if (dq) multiply_tables(m->strains, 0, dq, 1, m->e1);
+    if (m->shape) add_shape(m->shape, d->x, q, m->e1);
+    for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
+    const double *imposed = m->imposed ? m->imposed + 6 * (size_t)q * p->cells : 0;
+    for (int k = 0; imposed && k < 3 * p->cells; ++k) m->e1[k] -= imposed[k / 3 * 6 + 3 + k % 3];
+    return;
+  }
+  if (!dq) return; /* the form of the forces has the derivative by geometry at constant unknowns */
+  memset(m->r, 0, p->cells * sizeof *m->r);
+  multiply_tables(m->strains, 0, dq, 1, m->r);
+  const form_derivative *g = m->by_geometry;
+  if (g) multiply_tables(g, g->direction + (size_t)q * g->stride, 0, 1, m->r);
+  for (int i = 0; i < p->cells; ++i) m->e1[3 * i] = m->r[i];
 }
 
 /* Derivatives of the resultants at constant unknowns, for the form of the forces. */
 void add_points_derivative(void *self, const derivatives *d, int q, double *r)
 {
   const point_derivatives *m = self;
-  if (m->imposed) {
-    memset(m->e1, 0, 3 * (size_t)m->points->cells * sizeof *m->e1);
-    subtract_imposed_direction(m, q);
-  }
-  differentiate_points(m, q, m->imposed ? m->e1 : 0, m->r, 0);
+  find_strain_directions(m, d, q, 0);
+  differentiate_points(m, d, q, m->e1, m->r, 0);
   if (m->springs)
     for (int i = 0; i < m->points->cells; ++i) m->row[3 * i + 2] = m->r[3 * i];
 }
@@ -241,23 +325,12 @@ static void differentiate_tangents(const point_derivatives *m, int q)
 void accept_points_derivative(void *self, const derivatives *d, int q)
 {
   const point_derivatives *m = self;
-  const points *p = m->points;
-  const double *q1 = d->q1 + (size_t)q * d->size;
-  memset(m->e1, 0, 3 * (size_t)p->cells * sizeof *m->e1);
-  if (m->cells) {
-    multiply_tables(m->strains, 0, q1, 1, m->e1);
-    for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
-    if (m->imposed) subtract_imposed_direction(m, q);
-  } else {
-    memset(m->r, 0, p->cells * sizeof *m->r);
-    multiply_tables(m->strains, 0, q1, 1, m->r);
-    for (int i = 0; i < p->cells; ++i) m->e1[3 * i] = m->r[i];
-  }
+  find_strain_directions(m, d, q, d->q1 + (size_t)q * d->size);
   if (m->tangents) {
-    differentiate_points(m, q, m->e1, 0, 0);
+    differentiate_points(m, d, q, m->e1, 0, 0);
     differentiate_tangents(m, q);
   }
-  differentiate_points(m, q, m->e1, 0, 1);
+  differentiate_points(m, d, q, m->e1, 0, 1);
 }
 
 /* -- connectors -------------------------------------------------------------------------------------- */
@@ -270,12 +343,13 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
   const connectors *c = t->connectors;
   *m->dt = step->dt;
   find_motions(c, q1);
-  tabulate_derivative((void *)m->motions, step, q1);
+  tabulate_derivative(m->motions, step, q1);
+  if (m->by_geometry) tabulate_derivative(m->by_geometry, step, q1);
   for (int i = 0; i < c->number && m->table; ++i) {
     double *w = c->laws ? c->laws->w + i * c->laws->width : c->rigid_plastic->w + i * c->rigid_plastic->width;
     if (c->laws) memcpy(w, c->e1 + c->components * i, c->components * sizeof *w);
     else set_slip(w, c->e1[i] - w[SLIP_START], c->rigid_plastic->direction[i]);
-    ask_table(m->table, w, m->rows * m->columns, m->J + (size_t)i * m->rows * m->columns);
+    ask_table(m->table, w, m->outputs, m->J + (size_t)i * m->outputs);
   }
   for (int k = 0; k < m->parameters * c->number && (t->wanted_motion || t->wanted_force); ++k) {
     const int p = k / c->number, i = k % c->number;
@@ -301,13 +375,13 @@ static void set_slip_direction(const double *w, double de1, double *dw)
 
 static double product_with_row(const connector_derivatives *m, int i, int row, const double *dw)
 {
-  const double *J = m->J + ((size_t)i * m->rows + row) * m->columns;
+  const double *J = m->J + (size_t)i * m->outputs + row * m->columns;
   double sum = 0;
   for (int j = 0; j < m->columns; ++j) sum += J[j] * dw[m->column[j]];
   return sum;
 }
 
-/* Derivatives of the rows of the laws at constant unknowns, for the form of the forces. */
+/* Derivatives of the rows of the laws at constant motions, for the form of the forces. */
 void add_connectors_derivative(void *self, const derivatives *d, int p, double *r)
 {
   const connector_derivatives *m = self;
@@ -341,8 +415,10 @@ void accept_connectors_derivative(void *self, const derivatives *d, int p)
   const connectors *c = t->connectors;
   const int n = c->components, all = n * c->number;
   double *e0 = m->e0 + (size_t)p * all;
+  const form_derivative *g = m->by_geometry;
   memset(m->e1, 0, all * sizeof *e0);
   multiply_tables(m->motions, 0, d->q1 + (size_t)p * d->size, 1, m->e1);
+  if (g) multiply_tables(g, g->direction + (size_t)p * g->stride, 0, 1, m->e1);
   for (int i = 0; i < c->number; ++i) {
     if (c->laws) {
       const int variables = c->laws->variables;
@@ -350,11 +426,21 @@ void accept_connectors_derivative(void *self, const derivatives *d, int p)
       memcpy(dw, m->e1 + n * i, n * sizeof *dw);
       memcpy(dw + n, e0 + n * i, n * sizeof *dw);
       for (int j = 0; j < variables; ++j) end[j] = product_with_row(m, i, n + j, dw);
+      for (int k = 0; k < m->margins; ++k)
+        note_margin(d, p, n * i, m->J[(size_t)(i + 1) * m->outputs - m->margins + k],
+                    product_with_row(m, i, m->rows - m->margins + k, dw));
       memcpy(dw + 2 * n + 2, end, variables * sizeof *dw);
     } else if (c->rigid_plastic) {
       const rigid_plastic *of = c->rigid_plastic;
       double *dw = m->w + ((size_t)p * c->number + i) * of->width;
-      set_slip_direction(of->w + i * of->width, m->e1[i], dw);
+      const double force = d->x[c->force[i]] - of->back_force[i], *w = of->w + i * of->width;
+      double *limit = m->limit + (size_t)p * all + i, *back_force = m->back_force + (size_t)p * all + i;
+      set_slip_direction(w, m->e1[i], dw);
+      if (of->direction[i]) note_margin(d, p, i, w[SLIP], dw[SLIP]);
+      else
+        note_margin(d, p, i, fabs(force) - of->limit[i],
+                    copysign(1, force) * (d->q1[(size_t)p * d->size + c->force[i]] - *back_force) - *limit);
+      *limit = product_with_row(m, i, 1, dw), *back_force = product_with_row(m, i, 2, dw);
       dw[SLIPPED] += dw[SLIP];
       dw[SLIP_START] += of->direction[i] * dw[SLIP];
     }
@@ -390,7 +476,7 @@ void add_product_derivative(void *self, const derivatives *d, int p, double *r)
 }
 
 /* Derivatives of the rates after the step. */
-static void advance_rates(const derivatives *d, const time_loop *m, const step_product *product)
+static void advance_rates(const derivatives *d, const time_loop *m, const step_product *product, int initial)
 {
   const rates *of = m->rates;
   const scheme_numbers *now = of->now;
@@ -409,8 +495,10 @@ static void advance_rates(const derivatives *d, const time_loop *m, const step_p
         d->new_rates[k * all + at + i] = sum;
       }
   }
-  memcpy(d->rates[2], d->rates[1], all * sizeof *d->space); /* velocities before the last step */
-  memcpy(d->rates[1], d->new_rates, all * sizeof *d->space);
+  if (!initial) {
+    memcpy(d->rates[2], d->rates[1], all * sizeof *d->space); /* velocities before the last step */
+    memcpy(d->rates[1], d->new_rates, all * sizeof *d->space);
+  }
   for (int k = 1; k <= now->gives; ++k) memcpy(d->rates[2 + k], d->new_rates + k * all, all * sizeof *d->space);
 }
 
@@ -770,15 +858,16 @@ static void add_tangent_product(const derivatives *d, const equation *e, const d
   }
 }
 
-/* Differentiate the solved step, before it is accepted; returns 0 if the tangent is singular. */
-int differentiate_step(derivatives *d, time_loop *m)
+/* Differentiate the solved step, before it is accepted; returns 0 if the tangent is singular. The short
+ * step from which the `initial` rates of a scheme are taken changes only these. */
+int differentiate_step(derivatives *d, time_loop *m, int initial)
 {
   equation *e = m->equation;
   const int n = d->size;
   const step_product *product = m->rates ? d->inertia : 0;
   int failed = 0;
-  memcpy(d->s, m->s, n * sizeof *d->s); /* solutions may write into this array */
   d->step = &m->step, d->x = m->x;
+  memcpy(d->s, m->s, n * sizeof *d->s); /* solutions may write into this array */
   restart(e, EXACT);
   residual(e, e->unknowns, e->residual, e->f);
   fill_tangent(e, m->x);
@@ -811,9 +900,13 @@ int differentiate_step(derivatives *d, time_loop *m)
   }
   memcpy(m->s, d->s, n * sizeof *d->s);
   if (failed) return 0;
-  for (int k = 0; k < d->terms; ++k)
-    for (int p = 0; d->term[k].accept && p < d->parameters; ++p) d->term[k].accept(d->term[k].self, d, p);
-  if (product) advance_rates(d, m, product);
+  if (product) advance_rates(d, m, product, initial);
+  if (initial) return 1;
+  d->t = m->step.t1;
+  for (d->now = 0; d->now < d->terms; ++d->now) {
+    const term_derivative *term = d->term + d->now;
+    for (int p = 0; term->accept && p < d->parameters; ++p) term->accept(term->self, d, p);
+  }
   memcpy(d->q0, d->q1, (size_t)d->parameters * n * sizeof *d->q0);
   return 1;
 }

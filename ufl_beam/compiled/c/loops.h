@@ -16,7 +16,9 @@ part add_calls, add_cells, add_static_tangent, subtract_vector, subtract_followe
 
 /* -- forms and constant matrices --------------------------------------------------------------- */
 
-enum { MOST_ENTRIES = 144 }; /* entries of the vector or matrix of a cell, at most: 12 unknowns of degree 3 */
+/* Entries of the vector or matrix of a cell, at most: 12 unknowns of degree 3 need 144; the 9 unknowns of
+ * a bushing, differentiated by its geometry, need 216. */
+enum { MOST_ENTRIES = 216 };
 enum { SOME = 128 };         /* cells of a block whose data stay in the processor's cache between loops */
 
 /* A compiled form on some cells. w holds the packed coefficients of a cell without its unknowns,
@@ -1100,6 +1102,7 @@ int solve_begun_step(time_loop *m, int hold);
 int attempt_step(time_loop *m, double t1, double end);
 int accept_step(time_loop *m);
 int step_or_subdivide(time_loop *m, double end);
+int repeat_steps(time_loop *m, int steps, const double *ends, const double *configurations, double *rows);
 int take_steps(time_loop *m, int steps, const double *ends, double seconds, int keeps, double *rows);
 
 /* -- derivatives of a run by parameters, see derivatives.c --------------------------------------------- */
@@ -1126,10 +1129,16 @@ struct derivatives {
   int neighbours;         /* scenes with other values of a parameter, for differences */
   const double *weight;   /* parameters x neighbours: weights of the differences */
   const time_function *const *motion; /* parameters x neighbours: motions of supports */
+  const double *x;        /* configuration at the end of the step */
   const int32_t *indices; /* columns of the tangent */
   double *tangent, *r, *v, *s, *space;
-  const time_step *step;  /* the step, its end, and in s the step of the nodes */
-  const double *x;
+  const time_step *step;  /* the step; s: of the nodes */
+  /* Nearest switch of each parameter to another piece of the run, to first order: change of the parameter;
+   * time; index of the term, and of the point or connector in it. */
+  double *range, *range_time;
+  int32_t *range_term, *range_place;
+  double t;               /* end of the step */
+  int now;                /* index of the term */
   int kept;               /* number of stored states */
   double *kept_q, *kept_v, *kept_reactions;
 };
@@ -1143,16 +1152,42 @@ typedef struct {
                              * or none: the coefficient is the configuration before the step */
 } form_derivative;
 
+/* Derivatives of forms by the coordinates of the cells, as differences: the values of a form with the
+ * coordinates of neighbouring scenes. */
+typedef struct {
+  const cells *form;
+  int parameters, neighbours;
+  const double *const *coordinates; /* parameters x neighbours; none of a parameter that moves no vertex */
+  const double *weight;
+  int size;             /* number of values of the form */
+  double *space;
+} shape_derivative;
+
+/* Derivatives of second differences of strains, see SecondDifferences. */
+typedef struct {
+  const second_differences *differences;
+  form_derivative *strains, *force; /* strains by q1; force by the change of the strains in the last step */
+  const shape_derivative *shape;    /* of the strains; or none */
+  double *e0, *change;              /* derivatives of strains and of their changes in the last step */
+  double *e1, *direction;           /* of one parameter */
+  double ratio;
+} second_difference_derivatives;
+
 /* Derivatives of material points by all their inputs. The columns of a table are the growth, the
  * variables that a law solves for, then the other inputs; its rows are the stresses, the changes of the
- * variables, the stress at the end of the step, and the equations of the unknowns. The stresses follow. */
+ * variables, the stress and the resistance at the end of the step, the equations of the unknowns, and the
+ * margins of the conditions in the law. The stresses and the margins follow. */
 typedef struct {
   points *points;
   inelastic *cells;               /* or none */
   const connectors *springs;      /* or none */
   form_derivative *strains;       /* strains of the sections, or motions of the springs, by q1 */
+  const shape_derivative *shape;  /* strains of the sections by coordinates; or none */
+  form_derivative *by_geometry;   /* motions of the springs by their geometry; or none */
+  double *fixed;                  /* derivatives of the strains at constant unknowns */
   kernel *table;
-  int outputs, columns, equations, unknown; /* unknown: index in w of the first variable at the end */
+  int outputs, columns, equations, margin, margins; /* equations, margin: their first rows; margins: number */
+  int unknown;                    /* index in w of the first variable at the end of the step */
   const int32_t *column;          /* index in w of each column */
   double *J;                      /* tables of all points */
   double *w, *e0;                 /* derivatives of the data of the points, and of the strains before the step */
@@ -1166,13 +1201,17 @@ typedef struct {
 } point_derivatives;
 
 /* Derivatives of the laws of connectors. Compiled laws have a table: columns are inputs of the law, rows
- * its forces and its variables at the end of a step. Arrays have a row for each parameter. */
+ * its forces, its variables at the end of a step, and the margins of its conditions; the margins follow.
+ * Rigid-plastic laws have the limit and the back force instead of variables, and no margins. Arrays have
+ * a row for each parameter. */
 typedef struct {
   int parameters, neighbours;
   const connector_term *term;
   form_derivative *motions;      /* motions of the connectors by q1 */
+  form_derivative *by_geometry;  /* by the geometry of the connectors; or none */
   kernel *table;                 /* or none */
-  int rows, columns;
+  int rows, columns, margins, outputs;
+  double *limit, *back_force;    /* of rigid-plastic laws */
   const int32_t *column;         /* index of each column in the inputs of a law */
   double *J, *w;                 /* tables; derivatives of the inputs of all laws */
   double *e0, *e1, *row, *dt;    /* e0: of the motions before the step; of one parameter: motions, rows */
@@ -1246,7 +1285,7 @@ typedef struct {
   double *const *direction;
 } imposed_derivatives;
 
-int differentiate_step(derivatives *d, time_loop *m);
+int differentiate_step(derivatives *d, time_loop *m, int initial);
 void begin_neighbours(void *self, const time_step *step, const double *q1);
 void differentiate_moving_loads(void *self, const time_step *step, const double *q1);
 void find_tangents_before(void *self, const time_step *step, const double *q1);
@@ -1267,12 +1306,16 @@ void add_form_derivative(void *self, const derivatives *d, int p, double *r);
 void add_connectors_derivative(void *self, const derivatives *d, int p, double *r);
 void add_points_derivative(void *self, const derivatives *d, int p, double *r);
 void add_product_derivative(void *self, const derivatives *d, int p, double *r);
+void add_shape_derivative(void *self, const derivatives *d, int p, double *r);
+void add_second_differences_derivative(void *self, const derivatives *d, int p, double *r);
 void add_load_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_connectors_derivative(void *self, const derivatives *d, int p);
 void accept_points_derivative(void *self, const derivatives *d, int p);
+void accept_second_differences_derivative(void *self, const derivatives *d, int p);
 void accept_load_derivative(void *self, const derivatives *d, int p);
 void tabulate_derivative(void *self, const time_step *step, const double *q1);
 void tabulate_connectors(void *self, const time_step *step, const double *q1);
+void tabulate_second_differences(void *self, const time_step *step, const double *q1);
 void tabulate_points(void *self, const time_step *step, const double *q1);
 void differentiate_loads(void *self, const time_step *step, const double *q1);
 

@@ -285,6 +285,7 @@ int attempt_step(time_loop *m, double t1, double end)
   m->equation->raised = NOTHING;
   if (m->rates && m->prepare && !m->rates->ready) {
     if (!solve_to(m, m->t + FIRST_TRIAL * (t1 - m->t), t1)) return 0;
+    if (m->derivatives && !differentiate_step(m->derivatives, m, 1)) return fails(m, NO_DERIVATIVE);
     m->prepare(m->handle);
   }
   return solve_to(m, t1, end);
@@ -361,7 +362,7 @@ int step_or_subdivide(time_loop *m, double end)
     const int solved = attempt_step(m, t1, end);
     if (m->path) rejected = m->path->rejected;
     if (solved) {
-      if (m->derivatives && !differentiate_step(m->derivatives, m)) return fails(m, NO_DERIVATIVE);
+      if (m->derivatives && !differentiate_step(m->derivatives, m, 0)) return fails(m, NO_DERIVATIVE);
       if (!accept_step(m)) return 0;
       done += some;
       /* Double the substep at the times where a larger one would begin. */
@@ -414,6 +415,29 @@ int take_steps(time_loop *m, int steps, const double *ends, double seconds, int 
     if (m->derivatives) keep_derivatives(m->derivatives, m);
     m->substeps_of_last = m->substeps - before;
     if (m->substeps_of_last > 1 || (steps > 1 && seconds_now() > end)) return k + 1;
+  }
+  return steps;
+}
+
+/* Accept given configurations at the ends of steps, without solutions, and write the states into `rows`.
+ * The configurations are in the axes of the plane. Returns the number of steps. */
+int repeat_steps(time_loop *m, int steps, const double *ends, const double *configurations, double *rows)
+{
+  equation *e = m->equation;
+  for (int k = 0; k < steps; ++k) {
+    e->raised = NOTHING;
+    if (m->rates && m->prepare && !m->rates->ready) {
+      if (!solve_to(m, m->t + FIRST_TRIAL * (ends[k] - m->t), ends[k])) return k;
+      m->prepare(m->handle);
+    }
+    if (!set_step(m, ends[k], ends[k]) || !begin_terms(m)) return k;
+    memcpy(e->unknowns, configurations + (size_t)k * m->size, m->size * sizeof *e->unknowns);
+    turn_axes(e->turned, e->axes, e->unknowns, 1);
+    restart(e, EXACT);
+    /* Laws with several branches find their branch in the first residual. */
+    for (int i = 0; i < 2; ++i) residual(e, e->unknowns, e->residual, e->f);
+    if (!measure(m) || !accept_step(m)) return k;
+    keep_state(m, rows + (size_t)k * m->width);
   }
   return steps;
 }
