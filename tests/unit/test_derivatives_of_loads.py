@@ -12,7 +12,7 @@ import ufl_beam as ub
 WEIGHTS = {-2: 1 / 12, -1: -8 / 12, 1: 8 / 12, 2: -1 / 12}
 """Five-point difference."""
 
-TIGHT = ub.Newton(rtol=1e-13)
+TIGHT = ub.Newton(rtol=1e-12)
 """Differences divide errors of solutions by 1e-3 of a parameter."""
 
 DYNAMIC = ub.EnergyMomentum(0.02, 0.01), ub.GeneralizedAlpha(0.8)
@@ -142,8 +142,12 @@ ONLY_DYNAMIC = moving_mass, damped, damped_points
 
 
 SAME = 1e-8
-"""Differences of runs have an error of 1e-12 by a step of 1e-3; solutions have 1e-13 of the largest
+"""Differences of runs have an error of 1e-12 by a step of 1e-3; solutions have 1e-12 of the largest
 force, divided by this step, and some parameters change them by a hundredth only."""
+
+OF_CHORDS = 2e-7
+"""Directions of chords of guides have an error of the round-off to the power of two thirds, 4e-11, see
+``Guides``; divided by a step of 1e-3."""
 
 STEPS = 1e-3, 1e-4, 1e-5
 """Relative steps of differences, from the largest: a point may yield in one of the runs only."""
@@ -175,7 +179,7 @@ def disagreement(model, scheme, t, dt, **options):
 def test_derivatives_in_dynamics_are_those_of_runs(model, scheme):
     if model is frame and not scheme.has_mean_velocity:
         pytest.skip("refused: a rotating frame needs the mean velocity of a step")
-    assert disagreement(model, scheme, 1.0, 0.05)[0] < SAME
+    assert disagreement(model, scheme, 1.0, 0.05)[0] < (OF_CHORDS if model is guided else SAME)
 
 
 @pytest.mark.serial
@@ -183,7 +187,7 @@ def test_derivatives_in_dynamics_are_those_of_runs(model, scheme):
 @pytest.mark.parametrize("scheme", STATIC, ids=repr)
 @pytest.mark.parametrize("model", [m for m in MODELS if m not in ONLY_DYNAMIC])
 def test_derivatives_in_statics_are_those_of_runs(model, scheme):
-    assert disagreement(model, scheme, 1.0, 0.1)[0] < SAME
+    assert disagreement(model, scheme, 1.0, 0.1)[0] < (OF_CHORDS if model is guided else SAME)
 
 
 @pytest.mark.serial
