@@ -26,9 +26,9 @@ from ufl_beam import dolfinx_compat  # noqa: F401 - first: its errors explain mi
 # isort: split
 
 from ufl_beam.analysis.critical_points import Branch as Branch
+from ufl_beam.analysis.critical_points import CriticalPoint as CriticalPoint
 from ufl_beam.analysis.derivatives import Derivatives as Derivatives
 from ufl_beam.analysis.derivatives import differentiate as differentiate
-from ufl_beam.analysis.critical_points import CriticalPoint as CriticalPoint
 from ufl_beam.analysis.free_decay import (
     Decay as Decay,
 )

@@ -162,7 +162,9 @@ def disagreement(model, scheme, t, dt, **options):
     for p, (name, value) in enumerate(at.items()):
         errors = [np.inf]
         for h in (step * value for step in STEPS):
-            runs = {k: ub.simulate(model(**{name: value + k * h}), scheme, **options) for k in WEIGHTS}
+            runs = {
+                k: ub.simulate(model(**{name: value + k * h}), scheme, **options) for k in WEIGHTS
+            }
             if {run.substeps for run in runs.values()} == {found.solution.substeps}:
                 differences = sum(w * runs[k].q for k, w in WEIGHTS.items()) / h
                 error = np.abs(exact[..., p] - differences).max() / np.abs(differences).max()

@@ -49,6 +49,7 @@ extern "Python" void arrive_in_python(void *handle, const double *x);
 extern "Python" int change_along_in_python(void *handle, const double *x);
 extern "Python" int met_in_python(void *handle);
 extern "Python" void run_in_python(void *handle);
+extern "Python" void index_in_python(void *handle, int index);
 extern "Python" void begin_in_python(void *handle, double t, double dt);
 """
 
@@ -100,6 +101,11 @@ doubles = partial(ffi.from_buffer, ffi.typeof("double[]"))
 def view_pointer(array: Array) -> Any:
     """Return a pointer to the first number of a view of float64; the pointer keeps it alive."""
     return ffi.gc(ffi.cast("double *", array.ctypes.data), lambda _, alive=array: None)
+
+
+def number_view(struct: Any, field: str) -> Array:
+    """Return a view, (1,), of a number in a struct of loops.h, valid as long as the struct."""
+    return np.frombuffer(ffi.buffer(ffi.addressof(struct, field), 8))
 
 
 _FLOAT64, _INT32 = np.dtype(np.float64), np.dtype(np.int32)

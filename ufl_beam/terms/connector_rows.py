@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,7 +45,7 @@ from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.softening_laws import SofteningLaw
-from ufl_beam.terms.derivatives import Each, Neighbours, in_c
+from ufl_beam.terms.derivatives import Each, Neighbours, form_derivative, in_c
 from ufl_beam.terms.energy_ledger import LEDGER_ENTRIES, Account, Ledger
 from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS, Points, create_entries
 from ufl_beam.terms.term import Callbacks
@@ -223,14 +224,31 @@ class Response:
     ) -> list[Each]:
         """Return ``connector_derivatives`` of loops.h with further ``fields``."""
         parameters, number = neighbours.weights.shape
-        e0, (e1, dt) = np.zeros((parameters, len(row))), np.zeros((2, len(self._connectors)))
+        e1, dt = np.zeros((2, len(self._connectors)))
         c = struct(
             "connector_derivatives", parameters=parameters, neighbours=number,
             weight=neighbours.weights, term=term._term_in_c, row=row, dt=dt,
             motions=motions["strains"], by_geometry=motions["by_geometry"],
-            e0=np.zeros((parameters, len(self._connectors))), e1=e1, **fields,
+            e0=neighbours.state(np.zeros((parameters, len(self._connectors)))), e1=e1, **fields,
         )  # fmt: skip
         return [in_c("connectors", c)]
+
+    def _friction_in_c(
+        self, neighbours: Neighbours, term: Any, motions: Any, limits: Array
+    ) -> dict[str, Any] | None:
+        """Return fields of ``connector_derivatives`` for friction with derivatives of its limits.
+
+        The result is None if a parameter changes the geometry of the connectors in dynamics.
+        """
+        fields = {"limit": limits, "way": np.zeros(limits.shape)}
+        if self._setting.rates is None:
+            return fields
+        if motions["by_geometry"]:
+            return None
+        forms, rate = term.forms, term.motion_rate
+        by = {"rate_by_v": forms.u, "rate_by_q0": forms.q1}
+        found = {k: form_derivative(forms.rate, rate, term._form, f) for k, f in by.items()}
+        return fields | {k: f for k, f in found.items() if f is not None}
 
     def _table_in_c(
         self, neighbours: Neighbours, table: Any, inputs: Sequence[str],
@@ -241,7 +259,13 @@ class Response:
         column = np.array([inputs.index(name) for name in by], dtype=np.int32)
         changes = neighbours.differences(lambda term: storage(term.response))
         tables = np.zeros((len(self._connectors), numbers["outputs"]))
-        return {"table": function, **numbers, "column": column, "J": tables, "w": changes}
+        return {
+            "table": function,
+            **numbers,
+            "column": column,
+            "J": tables,
+            "w": neighbours.state(changes),
+        }
 
 
 # -- laws that prescribe a motion or a force -------------------------------------------------------
@@ -291,7 +315,6 @@ class PrescribedLaws(Response):
                     )
                 self._in_steps["wanted_force"] = wanted
 
-
     def derivatives(
         self, neighbours: Neighbours, term: Any, motions: Any, row: Array
     ) -> list[Each] | None:
@@ -302,16 +325,23 @@ class PrescribedLaws(Response):
             fields["viscosity"] = neighbours.differences(
                 lambda term: term.response._in_steps["viscosity"]
             )
-        elif self._time_functions:
-            now, end, reached = np.zeros((3, *shape))
+        elif self._time_functions:  # motors and actuators
+            now, end, reached = neighbours.state(np.zeros((3, *shape)))
             others = [x._term_in_c for some in neighbours.terms for x in some]
             fields = {"now": now, "end": end, "neighbour": ffi.new("connector_term *[]", others)}
             if "wanted_force" in self._time_functions:
                 fields["reached"] = reached
-        elif self._in_steps:
-            return None  # friction, controllers
-        else:
+        elif self.sticks is not None and not any(law.joint for law in self._laws):
+            limits = neighbours.differences(
+                lambda term: np.array([law.force for law in term.response._laws])
+            )
+            if (found := self._friction_in_c(neighbours, term, motions, limits)) is None:
+                return None
+            fields = found
+        elif self.sticks is None and not self._in_steps:
             return []  # constraints
+        else:
+            return None
         return self._derivatives_in_c(neighbours, term, motions, row, **fields)
 
 
@@ -380,7 +410,7 @@ class Springs(Response):
     ) -> list[Each] | None:
         """See the base class."""
         c = self.points.derivatives(
-            neighbours, lambda term: term.response.points, springs=term._in_c, row=row, **motions,
+            neighbours, "response.points", springs=term._in_c, row=row, **motions,
         )  # fmt: skip
         return [in_c("points", c)]
 
@@ -551,7 +581,8 @@ class RigidPlasticLaws(Response):
             neighbours, self._forms.table, tuple(self._at), lambda laws: laws._storage
         )
         for field, name in (("limit", "_limit"), ("back_force", "_back_force")):
-            table[field] = neighbours.differences(lambda x, name=name: getattr(x.response, name))
+            values = neighbours.differences(attrgetter(f"response.{name}"))
+            table[field] = neighbours.state(values)
         return self._derivatives_in_c(neighbours, term, motions, row, **table)
 
     def state(self) -> Array:

@@ -9,12 +9,13 @@ derivatives.c for the derivatives of a step.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import ufl
 from ufl.algorithms import expand_derivatives
-from ufl.classes import AndCondition, BinaryCondition, Conditional, OrCondition
+from ufl.classes import EQ, GE, GT, LE, LT, NE, Conditional
 from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_post_traversal
 
@@ -26,6 +27,9 @@ from ufl_beam.dolfinx_compat import fem
 FAR = 1e300
 """Margin of a comparison that does not matter."""
 
+MOST_MARGINS = 12
+"""Largest number of comparisons in a law that the ranges of derivatives take into account."""
+
 Each = tuple[Any, ...]
 """Fields of ``term_derivative`` of loops.h."""
 
@@ -36,34 +40,40 @@ class Neighbours:
     Attributes:
         term: The term in the scene itself.
         terms: The same term in the neighbouring scenes; for each parameter a list.
+        positions: Changes of the parameters in the neighbouring scenes; (parameters, n).
         weights: Weights of the neighbours in the derivative by a parameter, (parameters, n).  The
             weight of the scene itself makes their sum zero.
         size: Number of degrees of freedom.
         alive: Data that C refers to.
+        states: Derivatives of the state of the term, see :meth:`state`.
     """
 
     def __init__(
-        self, term: Any, terms: Sequence[Sequence[Any]], weights: Array, size: int
+        self, term: Any, terms: Sequence[Sequence[Any]], positions: Array, weights: Array, size: int
     ) -> None:
-        self.term, self.terms, self.weights, self.size = term, terms, weights, size
-        self.alive = list[Any]()
+        self.term, self.terms, self.size = term, terms, size
+        self.positions, self.weights = positions, weights
+        self.alive, self.states = list[Any](), list[Array]()
 
     def __len__(self) -> int:
         """Number of parameters."""
         return len(self.terms)
 
+    def state(self, values: Array) -> Array:
+        """Return ``values``, and store them as derivatives of the state of the term."""
+        self.states.append(values)
+        return values
+
     def differences(self, values: Callable[[Any], Array]) -> Array:
         """Return the derivatives of an array of the term; (parameters, *shape of the array)."""
-        here = values(self.term)
-        rows = []
-        for some, weights in zip(self.terms, self.weights, strict=True):
-            total = np.zeros(np.shape(here))
-            for other, weight in zip(some, weights, strict=True):
+        reference = values(self.term)
+        derivatives = np.zeros((len(self), *np.shape(reference)))
+        for p, some in enumerate(self.terms):
+            for k, term in enumerate(some):
                 with np.errstate(invalid="ignore"):  # infinite numbers do not change
-                    change = values(other) - here
-                total += weight * np.where(np.isfinite(change), change, 0.0)
-            rows.append(total)
-        return np.array(rows)
+                    change = values(term) - reference
+                derivatives[p] += self.weights[p, k] * np.where(np.isfinite(change), change, 0.0)
+        return derivatives
 
 
 @cached_forms
@@ -75,37 +85,35 @@ def _derivative(form: ufl.Form, coefficient: fem.Function) -> ufl.Form | None:
 
 
 def margins(outputs: Sequence[Expr]) -> list[Expr]:
-    """Return the differences of both sides of all comparisons on which expressions depend.
+    """Return the differences of both sides of the comparisons on which expressions depend.
 
-    A comparison in a branch that is not taken has the margin :data:`FAR`.
+    A comparison in a branch that is not taken has the margin :data:`FAR`.  The result is empty for
+    more than :data:`MOST_MARGINS` comparisons, whose derivatives would take minutes to compile.
     """
-    weights: dict[Expr, Expr | float] = dict.fromkeys(outputs, 1.0)
-    order, found = list[Expr](), list[Expr]()
-    seen = set[int]()
+    order: dict[int, Expr] = {}
     for output in outputs:
-        for node in unique_post_traversal(output):
-            if id(node) not in seen:
-                seen.add(id(node))
-                order.append(node)
-    active = {id(node): weights.get(node, 0.0) for node in order}
-    for node in reversed(order):  # parents come before their operands
-        weight = active[id(node)]
-        shares = [weight] * len(node.ufl_operands)
+        order |= {id(node): node for node in unique_post_traversal(output) if id(node) not in order}
+    # Conditions, and whether they hold, in all branches that contain a node
+    branches: dict[int, dict[int, tuple[Expr, bool]]] = {id(output): {} for output in outputs}
+    found = dict[str, Expr]()
+    for node in reversed(order.values()):  # parents come before their operands
+        mine = branches[id(node)]
+        inside = [mine] * len(node.ufl_operands)
         if isinstance(node, Conditional):
-            condition, *_ = node.ufl_operands
-            shares[1:] = [
-                ufl.conditional(condition, *pair) * weight for pair in ((1.0, 0.0), (0.0, 1.0))
-            ]
-        elif isinstance(node, BinaryCondition) and not isinstance(node, AndCondition | OrCondition):
+            condition = node.ufl_operands[0]
+            inside[1:] = [mine | {id(condition): (condition, holds)} for holds in (True, False)]
+        elif isinstance(node, EQ | NE | LE | LT | GE | GT):
             left, right = node.ufl_operands
             margin = left - right
-            if not isinstance(weight, float):
-                margin = ufl.conditional(ufl.gt(weight, 0.0), margin, FAR)
-            found.append(margin)
-        for operand, share in zip(node.ufl_operands, shares, strict=True):
-            if id(operand) in active:
-                active[id(operand)] = share + active[id(operand)]
-    return found
+            for condition, holds in mine.values():
+                pair = (margin, FAR) if holds else (FAR, margin)
+                margin = ufl.conditional(condition, *pair)
+            found.setdefault(repr(id(left)) + repr(id(right)), margin)
+        for operand, some in zip(node.ufl_operands, inside, strict=True):
+            if (known := branches.get(id(operand))) is not None:
+                some = {k: x for k, x in known.items() if some.get(k) == x}
+            branches[id(operand)] = some
+    return [*found.values()] if len(found) <= MOST_MARGINS else []
 
 
 def form_derivative(
@@ -133,6 +141,10 @@ def form_derivative(
     )  # fmt: skip
 
 
+def _values(kernel_of: Callable[[Any], Kernel], coefficient: fem.Function, term: Any) -> Array:
+    return kernel_of(term).get(coefficient)
+
+
 def form_derivatives(
     form: ufl.Form, kernel_of: Callable[[Any], Kernel], compile_form: Callable[[ufl.Form], Kernel],
     q0: fem.Function, neighbours: Neighbours, without: Sequence[fem.Function] = (),
@@ -143,15 +155,17 @@ def form_derivatives(
         if coefficient is q0:
             made.append(form_derivative(form, kernel, compile_form, q0))
         elif not any(coefficient is x for x in without):
-            change = neighbours.differences(lambda x, c=coefficient: kernel_of(x).get(c))
+            change = neighbours.differences(partial(_values, kernel_of, coefficient))
             if change.any():
                 direction = {"direction": change.ravel(), "stride": change[0].size}
                 made.append(form_derivative(form, kernel, compile_form, coefficient, **direction))
-    return [in_c("form", f) for f in made if f is not None] + shape_derivatives(kernel_of, neighbours)
+    return [in_c("form", f) for f in made if f is not None] + shape_derivatives(
+        kernel_of, neighbours
+    )
 
 
 def shape_derivative(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours, size: int) -> Any:
-    """Return ``shape_derivative`` of loops.h for a form with ``size`` values; null if it is zero."""
+    """Return ``shape_derivative`` of loops.h for a form with ``size`` values; null if zero."""
     kernel, coordinates = kernel_of(neighbours.term), list[Any]()
     for some in neighbours.terms:
         found = [kernel_of(term).cells.coordinates for term in some]
@@ -173,14 +187,22 @@ def shape_derivatives(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours
     return [in_c("shape", found)] if found else []
 
 
-def differences(neighbours: Neighbours) -> Each:
+def differences(
+    neighbours: Neighbours, state_of: Callable[[Any], Sequence[Array]] = lambda term: ()
+) -> Each:
     """Return the derivative of a term by numbers of the scene, as differences of its forces.
 
     The term in the neighbouring scenes takes the steps of the run, so that functions of time of a
     user and states that do not depend on the motion need no derivatives of their own.  Other
     derivatives of the term are those by the configuration before the step and by rates.
+
+    Args:
+        neighbours: The term.
+        state_of: Arrays of the state of a term that its next step needs.
     """
     made = list[Any]()
+    for some in neighbours.terms:
+        neighbours.states += [array for term in some for array in state_of(term)]
     for term in (neighbours.term, *(x for some in neighbours.terms for x in some)):
         phases = term.made_phases.begin, term.made_phases.accept
         calls = [ffi.new("phase_call[]", list(some)) for some in phases]
@@ -206,7 +228,12 @@ LINEARIZE = {
 ACCEPT = {
     name: f"accept_{name}_derivative"
     for name in (
-        "points", "load", "connectors", "second_differences", "differences", "moving_loads",
+        "points",
+        "load",
+        "connectors",
+        "second_differences",
+        "differences",
+        "moving_loads",
         "imposed",
     )
 }
@@ -223,4 +250,3 @@ def all_in_c(terms: Sequence[Each]) -> dict[str, Any]:
     """Return the fields ``terms`` and ``term`` of ``derivatives`` of loops.h."""
     array = ffi.new("term_derivative[]", terms)
     return {"terms": len(terms), "term": array}
-

@@ -20,11 +20,11 @@ from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
+from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.errors import ArgumentError
 from ufl_beam.terms.derivatives import Each, Neighbours, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.load_forces import LoadTerm
@@ -180,6 +180,7 @@ class ImposedStrains(LoadTerm):
         """See the base class."""
         parameters, number = neighbours.weights.shape
         others = [x._c for some in neighbours.terms for x in some]
+        neighbours.states += [x._factors for some in neighbours.terms for x in some]
         directions = [doubles(cells.directions) for cells in self._cells]
         c = struct(
             "imposed_derivatives", parameters=parameters, neighbours=number, here=self._c,

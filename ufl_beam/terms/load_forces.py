@@ -13,7 +13,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, number_view, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import cached_forms
 from ufl_beam.discretization.function_spaces import (
@@ -185,7 +185,7 @@ class DeadLoads(_AtDofs):
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
         parameters, number = neighbours.weights.shape
-        now, end, before = np.zeros((3, parameters, self._size))
+        now, end, before = neighbours.state(np.zeros((3, parameters, self._size)))
         loads = ffi.new("dead_loads *[]", [x._c for some in neighbours.terms for x in some])
         c = struct(
             "load_derivatives", parameters=parameters, size=self._size, neighbours=number,
@@ -301,7 +301,8 @@ class FollowerLoads(_AtDofs):
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
-        return [differences(neighbours), in_c("followers", self._c)]
+        found = differences(neighbours, lambda term: [term._sizes])
+        return [found, in_c("followers", self._c)]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them."""
@@ -373,7 +374,8 @@ class Pressures(_AtDofs):
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
-        return [differences(neighbours), in_c("pressures", self._c)]
+        found = differences(neighbours, lambda term: [term._factors])
+        return [found, in_c("pressures", self._c)]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them."""
@@ -486,7 +488,9 @@ class MovingLoads(_AtDofs):
                 "another value"
             )
         now, end, before = np.zeros((3, parameters, forces.size))
-        before[:] = neighbours.differences(lambda term: term._on_cells[2]).reshape(before.shape)
+        neighbours.state(before)[:] = neighbours.differences(
+            lambda term: term._on_cells[2]
+        ).reshape(before.shape)
         c = struct(
             "moving_derivatives", parameters=parameters, neighbours=number, ends_of=ends[0].size,
             loads=here, neighbour=ffi.new("moving_loads *[]", [x._c for x in others]),
@@ -604,7 +608,8 @@ class FrameForces(LoadTerm):
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
-        return [differences(neighbours), in_c("frame", self._c)]
+        found = differences(neighbours, lambda term: [number_view(term._c, "grown")])
+        return [found, in_c("frame", self._c)]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the forces before the next step to the forces at ``q``, and return them."""

@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -198,10 +199,10 @@ class PointForms:
         conditions = margins(with_shared_nodes([*stress, *map(ufl.as_ufl, end.changes)]))
         outputs = (*stress, *ends, *unknowns, *conditions)
         derivatives = [ufl.diff(ufl.as_ufl(f), at[name]) for f in outputs for name in by]
-        values, first = [*derivatives, *stress, *conditions], len(stress) + len(ends)
+        values, first_equation = [*derivatives, *stress, *conditions], len(stress) + len(ends)
         numbers = {
-            "outputs": len(values), "columns": len(by), "equations": first,
-            "margin": first + len(unknowns), "margins": len(conditions),
+            "outputs": len(values), "columns": len(by), "equations": first_equation,
+            "margin": first_equation + len(unknowns), "margins": len(conditions),
         }  # fmt: skip
         return self._pointwise.compile(*values), by, numbers
 
@@ -330,31 +331,33 @@ class Points:
             lines = np.zeros((2, cells, per_cell, int(lib.LINE)))
             fill(self.c, line=lines[0], predicted=lines[1])
 
-    def derivatives(
-        self, neighbours: Neighbours, points_of: Callable[[Any], Points], **fields: Any
-    ) -> Any:
-        """Return ``point_derivatives`` of loops.h, with further ``fields``."""
+    def derivatives(self, neighbours: Neighbours, path: str, **fields: Any) -> Any:
+        """Return ``point_derivatives`` of loops.h, with further ``fields``.
+
+        ``path`` is the attribute of a term that has its points.
+        """
         table, by, numbers = self._forms.table
-        cells, per_cell, width = self._storage.shape
-        change = neighbours.differences(lambda term: points_of(term)._storage)
+        cells, per_cell, _ = self._storage.shape
+        change = neighbours.differences(attrgetter(f"{path}._storage"))
         c = struct(
             "point_derivatives", points=self.c, table=table, **numbers,
             unknown=self.names.index(by[1]) if by[1].startswith("new ") else 0,
             column=np.array([self.names.index(name) for name in by], dtype=np.int32),
-            J=np.zeros((cells, per_cell, numbers["outputs"])), w=change,
-            e0=neighbours.differences(lambda term: points_of(term)._e0), r=np.zeros((cells, 3)),
+            J=np.zeros((cells, per_cell, numbers["outputs"])), w=neighbours.state(change),
+            e0=neighbours.state(neighbours.differences(attrgetter(f"{path}._e0"))),
+            r=np.zeros((cells, 3)),
             e1=np.zeros((cells, 3)), **fields,
         )  # fmt: skip
         for field, name in (("B", "strains"), ("weight", "weights"), ("rest", "rest")):
-            values = neighbours.differences(
-                lambda term, name=name: getattr(points_of(term)._section_points, name)
-            )
+            values = neighbours.differences(attrgetter(f"{path}._section_points.{name}"))
             if values.any():
                 fill(c, **{field: np.ascontiguousarray(values)})
         if self.committed is not None:
-            self.tangents = neighbours.differences(lambda term: points_of(term).committed)
-            elastic = neighbours.differences(lambda term: points_of(term)._elastic)
-            # An eighth of the neighbours' distance: far from the next switch, and 1e-12 of round-off
+            self.tangents = neighbours.state(
+                neighbours.differences(attrgetter(f"{path}.committed"))
+            )
+            elastic = neighbours.differences(attrgetter(f"{path}._elastic"))
+            # An eighth of the neighbours' distance: near the scene, and 1e-12 of round-off
             step = 1 / (8 * np.abs(neighbours.weights).max(axis=1))
             fill(c, tangents=self.tangents, elastic=elastic, step=step)
         return c

@@ -12,7 +12,7 @@ import ufl
 from ufl.algorithms import expand_derivatives
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import ffi, fill, lib, loop, struct
+from ufl_beam.compiled.c_library import ffi, fill, lib, loop, number_view, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.function_spaces import Fields, element_of
@@ -195,7 +195,11 @@ class Works(LoadTerm):
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
         found = [each for work in self._works for each in work.by_q0()]
-        return [differences(neighbours), *found]
+
+        def state_of(term: Works) -> list[Array]:
+            return [number_view(term._c, name) for name in ("t", "grown")]
+
+        return [differences(neighbours, state_of), *found]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the forces before the next step to the forces at ``q``, and return them."""

@@ -342,6 +342,8 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
   const connector_term *t = m->term;
   const connectors *c = t->connectors;
   *m->dt = step->dt;
+  if (m->rate_by_v) tabulate_derivative(m->rate_by_v, step, step->q0);
+  if (m->rate_by_q0) tabulate_derivative(m->rate_by_q0, step, step->q0);
   find_motions(c, q1);
   tabulate_derivative(m->motions, step, q1);
   if (m->by_geometry) tabulate_derivative(m->by_geometry, step, q1);
@@ -381,6 +383,37 @@ static double product_with_row(const connector_derivatives *m, int i, int row, c
   return sum;
 }
 
+/* Derivatives of the motions of friction in a step that leads to rest, see begin_friction. */
+static void find_ways(const connector_derivatives *m, const derivatives *d, int p)
+{
+  const connectors *c = m->term->connectors;
+  double *way = m->way + (size_t)p * c->number;
+  memset(way, 0, c->number * sizeof *way);
+  if (!m->rate_by_v) return;
+  const double *of = c->friction->rates->now->rates[0];
+  multiply_tables(m->rate_by_v, 0, d->rates[1] + (size_t)p * d->size, 1, way);
+  if (m->rate_by_q0) multiply_tables(m->rate_by_q0, 0, d->q0 + (size_t)p * d->size, 1, way);
+  for (int i = 0; i < c->number; ++i) way[i] *= c->friction->against[i] ? 0 : -(of[1] + of[2]) / of[0];
+}
+
+/* Derivative of the last number in the row of friction connector i, see set_rows_of_friction. */
+static double friction_row(const connector_derivatives *m, const derivatives *d, int p, int i, const double *e0)
+{
+  const connectors *c = m->term->connectors;
+  const friction *f = c->friction;
+  double *dw = c->laws ? m->w + ((size_t)p * c->number + i) * c->laws->width : 0;
+  double *limit = m->limit + (size_t)p * c->number + i;
+  if (dw) {
+    dw[0] = 0, dw[1] = e0[i];
+    *limit = product_with_row(m, i, 1 + c->laws->variables, dw);
+  }
+  if (f->sticks[i]) {
+    const double softer = *f->limit[i] > 0 ? -f->creep[i] / *f->limit[i] * *limit : 0;
+    return e0[i] + m->way[(size_t)p * c->number + i] + softer * d->x[c->force[i]];
+  }
+  return f->slip[i] * (dw ? product_with_row(m, i, 0, dw) : *limit);
+}
+
 /* Derivatives of the rows of the laws at constant motions, for the form of the forces. */
 void add_connectors_derivative(void *self, const derivatives *d, int p, double *r)
 {
@@ -389,9 +422,12 @@ void add_connectors_derivative(void *self, const derivatives *d, int p, double *
   const connectors *c = t->connectors;
   const int n = c->components;
   const double *e0 = m->e0 + (size_t)p * n * c->number;
+  if (c->friction) find_ways(m, d, p);
+  if (c->asked) m->rows_of_user(m->rows_handle, p);
   for (int i = 0; i < c->number; ++i) {
     double *row = m->row + n * (n + 2) * i + n + 1; /* the last number of the first row */
-    if (c->laws) {
+    if (c->friction) *row = friction_row(m, d, p, i, e0);
+    else if (c->laws) {
       double *dw = m->w + ((size_t)p * c->number + i) * c->laws->width;
       memset(dw, 0, n * sizeof *dw);
       memcpy(dw + n, e0 + n * i, n * sizeof *dw);
@@ -420,6 +456,13 @@ void accept_connectors_derivative(void *self, const derivatives *d, int p)
   multiply_tables(m->motions, 0, d->q1 + (size_t)p * d->size, 1, m->e1);
   if (g) multiply_tables(g, g->direction + (size_t)p * g->stride, 0, 1, m->e1);
   for (int i = 0; i < c->number; ++i) {
+    if (c->friction) {
+      const friction *f = c->friction;
+      const double force = d->x[c->force[i]], dforce = d->q1[(size_t)p * d->size + c->force[i]];
+      const double moved = c->e1[i] - c->e0[i], slip = f->slip[i];
+      if (f->sticks[i]) note_margin(d, p, i, fabs(force) - *f->limit[i], copysign(1, force) * dforce - m->limit[(size_t)p * all + i]);
+      else note_margin(d, p, i, slip * moved, slip * (m->e1[i] - e0[i]));
+    }
     if (c->laws) {
       const int variables = c->laws->variables;
       double *dw = m->w + ((size_t)p * c->number + i) * c->laws->width, end[MOST_VARIABLES];
@@ -445,6 +488,7 @@ void accept_connectors_derivative(void *self, const derivatives *d, int p)
       dw[SLIP_START] += of->direction[i] * dw[SLIP];
     }
   }
+  if (c->asked) m->end_of_user(m->end_handle, p);
   memcpy(e0, m->e1, all * sizeof *e0);
   if (m->reached) memcpy(m->reached + (size_t)p * all, m->end + (size_t)p * all, all * sizeof *e0);
 }

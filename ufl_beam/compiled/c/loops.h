@@ -1202,8 +1202,8 @@ typedef struct {
 
 /* Derivatives of the laws of connectors. Compiled laws have a table: columns are inputs of the law, rows
  * its forces, its variables at the end of a step, and the margins of its conditions; the margins follow.
- * Rigid-plastic laws have the limit and the back force instead of variables, and no margins. Arrays have
- * a row for each parameter. */
+ * Rigid-plastic laws have the limit and the back force instead of variables, and no margins; laws with a
+ * limit have it after the variables. Arrays have a row for each parameter. */
 typedef struct {
   int parameters, neighbours;
   const connector_term *term;
@@ -1211,7 +1211,9 @@ typedef struct {
   form_derivative *by_geometry;  /* by the geometry of the connectors; or none */
   kernel *table;                 /* or none */
   int rows, columns, margins, outputs;
-  double *limit, *back_force;    /* of rigid-plastic laws */
+  double *limit, *back_force;    /* of rigid-plastic laws; limit: also of friction */
+  form_derivative *rate_by_v, *rate_by_q0; /* rates of motions for friction in dynamics; or none */
+  double *way;                   /* of friction: derivatives of the motion in a step that leads to rest */
   const int32_t *column;         /* index of each column in the inputs of a law */
   double *J, *w;                 /* tables; derivatives of the inputs of all laws */
   double *e0, *e1, *row, *dt;    /* e0: of the motions before the step; of one parameter: motions, rows */
@@ -1219,6 +1221,8 @@ typedef struct {
   const connector_term *const *neighbour; /* of motors and actuators: the same in neighbouring scenes */
   const double *weight;          /* see derivatives */
   double *now, *end, *reached;   /* of motors: motions; of actuators: forces; or none */
+  void (*rows_of_user)(void *handle, int p), (*end_of_user)(void *handle, int p); /* of laws of users */
+  void *rows_handle, *end_handle;
 } connector_derivatives;
 
 /* Matrix of rates, with its derivative by each parameter, or none. */
