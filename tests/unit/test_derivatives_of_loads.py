@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Derivatives of runs with loads that move with the scene, works, imposed strains, damping, guides."""
+"""Derivatives of runs: loads that move with the scene, works, imposed strains, damping, guides."""
 
 import math
 
@@ -146,8 +146,8 @@ SAME = 1e-8
 force, divided by this step, and some parameters change them by a hundredth only."""
 
 OF_CHORDS = 2e-7
-"""Directions of chords of guides have an error of the round-off to the power of two thirds, 4e-11, see
-``Guides``; divided by a step of 1e-3."""
+"""Directions of chords of guides have an error of the round-off to the power of two thirds, 4e-11,
+see ``Guides``; divided by a step of 1e-3."""
 
 STEPS = 1e-3, 1e-4, 1e-5
 """Relative steps of differences, from the largest: a point may yield in one of the runs only."""
@@ -207,6 +207,24 @@ def test_a_number_inside_of_the_function_of_a_work_has_a_derivative(scheme):
 def test_derivatives_are_those_of_runs_in_curved_cells(model, degree):
     scheme, mesh = ub.EnergyMomentum(0.02), ub.Mesh(degree=degree)
     assert disagreement(model, scheme, 0.6, 0.05, mesh=mesh)[0] < SAME
+
+
+@pytest.mark.serial
+@pytest.mark.filterwarnings("ignore:VirtualWork 'air' takes v")  # a damper in statics
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentumStatic(0.7)], ids=repr)
+@pytest.mark.parametrize("model", MODELS)
+def test_a_run_in_two_parts_has_the_derivatives_of_one(model, scheme):
+    if not scheme.dynamic and model in ONLY_DYNAMIC:
+        pytest.skip("no effect in statics")
+    at = dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
+    options = {"dt": 0.05, "newton": TIGHT, "progress": False}
+    first = ub.differentiate(model, at, scheme, t=(0, 0.3), **options)
+    second = ub.differentiate(model, at, scheme, t=(0.3, 0.6), start=first, **options)
+    whole = ub.differentiate(model, at, scheme, t=(0, 0.6), **options)
+    parts, one = (x.of(lambda run: run.q[-1]) for x in (second, whole))
+    # Both solve the same equations to 1e-12 of the forces
+    same = OF_CHORDS if model is guided else 1e-9
+    assert parts == pytest.approx(one, rel=same, abs=same * np.abs(one).max())
 
 
 def pressed_hard(load=60.0, normal=40.0, curvature=2.0, growth=1.0):

@@ -104,8 +104,9 @@ def view_pointer(array: Array) -> Any:
 
 
 def number_view(struct: Any, field: str) -> Array:
-    """Return a view, (1,), of a number in a struct of loops.h, valid as long as the struct."""
-    return np.frombuffer(ffi.buffer(ffi.addressof(struct, field), 8))
+    """Return a view, (1,), of a number in a struct of loops.h; the view keeps it alive."""
+    offset = ffi.offsetof(ffi.typeof(struct).item, field)
+    return np.frombuffer(ffi.buffer(struct), count=1, offset=offset)
 
 
 _FLOAT64, _INT32 = np.dtype(np.float64), np.dtype(np.int32)

@@ -422,7 +422,7 @@ class TangentRayleighForces(Term):
         kernel, form = partial(fields.kernel, unknown=element.q1), applied(self._form, element.q1)
         by_q0 = form_derivative(form, self._kernels[1], kernel, element.q0)
         force = kernel(form)
-        force.put(self._tangents, 0.0)
+        force.put(self._tangents, np.zeros(1))
         directions = [doubles(beams.points.tangents) for beams in self._inelastic]
         c = struct(
             "damping_derivatives", damping=own, by_q0=by_q0, force=force.cells,

@@ -443,7 +443,7 @@ class MovingLoads(_AtDofs):
         )  # fmt: skip
         self._A, tangent, self._kinetic = A, None, np.zeros(len(loads))
         angles = numbering.axis_angles[self._cells]
-        self._numbers = given, mass, ends, angles  # of moving_loads in loops.h
+        self._numbers = {"given": given, "mass": mass, "ends": ends, "angles": angles}
         self._heavy = rates is not None and bool(mass.any())
         if self._heavy:
             whole, n = subdomain.cell_dofs[order], 2 * len(mesh.nodes)
@@ -478,24 +478,24 @@ class MovingLoads(_AtDofs):
         """See the base class."""
         parameters, number = neighbours.weights.shape
         others = [x for some in neighbours.terms for x in some]
-        here, forces = self._c, self._on_cells[:1]
-        given, mass, ends, angle = (
-            neighbours.differences(lambda term, k=k: term._numbers[k]) for k in range(4)
-        )
-        if has_inertia(self._scheme) and mass[:, self._numbers[1] == 0.0].any():
+
+        def change(name: str) -> Array:
+            return neighbours.differences(lambda term: term._numbers[name])
+
+        mass, ends = change("mass"), change("ends")
+        if has_inertia(self._scheme) and mass[:, self._numbers["mass"] == 0.0].any():
             raise ArgumentError(
                 "differentiate: a moving load has no mass for the value of a parameter; choose "
                 "another value"
             )
-        now, end, before = np.zeros((3, parameters, forces.size))
-        neighbours.state(before)[:] = neighbours.differences(
-            lambda term: term._on_cells[2]
-        ).reshape(before.shape)
+        now, end = np.zeros((2, parameters, self._on_cells[0].size))
+        before = neighbours.state(neighbours.differences(lambda term: term._on_cells[2]))
         c = struct(
             "moving_derivatives", parameters=parameters, neighbours=number, ends_of=ends[0].size,
-            loads=here, neighbour=ffi.new("moving_loads *[]", [x._c for x in others]),
-            weight=neighbours.weights, given=given, mass=mass, ends=ends, angle=angle,
-            motion=np.zeros((parameters, len(self._kinetic), 3)), now=now, end=end, before=before,
+            loads=self._c, neighbour=ffi.new("moving_loads *[]", [x._c for x in others]),
+            weight=neighbours.weights, given=change("given"), mass=mass, ends=ends,
+            angle=change("angles"), motion=np.zeros((parameters, len(self._kinetic), 3)),
+            now=now, end=end, before=before,
         )  # fmt: skip
         return [in_c("moving_loads", c)]
 

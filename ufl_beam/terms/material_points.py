@@ -353,9 +353,8 @@ class Points:
             if values.any():
                 fill(c, **{field: np.ascontiguousarray(values)})
         if self.committed is not None:
-            self.tangents = neighbours.state(
-                neighbours.differences(attrgetter(f"{path}.committed"))
-            )
+            tangents = neighbours.differences(attrgetter(f"{path}.committed"))
+            self.tangents = neighbours.state(tangents)
             elastic = neighbours.differences(attrgetter(f"{path}._elastic"))
             # An eighth of the neighbours' distance: near the scene, and 1e-12 of round-off
             step = 1 / (8 * np.abs(neighbours.weights).max(axis=1))
