@@ -273,6 +273,19 @@ def test_lengths_of_beams_change_the_forces_of_moving_loads_and_works():
 
 
 @pytest.mark.serial
+@pytest.mark.parametrize("model", [follower, works, viscous, imposed_on_points])
+def test_a_number_without_effect_changes_nothing(model):
+    """Differences of equal forces are exact zeros: round-off would pass for a small effect."""
+
+    def idle(x):
+        return model()
+
+    with raises("x does not enter the motion"):
+        options = {"t": (0, 0.2), "dt": 0.1, "progress": False}
+        ub.differentiate(idle, {"x": 1.0}, ub.EnergyMomentum(), **options)
+
+
+@pytest.mark.serial
 def test_strains_and_masses_that_begin_at_zero_are_refused():
     """The terms of the scene itself then lack the effect."""
 

@@ -556,11 +556,15 @@ void differentiate_loads(void *self, const time_step *step, const double *q1)
     const double *before = l->before + (size_t)p * l->size;
     memset(end, 0, l->size * sizeof *end);
     for (int k = 0; k < l->neighbours; ++k) {
-      const dead_loads *one = l->neighbour[p * l->neighbours + k];
-      for (int j = 0; j < one->vectors; ++j) {
-        const double factor = l->weight[p * l->neighbours + k] * value_at(one->factor + j, step->load_time);
-        for (int i = 0; i < one->size; ++i) end[one->dof[i]] += factor * one->vector[j][i];
-      }
+      /* Loads that do not change give exact zeros. */
+      const dead_loads *both[2] = {l->neighbour[p * l->neighbours + k], l->here};
+      for (int j = 0; j < both[0]->vectors || j < both[1]->vectors; ++j)
+        for (int of = 0; of < 2; ++of) {
+          const dead_loads *one = both[of];
+          if (j >= one->vectors) continue;
+          const double factor = l->weight[p * l->neighbours + k] * value_at(one->factor + j, step->load_time);
+          for (int i = 0; i < one->size; ++i) end[one->dof[i]] += (of ? -factor : factor) * one->vector[j][i];
+        }
     }
     for (int i = 0; i < l->size; ++i) {
       end[i] = before[i] + step->fraction * (end[i] - before[i]);
@@ -590,9 +594,10 @@ static void move_supports(const derivatives *d, const time_loop *m, int p, doubl
   turn_axes(e->turned, e->axes, d->space, 1);
   for (int k = 0; k < m->supports->moving; ++k) {
     const int i = m->supports->dof[k];
+    const double here = value_at(m->supports->motion + k, m->step.motion_time);
     double wanted = 0;
-    for (int j = 0; j < d->neighbours; ++j)
-      wanted += d->weight[p * d->neighbours + j] * value_at(d->motion[p * d->neighbours + j] + k, m->step.motion_time);
+    for (int j = p * d->neighbours; j < (p + 1) * d->neighbours; ++j)
+      wanted += d->weight[j] * (value_at(d->motion[j] + k, m->step.motion_time) - here);
     v[i] = d->space[i] + m->step.fraction * (wanted - d->space[i]);
   }
 }
