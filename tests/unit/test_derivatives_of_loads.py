@@ -297,3 +297,12 @@ def test_strains_and_masses_that_begin_at_zero_are_refused():
         ub.differentiate(heated, {"strain": 0.0}, ub.Static(), **options)
     with raises("has no mass"):
         ub.differentiate(moving_mass, {"mass": 0.0}, ub.EnergyMomentum(), **options)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("model", [follower, works, imposed_on_points, damped_points, guided])
+def test_effects_without_an_adjoint_are_refused(model):
+    at = dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
+    options = {"t": (0, 0.1), "dt": 0.05, "of": lambda run: run.q[:, 3]}
+    with raises("has no adjoint; use differentiate"):
+        ub.gradient(model, at, ub.EnergyMomentum(), **options)

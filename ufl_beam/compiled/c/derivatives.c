@@ -335,6 +335,26 @@ void accept_points_derivative(void *self, const derivatives *d, int q)
 
 /* -- connectors -------------------------------------------------------------------------------------- */
 
+/* Derivatives of the motions of motors and of the forces of actuators in the step. */
+static void find_prescribed(const connector_derivatives *m, const time_step *step)
+{
+  const connector_term *t = m->term;
+  for (int k = 0; m->now && k < m->parameters * t->connectors->number; ++k) {
+    const int p = k / t->connectors->number, i = k % t->connectors->number;
+    double wanted = 0;
+    for (int j = 0; j < m->neighbours; ++j) {
+      const connector_term *one = m->neighbour[p * m->neighbours + j];
+      const double change = t->wanted_motion
+        ? value_at(one->wanted_motion + i, step->motion_time) - value_at(t->wanted_motion + i, step->motion_time)
+        : value_at(t->wanted_force + i, step->load_time) - value_at(one->wanted_force + i, step->load_time);
+      wanted += m->weight[p * m->neighbours + j] * change;
+    }
+    const double before = t->wanted_motion ? m->e0[k] : m->reached[k];
+    m->end[k] = before + step->fraction * (wanted - before);
+    m->now[k] = t->wanted_motion ? m->end[k] : before + step->at * (m->end[k] - before);
+  }
+}
+
 /* Motions at the end of the step, their derivatives by the unknowns, and the derivatives of laws. */
 void tabulate_connectors(void *self, const time_step *step, const double *q1)
 {
@@ -353,20 +373,7 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
     else set_slip(w, c->e1[i] - w[SLIP_START], c->rigid_plastic->direction[i]);
     ask_table(m->table, w, m->outputs, m->J + (size_t)i * m->outputs);
   }
-  for (int k = 0; k < m->parameters * c->number && (t->wanted_motion || t->wanted_force); ++k) {
-    const int p = k / c->number, i = k % c->number;
-    const time_step s = *step;
-    double wanted = 0;
-    for (int j = 0; j < m->neighbours; ++j) {
-      const connector_term *one = m->neighbour[p * m->neighbours + j];
-      const double value = t->wanted_motion ? value_at(one->wanted_motion + i, s.motion_time)
-                                            : -value_at(one->wanted_force + i, s.load_time);
-      wanted += m->weight[p * m->neighbours + j] * value;
-    }
-    const double before = t->wanted_motion ? m->e0[k] : m->reached[k];
-    m->end[k] = before + s.fraction * (wanted - before);
-    m->now[k] = t->wanted_motion ? m->end[k] : before + s.at * (m->end[k] - before);
-  }
+  find_prescribed(m, step);
 }
 
 /* Set the derivative of the slip of a rigid-plastic connector from that of its motion. */
@@ -548,6 +555,14 @@ static void advance_rates(const derivatives *d, const time_loop *m, const step_p
 
 /* -- loads and prescribed motions ---------------------------------------------------------------------- */
 
+/* Add `weight` times the forces of a vector of loads at the time of the step. */
+static void add_loads(const dead_loads *l, int vector, const time_step *step, double weight, double *out)
+{
+  if (vector >= l->vectors) return;
+  const double factor = weight * value_at(l->factor + vector, step->load_time);
+  for (int i = 0; i < l->size; ++i) out[l->dof[i]] += factor * l->vector[vector][i];
+}
+
 void differentiate_loads(void *self, const time_step *step, const double *q1)
 {
   const load_derivatives *l = self;
@@ -556,15 +571,12 @@ void differentiate_loads(void *self, const time_step *step, const double *q1)
     const double *before = l->before + (size_t)p * l->size;
     memset(end, 0, l->size * sizeof *end);
     for (int k = 0; k < l->neighbours; ++k) {
-      /* Loads that do not change give exact zeros. */
-      const dead_loads *both[2] = {l->neighbour[p * l->neighbours + k], l->here};
-      for (int j = 0; j < both[0]->vectors || j < both[1]->vectors; ++j)
-        for (int of = 0; of < 2; ++of) {
-          const dead_loads *one = both[of];
-          if (j >= one->vectors) continue;
-          const double factor = l->weight[p * l->neighbours + k] * value_at(one->factor + j, step->load_time);
-          for (int i = 0; i < one->size; ++i) end[one->dof[i]] += (of ? -factor : factor) * one->vector[j][i];
-        }
+      const dead_loads *one = l->neighbour[p * l->neighbours + k];
+      const double weight = l->weight[p * l->neighbours + k];
+      for (int j = 0; j < one->vectors || j < l->loads->vectors; ++j) { /* equal loads give exact zeros */
+        add_loads(one, j, step, weight, end);
+        add_loads(l->loads, j, step, -weight, end);
+      }
     }
     for (int i = 0; i < l->size; ++i) {
       end[i] = before[i] + step->fraction * (end[i] - before[i]);
@@ -585,6 +597,13 @@ void accept_load_derivative(void *self, const derivatives *d, int p)
   memcpy(l->before + (size_t)p * l->size, l->end + (size_t)p * l->size, l->size * sizeof *l->end);
 }
 
+/* Difference of the prescribed motion k between a neighbouring scene and the scene itself. */
+static double change_of_motion(const derivatives *d, const time_loop *m, int neighbour, int k)
+{
+  const double t = m->step.motion_time;
+  return value_at(d->motion[neighbour] + k, t) - value_at(m->supports->motion + k, t);
+}
+
 /* Derivatives of the prescribed motions at the end of the step, in the axes of supports; else zero. */
 static void move_supports(const derivatives *d, const time_loop *m, int p, double *v)
 {
@@ -594,10 +613,9 @@ static void move_supports(const derivatives *d, const time_loop *m, int p, doubl
   turn_axes(e->turned, e->axes, d->space, 1);
   for (int k = 0; k < m->supports->moving; ++k) {
     const int i = m->supports->dof[k];
-    const double here = value_at(m->supports->motion + k, m->step.motion_time);
     double wanted = 0;
-    for (int j = p * d->neighbours; j < (p + 1) * d->neighbours; ++j)
-      wanted += d->weight[j] * (value_at(d->motion[j] + k, m->step.motion_time) - here);
+    for (int j = 0; j < d->neighbours; ++j)
+      wanted += d->weight[p * d->neighbours + j] * change_of_motion(d, m, p * d->neighbours + j, k);
     v[i] = d->space[i] + m->step.fraction * (wanted - d->space[i]);
   }
 }
