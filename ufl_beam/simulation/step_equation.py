@@ -194,6 +194,8 @@ class StepEquation:
             fill(self.c, inner_force=self.force)
         # The ledger has all entries now, so their addresses, to which phases write, do not change.
         self.phases = [term.phases(callbacks) for term in self.terms]
+        for term, phases in zip(self.terms, self.phases, strict=True):
+            term.made_phases = phases
 
     # -- continued runs ------------------------------------------------------------------------
 

@@ -24,6 +24,7 @@ from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
+from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
@@ -52,6 +53,7 @@ class FormForces(Term):
     """Forces of a virtual work on cells, with forms of the energy lost in a step."""
 
     _entry: str  # name of the ledger entry of the losses
+    _of_step: Sequence[fem.Function] = ()  # coefficients that phases of a step set
 
     def __init__(
         self, work: ufl.Form, losses: Sequence[ufl.Form], fields: Fields, A: Csr, ledger: Ledger,
@@ -78,7 +80,7 @@ class FormForces(Term):
         """See the base class."""
         kernel = partial(self._fields.kernel, unknown=self._q1)
         return form_derivatives(
-            self._work_form, lambda term: term._force, kernel, self._q0, neighbours
+            self._work_form, lambda term: term._force, kernel, self._q0, neighbours, self._of_step
         )
 
     def phases(self, callbacks: Callbacks) -> Phases:
@@ -194,6 +196,20 @@ class Cells(Term):
         return self._at(q1, "change", u=u, x=x, y=y).value(q1)
 
 
+def imposed_directions(neighbours: Neighbours) -> Array | None:
+    """Return the derivatives of the imposed strains of cells, which steps set; None without."""
+    own, others = neighbours.term.imposed, [[x.imposed for x in some] for some in neighbours.terms]
+    if own is None:
+        if any(other is not None for some in others for other in some):
+            raise ArgumentError(
+                "differentiate: imposed strains are zero for the value of a parameter; choose "
+                "another value"
+            )
+        return None
+    directions: Array = own.differentiate(others)
+    return directions
+
+
 def section_law(groups: Iterable[Cells], numbering: DofNumbering) -> tuple[Array, Array]:
     """Return b and D of the section forces b + D e of cells about the accepted state.
 
@@ -285,6 +301,20 @@ class ElasticBeams(FormForces, Cells):
         imposed.enter_forms(kernels, work, imposed_at_points(element))
         if self.predicted is not None:
             fill(self.predicted, imposed=imposed.strains)
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        own = imposed_directions(neighbours)
+        if own is None:
+            return super().derivatives(neighbours)
+        function = imposed_at_points(self._fields.element)
+        self._of_step = [function]
+        kernel = partial(self._fields.kernel, unknown=self._q1)
+        f = form_derivative(
+            self._work_form, self._force, kernel, function, direction=own.ravel(),
+            stride=own[0].size,
+        )  # fmt: skip
+        return [*(super().derivatives(neighbours) or []), in_c("form", f)]
 
     def about_state(self) -> tuple[Index, Array, Array]:
         """See the base class."""
@@ -433,6 +463,8 @@ class InelasticBeams(Cells):
         strains_of, size = (lambda term: term._strains.kernel), self.points.r.size
         shape = shape_derivative(strains_of, neighbours, size)
         at = {"cells": self._in_c, "strains": by_q1, "shape": shape}
+        if (imposed := imposed_directions(neighbours)) is not None:
+            at["imposed"] = imposed
         points = self.points.derivatives(neighbours, "points", **at)
         force = partial(form_derivative, self._force_form, self._force, kernel)
         by_r = force(self._r, direction=points.r, stride=0, bar=points.r_bar)

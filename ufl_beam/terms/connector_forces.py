@@ -36,7 +36,7 @@ from ufl_beam.terms.connector_rows import (
     Setting,
     Springs,
 )
-from ufl_beam.terms.derivatives import Each, Neighbours, form_derivative, in_c
+from ufl_beam.terms.derivatives import Each, Neighbours, differences, form_derivative, in_c
 from ufl_beam.terms.term import Callbacks, Phases, Term, beginning
 
 
@@ -364,6 +364,12 @@ class Guides(ConnectorTerm):
         self._c.report, self._c.handle = lib.run_in_python, callbacks.handle(self._report)
         begin, accept = (loop(name, self._c) for name in ("begin_guides", "accept_guides"))
         return Phases([begin], [accept], again=begin)
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        c = struct("guide_derivatives", guides=self._c, tangent=np.zeros((len(self._curves), 2)))
+        found = differences(neighbours, lambda term: [term._s0, term._steps, term._on0])
+        return [found, in_c("guides", c)]
 
     def _begin_again(self) -> None:
         """Discard iterates, and begin at the accepted points of the curves."""

@@ -190,13 +190,55 @@ def shape_derivatives(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours
     return [in_c("shape", found)] if found else []
 
 
+def differences(
+    neighbours: Neighbours, state_of: Callable[[Any], Sequence[Array]] = lambda term: ()
+) -> Each:
+    """Return the derivative of a term by numbers of the scene, as differences of its forces.
+
+    The term in the neighbouring scenes takes the steps of the run, so that functions of time of a
+    user and states that do not depend on the motion need no derivatives of their own.  Other
+    derivatives of the term are those by the configuration before the step and by rates.
+
+    Args:
+        neighbours: The term.
+        state_of: Arrays of the state of a term that its next step needs.
+    """
+    made = list[Any]()
+    for some in neighbours.terms:
+        neighbours.states += [array for term in some for array in state_of(term)]
+    for term in (neighbours.term, *(x for some in neighbours.terms for x in some)):
+        phases = term.made_phases.begin, term.made_phases.accept
+        calls = [ffi.new("phase_call[]", list(some)) for some in phases]
+        neighbours.alive.append(calls)
+        both = [(len(some), call) for some, call in zip(phases, calls, strict=True)]
+        made.append((*both, term.loops[0]))
+    parameters, number = neighbours.weights.shape
+    size = neighbours.size
+    c = struct(
+        "term_differences", parameters=parameters, neighbours=number, size=size,
+        term=ffi.new("term_in_steps[]", made), weight=neighbours.weights, here=np.zeros(size),
+    )  # fmt: skip
+    return in_c("differences", c)
+
+
 LINEARIZE = {
     "form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads",
     "connectors": "tabulate_connectors", "second_differences": "tabulate_second_differences",
+    "differences": "begin_neighbours", "moving_loads": "differentiate_moving_loads",
+    "guides": "find_tangents_before", "imposed": "find_imposed_directions",
+    "damping": "tabulate_damping",
 }  # fmt: skip
 ACCEPT = {
     name: f"accept_{name}_derivative"
-    for name in ("points", "load", "connectors", "second_differences")
+    for name in (
+        "points",
+        "load",
+        "connectors",
+        "second_differences",
+        "differences",
+        "moving_loads",
+        "imposed",
+    )
 }
 
 
@@ -208,7 +250,8 @@ def in_c(kind: str, data: Any) -> Each:
 def functions(kind: str) -> list[Any]:
     """Return the functions of ``term_derivative`` of loops.h for a kind; null if there is none."""
     found = LINEARIZE.get(kind), f"add_{kind}_derivative", ACCEPT.get(kind)
-    return [ffi.addressof(lib, name) if name else ffi.NULL for name in found]
+    has = (name if name and hasattr(lib, name) else None for name in found)
+    return [ffi.addressof(lib, name) if name else ffi.NULL for name in has]
 
 
 # -- the adjoint -----------------------------------------------------------------------------------

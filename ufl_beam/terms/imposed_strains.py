@@ -20,10 +20,12 @@ from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
+from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.imposed_strains import ImposedStrain
+from ufl_beam.terms.derivatives import Each, Neighbours, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.load_forces import LoadTerm
 from ufl_beam.terms.term import Callbacks, Phases
@@ -63,6 +65,8 @@ class CellStrains:
         strains: Imposed strains at the integration points at both ends of the step;
             (num_cells, points, 2, 3); 1, 1, 1/m.
         c: ``imposed_cells`` of loops.h.
+        directions: Derivatives of ``strains`` by parameters, if they are asked for; (parameters,
+            num_cells, points, 2, 3).
     """
 
     def __init__(self, cells: Index, fields: Sequence[Array]) -> None:
@@ -83,6 +87,16 @@ class CellStrains:
             self.strains += factor * field[:, :, None]
         for kernel in self._kernels:
             kernel.put(self._function, self.strains.reshape(len(self.strains), -1))
+
+    def differentiate(self, neighbours: Sequence[Sequence[CellStrains | None]]) -> Array:
+        """Create and return :attr:`directions`; ``neighbours`` see :class:`Neighbours`."""
+        if any(other is None for some in neighbours for other in some):
+            raise ArgumentError(
+                "differentiate: imposed strains are zero for a neighbouring value of a parameter; "
+                "choose another value"
+            )
+        self.directions = np.zeros((len(neighbours), *self.strains.shape))
+        return self.directions
 
     @property
     def now(self) -> Array:
@@ -150,7 +164,7 @@ class ImposedStrains(LoadTerm):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return the loops that begin and accept a step."""
-        c = struct(
+        c = self._c = struct(
             "imposed_strains", functions=len(self._in_time), groups=len(self._cells),
             factor=callbacks.time_functions(self._in_time), factors=self._factors[0],
             factors_at_end=self._factors[1],
@@ -161,6 +175,20 @@ class ImposedStrains(LoadTerm):
         change = loop("change_of_imposed_strains", c)
         begin, accept = loop("begin_imposed_strains", c), loop("accept_imposed_strains", c)
         return Phases([begin], [accept], change=change)
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        parameters, number = neighbours.weights.shape
+        others = [x._c for some in neighbours.terms for x in some]
+        neighbours.states += [x._factors for some in neighbours.terms for x in some]
+        directions = [doubles(cells.directions) for cells in self._cells]
+        c = struct(
+            "imposed_derivatives", parameters=parameters, neighbours=number, here=self._c,
+            size=np.array([cells.strains.size for cells in self._cells], dtype=np.int32),
+            neighbour=ffi.new("imposed_strains *[]", others), weight=neighbours.weights,
+            direction=ffi.new("double *[]", directions),
+        )  # fmt: skip
+        return [in_c("imposed", c)]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the strains before the next step to the strains at the time ``t``."""

@@ -47,6 +47,7 @@ from ufl_beam.terms.beam_forces import FormForces, InelasticBeams
 from ufl_beam.terms.derivatives import (
     Each,
     Neighbours,
+    differences,
     form_derivative,
     form_derivatives,
     in_c,
@@ -290,6 +291,12 @@ class KelvinVoigtForces(FormForces):
         )  # fmt: skip
         return Phases([*begin, loop("begin_viscous_forms", c)], accept)
 
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        kernel = partial(self._fields.kernel, unknown=self._q1)
+        by_q0 = form_derivative(self._work_form, self._force, kernel, self._q0)
+        return [differences(neighbours), in_c("form", by_q0)]
+
 
 @cached_forms
 def _reference_stiffness(element: Element) -> ufl.Form:
@@ -376,6 +383,7 @@ class TangentRayleighForces(Term):
         for kernel in kernels:
             kernel.put(D, at_points.reshape(len(elastic), -1))
         forms = fields_of_forms(kernels, D)["form"]
+        self._inelastic = inelastic
         cells = [beams.keep_tangents() for beams in inelastic]
         groups = [(*tangents.shape, integers(cell), doubles(tangents)) for cell, tangents in cells]
         at, _ = self._times.A.places(C)
@@ -387,6 +395,7 @@ class TangentRayleighForces(Term):
             C=self._times.A.data,
         )  # fmt: skip
         self._alive = kernels, groups
+        self._form, self._tangents, self._fields, self._kernels = form, D, fields, kernels
         self.in_cells = [
             InCells(lambda: force, lib.STRESS, fields.order, factor=damping.stiffness),
             InCells(
@@ -401,6 +410,30 @@ class TangentRayleighForces(Term):
         fill(self._in_c, damping=c)
         begin, accept = (loop(f"{x}_tangent_damping", self._in_c) for x in ("begin", "accept"))
         return Phases([begin], [accept])
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        element, fields, own = self._fields.element, self._fields, self._in_c
+        for other in (x for some in neighbours.terms for x in some):
+            # Differences at the same rates, and at the same tangents of points
+            other._in_c.damping.rates = own.damping.rates
+            for g in range(own.groups):
+                other._in_c.group[g].tangents = own.group[g].tangents
+        kernel, form = partial(fields.kernel, unknown=element.q1), applied(self._form, element.q1)
+        by_q0 = form_derivative(form, self._kernels[1], kernel, element.q0)
+        force = kernel(form)
+        force.put(self._tangents, np.zeros(1))
+        directions = [doubles(beams.points.tangents) for beams in self._inelastic]
+        c = struct(
+            "damping_derivatives", damping=own, by_q0=by_q0, force=force.cells,
+            at_q0=force.position(element.q0), at_tangents=force.position(self._tangents),
+            tangents=ffi.new("double *[]", directions), r=np.zeros(fields.subdomain.size),
+        )  # fmt: skip
+        neighbours.alive.append((force, directions))
+        same = ffi.new("constant_matrix *[]", len(neighbours))
+        by_rates = struct("product_derivative", matrix=own.damping, change=same)
+        found = [in_c("product", by_rates), in_c("damping", c)]
+        return [differences(neighbours), *found]
 
 
 def damping_forces(

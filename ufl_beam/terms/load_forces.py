@@ -13,7 +13,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, number_view, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import cached_forms
 from ufl_beam.discretization.function_spaces import (
@@ -25,6 +25,7 @@ from ufl_beam.discretization.function_spaces import (
 )
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
+from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
@@ -41,7 +42,7 @@ from ufl_beam.model.loads import (
     Pressure,
     RotatingFrame,
 )
-from ufl_beam.terms.derivatives import Each, Neighbours, in_c
+from ufl_beam.terms.derivatives import Each, Neighbours, differences, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term
 
@@ -299,6 +300,11 @@ class FollowerLoads(_AtDofs):
         c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_follower_loads", c)], [loop("accept_follower_loads", c)])
 
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        found = differences(neighbours, lambda term: [term._sizes])
+        return [found, in_c("followers", self._c)]
+
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them."""
         self._sizes[:] = self._unit_forces * self._factors_at(t).reshape(-1, 1)
@@ -367,6 +373,11 @@ class Pressures(_AtDofs):
         c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_pressures", c)], [loop("accept_pressures", c)])
 
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        found = differences(neighbours, lambda term: [term._factors])
+        return [found, in_c("pressures", self._c)]
+
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them."""
         self._factors[:] = self._factors_at(t)
@@ -400,6 +411,7 @@ class MovingLoads(_AtDofs):
         rates: Any,
     ) -> None:
         self._ledger, numbering, mesh = ledger, subdomain.numbering, subdomain.numbering.mesh
+        self._scheme = scheme
         self._positions = [(load.position, load) for load in loads]
         cells = [np.concatenate([numbering.cells_of(x) for x in load.route]) for load in loads]
         order: Index = np.flatnonzero(np.isin(subdomain.cells, np.concatenate(cells)))
@@ -415,21 +427,24 @@ class MovingLoads(_AtDofs):
         self._on_cells = np.zeros((3, *dofs.shape))
         each, second = np.zeros((2, len(order), 3 * len(mesh.nodes)))
         self._each = ffi.new("double *[1]", [doubles(each)]), each
+        ends = np.concatenate([np.column_stack([x[:-1], x[1:]]) for x in along])
+        given, mass = (np.array([getattr(x, name) for x in loads]) for name in ("force", "mass"))
         self._c = struct(
             "moving_loads", loads=len(loads), cells=len(order), nodes=len(mesh.nodes),
             size=len(self.dofs), dof=self.dofs,
             at=np.searchsorted(self.dofs, dofs).astype(np.int32),
             first=np.cumsum([0, *map(len, cells)]).astype(np.int32),
             cell=np.concatenate([number[x] for x in cells]),
-            ends=np.concatenate([np.column_stack([x[:-1], x[1:]]) for x in along]),
+            ends=ends,
             polynomial=mesh.polynomials[:, _in_order(mesh)].T.copy(),
-            given=np.array([load.force for load in loads]), now=self._on_cells[0],
+            given=given, now=self._on_cells[0],
             end=self._on_cells[1], before=self._on_cells[2], each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
             weight_of_before=scheme.weight_of_before,
         )  # fmt: skip
-        self._A, tangent, mass = A, None, np.array([load.mass for load in loads])
-        self._kinetic = np.zeros(len(loads))
+        self._A, tangent, self._kinetic = A, None, np.zeros(len(loads))
+        angles = numbering.axis_angles[self._cells]
+        self._numbers = {"given": given, "mass": mass, "ends": ends, "angles": angles}
         self._heavy = rates is not None and bool(mass.any())
         if self._heavy:
             whole, n = subdomain.cell_dofs[order], 2 * len(mesh.nodes)
@@ -439,7 +454,7 @@ class MovingLoads(_AtDofs):
                 here=np.full(len(loads), -1, dtype=np.int32), motion=np.zeros((len(loads), 3)),
                 freedom=whole.astype(np.int32),
                 entry=A.positions(rows.ravel(), columns.ravel()),
-                angle=numbering.axis_angles[self._cells], part=scheme.load_weight,
+                angle=angles, part=scheme.load_weight,
                 half_tangents=scheme.half_tangents,
             )  # fmt: skip
             tangent = loop("add_tangent_of_moving_masses", self._c)
@@ -459,6 +474,31 @@ class MovingLoads(_AtDofs):
             c.stored = self._ledger.state.pointer("kinetic")
             energies = [loop("add_energy_of_moving_masses", c)]
         return Phases([loop("begin_moving_loads", c)], [loop("accept_moving_loads", c)], energies)
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        parameters, number = neighbours.weights.shape
+        others = [x for some in neighbours.terms for x in some]
+
+        def change(name: str) -> Array:
+            return neighbours.differences(lambda term: term._numbers[name])
+
+        mass, ends = change("mass"), change("ends")
+        if has_inertia(self._scheme) and mass[:, self._numbers["mass"] == 0.0].any():
+            raise ArgumentError(
+                "differentiate: a moving load has no mass for the value of a parameter; choose "
+                "another value"
+            )
+        now, end = np.zeros((2, parameters, self._on_cells[0].size))
+        before = neighbours.state(neighbours.differences(lambda term: term._on_cells[2]))
+        c = struct(
+            "moving_derivatives", parameters=parameters, neighbours=number, ends_of=ends[0].size,
+            loads=self._c, neighbour=ffi.new("moving_loads *[]", [x._c for x in others]),
+            weight=neighbours.weights, given=change("given"), mass=mass, ends=ends,
+            angle=change("angles"), motion=np.zeros((parameters, len(self._kinetic), 3)),
+            now=now, end=end, before=before,
+        )  # fmt: skip
+        return [in_c("moving_loads", c)]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them.
@@ -566,6 +606,11 @@ class FrameForces(LoadTerm):
         """Return the loops that begin and accept a step."""
         self._c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_frame", self._c)], [loop("accept_frame", self._c)])
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        found = differences(neighbours, lambda term: [number_view(term._c, "grown")])
+        return [found, in_c("frame", self._c)]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the forces before the next step to the forces at ``q``, and return them."""

@@ -248,6 +248,8 @@ class Points:
         committed: Derivatives of (N, V, M) in the accepted state by the strains, with negative
             eigenvalues set to zero; (cells, 9).  None if no damping needs them, NaN until
             :meth:`start_tangents`.
+        tangents: Derivatives of ``committed`` by parameters, if they are asked for; (parameters,
+            cells, 9).
         recorded: For each cell: (N, V, M) in the accepted state, the jump of the last point, and
             the energies that plastic strains and discontinuities have dissipated since the
             beginning; (cells, 6); N, N, N m, rad or m, J, J.
@@ -342,8 +344,8 @@ class Points:
             unknown=self.names.index(by[1]) if by[1].startswith("new ") else 0,
             column=np.array([self.names.index(name) for name in by], dtype=np.int32),
             J=np.zeros((cells, per_cell, numbers["outputs"])), w=neighbours.state(change),
-            e0=neighbours.state(np.zeros((len(neighbours), cells, 3))), r=np.zeros((cells, 3)),
-            e1=np.zeros((cells, 3)), w_bar=np.zeros(self._storage.shape),
+            e0=neighbours.state(neighbours.differences(attrgetter(f"{path}._e0"))),
+            r=np.zeros((cells, 3)), e1=np.zeros((cells, 3)), w_bar=np.zeros(self._storage.shape),
             e0_bar=np.zeros((cells, 3)), r_bar=np.zeros((cells, 3)), **fields,
         )  # fmt: skip
         for field, name in (("B", "strains"), ("weight", "weights"), ("rest", "rest")):
@@ -351,6 +353,13 @@ class Points:
             if values.any():
                 bar = {f"{field}_bar": np.zeros(values[0].size)}
                 fill(c, **{field: np.ascontiguousarray(values)}, **bar)
+        if self.committed is not None:
+            tangents = neighbours.differences(attrgetter(f"{path}.committed"))
+            self.tangents = neighbours.state(tangents)
+            elastic = neighbours.differences(attrgetter(f"{path}._elastic"))
+            # An eighth of the neighbours' distance: near the scene, and 1e-12 of round-off
+            step = 1 / (8 * np.abs(neighbours.weights).max(axis=1))
+            fill(c, tangents=self.tangents, elastic=elastic, step=step)
         return c
 
     def __getitem__(self, name: str) -> Array:
@@ -431,6 +440,7 @@ class Points:
             elastic += (section_points.weights * self[name]) @ B**2
         self.committed = np.full((len(elastic), 9), np.nan)
         space = np.zeros(len(self.names))
+        self._elastic = elastic
         fill(self.c, committed=self.committed, elastic=elastic, inputs=space)
 
     def start_tangents(self) -> None:

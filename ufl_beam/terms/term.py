@@ -92,6 +92,9 @@ class Term(ABC):
     law_residual: Loop | None = None
     must_dissipate = False
 
+    made_phases: Phases
+    """Phases of the term in the equation of a step, which sets them."""
+
     _A: Csr
     """Matrix that the tangent is added to."""
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ import ufl
 from ufl.algorithms import expand_derivatives
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import ffi, fill, lib, loop, struct
+from ufl_beam.compiled.c_library import ffi, fill, lib, loop, number_view, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.function_spaces import Fields, element_of
@@ -23,6 +23,7 @@ from ufl_beam.errors import ModelError, shorten
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.functions import Constant
 from ufl_beam.model.works import Potential, Work
+from ufl_beam.terms.derivatives import Each, Neighbours, differences, form_derivative, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.load_forces import LoadTerm
 from ufl_beam.terms.term import Callbacks, InCells, Phases, entering
@@ -82,6 +83,13 @@ class Acting:
             at=np.array(at, dtype=np.int32), number=self._values, before=self._before,
             of_time=callbacks.time_functions([(value, work) for value in values]), **pointers,
         )  # fmt: skip
+
+    def by_q0(self) -> list[Each]:
+        """Return the derivative of the forces by the configuration before the step, if any."""
+        q0, q1 = self._fields.element.q0, self._fields.element.q1
+        kernel = partial(self._fields.kernel, unknown=q1)
+        found = form_derivative(self._forms.residual, self.residual, kernel, q0)
+        return [] if found is None else [in_c("form", found)]
 
     def initial_forces(self, q: Array, past: Archive | None) -> Array:
         """Return the forces before the next step, from ``past`` or at ``q``, and store them."""
@@ -183,6 +191,15 @@ class Works(LoadTerm):
         fill(self._c, work=ffi.new("user_work *[]", self._in_c))
         begin, accept = loop("begin_works", self._c), loop("accept_works", self._c)
         return Phases([begin], [accept], [loop("add_energy_of_works", self._c)])
+
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        found = [each for work in self._works for each in work.by_q0()]
+
+        def state_of(term: Works) -> list[Array]:
+            return [number_view(term._c, name) for name in ("t", "grown")]
+
+        return [differences(neighbours, state_of), *found]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the forces before the next step to the forces at ``q``, and return them."""

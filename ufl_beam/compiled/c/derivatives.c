@@ -262,6 +262,8 @@ static void find_strain_directions(const point_derivatives *m, const derivatives
     if (dq) multiply_tables(m->strains, 0, dq, 1, m->e1);
     if (m->shape) add_shape(m->shape, d->x, q, m->e1);
     for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
+    const double *imposed = m->imposed ? m->imposed + 6 * (size_t)q * p->cells : 0;
+    for (int k = 0; imposed && k < 3 * p->cells; ++k) m->e1[k] -= imposed[k / 3 * 6 + 3 + k % 3];
     return;
   }
   if (!dq) return; /* the form of the forces has the derivative by geometry at constant unknowns */
@@ -282,11 +284,52 @@ void add_points_derivative(void *self, const derivatives *d, int q, double *r)
     for (int i = 0; i < m->points->cells; ++i) m->row[3 * i + 2] = m->r[3 * i];
 }
 
+/* Derivatives of the committed tangents, see keep_tangents, in the direction of the inputs of the points,
+ * by differences. */
+static void differentiate_tangents(const point_derivatives *m, int q)
+{
+  static const double at[4] = {-2, -1, 1, 2}, part[4] = {1. / 12, -8. / 12, 8. / 12, -1. / 12};
+  const points *p = m->points;
+  const int d = p->components, width = p->width, one = 3 * d * p->of_cell;
+  points at_end = *p;
+  at_end.tried = 0;
+  for (int c = 0; c < p->cells; ++c) {
+    const size_t number = (size_t)q * p->cells + c;
+    memset(m->tangents + 9 * number, 0, 9 * sizeof(double));
+    for (int k = 0; k < 4; ++k) {
+      const double h = at[k] * m->step[q], *w = p->w + (size_t)c * p->of_cell * width;
+      const double *dw = m->w + number * p->of_cell * width;
+      double D[9] = {0}, C[3], b[9], s[3 + 9], r[3] = {0};
+      for (int j = 0; j < 3; ++j) {
+        D[4 * j] = p->rest[j] + (m->rest ? h * m->rest[3 * q + j] : 0);
+        C[j] = p->elastic[3 * c + j] + h * m->elastic[3 * number + j];
+      }
+      for (int i = 0; i < p->of_cell; ++i, w += width, dw += width) {
+        double weight = p->weight[i] + (m->weight ? h * m->weight[q * p->of_cell + i] : 0);
+        for (int j = 0; j < width; ++j) p->inputs[j] = w[j] + h * dw[j];
+        for (int j = 0; j < 3 * d; ++j)
+          b[j] = p->B[3 * d * i + j] + (m->B ? h * m->B[(size_t)q * one + 3 * d * i + j] : 0);
+        if (!answer_at(&at_end, 1, p->inputs, s)) {
+          answer_at(&at_end, p->theta, p->inputs, s);
+          weight /= p->theta;
+        }
+        add_answer(d, b, weight, s, r, D);
+      }
+      remove_negative(C, D);
+      for (int j = 0; j < 9; ++j) m->tangents[9 * number + j] += part[k] / m->step[q] * D[j];
+    }
+  }
+}
+
 /* Derivatives of the strains, and of the state of the points, at the end of the step. */
 void accept_points_derivative(void *self, const derivatives *d, int q)
 {
   const point_derivatives *m = self;
   find_strain_directions(m, d, q, d->q1 + (size_t)q * d->size);
+  if (m->tangents) {
+    differentiate_points(m, d, q, m->e1, 0, 0);
+    differentiate_tangents(m, q);
+  }
   differentiate_points(m, d, q, m->e1, 0, 1);
 }
 
@@ -577,6 +620,299 @@ static void move_supports(const derivatives *d, const time_loop *m, int p, doubl
   }
 }
 
+/* -- terms of loads by differences between scenes ------------------------------------------------------ */
+
+void begin_neighbours(void *self, const time_step *step, const double *q1)
+{
+  const term_differences *t = self;
+  const call *force = &t->term->force;
+  for (int k = 1; k <= t->parameters * t->neighbours; ++k) run(&t->term[k].begin, step, 0, 0);
+  memset(t->here, 0, t->size * sizeof *t->here);
+  force->add(force->self, q1, t->here);
+}
+
+/* Five-point differences of the forces at constant unknowns and rates. */
+void add_differences_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const term_differences *t = self;
+  for (int k = p * t->neighbours; k < (p + 1) * t->neighbours; ++k) {
+    const call *force = &t->term[1 + k].force;
+    memset(d->space, 0, t->size * sizeof *d->space);
+    force->add(force->self, d->x, d->space);
+    for (int i = 0; i < t->size; ++i) r[i] += t->weight[k] * (d->space[i] - t->here[i]);
+  }
+}
+
+void accept_differences_derivative(void *self, const derivatives *d, int p)
+{
+  const term_differences *t = self;
+  for (int k = p * t->neighbours; k < (p + 1) * t->neighbours; ++k)
+    run(&t->term[1 + k].accept, d->step, d->x, d->s);
+}
+
+/* -- loads that depend on the configuration before the step -------------------------------------------- */
+
+void add_followers_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const follower_loads *f = self;
+  for (int k = 0; k < f->number; ++k) {
+    const double turn = (1 - f->part) * d->q0[(size_t)p * d->size + f->turning[k]];
+    const int32_t *at = f->at + 3 * k;
+    double x, y;
+    turn_load(f, k, d->x, &x, &y);
+    r[f->dof[at[0]]] += y * turn, r[f->dof[at[1]]] -= x * turn;
+  }
+}
+
+void add_pressures_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const pressures *of = self;
+  const double *q0 = d->q0 + (size_t)p * d->size;
+  double x[8] = {0}, e[8];
+  for (int k = 0; k < of->cells; ++k) {
+    const int32_t *at = of->at + 2 * of->nodes * k;
+    for (int i = 0; i < 2 * of->nodes; ++i) x[i] = (1 - of->part) * q0[of->dof[at[i]]];
+    find_pressure(of, k, x, e);
+    for (int i = 0; i < 2 * of->nodes; ++i) r[of->dof[at[i]]] += e[i];
+  }
+}
+
+void add_frame_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const rotating_frame *f = self;
+  const double *q0 = d->q0 + (size_t)p * d->size;
+  for (int i = 0; i < f->size; ++i) d->space[i] = -f->growth * (1 - f->part) * q0[i];
+  add_product(f->pull, d->space, r);
+  for (int i = 0; i < f->size; ++i) d->space[i] = -q0[i] / f->dt;
+  add_product(f->turn, d->space, r);
+}
+
+/* -- moving loads --------------------------------------------------------------------------------------- */
+
+/* Derivative of the position of load k at a time. Forces of neighbouring scenes would not do: they have
+ * kinks where loads pass from cell to cell. */
+static double change_of_position(const moving_derivatives *m, int p, int k, double t)
+{
+  const double here = value_at(m->loads->position + k, t);
+  double sum = 0;
+  for (int j = p * m->neighbours; j < (p + 1) * m->neighbours; ++j)
+    sum += m->weight[j] * (value_at(m->neighbour[j]->position + k, t) - here);
+  return sum;
+}
+
+/* Derivative of the place s in cell i, from 0 to 1, for the derivative of the distance. */
+static double change_in_cell(const moving_derivatives *m, int p, int i, double s, double distance)
+{
+  const double *ends = m->loads->ends + 2 * i, *change = m->ends + (size_t)p * m->ends_of + 2 * i;
+  return (distance - change[0] - s * (change[1] - change[0])) / (ends[1] - ends[0]);
+}
+
+/* Derivatives of the forces without masses, and of the motions of the masses along their beams. */
+void differentiate_moving_loads(void *self, const time_step *step, const double *q1)
+{
+  const moving_derivatives *m = self;
+  const moving_loads *of = m->loads;
+  const int n = of->nodes, all = 2 * n * of->cells;
+  for (int p = 0; p < m->parameters; ++p) {
+    double *end = m->end + (size_t)p * all, *now = m->now + (size_t)p * all;
+    const double *before = m->before + (size_t)p * all;
+    memset(end, 0, all * sizeof *end);
+    for (int k = 0; k < of->loads; ++k) {
+      const double t = step->load_time, factor = value_at(of->factor + k, t), half = step->dt / 2;
+      const double *given = of->given + 2 * k, *by = m->given + 2 * ((size_t)p * of->loads + k);
+      double way[3] = {0, change_of_position(m, p, k, t), 0}, *motion = m->motion + 3 * ((size_t)p * of->loads + k);
+      double s, shape[4], slope[4], change = 0;
+      const int i = find_loaded_cell(of, k, value_at(of->position + k, t), &s);
+      if (i < 0) continue;
+      for (int j = p * m->neighbours; j < (p + 1) * m->neighbours; ++j)
+        change += m->weight[j] * (value_at(m->neighbour[j]->factor + k, t) - factor);
+      const double ds = change_in_cell(m, p, i, s, way[1]);
+      double *on = end + 2 * n * of->cell[i];
+      find_shapes(of, s, shape, slope);
+      for (int l = 0; l < 2; ++l)
+        for (int j = 0; j < n; ++j)
+          on[n * l + j] += (change * given[l] + factor * by[l]) * shape[j] + factor * given[l] * slope[j] * ds;
+      if (!of->rates) continue;
+      for (int j = 0; j < 3; j += 2) way[j] = change_of_position(m, p, k, t + (j - 1) * half);
+      motion[0] = ds;
+      motion[1] = (way[2] - way[0]) / step->dt;
+      motion[2] = (way[2] - 2 * way[1] + way[0]) / (half * half);
+    }
+    for (int i = 0; i < all; ++i) {
+      end[i] = before[i] + step->fraction * (end[i] - before[i]);
+      now[i] = before[i] + step->at * (end[i] - before[i]);
+    }
+  }
+}
+
+/* Second derivatives of the shape functions by the place s. */
+static void find_bends(const moving_loads *m, double s, double *bend)
+{
+  for (int j = 0; j < m->nodes; ++j) {
+    bend[j] = 0;
+    for (int power = m->nodes - 1; power > 1; --power)
+      bend[j] = bend[j] * s + power * (power - 1) * m->polynomial[j * m->nodes + power];
+  }
+}
+
+/* Derivative of rate_at at constant unknowns. `grows` is the derivative of the step by its end. */
+static double change_of_rate(const derivatives *d, const rates *r, const double *row, int p, int dof, double grows)
+{
+  double sum = -row[0] * grows * d->q0[(size_t)p * d->size + dof];
+  for (int j = 1; j < r->number; ++j)
+    if (row[j] != 0) sum += row[j] * d->rates[j][(size_t)p * d->size + dof];
+  return sum;
+}
+
+/* Derivative of the forces of mass k, see subtract_moving_loads and find_on_axis. */
+static void add_moving_mass_derivative(const moving_derivatives *m, const derivatives *d, int p, int k, double *r)
+{
+  const moving_loads *of = m->loads;
+  const double *q1 = d->x, *q0 = d->q0 + (size_t)p * d->size;
+  const double *motion = m->motion + 3 * ((size_t)p * of->loads + k), ds = motion[0];
+  on_axis a;
+  if (!find_on_axis(of, k, q1, &a)) return;
+  const int i = of->here[k], n = of->nodes;
+  const double s = of->motion[3 * k], length = of->ends[2 * i + 1] - of->ends[2 * i];
+  const double *longer = m->ends + (size_t)p * m->ends_of + 2 * i, stretch = (longer[1] - longer[0]) / length;
+  const double *ends = of->angle + 2 * a.cell, *turned = m->angle + 2 * ((size_t)p * of->cells + a.cell);
+  double bend[4], angle = turned[0] + s * (turned[1] - turned[0]) + ds * (ends[1] - ends[0]), spin = 0;
+  double curvature = (turned[1] - turned[0]) / length - stretch * a.curvature, rate = 0;
+  double x = a.acceleration * a.c - a.turn * a.s, y = a.acceleration * a.s + a.turn * a.c, dx = 0, dy = 0;
+  find_bends(of, s, bend);
+  for (int j = 0; j < n; ++j) {
+    const int dof = a.psi[j];
+    const double psi = of->q0[dof] + of->part * (q1[dof] - of->q0[dof]), change = (1 - of->part) * q0[dof];
+    const double half = step_of(of, q1, dof, 1) / 2, grows = of->half_tangents ? 1 + half * half : 1;
+    const double slope = a.slope[j] * length * ds; /* derivative of the shape function */
+    angle += slope * psi + a.shape[j] * change;
+    curvature += bend[j] / length * ds * psi + a.slope[j] * change;
+    spin += slope * rate_at(of->rates, a.velocity, dof, 2 * half)
+      + a.shape[j] * change_of_rate(d, of->rates, a.velocity, p, dof, grows);
+    rate += a.shape[j] * rate_at(of->rates, a.velocity, dof, 2 * half);
+    const double ax = rate_at(of->rates, a.inertia, a.x[j], step_of(of, q1, a.x[j], 0));
+    const double ay = rate_at(of->rates, a.inertia, a.y[j], step_of(of, q1, a.y[j], 0));
+    x += a.shape[j] * ax, y += a.shape[j] * ay;
+    dx += slope * ax + a.shape[j] * change_of_rate(d, of->rates, a.inertia, p, a.x[j], 1);
+    dy += slope * ay + a.shape[j] * change_of_rate(d, of->rates, a.inertia, p, a.y[j], 1);
+  }
+  const double turn = 2 * (motion[1] * rate + a.speed * spin)
+    + 2 * a.speed * motion[1] * a.curvature + a.speed * a.speed * curvature;
+  const double along = motion[2] - a.turn * angle, across = turn + a.acceleration * angle;
+  dx += along * a.c - across * a.s, dy += along * a.s + across * a.c;
+  const double mass = of->mass[k], heavier = m->mass[(size_t)p * of->loads + k];
+  for (int j = 0; j < n; ++j) {
+    const double share = heavier * a.shape[j] + mass * a.slope[j] * length * ds;
+    r[a.x[j]] += share * x + mass * a.shape[j] * dx;
+    r[a.y[j]] += share * y + mass * a.shape[j] * dy;
+  }
+}
+
+void add_moving_loads_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const moving_derivatives *m = self;
+  const moving_loads *of = m->loads;
+  const int all = 2 * of->nodes * of->cells;
+  for (int i = 0; i < all; ++i) r[of->dof[of->at[i]]] -= m->now[(size_t)p * all + i];
+  for (int k = 0; of->rates && k < of->loads; ++k) add_moving_mass_derivative(m, d, p, k, r);
+}
+
+void accept_moving_loads_derivative(void *self, const derivatives *d, int p)
+{
+  const moving_derivatives *m = self;
+  const size_t all = 2 * (size_t)m->loads->nodes * m->loads->cells;
+  memcpy(m->before + p * all, m->end + p * all, all * sizeof *m->end);
+}
+
+/* -- guides ---------------------------------------------------------------------------------------------- */
+
+/* Unit tangents of the curves at the points before the step. */
+void find_tangents_before(void *self, const time_step *step, const double *q1)
+{
+  const guide_derivatives *m = self;
+  curve_around c;
+  for (int k = 0; k < m->guides->number; ++k) {
+    expand_curve(m->guides, k, m->guides->s0[k], &c);
+    for (int i = 0; i < 2; ++i) m->tangent[2 * k + i] = c.a[1][i] / hypot(c.a[1][0], c.a[1][1]);
+  }
+}
+
+/* The direction of a chord depends on the point before the step, see find_frame. */
+void add_guides_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const guide_derivatives *m = self;
+  const guides *g = m->guides;
+  const double *q0 = d->q0 + (size_t)p * d->size;
+  for (int k = 0; k < g->number && g->over_step; ++k) {
+    const int32_t *dofs = g->dofs + 7 * k;
+    const guide_frame *f = g->frame + k;
+    const double *t0 = m->tangent + 2 * k, t[2] = {f->n[1], -f->n[0]}, direction[2] = {f->m[1], -f->m[0]};
+    const double way = t0[0] * q0[dofs[1]] + t0[1] * q0[dofs[3]], force = d->x[dofs[6]];
+    const double chord[2] = {f->on[0] - g->on0[2 * k], f->on[1] - g->on0[2 * k + 1]};
+    const double length = hypot(chord[0], chord[1]);
+    double change[2];
+    if (length > g->shortest[k]) {
+      const double along = product_of(direction, t0);
+      for (int i = 0; i < 2; ++i) change[i] = (direction[i] * along - t0[i]) / copysign(length, product_of(chord, t));
+    } else change[0] = product_of(f->dm[1], t), change[1] = -product_of(f->dm[0], t);
+    r[dofs[1]] -= force * change[1] * way;
+    r[dofs[3]] += force * change[0] * way;
+  }
+}
+
+/* -- damping by the tangent of the accepted state ------------------------------------------------------ */
+
+void tabulate_damping(void *self, const time_step *step, const double *q1)
+{
+  const damping_derivatives *m = self;
+  tabulate_derivative(m->by_q0, step, m->damping->damping->product->rate);
+}
+
+/* Derivative of the damping matrix times the rates; the forms are linear in the tangents of sections. */
+void add_damping_derivative(void *self, const derivatives *d, int p, double *r)
+{
+  const damping_derivatives *m = self;
+  const tangent_damping *of = m->damping;
+  memset(m->r, 0, d->size * sizeof *r);
+  multiply_tables(m->by_q0, 0, d->q0 + (size_t)p * d->size, 0, m->r);
+  set_cells(m->force, d->step->q0, m->at_q0);
+  for (int g = 0; g < of->groups; ++g) {
+    const committed_cells *group = of->group + g;
+    const double *change = m->tangents[g] + (size_t)p * group->number * group->numbers;
+    for (int c = 0; c < group->number; ++c)
+      put_in_cell(m->force, group->cell[c], m->at_tangents, group->numbers, change + group->numbers * c);
+  }
+  if (of->groups) add_cells((void *)m->force, of->damping->product->rate, m->r);
+  for (int i = 0; i < d->size; ++i) r[i] += of->factor * m->r[i];
+}
+
+/* -- imposed strains ------------------------------------------------------------------------------------- */
+
+/* Derivatives of the imposed strains at both ends of the step, from scenes that take the same step. */
+void find_imposed_directions(void *self, const time_step *step, const double *q1)
+{
+  const imposed_derivatives *m = self;
+  for (int g = 0; g < m->here->groups; ++g)
+    memset(m->direction[g], 0, (size_t)m->parameters * m->size[g] * sizeof(double));
+  for (int k = 0; k < m->parameters * m->neighbours; ++k) {
+    begin_imposed_strains(m->neighbour[k], step, 0, 0);
+    for (int g = 0; g < m->here->groups; ++g) {
+      const double *here = m->here->group[g]->strains, *there = m->neighbour[k]->group[g]->strains;
+      double *out = m->direction[g] + (size_t)(k / m->neighbours) * m->size[g];
+      for (int i = 0; i < m->size[g]; ++i) out[i] += m->weight[k] * (there[i] - here[i]);
+    }
+  }
+}
+
+void accept_imposed_derivative(void *self, const derivatives *d, int p)
+{
+  const imposed_derivatives *m = self;
+  for (int k = p * m->neighbours; k < (p + 1) * m->neighbours; ++k) {
+    imposed_strains *one = m->neighbour[k];
+    memcpy(one->factors, one->factors_at_end, one->functions * sizeof *one->factors);
+  }
+}
+
 /* -- the step ------------------------------------------------------------------------------------------ */
 
 /* y += K x for the tangent before supports hold it */
@@ -597,7 +933,7 @@ int differentiate_step(derivatives *d, time_loop *m, int initial)
   const int n = d->size;
   const step_product *product = m->rates ? d->inertia : 0;
   int failed = 0;
-  d->x = m->x;
+  d->step = &m->step, d->x = m->x;
   memcpy(d->s, m->s, n * sizeof *d->s); /* solutions may write into this array */
   restart(e, EXACT);
   residual(e, e->unknowns, e->residual, e->f);
@@ -609,7 +945,8 @@ int differentiate_step(derivatives *d, time_loop *m, int initial)
   for (int p = 0; p < d->parameters && !failed; ++p) {
     double *r = e->residual, *q1 = d->q1 + (size_t)p * n, *reactions = d->reactions + (size_t)p * e->held;
     memset(d->r, 0, n * sizeof *r);
-    for (int k = 0; k < d->terms; ++k) d->term[k].add(d->term[k].self, d, p, d->r);
+    for (int k = 0; k < d->terms; ++k)
+      if (d->term[k].add) d->term[k].add(d->term[k].self, d, p, d->r);
     memcpy(r, d->r, n * sizeof *r);
     move_supports(d, m, p, d->v);
     if (m->supports->moving) {

@@ -110,6 +110,20 @@ void add_tangent_of_follower_loads(void *self, const double *q, double *tangent)
   }
 }
 
+/* Minus the forces on the nodes of cell k at the positions x of its nodes. */
+static void find_pressure(const pressures *p, int k, const double *x, double *e)
+{
+  const int n = p->nodes;
+  const double factor = p->now[p->load[k]];
+  const double along = factor * p->tangential[p->load[k]], across = factor * p->normal[p->load[k]];
+  for (int i = 0; i < n; ++i) {
+    const double *share = p->share + (n * k + i) * n;
+    double a = 0, b = 0;
+    for (int j = 0; j < n; ++j) a += share[j] * x[j], b += share[j] * x[n + j];
+    e[i] = across * b - along * a, e[n + i] = -across * a - along * b;
+  }
+}
+
 void subtract_pressures(void *self, const double *q, double *r)
 {
   const pressures *p = self;
@@ -118,20 +132,13 @@ void subtract_pressures(void *self, const double *q, double *r)
   memset(p->force, 0, p->size * sizeof *p->force);
   for (int k = 0; k < p->cells; ++k, e += 3 * n) {
     const int32_t *at = p->at + 2 * n * k;
-    const double factor = p->now[p->load[k]];
-    const double along = factor * p->tangential[p->load[k]], across = factor * p->normal[p->load[k]];
-    double x[8]; /* of the four nodes of degree 3 */
+    double x[8] = {0}; /* of the four nodes of degree 3 */
     for (int i = 0; i < 2 * n; ++i) {
       const int dof = p->dof[at[i]];
       x[i] = p->place[2 * n * k + i] + p->q0[dof] + p->part * (q[dof] - p->q0[dof]);
     }
-    for (int i = 0; i < n; ++i) {
-      const double *share = p->share + (n * k + i) * n;
-      double a = 0, b = 0;
-      for (int j = 0; j < n; ++j) a += share[j] * x[j], b += share[j] * x[n + j];
-      e[i] = across * b - along * a, e[n + i] = -across * a - along * b;
-      p->force[at[i]] -= e[i], p->force[at[n + i]] -= e[n + i];
-    }
+    find_pressure(p, k, x, e);
+    for (int i = 0; i < 2 * n; ++i) p->force[at[i]] -= e[i];
   }
   for (int i = 0; i < p->size; ++i) r[p->dof[i]] -= p->force[i];
 }

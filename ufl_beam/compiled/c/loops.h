@@ -1127,8 +1127,7 @@ int take_steps(time_loop *m, int steps, const double *ends, double seconds, int 
 enum { MOST_LANES = 16 }; /* largest number of cells in a batch */
 
 /* Derivatives of a term in a step: tables at the end of the step; derivatives of its forces by parameter
- * p at constant unknowns; derivatives of its state at the end of the step. `linearize` and `accept` may
- * be none. */
+ * p at constant unknowns; derivatives of its state at the end of the step. Each may be none. */
 typedef struct {
   void *self;
   void (*linearize)(void *self, const time_step *step, const double *q1);
@@ -1150,6 +1149,7 @@ struct derivatives {
   const double *x;        /* configuration at the end of the step */
   const int32_t *indices; /* columns of the tangent */
   double *tangent, *r, *v, *s, *space;
+  const time_step *step;  /* the step; s: of the nodes */
   /* Nearest switch of each parameter to another piece of the run, to first order: change of the parameter;
    * time; index of the term, and of the point or connector in it. */
   double *range, *range_time;
@@ -1210,6 +1210,11 @@ typedef struct {
   double *J;                      /* tables of all points */
   double *w, *e0;                 /* derivatives of the data of the points, and of the strains before the step */
   const double *B, *weight, *rest; /* of the geometry of the sections; or none */
+  const double *imposed;          /* see imposed_derivatives; or none */
+  /* Of committed tangents, if a damping uses them: derivatives, also of the elastic stiffnesses; steps of
+   * parameters for differences. */
+  double *tangents;
+  const double *elastic, *step;
   double *r, *e1, *row;           /* of one parameter: of resultants and strains; of the rows of springs */
   double *w_bar, *e0_bar, *r_bar, *row_bar, *B_bar, *weight_bar, *rest_bar; /* of the adjoint; or none */
 } point_derivatives;
@@ -1254,6 +1259,56 @@ typedef struct {
   double *now, *end, *before; /* in the equation, at the end of this step, at the end of the last step */
 } load_derivatives;
 
+/* A term in the steps of a run. */
+typedef struct { phases begin, accept; call force; } term_in_steps;
+
+/* Derivatives of a term by numbers of the scene, as differences: the same term in scenes with other
+ * values of a parameter takes the steps of the run. */
+typedef struct {
+  int parameters, neighbours, size;
+  const term_in_steps *term; /* of the scene; then of its neighbours, parameters x neighbours */
+  const double *weight;      /* see derivatives */
+  double *here;              /* forces of the scene */
+} term_differences;
+
+/* Derivatives of moving loads. Arrays have a row for each parameter. */
+typedef struct {
+  int parameters, neighbours, ends_of; /* ends_of: length of a row of `ends` */
+  const moving_loads *loads;
+  const moving_loads *const *neighbour;
+  const double *weight;       /* see derivatives */
+  const double *given, *mass, *ends, *angle; /* derivatives of the numbers of moving_loads */
+  double *motion;             /* derivatives of the motions of masses */
+  double *now, *end, *before; /* of the forces on cells */
+} moving_derivatives;
+
+/* Guides and the unit tangents of their curves at the points before the step. */
+typedef struct {
+  const guides *guides;
+  double *tangent;
+} guide_derivatives;
+
+/* Derivatives of the damping by the tangent of the accepted state, by the configuration in its forms and
+ * by the tangents of sections. */
+typedef struct {
+  const tangent_damping *damping;
+  form_derivative *by_q0;
+  const cells *force;            /* the form of the forces, for derivatives of the tangents */
+  int at_q0, at_tangents;        /* positions in its coefficients */
+  const double *const *tangents; /* of each group: derivatives, with a row for each parameter */
+  double *r;
+} damping_derivatives;
+
+/* Derivatives of imposed strains, for each group a row of `size` numbers for each parameter. */
+typedef struct {
+  int parameters, neighbours;
+  const int32_t *size;
+  const imposed_strains *here;
+  imposed_strains *const *neighbour; /* in scenes with other values of a parameter */
+  const double *weight;              /* see derivatives */
+  double *const *direction;
+} imposed_derivatives;
+
 /* Transposes of a term: from the state at the end of a step to the state before it; from lambda, the
  * derivatives by the forces, to the state before the step; from the initial state to the parameters.
  * `state` and `finish` may be none. */
@@ -1297,6 +1352,21 @@ void transpose_shape(void *self, adjoint *a, const double *lambda);
 void finish_form(void *self, adjoint *a);
 void finish_points(void *self, adjoint *a);
 int differentiate_step(derivatives *d, time_loop *m, int initial);
+void begin_neighbours(void *self, const time_step *step, const double *q1);
+void differentiate_moving_loads(void *self, const time_step *step, const double *q1);
+void find_tangents_before(void *self, const time_step *step, const double *q1);
+void tabulate_damping(void *self, const time_step *step, const double *q1);
+void add_damping_derivative(void *self, const derivatives *d, int p, double *r);
+void find_imposed_directions(void *self, const time_step *step, const double *q1);
+void add_differences_derivative(void *self, const derivatives *d, int p, double *r);
+void add_followers_derivative(void *self, const derivatives *d, int p, double *r);
+void add_pressures_derivative(void *self, const derivatives *d, int p, double *r);
+void add_frame_derivative(void *self, const derivatives *d, int p, double *r);
+void add_moving_loads_derivative(void *self, const derivatives *d, int p, double *r);
+void add_guides_derivative(void *self, const derivatives *d, int p, double *r);
+void accept_imposed_derivative(void *self, const derivatives *d, int p);
+void accept_differences_derivative(void *self, const derivatives *d, int p);
+void accept_moving_loads_derivative(void *self, const derivatives *d, int p);
 void keep_derivatives(derivatives *d, const time_loop *m);
 void add_form_derivative(void *self, const derivatives *d, int p, double *r);
 void add_connectors_derivative(void *self, const derivatives *d, int p, double *r);
