@@ -153,6 +153,11 @@ def differentiate(
     for some in neighbours:
         for other in some:
             other.close()
+    for name, enters in zip(values, steps.enters(), strict=True):
+        if not enters:
+            raise ArgumentError(
+                f"differentiate: the run does not depend on {name}; remove it from at"
+            )
     return Derivatives(case, run.solution, steps, mesh)
 
 
@@ -259,6 +264,8 @@ class StepDerivatives:
             terms += found
             self._owners += [term] * len(found)
             self._alive.append(own)
+            scene.enters |= own.enters
+        self._neighbours = scene
         held = len(equation.supports.dofs)
         self.q, self.v = np.zeros((2, states, P, size))
         self._change, self._time = np.full(P, np.inf), np.full(P, np.nan)
@@ -287,6 +294,10 @@ class StepDerivatives:
             fill(c, new_rates=np.zeros(rates.shape), inertia=equation.inertia.step_product)
         fill(simulation.time_loop, derivatives=c)
 
+    def enters(self) -> list[bool]:
+        """Return, after the run, whether a number in it depends on each parameter."""
+        found = (np.any(x, axis=(0, 2)) for x in (self.q, self.v, self.reactions))
+        return np.any([self._neighbours.enters, np.isfinite(self._change), *found], axis=0).tolist()
 
     def ranges(self) -> list[Range]:
         """Return the range of each derivative."""
@@ -374,7 +385,7 @@ class Derivatives:
                 divided steps.
         """
         require_function(quantity, "of: quantity", "a Solution")
-        here = np.asarray(quantity(self.solution), dtype=np.float64)
+        here = _numbers(quantity(self.solution))
         try:
             rows = [self._differences(quantity, here, some) for some in self._motions()]
         except _Unknown:
@@ -391,7 +402,7 @@ class Derivatives:
         rows = []
         for other in some:
             try:
-                value = np.asarray(quantity(other), dtype=np.float64)
+                value = _numbers(quantity(other))
             except ArgumentError as error:
                 raise ArgumentError(
                     f"{error}. If the model makes new beams at each call, find places in the scene "
@@ -444,6 +455,19 @@ class Derivatives:
                         found.append(simulation.solution)
                 self._repeated.append(found)
         return self._repeated
+
+
+def _numbers(values: Any) -> Array:
+    """Return the result of a quantity as an array."""
+    try:
+        found = np.asarray(values, dtype=np.float64) if values is not None else None
+    except (TypeError, ValueError):
+        found = None
+    if found is None:
+        raise ArgumentError(
+            f"of: quantity returned {shorten(values)}; it must return a number or an array"
+        )
+    return found
 
 
 class _Unknown(Exception):

@@ -43,13 +43,14 @@ class Neighbours:
             weight of the scene itself makes their sum zero.
         size: Number of degrees of freedom.
         alive: Data that C refers to.
+        enters: True for a parameter on which some number of the term depends; (parameters,).
     """
 
     def __init__(
         self, term: Any, terms: Sequence[Sequence[Any]], weights: Array, size: int
     ) -> None:
         self.term, self.terms, self.weights, self.size = term, terms, weights, size
-        self.alive = list[Any]()
+        self.alive, self.enters = list[Any](), np.zeros(len(weights), dtype=bool)
 
     def __len__(self) -> int:
         """Number of parameters."""
@@ -66,6 +67,7 @@ class Neighbours:
                     change = values(other) - here
                 total += weight * np.where(np.isfinite(change), change, 0.0)
             rows.append(total)
+        self.enters |= [bool(np.any(row)) for row in rows]
         return np.array(rows)
 
 
@@ -148,15 +150,18 @@ def form_derivatives(
             if change.any():
                 direction = {"direction": change.ravel(), "stride": change[0].size}
                 made.append(form_derivative(form, kernel, compile_form, coefficient, **direction))
-    return [in_c("form", f) for f in made if f is not None] + shape_derivatives(kernel_of, neighbours)
+    return [in_c("form", f) for f in made if f is not None] + shape_derivatives(
+        kernel_of, neighbours
+    )
 
 
 def shape_derivative(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours, size: int) -> Any:
     """Return ``shape_derivative`` of loops.h for a form with ``size`` values; null if it is zero."""
     kernel, coordinates = kernel_of(neighbours.term), list[Any]()
-    for some in neighbours.terms:
+    for p, some in enumerate(neighbours.terms):
         found = [kernel_of(term).cells.coordinates for term in some]
         moves = any(not np.array_equal(kernel_of(x).coordinates, kernel.coordinates) for x in some)
+        neighbours.enters[p] |= moves
         coordinates += found if moves else [ffi.NULL] * len(found)
     if not any(coordinates):
         return ffi.NULL
@@ -194,4 +199,3 @@ def all_in_c(terms: Sequence[Each]) -> dict[str, Any]:
     """Return the fields ``terms`` and ``term`` of ``derivatives`` of loops.h."""
     array = ffi.new("term_derivative[]", terms)
     return {"terms": len(terms), "term": array}
-

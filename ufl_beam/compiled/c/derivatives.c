@@ -17,6 +17,12 @@ static void note_margin(const derivatives *d, int p, int place, double margin, d
   d->range_term[p] = d->now, d->range_place[p] = place;
 }
 
+/* Difference of a function of time in a neighbouring scene from the same function in the scene itself. */
+static double change_of(const time_function *one, const time_function *own, double t)
+{
+  return value_at(one, t) - value_at(own, t);
+}
+
 /* -- forms ------------------------------------------------------------------------------------------- */
 
 /* Copy the coefficients of a form to the form of its derivative, and compute the entries of all cells. */
@@ -316,9 +322,9 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
     double wanted = 0;
     for (int j = 0; j < m->neighbours; ++j) {
       const connector_term *one = m->neighbour[p * m->neighbours + j];
-      const double value = t->wanted_motion ? value_at(one->wanted_motion + i, s.motion_time)
-                                            : -value_at(one->wanted_force + i, s.load_time);
-      wanted += m->weight[p * m->neighbours + j] * value;
+      const double change = t->wanted_motion ? change_of(one->wanted_motion + i, t->wanted_motion + i, s.motion_time)
+                                             : -change_of(one->wanted_force + i, t->wanted_force + i, s.load_time);
+      wanted += m->weight[p * m->neighbours + j] * change;
     }
     const double before = t->wanted_motion ? m->e0[k] : m->reached[k];
     m->end[k] = before + s.fraction * (wanted - before);
@@ -503,23 +509,31 @@ static void advance_rates(const derivatives *d, const time_loop *m, const step_p
 
 /* -- loads and prescribed motions ---------------------------------------------------------------------- */
 
+/* Dead loads at a time. */
+static void find_loads_at(const dead_loads *one, double t, int size, double *out)
+{
+  memset(out, 0, size * sizeof *out);
+  for (int j = 0; j < one->vectors; ++j) {
+    const double factor = value_at(one->factor + j, t);
+    for (int i = 0; i < one->size; ++i) out[one->dof[i]] += factor * one->vector[j][i];
+  }
+}
+
 void differentiate_loads(void *self, const time_step *step, const double *q1)
 {
   const load_derivatives *l = self;
+  find_loads_at(l->loads, step->load_time, l->size, l->own);
   for (int p = 0; p < l->parameters; ++p) {
-    double *end = l->end + (size_t)p * l->size;
+    double *end = l->end + (size_t)p * l->size, *now = l->now + (size_t)p * l->size;
     const double *before = l->before + (size_t)p * l->size;
     memset(end, 0, l->size * sizeof *end);
     for (int k = 0; k < l->neighbours; ++k) {
-      const dead_loads *one = l->neighbour[p * l->neighbours + k];
-      for (int j = 0; j < one->vectors; ++j) {
-        const double factor = l->weight[p * l->neighbours + k] * value_at(one->factor + j, step->load_time);
-        for (int i = 0; i < one->size; ++i) end[one->dof[i]] += factor * one->vector[j][i];
-      }
+      find_loads_at(l->neighbour[p * l->neighbours + k], step->load_time, l->size, now);
+      for (int i = 0; i < l->size; ++i) end[i] += l->weight[p * l->neighbours + k] * (now[i] - l->own[i]);
     }
     for (int i = 0; i < l->size; ++i) {
       end[i] = before[i] + step->fraction * (end[i] - before[i]);
-      l->now[(size_t)p * l->size + i] = before[i] + step->at * (end[i] - before[i]);
+      now[i] = before[i] + step->at * (end[i] - before[i]);
     }
   }
 }
@@ -546,8 +560,8 @@ static void move_supports(const derivatives *d, const time_loop *m, int p, doubl
   for (int k = 0; k < m->supports->moving; ++k) {
     const int i = m->supports->dof[k];
     double wanted = 0;
-    for (int j = 0; j < d->neighbours; ++j)
-      wanted += d->weight[p * d->neighbours + j] * value_at(d->motion[p * d->neighbours + j] + k, m->step.motion_time);
+    for (int j = p * d->neighbours; j < (p + 1) * d->neighbours; ++j)
+      wanted += d->weight[j] * change_of(d->motion[j] + k, m->supports->motion + k, m->step.motion_time);
     v[i] = d->space[i] + m->step.fraction * (wanted - d->space[i]);
   }
 }

@@ -1227,8 +1227,9 @@ typedef struct {
 /* Derivatives of dead loads, from the loads of scenes with other values of a parameter. */
 typedef struct {
   int parameters, size, neighbours;
-  const dead_loads *const *neighbour;
+  const dead_loads *loads, *const *neighbour;
   const double *weight;
+  double *own;                /* the loads at the end of this step */
   double *now, *end, *before; /* in the equation, at the end of this step, at the end of the last step */
 } load_derivatives;
 
