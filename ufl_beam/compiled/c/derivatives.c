@@ -128,12 +128,12 @@ void accept_second_differences_derivative(void *self, const derivatives *d, int 
 
 /* -- material points --------------------------------------------------------------------------------- */
 
-/* Compute a table. Derivatives by infinite numbers, such as the limit of an elastic law, are not finite;
- * such numbers do not change. */
-static void ask_table(kernel *table, const double *w, int outputs, double *J)
+/* Compute a table, whose last outputs are margins. Derivatives by infinite numbers, such as the limit of an
+ * elastic law, are not finite; such numbers do not change. Infinite margins remain. */
+static void ask_table(kernel *table, const double *w, int outputs, int margins, double *J)
 {
   ask(table, w, outputs, J);
-  for (int k = 0; k < outputs; ++k)
+  for (int k = 0; k < outputs - margins; ++k)
     if (!isfinite(J[k])) J[k] = 0;
 }
 
@@ -154,7 +154,7 @@ void tabulate_points(void *self, const time_step *step, const double *q1)
     if (m->by_geometry) tabulate_derivative(m->by_geometry, step, q1);
   }
   for (int i = 0; i < p->cells * p->of_cell; ++i)
-    ask_table(m->table, p->w + (size_t)i * p->width, m->outputs, m->J + (size_t)i * m->outputs);
+    ask_table(m->table, p->w + (size_t)i * p->width, m->outputs, m->margins, m->J + (size_t)i * m->outputs);
 }
 
 /* Derivative of row `row` of a point's table in the direction dw of its inputs. */
@@ -314,7 +314,7 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
     double *w = c->laws ? c->laws->w + i * c->laws->width : c->rigid_plastic->w + i * c->rigid_plastic->width;
     if (c->laws) memcpy(w, c->e1 + c->components * i, c->components * sizeof *w);
     else set_slip(w, c->e1[i] - w[SLIP_START], c->rigid_plastic->direction[i]);
-    ask_table(m->table, w, m->outputs, m->J + (size_t)i * m->outputs);
+    ask_table(m->table, w, m->outputs, m->margins, m->J + (size_t)i * m->outputs);
   }
   for (int k = 0; k < m->parameters * c->number && (t->wanted_motion || t->wanted_force); ++k) {
     const int p = k / c->number, i = k % c->number;
