@@ -56,7 +56,7 @@ STEP_OF_QUANTITIES = 2.0**-17
 It is small because quantities, such as largest values, may be smooth in pieces only.  The round-off
 is 1e-11 of the quantity."""
 
-STENCILS = {
+STENCILS: dict[tuple[int, ...], tuple[float, ...]] = {
     (-2, -1, 1, 2): (1 / 12, -8 / 12, 8 / 12, -1 / 12),
     (1, 2, 3, 4): (4.0, -3.0, 4 / 3, -1 / 4),
     (-1, -2, -3, -4): (-4.0, 3.0, -4 / 3, 1 / 4),
@@ -176,7 +176,7 @@ class _Case:
     def scene(self, changes: Mapping[str, float]) -> Scene:
         """Return the scene for the values :attr:`at` with ``changes``."""
         try:
-            scene = self._model(**self.at | changes)
+            scene = self._model(**{**self.at, **changes})
         except TypeError as error:
             if "argument" not in str(error):
                 raise
@@ -186,7 +186,8 @@ class _Case:
 
     def simulation(self, changes: Mapping[str, float]) -> Simulation:
         """Return a simulation in its initial state."""
-        return self.create(self.scene(changes))
+        created: Simulation = self.create(self.scene(changes))
+        return created
 
     def _step(self, name: str, fraction: float) -> float:
         return fraction * (abs(self.at[name]) or 1.0)
@@ -203,7 +204,7 @@ class _Case:
             self._stencils[name] = stencil
             yield from scenes
             return
-        raise refused
+        raise ArgumentError(f"differentiate: {name} near {self.at[name]:g}: {refused}") from refused
 
     def simulations(self, name: str, fraction: float) -> Iterator[Simulation]:
         """Yield simulations of :meth:`scenes`."""
@@ -297,14 +298,19 @@ class StepDerivatives:
     def enters(self) -> list[bool]:
         """Return, after the run, whether a number in it depends on each parameter."""
         found = (np.any(x, axis=(0, 2)) for x in (self.q, self.v, self.reactions))
-        return np.any([self._neighbours.enters, np.isfinite(self._change), *found], axis=0).tolist()
+        enters = np.any([self._neighbours.enters, np.isfinite(self._change), *found], axis=0)
+        return [bool(x) for x in enters]
 
     def ranges(self) -> list[Range]:
         """Return the range of each derivative."""
         return [
             Range(change, t, self._owners[term].describe(place) if np.isfinite(change) else "")
             for change, t, term, place in zip(
-                self._change.tolist(), self._time.tolist(), self._term, self._place, strict=True
+                map(float, self._change),
+                map(float, self._time),
+                self._term,
+                self._place,
+                strict=True,
             )
         ]
 

@@ -248,11 +248,12 @@ class Simulation(Stepper):
             StepFailed: A law or a function of a user fails in a step.
         """
         self.keep()
-        columns, both = self._writer.columns, (np.ascontiguousarray(x) for x in (ends, configurations))
-        ends, configurations = both
+        columns = self._writer.columns
+        ends, configurations = (np.ascontiguousarray(x) for x in (ends, configurations))
         done = 0
         while done < len(ends):
-            space = self.solution.free_rows(columns, min(len(ends) - done, 1 + MOST_VALUES // columns.width))
+            rows = min(len(ends) - done, 1 + MOST_VALUES // columns.width)
+            space = self.solution.free_rows(columns, rows)
             with self._in_c():
                 arrays = doubles(ends[done:]), doubles(configurations[done:]), doubles(space)
                 taken: int = lib.repeat_steps(self.time_loop, len(space), *arrays)

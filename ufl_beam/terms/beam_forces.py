@@ -423,7 +423,7 @@ class InelasticBeams(Cells):
     def describe(self, place: int) -> str:
         """Return the cell of a material point."""
         points, numbering = self.points.c.of_cell, self._fields.subdomain.numbering
-        return numbering.describe_cell(self._cells[place // points // numbering.mesh.degree])
+        return str(numbering.describe_cell(self._cells[place // points // numbering.mesh.degree]))
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""

@@ -223,7 +223,7 @@ class Response:
     ) -> list[Each]:
         """Return ``connector_derivatives`` of loops.h with further ``fields``."""
         parameters, number = neighbours.weights.shape
-        e0, (e1, dt) = np.zeros((parameters, len(row))), np.zeros((2, len(self._connectors)))
+        e1, dt = np.zeros((2, len(self._connectors)))
         c = struct(
             "connector_derivatives", parameters=parameters, neighbours=number,
             weight=neighbours.weights, term=term._term_in_c, row=row, dt=dt,
@@ -307,7 +307,6 @@ class PrescribedLaws(Response):
                         setting.requested_forces(connector),
                     )
                 self._in_steps["wanted_force"] = wanted
-
 
     def derivatives(
         self, neighbours: Neighbours, term: Any, motions: Any, row: Array
@@ -574,8 +573,8 @@ class RigidPlasticLaws(Response):
         table = self._table_in_c(
             neighbours, self._forms.table, tuple(self._at), lambda laws: laws._storage
         )
-        for field, name in (("limit", "_limit"), ("back_force", "_back_force")):
-            table[field] = neighbours.differences(lambda x, name=name: getattr(x.response, name))
+        table["limit"] = neighbours.differences(lambda term: term.response._limit)
+        table["back_force"] = neighbours.differences(lambda term: term.response._back_force)
         return self._derivatives_in_c(neighbours, term, motions, row, **table)
 
     def state(self) -> Array:

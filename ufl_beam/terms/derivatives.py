@@ -9,6 +9,7 @@ derivatives.c for the derivatives of a step.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -60,12 +61,12 @@ class Neighbours:
         """Return the derivatives of an array of the term; (parameters, *shape of the array)."""
         here = values(self.term)
         rows = []
-        for some, weights in zip(self.terms, self.weights, strict=True):
+        for p, some in enumerate(self.terms):
             total = np.zeros(np.shape(here))
-            for other, weight in zip(some, weights, strict=True):
+            for k, other in enumerate(some):
                 with np.errstate(invalid="ignore"):  # infinite numbers do not change
                     change = values(other) - here
-                total += weight * np.where(np.isfinite(change), change, 0.0)
+                total += self.weights[p, k] * np.where(np.isfinite(change), change, 0.0)
             rows.append(total)
         self.enters |= [bool(np.any(row)) for row in rows]
         return np.array(rows)
@@ -136,6 +137,11 @@ def form_derivative(
     )  # fmt: skip
 
 
+def _values(kernel_of: Callable[[Any], Kernel], coefficient: fem.Function, term: Any) -> Array:
+    """Return the values of a coefficient in the cells of a term."""
+    return kernel_of(term).get(coefficient)
+
+
 def form_derivatives(
     form: ufl.Form, kernel_of: Callable[[Any], Kernel], compile_form: Callable[[ufl.Form], Kernel],
     q0: fem.Function, neighbours: Neighbours, without: Sequence[fem.Function] = (),
@@ -146,7 +152,7 @@ def form_derivatives(
         if coefficient is q0:
             made.append(form_derivative(form, kernel, compile_form, q0))
         elif not any(coefficient is x for x in without):
-            change = neighbours.differences(lambda x, c=coefficient: kernel_of(x).get(c))
+            change = neighbours.differences(partial(_values, kernel_of, coefficient))
             if change.any():
                 direction = {"direction": change.ravel(), "stride": change[0].size}
                 made.append(form_derivative(form, kernel, compile_form, coefficient, **direction))
@@ -156,7 +162,7 @@ def form_derivatives(
 
 
 def shape_derivative(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours, size: int) -> Any:
-    """Return ``shape_derivative`` of loops.h for a form with ``size`` values; null if it is zero."""
+    """Return ``shape_derivative`` of loops.h for a form of ``size`` values; null if it is zero."""
     kernel, coordinates = kernel_of(neighbours.term), list[Any]()
     for p, some in enumerate(neighbours.terms):
         found = [kernel_of(term).cells.coordinates for term in some]

@@ -198,10 +198,10 @@ class PointForms:
         conditions = margins(with_shared_nodes([*stress, *map(ufl.as_ufl, end.changes)]))
         outputs = (*stress, *ends, *unknowns, *conditions)
         derivatives = [ufl.diff(ufl.as_ufl(f), at[name]) for f in outputs for name in by]
-        values, first = [*derivatives, *stress, *conditions], len(stress) + len(ends)
+        values, equations_at = [*derivatives, *stress, *conditions], len(stress) + len(ends)
         numbers = {
-            "outputs": len(values), "columns": len(by), "equations": first,
-            "margin": first + len(unknowns), "margins": len(conditions),
+            "outputs": len(values), "columns": len(by), "equations": equations_at,
+            "margin": equations_at + len(unknowns), "margins": len(conditions),
         }  # fmt: skip
         return self._pointwise.compile(*values), by, numbers
 
@@ -333,7 +333,7 @@ class Points:
     ) -> Any:
         """Return ``point_derivatives`` of loops.h, with further ``fields``."""
         table, by, numbers = self._forms.table
-        cells, per_cell, width = self._storage.shape
+        cells, per_cell, _ = self._storage.shape
         change = neighbours.differences(lambda term: points_of(term)._storage)
         c = struct(
             "point_derivatives", points=self.c, table=table, **numbers,
@@ -343,10 +343,12 @@ class Points:
             e0=np.zeros((len(neighbours), cells, 3)), r=np.zeros((cells, 3)),
             e1=np.zeros((cells, 3)), **fields,
         )  # fmt: skip
-        for field, name in (("B", "strains"), ("weight", "weights"), ("rest", "rest")):
-            values = neighbours.differences(
-                lambda term, name=name: getattr(points_of(term)._section_points, name)
-            )
+        sections = {
+            "B": neighbours.differences(lambda term: points_of(term)._section_points.strains),
+            "weight": neighbours.differences(lambda term: points_of(term)._section_points.weights),
+            "rest": neighbours.differences(lambda term: points_of(term)._section_points.rest),
+        }
+        for field, values in sections.items():
             if values.any():
                 fill(c, **{field: np.ascontiguousarray(values)})
         return c
