@@ -29,6 +29,7 @@ from ufl_beam.errors import (
     require_function,
     require_kind,
     require_number,
+    require_switch,
     shorten,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia
@@ -126,7 +127,10 @@ def differentiate(
             "number"
         )
     require_number(dt, "differentiate: dt", positive=True)
-    require_plain(newton or Newton(), "differentiate")
+    if newton is not None:
+        require_kind(newton, Newton, "differentiate: newton")
+    require_plain(newton, "differentiate")
+    require_switch(progress, "differentiate: progress")
     require_kind(at, Mapping, "differentiate: at")
     if not at:
         raise ArgumentError("differentiate: at has no parameters")
