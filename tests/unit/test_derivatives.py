@@ -496,7 +496,7 @@ def test_runs_that_are_not_differentiated():
     refuse("reference=True cannot be combined with differentiate", newton=ub.Newton(reference=True))
     refuse("the result of model = 3 is not a Scene", model=lambda load: 3)
     refuse("model = 3.0 must be a function of the parameters", model=3.0)
-    refuse("t = (1, 0)", t=(1, 0))
+    refuse("the end t[1] = 0 must come after the beginning", t=(1, 0))
 
 
 def test_parameters_that_change_the_cells():

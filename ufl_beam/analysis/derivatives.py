@@ -22,6 +22,7 @@ import numpy.typing as npt
 from ufl_beam.arrays import Array, State
 from ufl_beam.compiled.c_library import doubles, ffi, fill, struct
 from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.display import in_one_line
 from ufl_beam.errors import (
     ArgumentError,
@@ -75,6 +76,7 @@ def differentiate(
     *,
     t: tuple[float, float],
     dt: float,
+    start: Derivatives | None = None,
     newton: Newton | None = None,
     mesh: Mesh | None = None,
     progress: bool = True,
@@ -97,6 +99,8 @@ def differentiate(
         scheme: Time scheme, as in :func:`simulate`.
         t: Beginning and end; s.
         dt: Time step; s.
+        start: Derivatives of an earlier run of the same model at the same values, which this run
+            continues.
         newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default the cells of the beams.
         progress: Show a progress bar in a terminal or notebook.
@@ -136,6 +140,13 @@ def differentiate(
         raise ArgumentError("differentiate: at has no parameters")
     for name, value in at.items():
         require_number(value, f"differentiate: at[{name!r}]")
+    if start is not None:
+        require_kind(start, Derivatives, "differentiate: start")
+        if start.at != dict(at) or start.solution.times[-1] != t0:
+            raise ArgumentError(
+                f"differentiate: start ends at t = {start.solution.times[-1]:g} s with "
+                f"{start.at}; begin there, at the same values"
+            )
     values, begin = {name: float(value) for name, value in at.items()}, time.perf_counter()
     case = _Case(model, values, partial(
         Simulation, scheme=scheme, t0=t0, newton=newton, mesh=mesh, comm=MPI.COMM_SELF
@@ -150,7 +161,12 @@ def differentiate(
                 "vertices"
             )
     weights = np.array([case.weights(name, STEP_OF_NUMBERS) for name in values])
-    steps = StepDerivatives(run, neighbours, weights, step_count(t1 - t0, dt) + 1)
+    positions = np.array([case.positions(name, STEP_OF_NUMBERS) for name in values])
+    states = step_count(t1 - t0, dt) + 1
+    steps = StepDerivatives(run, neighbours, positions, weights, states)
+    if start is not None:
+        run.save_or_restore(Archive(run.subdomain, start.end[0]))
+        steps.restore(start.end[1])
     with running(run, [], [], begin):
         bar = progress_bar(progress, MPI.COMM_WORLD, total=1.0)
         take_steps(run, EqualSteps(run, t1, dt), [], bar)
@@ -162,7 +178,9 @@ def differentiate(
             raise ArgumentError(
                 f"differentiate: the run does not depend on {name}; remove it from at"
             )
-    return Derivatives(case, run.solution, steps, mesh)
+    archive = Archive(run.subdomain)
+    run.save_or_restore(archive)
+    return Derivatives(case, run.solution, steps, mesh, archive.state(), start)
 
 
 class _Case:
@@ -190,8 +208,8 @@ class _Case:
 
     def simulation(self, changes: Mapping[str, float]) -> Simulation:
         """Return a simulation in its initial state."""
-        created: Simulation = self.create(self.scene(changes))
-        return created
+        simulation: Simulation = self.create(self.scene(changes))
+        return simulation
 
     def _step(self, name: str, fraction: float) -> float:
         return fraction * (abs(self.at[name]) or 1.0)
@@ -242,10 +260,12 @@ class StepDerivatives:
     Args:
         simulation: Simulation in its initial state.
         neighbours: For each parameter, simulations in scenes with neighbouring values of it.
+        positions: Changes of the parameters in the neighbouring scenes; (P, n).
         weights: Weights of the neighbours in differences; (P, n).
         states: Number of states of the run.
 
     Attributes:
+        states: Derivatives of the present state of the run, as arrays that C changes.
         q, v: Derivatives of configurations and velocities by P parameters; (states, P, size).
         held: Degrees of freedom that supports hold; (number,).
         reactions: Derivatives of the forces of supports, in their axes; (states, P, number).
@@ -253,21 +273,23 @@ class StepDerivatives:
     """
 
     def __init__(
-        self, simulation: Simulation, neighbours: list[list[Simulation]], weights: Array,
-        states: int,
+        self, simulation: Simulation, neighbours: list[list[Simulation]], positions: Array,
+        weights: Array, states: int,
     ) -> None:  # fmt: skip
         P, size = len(neighbours), simulation.subdomain.size
         equation, A = simulation.equation, simulation.equation.A
-        scene, terms = Neighbours(simulation, neighbours, weights, size), list[Any]()
+        scene = Neighbours(simulation, neighbours, positions, weights, size)
+        terms, self.states = list[Any](), list[Array]()
         self._alive = list[Any]([neighbours, terms])  # data of C
         self._owners = list[Any]()  # terms, by their index in C
         for i, term in enumerate(equation.terms):
             others = [[x.equation.terms[i] for x in some] for some in neighbours]
-            own = Neighbours(term, others, weights, size)
+            own = Neighbours(term, others, positions, weights, size)
             if (found := term.derivatives(own)) is None:
                 raise ArgumentError(f"differentiate: {term.effect} has no derivatives")
             terms += found
             self._owners += [term] * len(found)
+            self.states += own.states
             self._alive.append(own)
             scene.enters |= own.enters
         self._neighbours = scene
@@ -288,15 +310,15 @@ class StepDerivatives:
             range_term=self._term, range_place=self._place, kept=1, kept_q=self.q, kept_v=self.v,
             kept_reactions=self.reactions,
         )  # fmt: skip
-        self.q[0] = q0
-        self._equation = equation
+        rates = np.zeros((V + 1, P, size))
         if equation.inertia is not None:
             rates = np.zeros((equation.inertia.c.number, P, size))
-            rates[V] = rates[V + 1] = self.v[0] = scene.differences(lambda x: x.inertia.v)
+            rates[V] = rates[V + 1] = scene.differences(lambda x: x.inertia.v)
             for k in range(V, len(rates)):
                 c.rates[k] = doubles(rates[k])
-            self._alive.append(rates)
             fill(c, new_rates=np.zeros(rates.shape), inertia=equation.inertia.step_product)
+        self.states += [q0, rates]
+        self.restore(self.states)
         fill(simulation.time_loop, derivatives=c)
 
     def enters(self) -> list[bool]:
@@ -305,18 +327,21 @@ class StepDerivatives:
         enters = np.any([self._neighbours.enters, np.isfinite(self._change), *found], axis=0)
         return [bool(x) for x in enters]
 
+    def restore(self, states: list[Array]) -> None:
+        """Set the derivatives at the beginning of the run to the :attr:`states` of another one."""
+        for mine, other in zip(self.states, states, strict=True):
+            mine[:] = other
+        *_, self.q[0], rates = self.states
+        self.v[0] = rates[V]
+
     def ranges(self) -> list[Range]:
         """Return the range of each derivative."""
-        return [
-            Range(change, t, self._owners[term].describe(place) if np.isfinite(change) else "")
-            for change, t, term, place in zip(
-                map(float, self._change),
-                map(float, self._time),
-                self._term,
-                self._place,
-                strict=True,
-            )
-        ]
+        found = []
+        for p, change in enumerate(map(float, self._change)):
+            owner, place = self._owners[self._term[p]], int(self._place[p])
+            name = owner.describe(place) if np.isfinite(change) else ""
+            found.append(Range(change, float(self._time[p]), name))
+        return found
 
 
 @in_one_line
@@ -345,6 +370,7 @@ class Derivatives:
         solution: The run.
         at: Values of the parameters by name, in the order of the derivatives.
         ranges: :class:`Range` of each parameter by name.
+        end: State at the end of the run, and its derivatives, for a run that continues.
 
     Example:
         >>> def swing(length):
@@ -357,18 +383,15 @@ class Derivatives:
     """
 
     def __init__(
-        self, case: _Case, solution: Solution, steps: StepDerivatives, mesh: Mesh | None
-    ) -> None:
+        self, case: _Case, solution: Solution, steps: StepDerivatives, mesh: Mesh | None,
+        state: State, start: Derivatives | None,
+    ) -> None:  # fmt: skip
         self.solution, self.at, self._case, self._mesh = solution, case.at, case, mesh
+        self.end, self._start = (state, steps.states), start
         self._q, self._v, self._reactions = steps.q, steps.v, steps.reactions
         self._held, self.ranges = steps.held, dict(zip(case.at, steps.ranges(), strict=True))
         self._shifted: list[list[Solution]] = []
         self._repeated: list[list[Solution]] = []
-        for p, name in enumerate(self.at):
-            if not any(x[:, p].any() for x in (self._q, self._v, self._reactions)):
-                raise ArgumentError(
-                    f"differentiate: {name} does not enter the motion or the reactions of the run"
-                )
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name} = {value:.6g}" for name, value in self.at.items())
@@ -395,21 +418,21 @@ class Derivatives:
                 divided steps.
         """
         require_function(quantity, "of: quantity", "a Solution")
-        here = _numbers(quantity(self.solution))
+        reference = _numbers(quantity(self.solution))
         try:
-            rows = [self._differences(quantity, here, some) for some in self._motions()]
+            changes = [self._differences(quantity, reference, some) for some in self._motions()]
         except _Unknown:
-            rows = [self._differences(quantity, here, some) for some in self._runs()]
+            changes = [self._differences(quantity, reference, some) for some in self._runs()]
         found = [
             np.tensordot(self._case.weights(name, STEP_OF_QUANTITIES), row, axes=1)
-            for name, row in zip(self.at, rows, strict=True)
+            for name, row in zip(self.at, changes, strict=True)
         ]
         return np.stack(found, axis=-1)
 
     def _differences(
-        self, quantity: Callable[[Solution], npt.ArrayLike], here: Array, some: list[Solution]
+        self, quantity: Callable[[Solution], npt.ArrayLike], reference: Array, some: list[Solution]
     ) -> Array:
-        rows = []
+        changes = []
         for other in some:
             try:
                 value = _numbers(quantity(other))
@@ -418,10 +441,10 @@ class Derivatives:
                     f"{error}. If the model makes new beams at each call, find places in the scene "
                     "of the solution, as in lambda s: s.displacement(s.scene.beams[0].end)"
                 ) from error
-            if value.shape != here.shape:
+            if value.shape != reference.shape:
                 raise ArgumentError("of: the shape of the quantity depends on the parameters")
-            rows.append(value - here)
-        return np.array(rows)
+            changes.append(value - reference)
+        return np.array(changes)
 
     def _states(self, p: int, change: float) -> State:
         """Return motions and reactions if parameter ``p`` grows by ``change``."""
@@ -450,7 +473,8 @@ class Derivatives:
     def _runs(self) -> list[list[Solution]]:
         """Return whole solutions at neighbouring values of each parameter."""
         if not self._repeated:
-            if self.solution.substeps != len(self.solution) - 1:
+            before = 0 if self._start is None else self._start.solution.substeps
+            if self.solution.substeps - before != len(self.solution) - 1:
                 raise ArgumentError(
                     "of: this quantity needs material or energies, and steps of the run were "
                     "divided; use a smaller dt, with which no step is divided"
@@ -460,11 +484,17 @@ class Derivatives:
                 changes, found = self._case.positions(name, STEP_OF_QUANTITIES), list[Solution]()
                 for simulation, change in zip(simulations, changes, strict=True):
                     with closing(simulation):
-                        q = self._states(p, change)["q"]
-                        simulation.repeat(self.solution.times[1:], q[1:])
-                        found.append(simulation.solution)
+                        found.append(self._repeat(simulation, p, change))
                 self._repeated.append(found)
         return self._repeated
+
+    def _repeat(self, simulation: Simulation, p: int, change: float) -> Solution:
+        """Return the states of a simulation whose motion follows from a change of a parameter."""
+        if self._start is not None:
+            earlier = self._start._repeat(simulation, p, change)
+            simulation.solution = Solution(earlier.scene, earlier.numbering, earlier)
+        simulation.repeat(self.solution.times[1:], self._states(p, change)["q"][1:])
+        return simulation.solution
 
 
 def _numbers(values: Any) -> Array:

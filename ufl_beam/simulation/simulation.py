@@ -248,12 +248,11 @@ class Simulation(Stepper):
             StepFailed: A law or a function of a user fails in a step.
         """
         self.keep()
-        columns = self._writer.columns
-        ends, configurations = (np.ascontiguousarray(x) for x in (ends, configurations))
-        done = 0
+        ends, configurations = map(np.ascontiguousarray, (ends, configurations))
+        columns, done = self._writer.columns, 0
+        most = 1 + MOST_VALUES // columns.width
         while done < len(ends):
-            rows = min(len(ends) - done, 1 + MOST_VALUES // columns.width)
-            space = self.solution.free_rows(columns, rows)
+            space = self.solution.free_rows(columns, min(len(ends) - done, most))
             with self._in_c():
                 arrays = doubles(ends[done:]), doubles(configurations[done:]), doubles(space)
                 taken: int = lib.repeat_steps(self.time_loop, len(space), *arrays)

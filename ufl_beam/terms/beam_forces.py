@@ -422,8 +422,9 @@ class InelasticBeams(Cells):
 
     def describe(self, place: int) -> str:
         """Return the cell of a material point."""
-        points, numbering = self.points.c.of_cell, self._fields.subdomain.numbering
-        return str(numbering.describe_cell(self._cells[place // points // numbering.mesh.degree]))
+        points, numbering = int(self.points.c.of_cell), self._fields.subdomain.numbering
+        cell = int(self._cells[place // points // numbering.mesh.degree])
+        return str(numbering.describe_cell(cell))
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
@@ -432,7 +433,7 @@ class InelasticBeams(Cells):
         strains_of, size = (lambda term: term._strains.kernel), self.points.r.size
         shape = shape_derivative(strains_of, neighbours, size)
         at = {"cells": self._in_c, "strains": by_q1, "shape": shape}
-        points = self.points.derivatives(neighbours, lambda term: term.points, **at)
+        points = self.points.derivatives(neighbours, "points", **at)
         force = partial(form_derivative, self._force_form, self._force, kernel)
         by_r = force(self._r, direction=points.r, stride=0)
         by_q0 = [in_c("form", f) for f in [force(self._q0)] if f is not None]

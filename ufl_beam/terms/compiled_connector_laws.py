@@ -292,6 +292,7 @@ class UserLaw:
         state: Internal variables of the accepted state; :meth:`UserLaws.accept_end` writes them.
         last: Previous iterate of this step; None in the first iterate.
         energy: Function that returns the recoverable energy; None if the law has no such function.
+        known: Time t (s), length dt (s) and initial state of the step.
     """
 
     def __init__(
@@ -300,7 +301,7 @@ class UserLaw:
         self._connector, self._law, self._arguments = connector, law.force, law.arguments
         self._small, self._weight = 1e-3 * size, load_weight
         self.energy, self._stored_arguments = law.stored, law.stored_arguments
-        self._e0, self._dt, self._known = 0.0, 1.0, dict[str, Any]()
+        self._e0, self._dt, self.known = 0.0, 1.0, dict[str, Any]()
         self.last: Iterate | None = None
         self.state = state
         state[:] = law.state
@@ -310,7 +311,7 @@ class UserLaw:
         self._e0, self._dt = e0, dt
         state = self.state.copy()
         state.flags.writeable = False  # all iterates begin with the same state
-        self._known = {"t": t, "dt": dt, "state": state}
+        self.known = {"t": t, "dt": dt, "state": state}
         self.last = None
 
     # -- the functions -------------------------------------------------------------------------
@@ -326,12 +327,12 @@ class UserLaw:
         if not self._arguments:
             value = self._law(motion, rate)
         else:
-            value = self._law(motion, rate, **{name: self._known[name] for name in self._arguments})
+            value = self._law(motion, rate, **{name: self.known[name] for name in self._arguments})
             if state.size:
                 value, state = self._pair(value)
         if isinstance(value, float) and math.isfinite(value) and not self.state.size:
             return value, state
-        at = f"motion = {motion:.6g}, rate = {rate:.6g}, t = {self._known['t']:.9g} s"
+        at = f"motion = {motion:.6g}, rate = {rate:.6g}, t = {self.known['t']:.9g} s"
         force = require_returned(value, f"{self._connector}: the function", at)
         for number in (force, *map(float, state)):
             if not math.isfinite(number):  # NoNumber shortens the step, which may avoid the motion
@@ -354,7 +355,7 @@ class UserLaw:
         if self.energy is None:
             return 0.0
         value = self.energy(motion, **dict.fromkeys(self._stored_arguments, self.state.copy()))
-        t = f", t = {self._known['t']:.9g} s" if self._known else ""
+        t = f", t = {self.known['t']:.9g} s" if self.known else ""
         at = f"motion = {motion:.6g}{t}"
         return require_returned(value, f"{self._connector}: the energy", at, finite=True)
 
@@ -444,6 +445,43 @@ class UserLaws(Response):
         c.begin_self, c.rows_self = handle(self._begin), handle(self._find_rows)
         c.again_self = handle(self._again)
         return super().in_steps(callbacks)
+
+    def derivatives(
+        self, neighbours: Neighbours, term: Any, motions: Any, row: Array
+    ) -> list[Each] | None:
+        """See the base class; the functions of the users are differenced between the neighbours."""
+        P, n = len(neighbours), len(self._connectors)
+        dstate = neighbours.state(np.zeros((P, n, self._each[0].state.size)))
+
+        def ends(p: int, i: int, de0: float, de1: float) -> tuple[float, Array]:
+            """Return the derivatives of force and internal variables of a law."""
+            law, force, state = self._each[i], 0.0, np.zeros(dstate.shape[2])
+            pairs = zip(neighbours.positions[p], neighbours.weights[p], strict=True)
+            t, dt = law.known["t"], law.known["dt"]
+            reference = law.end(self._e1[i])
+            for other, (h, weight) in zip(neighbours.terms[p], pairs, strict=True):
+                mine = other.response._each[i]
+                mine.state[:] = law.state + h * dstate[p, i]
+                mine.begin(self._e0[i] + h * de0, t, dt)
+                neighbour = mine.end(self._e1[i] + h * de1)
+                force += weight * (neighbour[0] - reference[0])
+                state += weight * (neighbour[1] - reference[1])
+            return force, state
+
+        def rows(p: int) -> None:
+            for i in range(n):
+                row[i, 2] = ends(p, i, c.e0[p * n + i], 0.0)[0]
+
+        def end(p: int) -> None:
+            for i in range(n):
+                dstate[p, i] = ends(p, i, c.e0[p * n + i], c.e1[i])[1]
+
+        handle, call = term.callbacks.handle, lib.index_in_python
+        fields = {"rows_of_user": call, "end_of_user": call}
+        handles = {"rows_handle": handle(rows), "end_handle": handle(end)}
+        (made,) = self._derivatives_in_c(neighbours, term, motions, row, **fields, **handles)
+        c = made[0]
+        return [made]
 
     def bind_term(self, term: Any) -> None:
         """Store references to the motions, accepted and latest, and to the latest rows of laws."""

@@ -53,6 +53,7 @@ class ConnectorTerm(Term):
     """Connectors of the same kind; each has a force among the unknowns.
 
     Attributes:
+        callbacks: Python functions that C calls, see :meth:`phases`.
         indices: Indices of the connectors in :attr:`Scene.all_connectors`.
         connectors: The connectors; each component of a :class:`Bushing` counts as a connector.
         forces_at: Local degrees of freedom of the forces; (num_connectors,).
@@ -72,7 +73,7 @@ class ConnectorTerm(Term):
         self._dofs = subdomain.connector_dofs[positions].astype(np.int32)
         self.forces_at: Index = self._dofs[:, 6]
         self._A = A
-        self._callbacks: Callbacks  # set when the phases are created
+        self.callbacks: Callbacks  # set when the phases are created
         self.response = response = response_of(self.connectors[0].law, self.connectors, setting)
         self.must_dissipate = response.must_dissipate
         # In the accepted state: motions, forces, and `connector_number` of loops.h
@@ -99,12 +100,12 @@ class ConnectorTerm(Term):
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add forces and residuals of laws; raise exceptions of functions of a user."""
-        with self._callbacks.raising():
+        with self.callbacks.raising():
             super().add_residual(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
         """Add derivatives of forces and residuals; raise exceptions of functions of a user."""
-        with self._callbacks.raising():
+        with self.callbacks.raising():
             super().add_tangent(q1)
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
@@ -208,7 +209,7 @@ class ConnectorForces(ConnectorTerm):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the connectors; laws of a user accept the end of a step in Python."""
-        self._callbacks, response = callbacks, self.response
+        self.callbacks, response = callbacks, self.response
         law_fields = response.in_steps(callbacks)
         fields = {name for name, _ in ffi.typeof("connector_term").fields}
         mine = {name: x for name, x in law_fields.items() if name in fields}
@@ -362,7 +363,7 @@ class Guides(ConnectorTerm):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops that begin at the accepted points of the curves, and accept new points."""
-        self._callbacks = callbacks
+        self.callbacks = callbacks
         curves = [callbacks.handle(curve, 2 * lib.CURVE_POINTS) for curve in self._curves]
         fill(self._c, points=lib.curve_in_python, curve=ffi.new("void *[]", curves))
         self._c.report, self._c.handle = lib.run_in_python, callbacks.handle(self._report)
@@ -380,7 +381,7 @@ class Guides(ConnectorTerm):
     def motion(self, q: Array) -> Array:
         """Return the distances from the curves; (num_connectors,); m."""
         self._begin_again()
-        with self._callbacks.raising():
+        with self.callbacks.raising():
             lib.find_frames(self._c, doubles(q))
         return np.array([self._c.frame[k].distance for k in range(len(self.connectors))])
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -228,7 +229,7 @@ class Response:
             "connector_derivatives", parameters=parameters, neighbours=number,
             weight=neighbours.weights, term=term._term_in_c, row=row, dt=dt,
             motions=motions["strains"], by_geometry=motions["by_geometry"],
-            e0=np.zeros((parameters, len(self._connectors))), e1=e1, **fields,
+            e0=neighbours.state(np.zeros((parameters, len(self._connectors)))), e1=e1, **fields,
         )  # fmt: skip
         return [in_c("connectors", c)]
 
@@ -258,7 +259,13 @@ class Response:
         column = np.array([inputs.index(name) for name in by], dtype=np.int32)
         changes = neighbours.differences(lambda term: storage(term.response))
         tables = np.zeros((len(self._connectors), numbers["outputs"]))
-        return {"table": function, **numbers, "column": column, "J": tables, "w": changes}
+        return {
+            "table": function,
+            **numbers,
+            "column": column,
+            "J": tables,
+            "w": neighbours.state(changes),
+        }
 
 
 # -- laws that prescribe a motion or a force -------------------------------------------------------
@@ -319,7 +326,7 @@ class PrescribedLaws(Response):
                 lambda term: term.response._in_steps["viscosity"]
             )
         elif self._time_functions:  # motors and actuators
-            now, end, reached = np.zeros((3, *shape))
+            now, end, reached = neighbours.state(np.zeros((3, *shape)))
             others = [x._term_in_c for some in neighbours.terms for x in some]
             fields = {"now": now, "end": end, "neighbour": ffi.new("connector_term *[]", others)}
             if "wanted_force" in self._time_functions:
@@ -403,7 +410,7 @@ class Springs(Response):
     ) -> list[Each] | None:
         """See the base class."""
         c = self.points.derivatives(
-            neighbours, lambda term: term.response.points, springs=term._in_c, row=row, **motions,
+            neighbours, "response.points", springs=term._in_c, row=row, **motions,
         )  # fmt: skip
         return [in_c("points", c)]
 
@@ -573,8 +580,9 @@ class RigidPlasticLaws(Response):
         table = self._table_in_c(
             neighbours, self._forms.table, tuple(self._at), lambda laws: laws._storage
         )
-        table["limit"] = neighbours.differences(lambda term: term.response._limit)
-        table["back_force"] = neighbours.differences(lambda term: term.response._back_force)
+        for field, name in (("limit", "_limit"), ("back_force", "_back_force")):
+            values = neighbours.differences(attrgetter(f"response.{name}"))
+            table[field] = neighbours.state(values)
         return self._derivatives_in_c(neighbours, term, motions, row, **table)
 
     def state(self) -> Array:

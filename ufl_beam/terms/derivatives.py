@@ -40,36 +40,43 @@ class Neighbours:
     Attributes:
         term: The term in the scene itself.
         terms: The same term in the neighbouring scenes; for each parameter a list.
+        positions: Changes of the parameters in the neighbouring scenes; (parameters, n).
         weights: Weights of the neighbours in the derivative by a parameter, (parameters, n).  The
             weight of the scene itself makes their sum zero.
         size: Number of degrees of freedom.
         alive: Data that C refers to.
         enters: True for a parameter on which some number of the term depends; (parameters,).
+        states: Derivatives of the state of the term, see :meth:`state`.
     """
 
     def __init__(
-        self, term: Any, terms: Sequence[Sequence[Any]], weights: Array, size: int
+        self, term: Any, terms: Sequence[Sequence[Any]], positions: Array, weights: Array, size: int
     ) -> None:
-        self.term, self.terms, self.weights, self.size = term, terms, weights, size
-        self.alive, self.enters = list[Any](), np.zeros(len(weights), dtype=bool)
+        self.term, self.terms, self.size = term, terms, size
+        self.positions, self.weights = positions, weights
+        self.alive, self.states = list[Any](), list[Array]()
+        self.enters = np.zeros(len(terms), dtype=bool)
 
     def __len__(self) -> int:
         """Number of parameters."""
         return len(self.terms)
 
+    def state(self, values: Array) -> Array:
+        """Return ``values``, and store them as derivatives of the state of the term."""
+        self.states.append(values)
+        return values
+
     def differences(self, values: Callable[[Any], Array]) -> Array:
         """Return the derivatives of an array of the term; (parameters, *shape of the array)."""
-        here = values(self.term)
-        rows = []
+        reference = values(self.term)
+        derivatives = np.zeros((len(self), *np.shape(reference)))
         for p, some in enumerate(self.terms):
-            total = np.zeros(np.shape(here))
-            for k, other in enumerate(some):
+            for k, term in enumerate(some):
                 with np.errstate(invalid="ignore"):  # infinite numbers do not change
-                    change = values(other) - here
-                total += self.weights[p, k] * np.where(np.isfinite(change), change, 0.0)
-            rows.append(total)
-        self.enters |= [bool(np.any(row)) for row in rows]
-        return np.array(rows)
+                    change = values(term) - reference
+                derivatives[p] += self.weights[p, k] * np.where(np.isfinite(change), change, 0.0)
+        self.enters |= derivatives.reshape(len(self), -1).any(axis=1)
+        return derivatives
 
 
 @cached_forms
@@ -138,7 +145,6 @@ def form_derivative(
 
 
 def _values(kernel_of: Callable[[Any], Kernel], coefficient: fem.Function, term: Any) -> Array:
-    """Return the values of a coefficient in the cells of a term."""
     return kernel_of(term).get(coefficient)
 
 
@@ -162,7 +168,7 @@ def form_derivatives(
 
 
 def shape_derivative(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours, size: int) -> Any:
-    """Return ``shape_derivative`` of loops.h for a form of ``size`` values; null if it is zero."""
+    """Return ``shape_derivative`` of loops.h for a form with ``size`` values; null if zero."""
     kernel, coordinates = kernel_of(neighbours.term), list[Any]()
     for p, some in enumerate(neighbours.terms):
         found = [kernel_of(term).cells.coordinates for term in some]

@@ -474,7 +474,7 @@ class SecondDifferences(FormForces):
         )
         by_q1 = form_derivative(strains.form, strains.kernel, kernel, self._q1)
         e1, direction = np.zeros((2, *self._e.shape))
-        e0, change = np.zeros((2, len(neighbours), *self._e.shape))
+        e0, change = neighbours.state(np.zeros((2, len(neighbours), *self._e.shape)))
         c = struct(
             "second_difference_derivatives", differences=self._in_steps, strains=by_q1,
             force=force, e0=e0, change=change, e1=e1, direction=direction,

@@ -184,7 +184,7 @@ class DeadLoads(_AtDofs):
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
         parameters, number = neighbours.weights.shape
-        now, end, before = np.zeros((3, parameters, self._size))
+        now, end, before = neighbours.state(np.zeros((3, parameters, self._size)))
         loads = ffi.new("dead_loads *[]", [x._c for some in neighbours.terms for x in some])
         c = struct(
             "load_derivatives", parameters=parameters, size=self._size, neighbours=number,

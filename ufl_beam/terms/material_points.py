@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -198,10 +199,10 @@ class PointForms:
         conditions = margins(with_shared_nodes([*stress, *map(ufl.as_ufl, end.changes)]))
         outputs = (*stress, *ends, *unknowns, *conditions)
         derivatives = [ufl.diff(ufl.as_ufl(f), at[name]) for f in outputs for name in by]
-        values, equations_at = [*derivatives, *stress, *conditions], len(stress) + len(ends)
+        values, first_equation = [*derivatives, *stress, *conditions], len(stress) + len(ends)
         numbers = {
-            "outputs": len(values), "columns": len(by), "equations": equations_at,
-            "margin": equations_at + len(unknowns), "margins": len(conditions),
+            "outputs": len(values), "columns": len(by), "equations": first_equation,
+            "margin": first_equation + len(unknowns), "margins": len(conditions),
         }  # fmt: skip
         return self._pointwise.compile(*values), by, numbers
 
@@ -328,27 +329,24 @@ class Points:
             lines = np.zeros((2, cells, per_cell, int(lib.LINE)))
             fill(self.c, line=lines[0], predicted=lines[1])
 
-    def derivatives(
-        self, neighbours: Neighbours, points_of: Callable[[Any], Points], **fields: Any
-    ) -> Any:
-        """Return ``point_derivatives`` of loops.h, with further ``fields``."""
+    def derivatives(self, neighbours: Neighbours, path: str, **fields: Any) -> Any:
+        """Return ``point_derivatives`` of loops.h, with further ``fields``.
+
+        ``path`` is the attribute of a term that has its points.
+        """
         table, by, numbers = self._forms.table
         cells, per_cell, _ = self._storage.shape
-        change = neighbours.differences(lambda term: points_of(term)._storage)
+        change = neighbours.differences(attrgetter(f"{path}._storage"))
         c = struct(
             "point_derivatives", points=self.c, table=table, **numbers,
             unknown=self.names.index(by[1]) if by[1].startswith("new ") else 0,
             column=np.array([self.names.index(name) for name in by], dtype=np.int32),
-            J=np.zeros((cells, per_cell, numbers["outputs"])), w=change,
-            e0=np.zeros((len(neighbours), cells, 3)), r=np.zeros((cells, 3)),
+            J=np.zeros((cells, per_cell, numbers["outputs"])), w=neighbours.state(change),
+            e0=neighbours.state(np.zeros((len(neighbours), cells, 3))), r=np.zeros((cells, 3)),
             e1=np.zeros((cells, 3)), **fields,
         )  # fmt: skip
-        sections = {
-            "B": neighbours.differences(lambda term: points_of(term)._section_points.strains),
-            "weight": neighbours.differences(lambda term: points_of(term)._section_points.weights),
-            "rest": neighbours.differences(lambda term: points_of(term)._section_points.rest),
-        }
-        for field, values in sections.items():
+        for field, name in (("B", "strains"), ("weight", "weights"), ("rest", "rest")):
+            values = neighbours.differences(attrgetter(f"{path}._section_points.{name}"))
             if values.any():
                 fill(c, **{field: np.ascontiguousarray(values)})
         return c

@@ -386,6 +386,7 @@ void add_connectors_derivative(void *self, const derivatives *d, int p, double *
   const int n = c->components;
   const double *e0 = m->e0 + (size_t)p * n * c->number;
   if (c->friction) find_ways(m, d, p);
+  if (c->asked) m->rows_of_user(m->rows_handle, p);
   for (int i = 0; i < c->number; ++i) {
     double *row = m->row + n * (n + 2) * i + n + 1; /* the last number of the first row */
     if (c->friction) *row = friction_row(m, d, p, i, e0);
@@ -450,6 +451,7 @@ void accept_connectors_derivative(void *self, const derivatives *d, int p)
       dw[SLIP_START] += of->direction[i] * dw[SLIP];
     }
   }
+  if (c->asked) m->end_of_user(m->end_handle, p);
   memcpy(e0, m->e1, all * sizeof *e0);
   if (m->reached) memcpy(m->reached + (size_t)p * all, m->end + (size_t)p * all, all * sizeof *e0);
 }

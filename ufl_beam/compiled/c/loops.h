@@ -1216,6 +1216,8 @@ typedef struct {
   const connector_term *const *neighbour; /* of motors and actuators: the same in neighbouring scenes */
   const double *weight;          /* see derivatives */
   double *now, *end, *reached;   /* of motors: motions; of actuators: forces; or none */
+  void (*rows_of_user)(void *handle, int p), (*end_of_user)(void *handle, int p); /* of laws of users */
+  void *rows_handle, *end_handle;
 } connector_derivatives;
 
 /* Matrix of rates, with its derivative by each parameter, or none. */
