@@ -232,26 +232,28 @@ static void differentiate_points(const point_derivatives *m, const derivatives *
         }
       }
       if (!end) continue;
-      double change[MOST_VARIABLES];
-      for (int j = 0; j < p->variables; ++j) change[j] = along(m, J, d + j, dw);
-      for (int j = 0; j < p->variables; ++j) strain[3 * d + j] += change[j];
-      dw[JUMP] += w[DIRECTION] * dw[GROWTH];
-      dw[OPENING] += dw[GROWTH];
+      /* All derivatives are by the inputs before the step; these are updated afterwards. */
+      double change[MOST_VARIABLES], traction = dw[TRACTION], released = 0;
       const int place = c * per_cell + i;
+      for (int j = 0; j < p->variables; ++j) change[j] = along(m, J, d + j, dw);
       for (int k = 0; k < m->margins; ++k)
         note_margin(of, q, place, J[m->outputs - m->margins + k], along(m, J, m->margin + k, dw));
       if (w[TRACTION] < INFINITY) {
-        const double stress = J[m->outputs - d - m->margins], traction = w[TRACTION];
+        const double stress = J[m->outputs - d - m->margins];
         if (w[DIRECTION] != 0) note_margin(of, q, place, w[GROWTH], dw[GROWTH]);
-        else note_margin(of, q, place, fabs(stress) - traction, copysign(1, stress) * along(m, J, 0, dw) - dw[TRACTION]);
-        dw[TRACTION] = along(m, J, d + p->variables + 1, dw);
+        else note_margin(of, q, place, fabs(stress) - w[TRACTION], copysign(1, stress) * along(m, J, 0, dw) - dw[TRACTION]);
+        traction = along(m, J, d + p->variables + 1, dw);
         ask(p->end, w, POINT_OUTPUTS + d + p->variables, out);
         if (out[RESISTANCE] == 0) { /* see commit: the discontinuity takes over the elastic strain */
           const double C = w[p->strain + 2], L = w[LENGTH], dC = strain[2], dL = dw[LENGTH];
           const double s = out[POINT_OUTPUTS], ds = along(m, J, d + p->variables, dw);
-          dw[JUMP] += (ds * L + s * dL) / C - s * L * dC / (C * C);
+          released = (ds * L + s * dL) / C - s * L * dC / (C * C);
         }
       }
+      for (int j = 0; j < p->variables; ++j) strain[3 * d + j] += change[j];
+      dw[JUMP] += w[DIRECTION] * dw[GROWTH] + released;
+      dw[OPENING] += dw[GROWTH];
+      dw[TRACTION] = traction;
       for (int a = 0; a < d; ++a) strain[d + a] = strain[a];
       dw[GROWTH] = 0;
     }
