@@ -31,7 +31,8 @@ from ufl_beam.analysis.calibration_result import Measurement
 from ufl_beam.analysis.critical_points import Branch as Branch
 from ufl_beam.analysis.critical_points import CriticalPoint as CriticalPoint
 from ufl_beam.analysis.derivatives import Derivatives as Derivatives
-from ufl_beam.analysis.derivatives import differentiate as differentiate
+from ufl_beam.analysis.derivatives import Range as Range
+from ufl_beam.analysis.derivatives import differentiate
 from ufl_beam.analysis.free_decay import (
     Decay as Decay,
 )
@@ -323,6 +324,7 @@ __all__ = [
     "calibrate",
     "damping",
     "damping_ratio",
+    "differentiate",
     "fit_decay",
     "follow",
     "ground",
@@ -352,10 +354,10 @@ __all__ = [
 
 RESULTS = [
     "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "DemandCurves",
-    "Diagram", "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film", "Fragility",
-    "Governing", "HingeFormation", "HingeTable", "InteractionDiagram", "LinearModel",
-    "LoadCombinations", "Modes", "MomentCurvature", "Path", "Place", "Pushover", "ResponseSpectrum",
-    "SpectralResponse", "Storeys", "TargetDisplacement", "Tradeoff",
+    "Derivatives", "Diagram", "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film",
+    "Fragility", "Governing", "HingeFormation", "HingeTable", "InteractionDiagram", "LinearModel",
+    "LoadCombinations", "Modes", "MomentCurvature", "Path", "Place", "Pushover", "Range",
+    "ResponseSpectrum", "SpectralResponse", "Storeys", "TargetDisplacement", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 

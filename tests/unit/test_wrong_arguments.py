@@ -593,6 +593,14 @@ TABLE = {
         path=V(None, optional(PATH)), anew=V(False, SWITCH), progress=V(False, SWITCH),
         comm=V(None, optional(OBJECT)),
     ),
+    "differentiate": call(
+        ub.differentiate,
+        model=V(lambda force: GROWING, [*FUNCTION, lambda force: None]),
+        at=V({"force": 1.0}, [None, 1.0, "x", {}, {"force": "x"}, {"force": NAN}]),
+        scheme=V(ub.Static(), [*OBJECT, ub.Static]), t=V((0, 1), [*VECTOR, (1, 0)]),
+        dt=V(0.5, [*POSITIVE, ub.Adaptive(1e-3)]), start=V(None, optional(OBJECT)),
+        newton=V(None, optional(OBJECT)), **MESH, progress=V(False, SWITCH),
+    ),
     "tradeoff": call(
         ub.tradeoff,
         scene=V(SCENE, OBJECT),

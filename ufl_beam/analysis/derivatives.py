@@ -31,6 +31,8 @@ from ufl_beam.errors import (
     require_function,
     require_kind,
     require_number,
+    require_switch,
+    shorten,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia, order_of
 from ufl_beam.model.beams import Mesh
@@ -123,6 +125,7 @@ def differentiate(
         [ 0.0656 -0.0656]
     """
     t0, t1 = require_times(t, "differentiate")
+    require_switch(progress, "differentiate: progress")
     case = checked_case("differentiate", model, at, scheme, t0, dt, newton, mesh)
     if start is not None:
         require_kind(start, Derivatives, "differentiate: start")
@@ -152,7 +155,9 @@ def checked_case(
             f"{call}: {scheme} has stages, which are not differentiated; use order=2, with a "
             "smaller dt"
         )
-    require_plain(newton or Newton(), call)
+    if newton is not None:
+        require_kind(newton, Newton, f"{call}: newton")
+    require_plain(newton, call)
     require_kind(at, Mapping, f"{call}: at")
     if not at:
         raise ArgumentError(f"{call}: at has no parameters")
@@ -209,7 +214,7 @@ class Case:
             self._stencils[name] = stencil
             yield from scenes
             return
-        raise refused
+        raise ArgumentError(f"differentiate: {name} near {self.at[name]:g}: {refused}") from refused
 
     def simulations(self, name: str, fraction: float) -> Iterator[Simulation]:
         """Yield simulations of :meth:`scenes`."""
@@ -320,6 +325,8 @@ class StepDerivatives:
             self.owners += [term] * len(found)
             self.states += own.states
             self._alive.append(own)
+            scene.enters |= own.enters
+        self._neighbours = scene
         in_c = [(data, *functions(kind)) for kind, data in self.terms]
         held = len(equation.supports.dofs)
         self.q, self.v = np.zeros((2, states, P, size))
@@ -347,6 +354,12 @@ class StepDerivatives:
             fill(c, new_rates=np.zeros(rates.shape), inertia=equation.inertia.step_product)
         self.states += [q0, rates]
         self.restore(self.states)
+
+    def enters(self) -> list[bool]:
+        """Return, after the run, whether a number in it depends on each parameter."""
+        found = (np.any(x, axis=(0, 2)) for x in (self.q, self.v, self.reactions))
+        enters = np.any([self._neighbours.enters, np.isfinite(self._change), *found], axis=0)
+        return [bool(x) for x in enters]
 
     def restore(self, states: list[Array]) -> None:
         """Set the derivatives at the beginning of the run to the :attr:`states` of another one."""
@@ -411,6 +424,7 @@ class Derivatives:
         self.end, self._start = (state, steps.states), start
         self._q, self._v, self._reactions = steps.q, steps.v, steps.reactions
         self._held, self.ranges = steps.held, dict(zip(case.at, steps.ranges(), strict=True))
+        self._enters = steps.enters()
         self._shifted: list[list[Solution]] = []
         self._repeated: list[list[Solution]] = []
 
@@ -419,11 +433,11 @@ class Derivatives:
         return f"<Derivatives at {values}: {self.solution!r}>"
 
     def require_effects(self) -> None:
-        """Raise :class:`ArgumentError` if a parameter changes neither motions nor reactions."""
-        for p, name in enumerate(self.at):
-            if not any(x[:, p].any() for x in (self._q, self._v, self._reactions)):
+        """Raise :class:`ArgumentError` if the run does not depend on a parameter."""
+        for name, enters in zip(self.at, self._enters, strict=True):
+            if not enters:
                 raise ArgumentError(
-                    f"differentiate: {name} does not enter the motion or the reactions of the run"
+                    f"differentiate: the run does not depend on {name}; remove it from at"
                 )
 
     def of(self, quantity: Callable[[Solution], npt.ArrayLike]) -> Array:
@@ -447,7 +461,7 @@ class Derivatives:
                 divided steps.
         """
         require_function(quantity, "of: quantity", "a Solution")
-        reference = np.asarray(quantity(self.solution), dtype=np.float64)
+        reference = _numbers(quantity(self.solution))
         try:
             changes = [self._differences(quantity, reference, some) for some in self._motions()]
         except _Unknown:
@@ -464,7 +478,7 @@ class Derivatives:
         changes = []
         for other in some:
             try:
-                value = np.asarray(quantity(other), dtype=np.float64)
+                value = _numbers(quantity(other))
             except ArgumentError as error:
                 raise ArgumentError(
                     f"{error}. If the model makes new beams at each call, find places in the scene "
@@ -524,6 +538,19 @@ class Derivatives:
             simulation.solution = Solution(earlier.scene, earlier.numbering, earlier)
         simulation.repeat(self.solution.times[1:], self._states(p, change)["q"][1:])
         return simulation.solution
+
+
+def _numbers(values: Any) -> Array:
+    """Return the result of a quantity as an array."""
+    try:
+        found = np.asarray(values, dtype=np.float64) if values is not None else None
+    except (TypeError, ValueError):
+        found = None
+    if found is None:
+        raise ArgumentError(
+            f"of: quantity returned {shorten(values)}; it must return a number or an array"
+        )
+    return found
 
 
 class _Unknown(Exception):

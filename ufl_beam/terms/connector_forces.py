@@ -89,6 +89,11 @@ class ConnectorTerm(Term):
     def motion(self, q: Array) -> Array:
         """Return the relative motions at ``q``; (num_connectors,); m or rad."""
 
+    @property
+    def effect(self) -> str:
+        """See the base class."""
+        return type(self.connectors[0].law).__name__
+
     def describe(self, place: int) -> str:
         """Return the name of a connector."""
         return str(self.connectors[place])

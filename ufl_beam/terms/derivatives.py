@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import ufl
 from ufl.algorithms import expand_derivatives
-from ufl.classes import EQ, GE, GT, LE, LT, NE, Conditional
+from ufl.classes import EQ, GE, GT, LE, LT, NE, Conditional, Division, Product, Zero
 from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_post_traversal
 
@@ -45,6 +45,7 @@ class Neighbours:
             weight of the scene itself makes their sum zero.
         size: Number of degrees of freedom.
         alive: Data that C refers to.
+        enters: True for a parameter on which some number of the term depends; (parameters,).
         states: Derivatives of the state of the term, see :meth:`state`.
     """
 
@@ -54,6 +55,7 @@ class Neighbours:
         self.term, self.terms, self.size = term, terms, size
         self.positions, self.weights = positions, weights
         self.alive, self.states = list[Any](), list[Array]()
+        self.enters = np.zeros(len(terms), dtype=bool)
 
     def __len__(self) -> int:
         """Number of parameters."""
@@ -73,6 +75,7 @@ class Neighbours:
                 with np.errstate(invalid="ignore"):  # infinite numbers do not change
                     change = values(term) - reference
                 derivatives[p] += self.weights[p, k] * np.where(np.isfinite(change), change, 0.0)
+        self.enters |= derivatives.reshape(len(self), -1).any(axis=1)
         return derivatives
 
 
@@ -84,35 +87,79 @@ def _derivative(form: ufl.Form, coefficient: fem.Function) -> ufl.Form | None:
     return None if expand_derivatives(derivative).empty() else derivative
 
 
+Branches = dict[int, tuple[Expr, bool]]
+"""Conditions, by their identity, and whether they hold, in all branches that contain a node."""
+
+
+def _needed(factor: Expr) -> tuple[Expr, bool] | None:
+    """Return a condition, and whether it must hold, without which a factor is zero."""
+    if isinstance(factor, Conditional):
+        condition, yes, no = factor.ufl_operands
+        return (condition, isinstance(no, Zero)) if Zero in (type(yes), type(no)) else None
+    if isinstance(factor, Division):
+        return _needed(factor.ufl_operands[0])
+    if isinstance(factor, Product):
+        one, other = factor.ufl_operands
+        return _needed(one) or _needed(other)
+    return None
+
+
+def _common(some: list[Branches]) -> Branches:
+    """Return the conditions that are in all of some branches."""
+    first, *others = some
+    return {k: x for k, x in first.items() if all(other.get(k) == x for other in others)}
+
+
+def _operands(node: Expr, branches: Branches, compared: bool) -> list[Branches | None]:
+    """Return the branches with each operand of a node; None if the operand does not matter."""
+    inside: list[Branches | None] = [branches] * len(node.ufl_operands)
+    if isinstance(node, Conditional):
+        condition, yes, no = node.ufl_operands
+        inside[1:] = [branches | {id(condition): (condition, holds)} for holds in (True, False)]
+        if compared and yes == -no and condition.ufl_operands[0] in (yes, no):
+            inside = [None, branches, branches]  # the absolute value of a number
+    elif isinstance(node, Product):
+        for k, (one, other) in enumerate([node.ufl_operands, node.ufl_operands[::-1]]):
+            if (needed := _needed(other)) is not None:
+                inside[k] = branches | {id(needed[0]): needed}
+            elif compared and isinstance(one, Conditional):
+                sides = one.ufl_operands[0].ufl_operands
+                inside[k] = None if sides == (other, Zero()) else branches
+    return inside
+
+
 def margins(outputs: Sequence[Expr]) -> list[Expr]:
     """Return the differences of both sides of the comparisons on which expressions depend.
 
-    A comparison in a branch that is not taken has the margin :data:`FAR`.  The result is empty for
-    more than :data:`MOST_MARGINS` comparisons, whose derivatives would take minutes to compile.
+    A comparison in a branch that is not taken, or in a factor of zero, has the margin :data:`FAR`.
+    The sign of x in x sign(x) does not matter to comparisons of this product, which is continuous.
+    The result is empty for more than :data:`MOST_MARGINS` comparisons, whose derivatives would take
+    minutes to compile.
     """
     order: dict[int, Expr] = {}
     for output in outputs:
         order |= {id(node): node for node in unique_post_traversal(output) if id(node) not in order}
-    # Conditions, and whether they hold, in all branches that contain a node
-    branches: dict[int, dict[int, tuple[Expr, bool]]] = {id(output): {} for output in outputs}
+    # Branches with a node, as a value of the outputs and, apart from it, as a side of comparisons
+    reached: dict[tuple[int, bool], Branches] = {(id(output), False): {} for output in outputs}
     found = dict[str, Expr]()
     for node in reversed(order.values()):  # parents come before their operands
-        mine = branches[id(node)]
-        inside = [mine] * len(node.ufl_operands)
-        if isinstance(node, Conditional):
-            condition = node.ufl_operands[0]
-            inside[1:] = [mine | {id(condition): (condition, holds)} for holds in (True, False)]
-        elif isinstance(node, EQ | NE | LE | LT | GE | GT):
+        uses = [(c, reached[id(node), c]) for c in (False, True) if (id(node), c) in reached]
+        if uses and isinstance(node, EQ | NE | LE | LT | GE | GT):
+            branches = _common([some for _, some in uses])
             left, right = node.ufl_operands
             margin = left - right
-            for condition, holds in mine.values():
-                pair = (margin, FAR) if holds else (FAR, margin)
-                margin = ufl.conditional(condition, *pair)
+            for k, (condition, holds) in branches.items():
+                if k != id(node):
+                    pair = (margin, FAR) if holds else (FAR, margin)
+                    margin = ufl.conditional(condition, *pair)
             found.setdefault(repr(id(left)) + repr(id(right)), margin)
-        for operand, some in zip(node.ufl_operands, inside, strict=True):
-            if (known := branches.get(id(operand))) is not None:
-                some = {k: x for k, x in known.items() if some.get(k) == x}
-            branches[id(operand)] = some
+            uses = [(True, branches)]
+        for compared, branches in uses:
+            inside = _operands(node, branches, compared)
+            for operand, some in zip(node.ufl_operands, inside, strict=True):
+                if some is not None:
+                    key = id(operand), compared
+                    reached[key] = _common([reached.get(key, some), some])
     return [*found.values()] if len(found) <= MOST_MARGINS else []
 
 
@@ -170,9 +217,10 @@ def form_derivatives(
 def shape_derivative(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours, size: int) -> Any:
     """Return ``shape_derivative`` of loops.h for a form with ``size`` values; null if zero."""
     kernel, coordinates = kernel_of(neighbours.term), list[Any]()
-    for some in neighbours.terms:
+    for p, some in enumerate(neighbours.terms):
         found = [kernel_of(term).cells.coordinates for term in some]
         moves = any(not np.array_equal(kernel_of(x).coordinates, kernel.coordinates) for x in some)
+        neighbours.enters[p] |= moves
         coordinates += found if moves else [ffi.NULL] * len(found)
     if not any(coordinates):
         return ffi.NULL

@@ -424,7 +424,8 @@ int go_back(adjoint *a, time_loop *m)
         const int i = m->supports->dof[k];
         double wanted = 0;
         for (int j = 0; j < d->neighbours; ++j)
-          wanted += d->weight[p * d->neighbours + j] * change_of_motion(d, m, p * d->neighbours + j, k);
+          wanted += d->weight[p * d->neighbours + j] *
+                    change_of(d->motion[p * d->neighbours + j] + k, m->supports->motion + k, m->step.motion_time);
         a->gradient[p] += (d->v[i] + d->r[i]) * wanted;
       }
   }

@@ -17,6 +17,12 @@ static void note_margin(const derivatives *d, int p, int place, double margin, d
   d->range_term[p] = d->now, d->range_place[p] = place;
 }
 
+/* Difference of a function of time in a neighbouring scene from the same function in the scene itself. */
+static double change_of(const time_function *one, const time_function *own, double t)
+{
+  return value_at(one, t) - value_at(own, t);
+}
+
 /* -- forms ------------------------------------------------------------------------------------------- */
 
 /* Copy the coefficients of a form to the form of its derivative, and compute the entries of all cells. */
@@ -122,12 +128,12 @@ void accept_second_differences_derivative(void *self, const derivatives *d, int 
 
 /* -- material points --------------------------------------------------------------------------------- */
 
-/* Compute a table. Derivatives by infinite numbers, such as the limit of an elastic law, are not finite;
- * such numbers do not change. */
-static void ask_table(kernel *table, const double *w, int outputs, double *J)
+/* Compute a table, whose last outputs are margins. Derivatives by infinite numbers, such as the limit of an
+ * elastic law, are not finite; such numbers do not change. Infinite margins remain. */
+static void ask_table(kernel *table, const double *w, int outputs, int margins, double *J)
 {
   ask(table, w, outputs, J);
-  for (int k = 0; k < outputs; ++k)
+  for (int k = 0; k < outputs - margins; ++k)
     if (!isfinite(J[k])) J[k] = 0;
 }
 
@@ -148,7 +154,7 @@ void tabulate_points(void *self, const time_step *step, const double *q1)
     if (m->by_geometry) tabulate_derivative(m->by_geometry, step, q1);
   }
   for (int i = 0; i < p->cells * p->of_cell; ++i)
-    ask_table(m->table, p->w + (size_t)i * p->width, m->outputs, m->J + (size_t)i * m->outputs);
+    ask_table(m->table, p->w + (size_t)i * p->width, m->outputs, m->margins, m->J + (size_t)i * m->outputs);
 }
 
 /* Derivative of row `row` of a point's table in the direction dw of its inputs. */
@@ -226,26 +232,28 @@ static void differentiate_points(const point_derivatives *m, const derivatives *
         }
       }
       if (!end) continue;
-      double change[MOST_VARIABLES];
-      for (int j = 0; j < p->variables; ++j) change[j] = along(m, J, d + j, dw);
-      for (int j = 0; j < p->variables; ++j) strain[3 * d + j] += change[j];
-      dw[JUMP] += w[DIRECTION] * dw[GROWTH];
-      dw[OPENING] += dw[GROWTH];
+      /* All derivatives are by the inputs before the step; these are updated afterwards. */
+      double change[MOST_VARIABLES], traction = dw[TRACTION], released = 0;
       const int place = c * per_cell + i;
+      for (int j = 0; j < p->variables; ++j) change[j] = along(m, J, d + j, dw);
       for (int k = 0; k < m->margins; ++k)
         note_margin(of, q, place, J[m->outputs - m->margins + k], along(m, J, m->margin + k, dw));
       if (w[TRACTION] < INFINITY) {
-        const double stress = J[m->outputs - d - m->margins], traction = w[TRACTION];
+        const double stress = J[m->outputs - d - m->margins];
         if (w[DIRECTION] != 0) note_margin(of, q, place, w[GROWTH], dw[GROWTH]);
-        else note_margin(of, q, place, fabs(stress) - traction, copysign(1, stress) * along(m, J, 0, dw) - dw[TRACTION]);
-        dw[TRACTION] = along(m, J, d + p->variables + 1, dw);
+        else note_margin(of, q, place, fabs(stress) - w[TRACTION], copysign(1, stress) * along(m, J, 0, dw) - dw[TRACTION]);
+        traction = along(m, J, d + p->variables + 1, dw);
         ask(p->end, w, POINT_OUTPUTS + d + p->variables, out);
         if (out[RESISTANCE] == 0) { /* see commit: the discontinuity takes over the elastic strain */
           const double C = w[p->strain + 2], L = w[LENGTH], dC = strain[2], dL = dw[LENGTH];
           const double s = out[POINT_OUTPUTS], ds = along(m, J, d + p->variables, dw);
-          dw[JUMP] += (ds * L + s * dL) / C - s * L * dC / (C * C);
+          released = (ds * L + s * dL) / C - s * L * dC / (C * C);
         }
       }
+      for (int j = 0; j < p->variables; ++j) strain[3 * d + j] += change[j];
+      dw[JUMP] += w[DIRECTION] * dw[GROWTH] + released;
+      dw[OPENING] += dw[GROWTH];
+      dw[TRACTION] = traction;
       for (int a = 0; a < d; ++a) strain[d + a] = strain[a];
       dw[GROWTH] = 0;
     }
@@ -344,9 +352,8 @@ static void find_prescribed(const connector_derivatives *m, const time_step *ste
     double wanted = 0;
     for (int j = 0; j < m->neighbours; ++j) {
       const connector_term *one = m->neighbour[p * m->neighbours + j];
-      const double change = t->wanted_motion
-        ? value_at(one->wanted_motion + i, step->motion_time) - value_at(t->wanted_motion + i, step->motion_time)
-        : value_at(t->wanted_force + i, step->load_time) - value_at(one->wanted_force + i, step->load_time);
+      const double change = t->wanted_motion ? change_of(one->wanted_motion + i, t->wanted_motion + i, step->motion_time)
+                                             : -change_of(one->wanted_force + i, t->wanted_force + i, step->load_time);
       wanted += m->weight[p * m->neighbours + j] * change;
     }
     const double before = t->wanted_motion ? m->e0[k] : m->reached[k];
@@ -371,7 +378,7 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
     double *w = c->laws ? c->laws->w + i * c->laws->width : c->rigid_plastic->w + i * c->rigid_plastic->width;
     if (c->laws) memcpy(w, c->e1 + c->components * i, c->components * sizeof *w);
     else set_slip(w, c->e1[i] - w[SLIP_START], c->rigid_plastic->direction[i]);
-    ask_table(m->table, w, m->outputs, m->J + (size_t)i * m->outputs);
+    ask_table(m->table, w, m->outputs, m->margins, m->J + (size_t)i * m->outputs);
   }
   find_prescribed(m, step);
 }
@@ -555,32 +562,31 @@ static void advance_rates(const derivatives *d, const time_loop *m, const step_p
 
 /* -- loads and prescribed motions ---------------------------------------------------------------------- */
 
-/* Add `weight` times the forces of a vector of loads at the time of the step. */
-static void add_loads(const dead_loads *l, int vector, const time_step *step, double weight, double *out)
+/* Dead loads at a time. */
+static void find_loads_at(const dead_loads *one, double t, int size, double *out)
 {
-  if (vector >= l->vectors) return;
-  const double factor = weight * value_at(l->factor + vector, step->load_time);
-  for (int i = 0; i < l->size; ++i) out[l->dof[i]] += factor * l->vector[vector][i];
+  memset(out, 0, size * sizeof *out);
+  for (int j = 0; j < one->vectors; ++j) {
+    const double factor = value_at(one->factor + j, t);
+    for (int i = 0; i < one->size; ++i) out[one->dof[i]] += factor * one->vector[j][i];
+  }
 }
 
 void differentiate_loads(void *self, const time_step *step, const double *q1)
 {
   const load_derivatives *l = self;
+  find_loads_at(l->loads, step->load_time, l->size, l->own);
   for (int p = 0; p < l->parameters; ++p) {
-    double *end = l->end + (size_t)p * l->size;
+    double *end = l->end + (size_t)p * l->size, *now = l->now + (size_t)p * l->size;
     const double *before = l->before + (size_t)p * l->size;
     memset(end, 0, l->size * sizeof *end);
     for (int k = 0; k < l->neighbours; ++k) {
-      const dead_loads *one = l->neighbour[p * l->neighbours + k];
-      const double weight = l->weight[p * l->neighbours + k];
-      for (int j = 0; j < one->vectors || j < l->loads->vectors; ++j) { /* equal loads give exact zeros */
-        add_loads(one, j, step, weight, end);
-        add_loads(l->loads, j, step, -weight, end);
-      }
+      find_loads_at(l->neighbour[p * l->neighbours + k], step->load_time, l->size, now);
+      for (int i = 0; i < l->size; ++i) end[i] += l->weight[p * l->neighbours + k] * (now[i] - l->own[i]);
     }
     for (int i = 0; i < l->size; ++i) {
       end[i] = before[i] + step->fraction * (end[i] - before[i]);
-      l->now[(size_t)p * l->size + i] = before[i] + step->at * (end[i] - before[i]);
+      now[i] = before[i] + step->at * (end[i] - before[i]);
     }
   }
 }
@@ -597,13 +603,6 @@ void accept_load_derivative(void *self, const derivatives *d, int p)
   memcpy(l->before + (size_t)p * l->size, l->end + (size_t)p * l->size, l->size * sizeof *l->end);
 }
 
-/* Difference of the prescribed motion k between a neighbouring scene and the scene itself. */
-static double change_of_motion(const derivatives *d, const time_loop *m, int neighbour, int k)
-{
-  const double t = m->step.motion_time;
-  return value_at(d->motion[neighbour] + k, t) - value_at(m->supports->motion + k, t);
-}
-
 /* Derivatives of the prescribed motions at the end of the step, in the axes of supports; else zero. */
 static void move_supports(const derivatives *d, const time_loop *m, int p, double *v)
 {
@@ -614,8 +613,8 @@ static void move_supports(const derivatives *d, const time_loop *m, int p, doubl
   for (int k = 0; k < m->supports->moving; ++k) {
     const int i = m->supports->dof[k];
     double wanted = 0;
-    for (int j = 0; j < d->neighbours; ++j)
-      wanted += d->weight[p * d->neighbours + j] * change_of_motion(d, m, p * d->neighbours + j, k);
+    for (int j = p * d->neighbours; j < (p + 1) * d->neighbours; ++j)
+      wanted += d->weight[j] * change_of(d->motion[j] + k, m->supports->motion + k, m->step.motion_time);
     v[i] = d->space[i] + m->step.fraction * (wanted - d->space[i]);
   }
 }
