@@ -537,6 +537,7 @@ class Derivatives:
             earlier = self._start._repeat(simulation, p, change)
             simulation.solution = Solution(earlier.scene, earlier.numbering, earlier)
         simulation.repeat(self.solution.times[1:], self._states(p, change)["q"][1:])
+        simulation.end()
         return simulation.solution
 
 
@@ -579,3 +580,4 @@ class MotionOnly(Solution):
         raise _Unknown
 
     ledger = cell_resultants = _refuse  # type: ignore[assignment]
+    internal = property(_refuse, lambda self, value: None)  # type: ignore[assignment]
