@@ -306,3 +306,20 @@ def test_effects_without_an_adjoint_are_refused(model):
     options = {"t": (0, 0.1), "dt": 0.05, "of": lambda run: run.q[:, 3]}
     with raises("has no adjoint; use differentiate"):
         ub.gradient(model, at, ub.EnergyMomentum(), **options)
+
+
+@pytest.mark.serial
+def test_an_error_in_a_neighbouring_scene_ends_the_call():
+    """Its derivative would be NaN."""
+
+    def limited(load):
+        def size(t):
+            if load > 6.0 and t > 0.5:
+                raise ValueError("too much")
+            return t
+
+        return scene_of(100.0, lambda b: ub.FollowerLoad(b.end, (0, load), amplitude=size))
+
+    options = {"t": (0, 1), "dt": 0.1, "progress": False}
+    with raises("too much", kind=ub.ArgumentError):
+        ub.differentiate(limited, {"load": 6.0}, ub.Static(), **options)
