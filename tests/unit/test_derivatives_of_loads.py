@@ -300,9 +300,41 @@ def test_strains_and_masses_that_begin_at_zero_are_refused():
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("model", [follower, works, imposed_on_points, damped_points, guided])
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.02, 0.01), ub.Static()], ids=repr)
+@pytest.mark.parametrize("model", [follower, pressure, frame, works, viscous])
+def test_adjoint_is_the_same_sum(model, scheme):
+    """Round-off of sums of some hundred terms; `of` has the differences of a linear function."""
+    if model in (viscous, works) and scheme == ub.Static():
+        pytest.skip("forces by velocities")
+    at = dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
+    options = {"t": (0, 1), "dt": 0.05}
+    run = ub.differentiate(model, at, scheme, **options, progress=False)
+    direct = run.of(lambda run: run.q[-1, 3])
+    found = ub.gradient(model, at, scheme, **options, of=lambda run: run.q[:, 3])
+    np.testing.assert_allclose(found, direct, rtol=1e-9, atol=1e-10 * np.abs(direct).max())
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("model", [moving, imposed, imposed_on_points, damped_points, guided])
 def test_effects_without_an_adjoint_are_refused(model):
     at = dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
     options = {"t": (0, 0.1), "dt": 0.05, "of": lambda run: run.q[:, 3]}
     with raises("has no adjoint; use differentiate"):
         ub.gradient(model, at, ub.EnergyMomentum(), **options)
+
+
+@pytest.mark.serial
+def test_an_error_in_a_neighbouring_scene_ends_the_call():
+    """Its derivative would be NaN."""
+
+    def limited(load):
+        def size(t):
+            if load > 6.0 and t > 0.5:
+                raise ValueError("too much")
+            return t
+
+        return scene_of(100.0, lambda b: ub.FollowerLoad(b.end, (0, load), amplitude=size))
+
+    options = {"t": (0, 1), "dt": 0.1, "progress": False}
+    with raises("too much", kind=ValueError):
+        ub.differentiate(limited, {"load": 6.0}, ub.Static(), **options)

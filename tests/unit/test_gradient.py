@@ -98,6 +98,7 @@ def shaken(amplitude=0.02, EI=9.0e6, angle=0.3):
 
 CASES = {
     "flying": (flying, {}, ub.EnergyMomentum(0.01, 0.01), 2.0, 0.05),
+    "decaying": (flying, {}, ub.EnergyMomentumDecaying(), 2.0, 0.05),
     "yielding": (yielding, {}, ub.EnergyMomentum(0.02), 0.4, 0.004),
     "fibres": (fibres, {}, ub.EnergyMomentum(0.02), 0.4, 0.004),
     "softening": (softening, {}, ub.EnergyMomentum(0.02), 0.2, 0.002),

@@ -248,6 +248,7 @@ class Case:
             take_steps(run, EqualSteps(run, t1, dt), [], bar)
         for some in neighbours:
             for other in some:
+                other.equation.callbacks.synchronize()  # exceptions of functions of the user
                 other.close()
         archive = Archive(run.subdomain)
         run.save_or_restore(archive)

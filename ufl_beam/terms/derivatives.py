@@ -310,7 +310,16 @@ TRANSPOSES = {
     "product": ("", "transpose_product", ""),
     "connectors": ("transpose_connectors_state", "transpose_connectors", "finish_connectors"),
     "load": ("", "transpose_loads", ""),
+    "second_differences": (
+        "transpose_second_differences_state",
+        "transpose_second_differences",
+        "",
+    ),
     "shape": ("", "transpose_shape", ""),
+    "differences": ("", "transpose_differences", ""),
+    "followers": ("", "transpose_followers", ""),
+    "pressures": ("", "transpose_pressures", ""),
+    "frame": ("", "transpose_frame", ""),
 }
 """Functions of ``term_transposes`` of loops.h by the kind of a derivative."""
 
@@ -340,6 +349,10 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
     if kind == "shape":
         form = data.form
         return [(form.w, 8 * -(-form.number // form.batch_size) * form.batch_size * form.width)]
+    if kind == "second_differences":
+        shape = recorded("shape", data.shape) if data.shape else []
+        ratio = (ffi.addressof(data, "ratio"), 8)
+        return [table(data.strains), table(data.force), ratio, *shape]
     if kind == "product":
         product = data.matrix.product
         rate = ffi.addressof(product, "rate")  # C exchanges the vectors at this address

@@ -511,6 +511,7 @@ class SecondDifferences(FormForces):
         c = struct(
             "second_difference_derivatives", differences=self._in_steps, strains=by_q1,
             force=force, e0=e0, change=change, e1=e1, direction=direction,
+            e0_bar=np.zeros(e1.shape), change_bar=np.zeros(e1.shape),
             shape=shape_derivative(lambda x: x._strains.kernel, neighbours, e1.size),
         )  # fmt: skip
         others = form_derivatives(

@@ -67,6 +67,29 @@ static void transpose_shape_of(const shape_derivative *s, adjoint *a, const doub
 
 void transpose_shape(void *self, adjoint *a, const double *λ) { transpose_shape_of(self, a, λ); }
 
+/* -- second differences of strains ----------------------------------------------------------------------- */
+
+void transpose_second_differences_state(void *self, adjoint *a)
+{
+  const second_difference_derivatives *m = self;
+  const int n = m->differences->of_cell, all = m->differences->strains->number * n;
+  for (int i = 0; i < all; ++i) {
+    m->e1[i] = (m->e0_bar[i] + m->change_bar[i]) / m->differences->weight[i % n];
+    m->e0_bar[i] = -m->change_bar[i], m->change_bar[i] = 0;
+  }
+  transpose_tables(m->strains, m->e1, 0, 0, a->q1);
+  if (m->shape) transpose_shape_of(m->shape, a, m->e1);
+}
+
+void transpose_second_differences(void *self, adjoint *a, const double *λ)
+{
+  const second_difference_derivatives *m = self;
+  const int all = m->differences->strains->number * m->differences->of_cell;
+  memset(m->direction, 0, all * sizeof *m->direction);
+  transpose_tables(m->force, 0, λ, m->direction, 0);
+  for (int i = 0; i < all; ++i) m->change_bar[i] += m->ratio * m->direction[i];
+}
+
 /* -- material points ----------------------------------------------------------------------------------- */
 
 /* Remove the unknowns of a point from x_bar, the derivatives by all its inputs; the transpose of
@@ -355,6 +378,57 @@ void transpose_loads(void *self, adjoint *a, const double *λ)
   const load_derivatives *l = self;
   differentiate_loads(self, a->step, 0);
   for (int p = 0; p < a->parameters; ++p) a->gradient[p] -= dot(l->size, l->now + (size_t)p * l->size, λ);
+}
+
+/* Terms of loads by differences between scenes; only their explicit derivatives are differenced. */
+void transpose_differences(void *self, adjoint *a, const double *λ)
+{
+  begin_neighbours(self, a->step, a->d->x);
+  for (int p = 0; p < a->parameters; ++p) {
+    memset(a->values, 0, a->size * sizeof *a->values);
+    add_differences_derivative(self, a->d, p, a->values);
+    a->gradient[p] += dot(a->size, a->values, λ);
+  }
+}
+
+void transpose_followers(void *self, adjoint *a, const double *λ)
+{
+  const follower_loads *f = self;
+  begin_follower_loads(self, a->step, 0, 0);
+  for (int k = 0; k < f->number; ++k) {
+    const int32_t *at = f->at + 3 * k;
+    double x, y;
+    turn_load(f, k, a->d->x, &x, &y);
+    a->q0[f->turning[k]] += (1 - f->part) * (y * λ[f->dof[at[0]]] - x * λ[f->dof[at[1]]]);
+  }
+}
+
+void transpose_pressures(void *self, adjoint *a, const double *λ)
+{
+  const pressures *of = self;
+  double e[8];
+  begin_pressures(self, a->step, 0, 0);
+  for (int k = 0; k < of->cells; ++k) {
+    const int32_t *at = of->at + 2 * of->nodes * k;
+    for (int j = 0; j < 2 * of->nodes; ++j) {
+      double x[8] = {0};
+      x[j] = 1 - of->part;
+      find_pressure(of, k, x, e);
+      for (int i = 0; i < 2 * of->nodes; ++i) a->q0[of->dof[at[j]]] += e[i] * λ[of->dof[at[i]]];
+    }
+  }
+}
+
+/* The matrix of the forces by positions is symmetric, that of the forces by velocities skew. */
+void transpose_frame(void *self, adjoint *a, const double *λ)
+{
+  const rotating_frame *f = self;
+  double *x = a->values;
+  begin_frame(self, a->step, 0, 0);
+  for (int i = 0; i < f->size; ++i) x[i] = -f->growth * (1 - f->part) * λ[i];
+  add_product(f->pull, x, a->q0);
+  for (int i = 0; i < f->size; ++i) x[i] = λ[i] / f->dt;
+  add_product(f->turn, x, a->q0);
 }
 
 /* -- the steps ------------------------------------------------------------------------------------------- */

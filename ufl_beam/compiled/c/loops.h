@@ -1188,6 +1188,7 @@ typedef struct {
   const shape_derivative *shape;    /* of the strains; or none */
   double *e0, *change;              /* derivatives of strains and of their changes in the last step */
   double *e1, *direction;           /* of one parameter */
+  double *e0_bar, *change_bar;      /* of the adjoint */
   double ratio;
 } second_difference_derivatives;
 
@@ -1341,6 +1342,8 @@ struct adjoint {
 int record_step(adjoint *a, time_loop *m);
 int go_back(adjoint *a, time_loop *m);
 void finish_adjoint(adjoint *a, time_loop *m);
+void transpose_second_differences_state(void *self, adjoint *a);
+void transpose_second_differences(void *self, adjoint *a, const double *lambda);
 void transpose_points_state(void *self, adjoint *a);
 void transpose_connectors_state(void *self, adjoint *a);
 void transpose_connectors(void *self, adjoint *a, const double *lambda);
@@ -1350,6 +1353,10 @@ void transpose_points(void *self, adjoint *a, const double *lambda);
 void transpose_product(void *self, adjoint *a, const double *lambda);
 void transpose_loads(void *self, adjoint *a, const double *lambda);
 void transpose_shape(void *self, adjoint *a, const double *lambda);
+void transpose_differences(void *self, adjoint *a, const double *lambda);
+void transpose_followers(void *self, adjoint *a, const double *lambda);
+void transpose_pressures(void *self, adjoint *a, const double *lambda);
+void transpose_frame(void *self, adjoint *a, const double *lambda);
 void finish_form(void *self, adjoint *a);
 void finish_points(void *self, adjoint *a);
 int differentiate_step(derivatives *d, time_loop *m, int initial);
