@@ -8,11 +8,12 @@
  */
 
 /* Note the margin by which a term in the step is on one side of a switch, and its derivative by parameter
- * p. The run has another piece where the margin vanishes. */
+ * p. The run has another piece where the margin vanishes. Margins of zero are of numbers that do not grow in
+ * the step; a law takes them for positive or negative in the neighbouring runs, too. */
 static void note_margin(const derivatives *d, int p, int place, double margin, double change)
 {
   const double far = fabs(margin / change);
-  if (!(far < d->range[p])) return;
+  if (margin == 0 || !(far < d->range[p])) return;
   d->range[p] = far, d->range_time[p] = d->t;
   d->range_term[p] = d->now, d->range_place[p] = place;
 }
