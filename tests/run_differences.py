@@ -36,7 +36,9 @@ def differences(model, at, name, of, scheme, changes=CHANGES, **options):
 
     def value(x):
         scene = model(**{**at, name: x})
-        return np.asarray(of(ub.simulate(scene, scheme, newton=TIGHT, comm=MPI.COMM_SELF, **options)))
+        return np.asarray(
+            of(ub.simulate(scene, scheme, newton=TIGHT, comm=MPI.COMM_SELF, **options))
+        )
 
     return [difference(value, at[name], part * (abs(at[name]) or 1.0)) for part in changes]
 
