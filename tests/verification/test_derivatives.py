@@ -195,7 +195,8 @@ def limit_load(s):
         (residual_displacement, yielding, DAMPED, STEPS, AGREE),
         # A ratio of logarithms of small differences of peaks, each of which is interpolated
         (decay_ratio, yielding, DAMPED, {"t": (0, 1.2), "dt": 0.004}, 1e-5),
-        (limit_load, pulled, ub.Static(), {"t": (0, 1), "dt": 0.01}, AGREE),
+        # G_f changes the largest force little, just after the hinge opens
+        (limit_load, pulled, ub.Static(), {"t": (0, 1), "dt": 0.01}, 1e-5),
     ],
     ids=["residual displacement", "damping ratio", "limit load"],
 )
