@@ -43,6 +43,7 @@ from ufl_beam.analysis.free_decay import (
     logarithmic_decrement,
     peaks,
 )
+from ufl_beam.analysis.gradient import gradient as gradient
 from ufl_beam.analysis.imperfections import imperfect
 from ufl_beam.analysis.incremental_dynamics import incremental_dynamic_analysis
 from ufl_beam.analysis.incremental_dynamics_result import DemandCurves as DemandCurves

@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from functools import partial
+from inspect import signature
 from typing import Any, NamedTuple, NoReturn
 
 from mpi4py import MPI
@@ -44,7 +45,7 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_lengths import Adaptive, EqualSteps, step_count
 from ufl_beam.solvers.newton_options import Newton, require_plain
-from ufl_beam.terms.derivatives import Neighbours
+from ufl_beam.terms.derivatives import Neighbours, functions
 
 STEP_OF_NUMBERS = 2.0**-10
 """Relative change of a parameter for differences of the numbers in a scene.
@@ -123,23 +124,9 @@ def differentiate(
         >>> print((tip * [4e6, -1e5]).round(4))  # by relative changes of EI and of the force; m
         [ 0.0656 -0.0656]
     """
-    require_function(model, "differentiate: model", "the parameters")
     t0, t1 = require_times(t, "differentiate")
-    if isinstance(dt, Adaptive):
-        raise ArgumentError(
-            "differentiate: dt = Adaptive(...) chooses steps that depend on the parameters; give a "
-            "number"
-        )
-    require_number(dt, "differentiate: dt", positive=True)
-    if newton is not None:
-        require_kind(newton, Newton, "differentiate: newton")
-    require_plain(newton, "differentiate")
     require_switch(progress, "differentiate: progress")
-    require_kind(at, Mapping, "differentiate: at")
-    if not at:
-        raise ArgumentError("differentiate: at has no parameters")
-    for name, value in at.items():
-        require_number(value, f"differentiate: at[{name!r}]")
+    case = checked_case("differentiate", model, at, scheme, t0, dt, newton, mesh)
     if start is not None:
         require_kind(start, Derivatives, "differentiate: start")
         if start.at != dict(at) or start.solution.times[-1] != t0:
@@ -147,23 +134,12 @@ def differentiate(
                 f"differentiate: start ends at t = {start.solution.times[-1]:g} s with "
                 f"{start.at}; begin there, at the same values"
             )
-    values, begin = {name: float(value) for name, value in at.items()}, time.perf_counter()
-    case = _Case(model, values, partial(
-        Simulation, scheme=scheme, t0=t0, newton=newton, mesh=mesh, comm=MPI.COMM_SELF
-    ))  # fmt: skip
+    begin = time.perf_counter()
     run = case.simulation({})
-    neighbours = [[*case.simulations(name, STEP_OF_NUMBERS)] for name in values]
-    for name, some in zip(values, neighbours, strict=True):
-        if not all(_alike(run, other) for other in some):
-            raise ArgumentError(
-                f"differentiate: {name} changes the cells, unknowns or parts of the scene, so that "
-                "the run has no derivative; keep beams, cells and attached points on the same "
-                "vertices"
-            )
-    weights = np.array([case.weights(name, STEP_OF_NUMBERS) for name in values])
-    positions = np.array([case.positions(name, STEP_OF_NUMBERS) for name in values])
+    neighbours, positions, weights = case.neighbours(run)
     states = step_count(t1 - t0, dt) + 1
     steps = StepDerivatives(run, neighbours, positions, weights, states)
+    fill(run.time_loop, derivatives=steps.c)
     if start is not None:
         run.save_or_restore(Archive(run.subdomain, start.end[0]))
         steps.restore(start.end[1])
@@ -173,7 +149,7 @@ def differentiate(
     for some in neighbours:
         for other in some:
             other.close()
-    for name, enters in zip(values, steps.enters(), strict=True):
+    for name, enters in zip(case.at, steps.enters(), strict=True):
         if not enters:
             raise ArgumentError(
                 f"differentiate: the run does not depend on {name}; remove it from at"
@@ -183,7 +159,34 @@ def differentiate(
     return Derivatives(case, run.solution, steps, mesh, archive.state(), start)
 
 
-class _Case:
+def checked_case(
+    call: str, model: Model, at: Mapping[str, float], scheme: Scheme, t0: float, dt: float,
+    newton: Newton | None, mesh: Mesh | None,
+) -> Case:  # fmt: skip
+    """Check the arguments of a function ``call`` that differentiates runs."""
+    require_function(model, f"{call}: model", "the parameters")
+    if isinstance(dt, Adaptive):
+        raise ArgumentError(
+            f"{call}: dt = Adaptive(...) chooses steps that depend on the parameters; give a number"
+        )
+    require_number(dt, f"{call}: dt", positive=True)
+    if newton is not None:
+        require_kind(newton, Newton, f"{call}: newton")
+    require_plain(newton, call)
+    require_kind(at, Mapping, f"{call}: at")
+    if not at:
+        raise ArgumentError(f"{call}: at has no parameters")
+    for name, value in at.items():
+        require_number(value, f"{call}: at[{name!r}]")
+    try:
+        signature(model).bind(**at)
+    except TypeError as error:
+        raise ArgumentError(f"{call}: model has other parameters than at: {error}") from None
+    create = partial(Simulation, scheme=scheme, t0=t0, newton=newton, mesh=mesh, comm=MPI.COMM_SELF)
+    return Case(call, model, {name: float(value) for name, value in at.items()}, create)
+
+
+class Case:
     """Scenes of a model at neighbouring values of its parameters.
 
     Attributes:
@@ -191,19 +194,16 @@ class _Case:
         create: Function that creates a simulation of a scene.
     """
 
-    def __init__(self, model: Model, at: dict[str, float], create: Callable[..., Any]) -> None:
-        self._model, self.at, self.create = model, at, create
+    def __init__(
+        self, call: str, model: Model, at: dict[str, float], create: Callable[..., Any]
+    ) -> None:
+        self._call, self._model, self.at, self.create = call, model, at, create
         self._stencils: dict[str, tuple[int, ...]] = {}
 
     def scene(self, changes: Mapping[str, float]) -> Scene:
         """Return the scene for the values :attr:`at` with ``changes``."""
-        try:
-            scene = self._model(**{**self.at, **changes})
-        except TypeError as error:
-            if "argument" not in str(error):
-                raise
-            raise ArgumentError(f"differentiate: model: {error}") from error
-        require_kind(scene, Scene, "differentiate: the result of model")
+        scene = self._model(**{**self.at, **changes})
+        require_kind(scene, Scene, f"{self._call}: the result of model")
         return scene
 
     def simulation(self, changes: Mapping[str, float]) -> Simulation:
@@ -226,7 +226,8 @@ class _Case:
             self._stencils[name] = stencil
             yield from scenes
             return
-        raise ArgumentError(f"differentiate: {name} near {self.at[name]:g}: {refused}") from refused
+        near = f"{self._call}: {name} near {self.at[name]:g}"
+        raise ArgumentError(f"{near}: {refused}") from refused
 
     def simulations(self, name: str, fraction: float) -> Iterator[Simulation]:
         """Yield simulations of :meth:`scenes`."""
@@ -241,6 +242,28 @@ class _Case:
     def weights(self, name: str, fraction: float) -> Array:
         """Return the weights of the scenes of :meth:`scenes` in a derivative."""
         return np.array(STENCILS[self._stencils[name]]) / self._step(name, fraction)
+
+    def neighbours(self, run: Simulation) -> tuple[list[list[Simulation]], Array, Array]:
+        """Return simulations at neighbouring values for differences of numbers of the scene.
+
+        Returns:
+            For each parameter, the simulations; changes of the parameter, (P, n); and weights in
+            the derivative, (P, n).
+        """
+        names = [*self.at]
+        neighbours = [[*self.simulations(name, STEP_OF_NUMBERS)] for name in names]
+        for name, some in zip(names, neighbours, strict=True):
+            if not all(_alike(run, other) for other in some):
+                raise ArgumentError(
+                    f"{self._call}: {name} changes the cells, unknowns or parts of the scene, so "
+                    "that the run has no derivative; keep beams, cells and attached points on the "
+                    "same vertices"
+                )
+        positions, weights = (
+            np.array([f(name, STEP_OF_NUMBERS) for name in names])
+            for f in (self.positions, self.weights)
+        )
+        return neighbours, positions, weights
 
 
 def _alike(one: Simulation, other: Simulation) -> bool:
@@ -265,6 +288,7 @@ class StepDerivatives:
         states: Number of states of the run.
 
     Attributes:
+        terms: Derivatives of all terms: kinds, and data of C.
         states: Derivatives of the present state of the run, as arrays that C changes.
         q, v: Derivatives of configurations and velocities by P parameters; (states, P, size).
         held: Degrees of freedom that supports hold; (number,).
@@ -279,20 +303,21 @@ class StepDerivatives:
         P, size = len(neighbours), simulation.subdomain.size
         equation, A = simulation.equation, simulation.equation.A
         scene = Neighbours(simulation, neighbours, positions, weights, size)
-        terms, self.states = list[Any](), list[Array]()
-        self._alive = list[Any]([neighbours, terms])  # data of C
-        self._owners = list[Any]()  # terms, by their index in C
+        self.terms, self.states = list[Any](), list[Array]()
+        self._alive = list[Any]([neighbours])  # data of C
+        self.owners = list[Any]()  # terms, by their index in C
         for i, term in enumerate(equation.terms):
             others = [[x.equation.terms[i] for x in some] for some in neighbours]
             own = Neighbours(term, others, positions, weights, size)
             if (found := term.derivatives(own)) is None:
                 raise ArgumentError(f"differentiate: {term.effect} has no derivatives")
-            terms += found
-            self._owners += [term] * len(found)
+            self.terms += found
+            self.owners += [term] * len(found)
             self.states += own.states
             self._alive.append(own)
             scene.enters |= own.enters
         self._neighbours = scene
+        in_c = [(data, *functions(kind)) for kind, data in self.terms]
         held = len(equation.supports.dofs)
         self.q, self.v = np.zeros((2, states, P, size))
         self._change, self._time = np.full(P, np.inf), np.full(P, np.nan)
@@ -301,8 +326,8 @@ class StepDerivatives:
         q0 = scene.differences(lambda x: x.q)
         motions = [x.time_loop.supports.motion for some in neighbours for x in some]
         c = self.c = struct(
-            "derivatives", parameters=P, size=size, terms=len(terms),
-            term=ffi.new("term_derivative[]", terms), q0=q0, q1=np.zeros((P, size)),
+            "derivatives", parameters=P, size=size, terms=len(in_c),
+            term=ffi.new("term_derivative[]", in_c), q0=q0, q1=np.zeros((P, size)),
             reactions=np.zeros((P, held)), neighbours=weights.shape[1], weight=weights,
             motion=ffi.new("time_function *[]", motions), indices=A.indices,
             tangent=np.zeros(len(A.data)), r=np.zeros(size), v=np.zeros(size), s=np.zeros(size),
@@ -319,7 +344,6 @@ class StepDerivatives:
             fill(c, new_rates=np.zeros(rates.shape), inertia=equation.inertia.step_product)
         self.states += [q0, rates]
         self.restore(self.states)
-        fill(simulation.time_loop, derivatives=c)
 
     def enters(self) -> list[bool]:
         """Return, after the run, whether a number in it depends on each parameter."""
@@ -338,7 +362,7 @@ class StepDerivatives:
         """Return the range of each derivative."""
         found = []
         for p, change in enumerate(map(float, self._change)):
-            owner, place = self._owners[self._term[p]], int(self._place[p])
+            owner, place = self.owners[self._term[p]], int(self._place[p])
             name = owner.describe(place) if np.isfinite(change) else ""
             found.append(Range(change, float(self._time[p]), name))
         return found
@@ -383,7 +407,7 @@ class Derivatives:
     """
 
     def __init__(
-        self, case: _Case, solution: Solution, steps: StepDerivatives, mesh: Mesh | None,
+        self, case: Case, solution: Solution, steps: StepDerivatives, mesh: Mesh | None,
         state: State, start: Derivatives | None,
     ) -> None:  # fmt: skip
         self.solution, self.at, self._case, self._mesh = solution, case.at, case, mesh
@@ -467,7 +491,7 @@ class Derivatives:
                 made = [DofNumbering(scene, mesh_of(None, self._mesh)) for scene in scenes]
                 changes = self._case.positions(name, STEP_OF_QUANTITIES)
                 pairs = zip(made, changes, strict=True)
-                self._shifted.append([_Motion(n, self._states(p, x)) for n, x in pairs])
+                self._shifted.append([MotionOnly(n, self._states(p, x)) for n, x in pairs])
         return self._shifted
 
     def _runs(self) -> list[list[Solution]]:
@@ -514,7 +538,7 @@ class _Unknown(Exception):
     """A quantity needs numbers that the derivatives of the motion do not have."""
 
 
-class _Motion(Solution):
+class MotionOnly(Solution):
     """Motions and reactions of a run; other results are unknown."""
 
     def __init__(self, numbering: DofNumbering, states: State) -> None:

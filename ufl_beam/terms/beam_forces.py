@@ -435,7 +435,7 @@ class InelasticBeams(Cells):
         at = {"cells": self._in_c, "strains": by_q1, "shape": shape}
         points = self.points.derivatives(neighbours, "points", **at)
         force = partial(form_derivative, self._force_form, self._force, kernel)
-        by_r = force(self._r, direction=points.r, stride=0)
+        by_r = force(self._r, direction=points.r, stride=0, bar=points.r_bar)
         by_q0 = [in_c("form", f) for f in [force(self._q0)] if f is not None]
         moving = shape_derivatives(lambda term: term._force, neighbours)
         return [in_c("points", points), in_c("form", by_r), *by_q0, *moving]

@@ -480,7 +480,7 @@ class UserLaws(Response):
         fields = {"rows_of_user": call, "end_of_user": call}
         handles = {"rows_handle": handle(rows), "end_handle": handle(end)}
         (made,) = self._derivatives_in_c(neighbours, term, motions, row, **fields, **handles)
-        c = made[0]
+        c = made[1]
         return [made]
 
     def bind_term(self, term: Any) -> None:

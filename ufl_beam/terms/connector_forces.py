@@ -241,18 +241,18 @@ class ConnectorForces(ConnectorTerm):
         """See the base class."""
         forms, work, value = self.forms, self._step_kernels[0], self._motion_kernel
         by_q1 = form_derivative(forms.motion, value, self._form, forms.q1)
-        row = np.zeros((self._cells, forms.row.x.array.size))
+        row, row_bar = np.zeros((2, self._cells, forms.row.x.array.size))
         force = partial(form_derivative, forms.work, work, self._form)
         geometry, change = ffi.NULL, neighbours.differences(lambda term: term._geometry)
         direction = {"direction": change.ravel(), "stride": change[0].size}
         if change.any():
             form = form_derivative(forms.motion, value, self._form, forms.geometry, **direction)
             geometry = ffi.NULL if form is None else form
-        motions = {"strains": by_q1, "by_geometry": geometry}
+        motions = {"strains": by_q1, "by_geometry": geometry, "row_bar": row_bar}
         own = self.response.derivatives(neighbours, self, motions, row)
         if own is None:
             return None
-        made = [force(forms.row, direction=row.ravel(), stride=0)] if own else []
+        made = [force(forms.row, direction=row, stride=0, bar=row_bar)] if own else []
         made += [force(forms.q0)] if work.uses(forms.q0) else []
         made += [force(forms.geometry, **direction)] if change.any() else []
         return [*own, *(in_c("form", f) for f in made if f is not None)]

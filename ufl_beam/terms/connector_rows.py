@@ -214,7 +214,8 @@ class Response:
             neighbours: The :class:`ConnectorForces` ``term`` in neighbouring scenes.
             term: The term of these connectors.
             motions: ``form_derivative`` of loops.h: the motions by the unknowns, "strains", and
-                by the geometry of the connectors, "by_geometry".
+                by the geometry of the connectors, "by_geometry"; and "row_bar", the derivatives
+                of the adjoint by the rows.
             row: Array to which C writes the derivatives of the rows by one parameter.
         """
         return None
@@ -228,7 +229,9 @@ class Response:
         c = struct(
             "connector_derivatives", parameters=parameters, neighbours=number,
             weight=neighbours.weights, term=term._term_in_c, row=row, dt=dt,
-            motions=motions["strains"], by_geometry=motions["by_geometry"],
+            e0_bar=np.zeros(len(self._connectors)), row_bar=motions["row_bar"],
+            viscosity_bar=np.zeros(len(self._connectors)), motions=motions["strains"],
+            by_geometry=motions["by_geometry"],
             e0=neighbours.state(np.zeros((parameters, len(self._connectors)))), e1=e1, **fields,
         )  # fmt: skip
         return [in_c("connectors", c)]
@@ -265,6 +268,7 @@ class Response:
             "column": column,
             "J": tables,
             "w": neighbours.state(changes),
+            "w_bar": np.zeros(changes[0].shape),
         }
 
 

@@ -30,8 +30,8 @@ FAR = 1e300
 MOST_MARGINS = 24
 """Largest number of comparisons in a law that the ranges of derivatives take into account."""
 
-Each = tuple[Any, ...]
-"""Fields of ``term_derivative`` of loops.h."""
+Each = tuple[str, Any]
+"""Kind of a derivative, whose functions are in C, and their data."""
 
 
 class Neighbours:
@@ -174,16 +174,19 @@ def form_derivative(
         kernel: The form compiled, with its values.
         compile_form: Compiles another form on the same cells.
         coefficient: Coefficient of the form, or its unknown.
-        direction: Fields ``direction`` and ``stride``; none if the coefficient is q0.
+        direction: Fields ``direction`` and ``stride``; none if the coefficient is q0.  A direction
+            of one parameter has the stride 0, and ``bar`` of the term that computes it.
     """
     if (derivative := _derivative(form, coefficient)) is None:
         return None
     table = compile_form(derivative)
     table.keep_entries()
-    copies = table.copies_from(kernel)
+    copies, columns = table.copies_from(kernel), coefficient.function_space.element.space_dimension
+    if "direction" in direction:
+        direction.setdefault("bar", np.zeros(table.cells.number * columns))
     return struct(
         "form_derivative", form=kernel.cells, table=table.cells,
-        columns=coefficient.function_space.element.space_dimension, copies=len(copies),
+        columns=columns, copies=len(copies),
         copy=np.ascontiguousarray(copies), **direction,
     )  # fmt: skip
 
@@ -246,12 +249,77 @@ ACCEPT = {
 
 
 def in_c(kind: str, data: Any) -> Each:
-    """Return the fields of ``term_derivative`` of loops.h for data of a kind."""
-    found = (LINEARIZE.get(kind), f"add_{kind}_derivative", ACCEPT.get(kind))
-    return data, *(ffi.addressof(lib, name) if name else ffi.NULL for name in found)
+    """Return a derivative of a term: the kind of its functions in C, and their data."""
+    return kind, data
 
 
-def all_in_c(terms: Sequence[Each]) -> dict[str, Any]:
-    """Return the fields ``terms`` and ``term`` of ``derivatives`` of loops.h."""
-    array = ffi.new("term_derivative[]", terms)
-    return {"terms": len(terms), "term": array}
+def functions(kind: str) -> list[Any]:
+    """Return the functions of ``term_derivative`` of loops.h for a kind; null if there is none."""
+    found = LINEARIZE.get(kind), f"add_{kind}_derivative", ACCEPT.get(kind)
+    return [ffi.addressof(lib, name) if name else ffi.NULL for name in found]
+
+
+# -- the adjoint -----------------------------------------------------------------------------------
+
+TRANSPOSES = {
+    "form": ("", "transpose_form", "finish_form"),
+    "points": ("transpose_points_state", "transpose_points", "finish_points"),
+    "product": ("", "transpose_product", ""),
+    "connectors": ("transpose_connectors_state", "transpose_connectors", "finish_connectors"),
+    "load": ("", "transpose_loads", ""),
+    "shape": ("", "transpose_shape", ""),
+}
+"""Functions of ``term_transposes`` of loops.h by the kind of a derivative."""
+
+
+def transposes(kind: str, data: Any) -> list[Any] | None:
+    """Return the functions of ``term_transposes`` of loops.h; None if there is no adjoint."""
+    if kind not in TRANSPOSES:
+        return None
+    if kind == "connectors" and ((data.limit and data.way) or data.rows_of_user):
+        return None  # friction, and laws of users
+    return [ffi.addressof(lib, name) if name else ffi.NULL for name in TRANSPOSES[kind]]
+
+
+def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
+    """Return the memory that the adjoint of a step needs: addresses, and lengths in bytes.
+
+    Instead of an address, the first item may be a pointer to it.
+    """
+
+    def table(f: Any) -> tuple[Any, int]:
+        cells = f.table
+        batches = -(-cells.number // cells.batch_size)
+        return cells.each, 8 * batches * cells.rows * cells.batch_size
+
+    if kind == "form":
+        return [table(data)]
+    if kind == "shape":
+        form = data.form
+        return [(form.w, 8 * -(-form.number // form.batch_size) * form.batch_size * form.width)]
+    if kind == "product":
+        product = data.matrix.product
+        rate = ffi.addressof(product, "rate")  # C exchanges the vectors at this address
+        return [(rate, 8 * product.size), (product.half, 8 * product.rotations)]
+    if kind == "connectors":
+        c, blocks = data.term.connectors, [table(data.motions), (data.dt, 8)]
+        if data.by_geometry:
+            blocks.append(table(data.by_geometry))
+        laws = c.laws or c.rigid_plastic
+        if laws:
+            blocks += [(data.J, 8 * c.number * data.outputs), (laws.w, 8 * c.number * laws.width)]
+        if c.rigid_plastic:
+            blocks.append((c.rigid_plastic.direction, 4 * c.number))
+        return [*blocks, *((x, 8 * c.number * c.components) for x in (c.e0, c.e1))]
+    if kind == "points":
+        points, blocks = data.points, [table(data.strains)]
+        number = points.cells * points.of_cell
+        if data.by_geometry:
+            blocks.append(table(data.by_geometry))
+        if data.shape:
+            blocks += recorded("shape", data.shape)
+        return [
+            *blocks, (data.J, 8 * number * data.outputs), (points.w, 8 * number * points.width),
+            (points.e0, 24 * points.cells), (points.e1, 24 * points.cells),
+        ]  # fmt: skip
+    return []

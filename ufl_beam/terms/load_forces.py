@@ -187,9 +187,9 @@ class DeadLoads(_AtDofs):
         now, end, before = neighbours.state(np.zeros((3, parameters, self._size)))
         loads = ffi.new("dead_loads *[]", [x._c for some in neighbours.terms for x in some])
         c = struct(
-            "load_derivatives", parameters=parameters, size=self._size, neighbours=number,
-            loads=self._c, own=np.zeros(self._size), neighbour=loads, weight=neighbours.weights,
-            now=now, end=end, before=before,
+            "load_derivatives", loads=self._c, parameters=parameters, size=self._size,
+            neighbours=number, neighbour=loads, weight=neighbours.weights, now=now, end=end,
+            before=before,
         )  # fmt: skip
         return [in_c("load", c)]
 

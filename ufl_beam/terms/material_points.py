@@ -344,12 +344,14 @@ class Points:
             column=np.array([self.names.index(name) for name in by], dtype=np.int32),
             J=np.zeros((cells, per_cell, numbers["outputs"])), w=neighbours.state(change),
             e0=neighbours.state(np.zeros((len(neighbours), cells, 3))), r=np.zeros((cells, 3)),
-            e1=np.zeros((cells, 3)), **fields,
+            e1=np.zeros((cells, 3)), w_bar=np.zeros(self._storage.shape),
+            e0_bar=np.zeros((cells, 3)), r_bar=np.zeros((cells, 3)), **fields,
         )  # fmt: skip
         for field, name in (("B", "strains"), ("weight", "weights"), ("rest", "rest")):
             values = neighbours.differences(attrgetter(f"{path}._section_points.{name}"))
             if values.any():
-                fill(c, **{field: np.ascontiguousarray(values)})
+                bar = {f"{field}_bar": np.zeros(values[0].size)}
+                fill(c, **{field: np.ascontiguousarray(values)}, **bar)
         return c
 
     def __getitem__(self, name: str) -> Array:

@@ -18,12 +18,6 @@ static void note_margin(const derivatives *d, int p, int place, double margin, d
   d->range_term[p] = d->now, d->range_place[p] = place;
 }
 
-/* Difference of a function of time in a neighbouring scene from the same function in the scene itself. */
-static double change_of(const time_function *one, const time_function *own, double t)
-{
-  return value_at(one, t) - value_at(own, t);
-}
-
 /* -- forms ------------------------------------------------------------------------------------------- */
 
 /* Copy the coefficients of a form to the form of its derivative, and compute the entries of all cells. */
@@ -301,6 +295,26 @@ void accept_points_derivative(void *self, const derivatives *d, int q)
 
 /* -- connectors -------------------------------------------------------------------------------------- */
 
+/* Derivatives of the motions of motors and of the forces of actuators in the step. */
+static void find_prescribed(const connector_derivatives *m, const time_step *step)
+{
+  const connector_term *t = m->term;
+  for (int k = 0; m->now && k < m->parameters * t->connectors->number; ++k) {
+    const int p = k / t->connectors->number, i = k % t->connectors->number;
+    double wanted = 0;
+    for (int j = 0; j < m->neighbours; ++j) {
+      const connector_term *one = m->neighbour[p * m->neighbours + j];
+      const double change = t->wanted_motion
+        ? value_at(one->wanted_motion + i, step->motion_time) - value_at(t->wanted_motion + i, step->motion_time)
+        : value_at(t->wanted_force + i, step->load_time) - value_at(one->wanted_force + i, step->load_time);
+      wanted += m->weight[p * m->neighbours + j] * change;
+    }
+    const double before = t->wanted_motion ? m->e0[k] : m->reached[k];
+    m->end[k] = before + step->fraction * (wanted - before);
+    m->now[k] = t->wanted_motion ? m->end[k] : before + step->at * (m->end[k] - before);
+  }
+}
+
 /* Motions at the end of the step, their derivatives by the unknowns, and the derivatives of laws. */
 void tabulate_connectors(void *self, const time_step *step, const double *q1)
 {
@@ -319,20 +333,7 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
     else set_slip(w, c->e1[i] - w[SLIP_START], c->rigid_plastic->direction[i]);
     ask_table(m->table, w, m->outputs, m->margins, m->J + (size_t)i * m->outputs);
   }
-  for (int k = 0; k < m->parameters * c->number && (t->wanted_motion || t->wanted_force); ++k) {
-    const int p = k / c->number, i = k % c->number;
-    const time_step s = *step;
-    double wanted = 0;
-    for (int j = 0; j < m->neighbours; ++j) {
-      const connector_term *one = m->neighbour[p * m->neighbours + j];
-      const double change = t->wanted_motion ? change_of(one->wanted_motion + i, t->wanted_motion + i, s.motion_time)
-                                             : -change_of(one->wanted_force + i, t->wanted_force + i, s.load_time);
-      wanted += m->weight[p * m->neighbours + j] * change;
-    }
-    const double before = t->wanted_motion ? m->e0[k] : m->reached[k];
-    m->end[k] = before + s.fraction * (wanted - before);
-    m->now[k] = t->wanted_motion ? m->end[k] : before + s.at * (m->end[k] - before);
-  }
+  find_prescribed(m, step);
 }
 
 /* Set the derivative of the slip of a rigid-plastic connector from that of its motion. */
@@ -514,31 +515,32 @@ static void advance_rates(const derivatives *d, const time_loop *m, const step_p
 
 /* -- loads and prescribed motions ---------------------------------------------------------------------- */
 
-/* Dead loads at a time. */
-static void find_loads_at(const dead_loads *one, double t, int size, double *out)
+/* Add `weight` times the forces of a vector of loads at the time of the step. */
+static void add_loads(const dead_loads *l, int vector, const time_step *step, double weight, double *out)
 {
-  memset(out, 0, size * sizeof *out);
-  for (int j = 0; j < one->vectors; ++j) {
-    const double factor = value_at(one->factor + j, t);
-    for (int i = 0; i < one->size; ++i) out[one->dof[i]] += factor * one->vector[j][i];
-  }
+  if (vector >= l->vectors) return;
+  const double factor = weight * value_at(l->factor + vector, step->load_time);
+  for (int i = 0; i < l->size; ++i) out[l->dof[i]] += factor * l->vector[vector][i];
 }
 
 void differentiate_loads(void *self, const time_step *step, const double *q1)
 {
   const load_derivatives *l = self;
-  find_loads_at(l->loads, step->load_time, l->size, l->own);
   for (int p = 0; p < l->parameters; ++p) {
-    double *end = l->end + (size_t)p * l->size, *now = l->now + (size_t)p * l->size;
+    double *end = l->end + (size_t)p * l->size;
     const double *before = l->before + (size_t)p * l->size;
     memset(end, 0, l->size * sizeof *end);
     for (int k = 0; k < l->neighbours; ++k) {
-      find_loads_at(l->neighbour[p * l->neighbours + k], step->load_time, l->size, now);
-      for (int i = 0; i < l->size; ++i) end[i] += l->weight[p * l->neighbours + k] * (now[i] - l->own[i]);
+      const dead_loads *one = l->neighbour[p * l->neighbours + k];
+      const double weight = l->weight[p * l->neighbours + k];
+      for (int j = 0; j < one->vectors || j < l->loads->vectors; ++j) { /* equal loads give exact zeros */
+        add_loads(one, j, step, weight, end);
+        add_loads(l->loads, j, step, -weight, end);
+      }
     }
     for (int i = 0; i < l->size; ++i) {
       end[i] = before[i] + step->fraction * (end[i] - before[i]);
-      now[i] = before[i] + step->at * (end[i] - before[i]);
+      l->now[(size_t)p * l->size + i] = before[i] + step->at * (end[i] - before[i]);
     }
   }
 }
@@ -555,6 +557,13 @@ void accept_load_derivative(void *self, const derivatives *d, int p)
   memcpy(l->before + (size_t)p * l->size, l->end + (size_t)p * l->size, l->size * sizeof *l->end);
 }
 
+/* Difference of the prescribed motion k between a neighbouring scene and the scene itself. */
+static double change_of_motion(const derivatives *d, const time_loop *m, int neighbour, int k)
+{
+  const double t = m->step.motion_time;
+  return value_at(d->motion[neighbour] + k, t) - value_at(m->supports->motion + k, t);
+}
+
 /* Derivatives of the prescribed motions at the end of the step, in the axes of supports; else zero. */
 static void move_supports(const derivatives *d, const time_loop *m, int p, double *v)
 {
@@ -565,8 +574,8 @@ static void move_supports(const derivatives *d, const time_loop *m, int p, doubl
   for (int k = 0; k < m->supports->moving; ++k) {
     const int i = m->supports->dof[k];
     double wanted = 0;
-    for (int j = p * d->neighbours; j < (p + 1) * d->neighbours; ++j)
-      wanted += d->weight[j] * change_of(d->motion[j] + k, m->supports->motion + k, m->step.motion_time);
+    for (int j = 0; j < d->neighbours; ++j)
+      wanted += d->weight[p * d->neighbours + j] * change_of_motion(d, m, p * d->neighbours + j, k);
     v[i] = d->space[i] + m->step.fraction * (wanted - d->space[i]);
   }
 }

@@ -1038,6 +1038,7 @@ typedef struct {
 } group_columns;
 
 typedef struct derivatives derivatives;
+struct adjoint;
 
 /* The time loop of a scene: its state, and all terms of the equation. */
 typedef struct {
@@ -1083,6 +1084,7 @@ typedef struct {
   int applies;
   double begin_of_run, applied_by, applying_turn, short_part;
   derivatives *derivatives; /* or none */
+  struct adjoint *adjoint;  /* or none */
 } time_loop;
 
 phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
@@ -1150,6 +1152,7 @@ typedef struct {
   const int32_t *copy;      /* of each block of coefficients: its positions in both forms, its length */
   const double *direction;  /* derivatives of the coefficient, `stride` numbers apart for each parameter;
                              * or none: the coefficient is the configuration before the step */
+  double *bar;              /* of the adjoint: derivatives by the coefficient; or none */
 } form_derivative;
 
 /* Derivatives of forms by the coordinates of the cells, as differences: the values of a form with the
@@ -1193,6 +1196,7 @@ typedef struct {
   double *w, *e0;                 /* derivatives of the data of the points, and of the strains before the step */
   const double *B, *weight, *rest; /* of the geometry of the sections; or none */
   double *r, *e1, *row;           /* of one parameter: of resultants and strains; of the rows of springs */
+  double *w_bar, *e0_bar, *r_bar, *row_bar, *B_bar, *weight_bar, *rest_bar; /* of the adjoint; or none */
 } point_derivatives;
 
 /* Derivatives of the laws of connectors. Compiled laws have a table: columns are inputs of the law, rows
@@ -1216,6 +1220,7 @@ typedef struct {
   const connector_term *const *neighbour; /* of motors and actuators: the same in neighbouring scenes */
   const double *weight;          /* see derivatives */
   double *now, *end, *reached;   /* of motors: motions; of actuators: forces; or none */
+  double *w_bar, *e0_bar, *row_bar, *viscosity_bar; /* of the adjoint */
   void (*rows_of_user)(void *handle, int p), (*end_of_user)(void *handle, int p); /* of laws of users */
   void *rows_handle, *end_handle;
 } connector_derivatives;
@@ -1231,10 +1236,51 @@ typedef struct {
   int parameters, size, neighbours;
   const dead_loads *loads, *const *neighbour;
   const double *weight;
-  double *own;                /* the loads at the end of this step */
   double *now, *end, *before; /* in the equation, at the end of this step, at the end of the last step */
 } load_derivatives;
 
+/* Transposes of a term: from the state at the end of a step to the state before it; from lambda, the
+ * derivatives by the forces, to the state before the step; from the initial state to the parameters.
+ * `state` and `finish` may be none. */
+typedef struct adjoint adjoint;
+typedef struct {
+  void (*state)(void *self, adjoint *a);
+  void (*force)(void *self, adjoint *a, const double *lambda);
+  void (*finish)(void *self, adjoint *a);
+} term_transposes;
+
+/* Adjoint of a run, see adjoint.c: recorded steps, and the derivatives of one number. */
+struct adjoint {
+  derivatives *d;
+  int parameters, size;
+  const term_transposes *term;   /* in the order of the terms of d */
+  double *q0, *q1, *rates[MOST_RATES], *new_rates; /* derivatives by the state */
+  const time_step *step;
+  double *lambda, *values, *gradient; /* values: space; gradient: derivatives by the parameters */
+  const int32_t *transpose;      /* index of the transposed entry of each entry of the tangent */
+  double *transposed;
+  /* Blocks of memory that a step needs: their addresses, lengths in bytes, and the length of a step. */
+  int blocks, recorded, most;
+  void *const *const *block;
+  const int64_t *length;
+  int64_t bytes;
+  char *record;
+};
+
+int record_step(adjoint *a, time_loop *m);
+int go_back(adjoint *a, time_loop *m);
+void finish_adjoint(adjoint *a, time_loop *m);
+void transpose_points_state(void *self, adjoint *a);
+void transpose_connectors_state(void *self, adjoint *a);
+void transpose_connectors(void *self, adjoint *a, const double *lambda);
+void finish_connectors(void *self, adjoint *a);
+void transpose_form(void *self, adjoint *a, const double *lambda);
+void transpose_points(void *self, adjoint *a, const double *lambda);
+void transpose_product(void *self, adjoint *a, const double *lambda);
+void transpose_loads(void *self, adjoint *a, const double *lambda);
+void transpose_shape(void *self, adjoint *a, const double *lambda);
+void finish_form(void *self, adjoint *a);
+void finish_points(void *self, adjoint *a);
 int differentiate_step(derivatives *d, time_loop *m, int initial);
 void keep_derivatives(derivatives *d, const time_loop *m);
 void add_form_derivative(void *self, const derivatives *d, int p, double *r);

@@ -363,6 +363,7 @@ int step_or_subdivide(time_loop *m, double end)
     if (m->path) rejected = m->path->rejected;
     if (solved) {
       if (m->derivatives && !differentiate_step(m->derivatives, m, 0)) return fails(m, NO_DERIVATIVE);
+      if (m->adjoint && !record_step(m->adjoint, m)) return fails(m, NO_DERIVATIVE);
       if (!accept_step(m)) return 0;
       done += some;
       /* Double the substep at the times where a larger one would begin. */

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: MIT
+"""The adjoint of runs, against direct differentiation of the same runs."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+STEEL = {"EA": 2.1e9, "GA": 6.7e8, "rhoA": 78.5, "rhoI": 0.065}
+
+
+def tip(solution):
+    """Horizontal displacement of the end of the last beam; (n+1,); m."""
+    return solution.displacement(solution.scene.beams[-1].end)[:, 0]
+
+
+def pulse(t):
+    return math.sin(math.pi * t / 0.2) if t < 0.2 else 0.0
+
+
+def column(section, load=35e3, mass=400.0, hinges=None, height=3.0, **more):
+    beam = ub.Beam((0, 0), (0, height), section, cells=6, name="column", hinges=hinges or {})
+    return ub.Scene(
+        [beam],
+        supports=[ub.Clamped(beam.start)],
+        masses=[ub.PointMass(beam.end, mass)],
+        loads=[ub.PointLoad(beam.end, force=(load, 0.0), amplitude=pulse)],
+        **more,
+    )
+
+
+def flying(EI=100.0, rhoA=1.0, load=8.0, speed=0.5, length=10.0):
+    section = ub.Section(EA=1e4, GA=1e4, EI=EI, rhoA=rhoA, rhoI=10.0)
+    beam = ub.Beam((0.6 * length, 0), (0, 0.8 * length), section, cells=6)
+    push = ub.PointLoad(beam.start, force=(load, 0), moment=-10 * load)
+    return ub.Scene([beam], loads=[push], initial=[ub.Velocity([beam], linear=(speed, 0.0))])
+
+
+def yielding(limit=60e3, isotropic=4e5, kinematic=2e5, EI=9.0e6, load=35e3, mass=400.0):
+    law = ub.ElastoPlastic(limit, isotropic, kinematic)
+    return column(ub.Section(EI=EI, bending=law, **STEEL), load, mass)
+
+
+def fibres(limit=235e6, isotropic=2e9, E=210e9, height=0.2, load=60e3):
+    some = ub.Fibres(ub.ElastoPlastic(limit, isotropic), number=4)
+    section = ub.Section.rectangle(0.1, height, E=E, nu=0.3, rho=7850.0, fibres=some)
+    return column(section, load)
+
+
+def softening(limit=60e3, energy=6e3, EI=9.0e6, load=40e3):
+    weak = ub.Softening(limit, energy)
+    return column(ub.Section(EI=EI, hinge=weak, **STEEL), load)
+
+
+def sprung(stiffness=300.0, moment=30.0, length=1.0, EI=100.0, tau=0.0):
+    section = ub.Section(EA=1e4, GA=4e3, EI=EI, rhoA=1.0, rhoI=0.01)
+    beam = ub.Beam((0, 0), (length, 0.2), section, cells=4)
+    spring = ub.Spring(stiffness, law=ub.ElastoPlastic(20.0, 30.0))
+    return ub.Scene(
+        [beam],
+        supports=[ub.Pinned(beam.start)],
+        connectors=[ub.Turn(ub.ground(0, 0), beam.start, spring)],
+        loads=[ub.PointLoad(beam.end, moment=moment)],
+        damping=[ub.Rayleigh(mass=1.0, stiffness=1e-3)],
+    )
+
+
+def machine(viscosity=3.0, force=20.0, stroke=0.2, stiffness=500.0, EI=100.0, length=1.0):
+    """A crank with a motor, a damper, an actuator, a backbone and a nonlinear law; joints."""
+    section = ub.Section(EA=1e4, GA=4e3, EI=EI, rhoA=1.0, rhoI=0.01)
+    a = ub.Beam((0, 0), (length, 0), section, cells=3)
+    b = ub.Beam((length, 0), (length, 1.0), section, cells=3)
+    cushion = ub.Stop(stiffness, low=-0.05, high=0.05) if hasattr(ub, "Stop") else ub.Spring(stiffness)
+    return ub.Scene(
+        [a, b],
+        joints=[ub.Revolute(a.end, b.start, multipliers=True)],
+        supports=[ub.Pinned(a.start)],
+        connectors=[
+            ub.Turn(ub.ground(0, 0), a.start, ub.PrescribedMotion(lambda t: stroke * math.sin(8 * t))),
+            ub.Turn(a.end, b.start, ub.Damper(viscosity)),
+            ub.Stretch(ub.ground(0, 1.0), b.end, ub.PrescribedForce(lambda t: force * t)),
+            ub.Turn(a.end, b.start, cushion),
+        ],
+    )
+
+
+def shaken(amplitude=0.02, EI=9.0e6, angle=0.3):
+    beam = ub.Beam((0, 0), (0.5, 3), ub.Section(EI=EI, **STEEL), cells=4)
+    motion = ub.PrescribedDisplacement(
+        beam.start, u=lambda t: amplitude * math.sin(20 * t), v=0, psi=0
+    )
+    roller = ub.Roller(beam.end, along=(math.cos(angle), math.sin(angle)))
+    return ub.Scene([beam], supports=[motion, roller])
+
+
+CASES = {
+    "flying": (flying, {}, ub.EnergyMomentum(0.01, 0.01), 2.0, 0.05),
+    "yielding": (yielding, {}, ub.EnergyMomentum(0.02), 0.4, 0.004),
+    "fibres": (fibres, {}, ub.EnergyMomentum(0.02), 0.4, 0.004),
+    "softening": (softening, {}, ub.EnergyMomentum(0.02), 0.2, 0.002),
+    "springs": (sprung, {"tau": None}, ub.EnergyMomentum(), 1.0, 0.02),
+    "machine": (machine, {}, ub.EnergyMomentum(), 0.6, 0.01),
+    "moving support": (shaken, {"angle": None}, ub.EnergyMomentum(), 0.5, 0.01),
+    "statics": (flying, {}, ub.Static(), 1.0, 0.1),
+}
+
+
+def parameters(model, without):
+    names = model.__code__.co_varnames[: model.__code__.co_argcount]
+    values = dict(zip(names, model.__defaults__, strict=True))
+    return {name: x for name, x in values.items() if name not in without}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_adjoint_equals_direct_differentiation(name):
+    """They are the same sums in another order; the factor 1e-10 is the round-off of differences."""
+    model, without, scheme, end, dt = CASES[name]
+    if name == "statics":
+
+        def clamped(EI=100.0, load=8.0, length=10.0):
+            free = flying(EI, 1.0, load, 0.0, length)
+            beam = free.beams[0]
+            push = ub.PointLoad(beam.start, force=(load, 0), amplitude=lambda t: 0.1 * t)
+            return ub.Scene([beam], supports=[ub.Clamped(beam.end)], loads=[push])
+
+        def top(solution):
+            return solution.displacement(solution.scene.beams[0].start)[:, 0]
+
+        model, without, of = clamped, {}, top
+    else:
+        of = tip if name != "moving support" else middle
+    at = parameters(model, without)
+    arguments = (model, at, scheme)
+    times = {"t": (0, end), "dt": dt}
+    direct = ub.differentiate(*arguments, **times, progress=False).of(lambda s: of(s)[-1])
+    found = ub.gradient(*arguments, **times, of=of)
+    np.testing.assert_allclose(found, direct, rtol=1e-8, atol=1e-10 * np.abs(direct).max())
+    parts = ub.gradient(*arguments, **times, of=of, memory=1e5)
+    np.testing.assert_allclose(parts, found, rtol=1e-10, atol=1e-13 * np.abs(found).max())
+
+
+def middle(solution):
+    """Motion of the middle of a beam, (n+1, 2), and its velocity at an angle."""
+    return solution.displacement(solution.scene.beams[0].at(0.5))[:, 0]
+
+
+def test_number_may_depend_on_the_whole_history():
+    at = parameters(yielding, {})
+    run = (yielding, at, ub.EnergyMomentum(0.02))
+    times = {"t": (0, 0.4), "dt": 0.004}
+
+    def both(solution):
+        place = solution.scene.beams[0].end
+        return np.column_stack([solution.displacement(place), solution.velocity(place)])
+
+    def number(x):
+        return float(np.max(x[:, 0]) + 0.01 * np.mean(x[:, 3] ** 2))
+
+    direct = ub.differentiate(*run, **times, progress=False).of(lambda s: number(both(s)))
+    found = ub.gradient(*run, **times, of=both, reduce=number)
+    np.testing.assert_allclose(found, direct, rtol=1e-7)  # of differences of squares
+
+
+def test_stiffness_of_each_cell():
+    """A map of 24 parameters, of which some are compared with direct differentiation."""
+
+    def pieces(**EI):
+        sections = [ub.Section(EI=x, **STEEL) for x in EI.values()]
+        beams = [
+            ub.Beam((0, 0.125 * k), (0, 0.125 * (k + 1)), section, cells=1)
+            for k, section in enumerate(sections)
+        ]
+        joints = [ub.Rigid(a.end, b.start) for a, b in zip(beams, beams[1:], strict=False)]
+        push = ub.PointLoad(beams[-1].end, force=(1e4, 0.0), amplitude=pulse)
+        return ub.Scene(beams, joints=joints, supports=[ub.Clamped(beams[0].start)], loads=[push])
+
+    at = {f"EI{k}": 9e6 for k in range(24)}
+    times = {"t": (0, 0.1), "dt": 0.002}
+    found = ub.gradient(pieces, at, ub.EnergyMomentum(), **times, of=tip)
+    some = ("EI0", "EI11", "EI23")
+    direct = ub.differentiate(
+        lambda **values: pieces(**(at | values)),
+        {name: at[name] for name in some},
+        ub.EnergyMomentum(),
+        **times,
+        progress=False,
+    ).of(lambda s: tip(s)[-1])
+    # The derivative by the stiffness of the tip is small; errors are round-off of differences.
+    np.testing.assert_allclose(
+        found[[0, 11, 23]], direct, rtol=1e-9, atol=1e-9 * np.abs(direct).max()
+    )
+
+
+def refused(message, model=flying, scheme=None, of=tip, **more):
+    with pytest.raises(ub.ArgumentError, match=message):
+        ub.gradient(
+            model, {"EI": 100.0}, scheme or ub.EnergyMomentum(), t=(0, 1), dt=0.1, of=of, **more
+        )
+
+
+def test_wrong_arguments_are_refused():
+    refused("must return a history", of=lambda s: tip(s)[-1])
+    refused("no adjoint; use a scheme without accelerations", scheme=ub.Newmark())
+    refused("memory", memory=-1.0)
+
+
+def test_effects_without_an_adjoint_are_refused_by_name():
+    def brake(EI):
+        scene = flying(EI)
+        brake = ub.Turn(ub.ground(6, 0), scene.beams[0].start, ub.Coulomb(1.0))
+        return ub.Scene(scene.beams, connectors=[brake], loads=scene.loads)
+
+    refused("has no adjoint; use differentiate", brake)

@@ -1,0 +1,447 @@
+/* SPDX-License-Identifier: MIT */
+/* Discrete adjoint of a run: derivatives of one number by many parameters, see analysis/derivatives.py.
+ *
+ * A recorded step is the linear map of derivatives.c from the derivatives before the step to those at
+ * its end. Backwards through the steps, the transposed map takes the derivatives of the number by the
+ * state at the end of a step to those by the state before it. Arrays `..._bar` are derivatives of the
+ * number. */
+
+/* Transposed product with the tables: values of the rows of each cell, or of q at its degrees of freedom
+ * if `values` is null, times the columns. The product is added to `apart`, cell after cell, or else to
+ * out at the degrees of freedom. */
+static void transpose_tables(const form_derivative *f, const double *values, const double *q, double *apart,
+                             double *out)
+{
+  const cells *table = f->table;
+  const int n = table->batch_size, columns = f->columns, rows = table->rows / columns;
+  for (int c = 0; c < table->number; ++c) {
+    const double *entry = table->each + (size_t)(c & -n) * table->rows + (c & (n - 1));
+    const int32_t *dofs = table->dofs + (size_t)c * table->of_cell;
+    for (int i = 0; i < rows; ++i) {
+      const double x = values ? values[c * rows + i] : q[dofs[i]];
+      for (int j = 0; j < columns; ++j, entry += n)
+        if (apart) apart[c * columns + j] += *entry * x;
+        else out[dofs[j]] += *entry * x;
+    }
+  }
+}
+
+static double dot(size_t size, const double *x, const double *y)
+{
+  double sum = 0;
+  for (size_t i = 0; i < size; ++i) sum += x[i] * y[i];
+  return sum;
+}
+
+/* -- forms --------------------------------------------------------------------------------------------- */
+
+void transpose_form(void *self, adjoint *a, const double *λ)
+{
+  const form_derivative *f = self;
+  if (!f->bar) {
+    transpose_tables(f, 0, λ, 0, a->q0);
+    return;
+  }
+  /* A direction of one parameter belongs to the term that computes it. */
+  if (!f->stride) memset(f->bar, 0, (size_t)f->table->number * f->columns * sizeof *f->bar);
+  transpose_tables(f, 0, λ, f->bar, 0);
+}
+
+void finish_form(void *self, adjoint *a)
+{
+  const form_derivative *f = self;
+  for (int p = 0; f->bar && f->stride && p < a->parameters; ++p)
+    a->gradient[p] += dot(f->stride, f->bar, f->direction + (size_t)p * f->stride);
+}
+
+/* Work of the derivative by coordinates on λ, for each parameter. */
+static void transpose_shape_of(const shape_derivative *s, adjoint *a, const double *λ)
+{
+  for (int p = 0; p < a->parameters; ++p) {
+    if (!s->coordinates[p * s->neighbours]) continue;
+    memset(a->values, 0, s->size * sizeof *a->values);
+    add_shape(s, a->d->x, p, a->values);
+    a->gradient[p] += dot(s->size, a->values, λ);
+  }
+}
+
+void transpose_shape(void *self, adjoint *a, const double *λ) { transpose_shape_of(self, a, λ); }
+
+/* -- material points ----------------------------------------------------------------------------------- */
+
+/* Remove the unknowns of a point from x_bar, the derivatives by all its inputs; the transpose of
+ * find_unknowns. */
+static void remove_unknowns(const point_derivatives *m, const double *w, const double *J, double *x_bar)
+{
+  const points *p = m->points;
+  const int opens = w[DIRECTION] != 0, variables = p->solves ? p->variables : 0, size = opens + variables;
+  const int first = m->equations + (p->resistance && !opens);
+  double A[(1 + MOST_VARIABLES) * (1 + MOST_VARIABLES)], y[1 + MOST_VARIABLES];
+  for (int i = 0; i < size; ++i) {
+    const int mine = opens && i == 0 ? 0 : 1 + i - opens;
+    y[i] = x_bar[m->column[mine]];
+    for (int j = 0; j < size; ++j) A[i * size + j] = J[(first + j) * m->columns + mine];
+  }
+  if (size) solve_dense(size, A, 1, y);
+  x_bar[GROWTH] = 0;
+  for (int k = 0; k < variables; ++k) x_bar[m->unknown + k] = 0;
+  for (int i = 0; i < size; ++i)
+    for (int j = 1 + variables; j < m->columns; ++j) x_bar[m->column[j]] -= y[i] * J[(first + i) * m->columns + j];
+}
+
+static void add_row(const point_derivatives *m, const double *J, int row, double factor, double *x_bar)
+{
+  for (int j = 0; j < m->columns; ++j) x_bar[m->column[j]] += factor * J[row * m->columns + j];
+}
+
+/* Enter x_bar, the derivatives by the inputs of point i in section c: strains at both ends, whose
+ * derivatives are added to e1_bar and e0_bar, and the data of the point. */
+static void enter_point(const point_derivatives *m, int c, int i, double *x_bar, double *e1_bar)
+{
+  const points *p = m->points;
+  const int d = p->components, k = c * p->of_cell + i;
+  double *w_bar = m->w_bar + (size_t)k * p->width, *e0_bar = m->e0_bar + 3 * c;
+  for (int a = 0; a < 2 * d; ++a) {
+    const double x = x_bar[p->strain + a], *b = p->B + 3 * (d * i + a % d);
+    const double *e = (a < d ? p->e1 : p->e0) + 3 * c;
+    double *to = a < d ? e1_bar + 3 * c : e0_bar;
+    for (int l = 0; l < 3; ++l) {
+      to[l] += x * b[l];
+      if (m->B) m->B_bar[3 * (d * i + a % d) + l] += x * e[l];
+    }
+    x_bar[p->strain + a] = 0;
+  }
+  for (int j = 0; j < p->width; ++j) w_bar[j] += x_bar[j];
+}
+
+/* Derivatives of the state at the end of a step to those by its beginning; q1 gets those by the
+ * configuration at the end. */
+void transpose_points_state(void *self, adjoint *a)
+{
+  const point_derivatives *m = self;
+  const points *p = m->points;
+  const int d = p->components, width = p->width;
+  double out[POINT_OUTPUTS + 3 + MOST_VARIABLES], *x = a->values;
+  memcpy(m->e1, m->e0_bar, 3 * (size_t)p->cells * sizeof *m->e1);
+  memset(m->e0_bar, 0, 3 * (size_t)p->cells * sizeof *m->e0_bar);
+  for (int c = 0; c < p->cells; ++c)
+    for (int i = 0; i < p->of_cell; ++i) {
+      const size_t k = c * p->of_cell + i;
+      double *w = p->w + k * width, *w_bar = m->w_bar + k * width;
+      const double *J = m->J + k * m->outputs, *state = w_bar + p->strain + 3 * d;
+      memset(x, 0, width * sizeof *x);
+      for (int j = 0; j < p->variables; ++j) add_row(m, J, d + j, state[j], x);
+      x[GROWTH] += w[DIRECTION] * w_bar[JUMP] + w_bar[OPENING];
+      if (w[TRACTION] < INFINITY) {
+        ask(p->end, w, POINT_OUTPUTS + d + p->variables, out);
+        if (out[RESISTANCE] == 0) {
+          const double C = w[p->strain + 2], L = w[LENGTH], s = out[POINT_OUTPUTS], bar = w_bar[JUMP];
+          add_row(m, J, d + p->variables, bar * L / C, x);
+          x[LENGTH] += bar * s / C, x[p->strain + 2] -= bar * s * L / (C * C);
+        }
+      }
+      remove_unknowns(m, w, J, x);
+      enter_point(m, c, i, x, m->e1);
+    }
+  if (m->cells) {
+    for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
+    transpose_tables(m->strains, m->e1, 0, 0, a->q1);
+    if (m->shape) transpose_shape_of(m->shape, a, m->e1);
+  } else {
+    for (int i = 0; i < p->cells; ++i) m->r[i] = m->e1[3 * i];
+    transpose_tables(m->strains, m->r, 0, 0, a->q1);
+    if (m->by_geometry) transpose_tables(m->by_geometry, m->r, 0, m->by_geometry->bar, 0);
+  }
+}
+
+/* Derivatives by the resultants, or by the rows of springs, to those by the state before the step. */
+void transpose_points(void *self, adjoint *a, const double *λ)
+{
+  const point_derivatives *m = self;
+  const points *p = m->points;
+  const int d = p->components, width = p->width;
+  const double θ = p->theta;
+  double *x = a->values;
+  memset(m->e1, 0, 3 * (size_t)p->cells * sizeof *m->e1);
+  for (int c = 0; c < p->cells; ++c) {
+    const double *e0 = p->e0 + 3 * c, *e1 = p->e1 + 3 * c;
+    const double of_spring[3] = {m->springs ? m->row_bar[3 * c + 2] : 0};
+    const double *r_bar = m->springs ? of_spring : m->r_bar + 3 * c;
+    for (int k = 0; k < 3; ++k) {
+      m->e0_bar[3 * c + k] += p->rest[k] * (1 - θ) * r_bar[k];
+      if (m->rest) m->rest_bar[k] += r_bar[k] * ((1 - θ) * e0[k] + θ * e1[k]);
+    }
+    for (int i = 0; i < p->of_cell; ++i) {
+      const size_t at = c * p->of_cell + i;
+      const double *J = m->J + at * m->outputs;
+      memset(x, 0, width * sizeof *x);
+      for (int b = 0; b < d; ++b) {
+        const double s = J[m->outputs - d - m->margins + b];
+        double bar = 0;
+        for (int k = 0; k < 3; ++k) {
+          bar += p->B[3 * (d * i + b) + k] * r_bar[k];
+          if (m->B) m->B_bar[3 * (d * i + b) + k] += p->weight[i] * s * r_bar[k];
+        }
+        if (m->weight) m->weight_bar[i] += s * bar;
+        add_row(m, J, b, p->weight[i] * bar, x);
+      }
+      remove_unknowns(m, p->w + at * width, J, x);
+      enter_point(m, c, i, x, m->e1);
+    }
+  }
+  if (!m->shape) return; /* strains change at constant unknowns by the coordinates only */
+  for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
+  transpose_shape_of(m->shape, a, m->e1);
+}
+
+void finish_points(void *self, adjoint *a)
+{
+  const point_derivatives *m = self;
+  const points *p = m->points;
+  const size_t all = (size_t)p->cells * p->of_cell * p->width, strains = 3 * (size_t)p->cells;
+  const int one = 3 * p->components * p->of_cell;
+  for (int q = 0; q < a->parameters; ++q) {
+    double sum = dot(all, m->w_bar, m->w + q * all) + dot(strains, m->e0_bar, m->e0 + q * strains);
+    if (m->B) sum += dot(one, m->B_bar, m->B + (size_t)q * one);
+    if (m->weight) sum += dot(p->of_cell, m->weight_bar, m->weight + (size_t)q * p->of_cell);
+    if (m->rest) sum += dot(3, m->rest_bar, m->rest + 3 * q);
+    const form_derivative *g = m->by_geometry;
+    if (g) sum += dot(g->stride, g->bar, g->direction + (size_t)q * g->stride);
+    a->gradient[q] += sum;
+  }
+}
+
+/* -- connectors ---------------------------------------------------------------------------------------- */
+
+static void add_row_of_law(const connector_derivatives *m, int i, int row, double factor, double *x_bar)
+{
+  const double *J = m->J + (size_t)i * m->outputs + row * m->columns;
+  for (int j = 0; j < m->columns; ++j) x_bar[m->column[j]] += factor * J[j];
+}
+
+/* From the slip of a rigid-plastic connector to the motion at the end and at the beginning of the slip. */
+static void enter_slip(const double *w, double slip_bar, double *motion_bar, double *w_bar)
+{
+  if (!(w[SLIP] > 0)) return;
+  if (motion_bar) *motion_bar += w[SLIP_DIRECTION] * slip_bar;
+  w_bar[SLIP_START] -= w[SLIP_DIRECTION] * slip_bar;
+}
+
+void transpose_connectors_state(void *self, adjoint *a)
+{
+  const connector_derivatives *m = self;
+  const connectors *c = m->term->connectors;
+  const int n = c->components, all = n * c->number;
+  double *x = a->values;
+  memcpy(m->e1, m->e0_bar, all * sizeof *m->e1);
+  memset(m->e0_bar, 0, all * sizeof *m->e1);
+  for (int i = 0; i < c->number; ++i) {
+    if (c->laws) {
+      const int width = c->laws->width;
+      double *w_bar = m->w_bar + (size_t)i * width, *state = w_bar + 2 * n + 2;
+      memset(x, 0, width * sizeof *x);
+      for (int j = 0; j < c->laws->variables; ++j) add_row_of_law(m, i, n + j, state[j], x), state[j] = 0;
+      for (int j = 0; j < n; ++j) m->e1[n * i + j] += x[j], m->e0_bar[n * i + j] += x[n + j];
+      for (int j = 2 * n; j < width; ++j) w_bar[j] += x[j];
+    } else if (c->rigid_plastic) {
+      const double *w = c->rigid_plastic->w + (size_t)i * c->rigid_plastic->width;
+      double *w_bar = m->w_bar + (size_t)i * c->rigid_plastic->width;
+      enter_slip(w, w_bar[SLIPPED] + w[SLIP_DIRECTION] * w_bar[SLIP_START], m->e1 + i, w_bar);
+    }
+  }
+  transpose_tables(m->motions, m->e1, 0, 0, a->q1);
+  if (m->by_geometry) transpose_tables(m->by_geometry, m->e1, 0, m->by_geometry->bar, 0);
+}
+
+void transpose_connectors(void *self, adjoint *a, const double *λ)
+{
+  const connector_derivatives *m = self;
+  const connector_term *t = m->term;
+  const connectors *c = t->connectors;
+  const int n = c->components;
+  double *x = a->values;
+  if (m->now) find_prescribed(m, a->step);
+  for (int i = 0; i < c->number; ++i) {
+    const double *row_bar = m->row_bar + n * (n + 2) * i + n + 1;
+    if (c->laws) {
+      const int width = c->laws->width;
+      double *w_bar = m->w_bar + (size_t)i * width;
+      memset(x, 0, width * sizeof *x);
+      for (int j = 0; j < n; ++j) add_row_of_law(m, i, j, row_bar[j * (n + 2)], x);
+      for (int j = 0; j < n; ++j) m->e0_bar[n * i + j] += x[n + j];
+      for (int j = 2 * n; j < width; ++j) w_bar[j] += x[j];
+    } else if (c->rigid_plastic) {
+      const rigid_plastic *of = c->rigid_plastic;
+      const double *w = of->w + (size_t)i * of->width;
+      double *w_bar = m->w_bar + (size_t)i * of->width;
+      if (!of->direction[i]) w_bar[SLIP_START] += *row_bar;
+      else {
+        memset(x, 0, of->width * sizeof *x);
+        add_row_of_law(m, i, 0, -*row_bar / of->slope[i], x);
+        enter_slip(w, x[SLIP], 0, w_bar);
+        x[SLIP] = 0;
+        for (int j = 0; j < of->width; ++j) w_bar[j] += x[j];
+      }
+    } else if (t->viscosity) {
+      m->viscosity_bar[i] += *row_bar * (c->e1[i] - c->e0[i]) / *m->dt;
+      m->e0_bar[i] -= *row_bar * t->viscosity[i] / *m->dt;
+    } else if (m->now)
+      for (int p = 0; p < a->parameters; ++p) a->gradient[p] += *row_bar * m->now[p * c->number + i];
+  }
+}
+
+void finish_connectors(void *self, adjoint *a)
+{
+  const connector_derivatives *m = self;
+  const connectors *c = m->term->connectors;
+  const size_t width = c->laws ? c->laws->width : c->rigid_plastic ? c->rigid_plastic->width : 0, all = width * c->number;
+  const form_derivative *g = m->by_geometry;
+  for (int p = 0; p < a->parameters; ++p) {
+    double sum = all ? dot(all, m->w_bar, m->w + p * all) : 0;
+    if (m->viscosity) sum += dot(c->number, m->viscosity_bar, m->viscosity + (size_t)p * c->number);
+    if (g) sum += dot(g->stride, g->bar, g->direction + (size_t)p * g->stride);
+    a->gradient[p] += sum;
+  }
+}
+
+/* -- inertia, damping, loads ----------------------------------------------------------------------------- */
+
+/* The matrices are symmetric. */
+void transpose_product(void *self, adjoint *a, const double *λ)
+{
+  const product_derivative *m = self;
+  const step_product *product = m->matrix->product;
+  const rates *of = m->matrix->rates;
+  const double *row = m->matrix->damps ? of->now->velocity : of->now->inertia;
+  double *x = a->values;
+  memset(x, 0, a->size * sizeof *x);
+  add_product(product->A, λ, x);
+  for (int j = 1; j < of->number; ++j)
+    for (int i = 0; row[j] != 0 && i < a->size; ++i) a->rates[j][i] += row[j] * x[i];
+  scale_rotations(product, x);
+  for (int i = 0; i < a->size; ++i) a->q0[i] -= row[0] * x[i];
+  for (int p = 0; p < a->parameters; ++p) {
+    if (!m->change[p]) continue;
+    memset(x, 0, a->size * sizeof *x);
+    add_product(m->change[p], product->rate, x);
+    a->gradient[p] += dot(a->size, x, λ);
+  }
+}
+
+/* Rates after the step to rates before it, and to the configurations at both ends. */
+static void transpose_rates(adjoint *a, const time_loop *m)
+{
+  const rates *of = m->rates;
+  const scheme_numbers *now = of->now;
+  double *s = a->values;
+  memset(s, 0, a->size * sizeof *s);
+  for (int j = 1; j < of->number; ++j) memcpy(a->new_rates + (size_t)j * a->size, a->rates[j], a->size * sizeof *s);
+  for (int j = 1; j < of->number; ++j) memset(a->rates[j], 0, a->size * sizeof *s);
+  for (int i = 0; i < a->size; ++i) a->rates[1][i] = a->new_rates[2 * a->size + i]; /* velocities before the last step */
+  for (int k = 0; k <= now->gives; ++k) {
+    const double *bar = a->new_rates + (size_t)(k ? 2 + k : 1) * a->size;
+    for (int j = 0; j < of->number; ++j)
+      for (int i = 0; now->rates[k][j] != 0 && i < a->size; ++i)
+        *(j ? a->rates[j] + i : s + i) += now->rates[k][j] * bar[i];
+  }
+  for (int k = 0; k < m->multipliers; ++k) s[m->multiplier[k]] = 0;
+  scale_rotations(a->d->inertia, s);
+  for (int i = 0; i < a->size; ++i) a->q1[i] += s[i], a->q0[i] -= s[i];
+}
+
+/* Dead loads of whole steps, whose derivatives do not depend on the state. */
+void transpose_loads(void *self, adjoint *a, const double *λ)
+{
+  const load_derivatives *l = self;
+  differentiate_loads(self, a->step, 0);
+  for (int p = 0; p < a->parameters; ++p) a->gradient[p] -= dot(l->size, l->now + (size_t)p * l->size, λ);
+}
+
+/* -- the steps ------------------------------------------------------------------------------------------- */
+
+/* Record the solved step, before it is accepted. Returns 0 if the memory is full. */
+int record_step(adjoint *a, time_loop *m)
+{
+  equation *e = m->equation;
+  derivatives *d = a->d;
+  if (a->recorded == a->most) return 0;
+  memcpy(d->s, m->s, a->size * sizeof *d->s);
+  d->x = m->x;
+  restart(e, EXACT);
+  residual(e, e->unknowns, e->residual, e->f);
+  fill_tangent(e, m->x);
+  for (int k = 0; k < d->terms; ++k)
+    if (d->term[k].linearize) d->term[k].linearize(d->term[k].self, &m->step, m->x);
+  char *to = a->record + (size_t)a->recorded * a->bytes;
+  memcpy(to, &m->step, sizeof m->step), to += sizeof m->step;
+  if (m->rates) memcpy(to, m->rates->now, sizeof *m->rates->now);
+  to += sizeof(scheme_numbers);
+  for (int k = 0; k < a->blocks; ++k) memcpy(to, *a->block[k], a->length[k]), to += a->length[k];
+  ++a->recorded;
+  memcpy(m->s, d->s, a->size * sizeof *d->s);
+  return 1;
+}
+
+/* Go back through the last recorded step; returns 0 if the tangent is singular. */
+int go_back(adjoint *a, time_loop *m)
+{
+  equation *e = m->equation;
+  derivatives *d = a->d;
+  const char *from = a->record + (size_t)--a->recorded * a->bytes;
+  scheme_numbers numbers;
+  const rates *of = m->rates;
+  int failed = 0;
+  memcpy(&m->step, from, sizeof m->step), from += sizeof m->step;
+  memcpy(&numbers, from, sizeof numbers), from += sizeof numbers;
+  if (of) m->rates->now = &numbers;
+  for (int k = 0; k < a->blocks; ++k) memcpy(*a->block[k], from, a->length[k]), from += a->length[k];
+  d->x = m->x, a->step = &m->step;
+  memset(a->q0, 0, a->size * sizeof *a->q0);
+  for (int k = d->terms - 1; k >= 0; --k)
+    if (a->term[k].state) a->term[k].state(d->term[k].self, a);
+  if (of) transpose_rates(a, m);
+  /* λ = -K^-T q1_bar, in the axes of supports, where held motions are prescribed */
+  memcpy(d->tangent, e->tangent, e->indptr[e->size] * sizeof *d->tangent);
+  hold_tangent(e);
+  for (int k = 0; k < e->indptr[e->size]; ++k) a->transposed[k] = e->tangent[a->transpose[k]];
+  memcpy(e->tangent, a->transposed, e->indptr[e->size] * sizeof *d->tangent);
+  double *r = e->residual, *λ = a->lambda;
+  memcpy(r, a->q1, a->size * sizeof *r);
+  turn_axes(e->turned, e->axes, r, 1);
+  memcpy(d->v, r, a->size * sizeof *r);
+  for (int k = 0; k < e->held; ++k) r[e->hold[k]] = 0;
+  if (factor_tangent(e, &failed) || failed || solve_tangent(e, 1)) return 0;
+  for (int i = 0; i < a->size; ++i) λ[i] = -e->change[i];
+  for (int k = 0; k < e->held; ++k) λ[e->hold[k]] = 0;
+  turn_axes(e->turned, e->axes, λ, -1);
+  if (m->supports->moving) { /* derivatives by the prescribed motions */
+    memset(d->r, 0, a->size * sizeof *r);
+    for (int i = 0; i < e->size; ++i)
+      for (int k = e->indptr[i]; k < e->indptr[i + 1]; ++k) d->r[d->indices[k]] += d->tangent[k] * λ[i];
+    turn_axes(e->turned, e->axes, d->r, 1);
+    for (int p = 0; p < a->parameters; ++p)
+      for (int k = 0; k < m->supports->moving; ++k) {
+        const int i = m->supports->dof[k];
+        double wanted = 0;
+        for (int j = 0; j < d->neighbours; ++j)
+          wanted += d->weight[p * d->neighbours + j] * change_of_motion(d, m, p * d->neighbours + j, k);
+        a->gradient[p] += (d->v[i] + d->r[i]) * wanted;
+      }
+  }
+  for (int k = d->terms - 1; k >= 0; --k) a->term[k].force(d->term[k].self, a, λ);
+  memcpy(a->q1, a->q0, a->size * sizeof *a->q1); /* the end of the step before */
+  return 1;
+}
+
+/* Derivatives by the parameters, from those by the initial state. */
+void finish_adjoint(adjoint *a, time_loop *m)
+{
+  derivatives *d = a->d;
+  for (int k = 0; k < d->terms; ++k)
+    if (a->term[k].finish) a->term[k].finish(d->term[k].self, a);
+  for (int p = 0; p < a->parameters; ++p) {
+    a->gradient[p] += dot(a->size, a->q1, d->q0 + (size_t)p * a->size);
+    for (int j = 1; m->rates && j < m->rates->number; ++j)
+      a->gradient[p] += dot(a->size, a->rates[j], d->rates[j] + (size_t)p * a->size);
+  }
+}
