@@ -474,7 +474,11 @@ def refuse(*parts, model=yielding, at=(("load", 40.0),), scheme=None, **options)
 
 def test_parameters_that_do_not_fit():
     refuse("differentiate: at has no parameters", at=())
-    refuse("differentiate: model has other parameters than at:", "unexpected keyword argument 'EJ'", at={"EJ": 1.0})
+    refuse(
+        "differentiate: model has other parameters than at:",
+        "unexpected keyword argument 'EJ'",
+        at={"EJ": 1.0},
+    )
     refuse("differentiate: at['EI']", "'stiff'", at={"EI": "stiff"})
     refuse("Section: EI = -1 must be positive", at={"EI": -1.0})
 

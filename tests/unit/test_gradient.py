@@ -72,13 +72,17 @@ def machine(viscosity=3.0, force=20.0, stroke=0.2, stiffness=500.0, EI=100.0, le
     section = ub.Section(EA=1e4, GA=4e3, EI=EI, rhoA=1.0, rhoI=0.01)
     a = ub.Beam((0, 0), (length, 0), section, cells=3)
     b = ub.Beam((length, 0), (length, 1.0), section, cells=3)
-    cushion = ub.Stop(stiffness, low=-0.05, high=0.05) if hasattr(ub, "Stop") else ub.Spring(stiffness)
+    cushion = (
+        ub.Stop(stiffness, low=-0.05, high=0.05) if hasattr(ub, "Stop") else ub.Spring(stiffness)
+    )
     return ub.Scene(
         [a, b],
         joints=[ub.Revolute(a.end, b.start, multipliers=True)],
         supports=[ub.Pinned(a.start)],
         connectors=[
-            ub.Turn(ub.ground(0, 0), a.start, ub.PrescribedMotion(lambda t: stroke * math.sin(8 * t))),
+            ub.Turn(
+                ub.ground(0, 0), a.start, ub.PrescribedMotion(lambda t: stroke * math.sin(8 * t))
+            ),
             ub.Turn(a.end, b.start, ub.Damper(viscosity)),
             ub.Stretch(ub.ground(0, 1.0), b.end, ub.PrescribedForce(lambda t: force * t)),
             ub.Turn(a.end, b.start, cushion),
