@@ -327,6 +327,7 @@ __all__ = [
     "differentiate",
     "fit_decay",
     "follow",
+    "gradient",
     "ground",
     "imperfect",
     "incremental_dynamic_analysis",

@@ -69,6 +69,7 @@ ELSEWHERE = {
         "incremental_dynamic_analysis", "load_combinations", "pushover",
         "response_spectrum_analysis",
     },
+    "derivatives of runs, with random combinations of their own": {"differentiate", "gradient"},
     "many runs": {"Measurement", "Study", "TradeoffError", "calibrate", "study", "tradeoff"},
     "other geometry of ordinary scenes": {"imperfect"},
     "errors and words": {"ConvergenceError", "ProcessesDiffer", "ModelWarning", "ArgumentError",

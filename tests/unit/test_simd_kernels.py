@@ -329,7 +329,7 @@ def kernels(term):
 def cell_by_cell(kernel):
     """The same kernel without lanes."""
     n, one = len(kernel._dofs), copy(kernel)
-    for name in ("_packed", "_coordinates"):
+    for name in ("_packed", "coordinates"):
         batches = getattr(kernel, name).transpose(0, 2, 1)
         rows = batches.reshape(len(batches) * batches.shape[1], batches.shape[2])[:n]
         setattr(one, name, in_batches(rows, 1))

@@ -172,7 +172,7 @@ static void find_unknowns(const point_derivatives *m, const double *w, const dou
 {
   const points *p = m->points;
   const int opens = w[DIRECTION] != 0, variables = p->solves ? p->variables : 0, size = opens + variables;
-  double A[(1 + MOST_VARIABLES) * (1 + MOST_VARIABLES)], b[1 + MOST_VARIABLES];
+  double A[(1 + MOST_VARIABLES) * (1 + MOST_VARIABLES)], b[1 + MOST_VARIABLES] = {0};
   const int first = m->equations + (p->resistance && !opens); /* the equation of the growth comes first */
   dw[GROWTH] = 0;
   for (int k = 0; k < variables; ++k) dw[m->unknown + k] = 0;
@@ -296,7 +296,7 @@ void add_points_derivative(void *self, const derivatives *d, int q, double *r)
  * by differences. */
 static void differentiate_tangents(const point_derivatives *m, int q)
 {
-  static const double at[4] = {-2, -1, 1, 2}, part[4] = {1. / 12, -8. / 12, 8. / 12, -1. / 12};
+  static const double at[4] = {-2, -1, 1, 2}, share[4] = {1. / 12, -8. / 12, 8. / 12, -1. / 12};
   const points *p = m->points;
   const int d = p->components, width = p->width, one = 3 * d * p->of_cell;
   points at_end = *p;
@@ -324,7 +324,7 @@ static void differentiate_tangents(const point_derivatives *m, int q)
         add_answer(d, b, weight, s, r, D);
       }
       remove_negative(C, D);
-      for (int j = 0; j < 9; ++j) m->tangents[9 * number + j] += part[k] / m->step[q] * D[j];
+      for (int j = 0; j < 9; ++j) m->tangents[9 * number + j] += share[k] / m->step[q] * D[j];
     }
   }
 }

@@ -33,12 +33,12 @@ void predict(const prediction *p, double dt, const double *q, double *out)
  * which it may lie. */
 static void predict_stage(const prediction *p, double t, double *out)
 {
-  const int points = POINTS_OF_GUESS;
+  const int number = POINTS_OF_GUESS;
   memset(out, 0, p->size * sizeof *out);
-  for (int k = 0; k < points; ++k) {
+  for (int k = 0; k < number; ++k) {
     const double *q = p->past + (size_t)p->place[k] * p->size;
     double weight = 1;
-    for (int j = 0; j < points; ++j)
+    for (int j = 0; j < number; ++j)
       if (j != k) weight *= (t - p->time[j]) / (p->time[k] - p->time[j]);
     for (int i = 0; i < p->size; ++i) out[i] += weight * q[i];
   }

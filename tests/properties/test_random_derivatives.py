@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""Derivatives of random combinations agree with differences of runs, or are refused with a reason.
+
+The parameter is a factor of a random number in the script.  The derivative must be within 1e-7 of
+its largest value, or within three times the digits of the differences, which are known from two of
+their changes: in stiff scenes round-off over a change of 1e-4 leaves 1e-6.
+"""
+
+import re
+
+import pytest
+from derivative_cases import case, outcome
+
+import ufl_beam as ub
+
+pytestmark = [pytest.mark.serial, pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")]
+
+FEW = 4, 5, 6, 12, 18, 33, 47, 49, 52, 70, 72, 99
+"""Combinations with laws, hinges, connectors, joints, statics and dynamics, of a second each."""
+
+REASONS = (
+    r"differentiate: [A-Z]\w+ has no derivatives",  # an effect
+    r"differentiate: x changes the cells, unknowns or parts of the scene",
+    r"differentiate: x near 1: .* joint ends lie .* apart",  # one of two vertices moves
+    r"differentiate: the run does not depend on x",  # inertia in statics
+    r"differentiate: dt = Adaptive",
+)
+
+
+def require(found):
+    """The derivative agrees, a switch is nearer than the differences, or a reason is given."""
+    if found.kind == "refused":
+        assert any(re.match(reason, found.words, re.DOTALL) for reason in REASONS), found
+    else:
+        assert found.kind in ("agrees", "switches", "failed"), found
+
+
+@pytest.mark.parametrize("seed", FEW)
+def test_derivatives_agree_with_differences(seed):
+    found = outcome(case(seed))
+    assert found.kind == "agrees", (found, case(seed).number)
+
+
+@pytest.mark.parametrize(("seed", "reason"), [(0, 1), (1, 2), (3, 0), (14, 3), (97, 4)])
+def test_reasons_of_refusals(seed, reason):
+    found = outcome(case(seed))
+    assert found.kind == "refused"
+    assert re.match(REASONS[reason], found.words, re.DOTALL), found
+
+
+def test_a_mistake_is_found(monkeypatch):
+    """Derivatives that are wrong by a part in a million differ."""
+    right = ub.Derivatives.of
+    monkeypatch.setattr(ub.Derivatives, "of", lambda *of: (1 + 1e-6) * right(*of))
+    assert outcome(case(4)).kind == "differs"
+
+
+@pytest.mark.slow
+def test_a_hundred_random_scenes():
+    """No derivative differs; at most two runs of a hundred have a switch beside them or fail."""
+    kinds, faults = {}, {}
+    for seed in range(1000):
+        try:
+            one = case(seed)
+        except ub.ModelError:  # a combination that is refused, as test_combinations.py counts
+            continue
+        found = outcome(one)
+        kinds.setdefault(found.kind, []).append(seed)
+        try:
+            require(found)
+        except AssertionError:
+            faults[seed] = found, one.number
+        if len(kinds.get("agrees", [])) == 100:
+            break
+    print({kind: len(seeds) for kind, seeds in kinds.items()})
+    assert not faults
+    assert len(kinds["agrees"]) == 100
+    assert len([*kinds.get("switches", []), *kinds.get("failed", [])]) <= 2

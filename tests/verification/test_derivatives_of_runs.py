@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: MIT
+"""Derivatives of runs against five-point differences of runs, family by family; all [calc].
+
+Differences are of runs with steps solved to 1e-13, and the best of several changes of a parameter.
+They have 8 to 11 digits: 1e-13 over a change of 1e-4 is 1e-9, and a run adds up the errors of its
+steps.  The derivatives of the motion must agree to 1e-7 of their largest value.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from run_differences import TIGHT, errors, relative_error
+from scenes import clamped
+
+import ufl_beam as ub
+
+pytestmark = pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
+
+AGREE = 1e-7
+SECTION = ub.Section(EA=2.1e9, GA=6.7e8, EI=9e6, rhoA=78.5, rhoI=0.065)
+DAMPED = ub.EnergyMomentum(0.02)
+
+
+def pulse(t):
+    return math.sin(math.pi * t / 0.2) if t < 0.2 else 0.0
+
+
+def to_and_fro(t):
+    return math.sin(2 * math.pi * t / 0.3)
+
+
+def flying(EI=100.0, rhoA=1.0, load=8.0, v0=0.5):
+    """The flying beam of Simo and Vu-Quoc (1986), with a velocity."""
+    section = ub.Section(EA=1e4, GA=1e4, EI=EI, rhoA=rhoA, rhoI=10.0)
+    beam = ub.Beam((6, 0), (0, 8), section, cells=16)
+    kick = ub.PointLoad(
+        beam.start, force=(load, 0), moment=-10 * load, amplitude=lambda t: float(t < 2.5)
+    )
+    return ub.Scene([beam], loads=[kick], initial=[ub.Velocity([beam], linear=(v0, 0))])
+
+
+def column(section, load, *, hinges=None, amplitude=pulse, cells=12, **parts):
+    """A column of 3 m with a mass of 400 kg, which is pushed at its top."""
+    beam = ub.Beam((0, 0), (0, 3), section, cells=cells, hinges=hinges or {}, name="column")
+    push = ub.PointLoad(beam.end, force=(load, 0), amplitude=amplitude)
+    return clamped(beam, masses=[ub.PointMass(beam.end, 400.0)], loads=[push], **parts)
+
+
+def yielding(limit=60e3, isotropic=4e5, kinematic=2e5, EI=9e6, rhoA=78.5, load=35e3):
+    law = ub.ElastoPlastic(limit, isotropic, kinematic)
+    return column(replace(SECTION, EI=EI, rhoA=rhoA, bending=law), load)
+
+
+def viscous(limit=60e3, isotropic=4e5, eta=2e4, load=35e3):
+    law = ub.ElastoPlastic(limit, isotropic, viscosity=ub.Perzyna(eta))
+    return column(replace(SECTION, bending=law), load)
+
+
+def relaxing(limit=60e3, time=0.02, load=35e3):
+    law = ub.ElastoPlastic(limit, 4e5, viscosity=ub.DuvautLions(time))
+    return column(replace(SECTION, bending=law), load)
+
+
+def softening(M_u=60e3, G_f=6e3, EI=9e6, rhoA=78.5, load=32e3):
+    """An embedded hinge that opens in a cell, and does not close again."""
+    law = ub.Softening(M_u, G_f)
+    return column(replace(SECTION, EI=EI, rhoA=rhoA, hinge=law), load)
+
+
+def exhausted(M_u=60e3, G_f=1e3, EI=9e6, load=32e3):
+    """A hinge in a cell that softens linearly until it turns freely."""
+    return column(replace(SECTION, EI=EI, hinge=ub.LinearSoftening(M_u, G_f)), load)
+
+
+def hinged(M_u=60e3, G_f=6e3, EI=9e6, load=32e3):
+    """A plastic hinge of zero length that softens."""
+    return column(replace(SECTION, EI=EI), load, hinges={0.0: ub.LinearSoftening(M_u, G_f)})
+
+
+def both(limit=50e3, isotropic=4e5, kinematic=2e5, M_u=62e3, G_f=6e3, EI=9e6, load=30e3):
+    """Yielding to and fro, and a hinge that opens in a cell that has yielded."""
+    law = ub.ElastoPlastic(limit, isotropic, kinematic)
+    section = replace(SECTION, EI=EI, bending=law, hinge=ub.Softening(M_u, G_f))
+    return column(section, load, amplitude=to_and_fro)
+
+
+def fibres(limit=235e6, isotropic=2e9, E=210e9, height=0.2, load=60e3):
+    law = ub.Fibres(ub.ElastoPlastic(limit, isotropic), number=8)
+    section = ub.Section.rectangle(0.1, height, E=E, nu=0.3, rho=7850.0, fibres=law)
+    return column(section, load, amplitude=to_and_fro, cells=6)
+
+
+def steel(limit=235e6, hardening=0.01, R0=20.0, load=60e3):
+    law = ub.Fibres(ub.MenegottoPinto(limit, hardening, R0), number=8)
+    section = ub.Section.rectangle(0.1, 0.2, E=210e9, nu=0.3, rho=7850.0, fibres=law)
+    return column(section, load, amplitude=to_and_fro, cells=4)
+
+
+def machine(k=2e3, c=30.0, mass=3.0, length=1.0, limit=25.0, speed=2.0):
+    """Two arms with a motor, a yielding spring, a damper and a hinge with friction."""
+    section = ub.Section(EA=1e5, GA=1e5, EI=100.0, rhoA=1.0, rhoI=1e-3)
+    one = ub.Beam((0, 0), (length, 0), section, cells=3)
+    other = ub.Beam((length, 0), (length + 1, 0.3), section, cells=3)
+    return ub.Scene(
+        [one, other], supports=[ub.Pinned(one.start)], masses=[ub.PointMass(other.end, mass)],
+        joints=[ub.Revolute(one.end, other.start)], loads=[ub.Gravity()],
+        connectors=[
+            ub.Turn(ub.ground(0, 0), one.start, ub.PrescribedMotion(lambda t: speed * t**2)),
+            ub.Turn(one.end, other.start, ub.Spring(k, law=ub.ElastoPlastic(limit, 50.0))),
+            ub.Turn(one.end, other.start, ub.Damper(c)),
+        ],
+    )  # fmt: skip
+
+
+STEPS = {"t": (0, 0.6), "dt": 0.002}
+FAMILIES = {
+    "flying beam": (flying, ub.EnergyMomentum(), {"t": (0, 5), "dt": 0.05}),
+    "flying beam, damped": (flying, ub.EnergyMomentum(0.01, 0.01), {"t": (0, 5), "dt": 0.05}),
+    "flying beam, Newmark": (flying, ub.Newmark(), {"t": (0, 2), "dt": 0.02}),
+    "flying beam, generalized alpha": (
+        flying, ub.GeneralizedAlpha(0.8), {"t": (0, 2), "dt": 0.02}
+    ),
+    "yielding": (yielding, DAMPED, STEPS),
+    "yielding, degree 2": (yielding, DAMPED, {**STEPS, "dt": 0.005, "mesh": ub.Mesh(degree=2)}),
+    "Perzyna": (viscous, DAMPED, STEPS),
+    "Duvaut-Lions": (relaxing, DAMPED, STEPS),
+    "softening": (softening, DAMPED, STEPS),
+    "softening to zero": (exhausted, DAMPED, STEPS),
+    "hinge of zero length": (hinged, DAMPED, STEPS),
+    "yielding and softening": (both, DAMPED, STEPS),
+    "fibres": (fibres, DAMPED, STEPS),
+    "fibres of steel": (steel, DAMPED, STEPS),
+    "machine": (machine, ub.EnergyMomentum(0.05), {"t": (0, 1), "dt": 0.01}),
+}  # fmt: skip
+
+
+def defaults(model):
+    """Values of the parameters of a model."""
+    return dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_dynamics(name):
+    model, scheme, options = FAMILIES[name]
+    changes = 1e-3, 1e-4, 1e-5, 1e-6
+    best = errors(model, defaults(model), scheme, changes=changes, **options)
+    print(name, " ".join(f"{key} {error:.0e}" for key, error in best.items()))
+    assert max(best.values()) < AGREE, best
+
+
+# -- statics ---------------------------------------------------------------------------------------
+
+
+def pulled(yields=50e3, isotropic=4e5, EI=9e6, M_u=55e3, G_f=40e3, height=3.0, sway=0.05):
+    """A column whose top is moved; it yields, and a hinge of zero length opens at its foot."""
+    section = replace(SECTION, EI=EI, bending=ub.ElastoPlastic(yields, isotropic))
+    beam = ub.Beam((0, 0), (0, height), section, cells=6, hinges={0.0: ub.Softening(M_u, G_f)})
+    move = ub.PrescribedDisplacement(beam.end, u=lambda t: sway * t)
+    return clamped(beam, move, loads=[ub.PointLoad(beam.end, force=(0, -1e5))])
+
+
+@pytest.mark.parametrize(
+    "scheme", [ub.Static(), ub.EnergyMomentumStatic(), ub.EnergyMomentumStatic(0.7)], ids=str
+)
+def test_statics(scheme):
+    at = defaults(pulled)
+    best = errors(pulled, at, scheme, t=(0, 1), dt=0.02, changes=(1e-4, 1e-5, 1e-6))
+    assert max(best.values()) < AGREE, best
+
+
+# -- quantities ------------------------------------------------------------------------------------
+
+
+def residual_displacement(s):
+    """Mean of the displacement over the last half of the run, m; the column swings about it."""
+    return s.displacement(s.scene.beams[0].end)[150:, 0].mean()
+
+
+def decay_ratio(s):
+    """Damping ratio of the swings after the pulse."""
+    u = s.displacement(s.scene.beams[0].end)[75:, 0]  # after 0.3 s
+    return ub.damping(s.times[75:], u - u.mean()).ratio
+
+
+def limit_load(s):
+    """Largest force that the support at the top bears, just after the hinge opens; N."""
+    return np.abs(s.reaction(s.scene.supports[1])[1:, 0]).max()
+
+
+@pytest.mark.parametrize(
+    ("quantity", "model", "scheme", "options", "tolerance"),
+    [
+        (residual_displacement, yielding, DAMPED, STEPS, AGREE),
+        # A ratio of logarithms of small differences of peaks, each of which is interpolated
+        (decay_ratio, yielding, DAMPED, {"t": (0, 1.2), "dt": 0.004}, 1e-5),
+        # G_f changes the largest force little, just after the hinge opens
+        (limit_load, pulled, ub.Static(), {"t": (0, 1), "dt": 0.01}, 1e-5),
+    ],
+    ids=["residual displacement", "damping ratio", "limit load"],
+)
+def test_quantities(quantity, model, scheme, options, tolerance):
+    best = errors(
+        model, defaults(model), scheme, quantity, changes=(1e-4, 3e-5, 1e-5, 1e-6), **options
+    )
+    print(quantity.__name__, " ".join(f"{key} {error:.0e}" for key, error in best.items()))
+    assert max(best.values()) < tolerance, best
+
+
+def test_tolerances_of_steps():
+    """Steps that are solved to rtol have derivatives of that error, times a small factor."""
+    at = {"limit": 60e3, "EI": 9e6}
+
+    def history(rtol):
+        run = ub.differentiate(
+            yielding, at, DAMPED, newton=ub.Newton(rtol=rtol), progress=False, **STEPS
+        )
+        return run.of(lambda s: s.q)
+
+    exact = history(TIGHT.rtol)
+    for rtol in (1e-6, 1e-8, 1e-10):
+        assert relative_error(history(rtol), exact) < max(100 * rtol, 1e-9)
