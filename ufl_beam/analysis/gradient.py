@@ -97,7 +97,7 @@ def gradient(
         >>> at = {"EI_0": 4e6, "EI_1": 4e6}
         >>> sag = ub.gradient(frame, at, ub.EnergyMomentum(), t=(0, 0.1), dt=2e-3, of=tip)
         >>> print((sag * 4e6 * 1e6).round(2))  # by relative changes; micrometres
-        [190.   25.65]
+        [1707.16  124.12]
     """
     require_function(of, "gradient: of", "a Solution")
     require_function(reduce, "gradient: reduce", "a history")

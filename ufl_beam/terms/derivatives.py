@@ -27,7 +27,7 @@ from ufl_beam.dolfinx_compat import fem
 FAR = 1e300
 """Margin of a comparison that does not matter."""
 
-MOST_MARGINS = 12
+MOST_MARGINS = 24
 """Largest number of comparisons in a law that the ranges of derivatives take into account."""
 
 Each = tuple[str, Any]

@@ -196,7 +196,8 @@ class PointForms:
                 resistance = equations.resistance(at, at["growth"])
             unknowns = (at["direction"] * stress[0] - resistance, *unknowns)
         ends = *end.changes, ufl.as_ufl(end.stress[0]), ufl.as_ufl(end.resistance)
-        conditions = margins(with_shared_nodes([*stress, *map(ufl.as_ufl, end.changes)]))
+        answers = [*stress, *map(ufl.as_ufl, end.changes), *unknowns]
+        conditions = margins(with_shared_nodes(answers))
         outputs = (*stress, *ends, *unknowns, *conditions)
         derivatives = [ufl.diff(ufl.as_ufl(f), at[name]) for f in outputs for name in by]
         values, first_equation = [*derivatives, *stress, *conditions], len(stress) + len(ends)
