@@ -99,9 +99,9 @@ def optional(kind):
     return [value for value in kind if value is not None]
 
 
-def call(of, **parameters):
+def call(function, /, **parameters):
     """A row: a callable, a valid value and a kind of each of its parameters."""
-    return of, parameters
+    return function, parameters
 
 
 def V(value, kind):
@@ -605,10 +605,10 @@ TABLE = {
         ub.gradient,
         model=V(lambda force: GROWING, [*FUNCTION, lambda force: None]),
         at=V({"force": 1.0}, [None, 1.0, "x", {}, {"force": "x"}, {"force": NAN}]),
-        scheme=V(ub.Static(), [*OBJECT, ub.Static, ub.EnergyMomentumStatic(), ub.Newmark()]),
+        scheme=V(ub.Static(), [*OBJECT, ub.Static, ub.EnergyMomentumStatic(0.7), ub.Newmark()]),
         t=V((0, 1), [*VECTOR, (1, 0)]),
         dt=V(0.5, [*POSITIVE, ub.Adaptive(1e-3)]),
-        of=V(lambda run: run.displacement(BEAM.end)[:, 0], [*FUNCTION, lambda run: 1.0]),
+        of=V(lambda run: run.displacement(BEAM.end)[:, 0], FUNCTION),
         reduce=V(np.mean, FUNCTION),
         newton=V(None, optional(OBJECT)),
         memory=V(1e6, POSITIVE),

@@ -39,7 +39,7 @@ from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.state_rows import Block, Column, Columns
 from ufl_beam.parallel import progress_bar
-from ufl_beam.simulation.initial_state import mesh_of
+from ufl_beam.simulation.initial_state import mesh_of, require_scheme
 from ufl_beam.simulation.run import require_times, running, take_steps
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
@@ -150,6 +150,7 @@ def checked_case(
             f"{call}: dt = Adaptive(...) chooses steps that depend on the parameters; give a number"
         )
     require_number(dt, f"{call}: dt", positive=True)
+    require_scheme(scheme, f"{call}: scheme")
     if order_of(scheme) > 2:
         raise ArgumentError(
             f"{call}: {scheme} has stages, which are not differentiated; use order=2, with a "

@@ -21,7 +21,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ArgumentError, StepFailed, require_function, require_number
-from ufl_beam.mechanics.time_scheme import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.simulation.run import require_times
 from ufl_beam.simulation.simulation import Simulation
@@ -104,6 +104,13 @@ def gradient(
     require_number(memory, "gradient: memory", positive=True)
     t0, t1 = require_times(t, "gradient")
     case = checked_case("gradient", model, at, scheme, t0, dt, newton, mesh)
+    if has_inertia(scheme) and scheme.further_rates:
+        raise ArgumentError(
+            f"gradient: scheme = {scheme}: the initial accelerations have no adjoint; use a scheme "
+            "without accelerations, such as EnergyMomentum()"
+        )
+    if not has_inertia(scheme) and scheme.load_weight != 1.0:
+        raise ArgumentError(f"gradient: scheme = {scheme} has no adjoint; use Static()")
     with closing(case.simulation({})) as run:
         neighbours, positions, weights = case.neighbours(run)
         steps = StepDerivatives(run, neighbours, positions, weights, 1)
@@ -126,14 +133,6 @@ class _Adjoint:
     def __init__(self, simulation: Simulation, steps: StepDerivatives, memory: float) -> None:
         self._simulation, self._steps = simulation, steps
         c, A = steps.c, simulation.equation.A
-        scheme, inertia = simulation.scheme, simulation.equation.inertia
-        if inertia is None and scheme.load_weight != 1.0:
-            raise ArgumentError(f"gradient: {scheme} has no adjoint; use Static()")
-        if inertia is not None and inertia.scheme.further_rates:
-            raise ArgumentError(
-                f"gradient: the initial accelerations of {scheme} have no adjoint; use a scheme "
-                "without accelerations, such as EnergyMomentum()"
-            )
         terms, blocks = list[Any](), [(A.data, A.data.nbytes)]
         for (kind, data), owner in zip(steps.terms, steps.owners, strict=True):
             if (found := transposes(kind, data)) is None:
