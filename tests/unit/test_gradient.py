@@ -2,6 +2,7 @@
 """The adjoint of runs, against direct differentiation of the same runs."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -176,7 +177,7 @@ def test_stiffness_of_each_cell():
             ub.Beam((0, 0.125 * k), (0, 0.125 * (k + 1)), section, cells=1)
             for k, section in enumerate(sections)
         ]
-        joints = [ub.Rigid(a.end, b.start) for a, b in zip(beams, beams[1:], strict=False)]
+        joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
         push = ub.PointLoad(beams[-1].end, force=(1e4, 0.0), amplitude=pulse)
         return ub.Scene(beams, joints=joints, supports=[ub.Clamped(beams[0].start)], loads=[push])
 

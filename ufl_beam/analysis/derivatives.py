@@ -226,8 +226,8 @@ class Case:
             self._stencils[name] = stencil
             yield from scenes
             return
-        near = f"{self._call}: {name} near {self.at[name]:g}"
-        raise ArgumentError(f"{near}: {refused}") from refused
+        where = f"{self._call}: {name} near {self.at[name]:g}"
+        raise ArgumentError(f"{where}: {refused}") from refused
 
     def simulations(self, name: str, fraction: float) -> Iterator[Simulation]:
         """Yield simulations of :meth:`scenes`."""
