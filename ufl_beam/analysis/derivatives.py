@@ -442,7 +442,7 @@ class Derivatives:
                 divided steps.
         """
         require_function(quantity, "of: quantity", "a Solution")
-        reference = _numbers(quantity(self.solution))
+        reference = _as_array(quantity(self.solution))
         try:
             changes = [self._differences(quantity, reference, some) for some in self._motions()]
         except _Unknown:
@@ -459,7 +459,7 @@ class Derivatives:
         changes = []
         for other in some:
             try:
-                value = _numbers(quantity(other))
+                value = _as_array(quantity(other))
             except ArgumentError as error:
                 raise ArgumentError(
                     f"{error}. If the model makes new beams at each call, find places in the scene "
@@ -521,7 +521,7 @@ class Derivatives:
         return simulation.solution
 
 
-def _numbers(values: Any) -> Array:
+def _as_array(values: Any) -> Array:
     """Return the result of a quantity as an array."""
     try:
         found = np.asarray(values, dtype=np.float64) if values is not None else None
