@@ -12,7 +12,8 @@ import ufl_beam as ub
 PAGES = [
     *sorted(DOCS.glob("extending*.md")),
     *sorted(DOCS.glob("howto_*.md")),
-    *(DOCS / f"{name}.md" for name in ("coming_from", "hinges", "index", "results", "start")),
+    *(DOCS / f"{name}.md" for name in ("coming_from", "derivatives", "hinges", "index")),
+    *(DOCS / f"{name}.md" for name in ("results", "start")),
 ]
 
 

@@ -215,8 +215,8 @@ class Case:
             self._stencils[name] = stencil
             yield from scenes
             return
-        near = f"{self._call}: {name} near {self.at[name]:g}"
-        raise ArgumentError(f"{near}: {refused}") from refused
+        where = f"{self._call}: {name} near {self.at[name]:g}"
+        raise ArgumentError(f"{where}: {refused}") from refused
 
     def simulations(self, name: str, fraction: float) -> Iterator[Simulation]:
         """Yield simulations of :meth:`scenes`."""
@@ -475,7 +475,7 @@ class Derivatives:
                 divided steps.
         """
         require_function(quantity, "of: quantity", "a Solution")
-        reference = _numbers(quantity(self.solution))
+        reference = _as_array(quantity(self.solution))
         try:
             changes = [self._differences(quantity, reference, some) for some in self._motions()]
         except _Unknown:
@@ -492,7 +492,7 @@ class Derivatives:
         changes = []
         for other in some:
             try:
-                value = _numbers(quantity(other))
+                value = _as_array(quantity(other))
             except ArgumentError as error:
                 raise ArgumentError(
                     f"{error}. If the model makes new beams at each call, find places in the scene "
@@ -555,7 +555,7 @@ class Derivatives:
         return simulation.solution
 
 
-def _numbers(values: Any) -> Array:
+def _as_array(values: Any) -> Array:
     """Return the result of a quantity as an array."""
     try:
         found = np.asarray(values, dtype=np.float64) if values is not None else None

@@ -99,14 +99,14 @@ def _needed(factor: Expr) -> tuple[Expr, bool] | None:
     if isinstance(factor, Division):
         return _needed(factor.ufl_operands[0])
     if isinstance(factor, Product):
-        one, other = factor.ufl_operands
-        return _needed(one) or _needed(other)
+        first, second = factor.ufl_operands
+        return _needed(first) or _needed(second)
     return None
 
 
-def _common(some: list[Branches]) -> Branches:
-    """Return the conditions that are in all of some branches."""
-    first, *others = some
+def _common(branches: list[Branches]) -> Branches:
+    """Return the conditions that all branches have."""
+    first, *others = branches
     return {k: x for k, x in first.items() if all(other.get(k) == x for other in others)}
 
 
@@ -119,11 +119,11 @@ def _operands(node: Expr, branches: Branches, compared: bool) -> list[Branches |
         if compared and yes == -no and condition.ufl_operands[0] in (yes, no):
             inside = [None, branches, branches]  # the absolute value of a number
     elif isinstance(node, Product):
-        for k, (one, other) in enumerate([node.ufl_operands, node.ufl_operands[::-1]]):
+        for k, (factor, other) in enumerate([node.ufl_operands, node.ufl_operands[::-1]]):
             if (needed := _needed(other)) is not None:
                 inside[k] = branches | {id(needed[0]): needed}
-            elif compared and isinstance(one, Conditional):
-                sides = one.ufl_operands[0].ufl_operands
+            elif compared and isinstance(factor, Conditional):
+                sides = factor.ufl_operands[0].ufl_operands
                 inside[k] = None if sides == (other, Zero()) else branches
     return inside
 
@@ -145,7 +145,7 @@ def margins(outputs: Sequence[Expr]) -> list[Expr]:
     for node in reversed(order.values()):  # parents come before their operands
         uses = [(c, reached[id(node), c]) for c in (False, True) if (id(node), c) in reached]
         if uses and isinstance(node, EQ | NE | LE | LT | GE | GT):
-            branches = _common([some for _, some in uses])
+            branches = _common([conditions for _, conditions in uses])
             left, right = node.ufl_operands
             margin = left - right
             for k, (condition, holds) in branches.items():
@@ -156,10 +156,10 @@ def margins(outputs: Sequence[Expr]) -> list[Expr]:
             uses = [(True, branches)]
         for compared, branches in uses:
             inside = _operands(node, branches, compared)
-            for operand, some in zip(node.ufl_operands, inside, strict=True):
-                if some is not None:
+            for operand, conditions in zip(node.ufl_operands, inside, strict=True):
+                if conditions is not None:
                     key = id(operand), compared
-                    reached[key] = _common([reached.get(key, some), some])
+                    reached[key] = _common([reached.get(key, conditions), conditions])
     return [*found.values()] if len(found) <= MOST_MARGINS else []
 
 
