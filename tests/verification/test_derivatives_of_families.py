@@ -114,6 +114,13 @@ def machine(k=2e3, c=30.0, mass=3.0, length=1.0, limit=25.0, speed=2.0):
     )  # fmt: skip
 
 
+def swinging(length=2.0, height=0.2):
+    """A steel beam that falls about its pinned end; EA is 75 times EI over the square of a cell's length."""
+    section = ub.Section.rectangle(b=0.1, h=height, E=210e9, nu=0.3, rho=7850.0)
+    beam = ub.Beam((0, 0), (length, 0), section, cells=4)
+    return ub.Scene([beam], supports=[ub.Pinned(beam.start)], loads=[ub.Gravity()])
+
+
 STEPS = {"t": (0, 0.6), "dt": 0.002}
 FAMILIES = {
     "flying beam": (flying, ub.EnergyMomentum(), {"t": (0, 5), "dt": 0.05}),
@@ -132,6 +139,7 @@ FAMILIES = {
     "yielding and softening": (both, DAMPED, STEPS),
     "fibres": (fibres, DAMPED, STEPS),
     "fibres of steel": (steel, DAMPED, STEPS),
+    "swinging beam": (swinging, ub.EnergyMomentum(), {"t": (0, 1), "dt": 0.01}),
     "machine": (machine, ub.EnergyMomentum(0.05), {"t": (0, 1), "dt": 0.01}),
 }  # fmt: skip
 
