@@ -141,9 +141,10 @@ MODELS = (
 ONLY_DYNAMIC = moving_mass, damped, damped_points
 
 
-SAME = 1e-8
+SAME = 5e-8
 """Differences of runs have an error of 1e-12 by a step of 1e-3; solutions have 1e-12 of the largest
-force, divided by this step, and some parameters change them by a hundredth only."""
+force, divided by this step, and some parameters change them by a hundredth only.  Derivatives by
+differences of numbers and tangents have round-off over a step of 1e-4."""
 
 OF_CHORDS = 2e-7
 """Directions of chords of guides have an error of the round-off to the power of two thirds, 4e-11,
