@@ -115,7 +115,7 @@ def machine(k=2e3, c=30.0, mass=3.0, length=1.0, limit=25.0, speed=2.0):
 
 
 def swinging(length=2.0, height=0.2):
-    """A steel beam that falls about its pinned end; EA is 75 times EI over a cell's length squared."""
+    """A steel beam that falls about its pinned end; EA is 75 EI over a cell's length squared."""
     section = ub.Section.rectangle(b=0.1, h=height, E=210e9, nu=0.3, rho=7850.0)
     beam = ub.Beam((0, 0), (length, 0), section, cells=4)
     return ub.Scene([beam], supports=[ub.Pinned(beam.start)], loads=[ub.Gravity()])
