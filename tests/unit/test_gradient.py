@@ -139,7 +139,7 @@ def test_adjoint_equals_direct_differentiation(name):
     direct = ub.differentiate(*arguments, **times, progress=False).of(lambda s: of(s)[-1])
     found = ub.gradient(*arguments, **times, of=of)
     np.testing.assert_allclose(found, direct, rtol=1e-8, atol=1e-10 * np.abs(direct).max())
-    parts = ub.gradient(*arguments, **times, of=of, memory=1e5)
+    parts = ub.gradient(*arguments, **times, of=of, max_bytes=1e5)
     np.testing.assert_allclose(parts, found, rtol=1e-10, atol=1e-13 * np.abs(found).max())
 
 
@@ -205,7 +205,7 @@ def refused(message, model=flying, scheme=None, of=tip, **more):
 def test_wrong_arguments_are_refused():
     refused("must return a history", of=lambda s: tip(s)[-1])
     refused("have no adjoint; use a scheme", scheme=ub.Newmark())
-    refused("memory", memory=-1.0)
+    refused("max_bytes", max_bytes=-1.0)
 
 
 def test_effects_without_an_adjoint_are_refused_by_name():

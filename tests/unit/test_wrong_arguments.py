@@ -611,7 +611,7 @@ TABLE = {
         of=V(lambda run: run.displacement(BEAM.end)[:, 0], FUNCTION),
         reduce=V(np.mean, FUNCTION),
         newton=V(None, optional(OBJECT)),
-        memory=V(1e6, POSITIVE),
+        max_bytes=V(1e6, POSITIVE),
         **MESH,
     ),
     "tradeoff": call(

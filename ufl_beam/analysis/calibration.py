@@ -176,7 +176,7 @@ def calibrate(
     residuals = np.concatenate([m.values for m in measurements]) - computed
     scaled, splits = jacobian / stacked[:, None], problem.splits
     covariance, undetermined = _covariance(scaled)
-    alone = [_covariance(part)[0].diagonal() for part in np.split(scaled, splits)]
+    alone = [_covariance(rows)[0].diagonal() for rows in np.split(scaled, splits)]
     deviations = np.sqrt(covariance.diagonal())
     with np.errstate(invalid="ignore"):
         correlations = covariance / np.outer(deviations, deviations)

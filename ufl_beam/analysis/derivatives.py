@@ -47,14 +47,14 @@ from ufl_beam.simulation.step_lengths import Adaptive, EqualSteps, step_count
 from ufl_beam.solvers.newton_options import Newton, require_plain
 from ufl_beam.terms.derivatives import Neighbours, functions
 
-STEP_OF_NUMBERS = 2.0**-13
+MODEL_STEP = 2.0**-13
 """Relative change of a parameter for differences of the numbers in a scene.
 
 Five-point differences are exact for polynomials of degree 4; the round-off is 1e-12 of the number.
 The error by the coordinates of nodes, (change over length of the cell)⁴, is multiplied by the ratio
 of axial to bending stiffness."""
 
-STEP_OF_QUANTITIES = 2.0**-17
+QUANTITY_STEP = 2.0**-17
 """Relative change of a parameter for differences of quantities.
 
 It is small because quantities, such as largest values, may be smooth in pieces only.  The round-off
@@ -265,7 +265,7 @@ class Case:
             the derivative, (P, n).
         """
         names = [*self.at]
-        neighbours = [[*self.simulations(name, STEP_OF_NUMBERS)] for name in names]
+        neighbours = [[*self.simulations(name, MODEL_STEP)] for name in names]
         for name, some in zip(names, neighbours, strict=True):
             if not all(_alike(run, other) for other in some):
                 raise ArgumentError(
@@ -274,20 +274,20 @@ class Case:
                     "same vertices"
                 )
         positions, weights = (
-            np.array([f(name, STEP_OF_NUMBERS) for name in names])
+            np.array([f(name, MODEL_STEP) for name in names])
             for f in (self.positions, self.weights)
         )
         return neighbours, positions, weights
 
 
-def _alike(one: Simulation, other: Simulation) -> bool:
+def _alike(run: Simulation, other: Simulation) -> bool:
     """Return whether two simulations have the same unknowns and the same kinds of terms."""
-    a, b = one.numbering, other.numbering
+    a, b = run.numbering, other.numbering
     names = "cells", "dofs", "dofs_of_bodies", "multipliers"
     same = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
-    terms = [[type(term) for term in x.equation.terms] for x in (one, other)]
-    angles = [[support.angle for support in x.scene.supports] for x in (one, other)]
-    held = np.array_equal(one.supports.dofs, other.supports.dofs)
+    terms = [[type(term) for term in x.equation.terms] for x in (run, other)]
+    angles = [[support.angle for support in x.scene.supports] for x in (run, other)]
+    held = np.array_equal(run.supports.dofs, other.supports.dofs)
     return same and terms[0] == terms[1] and angles[0] == angles[1] and held
 
 
@@ -305,7 +305,7 @@ class StepDerivatives:
         terms: Derivatives of all terms: kinds, and data of C.
         states: Derivatives of the present state of the run, as arrays that C changes.
         q, v: Derivatives of configurations and velocities by P parameters; (states, P, size).
-        held: Degrees of freedom that supports hold; (number,).
+        held_dofs: Degrees of freedom that supports hold; (number,).
         reactions: Derivatives of the forces of supports, in their axes; (states, P, number).
         c: ``derivatives`` of loops.h.
     """
@@ -336,7 +336,7 @@ class StepDerivatives:
         self.q, self.v = np.zeros((2, states, P, size))
         self._change, self._time = np.full(P, np.inf), np.full(P, np.nan)
         self._term, self._place = np.zeros((2, P), dtype=np.int32)
-        self.held, self.reactions = equation.supports.dofs, np.zeros((states, P, held))
+        self.held_dofs, self.reactions = equation.supports.dofs, np.zeros((states, P, held))
         q0 = scene.differences(lambda x: x.q)
         motions = [x.time_loop.supports.motion for some in neighbours for x in some]
         c = self.c = struct(
@@ -438,7 +438,10 @@ class Derivatives:
         self.solution, self.at, self._case = solution, case.at, case
         self.end, self._start = (state, steps.states), start
         self._q, self._v, self._reactions = steps.q, steps.v, steps.reactions
-        self._held, self.ranges = steps.held, dict(zip(case.at, steps.ranges(), strict=True))
+        self._held_dofs, self.ranges = (
+            steps.held_dofs,
+            dict(zip(case.at, steps.ranges(), strict=True)),
+        )
         self._enters = steps.enters()
         self._shifted: list[list[Solution]] = []
         self._repeated: list[list[Solution]] = []
@@ -482,7 +485,7 @@ class Derivatives:
         except _Unknown:
             changes = [self._differences(quantity, reference, some) for some in self._runs()]
         found = [
-            np.tensordot(self._case.weights(name, STEP_OF_QUANTITIES), row, axes=1)
+            np.tensordot(self._case.weights(name, QUANTITY_STEP), row, axes=1)
             for name, row in zip(self.at, changes, strict=True)
         ]
         return np.stack(found, axis=-1)
@@ -513,7 +516,7 @@ class Derivatives:
         reactions = solution.column("reactions")[:,]
         for k, support in enumerate(solution.scene.supports):
             dofs, components = solution.numbering.node(support.place), [*support.held]
-            at = np.searchsorted(self._held, dofs[components])
+            at = np.searchsorted(self._held_dofs, dofs[components])
             reactions[:, k, components] += change * self._reactions[:, p, at]
         return states | {"reactions": reactions}
 
@@ -521,9 +524,9 @@ class Derivatives:
         """Return motions and reactions at neighbouring values of each parameter."""
         if not self._shifted:
             for p, name in enumerate(self.at):
-                scenes = self._case.scenes(name, STEP_OF_QUANTITIES)
+                scenes = self._case.scenes(name, QUANTITY_STEP)
                 made = [DofNumbering(scene, mesh_of(None, self._case.mesh)) for scene in scenes]
-                changes = self._case.positions(name, STEP_OF_QUANTITIES)
+                changes = self._case.positions(name, QUANTITY_STEP)
                 pairs = zip(made, changes, strict=True)
                 self._shifted.append([MotionOnly(n, self._states(p, x)) for n, x in pairs])
         return self._shifted
@@ -538,8 +541,8 @@ class Derivatives:
                     "divided; use a smaller dt, with which no step is divided"
                 )
             for p, name in enumerate(self.at):
-                simulations = self._case.simulations(name, STEP_OF_QUANTITIES)
-                changes, found = self._case.positions(name, STEP_OF_QUANTITIES), list[Solution]()
+                simulations = self._case.simulations(name, QUANTITY_STEP)
+                changes, found = self._case.positions(name, QUANTITY_STEP), list[Solution]()
                 for simulation, change in zip(simulations, changes, strict=True):
                     with closing(simulation):
                         found.append(self._repeat(simulation, p, change))

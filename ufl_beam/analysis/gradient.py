@@ -35,7 +35,7 @@ SMALL = 2.0**-17
 
 ALIKE = 1e-9  # relative difference of slopes by small and large steps that counts as round-off
 
-MEMORY = 2.0**28
+MAX_BYTES = 2.0**28
 """Memory for recorded steps; bytes."""
 
 
@@ -55,7 +55,7 @@ def gradient(
     reduce: Callable[[Array], float] = last,
     newton: Newton | None = None,
     mesh: Mesh | None = None,
-    memory: float = MEMORY,
+    max_bytes: float = MAX_BYTES,
 ) -> Array:
     """Differentiate one number of a run by many parameters of the scene.
 
@@ -63,7 +63,7 @@ def gradient(
     number of parameters.  :func:`differentiate` is cheaper for up to about ten parameters, and has
     derivatives of any quantity.
 
-    The steps are recorded in parts of the run that fit into the given memory.  Each part is
+    The steps are recorded in parts of the run that fit into the given memory.  Each segment is
     computed twice.
 
     Args:
@@ -77,7 +77,7 @@ def gradient(
         reduce: Function that returns the number for the history; by default its last value.
         newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default the cells of the beams.
-        memory: Memory for recorded steps; bytes.
+        max_bytes: Memory for recorded steps; bytes.
 
     Returns:
         Derivatives of the number; (P,), in the order of ``at``.
@@ -101,7 +101,7 @@ def gradient(
     """
     require_function(of, "gradient: of", "a Solution")
     require_function(reduce, "gradient: reduce", "a history")
-    require_number(memory, "gradient: memory", positive=True)
+    require_number(max_bytes, "gradient: max_bytes", positive=True)
     t0, t1 = require_times(t, "gradient")
     case = checked_case("gradient", model, at, scheme, t0, dt, newton, mesh)
     if has_inertia(scheme) and scheme.further_rates:
@@ -117,10 +117,10 @@ def gradient(
         number = step_count(t1 - t0, dt)
         ends = t0 + (t1 - t0) * np.arange(1, number + 1) / number
         ends[-1] = t1
-        adjoint = _Adjoint(run, steps, memory)
+        adjoint = _Adjoint(run, steps, max_bytes)
         starts = adjoint.run(ends)
         sources = _derivatives_by_motion(run.solution, of, reduce)
-        found = adjoint.back(ends, starts, *sources)
+        found = adjoint.reverse(ends, starts, *sources)
         for some in neighbours:
             for other in some:
                 other.close()
@@ -130,7 +130,7 @@ def gradient(
 class _Adjoint:
     """Recorded steps of a simulation, and their adjoint, see adjoint.c."""
 
-    def __init__(self, simulation: Simulation, steps: StepDerivatives, memory: float) -> None:
+    def __init__(self, simulation: Simulation, steps: StepDerivatives, max_bytes: float) -> None:
         self._simulation, self._steps = simulation, steps
         c, A = steps.c, simulation.equation.A
         terms, blocks = list[Any](), [(A.data, A.data.nbytes)]
@@ -144,7 +144,7 @@ class _Adjoint:
         pointers = [self._pointer(x) for x, _ in blocks]
         lengths = np.array([n for _, n in blocks], dtype=np.int64)
         step = ffi.sizeof("time_step") + ffi.sizeof("scheme_numbers") + int(lengths.sum())
-        self.most = max(1, int(memory // step))
+        self.most = max(1, int(max_bytes // step))
         rows = np.repeat(np.arange(size), np.diff(A.indptr)).astype(np.int32)
         # `values` is space for the degrees of freedom, the values of forms, and the data of a point
         space = max([size, 1024, *(n // 8 for _, n in blocks)])
@@ -173,33 +173,33 @@ class _Adjoint:
         return ffi.new("void *[1]", [ffi.cast("void *", values)])
 
     def run(self, ends: Array) -> list[Any]:
-        """Take all steps; return the states at the beginning of each recorded part."""
+        """Take all steps; return the states at the beginning of each recorded segment."""
         simulation, starts = self._simulation, list[Any]()
         simulation.keep()
         for first in range(0, len(ends), self.most):
             archive = Archive(simulation.subdomain)
             simulation.save_or_restore(archive)
             starts.append(archive.state())
-            self._take(ends[first : first + self.most], keep=True)
+            self._step_to(ends[first : first + self.most], keep=True)
         if simulation.substeps != len(ends):
             raise ArgumentError("gradient: steps of the run were divided; use a smaller dt")
         return starts
 
-    def _take(self, ends: Array, *, keep: bool) -> None:
+    def _step_to(self, ends: Array, *, keep: bool) -> None:
         while len(ends):
             ends = ends[self._simulation.steps_to(ends, keep=keep) :]
 
-    def back(self, ends: Array, starts: list[Any], q: Array, v: Array) -> Array:
+    def reverse(self, ends: Array, starts: list[Any], q: Array, v: Array) -> Array:
         """Return the derivatives by the parameters, from those by the states; (n+1, size) each."""
         simulation, c = self._simulation, self.c
         number = min(self.most, len(ends))
         fill(c, most=number, record=ffi.new("char[]", number * int(c.bytes)))
-        for part in reversed(range(len(starts))):
-            first = part * self.most
+        for segment in reversed(range(len(starts))):
+            first = segment * self.most
             some = ends[first : first + self.most]
-            simulation.save_or_restore(Archive(simulation.subdomain, starts[part]))
+            simulation.save_or_restore(Archive(simulation.subdomain, starts[segment]))
             fill(simulation.time_loop, adjoint=c)
-            self._take(some, keep=False)
+            self._step_to(some, keep=False)
             simulation.time_loop.adjoint = ffi.NULL
             for n in reversed(range(first + 1, first + 1 + len(some))):
                 self._q1 += q[n]

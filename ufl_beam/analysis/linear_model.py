@@ -21,7 +21,7 @@ from ufl_beam.analysis.linear_inputs_and_outputs import (
     checked_outputs,
 )
 from ufl_beam.analysis.linear_model_checks import (
-    HELD,
+    NEGLIGIBLE,
     require_equilibrium,
     require_free,
     warn_of_omissions,
@@ -312,7 +312,7 @@ class LinearModel(Rich):
         """
         n, small, nu = require_count(n, "reduced: n"), self._small, self._inputs.number_of_motions
         x, squares, names = self._modes(n)
-        moving = np.abs(squares)[np.abs(squares) > HELD * small.squares.min()]
+        moving = np.abs(squares)[np.abs(squares) > NEGLIGIBLE * small.squares.min()]
         s = QUASI_STATIC * float(moving.min(initial=small.squares.max())) ** 0.5
         # Static motions P with K P = B; K may be singular, and an iteration reduces the error of
         # the shifted matrix by the factor QUASI_STATIC² each time.
@@ -348,9 +348,11 @@ class LinearModel(Rich):
         x = (small._axes.T @ shapes)[small.left] / small.scale[small.left, None]
         x = np.hstack([x.real, x.imag])
         masses = np.sum(x * (M @ x), axis=0)
-        x = (x / np.sqrt(np.where(masses > 0.0, masses, 1.0)))[:, masses > HELD * masses.max()]
+        x = (x / np.sqrt(np.where(masses > 0.0, masses, 1.0)))[
+            :, masses > NEGLIGIBLE * masses.max()
+        ]
         values, mix = np.linalg.eigh(x.T @ (M @ x))
-        chosen = values > HELD * values.max()
+        chosen = values > NEGLIGIBLE * values.max()
         x = x @ (mix[:, chosen] / np.sqrt(values[chosen]))
         return x, np.abs(exponents) ** 2, [f"part {k} of the modes" for k in range(x.shape[1])]
 
@@ -480,9 +482,9 @@ class LinearModel(Rich):
             borne = self._basis[0][μ] @ motion.z + self._basis[1][μ] @ motion.u
         X = Z[:, y] @ motion.y + inputs.motions @ motion.u
         dX, terms = X[:, :ns] @ motion.rates, np.abs(X[:, :ns]) @ np.abs(motion.rates)
-        for rows, x, of_x in ((out.rows[1], X, np.abs(X)), (out.rows[2], X, np.abs(X)),
+        for rows, x, magnitudes in ((out.rows[1], X, np.abs(X)), (out.rows[2], X, np.abs(X)),
                               (out.rows[2], dX, terms)):  # fmt: skip
-            for i, j in jumps(rows, x, of_x, ns)[:1]:
+            for i, j in jumps(rows, x, magnitudes, ns)[:1]:
                 name = self.inputs[int(np.flatnonzero(inputs.order == j)[0])]
                 raise ArgumentError(
                     f"state_space: {self.outputs[i]} depends on the rate of {name}, because the "

@@ -20,7 +20,7 @@ from ufl_beam.simulation.solution import Solution
 
 UNBALANCED = 1e-6  # unbalanced force that is an error, as a fraction of the largest force
 MOVING = 1e-6  # velocity that is an error, as a fraction of lowest frequency times size
-HELD = 1e-9  # fraction of a motion that constraints allow, below which they hold it
+NEGLIGIBLE = 1e-9  # fraction of a motion that constraints allow, below which they hold it
 NAMED = 3  # largest number of unbalanced forces in a message
 
 
@@ -62,7 +62,7 @@ def _allowed(
         G = diags_array(1 / np.sqrt((G * G).sum(axis=1))) @ G
         system = block_array([[eye_array(len(y)), G.T], [G, None]])
         W = splu(csc_array(system)).solve(np.vstack([W, np.zeros((len(μ), W.shape[1]))]))[: len(y)]
-    return np.asarray(np.linalg.norm(W, axis=0) > HELD * whole)
+    return np.asarray(np.linalg.norm(W, axis=0) > NEGLIGIBLE * whole)
 
 
 def require_equilibrium(small: Linearization, at: Solution | None) -> None:

@@ -248,11 +248,11 @@ class Kernel:
         """Coefficients of the form, without the unknown."""
         return [f for f in self._form.coefficients if id(f) in self._columns]
 
-    def copies_from(self, source: Kernel) -> Index:
+    def common_blocks(self, source: Kernel) -> Index:
         """Return positions in ``source``, positions here and lengths of the common coefficients."""
         pairs = ((source._columns[k], at) for k, at in self._columns.items())
-        copies = [(x.start, at.start, at.stop - at.start) for x, at in pairs]
-        return np.array(copies, dtype=np.int32).reshape(-1, 3)
+        blocks = [(x.start, at.start, at.stop - at.start) for x, at in pairs]
+        return np.array(blocks, dtype=np.int32).reshape(-1, 3)
 
     def reuse_values(self, source: Kernel) -> bool:
         """Use the packed values of ``source``, if these contain this form's values as one block.

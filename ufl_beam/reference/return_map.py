@@ -183,7 +183,7 @@ class MaterialPoints:
         rest = self._section_points.rest  # stiffness of resultants without points
         self.r = rest * ((1 - θ) * self.strains0 + θ * strains)
         self.r = self.r + np.einsum("n,acn,nak->ck", w, stress, self._B)
-        self.D = self._of_sections(slope, θ)
+        self.D = self._section_tangents(slope, θ)
 
     def _bulk(self, at: At) -> tuple[Array, Array]:
         """Return bulk stresses at t_n+θ, and slopes by strain; (d, cells, n), (d, d, cells, n)."""
@@ -249,9 +249,9 @@ class MaterialPoints:
         }
         at["theta"] = np.ones_like(at["theta"])
 
-        return self._of_sections(jacobian(self._equations.elastic_stress, at, self._e)[1], 1.0)
+        return self._section_tangents(jacobian(self._equations.elastic_stress, at, self._e)[1], 1.0)
 
-    def _of_sections(self, slope: Array, θ: float) -> Array:
+    def _section_tangents(self, slope: Array, θ: float) -> Array:
         """Return derivatives of (N, V, M) from derivatives of stresses, (d, d, cells, n)."""
         w, rest = self._section_points.weights, self._section_points.rest
         D = np.einsum("n,abcn,nak,nbl->ckl", w, slope, self._B, self._B)

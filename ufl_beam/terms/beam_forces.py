@@ -53,7 +53,7 @@ class FormForces(Term):
     """Forces of a virtual work on cells, with forms of the energy lost in a step."""
 
     _entry: str  # name of the ledger entry of the losses
-    _of_step: Sequence[fem.Function] = ()  # coefficients that phases of a step set
+    _step_coefficients: Sequence[fem.Function] = ()  # coefficients that phases of a step set
 
     def __init__(
         self, work: ufl.Form, losses: Sequence[ufl.Form], fields: Fields, A: Csr, ledger: Ledger,
@@ -80,7 +80,12 @@ class FormForces(Term):
         """See the base class."""
         kernel = partial(self._fields.kernel, unknown=self._q1)
         return form_derivatives(
-            self._work_form, lambda term: term._force, kernel, self._q0, neighbours, self._of_step
+            self._work_form,
+            lambda term: term._force,
+            kernel,
+            self._q0,
+            neighbours,
+            self._step_coefficients,
         )
 
     def phases(self, callbacks: Callbacks) -> Phases:
@@ -308,7 +313,7 @@ class ElasticBeams(FormForces, Cells):
         if own is None:
             return super().derivatives(neighbours)
         function = imposed_at_points(self._fields.element)
-        self._of_step = [function]
+        self._step_coefficients = [function]
         kernel = partial(self._fields.kernel, unknown=self._q1)
         f = form_derivative(
             self._work_form, self._force, kernel, function, direction=own.ravel(),

@@ -181,13 +181,16 @@ def form_derivative(
         return None
     table = compile_form(derivative)
     table.keep_entries()
-    copies, columns = table.copies_from(kernel), coefficient.function_space.element.space_dimension
+    blocks, columns = (
+        table.common_blocks(kernel),
+        coefficient.function_space.element.space_dimension,
+    )
     if "direction" in direction:
         direction.setdefault("bar", np.zeros(table.cells.number * columns))
     return struct(
         "form_derivative", form=kernel.cells, table=table.cells,
-        columns=columns, copies=len(copies),
-        copy=np.ascontiguousarray(copies), **direction,
+        columns=columns, copies=len(blocks),
+        copy=np.ascontiguousarray(blocks), **direction,
     )  # fmt: skip
 
 

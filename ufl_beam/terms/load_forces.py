@@ -444,7 +444,7 @@ class MovingLoads(_AtDofs):
         )  # fmt: skip
         self._A, tangent, self._kinetic = A, None, np.zeros(len(loads))
         angles = numbering.axis_angles[self._cells]
-        self._numbers = {"given": given, "mass": mass, "ends": ends, "angles": angles}
+        self._load_data = {"given": given, "mass": mass, "ends": ends, "angles": angles}
         self._heavy = rates is not None and bool(mass.any())
         if self._heavy:
             whole, n = subdomain.cell_dofs[order], 2 * len(mesh.nodes)
@@ -481,10 +481,10 @@ class MovingLoads(_AtDofs):
         others = [x for some in neighbours.terms for x in some]
 
         def change(name: str) -> Array:
-            return neighbours.differences(lambda term: term._numbers[name])
+            return neighbours.differences(lambda term: term._load_data[name])
 
         mass, ends = change("mass"), change("ends")
-        if has_inertia(self._scheme) and mass[:, self._numbers["mass"] == 0.0].any():
+        if has_inertia(self._scheme) and mass[:, self._load_data["mass"] == 0.0].any():
             raise ArgumentError(
                 "differentiate: a moving load has no mass for the value of a parameter; choose "
                 "another value"
