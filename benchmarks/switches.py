@@ -43,8 +43,8 @@ def klu(inner, _):
 class AtVelocity(Prediction):
     """Prediction that goes on at the velocity of the last step, without its acceleration."""
 
-    def __init__(self, subdomain, q, weights, *, in_motion):
-        super().__init__(subdomain, q, weights, in_motion=in_motion)
+    def __init__(self, subdomain, q, weights, **options):
+        super().__init__(subdomain, q, weights, **options)
         self.c.second = c_library.ffi.NULL
 
 
