@@ -99,6 +99,8 @@ def shaken(amplitude=0.02, EI=9.0e6, angle=0.3):
 CASES = {
     "flying": (flying, {}, ub.EnergyMomentum(0.01, 0.01), 2.0, 0.05),
     "decaying": (flying, {}, ub.EnergyMomentumDecaying(), 2.0, 0.05),
+    "Newmark": (flying, {}, ub.Newmark(0.6, 0.31), 2.0, 0.05),
+    "generalized alpha": (machine, {}, ub.GeneralizedAlpha(0.8), 0.6, 0.01),
     "yielding": (yielding, {}, ub.EnergyMomentum(0.02), 0.4, 0.004),
     "fibres": (fibres, {}, ub.EnergyMomentum(0.02), 0.4, 0.004),
     "softening": (softening, {}, ub.EnergyMomentum(0.02), 0.2, 0.002),
@@ -204,7 +206,6 @@ def refused(message, model=flying, scheme=None, of=tip, **more):
 
 def test_wrong_arguments_are_refused():
     refused("must return a history", of=lambda s: tip(s)[-1])
-    refused("have no adjoint; use a scheme", scheme=ub.Newmark())
     refused("max_bytes", max_bytes=-1.0)
 
 

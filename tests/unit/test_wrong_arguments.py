@@ -605,7 +605,7 @@ TABLE = {
         ub.gradient,
         model=V(lambda force: GROWING, [*FUNCTION, lambda force: None]),
         at=V({"force": 1.0}, [None, 1.0, "x", {}, {"force": "x"}, {"force": NAN}]),
-        scheme=V(ub.Static(), [*OBJECT, ub.Static, ub.EnergyMomentumStatic(0.7), ub.Newmark()]),
+        scheme=V(ub.Static(), [*OBJECT, ub.Static, ub.EnergyMomentumStatic(0.7)]),
         t=V((0, 1), [*VECTOR, (1, 0)]),
         dt=V(0.5, [*POSITIVE, ub.Adaptive(1e-3)]),
         of=V(lambda run: run.displacement(BEAM.end)[:, 0], FUNCTION),

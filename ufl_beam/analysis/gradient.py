@@ -69,7 +69,7 @@ def gradient(
     Args:
         model: Function that returns the scene for values of its parameters.
         at: Values of the parameters by name.
-        scheme: Time scheme: :class:`Static`, or a scheme without accelerations.
+        scheme: Time scheme.
         t: Beginning and end; s.
         dt: Time step; s.
         of: Function of a :class:`Solution` that returns a history of its motion, (n+1,) or
@@ -104,11 +104,6 @@ def gradient(
     require_number(max_bytes, "gradient: max_bytes", positive=True)
     t0, t1 = require_times(t, "gradient")
     case = checked_case("gradient", model, at, scheme, t0, dt, newton, mesh)
-    if has_inertia(scheme) and scheme.further_rates:
-        raise ArgumentError(
-            f"gradient: scheme = {scheme}: the initial accelerations have no adjoint; use a scheme "
-            "without accelerations, such as EnergyMomentum()"
-        )
     if not has_inertia(scheme) and scheme.load_weight != 1.0:
         raise ArgumentError(f"gradient: scheme = {scheme} has no adjoint; use Static()")
     with closing(case.simulation({})) as run:
@@ -143,7 +138,7 @@ class _Adjoint:
         blocks += [(loop.x, 8 * size), (ffi.addressof(loop.step, "q0"), 8 * size)]
         pointers = [self._pointer(x) for x, _ in blocks]
         lengths = np.array([n for _, n in blocks], dtype=np.int64)
-        step = ffi.sizeof("time_step") + ffi.sizeof("scheme_numbers") + int(lengths.sum())
+        step = sum(map(ffi.sizeof, ("int", "time_step", "scheme_numbers"))) + int(lengths.sum())
         self.most = max(1, int(max_bytes // step))
         rows = np.repeat(np.arange(size), np.diff(A.indptr)).astype(np.int32)
         # `values` is space for the degrees of freedom, the values of forms, and the data of a point
@@ -154,8 +149,8 @@ class _Adjoint:
         self.c = struct(
             "adjoint", d=c, parameters=c.parameters, size=size,
             term=ffi.new("term_transposes[]", terms), q0=np.zeros(size), q1=self._q1,
-            new_rates=np.zeros((lib.MOST_RATES, size)), values=np.zeros(space),
-            gradient=self.gradient, transpose=A.positions(A.indices, rows),
+            new_rates=np.zeros((lib.MOST_RATES, size)), q_bar=np.zeros(size),
+            values=np.zeros(space), gradient=self.gradient, transpose=A.positions(A.indices, rows),
             transposed=np.zeros(len(A.data)), blocks=len(blocks),
             block=ffi.new("void **[]", pointers), bytes=step,
             length=ffi.from_buffer("int64_t[]", lengths), **{"lambda": np.zeros(size)},
@@ -192,7 +187,7 @@ class _Adjoint:
     def reverse(self, ends: Array, starts: list[Any], q: Array, v: Array) -> Array:
         """Return the derivatives by the parameters, from those by the states; (n+1, size) each."""
         simulation, c = self._simulation, self.c
-        number = min(self.most, len(ends))
+        number = min(self.most, len(ends)) + 1  # with a step for initial accelerations
         fill(c, most=number, record=ffi.new("char[]", number * int(c.bytes)))
         for segment in reversed(range(len(starts))):
             first = segment * self.most
@@ -209,6 +204,9 @@ class _Adjoint:
                         raise StepFailed(f"the tangent is singular at t = {ends[n - 1]:g} s")
         self._q1 += q[0]
         self._rates[1] += v[0]
+        if c.recorded:  # the step from which the initial accelerations were taken
+            with simulation.equation.callbacks.raising():
+                lib.go_back(c, simulation.time_loop)
         lib.finish_adjoint(c, simulation.time_loop)
         return self.gradient.copy()
 

@@ -351,17 +351,18 @@ void transpose_product(void *self, adjoint *a, const double *λ)
   }
 }
 
-/* Rates after the step to rates before it, and to the configurations at both ends. */
-static void transpose_rates(adjoint *a, const time_loop *m)
+/* Rates after the step to rates before it, and to the configurations at both ends. A step from which the
+ * `initial` rates are taken changes only rates besides the velocities. */
+static void transpose_rates(adjoint *a, const time_loop *m, int initial)
 {
   const rates *of = m->rates;
   const scheme_numbers *now = of->now;
   double *s = a->values;
   memset(s, 0, a->size * sizeof *s);
   for (int j = 1; j < of->number; ++j) memcpy(a->new_rates + (size_t)j * a->size, a->rates[j], a->size * sizeof *s);
-  for (int j = 1; j < of->number; ++j) memset(a->rates[j], 0, a->size * sizeof *s);
-  for (int i = 0; i < a->size; ++i) a->rates[1][i] = a->new_rates[2 * a->size + i]; /* velocities before the last step */
-  for (int k = 0; k <= now->gives; ++k) {
+  for (int j = initial ? 3 : 1; j < of->number; ++j) memset(a->rates[j], 0, a->size * sizeof *s);
+  for (int i = 0; !initial && i < a->size; ++i) a->rates[1][i] = a->new_rates[2 * a->size + i]; /* velocities before the last step */
+  for (int k = initial; k <= now->gives; ++k) {
     const double *bar = a->new_rates + (size_t)(k ? 2 + k : 1) * a->size;
     for (int j = 0; j < of->number; ++j)
       for (int i = 0; now->rates[k][j] != 0 && i < a->size; ++i)
@@ -433,8 +434,9 @@ void transpose_frame(void *self, adjoint *a, const double *λ)
 
 /* -- the steps ------------------------------------------------------------------------------------------- */
 
-/* Record the solved step, before it is accepted. Returns 0 if the memory is full. */
-int record_step(adjoint *a, time_loop *m)
+/* Record the solved step, before it is accepted; see differentiate_step on an `initial` one. Returns 0 if
+ * the memory is full. */
+int record_step(adjoint *a, time_loop *m, int initial)
 {
   equation *e = m->equation;
   derivatives *d = a->d;
@@ -447,6 +449,7 @@ int record_step(adjoint *a, time_loop *m)
   for (int k = 0; k < d->terms; ++k)
     if (d->term[k].linearize) d->term[k].linearize(d->term[k].self, &m->step, m->x);
   char *to = a->record + (size_t)a->recorded * a->bytes;
+  memcpy(to, &initial, sizeof initial), to += sizeof initial;
   memcpy(to, &m->step, sizeof m->step), to += sizeof m->step;
   if (m->rates) memcpy(to, m->rates->now, sizeof *m->rates->now);
   to += sizeof(scheme_numbers);
@@ -464,16 +467,19 @@ int go_back(adjoint *a, time_loop *m)
   const char *from = a->record + (size_t)--a->recorded * a->bytes;
   scheme_numbers numbers;
   const rates *of = m->rates;
-  int failed = 0;
+  int failed = 0, initial;
+  memcpy(&initial, from, sizeof initial), from += sizeof initial;
   memcpy(&m->step, from, sizeof m->step), from += sizeof m->step;
   memcpy(&numbers, from, sizeof numbers), from += sizeof numbers;
   if (of) m->rates->now = &numbers;
   for (int k = 0; k < a->blocks; ++k) memcpy(*a->block[k], from, a->length[k]), from += a->length[k];
   d->x = m->x, a->step = &m->step;
   memset(a->q0, 0, a->size * sizeof *a->q0);
+  memcpy(a->q_bar, a->q1, a->size * sizeof *a->q_bar);
+  if (initial) memset(a->q1, 0, a->size * sizeof *a->q1);
   for (int k = d->terms - 1; k >= 0; --k)
-    if (a->term[k].state) a->term[k].state(d->term[k].self, a);
-  if (of) transpose_rates(a, m);
+    if (a->term[k].state && !initial) a->term[k].state(d->term[k].self, a);
+  if (of) transpose_rates(a, m, initial);
   /* λ = -K^-T q1_bar, in the axes of supports, where held motions are prescribed */
   memcpy(d->tangent, e->tangent, e->indptr[e->size] * sizeof *d->tangent);
   hold_tangent(e);
@@ -504,7 +510,8 @@ int go_back(adjoint *a, time_loop *m)
       }
   }
   for (int k = d->terms - 1; k >= 0; --k) a->term[k].force(d->term[k].self, a, λ);
-  memcpy(a->q1, a->q0, a->size * sizeof *a->q1); /* the end of the step before */
+  /* The configuration at the end of the step before; an initial step does not change it. */
+  for (int i = 0; i < a->size; ++i) a->q1[i] = a->q0[i] + (initial ? a->q_bar[i] : 0);
   return 1;
 }
 

@@ -1327,6 +1327,7 @@ struct adjoint {
   int parameters, size;
   const term_transposes *term;   /* in the order of the terms of d */
   double *q0, *q1, *rates[MOST_RATES], *new_rates; /* derivatives by the state */
+  double *q_bar;                 /* space: derivatives by the configuration at the end of a step */
   const time_step *step;
   double *lambda, *values, *gradient; /* values: space; gradient: derivatives by the parameters */
   const int32_t *transpose;      /* index of the transposed entry of each entry of the tangent */
@@ -1339,7 +1340,7 @@ struct adjoint {
   char *record;
 };
 
-int record_step(adjoint *a, time_loop *m);
+int record_step(adjoint *a, time_loop *m, int initial);
 int go_back(adjoint *a, time_loop *m);
 void finish_adjoint(adjoint *a, time_loop *m);
 void transpose_second_differences_state(void *self, adjoint *a);

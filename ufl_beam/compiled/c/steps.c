@@ -395,6 +395,7 @@ int attempt_step(time_loop *m, double t1, double end)
   if (m->rates && m->prepare && !m->rates->ready) {
     if (!solve_to(m, m->t + FIRST_TRIAL * (t1 - m->t), t1)) return 0;
     if (m->derivatives && !differentiate_step(m->derivatives, m, 1)) return fails(m, NO_DERIVATIVE);
+    if (m->adjoint && !record_step(m->adjoint, m, 1)) return fails(m, NO_DERIVATIVE);
     m->prepare(m->handle);
   }
   if (m->stages <= 1) return solve_to(m, t1, end);
@@ -453,7 +454,7 @@ int step_or_subdivide(time_loop *m, double end)
     if (m->path) rejected = m->path->rejected;
     if (solved) {
       if (m->derivatives && !differentiate_step(m->derivatives, m, 0)) return fails(m, NO_DERIVATIVE);
-      if (m->adjoint && !record_step(m->adjoint, m)) return fails(m, NO_DERIVATIVE);
+      if (m->adjoint && !record_step(m->adjoint, m, 0)) return fails(m, NO_DERIVATIVE);
       if (!accept_step(m)) return 0;
       done += some;
       /* Double the substep at the times where a larger one would begin. */
