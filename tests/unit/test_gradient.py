@@ -44,10 +44,10 @@ def yielding(limit=60e3, isotropic=4e5, kinematic=2e5, EI=9.0e6, load=35e3, mass
     return column(ub.Section(EI=EI, bending=law, **STEEL), load, mass)
 
 
-def fibres(limit=235e6, isotropic=2e9, E=210e9, height=0.2, load=60e3):
+def fibres(limit=235e6, isotropic=2e9, E=210e9, height=0.2, load=60e3, length=3.0):
     some = ub.Fibres(ub.ElastoPlastic(limit, isotropic), number=4)
     section = ub.Section.rectangle(0.1, height, E=E, nu=0.3, rho=7850.0, fibres=some)
-    return column(section, load)
+    return column(section, load, height=length)
 
 
 def softening(limit=60e3, energy=6e3, EI=9.0e6, load=40e3):
@@ -96,6 +96,29 @@ def shaken(amplitude=0.02, EI=9.0e6, angle=0.3):
     return ub.Scene([beam], supports=[motion, roller])
 
 
+def heated(strain=2e-3, curvature=0.05, EI=100.0, rate=40.0, length=3.0, limit=math.inf):
+    """Imposed strains on an elastic or yielding beam, and on an elastic one beside it."""
+    soft = {"EA": 1e4, "GA": 4e3, "rhoA": 1.0, "rhoI": 0.01}
+    law = ub.ElastoPlastic(limit, 30.0) if limit < math.inf else None
+    a = ub.Beam((0, 0), (0.2, length), ub.Section(EI=EI, bending=law, **soft), cells=3)
+    b = ub.Beam((0.2, length), (0, 6), ub.Section(EI=EI, **soft), cells=3)
+    return ub.Scene(
+        [a, b],
+        joints=[ub.Rigid(a.end, b.start)],
+        supports=[ub.Clamped(a.start)],
+        loads=[
+            ub.ImposedStrain(a, strain, (curvature, 0.1 * curvature), lambda t: math.sin(rate * t)),
+            ub.ImposedStrain(b, strain, curvature, lambda t: 5.0 * t),
+            ub.PointLoad(b.end, force=(2.0, 0.0), amplitude=pulse),
+        ],
+        damping=[ub.KelvinVoigt(1e-4)],
+    )
+
+
+def heated_and_yielding(strain=2e-3, EI=100.0, rate=40.0, length=3.0, limit=1.0):
+    return heated(strain, 0.05, EI, rate, length, limit)
+
+
 CASES = {
     "flying": (flying, {}, ub.EnergyMomentum(0.01, 0.01), 2.0, 0.05),
     "decaying": (flying, {}, ub.EnergyMomentumDecaying(), 2.0, 0.05),
@@ -107,6 +130,9 @@ CASES = {
     "springs": (sprung, {"tau": None}, ub.EnergyMomentum(), 1.0, 0.02),
     "machine": (machine, {}, ub.EnergyMomentum(), 0.6, 0.01),
     "moving support": (shaken, {"angle": None}, ub.EnergyMomentum(), 0.5, 0.01),
+    "imposed strains": (heated, {"limit": None}, ub.EnergyMomentum(0.02, 0.01), 0.2, 0.004),
+    "imposed strains, statics": (heated, {"limit": None}, ub.Static(), 0.2, 0.02),
+    "imposed strains, yielding": (heated_and_yielding, {}, ub.EnergyMomentum(), 0.2, 0.004),
     "statics": (flying, {}, ub.Static(), 1.0, 0.1),
 }
 

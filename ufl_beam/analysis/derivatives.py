@@ -325,8 +325,10 @@ class StepDerivatives:
             own = Neighbours(term, others, positions, weights, size)
             if (found := term.derivatives(own)) is None:
                 raise ArgumentError(f"differentiate: {term.effect} has no derivatives")
-            self.terms += found
-            self.owners += [term] * len(found)
+            # Beams use imposed strains, which follow in equation.terms: with the terms in reverse
+            # order, the adjoint has imposed strains after beams.
+            self.terms[:0] = found
+            self.owners[:0] = [term] * len(found)
             self.states += own.states
             self._alive.append(own)
             scene.enters |= own.enters

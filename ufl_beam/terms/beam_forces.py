@@ -317,7 +317,7 @@ class ElasticBeams(FormForces, Cells):
         kernel = partial(self._fields.kernel, unknown=self._q1)
         f = form_derivative(
             self._work_form, self._force, kernel, function, direction=own.ravel(),
-            stride=own[0].size,
+            stride=own[0].size, bar=neighbours.term.imposed.bars,
         )  # fmt: skip
         return [*(super().derivatives(neighbours) or []), in_c("form", f)]
 
@@ -469,7 +469,7 @@ class InelasticBeams(Cells):
         shape = shape_derivative(strains_of, neighbours, size)
         at = {"cells": self._in_c, "strains": by_q1, "shape": shape}
         if (imposed := imposed_directions(neighbours)) is not None:
-            at["imposed"] = imposed
+            at |= {"imposed": imposed, "imposed_bar": neighbours.term.imposed.bars}
         points = self.points.derivatives(neighbours, "points", **at)
         force = partial(form_derivative, self._force_form, self._force, kernel)
         by_r = force(self._r, direction=points.r, stride=0, bar=points.r_bar)

@@ -323,6 +323,7 @@ TRANSPOSES = {
     "followers": ("", "transpose_followers", ""),
     "pressures": ("", "transpose_pressures", ""),
     "frame": ("", "transpose_frame", ""),
+    "imposed": ("", "transpose_imposed", ""),
 }
 """Functions of ``term_transposes`` of loops.h by the kind of a derivative."""
 

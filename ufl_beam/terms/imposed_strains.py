@@ -67,6 +67,7 @@ class CellStrains:
         c: ``imposed_cells`` of loops.h.
         directions: Derivatives of ``strains`` by parameters, if they are asked for; (parameters,
             num_cells, points, 2, 3).
+        bars: Derivatives of a number by ``strains`` in a step, of the adjoint; of the same shape.
     """
 
     def __init__(self, cells: Index, fields: Sequence[Array]) -> None:
@@ -95,6 +96,7 @@ class CellStrains:
                 "differentiate: imposed strains are zero for a neighbouring value of a parameter; "
                 "choose another value"
             )
+        self.bars = np.zeros(self.strains.shape)
         self.directions = np.zeros((len(neighbours), *self.strains.shape))
         return self.directions
 
@@ -181,12 +183,15 @@ class ImposedStrains(LoadTerm):
         parameters, number = neighbours.weights.shape
         others = [x._c for some in neighbours.terms for x in some]
         neighbours.states += [x._factors for some in neighbours.terms for x in some]
-        directions = [doubles(cells.directions) for cells in self._cells]
+        directions, bars = (
+            ffi.new("double *[]", [doubles(x) for x in some])
+            for some in zip(*((cells.directions, cells.bars) for cells in self._cells), strict=True)
+        )
         c = struct(
             "imposed_derivatives", parameters=parameters, neighbours=number, here=self._c,
             size=np.array([cells.strains.size for cells in self._cells], dtype=np.int32),
             neighbour=ffi.new("imposed_strains *[]", others), weight=neighbours.weights,
-            direction=ffi.new("double *[]", directions),
+            direction=directions, bar=bars,
         )  # fmt: skip
         return [in_c("imposed", c)]
 

@@ -137,6 +137,12 @@ static void enter_point(const point_derivatives *m, int c, int i, double *x_bar,
   for (int j = 0; j < p->width; ++j) w_bar[j] += x_bar[j];
 }
 
+/* Derivatives by the strains of sections in e1 to those by imposed strains. */
+static void transpose_imposed_in_points(const point_derivatives *m)
+{
+  for (int k = 0; m->imposed && k < 3 * m->points->cells; ++k) m->imposed_bar[k / 3 * 6 + 3 + k % 3] -= m->e1[k];
+}
+
 /* Derivatives of the state at the end of a step to those by its beginning; q1 gets those by the
  * configuration at the end. */
 void transpose_points_state(void *self, adjoint *a)
@@ -167,6 +173,7 @@ void transpose_points_state(void *self, adjoint *a)
       enter_point(m, c, i, x, m->e1);
     }
   if (m->cells) {
+    transpose_imposed_in_points(m);
     for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
     transpose_tables(m->strains, m->e1, 0, 0, a->q1);
     if (m->shape) transpose_shape_of(m->shape, a, m->e1);
@@ -192,6 +199,7 @@ void transpose_points(void *self, adjoint *a, const double *λ)
     const double *r_bar = m->springs ? of_spring : m->r_bar + 3 * c;
     for (int k = 0; k < 3; ++k) {
       m->e0_bar[3 * c + k] += p->rest[k] * (1 - θ) * r_bar[k];
+      m->e1[3 * c + k] += p->rest[k] * θ * r_bar[k];
       if (m->rest) m->rest_bar[k] += r_bar[k] * ((1 - θ) * e0[k] + θ * e1[k]);
     }
     for (int i = 0; i < p->of_cell; ++i) {
@@ -212,7 +220,9 @@ void transpose_points(void *self, adjoint *a, const double *λ)
       enter_point(m, c, i, x, m->e1);
     }
   }
-  if (!m->shape) return; /* strains change at constant unknowns by the coordinates only */
+  /* Strains change at constant unknowns by imposed strains and coordinates only. */
+  transpose_imposed_in_points(m);
+  if (!m->shape) return;
   for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
   transpose_shape_of(m->shape, a, m->e1);
 }
@@ -430,6 +440,24 @@ void transpose_frame(void *self, adjoint *a, const double *λ)
   add_product(f->pull, x, a->q0);
   for (int i = 0; i < f->size; ++i) x[i] = λ[i] / f->dt;
   add_product(f->turn, x, a->q0);
+}
+
+/* Imposed strains, after all terms that use them. The run has whole steps, so that the strains at the
+ * beginning are those at its time. */
+void transpose_imposed(void *self, adjoint *a, const double *λ)
+{
+  const imposed_derivatives *m = self;
+  for (int k = -1; k < m->parameters * m->neighbours; ++k) {
+    const imposed_strains *one = k < 0 ? m->here : m->neighbour[k];
+    for (int j = 0; j < one->functions; ++j) one->factors[j] = value_at(one->factor + j, a->step->t0);
+  }
+  begin_imposed_strains((void *)m->here, a->step, 0, 0);
+  find_imposed_directions(self, a->step, 0);
+  for (int g = 0; g < m->here->groups; ++g) {
+    for (int p = 0; p < a->parameters; ++p)
+      a->gradient[p] += dot(m->size[g], m->bar[g], m->direction[g] + (size_t)p * m->size[g]);
+    memset(m->bar[g], 0, m->size[g] * sizeof(double));
+  }
 }
 
 /* -- the steps ------------------------------------------------------------------------------------------- */

@@ -1212,6 +1212,7 @@ typedef struct {
   double *w, *e0;                 /* derivatives of the data of the points, and of the strains before the step */
   const double *B, *weight, *rest; /* of the geometry of the sections; or none */
   const double *imposed;          /* see imposed_derivatives; or none */
+  double *imposed_bar;            /* of the adjoint */
   /* Of committed tangents, if a damping uses them: derivatives, also of the elastic stiffnesses; steps of
    * parameters for differences. */
   double *tangents;
@@ -1309,6 +1310,7 @@ typedef struct {
   imposed_strains *const *neighbour; /* in scenes with other values of a parameter */
   const double *weight;              /* see derivatives */
   double *const *direction;
+  double *const *bar; /* of the adjoint: by the strains of a step; of the same size */
 } imposed_derivatives;
 
 /* Transposes of a term: from the state at the end of a step to the state before it; from lambda, the
@@ -1344,6 +1346,7 @@ int record_step(adjoint *a, time_loop *m, int initial);
 int go_back(adjoint *a, time_loop *m);
 void finish_adjoint(adjoint *a, time_loop *m);
 void transpose_second_differences_state(void *self, adjoint *a);
+void transpose_imposed(void *self, adjoint *a, const double *lambda);
 void transpose_second_differences(void *self, adjoint *a, const double *lambda);
 void transpose_points_state(void *self, adjoint *a);
 void transpose_connectors_state(void *self, adjoint *a);
