@@ -302,9 +302,7 @@ def test_strains_and_masses_that_begin_at_zero_are_refused():
 
 @pytest.mark.serial
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.02, 0.01), ub.Static()], ids=repr)
-@pytest.mark.parametrize(
-    "model", [follower, pressure, frame, works, viscous, imposed, imposed_on_points]
-)
+@pytest.mark.parametrize("model", [follower, pressure, frame, works, viscous, imposed])
 def test_adjoint_is_the_same_sum(model, scheme):
     """Round-off of sums of some hundred terms; `of` has the differences of a linear function."""
     if model in (viscous, works) and scheme == ub.Static():
