@@ -522,7 +522,9 @@ class UserLaws(Response):
     ) -> list[Each] | None:
         """See the base class; differences of the functions make a table of each law."""
         n, variables = len(self._connectors), len(self._variables)
-        initial = neighbours.differences(lambda term: np.array([x.state for x in term.response._each]))
+        initial = neighbours.differences(
+            lambda term: np.array([x.state for x in term.response._each])
+        )
         w = np.zeros((len(neighbours), n, len(STEP_INPUTS) + variables))
         w[:, :, len(STEP_INPUTS) :] = initial
         columns = [0, 1, *range(len(STEP_INPUTS), w.shape[2])]
