@@ -420,7 +420,9 @@ class UserLaw:
             return _five_point(along, max(abs(change), LEAST_CHANGE * size), size)
 
         by_motion = by(e1 - self._e0, size, 1.0, 0.0, 0.0)
-        by_rate = by(rate, max(abs(rate), size / dt), 0.0, 1.0, 0.0)
+        by_rate: Array = np.zeros(1 + len(before))
+        if math.isfinite(dt):  # a path takes infinite time, in which rates do not change
+            by_rate = by(rate, max(abs(rate), size / dt), 0.0, 1.0, 0.0)
         columns = [
             weight * by_motion + by_rate / dt,
             (1.0 - weight) * by_motion - by_rate / dt,
