@@ -2,7 +2,9 @@
 """The adjoint of runs, against direct differentiation of the same runs."""
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -119,6 +121,88 @@ def heated_and_yielding(strain=2e-3, EI=100.0, rate=40.0, length=3.0, limit=1.0)
     return heated(strain, 0.05, EI, rate, length, limit)
 
 
+@dataclass(frozen=True)
+class Wearing(ub.ConnectorLaw):
+    """Holds below a limit that falls with the way of sliding."""
+
+    new: float
+    worn: float
+    way: float
+    variables: ClassVar = {"slipped": 0.0}
+
+    def limit(self, state):
+        return self.worn + (self.new - self.worn) * ub.law_functions.exp(-state.slipped / self.way)
+
+    def sliding(self, motion, rate, state, dt):
+        return self.limit(state) + 0.3 * ub.law_functions.absolute(rate)
+
+    def increments(self, motion, rate, state, dt):
+        return {"slipped": ub.law_functions.absolute(rate) * dt}
+
+
+def rubbing(limit=12e3, EI=9.0e6, load=35e3, mass=400.0, worn=9e3, strength=60e3, tau=1e-3):
+    """A column that yields, with brakes at its head and at half its height; they stick and slip."""
+    law = ub.ElastoPlastic(strength, 4e5, 2e5)
+    scene = column(ub.Section(EI=EI, bending=law, **STEEL), load, mass)
+    column_ = scene.beams[0]
+    brakes = [
+        ub.Slide(ub.ground(0, 3), column_.end, ub.Coulomb(limit), axis=(1, 0)),
+        ub.Slide(ub.ground(0, 1.5), column_.at(0.5), Wearing(limit, worn, 0.01), axis=(1, 0)),
+    ]
+    return ub.Scene(
+        scene.beams,
+        supports=scene.supports,
+        masses=scene.masses,
+        loads=scene.loads,
+        connectors=brakes,
+        damping=[ub.KelvinVoigt(tau)],
+    )
+
+
+def held(limit=5.0, stiffness=2e5, EI=100.0, load=20.0):
+    """A cantilever with two brakes at its end, which share what they hold."""
+    section = ub.Section(EA=1e4, GA=4e3, EI=EI, rhoA=1.0, rhoI=0.01)
+    beam = ub.Beam((0, 0), (1, 0.2), section, cells=4)
+    laws = ub.Coulomb(limit), ub.Coulomb(1.5 * limit), ub.ForceLaw(lambda e, _: stiffness * e**3)
+    brakes = [ub.Slide(ub.ground(1, 0.2), beam.end, law, axis=(0, 1)) for law in laws]
+    push = ub.PointLoad(beam.end, force=(0.3 * load, load), amplitude=lambda t: t)
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=brakes, loads=[push])
+
+
+def asked(stiffness=2e5, viscosity=4e3, tau=0.05, strength=60e3, EI=9.0e6, load=60e3, start=10.0):
+    """A yielding column with a nonlinear damper, a Maxwell element and a spring that yields."""
+
+    def damper(motion, rate):
+        return stiffness * motion * (1 + 5 * motion) + viscosity * rate * (1 + 0.1 * rate**2)
+
+    def maxwell(motion, rate, dt, state):
+        after = (state[0] + stiffness * rate * dt) / (1 + dt / tau)
+        return (state[0] + after) / 2, [after]
+
+    def yields(motion, rate, t, state):
+        force, limit = 5e5 * (motion - state[0]), 2e3 + 1e3 * t
+        over = max(0.0, abs(force) - limit) / 6e5
+        slip = math.copysign(over, force)
+        return force - 5e5 * slip, [state[0] + slip]
+
+    law = ub.ElastoPlastic(strength, 4e5, 2e5)
+    scene = column(ub.Section(EI=EI, bending=law, **STEEL), load)
+    end, half = scene.beams[0].end, scene.beams[0].at(0.5)
+    laws = [
+        (half, ub.ForceLaw(damper)),
+        (end, ub.ForceLaw(maxwell, [start])),
+        (half, ub.ForceLaw(yields, [0.0])),
+    ]
+    connectors = [ub.Slide(ub.ground(*place.point), place, law, axis=(1, 0)) for place, law in laws]
+    return ub.Scene(
+        scene.beams,
+        supports=scene.supports,
+        masses=scene.masses,
+        loads=scene.loads,
+        connectors=connectors,
+    )
+
+
 CASES = {
     "flying": (flying, {}, ub.EnergyMomentum(0.01, 0.01), 2.0, 0.05),
     "decaying": (flying, {}, ub.EnergyMomentumDecaying(), 2.0, 0.05),
@@ -129,6 +213,11 @@ CASES = {
     "softening": (softening, {}, ub.EnergyMomentum(0.02), 0.2, 0.002),
     "springs": (sprung, {"tau": None}, ub.EnergyMomentum(), 1.0, 0.02),
     "machine": (machine, {}, ub.EnergyMomentum(), 0.6, 0.01),
+    "friction": (rubbing, {}, ub.EnergyMomentum(0.02), 0.4, 0.004),
+    "friction in statics": (held, {}, ub.Static(), 1.0, 0.05),
+    "friction, decaying": (rubbing, {}, ub.EnergyMomentumDecaying(), 0.4, 0.004),
+    "laws of users": (asked, {}, ub.EnergyMomentum(), 0.4, 0.004),
+    "laws of users, alpha": (asked, {}, ub.GeneralizedAlpha(0.8), 0.4, 0.004),
     "moving support": (shaken, {"angle": None}, ub.EnergyMomentum(), 0.5, 0.01),
     "imposed strains": (heated, {"limit": None}, ub.EnergyMomentum(0.02, 0.01), 0.2, 0.004),
     "imposed strains, statics": (heated, {"limit": None}, ub.Static(), 0.2, 0.02),
@@ -235,10 +324,30 @@ def test_wrong_arguments_are_refused():
     refused("max_bytes", max_bytes=-1.0)
 
 
-def test_effects_without_an_adjoint_are_refused_by_name():
-    def brake(EI):
-        scene = flying(EI)
-        brake = ub.Turn(ub.ground(6, 0), scene.beams[0].start, ub.Coulomb(1.0))
-        return ub.Scene(scene.beams, connectors=[brake], loads=scene.loads)
+def test_history_of_velocities_with_friction_and_laws_of_users():
+    times = {"t": (0, 0.4), "dt": 0.004}
 
-    refused("has no adjoint; use differentiate", brake)
+    def speed(solution):
+        return solution.velocity(solution.scene.beams[0].at(0.75))[:, 0]
+
+    def number(history):
+        return float(np.mean(history**2))
+
+    for model in (rubbing, asked):
+        run = model, parameters(model, {}), ub.EnergyMomentum(0.01)
+        direct = ub.differentiate(*run, **times, progress=False).of(lambda s: number(speed(s)))
+        found = ub.gradient(*run, **times, of=speed, reduce=number, max_bytes=1e5)
+        values = np.array(list(run[1].values()))  # for relative changes; differences of squares
+        most = np.abs(values * direct).max()
+        np.testing.assert_allclose(values * found, values * direct, rtol=1e-7, atol=1e-8 * most)
+
+
+def test_friction_with_the_force_of_a_joint_is_refused_by_name():
+    def brake(EI):
+        beam = flying(EI).beams[0]
+        pin = ub.Pinned(beam.start)
+        law = ub.Coulomb(1.0, coefficient=0.1, joint=pin)
+        brake = ub.Turn(ub.ground(*beam.start.point), beam.start, law)
+        return ub.Scene([beam], supports=[pin], connectors=[brake])
+
+    refused("Coulomb has no derivatives", brake)

@@ -49,7 +49,6 @@ extern "Python" void arrive_in_python(void *handle, const double *x);
 extern "Python" int change_along_in_python(void *handle, const double *x);
 extern "Python" int met_in_python(void *handle);
 extern "Python" void run_in_python(void *handle);
-extern "Python" void index_in_python(void *handle, int index);
 extern "Python" void begin_in_python(void *handle, double t, double dt);
 """
 

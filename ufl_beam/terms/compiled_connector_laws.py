@@ -8,7 +8,7 @@ calls the function.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -34,6 +34,10 @@ from ufl_beam.terms.derivatives import Each, Neighbours, margins
 from ufl_beam.terms.term import Callbacks
 
 # -- energy and resistance -------------------------------------------------------------------------
+
+
+STEP_INPUTS = ("motion 0", "before 0", "dt", "theta")
+"""Inputs of a law of one motion in the order of loops.h, before the variables."""
 
 
 def inputs(law: ConnectorLaw) -> tuple[str, ...]:
@@ -167,6 +171,8 @@ class CompiledLaws(Response):
         """See the base class."""
         storage = lambda laws: laws._w  # noqa: E731
         table = self._table_in_c(neighbours, self._forms.table, inputs(self._law), storage)
+        variables = len(self._law.variables)
+        table |= {"variables": variables, "variables_at_end": np.zeros(variables)}
         if self._law.holds:
             limits = np.zeros((len(neighbours), len(self._connectors)))
             if (friction := self._friction_in_c(neighbours, term, motions, limits)) is None:
@@ -276,6 +282,31 @@ DIFFERENCE = 6e-6
 """Relative increment at which central differences have the least error: ∛(round-off)."""
 
 
+RELATIVE_STEP = 2.0**-13
+"""Step of five-point differences, as a fraction of the change or of the size of an input."""
+
+LEAST_CHANGE = 1e-3
+"""Least change of an input in a step that differences resolve, as a fraction of its size."""
+
+ALIKE = 1e-8
+"""Relative difference of derivatives by small and large steps that counts as round-off."""
+
+
+def _five_point(function: Callable[[float], Array], change: float, size: float) -> Array:
+    """Return the derivative of a function at zero, for an argument of a change and a size.
+
+    Differences with a step in proportion to the size have less round-off than those in proportion
+    to the change; they are taken if both agree, as they do for laws without kinks.
+    """
+    found = []
+    for scale in (change, size):
+        h = RELATIVE_STEP * scale
+        far, near = (function(k * h) - function(-k * h) for k in (2, 1))
+        found.append((8.0 * near - far) / (12.0 * h))
+    small, large = found
+    return np.where(np.abs(large - small) <= ALIKE * np.abs(small), large, small)
+
+
 class Iterate(NamedTuple):
     """Motion and force of a connector in an iterate, and data of its law."""
 
@@ -323,11 +354,15 @@ class UserLaw:
     def end(self, e1: float) -> tuple[float, Array]:
         """Return force and internal variables if the step ends at the motion ``e1``."""
         motion = (1.0 - self._weight) * self._e0 + self._weight * e1
-        rate, state = (e1 - self._e0) / self._dt, self.state
+        return self._respond(motion, (e1 - self._e0) / self._dt, self.known)
+
+    def _respond(self, motion: float, rate: float, known: Mapping[str, Any]) -> tuple[float, Array]:
+        """Return force and internal variables after the step."""
+        state = self.state
         if not self._arguments:
             value = self._law(motion, rate)
         else:
-            value = self._law(motion, rate, **{name: self.known[name] for name in self._arguments})
+            value = self._law(motion, rate, **{name: known[name] for name in self._arguments})
             if state.size:
                 value, state = self._pair(value)
         if isinstance(value, float) and math.isfinite(value) and not self.state.size:
@@ -358,6 +393,44 @@ class UserLaw:
         t = f", t = {self.known['t']:.9g} s" if self.known else ""
         at = f"motion = {motion:.6g}{t}"
         return require_returned(value, f"{self._connector}: the energy", at, finite=True)
+
+    # -- derivatives of a step -----------------------------------------------------------------
+
+    def outputs(self, e1: float) -> Array:
+        """Return force and internal variables as :meth:`end`; (1 + number of variables,)."""
+        force, state = self.end(e1)
+        return np.array([force, *state])
+
+    def table(self, e1: float) -> Array:
+        """Return the derivatives of :meth:`outputs` by e1, by e0 and by the variables before."""
+        weight, dt, before = self._weight, self._dt, self.state.copy()
+        motion, rate = (1.0 - weight) * self._e0 + weight * e1, (e1 - self._e0) / dt
+        after = self.end(e1)[1]
+        size = max(abs(motion), self._small)  # of the motion
+
+        def by(change: float, size: float, *direction: Any) -> Array:
+            """Differentiate along changes of motion, rate and variables."""
+
+            def along(step: float) -> Array:
+                a, b, c = direction
+                known = {**self.known, "state": before + step * c}
+                force, state = self._respond(motion + step * a, rate + step * b, known)
+                return np.array([force, *state])
+
+            return _five_point(along, max(abs(change), LEAST_CHANGE * size), size)
+
+        by_motion = by(e1 - self._e0, size, 1.0, 0.0, 0.0)
+        by_rate: Array = np.zeros(1 + len(before))
+        if math.isfinite(dt):  # a path takes infinite time, in which rates do not change
+            by_rate = by(rate, max(abs(rate), size / dt), 0.0, 1.0, 0.0)
+        columns = [
+            weight * by_motion + by_rate / dt,
+            (1.0 - weight) * by_motion - by_rate / dt,
+        ]
+        for direction, old, new in zip(np.eye(len(before)), before, after, strict=True):
+            largest = max(abs(old), abs(new), size)
+            columns.append(by(new - old, largest, 0.0, 0.0, direction))
+        return np.column_stack(columns)
 
     # -- the law around an iterate -------------------------------------------------------------
 
@@ -449,39 +522,37 @@ class UserLaws(Response):
     def derivatives(
         self, neighbours: Neighbours, term: Any, motions: Any, row: Array
     ) -> list[Each] | None:
-        """See the base class; the functions of the users are differenced between the neighbours."""
-        P, n = len(neighbours), len(self._connectors)
-        dstate = neighbours.state(np.zeros((P, n, self._each[0].state.size)))
+        """See the base class; differences of the functions make a table of each law."""
+        n, variables = len(self._connectors), len(self._variables)
+        initial = neighbours.differences(
+            lambda term: np.array([x.state for x in term.response._each])
+        )
+        w = np.zeros((len(neighbours), n, len(STEP_INPUTS) + variables))
+        w[:, :, len(STEP_INPUTS) :] = initial
+        columns = [0, 1, *range(len(STEP_INPUTS), w.shape[2])]
+        J = np.zeros((n, 1 + variables, len(columns)))
+        by_parameter = np.zeros((len(neighbours), n, 1 + variables))
 
-        def ends(p: int, i: int, de0: float, de1: float) -> tuple[float, Array]:
-            """Return the derivatives of force and internal variables of a law."""
-            law, force, state = self._each[i], 0.0, np.zeros(dstate.shape[2])
-            pairs = zip(neighbours.positions[p], neighbours.weights[p], strict=True)
-            t, dt = law.known["t"], law.known["dt"]
-            reference = law.end(self._e1[i])
-            for other, (h, weight) in zip(neighbours.terms[p], pairs, strict=True):
-                mine = other.response._each[i]
-                mine.state[:] = law.state + h * dstate[p, i]
-                mine.begin(self._e0[i] + h * de0, t, dt)
-                neighbour = mine.end(self._e1[i] + h * de1)
-                force += weight * (neighbour[0] - reference[0])
-                state += weight * (neighbour[1] - reference[1])
-            return force, state
+        def tabulate() -> None:
+            motions = self._e0.tolist(), self._e1.tolist()
+            for i, (law, e0, e1) in enumerate(zip(self._each, *motions, strict=True)):
+                J[i] = law.table(e1)
+                here, (t, dt) = law.outputs(e1), (law.known[name] for name in ("t", "dt"))
+                for p, others in enumerate(neighbours.terms):
+                    by_parameter[p, i] = 0.0
+                    for other, weight in zip(others, neighbours.weights[p], strict=True):
+                        mine = other.response._each[i]
+                        mine.state[:] = law.state
+                        mine.begin(e0, t, dt)
+                        by_parameter[p, i] += weight * (mine.outputs(e1) - here)
 
-        def rows(p: int) -> None:
-            for i in range(n):
-                row[i, 2] = ends(p, i, c.e0[p * n + i], 0.0)[0]
-
-        def end(p: int) -> None:
-            for i in range(n):
-                dstate[p, i] = ends(p, i, c.e0[p * n + i], c.e1[i])[1]
-
-        handle, call = term.callbacks.handle, lib.index_in_python
-        fields = {"rows_of_user": call, "end_of_user": call}
-        handles = {"rows_handle": handle(rows), "end_handle": handle(end)}
-        (made,) = self._derivatives_in_c(neighbours, term, motions, row, **fields, **handles)
-        c = made[1]
-        return [made]
+        return self._derivatives_in_c(
+            neighbours, term, motions, row, J=J, rows=1 + variables, columns=len(columns),
+            outputs=J[0].size, column=np.array(columns, dtype=np.int32), width=w.shape[2],
+            variables=variables, variables_at_end=np.zeros(variables), by_parameter=by_parameter,
+            w=neighbours.state(w), w_bar=np.zeros(w[0].shape), tabulate_user=lib.run_in_python,
+            user=term.callbacks.handle(tabulate),
+        )  # fmt: skip
 
     def bind_term(self, term: Any) -> None:
         """Store references to the motions, accepted and latest, and to the latest rows of laws."""

@@ -225,12 +225,12 @@ class Response:
     ) -> list[Each]:
         """Return ``connector_derivatives`` of loops.h with further ``fields``."""
         parameters, number = neighbours.weights.shape
-        e1, dt = np.zeros((2, len(self._connectors)))
+        e1, dt, viscosity_bar, limit_bar, e0_bar = np.zeros((5, len(self._connectors)))
         c = struct(
             "connector_derivatives", parameters=parameters, neighbours=number,
             weight=neighbours.weights, term=term._term_in_c, row=row, dt=dt,
-            e0_bar=np.zeros(len(self._connectors)), row_bar=motions["row_bar"],
-            viscosity_bar=np.zeros(len(self._connectors)), motions=motions["strains"],
+            e0_bar=e0_bar, row_bar=motions["row_bar"], viscosity_bar=viscosity_bar,
+            limit_bar=limit_bar, motions=motions["strains"],
             by_geometry=motions["by_geometry"],
             e0=neighbours.state(np.zeros((parameters, len(self._connectors)))), e1=e1, **fields,
         )  # fmt: skip
@@ -269,6 +269,7 @@ class Response:
             "J": tables,
             "w": neighbours.state(changes),
             "w_bar": np.zeros(changes[0].shape),
+            "width": changes.shape[2],
         }
 
 

@@ -332,8 +332,6 @@ def transposes(kind: str, data: Any) -> list[Any] | None:
     """Return the functions of ``term_transposes`` of loops.h; None if there is no adjoint."""
     if kind not in TRANSPOSES:
         return None
-    if kind == "connectors" and ((data.limit and data.way) or data.rows_of_user):
-        return None  # friction, and laws of users
     return [ffi.addressof(lib, name) if name else ffi.NULL for name in TRANSPOSES[kind]]
 
 
@@ -366,10 +364,19 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         if data.by_geometry:
             blocks.append(table(data.by_geometry))
         laws = c.laws or c.rigid_plastic
+        if data.J:
+            blocks.append((data.J, 8 * c.number * data.outputs))
         if laws:
-            blocks += [(data.J, 8 * c.number * data.outputs), (laws.w, 8 * c.number * laws.width)]
+            blocks.append((laws.w, 8 * c.number * laws.width))
+        if data.by_parameter:
+            blocks.append((data.by_parameter, 8 * data.parameters * c.number * data.rows))
         if c.rigid_plastic:
             blocks.append((c.rigid_plastic.direction, 4 * c.number))
+        if f := c.friction:
+            blocks += [table(rate) for rate in (data.rate_by_v, data.rate_by_q0) if rate]
+            blocks += [(x, 8 * c.number) for x in (f.slip, f.creep)]
+            blocks += [(x, 4 * c.number) for x in (f.sticks, f.against)]
+            blocks += [(f.limit[i], 8) for i in range(c.number)]
         return [*blocks, *((x, 8 * c.number * c.components) for x in (c.e0, c.e1))]
     if kind == "points":
         points, blocks = data.points, [table(data.strains)]

@@ -265,11 +265,11 @@ def time_in_python(handle: Any, t: float) -> float:
 
 
 def call_in_python(handle: Any, *arguments: Any) -> None:
-    """Call a Python function for C; callbacks of four signatures use this function."""
+    """Call a Python function for C; callbacks of three signatures use this function."""
     ffi.from_handle(handle)[1](*arguments)
 
 
-for _name in ("run", "begin", "phase", "index"):
+for _name in ("run", "begin", "phase"):
     from_c(name=f"{_name}_in_python")(call_in_python)
 
 

@@ -246,10 +246,15 @@ void finish_points(void *self, adjoint *a)
 
 /* -- connectors ---------------------------------------------------------------------------------------- */
 
-static void add_row_of_law(const connector_derivatives *m, int i, int row, double factor, double *x_bar)
+/* Derivatives by a row of the table of connector i to those by its inputs and by parameters; the transpose
+ * of change_of_row. */
+static void add_row_of_law(const connector_derivatives *m, adjoint *a, int i, int row, double factor, double *x_bar)
 {
   const double *J = m->J + (size_t)i * m->outputs + row * m->columns;
+  const int number = m->term->connectors->number;
   for (int j = 0; j < m->columns; ++j) x_bar[m->column[j]] += factor * J[j];
+  for (int p = 0; m->by_parameter && p < a->parameters; ++p)
+    a->gradient[p] += factor * m->by_parameter[((size_t)p * number + i) * m->rows + row];
 }
 
 /* From the slip of a rigid-plastic connector to the motion at the end and at the beginning of the slip. */
@@ -269,21 +274,44 @@ void transpose_connectors_state(void *self, adjoint *a)
   memcpy(m->e1, m->e0_bar, all * sizeof *m->e1);
   memset(m->e0_bar, 0, all * sizeof *m->e1);
   for (int i = 0; i < c->number; ++i) {
-    if (c->laws) {
-      const int width = c->laws->width;
-      double *w_bar = m->w_bar + (size_t)i * width, *state = w_bar + 2 * n + 2;
-      memset(x, 0, width * sizeof *x);
-      for (int j = 0; j < c->laws->variables; ++j) add_row_of_law(m, i, n + j, state[j], x), state[j] = 0;
+    double *w_bar = m->w_bar + (size_t)i * m->width;
+    if (c->laws || c->asked) {
+      double *state = w_bar + 2 * n + 2;
+      memset(x, 0, m->width * sizeof *x);
+      for (int j = 0; j < m->variables; ++j) add_row_of_law(m, a, i, n + j, state[j], x), state[j] = 0;
       for (int j = 0; j < n; ++j) m->e1[n * i + j] += x[j], m->e0_bar[n * i + j] += x[n + j];
-      for (int j = 2 * n; j < width; ++j) w_bar[j] += x[j];
+      for (int j = 2 * n; j < m->width; ++j) w_bar[j] += x[j];
     } else if (c->rigid_plastic) {
       const double *w = c->rigid_plastic->w + (size_t)i * c->rigid_plastic->width;
-      double *w_bar = m->w_bar + (size_t)i * c->rigid_plastic->width;
       enter_slip(w, w_bar[SLIPPED] + w[SLIP_DIRECTION] * w_bar[SLIP_START], m->e1 + i, w_bar);
     }
   }
   transpose_tables(m->motions, m->e1, 0, 0, a->q1);
   if (m->by_geometry) transpose_tables(m->by_geometry, m->e1, 0, m->by_geometry->bar, 0);
+}
+
+/* From the last number in the rows of friction to the state before the step, to the inputs of laws and to
+ * the limits; the transpose of friction_row. */
+static void transpose_friction(const connector_derivatives *m, adjoint *a)
+{
+  const connectors *c = m->term->connectors;
+  const friction *f = c->friction;
+  double *x = a->values;
+  for (int i = 0; i < c->number; ++i) {
+    const double row_bar = m->row_bar[3 * i + 2];
+    const double limit_bar = row_bar * (f->sticks[i] ? motion_by_limit(c, i, a->d->x) : f->slip[i]);
+    m->way[i] = f->sticks[i] && m->rate_by_v ? row_bar * way_by_rate(f, i) : 0;
+    if (f->sticks[i]) m->e0_bar[i] += row_bar;
+    if (c->laws) {
+      double *w_bar = m->w_bar + (size_t)i * m->width;
+      memset(x, 0, m->width * sizeof *x);
+      add_row_of_law(m, a, i, f->sticks[i] ? 1 + m->variables : 0, limit_bar, x);
+      m->e0_bar[i] += x[1];
+      for (int j = 2; j < m->width; ++j) w_bar[j] += x[j];
+    } else m->limit_bar[i] += limit_bar;
+  }
+  if (m->rate_by_v) transpose_tables(m->rate_by_v, m->way, 0, 0, a->rates[1]);
+  if (m->rate_by_q0) transpose_tables(m->rate_by_q0, m->way, 0, 0, a->q0);
 }
 
 void transpose_connectors(void *self, adjoint *a, const double *λ)
@@ -294,23 +322,25 @@ void transpose_connectors(void *self, adjoint *a, const double *λ)
   const int n = c->components;
   double *x = a->values;
   if (m->now) find_prescribed(m, a->step);
+  if (c->friction) {
+    transpose_friction(m, a);
+    return;
+  }
   for (int i = 0; i < c->number; ++i) {
     const double *row_bar = m->row_bar + n * (n + 2) * i + n + 1;
-    if (c->laws) {
-      const int width = c->laws->width;
-      double *w_bar = m->w_bar + (size_t)i * width;
-      memset(x, 0, width * sizeof *x);
-      for (int j = 0; j < n; ++j) add_row_of_law(m, i, j, row_bar[j * (n + 2)], x);
+    double *w_bar = m->w_bar + (size_t)i * m->width;
+    if (c->laws || c->asked) {
+      memset(x, 0, m->width * sizeof *x);
+      for (int j = 0; j < n; ++j) add_row_of_law(m, a, i, j, row_bar[j * (n + 2)], x);
       for (int j = 0; j < n; ++j) m->e0_bar[n * i + j] += x[n + j];
-      for (int j = 2 * n; j < width; ++j) w_bar[j] += x[j];
+      for (int j = 2 * n; j < m->width; ++j) w_bar[j] += x[j];
     } else if (c->rigid_plastic) {
       const rigid_plastic *of = c->rigid_plastic;
       const double *w = of->w + (size_t)i * of->width;
-      double *w_bar = m->w_bar + (size_t)i * of->width;
       if (!of->direction[i]) w_bar[SLIP_START] += *row_bar;
       else {
         memset(x, 0, of->width * sizeof *x);
-        add_row_of_law(m, i, 0, -*row_bar / of->slope[i], x);
+        add_row_of_law(m, a, i, 0, -*row_bar / of->slope[i], x);
         enter_slip(w, x[SLIP], 0, w_bar);
         x[SLIP] = 0;
         for (int j = 0; j < of->width; ++j) w_bar[j] += x[j];
@@ -327,11 +357,12 @@ void finish_connectors(void *self, adjoint *a)
 {
   const connector_derivatives *m = self;
   const connectors *c = m->term->connectors;
-  const size_t width = c->laws ? c->laws->width : c->rigid_plastic ? c->rigid_plastic->width : 0, all = width * c->number;
+  const size_t all = (size_t)m->width * c->number;
   const form_derivative *g = m->by_geometry;
   for (int p = 0; p < a->parameters; ++p) {
     double sum = all ? dot(all, m->w_bar, m->w + p * all) : 0;
     if (m->viscosity) sum += dot(c->number, m->viscosity_bar, m->viscosity + (size_t)p * c->number);
+    if (c->friction && !c->laws) sum += dot(c->number, m->limit_bar, m->limit + (size_t)p * c->number);
     if (g) sum += dot(g->stride, g->bar, g->direction + (size_t)p * g->stride);
     a->gradient[p] += sum;
   }

@@ -380,6 +380,7 @@ void tabulate_connectors(void *self, const time_step *step, const double *q1)
     else set_slip(w, c->e1[i] - w[SLIP_START], c->rigid_plastic->direction[i]);
     ask_table(m->table, w, m->outputs, m->margins, m->J + (size_t)i * m->outputs);
   }
+  if (m->tabulate_user) m->tabulate_user(m->user);
   find_prescribed(m, step);
 }
 
@@ -389,12 +390,34 @@ static void set_slip_direction(const double *w, double de1, double *dw)
   dw[SLIP] = w[SLIP] > 0 ? w[SLIP_DIRECTION] * (de1 - dw[SLIP_START]) : 0;
 }
 
-static double product_with_row(const connector_derivatives *m, int i, int row, const double *dw)
+/* Derivatives by parameter p of the inputs of the law of connector i. */
+static double *changes_of_inputs(const connector_derivatives *m, int p, int i)
+{
+  return m->w + ((size_t)p * m->term->connectors->number + i) * m->width;
+}
+
+/* Derivative of a row of the table of connector i by parameter p. */
+static double change_of_row(const connector_derivatives *m, int p, int i, int row, const double *dw)
 {
   const double *J = m->J + (size_t)i * m->outputs + row * m->columns;
-  double sum = 0;
+  const size_t at = (size_t)p * m->term->connectors->number + i;
+  double sum = m->by_parameter ? m->by_parameter[at * m->rows + row] : 0;
   for (int j = 0; j < m->columns; ++j) sum += J[j] * dw[m->column[j]];
   return sum;
+}
+
+/* Motion to rest of friction connector i in a step by the rate of its motion before the step. */
+static double way_by_rate(const friction *f, int i)
+{
+  const double *of = f->rates->now->rates[0];
+  return f->against[i] ? 0 : -(of[1] + of[2]) / of[0];
+}
+
+/* Derivative of the motion of a sticking connector by its limit. */
+static double motion_by_limit(const connectors *c, int i, const double *q1)
+{
+  const friction *f = c->friction;
+  return *f->limit[i] > 0 ? -f->creep[i] / *f->limit[i] * q1[c->force[i]] : 0;
 }
 
 /* Derivatives of the motions of friction in a step that leads to rest, see begin_friction. */
@@ -404,10 +427,9 @@ static void find_ways(const connector_derivatives *m, const derivatives *d, int 
   double *way = m->way + (size_t)p * c->number;
   memset(way, 0, c->number * sizeof *way);
   if (!m->rate_by_v) return;
-  const double *of = c->friction->rates->now->rates[0];
   multiply_tables(m->rate_by_v, 0, d->rates[1] + (size_t)p * d->size, 1, way);
   if (m->rate_by_q0) multiply_tables(m->rate_by_q0, 0, d->q0 + (size_t)p * d->size, 1, way);
-  for (int i = 0; i < c->number; ++i) way[i] *= c->friction->against[i] ? 0 : -(of[1] + of[2]) / of[0];
+  for (int i = 0; i < c->number; ++i) way[i] *= way_by_rate(c->friction, i);
 }
 
 /* Derivative of the last number in the row of friction connector i, see set_rows_of_friction. */
@@ -415,17 +437,14 @@ static double friction_row(const connector_derivatives *m, const derivatives *d,
 {
   const connectors *c = m->term->connectors;
   const friction *f = c->friction;
-  double *dw = c->laws ? m->w + ((size_t)p * c->number + i) * c->laws->width : 0;
+  double *dw = c->laws ? changes_of_inputs(m, p, i) : 0;
   double *limit = m->limit + (size_t)p * c->number + i;
   if (dw) {
     dw[0] = 0, dw[1] = e0[i];
-    *limit = product_with_row(m, i, 1 + c->laws->variables, dw);
+    *limit = change_of_row(m, p, i, 1 + m->variables, dw);
   }
-  if (f->sticks[i]) {
-    const double softer = *f->limit[i] > 0 ? -f->creep[i] / *f->limit[i] * *limit : 0;
-    return e0[i] + m->way[(size_t)p * c->number + i] + softer * d->x[c->force[i]];
-  }
-  return f->slip[i] * (dw ? product_with_row(m, i, 0, dw) : *limit);
+  if (f->sticks[i]) return e0[i] + m->way[(size_t)p * c->number + i] + motion_by_limit(c, i, d->x) * *limit;
+  return f->slip[i] * (dw ? change_of_row(m, p, i, 0, dw) : *limit);
 }
 
 /* Derivatives of the rows of the laws at constant motions, for the form of the forces. */
@@ -437,20 +456,19 @@ void add_connectors_derivative(void *self, const derivatives *d, int p, double *
   const int n = c->components;
   const double *e0 = m->e0 + (size_t)p * n * c->number;
   if (c->friction) find_ways(m, d, p);
-  if (c->asked) m->rows_of_user(m->rows_handle, p);
   for (int i = 0; i < c->number; ++i) {
     double *row = m->row + n * (n + 2) * i + n + 1; /* the last number of the first row */
     if (c->friction) *row = friction_row(m, d, p, i, e0);
-    else if (c->laws) {
-      double *dw = m->w + ((size_t)p * c->number + i) * c->laws->width;
+    else if (c->laws || c->asked) {
+      double *dw = changes_of_inputs(m, p, i);
       memset(dw, 0, n * sizeof *dw);
       memcpy(dw + n, e0 + n * i, n * sizeof *dw);
-      for (int j = 0; j < n; ++j) row[j * (n + 2)] = product_with_row(m, i, j, dw);
+      for (int j = 0; j < n; ++j) row[j * (n + 2)] = change_of_row(m, p, i, j, dw);
     } else if (c->rigid_plastic) {
       const rigid_plastic *of = c->rigid_plastic;
-      double *dw = m->w + ((size_t)p * c->number + i) * of->width;
+      double *dw = changes_of_inputs(m, p, i);
       set_slip_direction(of->w + i * of->width, 0, dw);
-      *row = of->direction[i] ? -product_with_row(m, i, 0, dw) / of->slope[i] : dw[SLIP_START];
+      *row = of->direction[i] ? -change_of_row(m, p, i, 0, dw) / of->slope[i] : dw[SLIP_START];
     } else if (t->viscosity) {
       const double dt = *m->dt;
       *row = (m->viscosity[p * c->number + i] * (c->e1[i] - c->e0[i]) - t->viscosity[i] * e0[i]) / dt;
@@ -477,19 +495,18 @@ void accept_connectors_derivative(void *self, const derivatives *d, int p)
       if (f->sticks[i]) note_margin(d, p, i, fabs(force) - *f->limit[i], copysign(1, force) * dforce - m->limit[(size_t)p * all + i]);
       else note_margin(d, p, i, slip * moved, slip * (m->e1[i] - e0[i]));
     }
-    if (c->laws) {
-      const int variables = c->laws->variables;
-      double *dw = m->w + ((size_t)p * c->number + i) * c->laws->width, end[MOST_VARIABLES];
+    if (c->laws || c->asked) {
+      double *dw = changes_of_inputs(m, p, i), *end = m->variables_at_end;
       memcpy(dw, m->e1 + n * i, n * sizeof *dw);
       memcpy(dw + n, e0 + n * i, n * sizeof *dw);
-      for (int j = 0; j < variables; ++j) end[j] = product_with_row(m, i, n + j, dw);
+      for (int j = 0; j < m->variables; ++j) end[j] = change_of_row(m, p, i, n + j, dw);
       for (int k = 0; k < m->margins; ++k)
         note_margin(d, p, n * i, m->J[(size_t)(i + 1) * m->outputs - m->margins + k],
-                    product_with_row(m, i, m->rows - m->margins + k, dw));
-      memcpy(dw + 2 * n + 2, end, variables * sizeof *dw);
+                    change_of_row(m, p, i, m->rows - m->margins + k, dw));
+      memcpy(dw + 2 * n + 2, end, m->variables * sizeof *dw);
     } else if (c->rigid_plastic) {
       const rigid_plastic *of = c->rigid_plastic;
-      double *dw = m->w + ((size_t)p * c->number + i) * of->width;
+      double *dw = changes_of_inputs(m, p, i);
       const double force = d->x[c->force[i]] - of->back_force[i], *w = of->w + i * of->width;
       double *limit = m->limit + (size_t)p * all + i, *back_force = m->back_force + (size_t)p * all + i;
       set_slip_direction(w, m->e1[i], dw);
@@ -497,12 +514,11 @@ void accept_connectors_derivative(void *self, const derivatives *d, int p)
       else
         note_margin(d, p, i, fabs(force) - of->limit[i],
                     copysign(1, force) * (d->q1[(size_t)p * d->size + c->force[i]] - *back_force) - *limit);
-      *limit = product_with_row(m, i, 1, dw), *back_force = product_with_row(m, i, 2, dw);
+      *limit = change_of_row(m, p, i, 1, dw), *back_force = change_of_row(m, p, i, 2, dw);
       dw[SLIPPED] += dw[SLIP];
       dw[SLIP_START] += of->direction[i] * dw[SLIP];
     }
   }
-  if (c->asked) m->end_of_user(m->end_handle, p);
   memcpy(e0, m->e1, all * sizeof *e0);
   if (m->reached) memcpy(m->reached + (size_t)p * all, m->end + (size_t)p * all, all * sizeof *e0);
 }

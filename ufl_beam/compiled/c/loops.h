@@ -1224,7 +1224,8 @@ typedef struct {
 /* Derivatives of the laws of connectors. Compiled laws have a table: columns are inputs of the law, rows
  * its forces, its variables at the end of a step, and the margins of its conditions; the margins follow.
  * Rigid-plastic laws have the limit and the back force instead of variables, and no margins; laws with a
- * limit have it after the variables. Arrays have a row for each parameter. */
+ * limit have it after the variables. Python tabulates laws of users, whose inputs are in the order of
+ * compiled laws. Arrays have a row for each parameter. */
 typedef struct {
   int parameters, neighbours;
   const connector_term *term;
@@ -1232,19 +1233,22 @@ typedef struct {
   form_derivative *by_geometry;  /* by the geometry of the connectors; or none */
   kernel *table;                 /* or none */
   int rows, columns, margins, outputs;
+  int width, variables;          /* of a law: number of its inputs; number of its internal variables */
   double *limit, *back_force;    /* of rigid-plastic laws; limit: also of friction */
   form_derivative *rate_by_v, *rate_by_q0; /* rates of motions for friction in dynamics; or none */
   double *way;                   /* of friction: derivatives of the motion in a step that leads to rest */
   const int32_t *column;         /* index of each column in the inputs of a law */
   double *J, *w;                 /* tables; derivatives of the inputs of all laws */
+  double *by_parameter;          /* of laws of users: derivatives of the rows at constant inputs; or none */
+  double *variables_at_end;      /* space: derivatives of the variables of one law */
   double *e0, *e1, *row, *dt;    /* e0: of the motions before the step; of one parameter: motions, rows */
   const double *viscosity;       /* of dampers; or none */
   const connector_term *const *neighbour; /* of motors and actuators: the same in neighbouring scenes */
   const double *weight;          /* see derivatives */
   double *now, *end, *reached;   /* of motors: motions; of actuators: forces; or none */
-  double *w_bar, *e0_bar, *row_bar, *viscosity_bar; /* of the adjoint */
-  void (*rows_of_user)(void *handle, int p), (*end_of_user)(void *handle, int p); /* of laws of users */
-  void *rows_handle, *end_handle;
+  double *w_bar, *e0_bar, *row_bar, *viscosity_bar, *limit_bar; /* of the adjoint */
+  void (*tabulate_user)(void *handle); /* of laws of users; or none */
+  void *user;
 } connector_derivatives;
 
 /* Matrix of rates, with its derivative by each parameter, or none. */
