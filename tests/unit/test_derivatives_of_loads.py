@@ -302,10 +302,12 @@ def test_strains_and_masses_that_begin_at_zero_are_refused():
 
 @pytest.mark.serial
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.02, 0.01), ub.Static()], ids=repr)
-@pytest.mark.parametrize("model", [follower, pressure, frame, works, viscous])
+@pytest.mark.parametrize(
+    "model", [follower, pressure, frame, works, viscous, moving, moving_mass, guided, damped]
+)
 def test_adjoint_is_the_same_sum(model, scheme):
     """Round-off of sums of some hundred terms; `of` has the differences of a linear function."""
-    if model in (viscous, works) and scheme == ub.Static():
+    if model in (viscous, works, *ONLY_DYNAMIC) and scheme == ub.Static():
         pytest.skip("forces by velocities")
     at = dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
     options = {"t": (0, 1), "dt": 0.05}
@@ -316,7 +318,7 @@ def test_adjoint_is_the_same_sum(model, scheme):
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("model", [moving, imposed, imposed_on_points, damped_points, guided])
+@pytest.mark.parametrize("model", [imposed, imposed_on_points, damped_points])
 def test_effects_without_an_adjoint_are_refused(model):
     at = dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
     options = {"t": (0, 0.1), "dt": 0.05, "of": lambda run: run.q[:, 3]}

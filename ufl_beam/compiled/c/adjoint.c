@@ -432,6 +432,81 @@ void transpose_frame(void *self, adjoint *a, const double *λ)
   add_product(f->turn, x, a->q0);
 }
 
+/* Derivatives by the motions before the step, from the forces of mass k; see add_moving_mass_derivative. */
+static void transpose_moving_mass(const moving_loads *of, adjoint *a, int k, const double *λ)
+{
+  const double *q1 = a->d->x;
+  double x = 0, y = 0; /* derivatives by the acceleration of the mass */
+  on_axis at;
+  if (!find_on_axis(of, k, q1, &at)) return;
+  for (int j = 0; j < of->nodes; ++j) {
+    x += of->mass[k] * at.shape[j] * λ[at.x[j]];
+    y += of->mass[k] * at.shape[j] * λ[at.y[j]];
+  }
+  const double along = x * at.c + y * at.s, across = y * at.c - x * at.s;
+  const double angle = at.acceleration * across - at.turn * along;
+  const double spin = 2 * at.speed * across, curvature = at.speed * at.speed * across;
+  for (int j = 0; j < of->nodes; ++j) {
+    const int psi = at.psi[j];
+    const double half = step_of(of, q1, psi, 1) / 2, grows = of->half_tangents ? 1 + half * half : 1;
+    a->q0[psi] += (1 - of->part) * (at.shape[j] * angle + at.slope[j] * curvature);
+    a->q0[psi] -= at.velocity[0] * grows * at.shape[j] * spin;
+    a->q0[at.x[j]] -= at.inertia[0] * at.shape[j] * x;
+    a->q0[at.y[j]] -= at.inertia[0] * at.shape[j] * y;
+    for (int i = 1; i < of->rates->number; ++i) {
+      if (at.velocity[i] != 0) a->rates[i][psi] += at.velocity[i] * at.shape[j] * spin;
+      if (at.inertia[i] == 0) continue;
+      a->rates[i][at.x[j]] += at.inertia[i] * at.shape[j] * x;
+      a->rates[i][at.y[j]] += at.inertia[i] * at.shape[j] * y;
+    }
+  }
+}
+
+void transpose_moving_loads(void *self, adjoint *a, const double *λ)
+{
+  const moving_derivatives *m = self;
+  const moving_loads *of = m->loads;
+  const int all = 2 * of->nodes * of->cells;
+  begin_moving_loads((void *)of, a->step, 0, 0);
+  differentiate_moving_loads(self, a->step, 0);
+  for (int p = 0; p < a->parameters; ++p) {
+    for (int i = 0; i < all; ++i) a->gradient[p] -= m->now[(size_t)p * all + i] * λ[of->dof[of->at[i]]];
+    if (!of->rates) continue;
+    memset(a->values, 0, a->size * sizeof *a->values);
+    for (int k = 0; k < of->loads; ++k) add_moving_mass_derivative(m, a->d->x, 0, p, k, a->values);
+    a->gradient[p] += dot(a->size, a->values, λ);
+  }
+  for (int k = 0; of->rates && k < of->loads; ++k) transpose_moving_mass(of, a, k, λ);
+}
+
+/* The differences between scenes follow, see transpose_differences. */
+void transpose_guides(void *self, adjoint *a, const double *λ)
+{
+  const guide_derivatives *m = self;
+  guides *g = m->guides;
+  find_tangents_before(self, a->step, 0);
+  if (!g->over_step || !find_frames(g, a->d->x)) return;
+  for (int k = 0; k < g->number; ++k) {
+    const int32_t *dofs = g->dofs + 7 * k;
+    double by_way[2];
+    find_turn_of_chord(m, a->d->x, k, by_way);
+    const double way = by_way[0] * λ[dofs[1]] + by_way[1] * λ[dofs[3]];
+    for (int i = 0; i < 2; ++i) a->q0[dofs[1 + 2 * i]] += m->tangent[2 * k + i] * way;
+  }
+}
+
+/* The matrix and the tangents of the step, which the product with rates and the differences between scenes
+ * also use; these follow. */
+void transpose_damping(void *self, adjoint *a, const double *λ)
+{
+  const damping_derivatives *m = self;
+  double *x = a->values;
+  begin_tangent_damping((void *)m->damping, a->step, 0, 0);
+  tabulate_damping(self, a->step, 0);
+  for (int i = 0; i < a->size; ++i) x[i] = m->damping->factor * λ[i];
+  transpose_tables(m->by_q0, 0, x, 0, a->q0);
+}
+
 /* -- the steps ------------------------------------------------------------------------------------------- */
 
 /* Record the solved step, before it is accepted; see differentiate_step on an `initial` one. Returns 0 if

@@ -1284,9 +1284,12 @@ typedef struct {
   double *now, *end, *before; /* of the forces on cells */
 } moving_derivatives;
 
-/* Guides and the unit tangents of their curves at the points before the step. */
+/* Guides, the same in neighbouring scenes, and the unit tangents of their curves at the points before the
+ * step. */
 typedef struct {
-  const guides *guides;
+  guides *guides;
+  int neighbours;
+  guides *const *neighbour;
   double *tangent;
 } guide_derivatives;
 
@@ -1358,6 +1361,9 @@ void transpose_differences(void *self, adjoint *a, const double *lambda);
 void transpose_followers(void *self, adjoint *a, const double *lambda);
 void transpose_pressures(void *self, adjoint *a, const double *lambda);
 void transpose_frame(void *self, adjoint *a, const double *lambda);
+void transpose_moving_loads(void *self, adjoint *a, const double *lambda);
+void transpose_guides(void *self, adjoint *a, const double *lambda);
+void transpose_damping(void *self, adjoint *a, const double *lambda);
 void finish_form(void *self, adjoint *a);
 void finish_points(void *self, adjoint *a);
 int differentiate_step(derivatives *d, time_loop *m, int initial);
