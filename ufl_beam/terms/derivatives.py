@@ -336,8 +336,6 @@ def transposes(kind: str, data: Any) -> list[Any] | None:
         return None
     if kind == "connectors" and ((data.limit and data.way) or data.rows_of_user):
         return None  # friction, and laws of users
-    if kind == "damping" and data.damping.groups:
-        return None  # tangents of material points
     return [ffi.addressof(lib, name) if name else ffi.NULL for name in TRANSPOSES[kind]]
 
 
@@ -371,7 +369,10 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
     if kind == "moving_loads":
         return rates(data.loads.rates) if data.loads.rates else []
     if kind == "damping":
-        return rates(data.damping.damping.rates)
+        of = data.damping
+        groups = [of.group[g] for g in range(of.groups)]
+        tangents = [(x.tangents, 8 * x.number * x.numbers) for x in groups]
+        return [*rates(of.damping.rates), *tangents]
     if kind == "guides":
         g = data.guides
         found = [(x, ffi.sizeof(ffi.typeof(x).item)) for x in (g.s0, g.s, g.step, g.frame)]

@@ -1218,6 +1218,7 @@ typedef struct {
   const double *elastic, *step;
   double *r, *e1, *row;           /* of one parameter: of resultants and strains; of the rows of springs */
   double *w_bar, *e0_bar, *r_bar, *row_bar, *B_bar, *weight_bar, *rest_bar; /* of the adjoint; or none */
+  double *tangents_bar, *elastic_bar;
 } point_derivatives;
 
 /* Derivatives of the laws of connectors. Compiled laws have a table: columns are inputs of the law, rows
@@ -1301,6 +1302,8 @@ typedef struct {
   const cells *force;            /* the form of the forces, for derivatives of the tangents */
   int at_q0, at_tangents;        /* positions in its coefficients */
   const double *const *tangents; /* of each group: derivatives, with a row for each parameter */
+  form_derivative *by_tangents;  /* of the adjoint; or none */
+  double *const *tangents_bar;
   double *r;
 } damping_derivatives;
 
