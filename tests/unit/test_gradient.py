@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The adjoint of runs, against direct differentiation of the same runs."""
 
+import dataclasses
 import math
 from itertools import pairwise
 
@@ -147,6 +148,19 @@ def turning(mass=0.2, stiffness=0.01, EI=100.0, rhoA=1.0, length=2.0, speed=1.0)
     )
 
 
+def damped(scene, mass, stiffness):
+    matrix = ub.Rayleigh(mass=mass, stiffness=stiffness, tangent=True)
+    return dataclasses.replace(scene, damping=(matrix,))
+
+
+def damped_fibres(limit=235e6, E=210e9, height=0.2, load=60e3, mass=0.5, stiffness=2e-3):
+    return damped(fibres(limit, 2e9, E, height, load), mass, stiffness)
+
+
+def damped_softening(limit=60e3, energy=6e3, EI=9.0e6, load=40e3, stiffness=2e-3):
+    return damped(softening(limit, energy, EI, load), 0.5, stiffness)
+
+
 CASES = {
     "flying": (flying, {}, ub.EnergyMomentum(0.01, 0.01), 2.0, 0.05),
     "decaying": (flying, {}, ub.EnergyMomentumDecaying(), 2.0, 0.05),
@@ -165,6 +179,8 @@ CASES = {
     "guide, generalized alpha": (guided, {}, ub.GeneralizedAlpha(0.8), 1.0, 0.05),
     "damping by tangents": (turning, {}, ub.EnergyMomentum(), 1.0, 0.05),
     "damping by tangents, Newmark": (turning, {}, ub.Newmark(0.6, 0.31), 1.0, 0.05),
+    "damping by tangents, fibres": (damped_fibres, {}, ub.EnergyMomentum(0.02), 0.4, 0.004),
+    "damping by tangents, hinge": (damped_softening, {}, ub.EnergyMomentum(0.02), 0.2, 0.002),
     "statics": (flying, {}, ub.Static(), 1.0, 0.1),
 }
 
