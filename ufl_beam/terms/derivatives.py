@@ -336,6 +336,8 @@ def transposes(kind: str, data: Any) -> list[Any] | None:
         return None
     if kind == "connectors" and ((data.limit and data.way) or data.rows_of_user):
         return None  # friction, and laws of users
+    if kind == "damping" and data.damping.groups and not data.by_tangents:
+        return None  # too large tables of cells of degree 3
     return [ffi.addressof(lib, name) if name else ffi.NULL for name in TRANSPOSES[kind]]
 
 

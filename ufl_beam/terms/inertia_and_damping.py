@@ -426,8 +426,9 @@ class TangentRayleighForces(Term):
         directions = [doubles(beams.points.tangents) for beams in self._inelastic]
         bars = [doubles(beams.points.tangents_bar) for beams in self._inelastic]
         by_tangents: Any = ffi.NULL
-        if own.groups:
-            one = {"direction": ffi.NULL, "stride": 0}  # of the adjoint only
+        entries = fields.cell_dofs.shape[1] * self._tangents.function_space.element.space_dimension
+        if own.groups and entries <= lib.MOST_ENTRIES:  # of the adjoint only
+            one = {"direction": ffi.NULL, "stride": 0}
             by_tangents = form_derivative(form, self._kernels[1], kernel, self._tangents, **one)
         c = struct(
             "damping_derivatives", damping=own, by_q0=by_q0, force=force.cells,
