@@ -84,7 +84,7 @@ def gradient(
 
     Raises:
         ArgumentError: As in :func:`differentiate`; the history depends on something else than the
-            motion at its times; steps were divided; or an effect of the scene has no adjoint.
+            motion at its times; or steps were divided.
 
     Example:
         >>> def frame(**EI):
@@ -128,12 +128,9 @@ class _Adjoint:
     def __init__(self, simulation: Simulation, steps: StepDerivatives, max_bytes: float) -> None:
         self._simulation, self._steps = simulation, steps
         c, A = steps.c, simulation.equation.A
-        terms, blocks = list[Any](), [(A.data, A.data.nbytes)]
-        for (kind, data), owner in zip(steps.terms, steps.owners, strict=True):
-            if (found := transposes(kind, data)) is None:
-                raise ArgumentError(f"gradient: {owner.effect} has no adjoint; use differentiate")
-            terms.append(found)
-            blocks += recorded(kind, data)
+        terms = [transposes(kind) for kind, _ in steps.terms]
+        blocks = [(A.data, A.data.nbytes)]
+        blocks += [block for term in steps.terms for block in recorded(*term)]
         loop, size = simulation.time_loop, simulation.subdomain.size
         blocks += [(loop.x, 8 * size), (ffi.addressof(loop.step, "q0"), 8 * size)]
         pointers = [self._pointer(x) for x, _ in blocks]

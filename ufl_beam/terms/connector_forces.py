@@ -372,9 +372,13 @@ class Guides(ConnectorTerm):
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
-        c = struct("guide_derivatives", guides=self._c, tangent=np.zeros((len(self._curves), 2)))
-        found = differences(neighbours, lambda term: [term._s0, term._steps, term._on0])
-        return [found, in_c("guides", c)]
+        others = [term._c for some in neighbours.terms for term in some]
+        c = struct(
+            "guide_derivatives", guides=self._c, neighbours=len(others),
+            neighbour=ffi.new("guides *[]", others), tangent=np.zeros((len(self._curves), 2)),
+        )  # fmt: skip
+        # The state of the guides in neighbouring scenes follows from that of the guides themselves
+        return [differences(neighbours), in_c("guides", c)]
 
     def _begin_again(self) -> None:
         """Discard iterates, and begin at the accepted points of the curves."""

@@ -324,14 +324,15 @@ TRANSPOSES = {
     "pressures": ("", "transpose_pressures", ""),
     "frame": ("", "transpose_frame", ""),
     "imposed": ("", "transpose_imposed", ""),
+    "moving_loads": ("", "transpose_moving_loads", ""),
+    "guides": ("", "transpose_guides", ""),
+    "damping": ("", "transpose_damping", ""),
 }
 """Functions of ``term_transposes`` of loops.h by the kind of a derivative."""
 
 
-def transposes(kind: str, data: Any) -> list[Any] | None:
-    """Return the functions of ``term_transposes`` of loops.h; None if there is no adjoint."""
-    if kind not in TRANSPOSES:
-        return None
+def transposes(kind: str) -> list[Any]:
+    """Return the functions of ``term_transposes`` of loops.h."""
     return [ffi.addressof(lib, name) if name else ffi.NULL for name in TRANSPOSES[kind]]
 
 
@@ -346,6 +347,9 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         batches = -(-cells.number // cells.batch_size)
         return cells.each, 8 * batches * cells.rows * cells.batch_size
 
+    def rates(of: Any) -> list[tuple[Any, int]]:
+        return [(ffi.addressof(of, "rate", j), 8 * of.size) for j in range(1, of.number)]
+
     if kind == "form":
         return [table(data)]
     if kind == "shape":
@@ -359,6 +363,17 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         product = data.matrix.product
         rate = ffi.addressof(product, "rate")  # C exchanges the vectors at this address
         return [(rate, 8 * product.size), (product.half, 8 * product.rotations)]
+    if kind == "moving_loads":
+        return rates(data.loads.rates) if data.loads.rates else []
+    if kind == "damping":
+        of = data.damping
+        groups = [of.group[g] for g in range(of.groups)]
+        tangents = [(x.tangents, 8 * x.number * x.numbers) for x in groups]
+        return [*rates(of.damping.rates), *tangents]
+    if kind == "guides":
+        g = data.guides
+        found = [(x, ffi.sizeof(ffi.typeof(x).item)) for x in (g.s0, g.s, g.step, g.frame)]
+        return [(x, size * g.number) for x, size in [*found, (g.on0, 16)]]
     if kind == "connectors":
         c, blocks = data.term.connectors, [table(data.motions), (data.dt, 8)]
         if data.by_geometry:

@@ -424,12 +424,18 @@ class TangentRayleighForces(Term):
         force = kernel(form)
         force.put(self._tangents, np.zeros(1))
         directions = [doubles(beams.points.tangents) for beams in self._inelastic]
+        bars = [doubles(beams.points.tangents_bar) for beams in self._inelastic]
+        by_tangents: Any = ffi.NULL
+        if own.groups:  # of the adjoint only
+            one = {"direction": ffi.NULL, "stride": 0}
+            by_tangents = form_derivative(form, self._kernels[1], kernel, self._tangents, **one)
         c = struct(
             "damping_derivatives", damping=own, by_q0=by_q0, force=force.cells,
             at_q0=force.position(element.q0), at_tangents=force.position(self._tangents),
             tangents=ffi.new("double *[]", directions), r=np.zeros(fields.subdomain.size),
+            by_tangents=by_tangents, tangents_bar=ffi.new("double *[]", bars),
         )  # fmt: skip
-        neighbours.alive.append((force, directions))
+        neighbours.alive.append((force, directions, bars))
         same = ffi.new("constant_matrix *[]", len(neighbours))
         by_rates = struct("product_derivative", matrix=own.damping, change=same)
         found = [in_c("product", by_rates), in_c("damping", c)]

@@ -251,6 +251,7 @@ class Points:
             :meth:`start_tangents`.
         tangents: Derivatives of ``committed`` by parameters, if they are asked for; (parameters,
             cells, 9).
+        tangents_bar: Derivatives of a number by ``committed``, for the adjoint; (cells, 9).
         recorded: For each cell: (N, V, M) in the accepted state, the jump of the last point, and
             the energies that plastic strains and discontinuities have dissipated since the
             beginning; (cells, 6); N, N, N m, rad or m, J, J.
@@ -360,7 +361,11 @@ class Points:
             elastic = neighbours.differences(attrgetter(f"{path}._elastic"))
             # An eighth of the neighbours' distance: near the scene, and 1e-12 of round-off
             step = 1 / (8 * np.abs(neighbours.weights).max(axis=1))
-            fill(c, tangents=self.tangents, elastic=elastic, step=step)
+            self.tangents_bar = np.zeros(self.committed.shape)
+            fill(
+                c, tangents=self.tangents, elastic=elastic, step=step,
+                tangents_bar=self.tangents_bar, elastic_bar=np.zeros(self._elastic.shape),
+            )  # fmt: skip
         return c
 
     def __getitem__(self, name: str) -> Array:

@@ -143,6 +143,118 @@ static void transpose_imposed_in_points(const point_derivatives *m)
   for (int k = 0; m->imposed && k < 3 * m->points->cells; ++k) m->imposed_bar[k / 3 * 6 + 3 + k % 3] -= m->e1[k];
 }
 
+/* Derivatives by D without negative eigenvalues, see remove_negative, to those by D and by C. */
+static void transpose_remove_negative(const double *C, double *D, double *D_bar, double *C_bar)
+{
+  double A[3][3], V[3][3], G[3][3], inner[3][3] = {{0}};
+  find_eigenvalues(C, D, A, V);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j <= i; ++j) {
+      D_bar[3 * i + j] = D_bar[3 * j + i] = (D_bar[3 * i + j] + D_bar[3 * j + i]) / 2;
+      G[i][j] = G[j][i] = D_bar[3 * i + j] * sqrt(C[i] * C[j]);
+    }
+  /* The derivative of a function of a matrix has its divided differences between eigenvalues. */
+  for (int k = 0; k < 3; ++k)
+    for (int l = 0; l < 3; ++l) {
+      const double a = A[k][k], b = A[l][l];
+      const double slope = a < 0 && b < 0 ? 1 : a >= 0 && b >= 0 ? 0 : (fmin(a, 0) - fmin(b, 0)) / (a - b);
+      for (int i = 0; slope != 0 && i < 3; ++i)
+        for (int j = 0; j < 3; ++j) inner[k][l] += slope * V[i][k] * G[i][j] * V[j][l];
+    }
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      double bar = 0, removed = 0;
+      for (int k = 0; k < 3; ++k) {
+        removed += fmin(A[k][k], 0) * V[i][k] * V[j][k];
+        for (int l = 0; l < 3; ++l) bar += V[i][k] * inner[k][l] * V[j][l];
+      }
+      const double size = sqrt(C[i] * C[j]);
+      C_bar[i] += (bar * D[3 * i + j] / size - G[i][j] * removed) / C[i];
+      D_bar[3 * i + j] -= bar / size;
+    }
+}
+
+/* Answer of a point for its committed tangent, see keep_tangents; returns its share of the weight. */
+static double answer_at_end(const points *p, double *inputs, double *s)
+{
+  points at_end = *p;
+  at_end.tried = 0;
+  if (answer_at(&at_end, 1, inputs, s)) return 1;
+  answer_at(&at_end, p->theta, inputs, s);
+  return 1 / p->theta;
+}
+
+/* Size of changes of input j of a point in differences: a part of a number of the state, or the change of
+ * another number by the parameters. A number of the state that is still zero has the derivative zero. */
+static double step_of_input(const point_derivatives *m, int parameters, const double *w, size_t at, int j)
+{
+  const points *p = m->points;
+  const int d = p->components, z = p->strain + 3 * d;
+  double size = 0;
+  if (j == GROWTH || (p->solves && j >= m->unknown && j < m->unknown + p->variables)) return 0;
+  if (j >= p->strain && j < p->strain + 2 * d)
+    for (int a = 0; a < 2 * d; ++a) size = fmax(size, fabs(w[p->strain + a]));
+  else if (j == JUMP || j == OPENING || j == TRACTION || (j >= z && j < z + p->variables)) size = fabs(w[j]);
+  else {
+    const size_t all = (size_t)p->cells * p->of_cell * p->width;
+    for (int q = 0; q < parameters; ++q) size = fmax(size, m->step[q] * fabs(m->w[q * all + at + j]));
+    return size;
+  }
+  return isfinite(size) ? size / (1 << 16) : 0;
+}
+
+/* Derivatives by the committed tangent of section c at the end of the step, see differentiate_tangents, to
+ * those by its sum over the points, `sum_bar`, and by the numbers of the section. */
+static void transpose_sum_of_tangents(const point_derivatives *m, int c, double *sum_bar)
+{
+  const points *p = m->points;
+  const int d = p->components, width = p->width;
+  double D[9] = {0}, s[3 + 9], r[3] = {0};
+  for (int k = 0; k < 3; ++k) D[4 * k] = p->rest[k];
+  for (int i = 0; i < p->of_cell; ++i) {
+    memcpy(p->inputs, p->w + ((size_t)c * p->of_cell + i) * width, width * sizeof *s);
+    const double share = answer_at_end(p, p->inputs, s);
+    add_answer(d, p->B + 3 * d * i, share * p->weight[i], s, r, D);
+  }
+  memcpy(sum_bar, m->tangents_bar + 9 * (size_t)c, 9 * sizeof *s);
+  memset(m->tangents_bar + 9 * (size_t)c, 0, 9 * sizeof *s);
+  transpose_remove_negative(p->elastic + 3 * c, D, sum_bar, m->elastic_bar + 3 * c);
+  for (int k = 0; m->rest && k < 3; ++k) m->rest_bar[k] += sum_bar[4 * k];
+}
+
+/* From the sum of the tangents of section c to the inputs of point i, by differences. */
+static void transpose_tangent(const point_derivatives *m, int parameters, int c, int i, const double *sum_bar,
+                              double *x_bar)
+{
+  static const double at[4] = {-2, -1, 1, 2}, part[4] = {1. / 12, -8. / 12, 8. / 12, -1. / 12};
+  const points *p = m->points;
+  const int d = p->components, width = p->width;
+  const size_t first = ((size_t)c * p->of_cell + i) * width;
+  const double *w = p->w + first, *b = p->B + 3 * d * i;
+  double s[3 + 9], bar[9] = {0};
+  for (int a = 0; a < d; ++a)
+    for (int g = 0; g < d; ++g)
+      for (int k = 0; k < 3; ++k)
+        for (int l = 0; l < 3; ++l) bar[d * a + g] += b[3 * a + k] * sum_bar[3 * k + l] * b[3 * g + l];
+  memcpy(p->inputs, w, width * sizeof *w);
+  const double share = answer_at_end(p, p->inputs, s);
+  if (m->weight) m->weight_bar[i] += share * dot(d * d, s + d, bar);
+  for (int a = 0; m->B && a < d; ++a)
+    for (int g = 0; g < d; ++g)
+      for (int k = 0; k < 3; ++k)
+        m->B_bar[3 * (d * i + a) + k] += share * p->weight[i] * (s[d + d * a + g] + s[d + d * g + a])
+          * dot(3, sum_bar + 3 * k, b + 3 * g);
+  for (int j = 0; j < width; ++j) {
+    const double h = step_of_input(m, parameters, w, first, j);
+    for (int k = 0; h > 0 && k < 4; ++k) {
+      memcpy(p->inputs, w, width * sizeof *w);
+      p->inputs[j] += at[k] * h;
+      const double weight = answer_at_end(p, p->inputs, s) * p->weight[i];
+      x_bar[j] += part[k] / h * weight * dot(d * d, s + d, bar);
+    }
+  }
+}
+
 /* Derivatives of the state at the end of a step to those by its beginning; q1 gets those by the
  * configuration at the end. */
 void transpose_points_state(void *self, adjoint *a)
@@ -153,7 +265,9 @@ void transpose_points_state(void *self, adjoint *a)
   double out[POINT_OUTPUTS + 3 + MOST_VARIABLES], *x = a->values;
   memcpy(m->e1, m->e0_bar, 3 * (size_t)p->cells * sizeof *m->e1);
   memset(m->e0_bar, 0, 3 * (size_t)p->cells * sizeof *m->e0_bar);
-  for (int c = 0; c < p->cells; ++c)
+  for (int c = 0; c < p->cells; ++c) {
+    double sum_bar[9];
+    if (m->tangents) transpose_sum_of_tangents(m, c, sum_bar);
     for (int i = 0; i < p->of_cell; ++i) {
       const size_t k = c * p->of_cell + i;
       double *w = p->w + k * width, *w_bar = m->w_bar + k * width;
@@ -169,9 +283,11 @@ void transpose_points_state(void *self, adjoint *a)
           x[LENGTH] += bar * s / C, x[p->strain + 2] -= bar * s * L / (C * C);
         }
       }
+      if (m->tangents) transpose_tangent(m, a->parameters, c, i, sum_bar, x);
       remove_unknowns(m, w, J, x);
       enter_point(m, c, i, x, m->e1);
     }
+  }
   if (m->cells) {
     transpose_imposed_in_points(m);
     for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
@@ -238,6 +354,10 @@ void finish_points(void *self, adjoint *a)
     if (m->B) sum += dot(one, m->B_bar, m->B + (size_t)q * one);
     if (m->weight) sum += dot(p->of_cell, m->weight_bar, m->weight + (size_t)q * p->of_cell);
     if (m->rest) sum += dot(3, m->rest_bar, m->rest + 3 * q);
+    if (m->tangents) {
+      sum += dot(3 * strains, m->tangents_bar, m->tangents + 3 * q * strains);
+      sum += dot(strains, m->elastic_bar, m->elastic + q * strains);
+    }
     const form_derivative *g = m->by_geometry;
     if (g) sum += dot(g->stride, g->bar, g->direction + (size_t)q * g->stride);
     a->gradient[q] += sum;
@@ -488,6 +608,92 @@ void transpose_imposed(void *self, adjoint *a, const double *λ)
     for (int p = 0; p < a->parameters; ++p)
       a->gradient[p] += dot(m->size[g], m->bar[g], m->direction[g] + (size_t)p * m->size[g]);
     memset(m->bar[g], 0, m->size[g] * sizeof(double));
+  }
+}
+
+/* Derivatives by the motions before the step, from the forces of mass k; see add_moving_mass_derivative. */
+static void transpose_moving_mass(const moving_loads *of, adjoint *a, int k, const double *λ)
+{
+  const double *q1 = a->d->x;
+  double x = 0, y = 0; /* derivatives by the acceleration of the mass */
+  on_axis at;
+  if (!find_on_axis(of, k, q1, &at)) return;
+  for (int j = 0; j < of->nodes; ++j) {
+    x += of->mass[k] * at.shape[j] * λ[at.x[j]];
+    y += of->mass[k] * at.shape[j] * λ[at.y[j]];
+  }
+  const double along = x * at.c + y * at.s, across = y * at.c - x * at.s;
+  const double angle = at.acceleration * across - at.turn * along;
+  const double spin = 2 * at.speed * across, curvature = at.speed * at.speed * across;
+  for (int j = 0; j < of->nodes; ++j) {
+    const int psi = at.psi[j];
+    const double half = step_of(of, q1, psi, 1) / 2, grows = of->half_tangents ? 1 + half * half : 1;
+    a->q0[psi] += (1 - of->part) * (at.shape[j] * angle + at.slope[j] * curvature);
+    a->q0[psi] -= at.velocity[0] * grows * at.shape[j] * spin;
+    a->q0[at.x[j]] -= at.inertia[0] * at.shape[j] * x;
+    a->q0[at.y[j]] -= at.inertia[0] * at.shape[j] * y;
+    for (int i = 1; i < of->rates->number; ++i) {
+      if (at.velocity[i] != 0) a->rates[i][psi] += at.velocity[i] * at.shape[j] * spin;
+      if (at.inertia[i] == 0) continue;
+      a->rates[i][at.x[j]] += at.inertia[i] * at.shape[j] * x;
+      a->rates[i][at.y[j]] += at.inertia[i] * at.shape[j] * y;
+    }
+  }
+}
+
+void transpose_moving_loads(void *self, adjoint *a, const double *λ)
+{
+  const moving_derivatives *m = self;
+  const moving_loads *of = m->loads;
+  const int all = 2 * of->nodes * of->cells;
+  begin_moving_loads((void *)of, a->step, 0, 0);
+  differentiate_moving_loads(self, a->step, 0);
+  for (int p = 0; p < a->parameters; ++p) {
+    for (int i = 0; i < all; ++i) a->gradient[p] -= m->now[(size_t)p * all + i] * λ[of->dof[of->at[i]]];
+    if (!of->rates) continue;
+    memset(a->values, 0, a->size * sizeof *a->values);
+    for (int k = 0; k < of->loads; ++k) add_moving_mass_derivative(m, a->d->x, 0, p, k, a->values);
+    a->gradient[p] += dot(a->size, a->values, λ);
+  }
+  for (int k = 0; of->rates && k < of->loads; ++k) transpose_moving_mass(of, a, k, λ);
+}
+
+/* The differences between scenes follow, see transpose_differences. */
+void transpose_guides(void *self, adjoint *a, const double *λ)
+{
+  const guide_derivatives *m = self;
+  guides *g = m->guides;
+  find_tangents_before(self, a->step, 0);
+  if (!g->over_step || !find_frames(g, a->d->x)) return;
+  for (int k = 0; k < g->number; ++k) {
+    const int32_t *dofs = g->dofs + 7 * k;
+    double by_way[2];
+    find_turn_of_chord(m, a->d->x, k, by_way);
+    const double way = by_way[0] * λ[dofs[1]] + by_way[1] * λ[dofs[3]];
+    for (int i = 0; i < 2; ++i) a->q0[dofs[1 + 2 * i]] += m->tangent[2 * k + i] * way;
+  }
+}
+
+/* The matrix and the tangents of the step, which the product with rates and the differences between scenes
+ * also use; these follow. */
+void transpose_damping(void *self, adjoint *a, const double *λ)
+{
+  const damping_derivatives *m = self;
+  double *x = a->values;
+  begin_tangent_damping((void *)m->damping, a->step, 0, 0);
+  tabulate_damping(self, a->step, 0);
+  for (int i = 0; i < a->size; ++i) x[i] = m->damping->factor * λ[i];
+  transpose_tables(m->by_q0, 0, x, 0, a->q0);
+  form_derivative *f = m->by_tangents;
+  if (!f) return;
+  tabulate_derivative(f, a->step, m->damping->damping->product->rate);
+  memset(f->bar, 0, (size_t)f->table->number * f->columns * sizeof *x);
+  transpose_tables(f, 0, x, f->bar, 0);
+  for (int g = 0; g < m->damping->groups; ++g) {
+    const committed_cells *group = m->damping->group + g;
+    for (int c = 0; c < group->number; ++c)
+      for (int i = 0; i < group->numbers; ++i)
+        m->tangents_bar[g][c * group->numbers + i] += f->bar[group->cell[c] * f->columns + i];
   }
 }
 

@@ -770,20 +770,23 @@ static void find_bends(const moving_loads *m, double s, double *bend)
   }
 }
 
-/* Derivative of rate_at at constant unknowns. `grows` is the derivative of the step by its end. */
+/* Derivative of rate_at at constant unknowns. `grows` is the derivative of the step by its end. Without d,
+ * the motions before the step are constant. */
 static double change_of_rate(const derivatives *d, const rates *r, const double *row, int p, int dof, double grows)
 {
+  if (!d) return 0;
   double sum = -row[0] * grows * d->q0[(size_t)p * d->size + dof];
   for (int j = 1; j < r->number; ++j)
     if (row[j] != 0) sum += row[j] * d->rates[j][(size_t)p * d->size + dof];
   return sum;
 }
 
-/* Derivative of the forces of mass k, see subtract_moving_loads and find_on_axis. */
-static void add_moving_mass_derivative(const moving_derivatives *m, const derivatives *d, int p, int k, double *r)
+/* Derivative of the forces of mass k at q1, see subtract_moving_loads and find_on_axis. Without d, the
+ * motions before the step are constant. */
+static void add_moving_mass_derivative(const moving_derivatives *m, const double *q1, const derivatives *d, int p,
+                                       int k, double *r)
 {
   const moving_loads *of = m->loads;
-  const double *q1 = d->x, *q0 = d->q0 + (size_t)p * d->size;
   const double *motion = m->motion + 3 * ((size_t)p * of->loads + k), ds = motion[0];
   on_axis a;
   if (!find_on_axis(of, k, q1, &a)) return;
@@ -797,7 +800,8 @@ static void add_moving_mass_derivative(const moving_derivatives *m, const deriva
   find_bends(of, s, bend);
   for (int j = 0; j < n; ++j) {
     const int dof = a.psi[j];
-    const double psi = of->q0[dof] + of->part * (q1[dof] - of->q0[dof]), change = (1 - of->part) * q0[dof];
+    const double psi = of->q0[dof] + of->part * (q1[dof] - of->q0[dof]);
+    const double change = d ? (1 - of->part) * d->q0[(size_t)p * d->size + dof] : 0;
     const double half = step_of(of, q1, dof, 1) / 2, grows = of->half_tangents ? 1 + half * half : 1;
     const double slope = a.slope[j] * length * ds; /* derivative of the shape function */
     angle += slope * psi + a.shape[j] * change;
@@ -829,7 +833,7 @@ void add_moving_loads_derivative(void *self, const derivatives *d, int p, double
   const moving_loads *of = m->loads;
   const int all = 2 * of->nodes * of->cells;
   for (int i = 0; i < all; ++i) r[of->dof[of->at[i]]] -= m->now[(size_t)p * all + i];
-  for (int k = 0; of->rates && k < of->loads; ++k) add_moving_mass_derivative(m, d, p, k, r);
+  for (int k = 0; of->rates && k < of->loads; ++k) add_moving_mass_derivative(m, d->x, d, p, k, r);
 }
 
 void accept_moving_loads_derivative(void *self, const derivatives *d, int p)
@@ -841,18 +845,44 @@ void accept_moving_loads_derivative(void *self, const derivatives *d, int p)
 
 /* -- guides ---------------------------------------------------------------------------------------------- */
 
-/* Unit tangents of the curves at the points before the step. */
+/* Unit tangents of the curves at the points before the step. Guides in neighbouring scenes begin the step at
+ * the points of their curves nearest to the configuration before it. */
 void find_tangents_before(void *self, const time_step *step, const double *q1)
 {
   const guide_derivatives *m = self;
+  const guides *g = m->guides;
   curve_around c;
-  for (int k = 0; k < m->guides->number; ++k) {
-    expand_curve(m->guides, k, m->guides->s0[k], &c);
+  for (int k = 0; k < g->number; ++k) {
+    expand_curve(g, k, g->s0[k], &c);
     for (int i = 0; i < 2; ++i) m->tangent[2 * k + i] = c.a[1][i] / hypot(c.a[1][0], c.a[1][1]);
+  }
+  for (int i = 0; i < m->neighbours; ++i) {
+    guides *one = m->neighbour[i];
+    memcpy(one->s0, g->s0, g->number * sizeof *g->s0);
+    memcpy(one->step, g->step, g->number * sizeof *g->step);
+    begin_guides(one, step, 0, 0);
+    accept_guides(one, step, step->q0, 0);
   }
 }
 
-/* The direction of a chord depends on the point before the step, see find_frame. */
+/* Derivatives of the force of guide k, in x and y, by the point before the step along the curve: the
+ * direction of a chord depends on that point, see find_frame. */
+static void find_turn_of_chord(const guide_derivatives *m, const double *q1, int k, double *by_way)
+{
+  const guides *g = m->guides;
+  const guide_frame *f = g->frame + k;
+  const double *t0 = m->tangent + 2 * k, t[2] = {f->n[1], -f->n[0]}, direction[2] = {f->m[1], -f->m[0]};
+  const double force = q1[g->dofs[7 * k + 6]];
+  const double chord[2] = {f->on[0] - g->on0[2 * k], f->on[1] - g->on0[2 * k + 1]};
+  const double length = hypot(chord[0], chord[1]);
+  double change[2];
+  if (length > g->shortest[k]) {
+    const double along = product_of(direction, t0);
+    for (int i = 0; i < 2; ++i) change[i] = (direction[i] * along - t0[i]) / copysign(length, product_of(chord, t));
+  } else change[0] = product_of(f->dm[1], t), change[1] = -product_of(f->dm[0], t);
+  by_way[0] = -force * change[1], by_way[1] = force * change[0];
+}
+
 void add_guides_derivative(void *self, const derivatives *d, int p, double *r)
 {
   const guide_derivatives *m = self;
@@ -860,18 +890,10 @@ void add_guides_derivative(void *self, const derivatives *d, int p, double *r)
   const double *q0 = d->q0 + (size_t)p * d->size;
   for (int k = 0; k < g->number && g->over_step; ++k) {
     const int32_t *dofs = g->dofs + 7 * k;
-    const guide_frame *f = g->frame + k;
-    const double *t0 = m->tangent + 2 * k, t[2] = {f->n[1], -f->n[0]}, direction[2] = {f->m[1], -f->m[0]};
-    const double way = t0[0] * q0[dofs[1]] + t0[1] * q0[dofs[3]], force = d->x[dofs[6]];
-    const double chord[2] = {f->on[0] - g->on0[2 * k], f->on[1] - g->on0[2 * k + 1]};
-    const double length = hypot(chord[0], chord[1]);
-    double change[2];
-    if (length > g->shortest[k]) {
-      const double along = product_of(direction, t0);
-      for (int i = 0; i < 2; ++i) change[i] = (direction[i] * along - t0[i]) / copysign(length, product_of(chord, t));
-    } else change[0] = product_of(f->dm[1], t), change[1] = -product_of(f->dm[0], t);
-    r[dofs[1]] -= force * change[1] * way;
-    r[dofs[3]] += force * change[0] * way;
+    const double *t0 = m->tangent + 2 * k, way = t0[0] * q0[dofs[1]] + t0[1] * q0[dofs[3]];
+    double by_way[2];
+    find_turn_of_chord(m, d->x, k, by_way);
+    r[dofs[1]] += by_way[0] * way, r[dofs[3]] += by_way[1] * way;
   }
 }
 

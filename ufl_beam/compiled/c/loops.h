@@ -16,9 +16,9 @@ part add_calls, add_cells, add_static_tangent, subtract_vector, subtract_followe
 
 /* -- forms and constant matrices --------------------------------------------------------------- */
 
-/* Entries of the vector or matrix of a cell, at most: 12 unknowns of degree 3 need 144; the 9 unknowns of
- * a bushing, differentiated by its geometry, need 216. */
-enum { MOST_ENTRIES = 216 };
+/* Entries of the vector or matrix of a cell, at most: the forces of 12 unknowns of
+ * degree 3, differentiated by the tangents at 3 points, need 324. */
+enum { MOST_ENTRIES = 324 };
 enum { SOME = 128 };         /* cells of a block whose data stay in the processor's cache between loops */
 
 /* A compiled form on some cells. w holds the packed coefficients of a cell without its unknowns,
@@ -1219,6 +1219,7 @@ typedef struct {
   const double *elastic, *step;
   double *r, *e1, *row;           /* of one parameter: of resultants and strains; of the rows of springs */
   double *w_bar, *e0_bar, *r_bar, *row_bar, *B_bar, *weight_bar, *rest_bar; /* of the adjoint; or none */
+  double *tangents_bar, *elastic_bar;
 } point_derivatives;
 
 /* Derivatives of the laws of connectors. Compiled laws have a table: columns are inputs of the law, rows
@@ -1289,9 +1290,12 @@ typedef struct {
   double *now, *end, *before; /* of the forces on cells */
 } moving_derivatives;
 
-/* Guides and the unit tangents of their curves at the points before the step. */
+/* Guides, the same in neighbouring scenes, and the unit tangents of their curves at the points before the
+ * step. */
 typedef struct {
-  const guides *guides;
+  guides *guides;
+  int neighbours;
+  guides *const *neighbour;
   double *tangent;
 } guide_derivatives;
 
@@ -1303,6 +1307,8 @@ typedef struct {
   const cells *force;            /* the form of the forces, for derivatives of the tangents */
   int at_q0, at_tangents;        /* positions in its coefficients */
   const double *const *tangents; /* of each group: derivatives, with a row for each parameter */
+  form_derivative *by_tangents;  /* of the adjoint; or none */
+  double *const *tangents_bar;
   double *r;
 } damping_derivatives;
 
@@ -1365,6 +1371,9 @@ void transpose_differences(void *self, adjoint *a, const double *lambda);
 void transpose_followers(void *self, adjoint *a, const double *lambda);
 void transpose_pressures(void *self, adjoint *a, const double *lambda);
 void transpose_frame(void *self, adjoint *a, const double *lambda);
+void transpose_moving_loads(void *self, adjoint *a, const double *lambda);
+void transpose_guides(void *self, adjoint *a, const double *lambda);
+void transpose_damping(void *self, adjoint *a, const double *lambda);
 void finish_form(void *self, adjoint *a);
 void finish_points(void *self, adjoint *a);
 int differentiate_step(derivatives *d, time_loop *m, int initial);

@@ -265,11 +265,12 @@ double missed_by_points(void *self, const double *q, const double *r, double sca
   return largest > 0 ? largest / scale : 0;
 }
 
-/* Remove the negative eigenvalues from the symmetric part of D, relative to the stiffnesses C, by
- * Jacobi's method. */
-static void remove_negative(const double *C, double *D)
+/* Replace D by its symmetric part, and compute its eigenvalues A[k][k] and eigenvectors V[.][k],
+ * relative to the stiffnesses C, by Jacobi's method. */
+static void find_eigenvalues(const double *C, double *D, double A[3][3], double V[3][3])
 {
-  double A[3][3], V[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) V[i][j] = i == j;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j <= i; ++j) {
       D[3 * i + j] = D[3 * j + i] = (D[3 * i + j] + D[3 * j + i]) / 2;
@@ -293,6 +294,13 @@ static void remove_negative(const double *C, double *D)
         }
         A[i][j] = A[j][i] = 0;
       }
+}
+
+/* Remove the negative eigenvalues from the symmetric part of D. */
+static void remove_negative(const double *C, double *D)
+{
+  double A[3][3], V[3][3];
+  find_eigenvalues(C, D, A, V);
   for (int k = 0; k < 3; ++k)
     for (int i = 0; A[k][k] < 0 && i < 3; ++i)
       for (int j = 0; j < 3; ++j) D[3 * i + j] -= A[k][k] * V[i][k] * V[j][k] * sqrt(C[i] * C[j]);
