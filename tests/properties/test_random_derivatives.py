@@ -8,8 +8,10 @@ their changes: in stiff scenes round-off over a change of 1e-4 leaves 1e-6.
 
 import re
 
+import numpy as np
 import pytest
 from derivative_cases import case, outcome
+from run_differences import TIGHT
 
 import ufl_beam as ub
 
@@ -46,6 +48,23 @@ def test_reasons_of_refusals(seed, reason):
     found = outcome(case(seed))
     assert found.kind == "refused"
     assert re.match(REASONS[reason], found.words, re.DOTALL), found
+
+
+@pytest.mark.parametrize("seed", [4, 5, 6, 12, 18, 47, 49, 52, 70, 72])
+def test_adjoint_is_the_direct_derivative(seed):
+    """Of a random sum of motions at all times, which differences of `of` know to about 1e-9."""
+    one, random = case(seed), np.random.default_rng(seed)
+    run = {"newton": TIGHT, **one.run}
+    direct = ub.differentiate(one.model, {"x": 1.0}, progress=False, **run).of(lambda s: s.q)[
+        ..., 0
+    ]
+    times = random.normal(size=len(direct))
+    dofs = random.choice(direct.shape[1], 3, replace=False)
+    found = ub.gradient(
+        one.model, {"x": 1.0}, of=lambda s: s.q[:, dofs].sum(axis=1), reduce=times.dot, **run
+    )
+    parts = times[:, None] * direct[:, dofs]
+    np.testing.assert_allclose(found, parts.sum(), rtol=0, atol=1e-8 * np.abs(parts).sum())
 
 
 def test_a_mistake_is_found(monkeypatch):
