@@ -212,8 +212,8 @@ def kernel(degree=1, cells=2, coordinates=None):
 
 
 def test_cells_with_more_entries_than_there_is_room_for():
-    with pytest.raises(ValueError, match=r"16 x 16 .* has 256 entries; loops.h allows 216"):
-        kernel(degree=15)
+    with pytest.raises(ValueError, match=r"19 x 19 .* has 361 entries; loops.h allows 324"):
+        kernel(degree=18)
 
 
 def test_arrays_of_other_sizes_are_refused(monkeypatch):

@@ -319,7 +319,7 @@ def test_strains_and_masses_that_begin_at_zero_are_refused():
     ],
 )
 def test_adjoint_is_the_same_sum(model, scheme):
-    """Round-off of sums of some hundred terms; `of` has the differences of a linear function."""
+    """They are the same sums in another order; 1e-9 is round-off of differences in `of`."""
     if model in (viscous, works, *ONLY_DYNAMIC) and scheme == ub.Static():
         pytest.skip("forces by velocities")
     at = dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
@@ -327,7 +327,7 @@ def test_adjoint_is_the_same_sum(model, scheme):
     run = ub.differentiate(model, at, scheme, **options, progress=False)
     direct = run.of(lambda run: run.q[-1, 4])
     found = ub.gradient(model, at, scheme, **options, of=lambda run: run.q[:, 4])
-    np.testing.assert_allclose(found, direct, rtol=1e-9, atol=1e-10 * np.abs(direct).max())
+    np.testing.assert_allclose(found, direct, rtol=1e-8, atol=1e-10 * np.abs(direct).max())
 
 
 @pytest.mark.serial

@@ -226,7 +226,7 @@ static void transpose_sum_of_tangents(const point_derivatives *m, int c, double 
 static void transpose_tangent(const point_derivatives *m, int parameters, int c, int i, const double *sum_bar,
                               double *x_bar)
 {
-  static const double at[4] = {-2, -1, 1, 2}, part[4] = {1. / 12, -8. / 12, 8. / 12, -1. / 12};
+  static const double at[4] = {-2, -1, 1, 2}, factor[4] = {1. / 12, -8. / 12, 8. / 12, -1. / 12};
   const points *p = m->points;
   const int d = p->components, width = p->width;
   const size_t first = ((size_t)c * p->of_cell + i) * width;
@@ -250,7 +250,7 @@ static void transpose_tangent(const point_derivatives *m, int parameters, int c,
       memcpy(p->inputs, w, width * sizeof *w);
       p->inputs[j] += at[k] * h;
       const double weight = answer_at_end(p, p->inputs, s) * p->weight[i];
-      x_bar[j] += part[k] / h * weight * dot(d * d, s + d, bar);
+      x_bar[j] += factor[k] / h * weight * dot(d * d, s + d, bar);
     }
   }
 }
