@@ -301,8 +301,8 @@ def _five_point(function: Callable[[float], Array], change: float, size: float) 
     found = []
     for scale in (change, size):
         h = RELATIVE_STEP * scale
-        far, near = (function(k * h) - function(-k * h) for k in (2, 1))
-        found.append((8.0 * near - far) / (12.0 * h))
+        far, close = (function(k * h) - function(-k * h) for k in (2, 1))
+        found.append((8.0 * close - far) / (12.0 * h))
     small, large = found
     return np.where(np.abs(large - small) <= ALIKE * np.abs(small), large, small)
 
@@ -537,14 +537,14 @@ class UserLaws(Response):
             motions = self._e0.tolist(), self._e1.tolist()
             for i, (law, e0, e1) in enumerate(zip(self._each, *motions, strict=True)):
                 J[i] = law.table(e1)
-                here, (t, dt) = law.outputs(e1), (law.known[name] for name in ("t", "dt"))
+                outputs, (t, dt) = law.outputs(e1), (law.known[name] for name in ("t", "dt"))
                 for p, others in enumerate(neighbours.terms):
                     by_parameter[p, i] = 0.0
                     for other, weight in zip(others, neighbours.weights[p], strict=True):
                         mine = other.response._each[i]
                         mine.state[:] = law.state
                         mine.begin(e0, t, dt)
-                        by_parameter[p, i] += weight * (mine.outputs(e1) - here)
+                        by_parameter[p, i] += weight * (mine.outputs(e1) - outputs)
 
         return self._derivatives_in_c(
             neighbours, term, motions, row, J=J, rows=1 + variables, columns=len(columns),

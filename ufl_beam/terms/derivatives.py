@@ -347,8 +347,8 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         batches = -(-cells.number // cells.batch_size)
         return cells.each, 8 * batches * cells.rows * cells.batch_size
 
-    def rates(of: Any) -> list[tuple[Any, int]]:
-        return [(ffi.addressof(of, "rate", j), 8 * of.size) for j in range(1, of.number)]
+    def rates(c: Any) -> list[tuple[Any, int]]:
+        return [(ffi.addressof(c, "rate", j), 8 * c.size) for j in range(1, c.number)]
 
     if kind == "form":
         return [table(data)]
@@ -366,10 +366,10 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
     if kind == "moving_loads":
         return rates(data.loads.rates) if data.loads.rates else []
     if kind == "damping":
-        of = data.damping
-        groups = [of.group[g] for g in range(of.groups)]
+        damping = data.damping
+        groups = [damping.group[g] for g in range(damping.groups)]
         tangents = [(x.tangents, 8 * x.number * x.numbers) for x in groups]
-        return [*rates(of.damping.rates), *tangents]
+        return [*rates(damping.damping.rates), *tangents]
     if kind == "guides":
         g = data.guides
         found = [(x, ffi.sizeof(ffi.typeof(x).item)) for x in (g.s0, g.s, g.step, g.frame)]

@@ -427,8 +427,8 @@ class TangentRayleighForces(Term):
         bars = [doubles(beams.points.tangents_bar) for beams in self._inelastic]
         by_tangents: Any = ffi.NULL
         if own.groups:  # of the adjoint only
-            one = {"direction": ffi.NULL, "stride": 0}
-            by_tangents = form_derivative(form, self._kernels[1], kernel, self._tangents, **one)
+            columns = {"direction": ffi.NULL, "stride": 0}
+            by_tangents = form_derivative(form, self._kernels[1], kernel, self._tangents, **columns)
         c = struct(
             "damping_derivatives", damping=own, by_q0=by_q0, force=force.cells,
             at_q0=force.position(element.q0), at_tangents=force.position(self._tangents),
