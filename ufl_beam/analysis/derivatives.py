@@ -239,9 +239,9 @@ class Case:
         """Simulate until ``t1`` (s) and differentiate each step, see :func:`differentiate`."""
         begin = time.perf_counter()
         run = self.simulation({})
-        neighbours, positions, weights = self.neighbours(run)
+        neighbours, weights = self.neighbours(run)
         states = step_count(t1 - run.t, dt) + 1
-        steps = StepDerivatives(run, neighbours, positions, weights, states)
+        steps = StepDerivatives(run, neighbours, weights, states)
         fill(run.time_loop, derivatives=steps.c)
         if start is not None:
             run.save_or_restore(Archive(run.subdomain, start.end[0]))
@@ -257,12 +257,11 @@ class Case:
         run.save_or_restore(archive)
         return Derivatives(self, run.solution, steps, archive.state(), start)
 
-    def neighbours(self, run: Simulation) -> tuple[list[list[Simulation]], Array, Array]:
+    def neighbours(self, run: Simulation) -> tuple[list[list[Simulation]], Array]:
         """Return simulations at neighbouring values for differences of numbers of the scene.
 
         Returns:
-            For each parameter, the simulations; changes of the parameter, (P, n); and weights in
-            the derivative, (P, n).
+            For each parameter, the simulations; and their weights in the derivative, (P, n).
         """
         names = [*self.at]
         neighbours = [[*self.simulations(name, MODEL_STEP)] for name in names]
@@ -273,11 +272,7 @@ class Case:
                     "that the run has no derivative; keep beams, cells and attached points on the "
                     "same vertices"
                 )
-        positions, weights = (
-            np.array([f(name, MODEL_STEP) for name in names])
-            for f in (self.positions, self.weights)
-        )
-        return neighbours, positions, weights
+        return neighbours, np.array([self.weights(name, MODEL_STEP) for name in names])
 
 
 def _alike(run: Simulation, other: Simulation) -> bool:
@@ -297,7 +292,6 @@ class StepDerivatives:
     Args:
         simulation: Simulation in its initial state.
         neighbours: For each parameter, simulations in scenes with neighbouring values of it.
-        positions: Changes of the parameters in the neighbouring scenes; (P, n).
         weights: Weights of the neighbours in differences; (P, n).
         states: Number of states of the run.
 
@@ -311,18 +305,18 @@ class StepDerivatives:
     """
 
     def __init__(
-        self, simulation: Simulation, neighbours: list[list[Simulation]], positions: Array,
-        weights: Array, states: int,
+        self, simulation: Simulation, neighbours: list[list[Simulation]], weights: Array,
+        states: int,
     ) -> None:  # fmt: skip
         P, size = len(neighbours), simulation.subdomain.size
         equation, A = simulation.equation, simulation.equation.A
-        scene = Neighbours(simulation, neighbours, positions, weights, size)
+        scene = Neighbours(simulation, neighbours, weights, size)
         self.terms, self.states = list[Any](), list[Array]()
         self._alive = list[Any]([neighbours])  # data of C
         self.owners = list[Any]()  # terms, by their index in C
         for i, term in enumerate(equation.terms):
             others = [[x.equation.terms[i] for x in some] for some in neighbours]
-            own = Neighbours(term, others, positions, weights, size)
+            own = Neighbours(term, others, weights, size)
             if (found := term.derivatives(own)) is None:
                 raise ArgumentError(f"differentiate: {term.effect} has no derivatives")
             # Beams use imposed strains, which follow in equation.terms: with the terms in reverse

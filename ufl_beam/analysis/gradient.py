@@ -107,8 +107,8 @@ def gradient(
     if not has_inertia(scheme) and scheme.load_weight != 1.0:
         raise ArgumentError(f"gradient: scheme = {scheme} has no adjoint; use Static()")
     with closing(case.simulation({})) as run:
-        neighbours, positions, weights = case.neighbours(run)
-        steps = StepDerivatives(run, neighbours, positions, weights, 1)
+        neighbours, weights = case.neighbours(run)
+        steps = StepDerivatives(run, neighbours, weights, 1)
         number = step_count(t1 - t0, dt)
         ends = t0 + (t1 - t0) * np.arange(1, number + 1) / number
         ends[-1] = t1

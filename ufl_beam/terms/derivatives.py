@@ -40,7 +40,6 @@ class Neighbours:
     Attributes:
         term: The term in the scene itself.
         terms: The same term in the neighbouring scenes; for each parameter a list.
-        positions: Changes of the parameters in the neighbouring scenes; (parameters, n).
         weights: Weights of the neighbours in the derivative by a parameter, (parameters, n).  The
             weight of the scene itself makes their sum zero.
         size: Number of degrees of freedom.
@@ -50,10 +49,9 @@ class Neighbours:
     """
 
     def __init__(
-        self, term: Any, terms: Sequence[Sequence[Any]], positions: Array, weights: Array, size: int
+        self, term: Any, terms: Sequence[Sequence[Any]], weights: Array, size: int
     ) -> None:
-        self.term, self.terms, self.size = term, terms, size
-        self.positions, self.weights = positions, weights
+        self.term, self.terms, self.weights, self.size = term, terms, weights, size
         self.alive, self.states = list[Any](), list[Array]()
         self.enters = np.zeros(len(terms), dtype=bool)
 
