@@ -351,8 +351,11 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
     if kind == "form":
         return [table(data)]
     if kind == "shape":
-        form = data.form
-        return [(form.w, 8 * -(-form.number // form.batch_size) * form.batch_size * form.width)]
+        form, batches = data.form, -(-data.form.number // data.form.batch_size)
+        stored = form.coefficients - form.unknowns
+        if not stored:
+            return []
+        return [(form.w, 8 * form.batch_size * ((batches - 1) * form.width + stored))]
     if kind == "second_differences":
         shape = recorded("shape", data.shape) if data.shape else []
         ratio = (ffi.addressof(data, "ratio"), 8)
