@@ -525,7 +525,7 @@ class Derivatives:
     def _runs(self) -> list[list[Solution]]:
         """Return whole solutions at neighbouring values of each parameter."""
         if not self._repeated:
-            if order_of(self.solution.scheme) > 2:
+            if order_of(self.solution.scheme) > 2:  # type: ignore[arg-type]
                 raise ArgumentError(
                     "of: this quantity needs section forces, material or energies between the "
                     f"stages of {self.solution.scheme}; use order=2"
