@@ -26,7 +26,6 @@ REASONS = (
     r"differentiate: x near 1: .* joint ends lie .* apart",  # one of two vertices moves
     r"differentiate: the run does not depend on x",  # inertia in statics
     r"differentiate: dt = Adaptive",
-    r"differentiate: EnergyMomentum\(.*order=4\)",
 )
 
 

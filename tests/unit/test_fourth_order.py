@@ -242,6 +242,19 @@ def test_a_stage_that_fails_repeats_the_whole_step_in_halves():
     assert simulation.t % (50 / 4096) == pytest.approx(0, abs=1e-12)  # it is no end of a stage
 
 
+def test_a_stage_that_fails_has_no_derivative():
+    """The derivatives of earlier stages of the step are not taken back."""
+
+    def swing(EI):
+        section = ub.Section(EA=1e4, GA=4e3, EI=EI, rhoA=1.0, rhoI=0.01)
+        beam = ub.Beam((0, 0), (2, 0), section, cells=4)
+        return ub.Scene([beam], supports=[ub.Pinned(beam.start)], loads=[ub.Gravity()])
+
+    run = {"scheme": FOURTH, "t": (0, 2.0), "dt": 0.5, "newton": ub.Newton(max_iterations=4)}
+    with raises("the step to t = 0.5 s has no derivative: a stage has", kind=ub.ModelError):
+        ub.differentiate(swing, {"EI": 100.0}, **run, progress=False)
+
+
 def test_a_run_that_ends_in_a_stage_ends_in_the_last_whole_step():
     def late(t):
         if t > 0.33:

@@ -273,6 +273,7 @@ CASES = {
     "decaying": (flying, {}, ub.EnergyMomentumDecaying(), 2.0, 0.05),
     "Newmark": (flying, {}, ub.Newmark(0.6, 0.31), 2.0, 0.05),
     "generalized alpha": (machine, {}, ub.GeneralizedAlpha(0.8), 0.6, 0.01),
+    "order 4": (flying, {}, ub.EnergyMomentum(order=4), 2.0, 0.1),
     "yielding": (yielding, {}, ub.EnergyMomentum(0.02), 0.4, 0.004),
     "fibres": (fibres, {}, ub.EnergyMomentum(0.02), 0.4, 0.004),
     "softening": (softening, {}, ub.EnergyMomentum(0.02), 0.2, 0.002),

@@ -129,6 +129,7 @@ FAMILIES = {
     "flying beam, generalized alpha": (
         flying, ub.GeneralizedAlpha(0.8), {"t": (0, 2), "dt": 0.02}
     ),
+    "flying beam, order 4": (flying, ub.EnergyMomentum(order=4), {"t": (0, 2), "dt": 0.1}),
     "yielding": (yielding, DAMPED, STEPS),
     "yielding, degree 2": (yielding, DAMPED, {**STEPS, "dt": 0.005, "mesh": ub.Mesh(degree=2)}),
     "Perzyna": (viscous, DAMPED, STEPS),

@@ -152,11 +152,6 @@ def checked_case(
         )
     require_number(dt, f"{call}: dt", positive=True)
     require_scheme(scheme, f"{call}: scheme")
-    if order_of(scheme) > 2:
-        raise ArgumentError(
-            f"{call}: {scheme} has stages, which are not differentiated; use order=2, with a "
-            "smaller dt"
-        )
     if newton is not None:
         require_kind(newton, Newton, f"{call}: newton")
     require_plain(newton, call)
@@ -468,7 +463,7 @@ class Derivatives:
                 ``lambda s: s.displacement(s.scene.beams[0].end)``.
 
         Returns:
-            Derivatives; (*shape of the quantity, P), in the order of :attr:`at`.
+            Derivatives; (..., P) for a quantity of shape (...), in the order of :attr:`at`.
 
         Raises:
             ArgumentError: The quantity fails, or it needs material or energies of a run with
@@ -530,6 +525,11 @@ class Derivatives:
     def _runs(self) -> list[list[Solution]]:
         """Return whole solutions at neighbouring values of each parameter."""
         if not self._repeated:
+            if order_of(self.solution.scheme) > 2:  # type: ignore[arg-type]
+                raise ArgumentError(
+                    "of: this quantity needs section forces, material or energies between the "
+                    f"stages of {self.solution.scheme}; use order=2"
+                )
             before = 0 if self._start is None else self._start.solution.substeps
             if self.solution.substeps - before != len(self.solution) - 1:
                 raise ArgumentError(

@@ -21,7 +21,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ArgumentError, StepFailed, require_function, require_number
-from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
+from ufl_beam.mechanics.time_scheme import Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import Mesh
 from ufl_beam.simulation.run import require_times
 from ufl_beam.simulation.simulation import Simulation
@@ -136,7 +136,8 @@ class _Adjoint:
         pointers = [self._pointer(x) for x, _ in blocks]
         lengths = np.array([n for _, n in blocks], dtype=np.int64)
         step = sum(map(ffi.sizeof, ("int", "time_step", "scheme_numbers"))) + int(lengths.sum())
-        self.most = max(1, int(max_bytes // step))
+        self._stages = len(stages_of(simulation.scheme))
+        self.most = max(1, int(max_bytes // (step * self._stages)))
         rows = np.repeat(np.arange(size), np.diff(A.indptr)).astype(np.int32)
         # `values` is space for the degrees of freedom, the values of forms, and the data of a point
         space = max([size, 1024, *(n // 8 for _, n in blocks)])
@@ -184,7 +185,8 @@ class _Adjoint:
     def reverse(self, ends: Array, starts: list[Any], q: Array, v: Array) -> Array:
         """Return the derivatives by the parameters, from those by the states; (n+1, size) each."""
         simulation, c = self._simulation, self.c
-        number = min(self.most, len(ends)) + 1  # with a step for initial accelerations
+        # With a step for initial accelerations
+        number = min(self.most, len(ends)) * self._stages + 1
         fill(c, most=number, record=ffi.new("char[]", number * int(c.bytes)))
         for segment in reversed(range(len(starts))):
             first = segment * self.most
@@ -197,8 +199,9 @@ class _Adjoint:
                 self._q1 += q[n]
                 self._rates[1] += v[n]
                 with simulation.equation.callbacks.raising():
-                    if not lib.go_back(c, simulation.time_loop):
-                        raise StepFailed(f"the tangent is singular at t = {ends[n - 1]:g} s")
+                    for _ in range(self._stages):
+                        if not lib.go_back(c, simulation.time_loop):
+                            raise StepFailed(f"the tangent is singular at t = {ends[n - 1]:g} s")
         self._q1 += q[0]
         self._rates[1] += v[0]
         if c.recorded:  # the step from which the initial accelerations were taken

@@ -415,8 +415,9 @@ class Stepper(StateView):
                 "reduce dt"
             )
         if failure == lib.NO_DERIVATIVE:
-            at = f"{c.step.t1:.9g} s"
-            raise ModelError(f"the tangent at t = {at} is singular: the step has no derivative")
+            at = f"{c.failed_end:.9g} s"
+            reason = "a stage has failed" if c.stages > 1 else "the tangent is singular"
+            raise ModelError(f"the step to t = {at} has no derivative: {reason}; use a smaller dt")
         if failure == lib.APPLIED_TOO_FAST:
             raise StepFailed("a node turns too far while the loads at the beginning are applied")
         if failure == lib.GIVES_ENERGY:

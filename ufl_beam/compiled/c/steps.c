@@ -365,6 +365,14 @@ void take_back(time_loop *m)
   e->raised = raised, e->error = error, m->failure = failure;
 }
 
+/* Differentiate the solved step or stage before it is accepted, if that is asked for; see
+ * differentiate_step on an `initial` one. */
+static int differentiate_or_record(time_loop *m, int initial)
+{
+  if (m->derivatives && !differentiate_step(m->derivatives, m, initial)) return fails(m, NO_DERIVATIVE);
+  return !m->adjoint || record_step(m->adjoint, m, initial) || fails(m, NO_DERIVATIVE);
+}
+
 /* Take all stages of the step to t1 but the last one, in which the state of the terms goes on. */
 static int take_stages(time_loop *m, double t1)
 {
@@ -372,7 +380,7 @@ static int take_stages(time_loop *m, double t1)
   if (!m->prediction->known) enter_stage(m->prediction, m->t, m->q);
   while (m->taken + 1 < m->stages) {
     double *begun = m->begun + (size_t)m->taken * m->size;
-    if (!solve_to(m, begin + m->stage[m->taken] * (t1 - begin), t1)) return 0;
+    if (!solve_to(m, begin + m->stage[m->taken] * (t1 - begin), t1) || !differentiate_or_record(m, 0)) return 0;
     memcpy(begun, m->q, m->size * sizeof *begun);
     turn_axes(m->equation->turned, m->equation->axes, begun, 1);
     m->stage_begin[m->taken++] = m->t;
@@ -393,13 +401,13 @@ int attempt_step(time_loop *m, double t1, double end)
   m->equation->raised = NOTHING;
   take_back(m); /* an attempt that was not accepted */
   if (m->rates && m->prepare && !m->rates->ready) {
-    if (!solve_to(m, m->t + FIRST_TRIAL * (t1 - m->t), t1)) return 0;
-    if (m->derivatives && !differentiate_step(m->derivatives, m, 1)) return fails(m, NO_DERIVATIVE);
-    if (m->adjoint && !record_step(m->adjoint, m, 1)) return fails(m, NO_DERIVATIVE);
+    if (!solve_to(m, m->t + FIRST_TRIAL * (t1 - m->t), t1) || !differentiate_or_record(m, 1)) return 0;
     m->prepare(m->handle);
   }
   if (m->stages <= 1) return solve_to(m, t1, end);
   if (take_stages(m, t1) && solve_to(m, t1, end)) return 1;
+  /* Derivatives of stages are not taken back. */
+  if (m->taken && m->equation->raised == NOTHING && (m->derivatives || m->adjoint)) fails(m, NO_DERIVATIVE);
   take_back(m);
   return 0;
 }
@@ -450,18 +458,16 @@ int step_or_subdivide(time_loop *m, double end)
   for (int done = 0, some = MOST_SUBSTEPS; done < MOST_SUBSTEPS;) {
     if (m->path) m->path->rejected = rejected;
     const double t1 = done + some == MOST_SUBSTEPS ? end : begin + (end - begin) * (done + some) / MOST_SUBSTEPS;
+    m->failed_end = t1;
     const int solved = attempt_step(m, t1, end);
     if (m->path) rejected = m->path->rejected;
     if (solved) {
-      if (m->derivatives && !differentiate_step(m->derivatives, m, 0)) return fails(m, NO_DERIVATIVE);
-      if (m->adjoint && !record_step(m->adjoint, m, 0)) return fails(m, NO_DERIVATIVE);
-      if (!accept_step(m)) return 0;
+      if (!differentiate_or_record(m, 0) || !accept_step(m)) return 0;
       done += some;
       /* Double the substep at the times where a larger one would begin. */
       if (done % (2 * some) == 0 && some < MOST_SUBSTEPS) some *= 2;
     } else {
-      m->failed_end = t1;
-      if (some == 1 || m->equation->raised == OTHER || m->equation->error) return 0;
+      if (some == 1 || m->equation->raised == OTHER || m->equation->error || m->failure == NO_DERIVATIVE) return 0;
       some /= 2;
     }
   }
