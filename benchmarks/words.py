@@ -61,7 +61,9 @@ KEPT_NAMES = {
     "crack opening, of fracture mechanics": ("opening", "_crack_opening"),
     "of matrices and of the ledger": ("entries",),
     "public attributes and arguments": ("found", "held", "numbers"),
-    "constructors, as `from_` in other packages": ("of_fibres", "of_sectionproperties", "of_shape"),
+    "derivatives of a quantity; constructors, as `from_` in other packages": (
+        "of", "of_fibres", "of_sectionproperties", "of_shape",
+    ),
     "argument of `__eq__` in Python": ("other",),
 }  # fmt: skip
 """Names with such words that stay, by reason."""

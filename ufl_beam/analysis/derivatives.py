@@ -277,8 +277,8 @@ def _alike(run: Simulation, other: Simulation) -> bool:
     same = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
     terms = [[type(term) for term in x.equation.terms] for x in (run, other)]
     angles = [[support.angle for support in x.scene.supports] for x in (run, other)]
-    held = np.array_equal(run.supports.dofs, other.supports.dofs)
-    return same and terms[0] == terms[1] and angles[0] == angles[1] and held
+    constrained = np.array_equal(run.supports.dofs, other.supports.dofs)
+    return same and terms[0] == terms[1] and angles[0] == angles[1] and constrained
 
 
 class StepDerivatives:
@@ -294,7 +294,7 @@ class StepDerivatives:
         terms: Derivatives of all terms: kinds, and data of C.
         states: Derivatives of the present state of the run, as arrays that C changes.
         q, v: Derivatives of configurations and velocities by P parameters; (states, P, size).
-        held_dofs: Degrees of freedom that supports hold; (number,).
+        constrained_dofs: Degrees of freedom that supports hold; (number,).
         reactions: Derivatives of the forces of supports, in their axes; (states, P, number).
         c: ``derivatives`` of loops.h.
     """
@@ -323,17 +323,18 @@ class StepDerivatives:
             scene.enters |= own.enters
         self._neighbours = scene
         in_c = [(data, *functions(kind)) for kind, data in self.terms]
-        held = len(equation.supports.dofs)
+        constrained = len(equation.supports.dofs)
         self.q, self.v = np.zeros((2, states, P, size))
         self._change, self._time = np.full(P, np.inf), np.full(P, np.nan)
         self._term, self._place = np.zeros((2, P), dtype=np.int32)
-        self.held_dofs, self.reactions = equation.supports.dofs, np.zeros((states, P, held))
+        self.constrained_dofs = equation.supports.dofs
+        self.reactions = np.zeros((states, P, constrained))
         q0 = scene.differences(lambda x: x.q)
         motions = [x.time_loop.supports.motion for some in neighbours for x in some]
         c = self.c = struct(
             "derivatives", parameters=P, size=size, terms=len(in_c),
             term=ffi.new("term_derivative[]", in_c), q0=q0, q1=np.zeros((P, size)),
-            reactions=np.zeros((P, held)), neighbours=weights.shape[1], weight=weights,
+            reactions=np.zeros((P, constrained)), neighbours=weights.shape[1], weight=weights,
             motion=ffi.new("time_function *[]", motions), indices=A.indices,
             tangent=np.zeros(len(A.data)), r=np.zeros(size), v=np.zeros(size), s=np.zeros(size),
             space=np.zeros(size), range=self._change, range_time=self._time,
@@ -429,8 +430,8 @@ class Derivatives:
         self.solution, self.at, self._case = solution, case.at, case
         self.end, self._start = (state, steps.states), start
         self._q, self._v, self._reactions = steps.q, steps.v, steps.reactions
-        self._held_dofs, self.ranges = (
-            steps.held_dofs,
+        self._constrained_dofs, self.ranges = (
+            steps.constrained_dofs,
             dict(zip(case.at, steps.ranges(), strict=True)),
         )
         self._enters = steps.enters()
@@ -507,7 +508,7 @@ class Derivatives:
         reactions = solution.column("reactions")[:,]
         for k, support in enumerate(solution.scene.supports):
             dofs, components = solution.numbering.node(support.place), [*support.held]
-            at = np.searchsorted(self._held_dofs, dofs[components])
+            at = np.searchsorted(self._constrained_dofs, dofs[components])
             reactions[:, k, components] += change * self._reactions[:, p, at]
         return states | {"reactions": reactions}
 

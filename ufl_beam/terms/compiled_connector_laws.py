@@ -354,9 +354,11 @@ class UserLaw:
     def end(self, e1: float) -> tuple[float, Array]:
         """Return force and internal variables if the step ends at the motion ``e1``."""
         motion = (1.0 - self._weight) * self._e0 + self._weight * e1
-        return self._respond(motion, (e1 - self._e0) / self._dt, self.known)
+        return self._evaluate(motion, (e1 - self._e0) / self._dt, self.known)
 
-    def _respond(self, motion: float, rate: float, known: Mapping[str, Any]) -> tuple[float, Array]:
+    def _evaluate(
+        self, motion: float, rate: float, known: Mapping[str, Any]
+    ) -> tuple[float, Array]:
         """Return force and internal variables after the step."""
         state = self.state
         if not self._arguments:
@@ -414,7 +416,7 @@ class UserLaw:
             def along(step: float) -> Array:
                 a, b, c = direction
                 known = {**self.known, "state": before + step * c}
-                force, state = self._respond(motion + step * a, rate + step * b, known)
+                force, state = self._evaluate(motion + step * a, rate + step * b, known)
                 return np.array([force, *state])
 
             return _five_point(along, max(abs(change), LEAST_CHANGE * size), size)

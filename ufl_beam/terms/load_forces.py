@@ -428,7 +428,7 @@ class MovingLoads(_AtDofs):
         each, second = np.zeros((2, len(order), 3 * len(mesh.nodes)))
         self._each = ffi.new("double *[1]", [doubles(each)]), each
         ends = np.concatenate([np.column_stack([x[:-1], x[1:]]) for x in along])
-        given, mass = (np.array([getattr(x, name) for x in loads]) for name in ("force", "mass"))
+        forces, mass = (np.array([getattr(x, name) for x in loads]) for name in ("force", "mass"))
         self._c = struct(
             "moving_loads", loads=len(loads), cells=len(order), nodes=len(mesh.nodes),
             size=len(self.dofs), dof=self.dofs,
@@ -437,14 +437,14 @@ class MovingLoads(_AtDofs):
             cell=np.concatenate([number[x] for x in cells]),
             ends=ends,
             polynomial=mesh.polynomials[:, _in_order(mesh)].T.copy(),
-            given=given, now=self._on_cells[0],
+            given=forces, now=self._on_cells[0],
             end=self._on_cells[1], before=self._on_cells[2], each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
             weight_of_before=scheme.weight_of_before,
         )  # fmt: skip
         self._A, tangent, self._kinetic = A, None, np.zeros(len(loads))
         angles = numbering.axis_angles[self._cells]
-        self._load_data = {"given": given, "mass": mass, "ends": ends, "angles": angles}
+        self._load_data = {"given": forces, "mass": mass, "ends": ends, "angles": angles}
         self._heavy = rates is not None and bool(mass.any())
         if self._heavy:
             whole, n = subdomain.cell_dofs[order], 2 * len(mesh.nodes)
