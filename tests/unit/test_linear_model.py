@@ -343,6 +343,21 @@ def test_follower_force_makes_the_stiffness_unsymmetric():
         assert apart.min() <= tolerance * abs(expected)
 
 
+# -- dampers ---------------------------------------------------------------------------------------
+
+
+def test_tangent_damping_is_a_part_of_section_forces():
+    """About the undeformed scene it is the damping with the initial stiffness."""
+    found = []
+    for tangent in (False, True):
+        scene = replace(SCENE, damping=[ub.Rayleigh(mass=0.3, stiffness=2e-3, tangent=tangent)])
+        outputs = [("section_forces_at", BEAM.at(0.3)), ("section_forces_at", BEAM.start),
+                   ("reaction", FOOT)]  # fmt: skip
+        found.append(model_of(scene, outputs=outputs).frequency_response([1.0, 30.0]))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(found[1][3:6], -found[1][6:], rtol=1e-9, atol=1e-9)
+
+
 # -- refused calls ---------------------------------------------------------------------------------
 
 
