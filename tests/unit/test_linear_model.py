@@ -603,6 +603,16 @@ def test_outputs_that_are_refused(output, message):
         model_of(outputs=[output])
 
 
+def test_connectors_and_joints_of_other_scenes_are_named_with_their_place():
+    spring = ub.Turn(ub.ground(0, 0), BEAM.start, ub.Spring(1.0))
+    rail = ub.Prismatic(ub.ground(2, 0), BEAM.end, axis=(1, 0))
+    for kind, x in (("connector", spring), ("joint", rail)):
+        with raises("linearize: outputs[1]", "not in the scene"):
+            model_of(outputs=[TIP, (kind, x)])
+    with raises("linearize: inputs[0]", "not in the scene"):
+        model_of(inputs=[replace(spring, law=ub.PrescribedForce(still))])
+
+
 def test_joint_without_multipliers_has_no_force():
     arm = ub.Beam((2, 0), (3, 0), SECTION, name="arm")
     pin = ub.Revolute(BEAM.end, arm.start)
