@@ -5,6 +5,7 @@ Their responses are in verification/test_linear_models.py.
 """
 
 import math
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -343,6 +344,159 @@ def test_follower_force_makes_the_stiffness_unsymmetric():
         assert apart.min() <= tolerance * abs(expected)
 
 
+# -- dampers ---------------------------------------------------------------------------------------
+
+
+def maxwell(count=1, viscosity=3.0):
+    """Masses of 2 kg in a row on springs; each has a damper in series with a spring."""
+    bodies, connectors, held, last = [], [], [], ub.ground(-1, 0)
+    for k in range(count):
+        body = ub.Body((k, 0), mass=2.0, inertia=1.0, name=f"mass {k}")
+        plug = ub.Body((k, 1), mass=0.0, inertia=0.0, name=f"plug {k}")
+        pairs = [(last, body.middle, ub.Spring(50.0)), (body.middle, plug.middle, ub.Spring(40.0)),
+                 (ub.ground(k + 0.5, 1), plug.middle, ub.Damper(viscosity * (1 + k)))]  # fmt: skip
+        connectors += [ub.Slide(a, b, law, axis=(1, 0)) for a, b, law in pairs]
+        held += [ub.PrescribedDisplacement(x.middle, v=0.0, psi=0.0) for x in (body, plug)]
+        bodies, last = [*bodies, body, plug], body.middle
+    push = ub.PointLoad(last, force=(1.0, 0))
+    scene = ub.Scene([], bodies=bodies, connectors=connectors, supports=held, loads=[push])
+    return scene, push, [("displacement", last, "u"), ("displacement", plug.middle, "u")]
+
+
+@pytest.mark.parametrize("viscosity", [3.0, 300.0])
+@pytest.mark.parametrize("count", [1, 3])
+def test_dampers_in_series_with_springs(count, viscosity):
+    """The reduced model has the lags of the dampers as states; `modes` has all exponents."""
+    scene, push, outputs = maxwell(count, viscosity)
+    model = model_of(scene, [push], outputs)
+    expected = np.linalg.eigvals(model.state_space()[0])
+    expected = expected[expected.imag >= 0]
+    assert len(expected) == 2 * count
+    if count == 1:  # (m s² + k) (c s + k1) + k1 c s = 0
+        c, k, k1 = viscosity, 50.0, 40.0
+        roots = np.roots([2 * c, 2 * k1, c * (k + k1), k * k1])
+        np.testing.assert_allclose(
+            np.sort_complex(expected), np.sort_complex(roots[roots.imag >= 0]), rtol=1e-12
+        )
+    found = ub.modes(scene, 10).exponents
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(expected), rtol=1e-10)
+    reduced = model.reduced(10)
+    assert len(reduced.states) == 3 * count
+    assert reduced.states[count] == "lag 0 of dampers"
+    s = 0.2 + 5.0j
+    np.testing.assert_allclose(reduced.transfer_function(s), model.transfer_function(s), rtol=1e-9)
+    simulation = ub.Simulation(scene, ub.EnergyMomentum())
+    simulation.step_to(0.01)
+    simulation.step_to(0.02)
+    states = [form.state(simulation) for form in (model, reduced)]
+    simulation.close()
+    C = [form.state_space()[2] for form in (model, reduced)]
+    np.testing.assert_allclose(C[0] @ states[0], C[1] @ states[1], rtol=1e-9)
+
+
+def damped_machine():
+    """Beam with a hung body, a damper on the body, and a jack below the middle of the beam."""
+    beam = ub.Beam((0, 0), (2, 0.4), replace(SECTION, rhoI=1e-2), cells=4)
+    body = ub.Body((2, 1), mass=0.3, inertia=0.02, name="body")
+    pin = ub.Revolute(beam.end, body.at(2, 0.4))
+    spring = ub.Turn(beam.end, body.middle, ub.Spring(1.0))
+    damper = ub.Slide(ub.ground(2, 1), body.middle, ub.Damper(2.0), axis=(0, 1))
+    jack = ub.Slide(ub.ground(1, 0), beam.at(0.5), ub.PrescribedMotion(still), axis=(0, 1))
+    foot, push = ub.Clamped(beam.start), ub.PointLoad(body.middle, force=(1.0, 1.0))
+    scene = ub.Scene(
+        [beam], bodies=[body], joints=[pin], supports=[foot], loads=[push],
+        connectors=[spring, damper, jack],
+    )  # fmt: skip
+    outputs = [("joint", pin, "x"), ("joint", pin, "y"), ("connector", jack, "force"),
+               ("reaction", foot), ("displacement", body.middle), ("velocity", body.middle, "v"),
+               ("section_forces_at", beam.at(0.7))]  # fmt: skip
+    return scene, [jack, push, (foot, "v")], outputs
+
+
+def test_reduced_model_with_all_modes_is_exact():
+    """Also for forces of constraints, on which the dampers work.
+
+    The tolerance is the round-off of the static parts.
+    """
+    model = model_of(*damped_machine())
+    reduced = model.reduced(100)
+    for s in (0.3 + 2.0j, 20.0j):
+        full, every = (m.transfer_function(s)[:, :, 0] for m in (model, reduced))
+        np.testing.assert_allclose(every, full, rtol=1e-7)
+
+
+def test_reduced_model_with_dampers_is_exact_for_slow_inputs():
+    """The modes that are left out bear the forces of dampers as in statics.
+
+    Velocities apart, which depend on the rate of the inputs, the error is of first order in s.
+    """
+    scene, inputs, outputs = damped_machine()
+    model = model_of(scene, inputs, outputs)
+    reduced = model.reduced(4)
+    full, few = (m.transfer_function(1.0j)[:, :, 0] for m in (model, reduced))
+    velocity = model.outputs.index("dv/dt body (2, 1) [m/s]")
+    errors = np.delete(np.abs(few - full) / np.abs(full), velocity, axis=0)
+    assert errors.max() <= 1e-4
+    *_, D = reduced.state_space()
+    force = model.inputs.index("factor of PointLoad at body (2, 1) [1]")
+    assert abs(D[velocity, force]) <= 1e-9
+
+
+def test_tangent_damping_is_a_part_of_section_forces():
+    """About the undeformed scene it is the damping with the initial stiffness."""
+    found = []
+    for tangent in (False, True):
+        scene = replace(SCENE, damping=[ub.Rayleigh(mass=0.3, stiffness=2e-3, tangent=tangent)])
+        outputs = [("section_forces_at", BEAM.at(0.3)), ("section_forces_at", BEAM.start),
+                   ("reaction", FOOT)]  # fmt: skip
+        found.append(model_of(scene, outputs=outputs).frequency_response([1.0, 30.0]))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(found[1][3:6], -found[1][6:], rtol=1e-9, atol=1e-9)
+
+
+def test_laws_that_relax_are_named():
+    """A damper in series with a spring has no matrix; hysteresis has one for small motions."""
+
+    def relaxing(motion, rate, dt, state):
+        after = (state[0] + 40.0 * rate * dt) / (1 + dt / 0.1)
+        return after, [after]
+
+    def hysteresis(motion, rate, dt, state):
+        after = state[0] + rate * dt * (1 - abs(state[0]))
+        return 40.0 * after, [after]
+
+    body = ub.Body((0, 0), mass=2.0, inertia=1.0)
+    push = ub.PointLoad(body.middle, force=(1.0, 0))
+    held = ub.PrescribedDisplacement(body.middle, v=0.0, psi=0.0)
+    spring = ub.Slide(ub.ground(-1, 0), body.middle, ub.Spring(50.0), axis=(1, 0))
+    for law, warns in (
+        (ub.ForceLaw(relaxing, [0.0]), True),
+        (ub.ForceLaw(hysteresis, [0.0]), False),
+        (ub.ForceLaw(lambda x, rate: 3 * x + x**3 + 2 * rate + rate**3), False),
+        (ub.Damper(2.0), False),
+    ):
+        device = ub.Slide(ub.ground(1, 0), body.middle, law, axis=(1, 0))
+        scene = ub.Scene(
+            [], bodies=[body], supports=[held], loads=[push], connectors=[spring, device]
+        )
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            model_of(scene, [push], [("displacement", body.middle, "u")])
+            ub.modes(scene, 1)
+        said = [str(x.message) for x in caught]
+        assert len(said) == 2 * warns
+        assert all("depends on the length of a step" in text for text in said)
+
+
+def test_response_of_a_reduced_model_at_an_exponent():
+    model = model_of(replace(SCENE, damping=()), [PUSH, (FOOT, "v")]).reduced(2)
+    with raises("s = 0: a prescribed motion grows"):
+        model.frequency_response(0.0)
+    free = replace(SCENE, supports=(), damping=())
+    with raises("s = 0", "is an exponent of the model"):
+        model_of(free).reduced(4).frequency_response(0.0)
+
+
 # -- refused calls ---------------------------------------------------------------------------------
 
 
@@ -447,6 +601,16 @@ def test_inputs_that_are_refused(inputs, message):
 def test_outputs_that_are_refused(output, message):
     with raises(message):
         model_of(outputs=[output])
+
+
+def test_connectors_and_joints_of_other_scenes_are_named_with_their_place():
+    spring = ub.Turn(ub.ground(0, 0), BEAM.start, ub.Spring(1.0))
+    rail = ub.Prismatic(ub.ground(2, 0), BEAM.end, axis=(1, 0))
+    for kind, x in (("connector", spring), ("joint", rail)):
+        with raises("linearize: outputs[1]", "not in the scene"):
+            model_of(outputs=[TIP, (kind, x)])
+    with raises("linearize: inputs[0]", "not in the scene"):
+        model_of(inputs=[replace(spring, law=ub.PrescribedForce(still))])
 
 
 def test_joint_without_multipliers_has_no_force():

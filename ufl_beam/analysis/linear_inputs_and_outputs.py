@@ -151,7 +151,7 @@ def checked_inputs(scene: Scene, requested: Sequence[Any]) -> list[tuple[Any, li
             if isinstance(x, RotatingFrame):
                 raise ArgumentError(f"{what}: forces of a RotatingFrame have no factor")
         elif isinstance(x, Connector):
-            connector_indices(scene, x)
+            _require_in_scene(scene, x, what)
             if not isinstance(x.law, PrescribedForce | Controller | PrescribedMotion):
                 raise ArgumentError(
                     f"{what}: {x} has the law {type(x.law).__name__}; an input has a "
@@ -413,15 +413,23 @@ def _checked_output(scene: Scene, output: Any, what: str) -> tuple[str, Any, lis
     if missing:
         raise ArgumentError(f"{what}: {x} is not in the scene")
     if isinstance(x, Connector):
-        connector_indices(scene, x)
+        _require_in_scene(scene, x, what)
     elif isinstance(x, Joint):
         _require_known_force(scene, x, rest, what)
     return kind, x, [names.index(rest[0])] if rest else [*range(len(names))]
 
 
+def _require_in_scene(scene: Scene, x: Connector | Joint, what: str) -> None:
+    """Raise unless a connector or joint is in the scene."""
+    try:
+        connector_indices(scene, x)
+    except ArgumentError as error:
+        raise ArgumentError(f"{what}: {error}") from None
+
+
 def _require_known_force(scene: Scene, joint: Joint, rest: Sequence[str], what: str) -> None:
     """Raise unless the force of a joint between its first two places is an unknown."""
-    connector_indices(scene, joint)
+    _require_in_scene(scene, joint, what)
     if not any({holder.a, holder.b} == {*joint.places[:2]} for holder in joint.holders):
         raise ArgumentError(
             f"{what}: {joint} shares unknowns, so that its force is not known; make it with "

@@ -36,6 +36,12 @@ from ufl_beam.analysis.state_space import (
     independent_coordinates,
     jumps,
 )
+from ufl_beam.analysis.static_corrections import (
+    Corrections,
+    Equations,
+    corrections,
+    motions_of_dampers,
+)
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.display import Rich, counted
@@ -59,7 +65,7 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.eigensolvers import ROUND_OFF
 
-QUASI_STATIC = 1e-2  # exponent of the static correction, as a fraction of the lowest frequency
+QUASI_STATIC = 1e-2  # frequency of the static correction, as a fraction of the lowest frequency
 ITERATIONS = 4  # of the static motions of a reduced model
 MOST_STATES = 4000  # largest number of states without modal reduction
 
@@ -100,8 +106,9 @@ class LinearModel(Rich):
         rows = small._constraint_rows
         self._free, self._constraints = np.flatnonzero(~rows), np.flatnonzero(rows)  # rows of K
         self._basis: tuple[Array, Array] | None = None  # modes and motions with unit inputs
-        self._correction: Array | float = 0.0  # of D in a reduced model
-        self._squares: Array = np.zeros(0)  # squared frequencies of the modes
+        self._corrections: Corrections | None = None  # of the outputs of a reduced model
+        self._modal_stiffness: Array | None = None
+        self._number_of_modes = 0
         self._mode_names: list[str] = []
         require_free(small, inputs, outputs)
 
@@ -254,7 +261,10 @@ class LinearModel(Rich):
         if self._basis is not None:
             A, B, C, D = self.state_space()
             for k, at in enumerate(values):
-                response[:, :, k] = C @ np.linalg.solve(at * np.eye(len(A)) - A, B) + D
+                try:
+                    response[:, :, k] = C @ np.linalg.solve(at * np.eye(len(A)) - A, B) + D
+                except np.linalg.LinAlgError:
+                    raise self._pole(at) from None
             return response
         for k, at in enumerate(values):
             response[:, :, k] = self._response(at)
@@ -280,13 +290,11 @@ class LinearModel(Rich):
         F, moved = self._loads
         nu = S.shape[1]
         if nu and s == 0:
-            raise ArgumentError("transfer_function: s = 0: a prescribed motion grows without bound")
+            raise self._pole(s)
         try:
             factors = splu(csc_array(small.K + s * self._damping + s**2 * small.M))
         except RuntimeError:
-            raise ArgumentError(
-                f"transfer_function: s = {s:g} is an exponent of the model"
-            ) from None
+            raise self._pole(s) from None
         u = 1 / s**2 if nu else 0.0
         load = np.hstack([F.toarray(), u * sum(s**k * A.toarray() for k, A in enumerate(moved))])
         X = small._Z @ factors.solve(load.astype(complex)) + np.hstack(
@@ -296,6 +304,13 @@ class LinearModel(Rich):
         Y[:, : F.shape[1]] += self._outputs.direct
         return np.asarray(Y[:, self._inputs.order])
 
+    def _pole(self, s: complex) -> ArgumentError:
+        """Return the error of a response at an exponent of the model."""
+        why = "s = {:g} is an exponent of the model"
+        if self._inputs.number_of_motions and s == 0:
+            why = "s = 0: a prescribed motion grows without bound"
+        return ArgumentError("transfer_function: " + why.format(s))
+
     # -- modal reduction -----------------------------------------------------------------------
 
     def reduced(self, n: int) -> LinearModel:
@@ -304,8 +319,10 @@ class LinearModel(Rich):
         The modes are those nearest to zero frequency, rigid motions included.  Damping and
         gyroscopic forces couple them.  With an unsymmetric stiffness, as of a follower force, the
         real and imaginary parts of the first n modes of :func:`modes` are the basis.  Prescribed
-        motions keep their states; the scene follows them as in statics.  The correction, a part of
-        D, makes the response to slow inputs exact.
+        motions keep their states; the scene follows them as in statics.  The corrections, parts of
+        D and of the columns of C of rates, make the response to slow inputs exact.  Motions without
+        mass that a damper makes lag behind the modes, as in a damper in series with a spring, are
+        further states of first order.
 
         Args:
             n: Number of modes; fewer if the scene has fewer.
@@ -321,14 +338,29 @@ class LinearModel(Rich):
             shifted = splu(csc_array(small.K + s**2 * small.M))
             for _ in range(ITERATIONS):
                 P = shifted.solve(self._loads[1][0].toarray() + s**2 * (small.M @ P))
+        F, moved = self._loads
+        equations = Equations(small.M, self._damping, small.K, F, moved, self._free)
+        omega = np.sqrt(np.maximum(np.abs(squares), moving.min(initial=small.squares.max())))
+        omega = np.resize(omega, x.shape[1])  # of real, then of imaginary parts
+        lengths = small.lengths[small.left[self._free]]
+        lags = motions_of_dampers(equations, x, omega, P, lengths)
+        basis = np.hstack([x, lags])
+        y = self._free
+        K = basis[y].T @ (small.K.tocsr()[y][:, y] @ basis[y])
+        if self._symmetric:  # quotients of works, without round-off of K
+            K[: len(squares)] = K[:, : len(squares)] = 0.0
+            K[: len(squares), : len(squares)] = np.diag(squares)
         model = copy.copy(self)
         for name in ("_motion", "_space", "states"):
             vars(model).pop(name, None)
-        model._basis = x, P
-        model._squares, model._mode_names = squares, names
-        model._correction = 0.0
-        model._correction = (self._response(complex(s)) - model.transfer_function(s)[:, :, 0]).real
-        vars(model).pop("_space")
+        model._basis, model._modal_stiffness = (basis, P), K
+        model._number_of_modes = x.shape[1]
+        model._mode_names = names + [f"lag {k} of dampers" for k in range(lags.shape[1])]
+        (P0, P1, P2), Z = self._outputs.rows, small._Z
+        model._corrections = corrections(
+            equations, basis, P, K,
+            lambda X, z: P0 @ (Z @ X) + z * (P1 @ (Z @ X)) + z**2 * (P2 @ (Z @ X)), s,
+        )  # fmt: skip
         return model
 
     def _modes(self, n: int) -> tuple[Array, Array, list[str]]:
@@ -450,11 +482,13 @@ class LinearModel(Rich):
             J, h = small.K.tocsr()[self._constraints][:, y], moved[0][self._constraints].toarray()
             coordinates = independent_coordinates(M, J, h, small.lengths[small.left[y]])
         else:
-            N, P = self._basis[0][y], self._basis[1][y]
-            n = N.shape[1]
-            coordinates = Coordinates(N, P, np.eye(n), np.zeros((n, 0)), N.T @ M)
-            if self._symmetric:
-                more = np.diag(self._squares)  # quotients of works, without round-off of K
+            N, P, na = self._basis[0][y], self._basis[1][y], self._number_of_modes
+            identity, more = np.eye(N.shape[1]), self._modal_stiffness
+            # Motions without mass: what the modes do not explain, at the places that they move
+            modes, lags = N[:, :na].T @ M, N[:, na:]
+            rest = np.eye(len(y)) - N[:, :na] @ modes if lags.size else np.zeros((0, len(y)))
+            read = np.vstack([modes, np.linalg.pinv(lags) @ rest]) if lags.size else modes
+            coordinates = Coordinates(N, P, identity[:, :na], identity[:, na:], read)
         names, sizes = self._names_of_motions, small.lengths[small.left[y]]
         return first_order(
             coordinates, M, C, K, F[y], tuple(B[y].toarray() for B in moved),
@@ -493,8 +527,12 @@ class LinearModel(Rich):
         Y = out.rows[0] @ (X + Z[:, μ] @ borne)
         Y[:, ns : ns + F.shape[1]] += out.direct
         Y += out.rows[1] @ dX + out.rows[2] @ (dX[:, :ns] @ motion.rates)
+        if self._corrections is not None:
+            by_inputs, by_rates, by_motions = self._corrections
+            Y += by_rates @ (motion.z[:, :ns] @ motion.rates) + by_motions @ motion.du
+            Y[:, ns:] += by_inputs
         A, B = motion.rates[:, :ns], motion.rates[:, ns:]
-        return A, B[:, inputs.order], Y[:, :ns], Y[:, ns:][:, inputs.order] + self._correction
+        return A, B[:, inputs.order], Y[:, :ns], Y[:, ns:][:, inputs.order]
 
     @cached_property
     def _names_of_motions(self) -> list[str]:
@@ -540,7 +578,8 @@ def linearize(
             input or output.
 
     Warns:
-        ModelWarning: Some beams have no mass, or a controller or sliding friction is left out.
+        ModelWarning: Some beams have no mass, a controller or sliding friction is left out, or
+            internal variables of a law of a connector relax.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(0, 1.0))

@@ -103,8 +103,20 @@ def warn_of_omissions(small: Linearization, inputs: Sequence[Any]) -> None:
     for connector in small.scene.all_connectors:
         if isinstance(connector.law, Controller) and connector not in inputs:
             warn(f"linearize: {connector}: the force of the controller is constant")
+    warn_of_relaxation("linearize", small)
     for group in small._simulation.equation.connector_terms:
         if isinstance(group.connectors[0].law, Coulomb) and group.response.sticks is not None:
             for connector, sticks in zip(group.connectors, group.response.sticks, strict=True):
                 if not sticks:
                     warn(f"linearize: {connector}: sliding friction is left out")
+
+
+def warn_of_relaxation(call: str, small: Linearization) -> None:
+    """Warn of laws whose internal variables change in time, which have no matrix of damping."""
+    for connector in small.relaxing:
+        warn(
+            f"{call}: {connector}: the force of the law changes in time while the motion is "
+            "constant, or depends on the length of a step; stiffness and viscosity cannot describe "
+            "this, so that results are wrong. Replace the law by springs and dampers, with a body "
+            "without mass between those in series"
+        )

@@ -41,6 +41,8 @@ from ufl_beam.terms.term import InCells
 
 BALANCED = 1e-13  # forces below this fraction of the stiffness times the scene's size are round-off
 CHANGE = 1e-6  # change for difference quotients; rad, or fraction of the size of the scene
+SLOWER = 10.0  # ratio of two steps in which forces of laws are compared
+RELAXES = 1e-6  # difference of viscosities from two steps that is not round-off, as a fraction
 AT_REST = 1e150  # time step after which rates vanish; its square does not overflow; s
 
 
@@ -164,6 +166,32 @@ class Linearization:
         """Derivative of forces with respect to velocities, reduced as K."""
         τ, T = self._in_short_step
         return (self._reduced(T) - self.K) * τ
+
+    @cached_property
+    def relaxing(self) -> list[Connector]:
+        """Connectors whose forces depend on the step in another way than by a viscosity.
+
+        Internal variables of a law that change in time cause this.
+        """
+        τ, viscosities, laws = self._in_short_step[0], list[Array](), self._laws
+        if not len(laws):
+            return []
+        largest = np.zeros(len(laws))
+        for factor in (1.0, SLOWER):
+            forces = []
+            for T in (self.tangent, self._linearized(self.q, factor * τ)[1]):
+                rows = T[laws].tolil()
+                rows[:, laws] = 0.0
+                forces.append(csr_array(rows / T.diagonal()[laws][:, None]))
+                largest = np.maximum(largest, abs(forces[-1]).max(axis=1).toarray().ravel())
+            viscosities.append((forces[1] - forces[0]) * factor)
+        apart, size = (
+            abs(A).max(axis=1).toarray().ravel()
+            for A in (viscosities[1] - viscosities[0], abs(viscosities[0]) + abs(viscosities[1]))
+        )
+        relaxes = apart > np.maximum(RELAXES * size, RELAXES * largest)
+        where = dict(zip(self.numbering.multipliers, self.scene.all_connectors, strict=True))
+        return [where[law] for law in laws[relaxes]]
 
     def participation(self, direction: Array) -> tuple[Array, float]:
         """Return M r for a translation r of all nodes along a unit vector, and the moving mass.

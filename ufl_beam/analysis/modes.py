@@ -15,6 +15,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.analysis.constant_loads import AT, duration
+from ufl_beam.analysis.linear_model_checks import warn_of_relaxation
 from ufl_beam.analysis.small_motions import SmallMotions
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.c_library import lib
@@ -316,7 +317,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
             has a :class:`RotatingFrame` and ``at`` is not given.
 
     Warns:
-        ModelWarning: The undeformed scene is no equilibrium, or some beams have no mass.
+        ModelWarning: The undeformed scene is no equilibrium, some beams have no mass, or internal
+            variables of a law of a connector relax.
 
     Example:
         >>> shapes = ub.modes(scene, 3, mesh=ub.Mesh(refine=4))
@@ -354,6 +356,8 @@ def computed_modes(
     if not small.M.data.any():
         raise ArgumentError("modes: nothing that can move has mass; give sections rho or rhoA")
     warn_of_masses(scene)
+    if damped:
+        warn_of_relaxation("modes", small)
     exponents, shapes = small.exponents(n, damped=damped)
     stresses = _stresses(small, at)
     return Modes(scene, small.numbering, small.q, shapes, *stresses, exponents)

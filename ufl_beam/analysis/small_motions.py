@@ -8,12 +8,13 @@ from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import null_space
 from scipy.sparse import block_array, csr_array, diags_array, eye_array
 
 from ufl_beam.analysis.linearization import Linearization
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.solvers import eigensolvers
-from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
+from ufl_beam.solvers.eigensolvers import DENSE, ROUND_OFF, SHIFT, ZERO
 
 V = TypeVar("V", Array, Complex)
 
@@ -89,7 +90,7 @@ class SmallMotions(Linearization):
         C, M = C.copy(), self.M.copy()
         for A in (C, M):
             A.resize(K.shape)
-        most = 2 * (self.most - B.shape[1])
+        most = 2 * (self.most - B.shape[1]) + self._number_of_decays(self.C)
         s, x = eigensolvers.quadratic(K, C, M, 2 * n, most=most, shift=lowest)
         # Nearly zero exponents of the motions without stiffness become exact zeros.
         x = x[: len(free)]
@@ -103,6 +104,22 @@ class SmallMotions(Linearization):
         nonzero = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
         exponents = np.concatenate([np.zeros(free.shape[1]), s[elastic], decay[nonzero]])
         return exponents, np.hstack([free, x[:, elastic], N @ mix[:, nonzero]])
+
+    def _number_of_decays(self, C: csr_array) -> int:
+        """Return the number of motions without mass that dampers resist; each has one exponent."""
+        rows = self._constraint_rows
+        light = np.flatnonzero((self.M.diagonal() == 0.0) & ~rows)
+        between = C[light][:, light]
+        if not between.nnz or C.shape[0] > DENSE:
+            return int(between.nnz > 0) * len(light)  # SLEPc seeks far fewer
+        sizes = self.lengths[self.left[light]]
+        N = null_space(self.K[np.flatnonzero(rows)][:, light].toarray() * sizes)
+        stiff, viscous = (N.T @ (A.toarray() * np.outer(sizes, sizes)) @ N
+                          for A in (self.K[light][:, light], between))  # fmt: skip
+        round_off = ROUND_OFF * np.abs(stiff).max(initial=0.0) / self.squares.max() ** 0.5
+        values = np.linalg.svd(viscous, compute_uv=False)
+        largest = float(values.max(initial=0.0))
+        return int(np.sum(values > max(MODAL_TOLERANCE * largest, round_off)))
 
     # -- buckling ------------------------------------------------------------------------------
 

@@ -359,6 +359,11 @@ class StepEquation:
                     term.add_tangent(q)
                 if isinstance(term, FrameForces):  # for the forces of cells
                     term.put_accelerations(self._begun[0], q)
+            still = np.zeros(len(q))
+            for term, phases in zip(self.terms, self.phases, strict=True):
+                # Some damping computes forces of cells when a step is accepted
+                for accept, data in phases.accept if term.kind == "damping" else ():
+                    accept(data, self._begun[0], doubles(q), doubles(still))
         return r, self.A.data.copy()
 
     def tangent_change(self, q: Array, u: Array) -> Array:
