@@ -463,8 +463,33 @@ def test_histories_of_positions_and_of_points_of_bodies(scheme):
     np.testing.assert_allclose(found, run.of(lambda s: number(far(s))), rtol=1e-8)
 
 
+def test_logarithm_of_the_last_of_many_decaying_swings():
+    """The last swing has 1e-7 of the first."""
+
+    def decaying(k=400.0, c=6.0):
+        body = ub.Body((0, 0), mass=1.0, inertia=1.0)
+        ends = ub.ground(0, 0), body.at(0, 0)
+        laws = ub.Spring(k), ub.Damper(c)
+        connectors = [ub.Slide(*ends, law, axis=(1, 0)) for law in laws]
+        start = ub.Velocity([body], linear=(1.0, 0.0))
+        return ub.Scene([], bodies=[body], connectors=connectors, initial=[start])
+
+    def motion(s):
+        return s.displacement(s.scene.bodies[0].at(0, 0))[:, 0]
+
+    def decay(history):
+        return math.log(abs(history[-1] / history[20]))
+
+    run = decaying, parameters(decaying, {}), ub.EnergyMomentum()
+    times = {"t": (0, 5.0), "dt": 0.01}
+    direct = ub.differentiate(*run, **times, progress=False).of(lambda s: decay(motion(s)))
+    found = ub.gradient(*run, **times, of=motion, reduce=decay)
+    np.testing.assert_allclose(found, direct, rtol=1e-6)
+
+
 def test_wrong_arguments_are_refused():
     refused("must return a history", of=lambda s: tip(s)[-1])
+    refused("the history is not finite at t = 0 s", of=lambda s: np.where(s.times > 0, 0.0, np.nan))
     refused("forces or energies; use differentiate", of=lambda s: s.energy.state["stored"])
     refused("max_bytes", max_bytes=-1.0)
 

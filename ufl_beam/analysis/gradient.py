@@ -39,7 +39,7 @@ SMALL = 2.0**-17
 ALIKE = 1e-9  # relative difference of slopes by small and large steps that counts as round-off
 
 FINER = 2.0**-6
-"""Ratio of steps of differences of histories by one degree of freedom, see :func:`_best_slope`."""
+"""Ratio of steps of differences of histories and numbers, see :func:`_slope`."""
 
 MAX_BYTES = 2.0**28
 """Memory for recorded steps; bytes."""
@@ -239,6 +239,12 @@ class _History:
                 f"history with one row for each of the {len(solution)} states; put the rest into "
                 "reduce"
             )
+        if not np.isfinite(reference).all():
+            n = int(np.argmin(np.isfinite(reference.reshape(len(reference), -1)).all(axis=1)))
+            raise ArgumentError(
+                f"gradient: the history is not finite at t = {solution.times[n]:g} s; return "
+                "finite values, and leave out those that reduce does not need"
+            )
 
     def _in(self, numbering: DofNumbering, **changes: Array) -> Array:
         """Return the history in a scene, for changes of the motion."""
@@ -305,47 +311,39 @@ class _History:
                     change[:, dofs] = shift
                     return self._in(self._numbering, **{name: change})
 
-                slope = np.asarray(_best_slope(shifted, scale)).reshape(len(x), -1)
+                slope = np.asarray(_slope(shifted, scale)).reshape(len(x), -1)
                 bar[:, dofs[0]] = np.sum(by_rows * slope, axis=1)
             found.append(bar)
         return found[0], found[1]
 
 
-def _slope(function: Callable[[float], Any], scale: float) -> Any:
-    """Return the derivative of a function at zero, for arguments of the size ``scale``.
+def _slope(function: Callable[[float], Any], scale: float) -> Array:
+    """Return the derivative of a function at zero, for arguments of the size ``scale`` or less.
 
-    Differences with a large step have less round-off; they are taken if those with a small step
-    agree, as for polynomials.
+    The argument may be much smaller than ``scale``, which is the largest number of the motion or of
+    the history: a force of a joint, an angle after many turns, the first of many decaying swings.
+    So steps become finer until slopes agree, and the slope is taken that differs least from the
+    slope before, with its round-off.  Polynomials of degree 4 need two steps.
     """
-    (positions, weights), start = next(iter(STENCILS.items())), function(0.0)
-    small, large = (
-        sum(w / h * (function(k * h) - start) for k, w in zip(positions, weights, strict=True))
-        for h in (SMALL * (scale or 1.0), scale or 1.0)
-    )
-    same = np.abs(large - small).max() <= ALIKE * np.abs(small).max()
-    return large if same else small
-
-
-def _best_slope(function: Callable[[float], Array], scale: float) -> Array:
-    """Return the derivative at zero of a history by one degree of freedom.
-
-    The largest number ``scale`` of the motion may be the force of a joint or an angle after many
-    turns, and says nothing about this degree of freedom.  So the steps become finer, and the slope
-    is taken that differs least from the slope before, with its round-off.
-    """
-    (positions, weights), start = next(iter(STENCILS.items())), function(0.0)
+    (positions, weights), start = next(iter(STENCILS.items())), np.asarray(function(0.0))
 
     def slope_at(h: float) -> Array:
         shifted = zip(positions, weights, strict=True)
         return np.asarray(sum(w / h * (function(k * h) - start) for k, w in shifted))
 
-    finest, round_off = 2.0**-40 * min(scale, 1.0), np.finfo(np.float64).eps * np.abs(start).max()
-    h, last, best, least = scale, slope_at(scale), None, 1.0
+    h, round_off = scale or 1.0, np.finfo(np.float64).eps * np.abs(start).max()
+    finest, last, best, least = 2.0**-40 * min(h, 1.0), slope_at(h), None, 1.0
+    largest = np.abs(last).max()
     while least > ALIKE and h > finest:
         h *= FINER
+        if round_off / h > least * largest > 0:  # finer steps have more round-off
+            break
         slope = slope_at(h)
+        if not largest and not slope.any() and h < SMALL * (scale or 1.0):
+            return slope
+        largest = max(largest, np.abs(slope).max())
         error = np.abs(slope - last).max() + round_off / h
-        if error < least * np.abs(slope).max():
-            best, least = slope, float(error / np.abs(slope).max())
+        if error < least * largest:
+            best, least = slope, float(error / largest)
         last = slope
-    return slope_at(SMALL * min(scale, 1.0)) if best is None else best
+    return slope_at(SMALL * min(scale or 1.0, 1.0)) if best is None else best
