@@ -285,6 +285,12 @@ def test_quantities(name):
     assert max(best.values()) < 100 * AGREE, best
 
 
+def test_quantities_may_be_complex():
+    """The derivative of i u is i times that of u."""
+    run = ub.differentiate(yielding, {"load": 40.0}, ub.EnergyMomentum(), progress=False, **DYNAMIC)
+    np.testing.assert_allclose(run.of(lambda s: (1 + 2j) * tip(s)), (1 + 2j) * run.of(tip))
+
+
 def test_the_shape_of_derivatives():
     run = ub.differentiate(yielding, {"load": 40.0, "EI": 100.0}, ub.EnergyMomentum(), **DYNAMIC)
     assert list(run.at) == list(run.ranges) == ["load", "EI"]
@@ -349,12 +355,57 @@ def test_two_runs_give_the_derivatives_of_one():
     whole = ub.differentiate(yielding, at, scheme, t=(0, 0.6), **options)
     first = ub.differentiate(yielding, at, scheme, t=(0, 0.3), **options)
     second = ub.differentiate(yielding, at, scheme, t=(0.3, 0.6), start=first, **options)
-    for quantity in (tip, lambda s: s.energy.lost["plastic"]):
+    for quantity in (tip, lambda s: s.energy.lost["plastic"], lambda s: s.energy.supplied["loads"]):
         one, half = whole.of(quantity), second.of(quantity)
         both = one[30:] if len(half) == 31 else one
         assert relative_error(half, both) < 1e-9  # times differ by round-off
     with raises("differentiate: start ends at t = 0.3 s", "begin there, at the same values"):
         ub.differentiate(yielding, at, scheme, t=(0.2, 0.6), start=first, **options)
+    assert whole.ranges["limit"].time < 0.3
+    for name, near in whole.ranges.items():  # switches of the first run count as well
+        assert second.ranges[name].change == pytest.approx(near.change, rel=1e-6)
+        assert second.ranges[name].time == pytest.approx(near.time)
+
+
+def test_energies_of_a_static_run_that_continues():
+    """N² L/(2 EA), and the work of the force; the first run has one step."""
+    L, N_y, N, EA = 2.0, 60.0, 100.0, 1e6
+    at, options = {"N_y": N_y, "N": N}, {"dt": 0.5, "newton": TIGHT, "progress": False}
+    first = ub.differentiate(pulled, at, ub.Static(), t=(0, 0.5), **options)
+    second = ub.differentiate(pulled, at, ub.Static(), t=(0.5, 1), start=first, **options)
+    whole = ub.differentiate(pulled, at, ub.Static(), t=(0, 1), **options)
+
+    def energies(s):
+        return s.energy.state["stored"][-1], s.energy.supplied["loads"][-1]
+
+    found = second.of(energies)
+    assert found[0] == pytest.approx([0, L * N / EA], rel=1e-7, abs=1e-10)
+    np.testing.assert_allclose(found, whole.of(energies), rtol=1e-7, atol=1e-12)
+
+
+def test_energies_after_divided_steps():
+    """The first run is divided, the second one is not."""
+    at = {"N_y": 40.0, "N": 100.0}
+
+    def bar(N_y, N):
+        return pulled(N_y, N, 1e6 / 30)
+
+    options = {"newton": TIGHT, "progress": False}
+    first = ub.differentiate(bar, at, ub.Static(), t=(0, 0.5), dt=0.25, **options)
+    second = ub.differentiate(bar, at, ub.Static(), t=(0.5, 1), dt=0.25, start=first, **options)
+    assert first.solution.substeps > 2
+    with raises("of: this quantity needs material or energies", "use a smaller dt"):
+        second.of(lambda s: s.energy.state["stored"])
+
+
+def test_runs_with_another_scheme_or_mesh_do_not_continue():
+    at, options = {"load": 40.0}, {"dt": 0.1, "progress": False}
+    first = ub.differentiate(yielding, at, ub.Static(), t=(0, 0.1), **options)
+    more = {"t": (0.1, 0.2), "start": first, **options}
+    with raises("differentiate: start has scheme = Static()", "continue with the same ones"):
+        ub.differentiate(yielding, at, ub.EnergyMomentum(), **more)
+    with raises("mesh = None; continue with the same ones"):
+        ub.differentiate(yielding, at, ub.Static(), mesh=ub.Mesh(degree=2), **more)
 
 
 # -- ranges and switches ---------------------------------------------------------------------------

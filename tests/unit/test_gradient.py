@@ -399,8 +399,98 @@ def refused(message, model=flying, scheme=None, of=tip, **more):
         )
 
 
+def pinned(EI=2e6, mass=4e3, load=1e6, length=1.0):
+    """Two beams with a pin between them, whose force exceeds the motion by a factor of 1e8."""
+    section = ub.Section(EI=EI, EA=2e10, GA=8e9, rhoA=800.0, rhoI=1.0)
+    left = ub.Beam((0, 0), (length, 0), section, cells=3)
+    right = ub.Beam((length, 0), (2 * length, 0), section, cells=3)
+    return ub.Scene(
+        [left, right],
+        joints=[ub.Revolute(left.end, right.start, multipliers=True)],
+        supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
+        masses=[ub.PointMass(left.end, mass)],
+        loads=[ub.PointLoad(left.end, force=(0, load))],
+    )
+
+
+def test_curved_histories_beside_large_forces_of_joints():
+    def distance(s):
+        u, v, psi = s.displacement(s.scene.beams[0].end).T
+        return np.column_stack([np.hypot(1 + u, 0.2 + v), np.cos(psi)])
+
+    def number(history):
+        return float(history[-1].sum())
+
+    at, options = parameters(pinned, {"length"}), {"t": (0, 0.3), "dt": 0.01}
+    run = ub.differentiate(pinned, at, ub.EnergyMomentum(), progress=False, **options)
+    assert np.abs(run.solution.q).max() > 1e7
+    found = ub.gradient(pinned, at, ub.EnergyMomentum(), of=distance, reduce=number, **options)
+    np.testing.assert_allclose(found, run.of(lambda s: number(distance(s))), rtol=1e-6)
+
+
+def balance(arm=0.7, k=50.0, speed=2.0):
+    """A body with a point at a distance that is a parameter, and a beam that carries it."""
+    section = ub.Section(EI=50.0, EA=1e5, GA=1e5, rhoA=1.0, rhoI=0.01)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2)
+    body = ub.Body((1 + arm / 2, 0), mass=2.0, inertia=0.1)
+    spring = ub.Slide(ub.ground(1, 0), beam.end, ub.Spring(k), axis=(0, 1))
+    return ub.Scene(
+        [beam],
+        bodies=[body],
+        joints=[ub.Rigid(beam.end, body.at(1, 0))],
+        connectors=[spring],
+        supports=[ub.Pinned(beam.start)],
+        initial=[ub.Velocity([beam, body], angular=speed, about=(0, 0))],
+    )
+
+
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(order=4)], ids=repr)
+def test_histories_of_positions_and_of_points_of_bodies(scheme):
+    """They depend on the geometry, also if the motion does not change."""
+
+    def far(s):
+        (body,), (beam,) = s.scene.bodies, s.scene.beams
+        arm = 2 * (body.center[0] - 1)
+        point = body.at(1 + arm, 0)
+        return np.column_stack([s.displacement(point), s.position(point), s.velocity(beam.end)])
+
+    def number(history):
+        return float((history[-1] * np.arange(1, 1 + history.shape[1])).sum())
+
+    at, options = parameters(balance, {}), {"t": (0, 0.5), "dt": 0.02}
+    run = ub.differentiate(balance, at, scheme, progress=False, **options)
+    found = ub.gradient(balance, at, scheme, of=far, reduce=number, **options)
+    np.testing.assert_allclose(found, run.of(lambda s: number(far(s))), rtol=1e-8)
+
+
+def test_logarithm_of_the_last_of_many_decaying_swings():
+    """The last swing has 1e-7 of the first."""
+
+    def decaying(k=400.0, c=6.0):
+        body = ub.Body((0, 0), mass=1.0, inertia=1.0)
+        ends = ub.ground(0, 0), body.at(0, 0)
+        laws = ub.Spring(k), ub.Damper(c)
+        connectors = [ub.Slide(*ends, law, axis=(1, 0)) for law in laws]
+        start = ub.Velocity([body], linear=(1.0, 0.0))
+        return ub.Scene([], bodies=[body], connectors=connectors, initial=[start])
+
+    def motion(s):
+        return s.displacement(s.scene.bodies[0].at(0, 0))[:, 0]
+
+    def decay(history):
+        return math.log(abs(history[-1] / history[20]))
+
+    run = decaying, parameters(decaying, {}), ub.EnergyMomentum()
+    times = {"t": (0, 5.0), "dt": 0.01}
+    direct = ub.differentiate(*run, **times, progress=False).of(lambda s: decay(motion(s)))
+    found = ub.gradient(*run, **times, of=motion, reduce=decay)
+    np.testing.assert_allclose(found, direct, rtol=1e-6)
+
+
 def test_wrong_arguments_are_refused():
     refused("must return a history", of=lambda s: tip(s)[-1])
+    refused("the history is not finite at t = 0 s", of=lambda s: np.where(s.times > 0, 0.0, np.nan))
+    refused("forces or energies; use differentiate", of=lambda s: s.energy.state["stored"])
     refused("max_bytes", max_bytes=-1.0)
 
 

@@ -101,8 +101,8 @@ def differentiate(
         scheme: Time scheme, as in :func:`simulate`.
         t: Beginning and end; s.
         dt: Time step; s.
-        start: Derivatives of an earlier run of the same model at the same values, which this run
-            continues.
+        start: Derivatives of an earlier run of the same model at the same values, with the same
+            scheme and mesh, which this run continues.
         newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default the cells of the beams.
         progress: Show a progress bar in a terminal or notebook.
@@ -134,6 +134,11 @@ def differentiate(
             raise ArgumentError(
                 f"differentiate: start ends at t = {start.solution.times[-1]:g} s with "
                 f"{start.at}; begin there, at the same values"
+            )
+        if start.solution.scheme != scheme or start.mesh != mesh:
+            raise ArgumentError(
+                f"differentiate: start has scheme = {start.solution.scheme} and "
+                f"mesh = {start.mesh}; continue with the same ones"
             )
     found = case.run(t1, dt, start, progress=progress)
     found.require_effects()
@@ -410,7 +415,8 @@ class Derivatives:
     Attributes:
         solution: The run.
         at: Values of the parameters by name, in the order of the derivatives.
-        ranges: :class:`Range` of each parameter by name.
+        ranges: :class:`Range` of each parameter by name, including those of ``start``.
+        mesh: Discretization; None for the cells of the beams.
         end: State at the end of the run, and its derivatives, for a run that continues.
 
     Example:
@@ -430,10 +436,11 @@ class Derivatives:
         self.solution, self.at, self._case = solution, case.at, case
         self.end, self._start = (state, steps.states), start
         self._q, self._v, self._reactions = steps.q, steps.v, steps.reactions
-        self._constrained_dofs, self.ranges = (
-            steps.constrained_dofs,
-            dict(zip(case.at, steps.ranges(), strict=True)),
-        )
+        self._constrained_dofs, self.mesh = steps.constrained_dofs, case.mesh
+        self.ranges = dict(zip(case.at, steps.ranges(), strict=True))
+        if start is not None:
+            for name, earlier in start.ranges.items():
+                self.ranges[name] = min(earlier, self.ranges[name], key=lambda x: x.change)
         self._enters = steps.enters()
         self._shifted: list[list[Solution]] = []
         self._repeated: list[list[Solution]] = []
@@ -474,7 +481,7 @@ class Derivatives:
         reference = _as_array(quantity(self.solution))
         try:
             changes = [self._differences(quantity, reference, some) for some in self._motions()]
-        except _Unknown:
+        except Unknown:
             changes = [self._differences(quantity, reference, some) for some in self._runs()]
         found = [
             np.tensordot(self._case.weights(name, QUANTITY_STEP), row, axes=1)
@@ -487,13 +494,7 @@ class Derivatives:
     ) -> Array:
         changes = []
         for other in some:
-            try:
-                value = _as_array(quantity(other))
-            except ArgumentError as error:
-                raise ArgumentError(
-                    f"{error}. If the model makes new beams at each call, find places in the scene "
-                    "of the solution, as in lambda s: s.displacement(s.scene.beams[0].end)"
-                ) from error
+            value = _as_array(in_scene(quantity, other))
             if value.shape != reference.shape:
                 raise ArgumentError("of: the shape of the quantity depends on the parameters")
             changes.append(value - reference)
@@ -531,20 +532,29 @@ class Derivatives:
                     "of: this quantity needs section forces, material or energies between the "
                     f"stages of {self.solution.scheme}; use order=2"
                 )
-            before = 0 if self._start is None else self._start.solution.substeps
-            if self.solution.substeps - before != len(self.solution) - 1:
-                raise ArgumentError(
-                    "of: this quantity needs material or energies, and steps of the run were "
-                    "divided; use a smaller dt, with which no step is divided"
-                )
+            first = self
+            first._require_whole_steps()
+            while first._start is not None:
+                first = first._start
+                first._require_whole_steps()
             for p, name in enumerate(self.at):
-                simulations = self._case.simulations(name, QUANTITY_STEP)
+                # Simulations begin at the time of the first run
+                simulations = first._case.simulations(name, QUANTITY_STEP)
                 changes, found = self._case.positions(name, QUANTITY_STEP), list[Solution]()
                 for simulation, change in zip(simulations, changes, strict=True):
                     with closing(simulation):
                         found.append(self._repeat(simulation, p, change))
                 self._repeated.append(found)
         return self._repeated
+
+    def _require_whole_steps(self) -> None:
+        """Raise :class:`ArgumentError` if steps of the run were divided."""
+        before = 0 if self._start is None else self._start.solution.substeps
+        if self.solution.substeps - before != len(self.solution) - 1:
+            raise ArgumentError(
+                "of: this quantity needs material or energies, and steps of the run were "
+                "divided; use a smaller dt, with which no step is divided"
+            )
 
     def _repeat(self, simulation: Simulation, p: int, change: float) -> Solution:
         """Return the states of a simulation whose motion follows from a change of a parameter."""
@@ -556,10 +566,23 @@ class Derivatives:
         return simulation.solution
 
 
-def _as_array(values: Any) -> Array:
-    """Return the result of a quantity as an array."""
+def in_scene(quantity: Callable[[Solution], npt.ArrayLike], solution: Solution) -> npt.ArrayLike:
+    """Return a quantity in a neighbouring scene, which may have other beams than the scene."""
     try:
-        found = np.asarray(values, dtype=np.float64) if values is not None else None
+        return quantity(solution)
+    except ArgumentError as error:
+        raise ArgumentError(
+            f"{error}. If the model makes new beams at each call, find places in the scene "
+            "of the solution, as in lambda s: s.displacement(s.scene.beams[0].end)"
+        ) from error
+
+
+def _as_array(values: Any) -> Array:
+    """Return the result of a quantity as an array, of complex numbers if it has some."""
+    try:
+        found = np.asarray(values) if values is not None else None
+        if found is not None:
+            found = found.astype(np.complex128 if np.iscomplexobj(found) else np.float64)
     except (TypeError, ValueError):
         found = None
     if found is None:
@@ -569,7 +592,7 @@ def _as_array(values: Any) -> Array:
     return found
 
 
-class _Unknown(Exception):
+class Unknown(Exception):
     """A quantity needs numbers that the derivatives of the motion do not have."""
 
 
@@ -585,14 +608,14 @@ class MotionOnly(Solution):
     def column(self, name: str) -> Column:
         """Return a column of the states."""
         if name not in self._blocks[0].columns.at and name != "v":
-            raise _Unknown
+            raise Unknown
         return super().column(name)
 
     def _row(self, name: str, n: int) -> Array:
         return self.column(name)[n,]
 
     def _refuse(self, *_: Any) -> NoReturn:
-        raise _Unknown
+        raise Unknown
 
     ledger = cell_resultants = _refuse  # type: ignore[assignment]
     internal = property(_refuse, lambda self, value: None)  # type: ignore[assignment]

@@ -15,10 +15,13 @@ from ufl_beam.analysis.derivatives import (
     Model,
     MotionOnly,
     StepDerivatives,
+    Unknown,
     checked_case,
+    in_scene,
 )
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ArgumentError, StepFailed, require_function, require_number
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia, stages_of
@@ -34,6 +37,9 @@ SMALL = 2.0**-17
 """Small step of differences of histories and numbers, as a fraction of the largest value."""
 
 ALIKE = 1e-9  # relative difference of slopes by small and large steps that counts as round-off
+
+FINER = 2.0**-6
+"""Ratio of steps of differences of histories and numbers, see :func:`_slope`."""
 
 MAX_BYTES = 2.0**28
 """Memory for recorded steps; bytes."""
@@ -73,14 +79,16 @@ def gradient(
         t: Beginning and end; s.
         dt: Time step; s.
         of: Function of a :class:`Solution` that returns a history of its motion, (n+1,) or
-            (n+1, k): each value depends on displacements and velocities at its time only.
+            (n+1, k): each value depends on displacements, positions and velocities at its time
+            only.
         reduce: Function that returns the number for the history; by default its last value.
         newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default the cells of the beams.
         max_bytes: Memory for recorded steps; bytes.
 
     Returns:
-        Derivatives of the number; (P,), in the order of ``at``.
+        Derivatives of the number; (P,), in the order of ``at``.  The derivative by a parameter on
+        which the run does not depend is round-off.
 
     Raises:
         ArgumentError: As in :func:`differentiate`; the history depends on something else than the
@@ -114,8 +122,10 @@ def gradient(
         ends[-1] = t1
         adjoint = _Adjoint(run, steps, max_bytes)
         starts = adjoint.run(ends)
-        sources = _derivatives_by_motion(run.solution, of, reduce)
-        found = adjoint.reverse(ends, starts, *sources)
+        history = _History(run.solution, of, reduce)
+        found = adjoint.reverse(ends, starts, *history.derivatives_by_motion())
+        for p, (some, row) in enumerate(zip(neighbours, weights, strict=True)):
+            found[p] += np.dot(row, [history.change_in(other.numbering) for other in some])
         for some in neighbours:
             for other in some:
                 other.close()
@@ -211,75 +221,129 @@ class _Adjoint:
         return self.gradient.copy()
 
 
-def _derivatives_by_motion(
-    solution: Solution, of: Callable[[Solution], npt.ArrayLike], reduce: Callable[[Array], float]
-) -> tuple[Array, Array]:
-    """Return the derivatives of the number by q and v of each state; (n+1, size) each."""
-    states = {"t": solution.times, "q": solution.q, "v": solution.v}
-    if not len(states["v"]):
-        states["v"] = np.zeros_like(states["q"])
-    numbering = solution.numbering
+class _History:
+    """A history of the motion of a run, and a number that is made of it."""
 
-    def history(**changes: Array) -> Array:
-        shifted = {**states, **{name: states[name] + x for name, x in changes.items()}}
-        return np.asarray(of(MotionOnly(numbering, shifted)), dtype=np.float64)
+    def __init__(
+        self, solution: Solution, of: Callable[[Solution], npt.ArrayLike],
+        reduce: Callable[[Array], float],
+    ) -> None:  # fmt: skip
+        self._numbering, self._of, self._reduce = solution.numbering, of, reduce
+        self._states = {"t": solution.times, "q": solution.q, "v": solution.v}
+        if not len(self._states["v"]):
+            self._states["v"] = np.zeros_like(self._states["q"])
+        reference = self._reference = self._in(self._numbering)
+        if reference.shape[:1] != (len(solution),):
+            raise ArgumentError(
+                f"gradient: of returns an array of shape {reference.shape}, and must return a "
+                f"history with one row for each of the {len(solution)} states; put the rest into "
+                "reduce"
+            )
+        if not np.isfinite(reference).all():
+            n = int(np.argmin(np.isfinite(reference.reshape(len(reference), -1)).all(axis=1)))
+            raise ArgumentError(
+                f"gradient: the history is not finite at t = {solution.times[n]:g} s; return "
+                "finite values, and leave out those that reduce does not need"
+            )
 
-    reference = history()
-    if reference.shape[:1] != (len(solution),):
-        raise ArgumentError(
-            f"gradient: of returns an array of shape {reference.shape}, and must return a history "
-            f"with one row for each of the {len(solution)} states; put the rest into reduce"
-        )
-    rows = reference.reshape(len(solution), -1)
-    by_rows, found = np.zeros(rows.shape), []
-    for n, k in np.ndindex(rows.shape):
+    def _in(self, numbering: DofNumbering, **changes: Array) -> Array:
+        """Return the history in a scene, for changes of the motion."""
+        shifted = self._states | {name: self._states[name] + x for name, x in changes.items()}
+        try:
+            values = in_scene(self._of, MotionOnly(numbering, shifted))
+        except Unknown:
+            raise ArgumentError(
+                "gradient: the history needs more than displacements and velocities, such as "
+                "forces or energies; use differentiate"
+            ) from None
+        return np.asarray(values, dtype=np.float64)
 
-        def number(change: float, at: tuple[int, int] = (n, k)) -> float:
-            changed = rows.copy()
-            changed[at] += change
-            return reduce(changed.reshape(reference.shape))
+    def change_in(self, numbering: DofNumbering) -> float:
+        """Return the change of the number in another scene with the same motion.
 
-        by_rows[n, k] = _slope(number, float(np.abs(rows[:, k]).max()))
-    for name, x in (("q", states["q"]), ("v", states["v"])):
-        scale, bar = float(np.abs(x).max()) or 1.0, np.zeros_like(x)
-        pending = [np.arange(x.shape[1])]
-        while pending:  # bisection for the degrees of freedom that the history depends on
-            dofs = pending.pop()
-            change = np.zeros_like(x)
-            change[:, dofs] = SMALL * scale * (1 + np.arange(len(dofs)) / x.shape[1])
-            if np.array_equal(history(**{name: change}), reference):
-                continue
-            if len(dofs) > 1:
-                pending += np.array_split(dofs, 2)
-                continue
-            change[::2] = 0.0
-            if np.any(history(**{name: change})[::2] != reference[::2]):
-                raise ArgumentError(
-                    "gradient: values of the history depend on motions at other times; put the "
-                    "part that combines times into reduce"
-                )
+        Positions, and displacements of points of bodies, depend on the geometry, too.
+        """
+        history = self._in(numbering)
+        if np.array_equal(history, self._reference, equal_nan=True):
+            return 0.0
+        return self._reduce(history) - self._reduce(self._reference)
 
-            def shifted_history(shift: float, name: str = name, dofs: Index = dofs) -> Array:
-                change = np.zeros_like(states["q"])
-                change[:, dofs] = shift
-                return history(**{name: change})
+    def _by_values(self) -> Array:
+        """Return the derivatives of the number by the values of the history; (n+1, k)."""
+        reference = self._reference
+        rows = reference.reshape(len(reference), -1)
+        by_rows = np.zeros(rows.shape)
+        for n, k in np.ndindex(rows.shape):
 
-            slope = np.asarray(_slope(shifted_history, scale)).reshape(len(x), -1)
-            bar[:, dofs[0]] = np.sum(by_rows * slope, axis=1)
-        found.append(bar)
-    return found[0], found[1]
+            def number(change: float, at: tuple[int, int] = (n, k)) -> float:
+                changed = rows.copy()
+                changed[at] += change
+                return self._reduce(changed.reshape(reference.shape))
+
+            by_rows[n, k] = _slope(number, float(np.abs(rows[:, k]).max()))
+        return by_rows
+
+    def derivatives_by_motion(self) -> tuple[Array, Array]:
+        """Return the derivatives of the number by q and v of each state; (n+1, size) each."""
+        reference, by_rows, found = self._reference, self._by_values(), []
+        for name in ("q", "v"):
+            x = self._states[name]
+            scale, bar = float(np.abs(x).max()) or 1.0, np.zeros_like(x)
+            pending = [np.arange(x.shape[1])]
+            while pending:  # bisection for the degrees of freedom that the history depends on
+                dofs = pending.pop()
+                change = np.zeros_like(x)
+                change[:, dofs] = SMALL * scale * (1 + np.arange(len(dofs)) / x.shape[1])
+                if np.array_equal(self._in(self._numbering, **{name: change}), reference):
+                    continue
+                if len(dofs) > 1:
+                    pending += np.array_split(dofs, 2)
+                    continue
+                change[::2] = 0.0
+                if np.any(self._in(self._numbering, **{name: change})[::2] != reference[::2]):
+                    raise ArgumentError(
+                        "gradient: values of the history depend on motions at other times; put the "
+                        "part that combines times into reduce"
+                    )
+
+                def shifted(shift: float, name: str = name, dofs: Index = dofs) -> Array:
+                    change = np.zeros_like(self._states["q"])
+                    change[:, dofs] = shift
+                    return self._in(self._numbering, **{name: change})
+
+                slope = np.asarray(_slope(shifted, scale)).reshape(len(x), -1)
+                bar[:, dofs[0]] = np.sum(by_rows * slope, axis=1)
+            found.append(bar)
+        return found[0], found[1]
 
 
-def _slope(function: Callable[[float], Any], scale: float) -> Any:
-    """Return the derivative of a function at zero, for arguments of the size ``scale``.
+def _slope(function: Callable[[float], Any], scale: float) -> Array:
+    """Return the derivative of a function at zero, for arguments of the size ``scale`` or less.
 
-    Differences with a large step have less round-off; they are taken if those with a small step
-    agree, as for polynomials.
+    The argument may be much smaller than ``scale``, which is the largest number of the motion or of
+    the history: a force of a joint, an angle after many turns, the first of many decaying swings.
+    So steps become finer until slopes agree, and the slope is taken that differs least from the
+    slope before, with its round-off.  Polynomials of degree 4 need two steps.
     """
-    (positions, weights), start = next(iter(STENCILS.items())), function(0.0)
-    small, large = (
-        sum(w / h * (function(k * h) - start) for k, w in zip(positions, weights, strict=True))
-        for h in (SMALL * (scale or 1.0), scale or 1.0)
-    )
-    same = np.abs(large - small).max() <= ALIKE * np.abs(small).max()
-    return large if same else small
+    (positions, weights), start = next(iter(STENCILS.items())), np.asarray(function(0.0))
+
+    def slope_at(h: float) -> Array:
+        shifted = zip(positions, weights, strict=True)
+        return np.asarray(sum(w / h * (function(k * h) - start) for k, w in shifted))
+
+    h, round_off = scale or 1.0, np.finfo(np.float64).eps * np.abs(start).max()
+    finest, last, best, least = 2.0**-40 * min(h, 1.0), slope_at(h), None, 1.0
+    largest = np.abs(last).max()
+    while least > ALIKE and h > finest:
+        h *= FINER
+        if round_off / h > least * largest > 0:  # finer steps have more round-off
+            break
+        slope = slope_at(h)
+        if not largest and not slope.any() and h < SMALL * (scale or 1.0):
+            return slope
+        largest = max(largest, np.abs(slope).max())
+        error = np.abs(slope - last).max() + round_off / h
+        if error < least * largest:
+            best, least = slope, float(error / largest)
+        last = slope
+    return slope_at(SMALL * min(scale or 1.0, 1.0)) if best is None else best
