@@ -416,7 +416,7 @@ class Stepper(StateView):
             )
         if failure == lib.NO_DERIVATIVE:
             at = f"{c.failed_end:.9g} s"
-            reason = "a stage has failed" if c.stages > 1 else "the tangent is singular"
+            reason = "the tangent is singular" + ", or a stage has failed" * (c.stages > 1)
             raise ModelError(f"the step to t = {at} has no derivative: {reason}; use a smaller dt")
         if failure == lib.APPLIED_TOO_FAST:
             raise StepFailed("a node turns too far while the loads at the beginning are applied")

@@ -345,11 +345,13 @@ static int accept_end(time_loop *m)
 
 /* Take back the accepted stages of a step that is not accepted. A step of such a scheme is the same
  * in both directions of time, so the beginning of a stage, which is known, is its end in a stage
- * that goes back. All terms accept this stage; no equation is solved. */
+ * that goes back. All terms accept this stage; no equation is solved. Its derivatives take those of
+ * the stage back, too. */
 void take_back(time_loop *m)
 {
   equation *e = m->equation;
-  const int raised = e->raised, error = e->error, failure = m->failure;
+  const int raised = e->raised, error = e->error;
+  int failure = m->failure;
   if (!m->taken) return;
   forget_ends(m->prediction, m->taken);
   e->raised = NOTHING;
@@ -360,6 +362,7 @@ void take_back(time_loop *m)
     go_to(e, m->begun + (size_t)k * m->size, EXACT);
     residual_at(e, e->unknowns);
     measure(m);
+    if (m->derivatives && failure != NO_DERIVATIVE && !differentiate_step(m->derivatives, m, 0)) failure = NO_DERIVATIVE;
     accept_end(m);
   }
   e->raised = raised, e->error = error, m->failure = failure;
@@ -406,8 +409,7 @@ int attempt_step(time_loop *m, double t1, double end)
   }
   if (m->stages <= 1) return solve_to(m, t1, end);
   if (take_stages(m, t1) && solve_to(m, t1, end)) return 1;
-  /* Derivatives of stages are not taken back. */
-  if (m->taken && m->equation->raised == NOTHING && (m->derivatives || m->adjoint)) fails(m, NO_DERIVATIVE);
+  if (m->taken && m->equation->raised == NOTHING && m->adjoint) fails(m, NO_DERIVATIVE); /* the record has the stages */
   take_back(m);
   return 0;
 }
