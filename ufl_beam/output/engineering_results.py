@@ -25,7 +25,7 @@ from ufl_beam.model.bodies import AttachmentPoint, Member, Place, require_place
 from ufl_beam.model.connector_laws import RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector, can_yield, place_of
 from ufl_beam.model.scene import Scene, attachment_points
-from ufl_beam.output.state_rows import HINGE, OWN_LAW_YIELDS, PLASTIC, Columns
+from ufl_beam.output.state_rows import HINGE, OWN_LAW_YIELDS, PLASTIC
 from ufl_beam.output.states import States
 
 # -- storeys ---------------------------------------------------------------------------------------
@@ -132,7 +132,7 @@ def shears_above(states: States, elevations: Array, tolerance: float) -> Array:
         connectors = _cut_connectors(scene, elevation, tolerance)
         for connector, sign in connectors:
             force = states.connector(connector).force
-            shear[:, k] += sign * force * _directions(states, connector)
+            shear[:, k] += sign * force * states.directions(connector)[:, 0]
         if not connectors and not any(cut[0] == k for cut in cut_cells):
             raise ArgumentError(
                 f"storeys: nothing is cut just above the level y = {elevation:g} m; give a place "
@@ -162,31 +162,6 @@ def _cut_connectors(scene: Scene, elevation: float, tol: float) -> list[tuple[Co
         for connector in scene.all_connectors
         if not connector.is_rotation and above(connector.a) != above(connector.b)
     ]
-
-
-def _directions(states: States, connector: Connector) -> Array:
-    """Return x of the directions in which b moves if a motion grows, in the steps; (n+1,)."""
-    if connector.motion == "parting":
-        return np.full(len(states), connector.axis[0])
-    e, (x, y) = states.equilibrium_fraction, connector.axis
-    along, length = np.zeros((2, len(states)))
-    for weight, some in ((e, states), (1 - e, states if e == 1 else before(states))):
-        if connector.stretches:
-            between = some.position(connector.b) - some.position(connector.a)
-            along += weight * between[:, 0]
-            length += weight * np.linalg.norm(between, axis=1)
-        else:
-            angle = some.displacement(connector.a)[:, 2]
-            along += weight * (x * np.cos(angle) - y * np.sin(angle))
-    return along / length if connector.stretches else along
-
-
-def before(states: States) -> States:
-    """Return configurations at the beginnings of the steps that end at the states."""
-    begun, columns = States(states.numbering), Columns({"t": (), "q": (states.numbering.size,)})
-    for n in range(len(states)):
-        begun.append(columns, np.zeros(1), states.before(n))
-    return begun
 
 
 SAME_VALUE = 1e-9

@@ -308,6 +308,8 @@ class StateWriter:
 class JointHistory(NamedTuple):
     """History of a joint between its first place a and its second place b.
 
+    Forces and their directions belong to the step that ends at their time, as reactions do.
+
     Attributes:
         motion: Displacement of b relative to a, in axes that turn with a, and rotation of b
             relative to a; zero in the undeformed scene; (n+1, 3); m, m, rad.

@@ -307,6 +307,8 @@ class States:
                 "known; make it with multipliers=True"
             )
         rotations = [self.displacement(place)[:, 2] for place in (a, b)]
+        ends = self._ends()
+        angles = [np.sum([w * x.displacement(p)[:, 2] for w, x in ends], 0) for p in (a, b)]
         between = self.position(b) - self.position(a)
         apart = turned(between, -rotations[0]) - np.subtract(b.point, a.point)
         motion = np.column_stack([apart, rotations[1] - rotations[0]])
@@ -321,24 +323,47 @@ class States:
             if holder.is_rotation:
                 moment -= λ
             else:
-                force -= λ[:, None] * self._direction(holder, rotations[0])
-        in_a, in_b = (turned(force, -angle) for angle in rotations)
+                force -= λ[:, None] * self.directions(holder)
+        in_a, in_b = (turned(force, -angle) for angle in angles)
         return JointHistory(motion, force, in_a, in_b, moment)
 
-    def _direction(self, holder: Connector, angle: Array) -> Array:
-        """Return directions in which b moves if the motion of ``holder`` grows; (n+1, 2)."""
-        if holder.stretches:
-            between = self.position(holder.b) - self.position(holder.a)
-            return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
-        if isinstance(holder.law, Guide):
-            curve, s, size, normals = holder.law.curve, 0.0, self.scene.size, []
-            for point in self.position(holder.b):
+    def directions(self, connector: Connector) -> Array:
+        """Return directions in which b moves if the motion of a connector grows; (n+1, 2).
+
+        They belong to the step that ends at each time, as the forces do: with
+        :attr:`equilibrium_fraction` < 1 they are means of the directions at both ends of it.
+        """
+        a, b, ends = connector.a, connector.b, self._ends()
+        if isinstance(connector.law, Guide):
+            curve, s, size, normals = connector.law.curve, 0.0, self.scene.size, []
+            for point in np.sum([weight * some.position(b) for weight, some in ends], axis=0):
                 step = parameter_step(curve, s, size)
                 s = nearest(curve, point, s, step, size)
                 x, y = tangent(curve, s, step)
                 normals.append((-y, x))
             return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
-        return turned(holder.axis, angle if holder.follows_a else np.zeros_like(angle))
+        found, length = np.zeros((len(self), 2)), np.ones(len(self))
+        if connector.stretches:
+            length[:] = 0.0
+            for weight, some in ends:
+                between = some.position(b) - some.position(a)
+                found += weight * between
+                length += weight * np.linalg.norm(between, axis=1)
+        else:
+            for weight, some in ends:
+                angle = some.displacement(a)[:, 2] if connector.follows_a else np.zeros(len(self))
+                found += weight * turned(connector.axis, angle)
+        return found / length[:, None]
+
+    def _ends(self) -> list[tuple[float, States]]:
+        """Return the states, and those at the beginnings of their steps, with their weights."""
+        e = self.equilibrium_fraction
+        if e == 1.0:
+            return [(e, self)]
+        begun, columns = States(self.numbering), Columns({"t": (), "q": (self.numbering.size,)})
+        for n in range(len(self)):
+            begun.append(columns, np.zeros(1), self.before(n))
+        return [(e, self), (1.0 - e, begun)]
 
     def reaction(self, support: Support) -> Array:
         """Return force (x, y) and moment of a support on the scene; (n+1, 3); N, N, N m.
