@@ -226,6 +226,39 @@ def test_an_attempt_that_is_taken_back_leaves_the_state():
     one.close(), other.close()
 
 
+DRIVEN = {
+    "motor": lambda b: held(
+        b,
+        supports=[ub.Pinned(b.start)],
+        connectors=[ub.Turn(ub.ground(0, 0), b.start, ub.PrescribedMotion(smooth))],
+    ),
+    "moving support of a rail": lambda b: held(
+        b,
+        bodies=[slider := ub.Body((4, 1), mass=1.0, inertia=0.2)],
+        joints=[ub.Prismatic(b.end, slider.middle)],
+        supports=[ub.Pinned(b.start), ub.PrescribedDisplacement(slider.middle, u=smooth)],
+    ),
+}
+"""Scenes in which multipliers do work on prescribed motions."""
+
+
+@pytest.mark.parametrize("part", DRIVEN)
+def test_works_of_multipliers_are_taken_back(part):
+    """The force of a constraint belongs to a stage, not to the configuration at its beginning."""
+    simulation = ub.Simulation(DRIVEN[part](arm()), FOURTH, newton=TIGHT)
+    simulation.step_to(0.2)
+    ledger = simulation.ledger
+    before = {**ledger.state, **ledger.supplied}
+    simulation.attempt(0.6)
+    simulation.take_back()
+    after = {**ledger.state, **ledger.supplied}
+    size = sum(map(abs, before.values()))
+    assert before == pytest.approx(after, abs=1e-10 * size)
+    simulation.close()
+    adaptive = go(DRIVEN[part](arm()), dt=ub.Adaptive(1e-5, first=0.5))
+    assert adaptive.energy.worst < SAME
+
+
 def test_a_stage_that_fails_repeats_the_whole_step_in_halves():
     """Three iterations are too few for steps of 0.5 s, and enough for the halves."""
     scene, _ = linked()
