@@ -130,6 +130,25 @@ def test_weights_of_several_measurements_agree_with_their_estimated_deviations()
     assert result.identified_by == {"a": "measurement", "b": "measurement"}
 
 
+def peaks(a, b):
+    """Two measured numbers that the fit of two parameters can meet."""
+
+    def numbers(run):
+        return force(run)[[20, 40]]
+
+    values = np.array([a * 0.5 + b * 0.25, a + b])
+    return measurement(values, times=None, quantity=numbers, name="peaks")
+
+
+def test_too_few_values_for_an_estimate_of_their_deviation_are_refused():
+    """Without a refusal the fit would go through them, and their deviation would become 1e-9."""
+    one = measurement([-1.2], times=None, quantity=lambda run: force(run)[-1], name="peak")
+    with raises("peak has 1 value, too few to estimate a standard deviation", "sigma="):
+        fit([measurement(), one])
+    with raises("peaks has 2 values, too few to estimate a standard deviation", "sigma="):
+        fit([measurement(sigma=1.0), peaks(2.1, -3.2)])
+
+
 def test_intervals_of_positive_parameters_are_symmetric_in_their_logarithm():
     values, times = np.exp([0.1, -0.1, 0.05]) * [0.5, 1.0, 1.5], np.array([0.5, 1.0, 1.5])
     result = fit(
@@ -159,6 +178,35 @@ def test_interpolation_is_exact_for_cubics_and_of_fourth_order():
     assert np.log2(errors[0] / errors[1]) > 3.9
 
 
+def test_interpolation_at_fourth_order_is_of_sixth_order():
+    """Its error is below that of the steps; with four states it would be above it."""
+
+    def shaken(k):
+        section = ub.Section(EA=1e3, GA=1e3, EI=30.0, rhoA=1.0, rhoI=0.5)
+        beam = ub.Beam((0, 0), (3, 0), section, cells=1, name="beam")
+        load = ub.PointLoad(beam.end, force=(0, k), amplitude=lambda s: np.sin(s) ** 4)
+        return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+
+    def tip(run):
+        return run.displacement(run.scene["beam"].end)[:, 1]
+
+    fourth = ub.EnergyMomentum(order=4)
+    options = {"quantity": tip, "scheme": fourth, "t": (0, 3)}
+    fine, coarse = (
+        ub.simulate(shaken(1.0), fourth, t=(0, 3), dt=dt, progress=False) for dt in (0.01, 0.1)
+    )
+    at = measurement(np.zeros(301), times=fine.times, dt=0.1, **options)
+    steps = np.abs(tip(coarse) - tip(fine)[::10]).max()
+    assert np.abs(at.computed(coarse) - tip(fine)).max() < 1.5 * steps
+
+
+def test_a_time_outside_of_the_run_by_round_off_is_its_end():
+    """3 times 0.1 is above 0.3."""
+    times = np.arange(1, 4) * 0.1
+    assert times[-1] > 0.3
+    assert measurement([1.0, 2.0, 3.0], times=times, t=(0, 0.3), dt=0.1).times[-1] == 0.3
+
+
 def test_a_first_row_without_a_value_is_left_out():
     def acceleration(run):
         return run.acceleration(run.scene["beam"].end)[:, 0]
@@ -180,7 +228,10 @@ def test_values_without_times_are_compared_as_they_are():
     result = fit(measurement([4.0], times=None, quantity=at_end, sigma=0.1), {"a": 1.0},
                  lambda a: pushed(a, 0.0))  # fmt: skip
     assert result.parameters["a"] == pytest.approx(4.0)
-    ub.plot(result)
+    assert "measurement: 1 value, " in str(result)
+    below = ub.plot(result).axes[1]
+    assert below.get_xlabel() == "number of the value"
+    assert [x for x in below.get_xticks() if 0.5 <= x <= 1.5] == [1.0]
 
 
 def test_arguments_distinguish_the_runs_of_measurements():
@@ -258,6 +309,18 @@ def test_wide_intervals_and_bounds_are_named():
                      lambda a: pushed(a, 0.0))  # fmt: skip
     assert result.parameters["a"] == pytest.approx(1.5, rel=1e-4)
     assert result.intervals["a"][1] <= 1.5
+
+
+def test_a_bound_on_one_side_holds():
+    data = measurement(truth(2.0, 0.0), sigma=SIGMA)
+    ends = {(3.0, 2.5, None): 2.5, (1.0, None, 1.5): 1.5, (-3.0, None, -1.0): -1.0}
+    for entry, end in ends.items():
+        with warned(f"a = {end:g} is at its"):
+            result = fit(data, {"a": entry}, lambda a: pushed(a, 0.0))
+        assert result.parameters["a"] == pytest.approx(end, rel=1e-3)
+    assert fit(data, {"a": (1.0, 0.0, None)}, lambda a: pushed(a, 0.0)).warnings == ()
+    with raises("parameters['a']: 1 is not between the bounds 2 and inf"):
+        fit(data, {"a": (1.0, 2.0, None)}, lambda a: pushed(a, 0.0))
 
 
 def test_failed_runs_shorten_the_step_of_the_search():

@@ -226,6 +226,39 @@ def test_an_attempt_that_is_taken_back_leaves_the_state():
     one.close(), other.close()
 
 
+DRIVEN = {
+    "motor": lambda b: held(
+        b,
+        supports=[ub.Pinned(b.start)],
+        connectors=[ub.Turn(ub.ground(0, 0), b.start, ub.PrescribedMotion(smooth))],
+    ),
+    "moving support of a rail": lambda b: held(
+        b,
+        bodies=[slider := ub.Body((4, 1), mass=1.0, inertia=0.2)],
+        joints=[ub.Prismatic(b.end, slider.middle)],
+        supports=[ub.Pinned(b.start), ub.PrescribedDisplacement(slider.middle, u=smooth)],
+    ),
+}
+"""Scenes in which multipliers do work on prescribed motions."""
+
+
+@pytest.mark.parametrize("part", DRIVEN)
+def test_works_of_multipliers_are_taken_back(part):
+    """The force of a constraint belongs to a stage, not to the configuration at its beginning."""
+    simulation = ub.Simulation(DRIVEN[part](arm()), FOURTH, newton=TIGHT)
+    simulation.step_to(0.2)
+    ledger = simulation.ledger
+    before = {**ledger.state, **ledger.supplied}
+    simulation.attempt(0.6)
+    simulation.take_back()
+    after = {**ledger.state, **ledger.supplied}
+    size = sum(map(abs, before.values()))
+    assert before == pytest.approx(after, abs=1e-10 * size)
+    simulation.close()
+    adaptive = go(DRIVEN[part](arm()), dt=ub.Adaptive(1e-5, first=0.5))
+    assert adaptive.energy.worst < SAME
+
+
 def test_a_stage_that_fails_repeats_the_whole_step_in_halves():
     """Three iterations are too few for steps of 0.5 s, and enough for the halves."""
     scene, _ = linked()
@@ -242,21 +275,33 @@ def test_a_stage_that_fails_repeats_the_whole_step_in_halves():
     assert simulation.t % (50 / 4096) == pytest.approx(0, abs=1e-12)  # it is no end of a stage
 
 
-def test_derivatives_of_stages_are_taken_back_with_a_step_that_is_divided():
-    def swing(EI):
+@pytest.mark.parametrize("motor", [False, True])
+def test_derivatives_of_stages_are_taken_back_with_a_step_that_is_divided(motor):
+    def swing(EI, rate=0.5):
         section = ub.Section(EA=1e4, GA=4e3, EI=EI, rhoA=1.0, rhoI=0.01)
         beam = ub.Beam((0, 0), (2, 0), section, cells=4)
-        return ub.Scene([beam], supports=[ub.Pinned(beam.start)], loads=[ub.Gravity()])
+        pin, loads = ub.Revolute(ub.ground(0, 0), beam.start, multipliers=True), [ub.Gravity()]
+        if not motor:
+            return ub.Scene([beam], joints=[pin], loads=loads)
+        drive = ub.PrescribedMotion(lambda t: rate * t**2)
+        turn = ub.Turn(ub.ground(0, 0), beam.start, drive)
+        return ub.Scene([beam], joints=[pin], loads=loads, connectors=[turn])
 
+    at = {"EI": 100.0} | ({"rate": 0.5} if motor else {})
     run = {"scheme": FOURTH, "t": (0, 2.0), "dt": 0.5, "newton": ub.Newton(max_iterations=4)}
-    found = ub.differentiate(swing, {"EI": 100.0}, **run, progress=False)
+    found = ub.differentiate(swing, at, **run, progress=False)
     assert found.solution.substeps > len(found.solution)
-    h = 1e-2
-    q = [ub.simulate(swing(100.0 + k * h), **run, progress=False).q for k in (-2, -1, 1, 2)]
-    expected = (q[0] - 8 * q[1] + 8 * q[2] - q[3]) / (12 * h)
-    size = np.abs(expected).max()
-    slopes = found.of(lambda s: s.q)[..., 0]
-    assert slopes == pytest.approx(expected, rel=0, abs=1e-7 * size)
+    slopes = found.of(lambda s: s.q)
+    for p, (name, value) in enumerate(at.items()):
+        h = 1e-4 * value
+        q = [
+            ub.simulate(swing(**at | {name: value + k * h}), **run, progress=False).q
+            for k in (-2, -1, 1, 2)
+        ]
+        expected = (q[0] - 8 * q[1] + 8 * q[2] - q[3]) / (12 * h)
+        size = np.abs(expected).max(axis=0)  # of 15 motions, and of larger forces of joints
+        error = np.abs(slopes[..., p] - expected).max(axis=0)
+        assert np.all(error <= 1e-7 * np.maximum(size, size[:15].max()))
 
 
 def test_a_run_that_ends_in_a_stage_ends_in_the_last_whole_step():

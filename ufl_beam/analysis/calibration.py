@@ -21,6 +21,7 @@ from ufl_beam.analysis.calibration_result import Calibration, Measurement
 from ufl_beam.analysis.derivatives import checked_case
 from ufl_beam.analysis.parameter_study import study
 from ufl_beam.arrays import Array, Index
+from ufl_beam.display import counted
 from ufl_beam.errors import (
     ArgumentError,
     ConvergenceError,
@@ -77,12 +78,18 @@ AT_BOUND = 1e-4  # distance from a bound that counts as zero, in the search vari
 
 FAILURES = ConvergenceError, ArgumentError  # of runs during a search
 
+LEAST_FREE = 0.5
+"""Degrees of freedom of a measurement below which its residuals do not estimate a standard
+deviation: the fit goes through its values, and each round would make the estimate smaller."""
+
 Model = Callable[..., Scene]
+
+Entry = float | tuple[float, float | None, float | None]  # start, or start with bounds
 
 
 def calibrate(
     model: Model,
-    parameters: Mapping[str, float | tuple[float, float, float]],
+    parameters: Mapping[str, Entry],
     measured: Sequence[Measurement],
     *,
     starts: int = 1,
@@ -100,14 +107,15 @@ def calibrate(
     step of the search.
 
     Where no standard deviation is given, it is estimated from the residuals.  With several
-    measurements the estimates and the fit are repeated until they agree.
+    measurements the estimates and the fit are repeated until they agree.  A measurement with as few
+    values as the fit can meet, such as one frequency, has no such estimate and needs ``sigma=``.
 
     Args:
         model: Function that returns the scene for values of the parameters.  It is called as
             ``model(**parameters, **measurement.arguments)``.
-        parameters: Start of each parameter by name: a number, or (start, lower bound, upper bound).
-            A parameter is positive if its start is positive and it has no bounds, or if its lower
-            bound is positive.
+        parameters: Start of each parameter by name: a number, or (start, lower bound, upper bound),
+            where a bound may be None.  A parameter is positive if its start is positive and it has
+            no lower bound, or if its lower bound is positive.
         measured: Measurements.
         starts: Number of searches: from the start given, and from random starts within the bounds,
             a Latin hypercube.  A random start at which a run fails is moved halfway to the start
@@ -121,7 +129,8 @@ def calibrate(
 
     Raises:
         ArgumentError: The model has no such argument, a start is outside its bounds, there are
-            fewer values than parameters, or a parameter has no effect on any computed value.
+            fewer values than parameters, a parameter has no effect on any computed value, or a
+            standard deviation cannot be estimated.
         ConvergenceError: The run at the start given failed.
 
     Warns:
@@ -160,6 +169,9 @@ def calibrate(
             + (" and a standard deviation" if least > p else "")
             + "; leave out parameters, or measure more"
         )
+    for measurement in measurements:
+        if measurement.sigma is None and len(measurement) == 1:
+            raise _without_estimate(measurement)
     points = _start_points(variables, starts, seed)
 
     sigma = [_assumed_sigma(m) for m in measurements]
@@ -235,7 +247,7 @@ class Variables:
     upper: Array
 
     @classmethod
-    def of(cls, parameters: Mapping[str, float | tuple[float, float, float]]) -> Variables:
+    def of(cls, parameters: Mapping[str, Entry]) -> Variables:
         """Check parameters and their bounds."""
         require_kind(parameters, Mapping, f"{WHAT}: parameters")
         if not parameters:
@@ -251,18 +263,16 @@ class Variables:
                     f"{what} = {shorten(entry)} must be a start, or (start, lower, upper)"
                 ) from None
             start = require_number(start, what)
-            if low is None or high is None:
-                positive, low, high = start > 0, -math.inf, math.inf
-                scale = abs(start)
-                if not start:
-                    raise ArgumentError(f"{what} = 0 has no scale; give (start, lower, upper)")
-            else:
-                low, high = (require_number(x, f"{what}: bound") for x in (low, high))
-                positive, scale = low > 0, (high - low) / 2
-                if not low <= start <= high or not low < high:
-                    raise ArgumentError(
-                        f"{what}: {start:g} is not between the bounds {low:g} and {high:g}"
-                    )
+            positive = start > 0 if low is None else low > 0
+            low = -math.inf if low is None else require_number(low, f"{what}: bound")
+            high = math.inf if high is None else require_number(high, f"{what}: bound")
+            if not low <= start <= high or not low < high:
+                raise ArgumentError(
+                    f"{what}: {start:g} is not between the bounds {low:g} and {high:g}"
+                )
+            scale = (high - low) / 2 if math.isfinite(high - low) else abs(start)
+            if not scale:
+                raise ArgumentError(f"{what} = 0 has no scale; give (start, lower, upper)")
             rows.append((positive, start, start if positive else scale, low, high))
         return cls(tuple(parameters), *map(np.array, zip(*rows, strict=True)))
 
@@ -483,9 +493,12 @@ class Problem:
 
         The estimate of a measurement is sqrt(S/(m - h)) with the sum S of its squared residuals and
         its part h of the trace of the hat matrix; the sum of h is p.
+
+        Raises:
+            ArgumentError: The values of a measurement are too few for an estimate.
         """
         unknown = [k for k, m in enumerate(self.measured) if m.sigma is None]
-        splits = self.splits
+        splits, free = self.splits, dict[int, float]()
         for _ in range(ROUNDS if unknown else 0):
             computed, jacobian = self.linearize(x)
             orthogonal = np.linalg.qr(jacobian / np.concatenate(self.sigma)[:, None])[0]
@@ -493,15 +506,28 @@ class Problem:
             change = 0.0
             for k in unknown:
                 values = self.measured[k].values
-                free = max(len(values) - float(np.sum(blocks[k] ** 2)), 1.0)
+                free[k] = len(values) - float(np.sum(blocks[k] ** 2))
                 least = ROUND_OFF * (np.abs(values).max() or 1.0)
-                estimate = max(math.sqrt(np.sum((values - rows[k]) ** 2) / free), least)
+                deviation = math.sqrt(np.sum((values - rows[k]) ** 2) / max(free[k], 1.0))
+                estimate = max(deviation, least)
                 change = max(change, abs(self.sigma[k][0] / estimate - 1.0))
                 self.sigma[k] = np.full(len(values), estimate)
             if change < SETTLED or len(self.measured) == 1:
                 break  # the minimum of one measurement does not depend on its deviation
             _, x, _ = self.search(x)
+        for k in unknown:
+            if free[k] < LEAST_FREE:
+                raise _without_estimate(self.measured[k])
         return x
+
+
+def _without_estimate(measurement: Measurement) -> ArgumentError:
+    """Return the error of a measurement without a standard deviation and with too few values."""
+    number = counted((len(measurement), "value", "values"))
+    return ArgumentError(
+        f"{WHAT}: {measurement.name} has {number}, too few to estimate a standard deviation, "
+        "since the fit can meet as many exactly; give sigma="
+    )
 
 
 def _require_effects(problem: Problem) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array
-from ufl_beam.display import TIME, Rich
+from ufl_beam.display import TIME, Rich, counted
 from ufl_beam.errors import (
     ArgumentError,
     require_all,
@@ -24,10 +24,10 @@ from ufl_beam.errors import (
     require_row,
     shorten,
 )
-from ufl_beam.mechanics.time_scheme import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme, order_of
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.records import Record, Text
-from ufl_beam.simulation.initial_state import require_scheme
+from ufl_beam.simulation.initial_state import SAME_TIME, require_scheme
 from ufl_beam.simulation.run import require_times
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
@@ -38,7 +38,7 @@ SAME = 1e-8
 """Largest difference of costs that count as one minimum, as a fraction of 1 + cost; a difference
 of the cost by 1/2 is one standard deviation."""
 
-STENCIL = 4  # number of stored states in an interpolation
+STENCIL = {2: 4, 4: 6}  # number of stored states in an interpolation, by the order of the scheme
 
 
 def _require_sigma(value: Any, what: str) -> Any:
@@ -67,8 +67,14 @@ class Measurement(Record):
 
     The computed history is interpolated at the measured times by cubic polynomials through the four
     nearest stored states.  For smooth motions this error is of fourth order in the step and smaller
-    than the error of the steps, of second order.  Where a history jumps or has a kink, the
-    interpolation is linear at best; choose steps that end at the measured times.
+    than the error of the steps, of second order.  Runs with ``EnergyMomentum(order=4)`` have six
+    states and an error of sixth order.  Where a history jumps or has a kink, the interpolation is
+    linear at best; choose steps that end at the measured times.
+
+    Accelerations hold in the middle of the step that ends at the time of their row.  So do
+    reactions and section forces in energy-momentum schemes; with ``order=4`` these hold 0.207 dt
+    before that time.  Add half a step, or 0.207 dt, to the times of such measurements, as in
+    ``Measurement(times + dt / 2, ...)``.  Otherwise the comparison has an error of first order.
 
     In statics t is the parameter of loads and prescribed displacements.  A pushover curve is a run
     in which ``PrescribedDisplacement(place, u=lambda t: t)`` moves a place, so that t is the
@@ -143,6 +149,8 @@ class Measurement(Record):
         if self.times is None:
             return
         times = require_row(self.times, f"{what}: times")
+        inside = np.clip(times, t0, t1)
+        times = np.where(np.abs(times - inside) <= SAME_TIME * max(abs(t0), abs(t1)), inside, times)
         object.__setattr__(self, "times", times)
         if len(times) != len(self):
             raise ArgumentError(f"{what}: {len(times)} times and {len(self)} values")
@@ -161,7 +169,7 @@ class Measurement(Record):
         return len(self.values)
 
     def __repr__(self) -> str:
-        return f"<Measurement {self.name}: {len(self)} values>"
+        return f"<Measurement {self.name}: {counted((len(self), 'value', 'values'))}>"
 
     def computed(self, solution: Solution) -> Array:
         """Return the computed values of a run at the measured times; (m,).
@@ -200,15 +208,15 @@ class Measurement(Record):
                 f"{what} returned {values[0]} at the beginning of the run; leave out the measured "
                 f"values before {stored[0]:g}"
             )
-        return _interpolate(at, stored, values[first:])
+        return _interpolate(at, stored, values[first:], STENCIL[order_of(self.scheme)])
 
 
-def _interpolate(at: Array, times: Array, values: Array) -> Array:
-    """Interpolate values by polynomials through the :data:`STENCIL` nearest times; (len(at),).
+def _interpolate(at: Array, times: Array, values: Array, number: int = STENCIL[2]) -> Array:
+    """Interpolate values by polynomials through a number of nearest times; (len(at),).
 
     The result at a time of ``times`` is its value, to the last bit.
     """
-    order = np.arange(min(STENCIL, len(times)))
+    order = np.arange(min(number, len(times)))
     first = np.searchsorted(times, at, side="right") - len(order) // 2
     index = np.clip(first, 0, len(times) - len(order))[:, None] + order
     nodes, result = times[index], np.zeros(len(at))
@@ -327,8 +335,9 @@ class Calibration(Rich):
             origin = "estimated" if m.sigma is None else "given"
             size = f"{sigma.min():.4g}" + (f" to {sigma.max():.4g}" if np.ptp(sigma) else "")
             root = math.sqrt(np.mean((r / sigma) ** 2))
+            number = counted((len(m), "value", "values"))
             lines.append(
-                f"{m.name}: {len(m)} values, standard deviation {size} ({origin}), residuals "
+                f"{m.name}: {number}, standard deviation {size} ({origin}), residuals "
                 f"{root:.2f} times as large"
             )
         if len(self.starts) > 1:
@@ -361,15 +370,9 @@ class Calibration(Rich):
 
     def __repr__(self) -> str:
         failed = f", {self.failed} failed" if self.failed else ""
-        return (
-            f"<Calibration: {_counted(self.parameters, 'parameter')}, "
-            f"{_counted(self.measured, 'measurement')}, {self.runs} runs{failed}>"
-        )
-
-
-def _counted(things: Sequence[Any] | Mapping[str, Any], name: str) -> str:
-    """Write a number of things: "1 parameter", "2 parameters"."""
-    return f"{len(things)} {name}{'s' if len(things) != 1 else ''}"
+        p, m = len(self.parameters), len(self.measured)
+        numbers = counted((p, "parameter", "parameters"), (m, "measurement", "measurements"))
+        return f"<Calibration: {numbers}, {self.runs} runs{failed}>"
 
 
 def _relative(width: float, value: float) -> str:

@@ -49,6 +49,9 @@ LEAST_ROWS, MOST_VALUES = 8, 2**17
 into memory that the process already has.  The first access to new memory takes a considerable
 fraction of the time of a step."""
 
+SHORTEST_CHORD = 1e-5
+"""Length of a chord of a guide whose direction has few digits, as a fraction of the size."""
+
 
 class Cells:
     """Objects that compute results of all cells of a scene; each is created at its first access.
@@ -335,11 +338,15 @@ class States:
         """
         a, b, ends = connector.a, connector.b, self._ends()
         if isinstance(connector.law, Guide):
-            curve, s, size, normals = connector.law.curve, 0.0, self.scene.size, []
-            for point in np.sum([weight * some.position(b) for weight, some in ends], axis=0):
-                step = parameter_step(curve, s, size)
-                s = nearest(curve, point, s, step, size)
+            curve, size, s, normals = connector.law.curve, self.scene.size, 0.0, []
+            for point, begun in zip(*(some.position(b) for _, some in (ends[0], ends[-1]))):
+                step, chord = parameter_step(curve, s, size), point - begun
+                s = nearest(curve, (point + begun) / 2, s, step, size)
                 x, y = tangent(curve, s, step)
+                if (
+                    np.hypot(*chord) > SHORTEST_CHORD * size
+                ):  # the force in the step is normal to it
+                    x, y = chord * np.sign(chord @ (x, y))
                 normals.append((-y, x))
             return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
         found, length = np.zeros((len(self), 2)), np.ones(len(self))

@@ -173,7 +173,7 @@ def draw_calibration(fit: Calibration) -> Figure:
         rows = figure.subplots(2, number, sharex="col", squeeze=False, height_ratios=(3, 1))
         data = zip(fit.measured, fit.solutions, fit.residuals, fit.sigma, strict=True)
         for (above, below), (m, run, residuals, sigma) in zip(rows.T, data, strict=True):
-            at = np.arange(len(m)) if m.times is None else np.asarray(m.times)
+            at = np.arange(1, len(m) + 1) if m.times is None else np.asarray(m.times)
             if m.times is None:
                 above.plot(at, m.values - residuals, "_", color=BLUE, ms=14.0, label="computed")
             else:
@@ -185,7 +185,10 @@ def draw_calibration(fit: Calibration) -> Figure:
             below.axhspan(-2.0, 2.0, color=GREY, alpha=0.3, lw=0)
             below.axhline(0.0, color=BLUE, lw=1.0)
             below.plot(at, residuals / sigma, ".", color=shade(RED), ms=4.0)
-            below.set(xlabel="value" if m.times is None else m.labels[0], ylabel="residual / σ")
+            below.set(xlabel=m.labels[0], ylabel="residual / σ")
+            if m.times is None:
+                below.set(xlabel="number of the value", xlim=(0.5, len(m) + 0.5))
+                below.xaxis.get_major_locator().set_params(integer=True, min_n_ticks=1)
     return figure
 
 

@@ -225,8 +225,9 @@ class Solution(States, Rich):
 
         It is the change of the velocity since the previous stored time, divided by the time between
         both, and is exact to second order in the middle of this interval.  In midpoint schemes
-        :meth:`reaction` and section forces of the same row are in equilibrium with it.  The first
-        row is NaN.  See docs/results.md for values at the stored times, and for moving supports.
+        :meth:`reaction` and section forces of the same row are in equilibrium with it, but not at
+        fourth order, where they belong to the last stage of the step.  The first row is NaN.  See
+        docs/results.md for values at the stored times, and for moving supports.
 
         Raises:
             ArgumentError: The run was static, or the beam or body is not in the scene.

@@ -343,9 +343,20 @@ static int accept_end(time_loop *m)
 
 /* -- steps of several stages ---------------------------------------------------------------------- */
 
+/* Exchange the multipliers of two configurations. */
+static void exchange_multipliers(const time_loop *m, double *a, double *b)
+{
+  for (int k = 0; k < m->multipliers; ++k) {
+    const int i = m->multiplier[k];
+    const double value = a[i];
+    a[i] = b[i], b[i] = value;
+  }
+}
+
 /* Take back the accepted stages of a step that is not accepted. A step of such a scheme is the same
  * in both directions of time, so the beginning of a stage, which is known, is its end in a stage
- * that goes back. All terms accept this stage; no equation is solved. Its derivatives take those of
+ * that goes back. All terms accept this stage; no equation is solved. Multipliers are forces of the
+ * stage, found with its end: the stage that goes back has the same. Its derivatives take those of
  * the stage back, too. */
 void take_back(time_loop *m)
 {
@@ -357,13 +368,16 @@ void take_back(time_loop *m)
   e->raised = NOTHING;
   for (; m->taken > 0; --m->taken) {
     const int k = m->taken - 1;
+    double *begun = m->begun + (size_t)k * m->size;
     set_step(m, m->stage_begin[k], m->stage_begin[k]);
+    exchange_multipliers(m, begun, m->q);
     run(&m->begin, &m->step, 0, 0);
-    go_to(e, m->begun + (size_t)k * m->size, EXACT);
+    go_to(e, begun, EXACT);
     residual_at(e, e->unknowns);
     measure(m);
     if (m->derivatives && failure != NO_DERIVATIVE && !differentiate_step(m->derivatives, m, 0)) failure = NO_DERIVATIVE;
     accept_end(m);
+    exchange_multipliers(m, m->q, m->prediction->q_before);
   }
   e->raised = raised, e->error = error, m->failure = failure;
 }
