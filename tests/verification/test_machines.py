@@ -115,7 +115,7 @@ def test_force_of_a_joint_with_an_axis_that_turns_accelerates_the_body(kind, sch
         loads=[ub.Gravity((0, -G))], initial=[ub.Velocity((arm, bob), angular=3.0)],
     )  # fmt: skip
     solution = run(scene, 0.5, 0.01, scheme)
-    force = solution.joint(joint).force + [0.0, -0.7 * G]
+    force = solution.joint(joint).force - 0.7 * np.array([0.0, G])
     error = force - 0.7 * solution.acceleration(bob.middle)[:, :2]
     assert np.abs(error[1:]).max() < 1e-8 * np.abs(force[1:]).max()
 

@@ -339,7 +339,8 @@ class States:
         a, b, ends = connector.a, connector.b, self._ends()
         if isinstance(connector.law, Guide):
             curve, size, s, normals = connector.law.curve, self.scene.size, 0.0, []
-            for point, begun in zip(*(some.position(b) for _, some in (ends[0], ends[-1]))):
+            (_, now), *_, (_, before) = *ends, *ends
+            for point, begun in zip(now.position(b), before.position(b), strict=True):
                 step, chord = parameter_step(curve, s, size), point - begun
                 s = nearest(curve, (point + begun) / 2, s, step, size)
                 x, y = tangent(curve, s, step)
