@@ -269,6 +269,42 @@ def test_starts_end_at_the_same_minimum_and_others_are_reported():
     assert "times this cost, a = -0.8" in str(result)
 
 
+def rubbing(limit, hardening):
+    """A beam that yields and rubs at its end."""
+    bends = ub.ElastoPlastic(limit, isotropic=hardening)
+    section = ub.Section(EA=2e6, GA=8e5, EI=2e3, rhoA=5.0, rhoI=0.01, bending=bends)
+    beam = ub.Beam((0, 0), (2, 0), section, cells=6, name="beam")
+    rub = ub.Slide(ub.ground(2, 0), beam.end, ub.Coulomb(20.0), axis=(0, 1))
+    push = ub.Table([0, 0.1, 0.2], [0, 1, 0])
+    load = ub.PointLoad(beam.end, force=(0, -300.0), amplitude=push)
+    return ub.Scene(
+        [beam], supports=[ub.Clamped(beam.start)], masses=[ub.PointMass(beam.end, 10.0)],
+        connectors=[rub], loads=[load],
+    )  # fmt: skip
+
+
+def tip(run):
+    return run.displacement(run.scene["beam"].end)[:, 1]
+
+
+@pytest.mark.parametrize("start", [{"limit": (250.0, 100, 500), "hardening": (300.0, 10, 5000)},
+                                   {"limit": 250.0, "hardening": 400.0}])  # fmt: skip
+def test_a_search_goes_on_where_computed_values_jump(start):
+    """They jump where friction sticks in another step; the cost there is 12 % above the least."""
+    options = {
+        "scheme": ub.EnergyMomentum(alpha=0.05, beta=0.05), "t": (0, 0.5), "dt": 2.5e-3,
+    }  # fmt: skip
+    run = ub.simulate(rubbing(300.0, 500.0), progress=False, **options)
+    times, random = np.arange(0.01, 0.5, 0.01), np.random.default_rng(1)
+    values = np.interp(times, run.times, tip(run))
+    values += 0.002 * np.abs(values).max() * random.normal(size=len(times))
+    with warned("hardly distinguish limit and hardening"):
+        found = fit([ub.Measurement(times, values, tip, **options)], start, model=rubbing)
+    low, high = found.intervals["limit"]
+    assert low < 300.0 < high
+    assert np.sum(found.residuals[0] ** 2) < 9.5e-6
+
+
 def test_parameters_that_act_alike_are_named():
     measured = measurement(truth(2.0, 0.0), sigma=SIGMA)
     with warned("do not determine a and b: they have the same effect"):

@@ -72,6 +72,12 @@ WIDE = 1.0
 """Half width of an interval beyond which a warning is issued, in the search variables: a factor of
 e for positive parameters."""
 
+STALLED, LEAST_MOVE = 0.5, 1e-6
+"""Further step of a search that has ended too early, where computed values jump: in standard
+deviations, and in the search variables, in which errors of derivatives move the end."""
+
+RESTARTS = 3  # most further searches from such an end
+
 HALVINGS = 8  # most attempts to find a start at which all runs succeed
 
 AT_BOUND = 1e-4  # distance from a bound that counts as zero, in the search variables
@@ -137,6 +143,7 @@ def calibrate(
         ModelWarning: The data do not determine a parameter: computed values depend on fewer
             combinations of parameters than there are parameters, two parameters have a correlation
             beyond 0.99, an interval is wider than a factor of e, or a parameter is at its bound.
+            Or the search ended where computed values jump.
 
     Example:
         >>> def cantilever(E):
@@ -198,6 +205,16 @@ def calibrate(
         quantile = scipy.special.stdtrit(number - p, 0.5 + LEVEL / 2)
     slopes, widths = variables.slopes(x), quantile * deviations
     low, high = (variables.values(x + change) for change in (-widths, widths))
+    faults = [*_faults(variables, x, widths, correlations, undetermined)]
+    step, far = further_step(variables, x, scaled, -residuals / stacked)
+    if far.any():
+        moving = " and ".join(np.array(variables.names)[far])
+        most = np.abs(step / deviations)[far].max()
+        faults.append(
+            "the search ended where computed values jump, as where friction sticks or a hinge "
+            f"opens in another step: a further step would change {moving} by up to {most:.2g} "
+            "standard deviations; use smaller steps dt, or other starts"
+        )
     result = Calibration(
         parameters=values,
         intervals={name: (low[name], high[name]) for name in values},
@@ -215,7 +232,7 @@ def calibrate(
         runs=problem.runs + sum(search.runs for search in found),
         failed=problem.failed + sum(search.failed for search in found),
         solutions=solutions,
-        warnings=tuple(_faults(variables, x, widths, correlations, undetermined)),
+        warnings=tuple(faults),
     )
     if comm.rank == 0:
         for message in result.warnings:
@@ -472,6 +489,7 @@ class Problem:
         """Search for a minimum from x; return the start of the search, its end, and the cost there.
 
         A start at which a run fails is moved halfway to zero, the start given, until runs succeed.
+        A search ends too early where computed values jump; it goes on from beyond the jump.
         """
         sigma = np.concatenate(self.sigma)
         values = np.concatenate([m.values for m in self.measured])
@@ -481,12 +499,22 @@ class Problem:
             x = np.divide(x, 2.0)
         else:
             raise ArgumentError(f"{WHAT}: runs fail at all points between two starts")
-        end = scipy.optimize.least_squares(
-            lambda x: (self._or_nan(x) - values) / sigma, x,
-            lambda x: self.linearize(x)[1] / sigma[:, None],
-            bounds=self.variables.bounds(), method="trf", **TOLERANCES,
-        )  # fmt: skip
-        return x, end.x, float(end.cost)
+        start, best = x, None
+        for _ in range(1 + RESTARTS):
+            end = scipy.optimize.least_squares(
+                lambda x: (self._or_nan(x) - values) / sigma, x,
+                lambda x: self.linearize(x)[1] / sigma[:, None],
+                bounds=self.variables.bounds(), method="trf", **TOLERANCES,
+            )  # fmt: skip
+            if best is not None and end.cost >= best.cost:
+                break
+            best = end
+            step, far = further_step(self.variables, end.x, end.jac, end.fun)
+            x = np.clip(end.x + step, *self.variables.bounds())
+            if not far.any() or np.isnan(self._or_nan(x)).any():
+                break
+        assert best is not None
+        return start, best.x, float(best.cost)
 
     def reweight(self, x: Array) -> Array:
         """Return the minimum near x with estimated standard deviations, which become final.
@@ -599,6 +627,33 @@ def _covariance(jacobian: Array) -> tuple[Array, list[list[int]]]:
         covariance[i] = covariance[:, i] = math.nan
         covariance[i, i] = math.inf
     return covariance, undetermined
+
+
+def further_step(
+    variables: Variables, x: Array, jacobian: Array, residuals: Array
+) -> tuple[Array, Array]:
+    """Return the further step of a search that has ended at x, and where it is too long; (p,) each.
+
+    Args:
+        variables: Search variables.
+        x: End of the search.
+        jacobian: Derivatives of ``residuals``; (N, p).
+        residuals: Computed minus measured values, divided by their standard deviations; (N,).
+    """
+    free = np.abs(x - variables.bounds()).min(axis=0) >= AT_BOUND
+    step, far = np.zeros(len(x)), np.zeros(len(x), dtype=bool)
+    if not free.any():
+        return step, far
+    covariance, undetermined = _covariance(jacobian[:, free])
+    if undetermined:
+        return step, far
+    step[free] = -covariance @ (jacobian[:, free].T @ residuals)
+    if np.abs(step).max() > WIDE:  # the data hardly determine a parameter
+        return np.zeros(len(x)), far
+    # The residuals tell the sizes of errors if standard deviations are assumed.
+    variance = covariance.diagonal() * np.mean(residuals**2)
+    far[free] = np.abs(step[free]) > np.maximum(STALLED * np.sqrt(variance), LEAST_MOVE)
+    return step, far
 
 
 def _faults(

@@ -357,7 +357,7 @@ class Calibration(Rich):
             end = ", ".join(
                 f"{n} = {x:.4g}" for n, x in zip(self.parameters, self.ends[order[0]], strict=True)
             )
-            lines.append(f"  {number} at {ratio:.4g} times this cost, {end}")
+            lines.append(f"  {number} at {ratio:.6g} times this cost, {end}")
         if lost := len(self.starts) - len(known):
             lines.append(f"  {lost} failed")
         return lines

@@ -339,14 +339,12 @@ class States:
         a, b, ends = connector.a, connector.b, self._ends()
         if isinstance(connector.law, Guide):
             curve, size, s, normals = connector.law.curve, self.scene.size, 0.0, []
-            (_, now), *_, (_, before) = *ends, *ends
-            for point, begun in zip(now.position(b), before.position(b), strict=True):
-                step, chord = parameter_step(curve, s, size), point - begun
-                s = nearest(curve, (point + begun) / 2, s, step, size)
+            points, begun = ends[0][1].position(b), ends[-1][1].position(b)
+            for n in range(len(self)):
+                step, chord = parameter_step(curve, s, size), np.array(points[n] - begun[n])
+                s = nearest(curve, np.array(points[n] + begun[n]) / 2, s, step, size)
                 x, y = tangent(curve, s, step)
-                if (
-                    np.hypot(*chord) > SHORTEST_CHORD * size
-                ):  # the force in the step is normal to it
+                if np.hypot(*chord) > SHORTEST_CHORD * size:  # the force is normal to it
                     x, y = chord * np.sign(chord @ (x, y))
                 normals.append((-y, x))
             return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
