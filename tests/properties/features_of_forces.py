@@ -245,8 +245,18 @@ def moving_load(d):
     beam = d.one(["b0", "[b1, b2]"]) if len(d.beams) > 2 else "b0"
     d.loads.append(
         f"ub.MovingLoad({beam}, lambda t: {place.replace('END', f'{d.end:.4g}')}, "
-        f"({d.some(-15, 15):.3f}, {d.some(-15, 15):.3f}), {d.time()}{d.one(['', ', mass=0.5'])})"
+        f"({d.some(-15, 15):.3f}, {d.some(-15, 15):.3f}), {d.time()}{d.one(['', MASS])})"
     )
+    without_mass_in_a_frame(d)
+
+
+MASS = ", mass=0.5"
+
+
+def without_mass_in_a_frame(d):
+    """Take the masses from moving loads in a rotating frame, which refuses them."""
+    if any("RotatingFrame" in load for load in d.loads):
+        d.loads[:] = [load.replace(MASS, "") for load in d.loads]
 
 
 @feature()
@@ -257,6 +267,7 @@ def gravity(d):
 @feature("frame", at_end=False)
 def rotating_frame(d):
     d.loads.append(f"ub.RotatingFrame({d.some(1, 5):.3f}, about=(-0.2, 0.1))")
+    without_mass_in_a_frame(d)
 
 
 @feature("work")

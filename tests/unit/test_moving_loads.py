@@ -88,6 +88,33 @@ def test_moving_loads_and_masses_in_both_solvers(scheme, degree):
         assert_balanced(mine.energy)
 
 
+@pytest.mark.parametrize("reference", [False, True])
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentumDecaying(), ub.GeneralizedAlpha(0.5)], ids=str)
+def test_work_of_the_drive_of_a_mass_that_begins_on_the_beam(scheme, reference):
+    """A mass m moves outwards with the speed u along a beam that turns with ω."""
+    m, ω, u = 3.0, 3.0, 1.0
+    beam = ub.Beam((0, 0), (2, 0), ub.Section(EA=1e7, GA=1e7, EI=1e6, rhoA=0.01, rhoI=1e-4))
+    turned = ub.PrescribedDisplacement(beam.start, u=0.0, v=0.0, psi=lambda t: ω * t)
+    scene = ub.Scene(
+        [beam], supports=[turned], loads=[ub.MovingLoad(beam, lambda t: 0.2 + u * t, mass=m)],
+        initial=[ub.Velocity((beam,), angular=ω)],
+    )  # fmt: skip
+    newton = ub.Newton(reference=True) if reference else None
+    energy = run(scene, scheme, t=(0, 0.5), dt=0.01, newton=newton).energy
+    assert energy.state["kinetic"][0] == pytest.approx(m / 2 * (u**2 + (0.2 * ω) ** 2), rel=0.06)
+    assert energy.supplied["loads"][-1] == pytest.approx(m * ω**2 * (0.2**2 - 0.7**2) / 2, rel=0.01)
+    assert energy.supplied["supports"][-1] == pytest.approx(m * ω**2 * (0.7**2 - 0.2**2), rel=0.01)
+
+
+def test_a_rotating_frame_refuses_a_moving_mass():
+    beam = ub.Beam((1, 0), (2, 0), SECTION)
+    moving = [ub.MovingLoad(beam, lambda t: 0.5, mass=m) for m in (3.0, 0.0)]
+    frame = ub.RotatingFrame(rate=3.0)
+    with pytest.raises(ub.ModelError, match=r"MovingLoad on beam has a mass.*RotatingFrame"):
+        ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[frame, moving[0]])
+    ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[frame, moving[1]])
+
+
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentumStatic(), ub.EnergyMomentum()])
 def test_a_run_with_moving_loads_is_resumed_and_saved(scheme, tmp_path):
     scene, _ = crossed(mass=2.0)

@@ -297,8 +297,9 @@ class MovingLoad(Load):
     In dynamics, the acceleration of the mass is the one of the axis at its place, plus
     s̈ t + (2 ṡ ψ̇ + ṡ² κ) n with the distance s and the rotation ψ and curvature κ of the axis; t
     and n are tangent and normal of the cross-section.  The kinetic energy of the mass on the beam
-    is part of "kinetic" in the ledger; "loads" contains the energy that the drive of the mass
-    supplies, and with which the mass enters and leaves.  ``Gravity`` does not weigh this mass:
+    is part of "kinetic" in the ledger, from the beginning if the mass is then on the beam; "loads"
+    contains the energy that the drive of the mass supplies, and with which the mass enters and
+    leaves.  ``Gravity`` does not weigh this mass:
     ``force`` contains its weight.  Analyses of modes ignore it.  For the kinetic energy the speed
     is a difference of positions over 1e-5 s.  A mass that is exactly at a node at the time of an
     equation belongs to one of both cells, and round-off decides to which; a curved axis has a kink
@@ -371,7 +372,8 @@ class RotatingFrame(Load):
     """Centrifugal and Coriolis forces on all masses, in a frame that turns at a constant rate.
 
     Motions, velocities and all other loads refer to the rotating frame.  A static run gives the
-    state of steady rotation, with its deformation.
+    state of steady rotation, with its deformation.  A scene with a frame refuses a
+    :class:`MovingLoad` with a mass, on which these forces would not act.
 
     Args:
         rate: Angular velocity of the frame, counter-clockwise; rad/s.

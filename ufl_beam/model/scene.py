@@ -277,7 +277,7 @@ class Scene(Record, Rich):
         return places
 
     def _require_once(self) -> None:
-        """Raise if an object is repeated, works share a name, or there are two rotating frames."""
+        """Raise if objects are repeated, works share a name, or rotating frames do not fit."""
         for member, twice in (*_again("beams", self.beams), *_again("bodies", self.bodies)):
             raise ModelError(f"Scene: {member.name} is in the scene {twice}")
         for field in ("joints", "connectors", "loads", "masses", "initial", "damping", "works"):
@@ -311,6 +311,12 @@ class Scene(Record, Rich):
                 f"Scene: {len(frames)} rotating frames, {frames[0]} and {frames[1]}: a scene is in "
                 "one frame, and the forces of two cannot be added, because centrifugal forces are "
                 "quadratic in the rate; give one RotatingFrame with the total rate"
+            )
+        heavy = [load for load in self.loads if isinstance(load, MovingLoad) and load.mass]
+        if frames and heavy:
+            raise ModelError(
+                f"Scene: {heavy[0]} has a mass, on which the forces of {frames[0]} do not act; "
+                "leave out the frame, and prescribe its rotation as a motion of the supports"
             )
 
     def _require_normal_force(self, connector: Connector, bearing: Bearing) -> None:

@@ -326,9 +326,14 @@ class MovingForce(LoadForce):
         """Return the load at time ``t``, which is assumed in equilibrium with the initial state."""
         self._reached_forces = self._forces_at(t)
         self.force = self._before = self._reached_forces[0]
-        if self._inertia is not None and v is not None:
-            self.stored = {"kinetic": self._kinetic(t, q, v)}
+        if v is not None:
+            self.begin_energy(t, q, v)
         return self.force
+
+    def begin_energy(self, t: float, q: Array, v: Array) -> None:
+        """Set the kinetic energy of the mass at the time ``t``."""
+        if self._inertia is not None:
+            self.stored = {"kinetic": self._kinetic(t, q, v)}
 
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the forces in the last step, if the next work uses those of a mass."""

@@ -38,7 +38,7 @@ from ufl_beam.reference.beam_residuals import (
 )
 from ufl_beam.reference.cell_forms import Archive, Force, Response, Setting
 from ufl_beam.reference.connector_residuals import Connectors, all_connectors
-from ufl_beam.reference.load_vectors import Supports, all_loads
+from ufl_beam.reference.load_vectors import MovingForce, Supports, all_loads
 
 LARGEST_ROTATION = 0.75 * math.pi
 """Rotation of a node above which a step is cut, as 2 tan(Δψ/2) is infinite at π; rad."""
@@ -181,6 +181,10 @@ class Solver(PresentState):
             loads = sum((load.equilibrium(self.t, self.q, v) for load in self.loads), loads)
             for beam in self.beams:
                 beam.imposed.start(self.t)
+        elif v is not None:
+            for load in self.loads:
+                if isinstance(load, MovingForce):
+                    load.begin_energy(self.t, self.q, v)
         known = same and "reactions" in variables
         if not same:  # rates and forces of the last step belong to the forces before the jump
             lasting = (n for n, x in variables.items() if x.ndim == 2 or n == "reactions")

@@ -121,6 +121,8 @@ class Simulation(Stepper):
             past = Archive(subdomain, internal) if same else None
             loads = equation.loads
             loaded = together(lambda: [x.carry_on(t0, q_local, rates, past) for x in loads])
+        elif inertia is not None:
+            together(equation.begin_energies, t0, q_local, inertia.v)
         if start is not None:
             equation.set_internal_variables(q_local, t0, internal, same=same)
         for term in equation.terms:

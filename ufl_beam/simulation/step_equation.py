@@ -218,6 +218,11 @@ class StepEquation:
             load.pass_on(archive)
         return archive.state()
 
+    def begin_energies(self, t: float, q: Array, v: Array) -> None:
+        """Set the energies of loads in the state that begins a run, see :class:`LoadTerm`."""
+        for load in self.loads:
+            load.begin_energy(t, q, v)
+
     def set_internal_variables(self, q: Array, t: float, internal: State, *, same: bool) -> None:
         """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
 

@@ -98,6 +98,9 @@ class LoadTerm(Term):
     def pass_on(self, archive: Archive) -> None:
         """Save the forces of the last step that :meth:`carry_on` cannot recompute."""
 
+    def begin_energy(self, t: float, q: Array, v: Array) -> None:
+        """Set the energies of the state that begins a dynamic run without :meth:`carry_on`."""
+
 
 class _AtDofs(LoadTerm):
     """Loads that act at some degrees of freedom, with sizes that are functions of time.
@@ -508,8 +511,8 @@ class MovingLoads(_AtDofs):
         step = struct("time_step", load_time=t, fraction=1.0, at=1.0, dt=1.0)
         rates, self._c.rates = self._c.rates, ffi.NULL
         lib.begin_moving_loads(self._c, step, ffi.NULL, ffi.NULL)
-        if self._heavy:
-            lib.start_moving_masses(self._c, t, doubles(q), doubles(v))
+        if v is not None:
+            self.begin_energy(t, q, v)
         self._callbacks.synchronize()
         self._on_cells[2] = self._on_cells[0]
         self.add_residual(q, np.zeros(self._size))
@@ -518,6 +521,12 @@ class MovingLoads(_AtDofs):
         if past is not None and past.has("moving masses"):
             self._forces[1] = past.added("moving masses", self._whole(self._forces[1]))[self.dofs]
         return self._whole(self._forces[0])
+
+    def begin_energy(self, t: float, q: Array, v: Array) -> None:
+        """Set the kinetic energies of the masses at the time ``t``."""
+        if self._heavy:
+            lib.start_moving_masses(self._c, t, doubles(q), doubles(v))
+            self._callbacks.synchronize()
 
     def pass_on(self, archive: Archive) -> None:
         """Save the forces of the last step, if masses add to them and the next work uses them."""
