@@ -291,6 +291,48 @@ def test_forces_of_a_joint_at_rest():
     assert history.motion == pytest.approx(np.zeros((2, 3)), abs=1e-12)
 
 
+@pytest.mark.parametrize("multipliers", [False, True])
+def test_force_of_a_joint_of_three_places(multipliers):
+    """A body holds two beams at one of its points, and a third place may share unknowns."""
+    body = ub.Body((0, 0), mass=1.0, inertia=0.1)
+    pin, a, b = body.at(1, 0), beam((1, 0), (2, 0), name="a"), beam((1, 0), (1, 1), name="b")
+    loads = [ub.PointLoad(a.end, force=(0.02, 0.01)), ub.PointLoad(b.end, force=(0.0, 0.03))]
+
+    def force(*places):
+        joint = ub.Rigid(*places, multipliers=multipliers)
+        scene = ub.Scene(
+            [a, b], bodies=[body], joints=[joint], loads=loads, supports=[ub.Clamped(body.middle)]
+        )
+        return run(scene, ub.Static(), t=(0, 1), dt=1.0).joint(joint).force[-1]
+
+    if multipliers:
+        assert force(pin, a.start, b.start) == pytest.approx([-0.02, -0.01], abs=1e-10)
+        assert force(a.start, b.start, pin) == pytest.approx([0.0, -0.03], abs=1e-10)
+    else:
+        for places in ((pin, a.start, b.start), (a.start, b.start, pin)):
+            with raises("share unknowns, so that the force between them"):
+                force(*places)
+    assert force(a.start, pin, b.start) == pytest.approx([0.02, 0.04], abs=1e-10)
+
+
+def test_force_on_a_pin_of_two_bodies():
+    """One body holds the other one and a beam; all are loaded."""
+    held, hung = (ub.Body((x, 0), mass=1.0, inertia=0.1) for x in (0, 2))
+    pins, bar = (held.at(1, 0), hung.at(1, 0)), beam((1, 0), (1, 1))
+    scene = {
+        "bodies": [held, hung],
+        "loads": [ub.PointLoad(x, force=(0, y)) for x, y in ((bar.end, 3e-2), (hung.middle, 5e-2))],
+        "supports": [
+            ub.Clamped(held.middle),
+            *(ub.PrescribedDisplacement(x, psi=0.0) for x in (hung.middle, bar.start)),
+        ],
+    }
+    for places, expected in (((*pins, bar.start), -5e-2), ((pins[0], bar.start, pins[1]), -3e-2)):
+        joint = ub.Revolute(*places)
+        solution = run(ub.Scene([bar], joints=[joint], **scene), ub.Static(), t=(0, 1), dt=1.0)
+        assert solution.joint(joint).force[-1, 1] == pytest.approx(expected, abs=1e-10)
+
+
 def test_questions_about_joints():
     left, right = beam(), beam((1, 0), (2, 0))
     joint, other = ub.Rigid(left.end, right.start), ub.Revolute(left.end, right.start)

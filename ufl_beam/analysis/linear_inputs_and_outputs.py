@@ -21,7 +21,7 @@ from ufl_beam.model.loads import Load, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.output.section_forces import ForcesAlongCells
-from ufl_beam.output.state_rows import connector_indices
+from ufl_beam.output.state_rows import connector_indices, signs_on_second_place
 
 IMAGINARY = 1e-100  # imaginary change of a configuration; its square vanishes
 UNITS = ("m", "m", "rad")
@@ -295,13 +295,10 @@ class Outputs:
     def _add_joint(self, x: Any, components: Sequence[int], kind: str) -> None:
         """Add the force of a joint on its second place, see :meth:`States.joint`."""
         small, numbering = self._small, self._small.numbering
-        indices, (a, b, *_) = connector_indices(self._scene, x), x.places
-        holders = [holder for holder in x.holders if {holder.a, holder.b} == {a, b}]
+        indices, signs = connector_indices(self._scene, x), signs_on_second_place(x)
         rows = np.zeros((3, numbering.size))
-        for index, holder in zip(indices, x.holders, strict=True):
-            if holder not in holders:
-                continue
-            λ, sign = int(numbering.multipliers[index]), 1.0 if holder.b == b else -1.0
+        for k, sign in signs.items():
+            holder, λ = x.holders[k], int(numbering.multipliers[indices[k]])
             if holder.is_rotation:
                 rows[2, λ] -= sign
                 continue
@@ -321,7 +318,7 @@ class Outputs:
             rows[:2] -= sign * small.q[λ] * change
             rows[:2, λ] -= sign * d
         for c in components:
-            resists_rotation = any(holder.is_rotation for holder in holders)
+            resists_rotation = any(x.holders[k].is_rotation for k in signs)
             if c == 2 and not resists_rotation and len(components) > 1:
                 continue  # the moment is zero, or with a shared rotation not known
             self._enter(f"{FORCE[c]} {x} [{('N', 'N', 'N m')[c]}]", [rows[[c]], None, None])
@@ -428,13 +425,12 @@ def _require_in_scene(scene: Scene, x: Connector | Joint, what: str) -> None:
 
 
 def _require_known_force(scene: Scene, joint: Joint, rest: Sequence[str], what: str) -> None:
-    """Raise unless the force of a joint between its first two places is an unknown."""
+    """Raise unless the force of a joint on its second place is known."""
     _require_in_scene(scene, joint, what)
-    if not any({holder.a, holder.b} == {*joint.places[:2]} for holder in joint.holders):
-        raise ArgumentError(
-            f"{what}: {joint} shares unknowns, so that its force is not known; make it with "
-            "multipliers=True"
-        )
+    try:
+        signs_on_second_place(joint)
+    except ArgumentError as error:
+        raise ArgumentError(f"{what}: {error}") from None
     if any(isinstance(holder.law, Guide) for holder in joint.holders):
         raise ArgumentError(f"{what}: {joint}: the force of a guide is no output")
     if rest and rest[0] == "moment" and 2 in joint.shared:

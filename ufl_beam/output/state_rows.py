@@ -24,6 +24,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import in_one_line
 from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.time_scheme import V
+from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
@@ -341,3 +342,22 @@ def connector_indices(scene: Scene, connector: Connector | Joint) -> list[int]:
             "multipliers=True"
         )
     return [scene.all_connectors.index(holder) for holder in connector.holders]
+
+
+def signs_on_second_place(joint: Joint) -> dict[int, float]:
+    """Return the signs of the holders in the force of a joint on its second place, by index.
+
+    Raises:
+        ArgumentError: The second place shares its displacement with another place, so that the
+            force on it alone is not known.
+    """
+    b = joint.places[1]
+    alike = [x for x in joint.places if 0 in joint.shared and moves_with_node(x)]
+    if b in alike and len(alike) > 1:
+        other = next(place for place in alike if place != b)
+        raise ArgumentError(
+            f"{joint}: {other} and {b} share unknowns, so that the force between them is not "
+            "known; make it with multipliers=True, or give a point of a body as second place"
+        )
+    places = [(holder.a, holder.b) for holder in joint.holders]
+    return {k: 1.0 if x[1] == b else -1.0 for k, x in enumerate(places) if b in x}

@@ -41,6 +41,7 @@ from ufl_beam.output.state_rows import (
     connection,
     connector_indices,
     new_rows,
+    signs_on_second_place,
 )
 from ufl_beam.terms.energy_ledger import Energy
 
@@ -298,17 +299,14 @@ class States:
         return connection(self.column("connectors")[:, connector_indices(self.scene, connector)])
 
     def joint(self, joint: Joint) -> JointHistory:
-        """Return the motion between the first two places of a joint, and the forces of the joint.
+        """Return the motion between the first two places of a joint, and its force on the second.
 
         Raises:
-            ArgumentError: The joint is not in the scene, or its places share unknowns.
+            ArgumentError: The joint is not in the scene, or the second place shares unknowns with
+                another one.
         """
         resultants, (a, b, *_) = connector_indices(self.scene, joint), joint.places
-        if not any({holder.a, holder.b} == {a, b} for holder in joint.holders):
-            raise ArgumentError(
-                f"{joint}: {a} and {b} share unknowns, so that the force between them is not "
-                "known; make it with multipliers=True"
-            )
+        signs = signs_on_second_place(joint)
         rotations = [self.displacement(place)[:, 2] for place in (a, b)]
         ends = self._ends()
         angles = [np.sum([w * x.displacement(p)[:, 2] for w, x in ends], 0) for p in (a, b)]
@@ -319,10 +317,8 @@ class States:
         if 2 in joint.shared:
             moment[:] = np.nan
         forces = self.column("connectors")[:, resultants, FORCE].T
-        for k, holder in enumerate(joint.holders):
-            if {holder.a, holder.b} != {a, b}:
-                continue
-            λ = forces[k] if holder.b == b else -forces[k]
+        for k, sign in signs.items():
+            holder, λ = joint.holders[k], sign * forces[k]
             if holder.is_rotation:
                 moment -= λ
             else:
