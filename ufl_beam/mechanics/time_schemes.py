@@ -461,7 +461,8 @@ class EnergyMomentum(EnergyMomentumBase, _Velocities):
     With ``order=4`` a step consists of five steps of second order, one of which goes backward
     (Suzuki 1990).  Energy, linear and angular momentum stay exact.  Loads and motions must be
     smooth within a step.  Section forces and reactions are means over the last stage, at 0.207 dt
-    before the end of the step, and of second order; so are velocities along constraints.
+    before the end of the step, and of second order; so are velocities along constraints.  Forces of
+    joints with multipliers and reactions of moving supports are of first order.
 
     Args:
         alpha: Dissipation by the resultants, from 0 to 1/2.
