@@ -575,6 +575,8 @@ class States:
     def momentum(self) -> Array:
         """Return momenta (p_x, p_y, L), with L about the origin; (n+1, 3); N s, N s, N m s.
 
+        They are those of beams, bodies and point masses, without masses of moving loads.
+
         Raises:
             ArgumentError: The run was static.
         """
