@@ -275,6 +275,10 @@ SCENES = [
     (lambda: rubbed(ub.Release(END, BESIDE, free="M")), "Release(...shares unknowns...multipliers"),
     (lambda: rubbed(moved(psi=0.0)(GIRDER.start)), "girder.start...holds no displacement"),
     (
+        lambda: rubbed(ub.Revolute(ub.ground(1, 0), END, BESIDE, multipliers=True)),
+        "has more than two places, so that it has no single force; make a joint of two",
+    ),
+    (
         lambda: scene(
             connectors=[
                 ub.Turn(

@@ -325,6 +325,8 @@ class Scene(Record, Rich):
             why = "is not in the scene; add it to joints or supports"
         elif isinstance(bearing, Support) and not bearing.held.keys() & {0, 1}:
             why = "holds no displacement and bears no force; name another support or joint"
+        elif isinstance(bearing, Joint) and len(bearing.places) > 2:
+            why = "has more than two places, so that it has no single force; make a joint of two"
         elif isinstance(bearing, Joint) and all(holder.is_rotation for holder in bearing.holders):
             why = "shares unknowns, so that its force is not known; make it with multipliers=True"
         else:

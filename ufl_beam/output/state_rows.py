@@ -317,7 +317,8 @@ class JointHistory(NamedTuple):
         force: Force of the joint on b, in the plane; (n+1, 2); N.
         in_a, in_b: The same force in axes that turn with a and with b; (n+1, 2); N.
         moment: Moment of the joint on b, about the place b; (n+1,); N m.  If the places share
-            their rotation, the moment is unknown: NaN.
+            their rotation, the moment is unknown: NaN.  In energy-momentum schemes it does the
+            work of the step on the change of the rotation, and has an error of second order.
     """
 
     motion: Array
