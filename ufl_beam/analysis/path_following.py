@@ -469,8 +469,9 @@ class PathStepper:
             end, direction = path(x), path(x, 1)  # the load factor is linear in x
             mode = np.array(stiffness.softest[1][corrector.subdomain.dofs])
             to_plane(seen := mode.copy())
-            speed = corrector.along(corrector.weights[:-1] * seen, direction[:-1]) / direction[-1]
-            corrector.crossing = Crossing(end - corrector.start, mode, speed)
+            weights = corrector.weights[:-1]
+            speed = corrector.along(weights * seen, direction[:-1]) / direction[-1]
+            corrector.crossing = Crossing(end - corrector.start, weights * mode, speed)
             reached = (1 - x) * fractions[0] + x * fractions[1]
             try:
                 candidate = self._seek(reached)
