@@ -151,7 +151,7 @@ def test_a_frame_of_roorda_has_a_limit_point():
     assert missing[0] / missing[1] == pytest.approx(10**0.5, rel=0.05)
 
 
-@pytest.mark.parametrize("cells, step", [(12, 0.028), (24, 0.013), (24, 0.025)])
+@pytest.mark.parametrize(("cells", "step"), [(12, 0.028), (24, 0.013), (24, 0.025)])
 def test_a_symmetric_arch_stays_symmetric(cells, step):
     """Rounding of the mode must not spoil the state at the bifurcation before the limit point."""
     section = ub.Section.rectangle(h=0.02, b=0.1, E=210e9, nu=0.3)

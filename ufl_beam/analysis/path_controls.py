@@ -223,7 +223,7 @@ class PathCorrector:
             z = z - self._rates
         if self.crossing is not None:
             _, weighted, speed = self.crossing
-            v = v / self.along(weighted, v)
+            v /= self.along(weighted, v)
             y -= self.along(weighted, y) * v
             z = z - (self.along(weighted, z) + speed) * v
         by_y = self._error_derivative(np.append(supports.in_plane(y), 0.0))
@@ -355,6 +355,8 @@ class Control:
         while True:
             normal = self.normal(corrector, direction)
             speed = corrector.along(normal, direction)
+            if speed == 0 and self.quantity:
+                raise StepFailed(f"{self.quantity} is held, or does not move along the path here")
             if not speed > 0:
                 raise Reversal(self.quantity)
             step = increment + rest / speed * direction

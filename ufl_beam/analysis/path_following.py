@@ -44,7 +44,8 @@ MOST_POINTS = 5  # most critical points that the summary of a path names
 
 ADVICE = (
     "Try a shorter step or another control: ArcLength goes through limit points of loads and of "
-    "displacements, DissipationControl through softening that snaps back"
+    "displacements, with a larger factor also through contacts that close while the load falls, "
+    "DissipationControl through softening that snaps back"
 )
 
 SMALLEST_FRACTION = 2.0**-12  # smallest fraction of a step

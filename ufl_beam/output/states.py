@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
@@ -159,9 +160,18 @@ class States:
         """Number of states."""
         return sum(block.number for block in self._blocks)
 
+    def index(self, n: int) -> int:
+        """Return the index of the n-th state from the beginning; raise ArgumentError without it."""
+        number, n = len(self), operator.index(n)
+        if not -number <= n < number:
+            raise ArgumentError(
+                f"n = {n}: the solution kept {number} times; give {-number} to {number - 1}"
+            )
+        return n % number
+
     def row(self, n: int) -> tuple[Columns, Array]:
         """Return the columns of the n-th state, and a view of its row."""
-        n = range(len(self))[n]
+        n = self.index(n)
         for block in self._blocks:
             if n < block.number:
                 break
@@ -182,7 +192,7 @@ class States:
 
         If forces do not depend on this q, or if no step led to the state, return q of the state.
         """
-        n = range(len(self))[n]
+        n = self.index(n)
         columns, row = self.row(n)
         if BEFORE in columns.at:
             return columns.column_of(BEFORE, row)
@@ -403,7 +413,7 @@ class States:
         Returns:
             Section forces; (num_cells, len(pieces), 3); N, N, N m.
         """
-        key = range(len(self))[n], pieces.tobytes()
+        key = self.index(n), pieces.tobytes()
         if self._computed is None or self._computed[0] != key:
             q = self._row("q", n)
             if self.equilibrium_fraction < 1:
