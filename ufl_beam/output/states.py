@@ -502,13 +502,13 @@ class States:
         """Return forces, jumps and dissipated energies in the cells of a beam at the n-th time.
 
         Raises:
-            ArgumentError: The scene is elastic, or the beam is not in the scene.
+            ArgumentError: All beams are elastic, or the beam is not in the scene.
         """
         return self._material(n, self.numbering.cells_of(beam))
 
     def _material(self, n: int, cells: Index | int) -> Material:
         if not len(self.numbering.inelastic_cells) and not self.scene.hinges:
-            raise ArgumentError("material: nothing in the scene yields or breaks; it is elastic")
+            raise ArgumentError("material: no beam of the scene yields or breaks")
         chosen = self.cells_of(n, self.cell_forces(n)[:, 0])[cells].T
         return Material(chosen[:3].T, *chosen[3:])
 
@@ -540,7 +540,7 @@ class States:
         ``hinge`` its dissipated energy.
 
         Raises:
-            ArgumentError: The scene is elastic, or the beam is not in the scene.
+            ArgumentError: All beams are elastic, or the beam is not in the scene.
         """
         cell, hinge = self.numbering.cell(place), self.numbering.hinge_at(place)
         states = zip(*(self._material(n, cell) for n in range(len(self))), strict=True)

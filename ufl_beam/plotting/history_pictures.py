@@ -395,7 +395,7 @@ def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
             curve.endurance(1e6 * some), some, color=shade(INK), lw=1.4, ls="--", label="borne"
         )
         spectrum.set(xscale="log", xlabel="number of cycles")
-        spectrum.legend(loc="lower left")
+        spectrum.legend(loc="best")
         total = done.sum()
         fractions, _ = np.histogram(ranges, edges, weights=done / (total or 1.0))
         damage.barh(edges[:-1], 100 * fractions, np.diff(edges), align="edge", color=RED, alpha=0.6)
