@@ -10,6 +10,7 @@ import html
 import math
 import reprlib
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from fractions import Fraction
 from functools import singledispatch
 from inspect import signature
@@ -35,6 +36,12 @@ class _Short(reprlib.Repr):
             short = x.ndim == 1 and x.size <= FEW
             return self.repr_list([*x], level) if short else f"array of shape {x.shape}"
         return super().repr1(x, level)
+
+
+def at_point(point: Iterable[float]) -> str:
+    """Return "(x, y)"; coordinates below 1e-12 m, as by round-off of arcs, are written as zero."""
+    x, y = (round(float(coordinate), 12) + 0.0 for coordinate in point)  # -0 + 0 is 0
+    return f"({x:g}, {y:g})"
 
 
 _SHORT = _Short()

@@ -443,8 +443,8 @@ RUNS = [
     (lambda: run().reaction(ub.Clamped(STRAY.end)), "reaction: Clamped at stray.end...not in"),
     (lambda: run(CLAMPED, ub.Static()).velocity(END), "velocity: the run was static"),
     (lambda: run(CLAMPED, ub.Static()).momentum(), "momentum: the run was static"),
-    (lambda: run().material(GIRDER), "material: nothing in the scene yields or breaks; it is"),
-    (lambda: run().material_at(END), "material: nothing in the scene yields or breaks; it is"),
+    (lambda: run().material(GIRDER), "material: no beam of the scene yields or breaks"),
+    (lambda: run().material_at(END), "material: no beam of the scene yields or breaks"),
     (lambda: run(YIELDS, ub.Static()).material(STRAY), "stray is not in the scene"),
     (lambda: run(YIELDS, ub.Static()).material_at(STRAY.end), "stray...is not in the scene"),
 ]

@@ -192,6 +192,26 @@ def test_bang_bang_at_the_end_of_a_beam_warns(dt):
     assert all(one in str(solution) for one in said)
 
 
+def test_the_error_of_a_run_names_an_unstable_controller():
+    """Each sample of 2 ms multiplies the velocity by 1 - kd dt/J = -3: the run fails early."""
+    beam = ub.Beam((0, 0), (1.5, 0), ub.Section(EA=1e8, GA=4e7, EI=1e5, rhoA=6.0, rhoI=1e-3))
+
+    def control(now):
+        angle, rate = now.displacement(beam.start)[2], now.velocity(beam.start)[2]
+        return 4e4 * (0.5 - angle) - 4e3 * rate
+
+    drive = ub.Turn(ub.ground(0, 0), beam.start, ub.Controller(control, sample=0.002))
+    scene = ub.Scene(
+        [beam],
+        supports=[ub.Pinned(beam.start)],
+        connectors=[drive],
+        masses=[ub.PointMass(beam.start, 0.0, inertia=2.0)],
+    )
+    failed = r"Turn\(.*\): the force rose and fell in turn in the last \d+ samples.*kd dt < 2 J"
+    with pytest.raises(ub.ConvergenceError, match=failed):
+        ub.simulate(scene, DAMPED, t=(0, 1), dt=2e-3)
+
+
 @pytest.mark.parametrize(
     ("law", "inertia"),
     [(lambda beam: ub.ForceLaw(lambda x, rate: -limited(x, rate)), 0.0), (controlled, 0.03)],

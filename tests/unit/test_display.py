@@ -49,6 +49,12 @@ def test_numbers_have_six_digits():
     assert repr(ub.Mesh(refine=Fraction(3, 2))) == "Mesh(refine=3/2)"
 
 
+def test_round_off_of_arcs_is_not_written():
+    arc = ub.Beam.arc((0, -1), 1.0, (np.pi, 0), SECTION)
+    assert str(arc.at(0.5)) == "beam.at(0.5) (0, 0)"
+    assert str(ub.ground(-1e-17, 1e-6)) == "ground (0, 1e-06)"
+
+
 def test_functions_have_their_names():
     assert compact_repr(Pair(ub.ramp)) == "Pair(first=ramp)"
 

@@ -383,6 +383,7 @@ def test_fatigue_and_extremes_have_pictures():
     shown = np.nansum(matrix.collections[0].get_array())
     assert shown == pytest.approx(recorder.cycles(spot).count.sum())
     assert spectrum.lines[0].get_xdata()[0] == pytest.approx(shown)
+    assert spectrum.lines[0].get_ydata()[0] == 0.0  # cycles of a single range are a line, too
     assert sum(bar.get_width() for bar in damage.patches) == pytest.approx(100.0)
     with pytest.raises(ub.ArgumentError, match="is not one of"):
         ub.plot(extremes, "shape")

@@ -421,6 +421,29 @@ def test_load_control_says_what_turns():
     assert "dt =" not in text
 
 
+def test_a_held_displacement_controls_no_path():
+    _, scene = truss()
+    foot = scene["left"].start
+    with pytest.raises(ub.ConvergenceError, match=r"v of left.start \(-4, 0\) is held, or does"):
+        ub.follow(scene, ub.DisplacementControl(foot, "v", 0.1))
+
+
+def test_a_stop_under_a_falling_load():
+    """The load factor turns sharply there: the path goes on if displacements weigh enough."""
+    apex, scene = truss()
+    stop = ub.Slide(ub.ground(0, HEIGHT), apex, ub.Stop(1e6, low=-1.1), axis=(0, 1))
+    stopped = replace(scene, connectors=[stop])
+
+    def end(now):
+        return now.displacement(apex)[1] < -1.11
+
+    with pytest.raises(ub.ConvergenceError, match="with a larger factor also") as failure:
+        ub.follow(stopped, ub.ArcLength(0.05, factor=10), until=end)
+    assert "ub.follow" not in str(failure.value)  # the run is such a path already
+    path = ub.follow(stopped, ub.ArcLength(0.05, factor=1e4), until=end)
+    assert path.displacement(apex)[-1, 1] < -1.11
+
+
 def test_the_snap_back_of_a_second_hinge_is_told_apart_from_a_softening_that_is_gentle():
     """[closed] The tops turn back if the hinge softens faster than a column resists, 3 EI/h.
 

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers import raises
 from scenes import SECTION, clamped
 
 import ufl_beam as ub
@@ -47,6 +48,15 @@ def test_shapes_and_first_rows():
     # No step came before, so no force is known
     assert np.isnan(solution.reaction(scene.supports[0])[0]).all()
     assert np.isfinite(solution.reaction(scene.supports[0])[1:]).all()
+
+
+@pytest.mark.parametrize("n", [5, -6])
+def test_a_state_that_does_not_exist_is_named(n):
+    scene, beam = cantilever()
+    solution = static(scene)
+    for ask in (solution.section_forces, solution.diagram, solution.strains):
+        with raises(f"n = {n}: the solution kept 5 times; give -5 to 4"):
+            ask(beam, n=n)
 
 
 def test_the_last_step_arrives():

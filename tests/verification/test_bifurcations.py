@@ -149,3 +149,19 @@ def test_a_frame_of_roorda_has_a_limit_point():
         assert point.kind == "limit"
         missing.append(1 - point.factor / ub.buckling(scene, 1).factors[0])
     assert missing[0] / missing[1] == pytest.approx(10**0.5, rel=0.05)
+
+
+@pytest.mark.parametrize(("cells", "step"), [(12, 0.028), (24, 0.013), (24, 0.025)])
+def test_a_symmetric_arch_stays_symmetric(cells, step):
+    """Rounding of the mode must not spoil the state at the bifurcation before the limit point."""
+    section = ub.Section.rectangle(h=0.02, b=0.1, E=210e9, nu=0.3)
+    ends = np.pi / 2 + 0.4, np.pi / 2 - 0.4
+    arch = ub.Beam.arc((0, -5 * np.cos(0.4)), 5.0, ends, section, cells=cells)
+    crown = arch.at(0.5)
+    load = ub.PointLoad(crown, force=(0, -1e3), amplitude=growing)
+    scene = ub.Scene([arch], supports=[ub.Pinned(p) for p in (arch.start, arch.end)], loads=[load])
+    path = ub.follow(
+        scene, ub.ArcLength(step, factor=30), until=lambda now: now.displacement(crown)[1] < -0.25
+    )
+    assert [point.kind for point in path.critical] == ["bifurcation", "limit"]
+    assert abs(path.displacement(crown)[:, 0]).max() < 1e-8

@@ -36,12 +36,14 @@ class Crossing(NamedTuple):
 
     Along the mode the tangent is singular and the load does no work, so a correction along the mode
     would be round-off divided by zero.  Therefore this component of the correction is
-    prescribed: ``speed`` times the change of the load factor, the ratio on the path.  The mode is
-    in the axes of the supports.
+    prescribed: ``speed`` times the change of the load factor, the ratio on the path.  The component
+    is the product with ``weighted``, the mode times the weights of the norm, in the axes of the
+    supports.  The correction along the mode is removed by a multiple of K⁻¹ ``weighted``, with the
+    tangent K: an error of the mode would cause forces in stiff cells.
     """
 
     predicted: Array
-    mode: Array
+    weighted: Array
     speed: float
 
 
@@ -209,20 +211,21 @@ class PathCorrector:
         self._rates = np.asarray((self._moved(t + ε) - self._moved(t - ε)) / (2 * ε), dtype=float)
         self._A = simulation.equation.tangent_at(x, self._rates, r)
 
-    def correct(self, y: Array, z: Array) -> None:
+    def correct(self, y: Array, z: Array, v: Array) -> None:
         """Find the load factor by the linearized control equation, and add its correction to ``y``.
 
         Corrections are subtracted from an iterate.  ``y`` is the correction at a constant load
-        factor; ``z`` is the derivative of the correction with respect to the load factor.
+        factor; ``z`` is the derivative of the correction with respect to the load factor; ``v`` is
+        the solution for ``crossing.weighted``, if there is a crossing.
         """
         supports, moving = self.simulation.supports, self.simulation.supports.moving
         if len(moving):
             z = z - self._rates
         if self.crossing is not None:
-            _, mode, speed = self.crossing
-            weighted = self.weights[:-1] * mode
-            y -= self.along(weighted, y) * mode
-            z = z - (self.along(weighted, z) + speed) * mode
+            _, weighted, speed = self.crossing
+            v /= self.along(weighted, v)
+            y -= self.along(weighted, y) * v
+            z = z - (self.along(weighted, z) + speed) * v
         by_y = self._error_derivative(np.append(supports.in_plane(y), 0.0))
         by_z = self._error_derivative(np.append(supports.in_plane(z), -1.0))
         change = (self._error(supports.in_plane(self._x)) - by_y) / by_z if by_z else math.nan
@@ -352,6 +355,8 @@ class Control:
         while True:
             normal = self.normal(corrector, direction)
             speed = corrector.along(normal, direction)
+            if speed == 0 and self.quantity:
+                raise StepFailed(f"{self.quantity} is held, or does not move along the path here")
             if not speed > 0:
                 raise Reversal(self.quantity)
             step = increment + rest / speed * direction

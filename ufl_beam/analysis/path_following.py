@@ -44,7 +44,8 @@ MOST_POINTS = 5  # most critical points that the summary of a path names
 
 ADVICE = (
     "Try a shorter step or another control: ArcLength goes through limit points of loads and of "
-    "displacements, DissipationControl through softening that snaps back"
+    "displacements, with a larger factor also through contacts that close while the load falls, "
+    "DissipationControl through softening that snaps back"
 )
 
 SMALLEST_FRACTION = 2.0**-12  # smallest fraction of a step
@@ -469,8 +470,9 @@ class PathStepper:
             end, direction = path(x), path(x, 1)  # the load factor is linear in x
             mode = np.array(stiffness.softest[1][corrector.subdomain.dofs])
             to_plane(seen := mode.copy())
-            speed = corrector.along(corrector.weights[:-1] * seen, direction[:-1]) / direction[-1]
-            corrector.crossing = Crossing(end - corrector.start, mode, speed)
+            weights = corrector.weights[:-1]
+            speed = corrector.along(weights * seen, direction[:-1]) / direction[-1]
+            corrector.crossing = Crossing(end - corrector.start, weights * mode, speed)
             reached = (1 - x) * fractions[0] + x * fractions[1]
             try:
                 candidate = self._seek(reached)

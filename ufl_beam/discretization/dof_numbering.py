@@ -17,7 +17,7 @@ from zlib import crc32
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.display import counted
+from ufl_beam.display import at_point, counted
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.model.beams import DEFAULT_MESH, Mesh
 from ufl_beam.model.bodies import (
@@ -433,14 +433,13 @@ class DofNumbering:
             body, component = np.argwhere(self.dofs_of_bodies == dof)[0]
             return f"{COMPONENTS[component]} of {self.scene.rigid_bodies[body].name}"
         node, component = np.argwhere(self.dofs == dof)[0]
-        x, y = self.points[node]
         beam = next(b for b in self.scene.beams if node in self._beam_nodes(b))
-        return f"{COMPONENTS[component]} of {beam.name} at ({x:g}, {y:g})"
+        return f"{COMPONENTS[component]} of {beam.name} at {at_point(self.points[node])}"
 
     def describe_cell(self, number: int) -> str:
         """Describe a cell by its beam and its middle."""
-        x, y = self.points[self.cells[number]].mean(axis=0)
-        return f"{self.scene.beams[self.beam_of_cell[number]].name} at ({x:g}, {y:g})"
+        middle = self.points[self.cells[number]].mean(axis=0)
+        return f"{self.scene.beams[self.beam_of_cell[number]].name} at {at_point(middle)}"
 
     def worst(self, sizes: Array) -> dict[str, float]:
         """Return the largest of ``sizes`` in each beam, body and connector, in descending order.

@@ -78,16 +78,45 @@ class Scheme(Protocol):
         ufl_beam.errors.ArgumentError: scheme: Mine is not a time scheme: it lacks advice, ...
     """
 
-    dynamic: bool  # True if the scheme has inertia
-    advice: str  # for the error if a step finds no equilibrium
-    load_weight: float  # when loads act, as a fraction of the step; in statics, how much of them
-    weight_of_before: float  # weight of the forces before the step in its work, see acting()
-    half_tangents: bool  # True if forces work on 2 tan(Δψ/2) of a rotation, else on Δψ
-    limits_rotation: bool  # True if a step that turns a node by more than 0.75 π is subdivided
-    theta: float  # fraction of the step at which inelastic material satisfies its laws
-    slack: float  # relative error of the work of forces above which a static step is subdivided
-    alpha: float  # numerical loss divided by twice the energy of the change of strain
-    lost_fraction: float  # numerical loss divided by the energy of a second difference of strain
+    @property
+    def dynamic(self) -> bool:
+        """Whether the scheme has inertia."""
+
+    @property
+    def advice(self) -> str:
+        """Advice in the error if a step finds no equilibrium."""
+
+    @property
+    def load_weight(self) -> float:
+        """When loads act, as a fraction of the step; in statics, how much of them."""
+
+    @property
+    def weight_of_before(self) -> float:
+        """Weight of the forces before the step in its work, see :func:`acting`."""
+
+    @property
+    def half_tangents(self) -> bool:
+        """Whether forces work on 2 tan(Δψ/2) of a rotation, else on Δψ."""
+
+    @property
+    def limits_rotation(self) -> bool:
+        """Whether a step that turns a node by more than 0.75 π is subdivided."""
+
+    @property
+    def theta(self) -> float:
+        """Fraction of the step at which inelastic material satisfies its laws."""
+
+    @property
+    def slack(self) -> float:
+        """Relative error of the work of forces above which a static step is subdivided."""
+
+    @property
+    def alpha(self) -> float:
+        """Numerical loss divided by twice the energy of the change of strain."""
+
+    @property
+    def lost_fraction(self) -> float:
+        """Numerical loss divided by the energy of a second difference of strain."""
 
     def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
         """Return the traction of a discontinuity with an ``opening`` and its growth in the step."""
@@ -159,10 +188,21 @@ class DynamicScheme(Scheme, Protocol):
         ufl_beam.errors.ArgumentError: scheme: Mine is not a time scheme: it lacks coefficients, ...
     """
 
-    further_rates: tuple[str, ...]  # names of rates besides velocities, such as accelerations
-    has_mean_velocity: bool  # True if friction and RotatingFrame can use the step's mean velocity
-    uses_last_step: bool  # True if a step depends on length and velocities of the last step
-    accelerations_oscillate: bool  # True if accelerations of prescribed motions oscillate for ever
+    @property
+    def further_rates(self) -> tuple[str, ...]:
+        """Names of rates besides velocities, such as accelerations."""
+
+    @property
+    def has_mean_velocity(self) -> bool:
+        """Whether friction and RotatingFrame can use the step's mean velocity."""
+
+    @property
+    def uses_last_step(self) -> bool:
+        """Whether a step depends on length and velocities of the last step."""
+
+    @property
+    def accelerations_oscillate(self) -> bool:
+        """Whether accelerations of prescribed motions oscillate for ever."""
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
         """Return the coefficients of a step of length ``dt``.

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array
-from ufl_beam.display import compact_repr
+from ufl_beam.display import at_point, compact_repr
 from ufl_beam.errors import ModelError, shorten, warn
 from ufl_beam.model.bodies import TOGETHER, Member, Place
 from ufl_beam.model.checks import (
@@ -135,7 +135,7 @@ class Beam(Record, Member):
         return self.name
 
     def __repr__(self) -> str:
-        a, b = (f"({x:g}, {y:g})" for x, y in self.ends)
+        a, b = map(at_point, self.ends)
         return f"<Beam {self.name!r}: {a} to {b}, {self.cells} cells>"
 
     @property

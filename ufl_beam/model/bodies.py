@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from ufl_beam.display import bracketed
+from ufl_beam.display import at_point, bracketed
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.model.checks import (
     require_all,
@@ -130,8 +130,7 @@ class Place:
 
     def __str__(self) -> str:
         ends = {0.0: "start", 1.0: "end"}
-        x, y = self.point
-        name = f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} ({x:g}, {y:g})"
+        name = f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} {at_point(self.point)}"
         return f"{name} beyond the hinge" if self.beyond else name
 
 
@@ -200,8 +199,7 @@ class BodyPoint:
         object.__setattr__(self, "point", point)
 
     def __str__(self) -> str:
-        x, y = self.point
-        return f"{self.body.name} ({x:g}, {y:g})"
+        return f"{self.body.name} {at_point(self.point)}"
 
 
 GROUND = Body((0.0, 0.0), name="ground")

@@ -365,8 +365,13 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
 class Rated(Protocol):
     """Properties of a time scheme that :func:`require_rates` reads."""
 
-    has_mean_velocity: bool
-    accelerations_oscillate: bool
+    @property
+    def has_mean_velocity(self) -> bool:
+        """Whether a step has a mean velocity, see :class:`DynamicScheme`."""
+
+    @property
+    def accelerations_oscillate(self) -> bool:
+        """Whether prescribed accelerations oscillate, see :class:`DynamicScheme`."""
 
 
 def require_rates(scene: Scene, scheme: Rated) -> None:

@@ -485,7 +485,9 @@ class Rayleigh(Record):
         z1, z2 = checks.require_vector(pair, f"{what}: ratios")
         w1, w2 = checks.require_vector(omega, f"{what}: omega")
         if min(w1, w2) <= 0 or w1 == w2:
-            raise ModelError(f"{what}: omega = ({w1:g}, {w2:g}) must be two positive frequencies")
+            raise ModelError(
+                f"{what}: omega = ({w1:g}, {w2:g}) must be two different, positive frequencies"
+            )
         mass, stiffness = np.linalg.solve([[0.5 / w1, w1 / 2], [0.5 / w2, w2 / 2]], [z1, z2])
         if min(z1, z2) <= 0 or min(mass, stiffness) < 0:
             raise ModelError(

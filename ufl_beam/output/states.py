@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
@@ -160,9 +161,18 @@ class States:
         """Number of states."""
         return sum(block.number for block in self._blocks)
 
+    def index(self, n: int) -> int:
+        """Return the index of the n-th state from the beginning; raise ArgumentError without it."""
+        number, n = len(self), operator.index(n)
+        if not -number <= n < number:
+            raise ArgumentError(
+                f"n = {n}: the solution kept {number} times; give {-number} to {number - 1}"
+            )
+        return n % number
+
     def row(self, n: int) -> tuple[Columns, Array]:
         """Return the columns of the n-th state, and a view of its row."""
-        n = range(len(self))[n]
+        n = self.index(n)
         for block in self._blocks:
             if n < block.number:
                 break
@@ -183,7 +193,7 @@ class States:
 
         If forces do not depend on this q, or if no step led to the state, return q of the state.
         """
-        n = range(len(self))[n]
+        n = self.index(n)
         columns, row = self.row(n)
         if BEFORE in columns.at:
             return columns.column_of(BEFORE, row)
@@ -399,7 +409,7 @@ class States:
         Returns:
             Section forces; (num_cells, len(pieces), 3); N, N, N m.
         """
-        key = range(len(self))[n], pieces.tobytes()
+        key = self.index(n), pieces.tobytes()
         if self._computed is None or self._computed[0] != key:
             q = self._row("q", n)
             if self.equilibrium_fraction < 1:
@@ -488,13 +498,13 @@ class States:
         """Return forces, jumps and dissipated energies in the cells of a beam at the n-th time.
 
         Raises:
-            ArgumentError: The scene is elastic, or the beam is not in the scene.
+            ArgumentError: All beams are elastic, or the beam is not in the scene.
         """
         return self._material(n, self.numbering.cells_of(beam))
 
     def _material(self, n: int, cells: Index | int) -> Material:
         if not len(self.numbering.inelastic_cells) and not self.scene.hinges:
-            raise ArgumentError("material: nothing in the scene yields or breaks; it is elastic")
+            raise ArgumentError("material: no beam of the scene yields or breaks")
         chosen = self.cells_of(n, self.cell_forces(n)[:, 0])[cells].T
         return Material(chosen[:3].T, *chosen[3:])
 
@@ -526,7 +536,7 @@ class States:
         ``hinge`` its dissipated energy.
 
         Raises:
-            ArgumentError: The scene is elastic, or the beam is not in the scene.
+            ArgumentError: All beams are elastic, or the beam is not in the scene.
         """
         cell, hinge = self.numbering.cell(place), self.numbering.hinge_at(place)
         states = zip(*(self._material(n, cell) for n in range(len(self))), strict=True)

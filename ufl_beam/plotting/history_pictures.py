@@ -389,13 +389,14 @@ def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
         style.draw_bar(matrix, colors, "number")
         matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)")
         more = np.cumsum(cycles.count[::-1])[::-1]
-        spectrum.plot(more, ranges, color=BLUE, drawstyle="steps-post", label="reached")
+        reached = np.append(more[0], more), np.append(0.0, ranges)
+        spectrum.plot(*reached, color=BLUE, drawstyle="steps-post", label="reached")
         some = np.linspace(edges[1] / 10, 1.1 * edges[-1], 1000)
         spectrum.plot(
             curve.endurance(1e6 * some), some, color=shade(INK), lw=1.4, ls="--", label="borne"
         )
         spectrum.set(xscale="log", xlabel="number of cycles")
-        spectrum.legend(loc="lower left")
+        spectrum.legend(loc="best")
         total = done.sum()
         fractions, _ = np.histogram(ranges, edges, weights=done / (total or 1.0))
         damage.barh(edges[:-1], 100 * fractions, np.diff(edges), align="edge", color=RED, alpha=0.6)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ArgumentError, require_kind, require_number
+from ufl_beam.errors import require_kind, require_number
 from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
@@ -129,13 +129,9 @@ class Canvas:
     def shape(self, n: int) -> DeformedShape:
         """Return the shape at the n-th recorded time of the solution, or raise ArgumentError."""
         assert self._solution is not None
-        numbering, number = self._solution.numbering, len(self._solution.times)
         require_kind(n, (int, np.integer), "plot: n")
-        if not -number <= n < number:
-            raise ArgumentError(
-                f"n = {n}: the solution kept {number} times; give {-number} to {number - 1}"
-            )
-        state = self._solution.subset(n % number, n % number + 1)
+        numbering, n = self._solution.numbering, self._solution.index(n)
+        state = self._solution.subset(n, n + 1)
         nodes = numbering.points + self.magnify * state.q[0, numbering.dofs[:, :2]]
         return DeformedShape(self, lambda place: state.displacement(place)[0], nodes)
 

@@ -121,6 +121,9 @@ ALTERNATIONS = 20
 
 Changes are counted from step to step, or from sample to sample."""
 
+SUSPICIOUS = 5
+"""Number of such changes up to the failure of a run that the error reports."""
+
 LEAST_CHANGE = 0.5
 """Least size of a counted change, as a fraction of the largest force so far."""
 
@@ -189,12 +192,22 @@ class ForceWatch:
             return
         self.c.tells = 0
         for connector, t in zip(self._connectors, map(float, self._told), strict=True):
-            if math.isnan(t):
-                continue
-            times, why = "steps", TOO_FAST
-            if isinstance(connector.law, Controller):
-                times, why = "samples" if connector.law.sample else "steps", CONTROLLED
-            yield (
-                f"{connector}: the force rose and fell in turn in the last {ALTERNATIONS} {times} "
-                f"before t = {t:.6g} s: {why}"
-            )
+            if not math.isnan(t):
+                yield self._report(connector, ALTERNATIONS, t)
+
+    def suspects(self, t: float) -> Iterator[str]:
+        """Yield reports on connectors whose forces rise and fall in turn when a run fails at t."""
+        if self.c is None:
+            return
+        for k, connector in enumerate(self._connectors):
+            if self.c.count[k] >= SUSPICIOUS:
+                yield self._report(connector, self.c.count[k], t)
+
+    def _report(self, connector: Connector, number: int, t: float) -> str:
+        times, why = "steps", TOO_FAST
+        if isinstance(connector.law, Controller):
+            times, why = "samples" if connector.law.sample else "steps", CONTROLLED
+        return (
+            f"{connector}: the force rose and fell in turn in the last {number} {times} "
+            f"before t = {t:.6g} s: {why}"
+        )

@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
     ArgumentError,
     ConvergenceError,
@@ -168,9 +169,12 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
     names = _names(numbering, *_deformations(equation, probe, x, YIELDED))
     verb = "yields or softens" if len(names) == 1 else "yield or soften"
     said = f"; {_list(names, MOST_LISTED)} {verb}" if names else ""
+    advice = "; follow the path through it with ub.follow(scene, ub.ArcLength(...))"
+    if solution.parameter is FACTOR:
+        advice = ""  # the run is such a path
     return (
-        f"a limit load or a bifurcation is near, where the tangent stiffness is singular{said}; "
-        "follow the path through it with ub.follow(scene, ub.ArcLength(...))"
+        "a limit load or a bifurcation is near, where the tangent stiffness is singular"
+        f"{said}{advice}"
     )
 
 

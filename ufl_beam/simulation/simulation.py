@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property, partial
+from itertools import chain
 from typing import NoReturn
 
 from mpi4py import MPI
@@ -287,9 +288,11 @@ class Simulation(Stepper):
         self.comparison.finish()
         self.supports.go_back()
         self.end()
+        local = [f"{said}." for said in self._force_watch.suspects(self.t)]
+        suspects = dict.fromkeys(chain.from_iterable(self.subdomain.comm.allgather(local)))
         raise no_equilibrium(
             self.equation, self.solver, self.solution, failure, self.q, (self.t, end),
-            advice or self.scheme.advice, self._free_motion,
+            " ".join([*suspects, advice or self.scheme.advice]), self._free_motion,
         ) from failure  # fmt: skip
 
     # -- the state -----------------------------------------------------------------------------

@@ -279,7 +279,7 @@ class Solver:
         recovers the lost digits.
         """
         border, subdomain, owned = self._border, self._subdomain, slice(self._subdomain.num_owned)
-        rates, y, z = np.zeros((3, len(x)))
+        rates, y, z, v = np.zeros((4, len(x)))
         border.tangent(x, rates)
         self._equation.A.data[self._diagonal] += self._stiffness
         rates = subdomain.added(rates)
@@ -288,8 +288,10 @@ class Solver:
             return True
         self._factors.solve(self._r[owned], y[owned], reduced=True)
         good = self._factors.solve(rates[owned], z[owned], reduced=False)
-        y, z = (subdomain.gather(v)[subdomain.dofs] for v in (y, z))
-        border.correct(y, z)
+        if border.crossing is not None:
+            good &= self._factors.solve(border.crossing.weighted[owned], v[owned], reduced=False)
+        y, z, v = (subdomain.gather(part)[subdomain.dofs] for part in (y, z, v))
+        border.correct(y, z, v)
         self.change[:], self._t[0] = y, border.t
         return not good
 

@@ -251,7 +251,7 @@ def test_xdmf_holds_jumps_and_dissipated_energies(shared_path, on_first_rank):
     ],
 )
 def test_elastic_scenes_are_refused(portal, draw):
-    with pytest.raises(ub.ArgumentError, match="nothing in the scene yields or breaks"):
+    with pytest.raises(ub.ArgumentError, match="no beam of the scene yields or breaks"):
         draw(portal)
 
 
