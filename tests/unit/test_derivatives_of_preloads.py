@@ -217,6 +217,16 @@ def test_a_dynamic_run_goes_on_with_another_scheme(schemes):
     assert errors[2].max() < 1e-5, errors  # normal forces are small differences
 
 
+def test_two_models_with_other_beams_are_refused():
+    at, options = {"load": 9.0}, {"progress": False}
+    start = ub.differentiate(lambda load: loaded(load=load), at, ub.Static(), **PRELOAD, **options)
+    for scheme in ub.Static(), ub.EnergyMomentum():
+        with raises("differentiate: the model is not that of start", "by functools.cache"):
+            ub.differentiate(
+                lambda load: loaded(load=load), at, scheme, **MOTION, start=start, **options
+            )
+
+
 def test_two_models_with_the_same_beams():
     """Damping is refused in statics, and a joint is removed after it."""
 

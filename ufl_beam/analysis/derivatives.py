@@ -217,6 +217,12 @@ class Case:
     def _begin(self, scene: Scene, start: Solution | None) -> Simulation:
         if start is not None and self._same_model:  # which may make new beams at each call
             scene = start.scene
+        if start is not None and scene.beams != start.scene.beams:
+            raise ArgumentError(
+                f"{self._call}: the model is not that of start, and has other beams; let both "
+                "return the same Beam objects for the same values, by functools.cache, see "
+                "docs/derivatives.md"
+            )
         simulation: Simulation = self.create(scene, start=start)
         return simulation
 
@@ -582,9 +588,11 @@ class Derivatives:
         """Raise :class:`ArgumentError` if steps of the run were divided."""
         before = 0 if self._start is None else self._start.solution.substeps
         if self.solution.substeps - before != len(self.solution) - 1:
+            dynamic = has_inertia(self.solution.scheme)  # type: ignore[arg-type]
             raise ArgumentError(
                 "of: this quantity needs material or energies, and steps of the run were "
                 "divided; use a smaller dt, with which no step is divided"
+                + ("" if dynamic else ", and loads that grow from zero")
             )
 
     def _ends(self) -> list[list[Solution]]:
