@@ -337,13 +337,28 @@ def test_an_infinite_limit_is_an_elastic_law():
 
 
 def test_divided_steps():
-    """A bar that begins to flow in the second step, which is divided; energies are refused."""
+    """A bar that begins to flow in the second step, which is divided.
+
+    It stores N² L/(2 EA), and dissipates N_y (N - N_y) L/H.
+    """
     L, EA, H, N_y, N = 2.0, 1e6, 1e6 / 30, 40.0, 100.0
     at = {"N_y": N_y, "N": N}
     found = ub.differentiate(lambda N_y, N: pulled(N_y, N, H), at, ub.Static(), **RUN)
     assert found.solution.substeps > len(found.solution) - 1
     expected = [-L / H, L * (1 / EA + 1 / H)]  # see test_hardening_under_tension
     assert found.of(lambda s: tip(s)[-1, 0]) == pytest.approx(expected, rel=EXACT)
+    stored, lost = found.of(lambda s: (s.energy.state["stored"][-1], s.energy.lost["plastic"][-1]))
+    assert stored == pytest.approx([0, N * L / EA], rel=EXACT, abs=1e-9)
+    assert lost == pytest.approx([(N - 2 * N_y) * L / H, N_y * L / H], rel=EXACT)
+
+
+def test_too_many_substeps(monkeypatch):
+    """Energies are refused after more substeps than there is space for."""
+    monkeypatch.setattr("ufl_beam.analysis.derivatives.LEAST_ROOM", 3)
+    at = {"N_y": 40.0, "N": 100.0}
+    options = {**RUN, "dt": 1.0}
+    found = ub.differentiate(lambda N_y, N: pulled(N_y, N, 1e6 / 30), at, ub.Static(), **options)
+    assert found.solution.substeps == 5
     with raises("of: this quantity needs material or energies", "use a smaller dt"):
         found.of(lambda s: s.energy.state["stored"])
 
@@ -387,7 +402,7 @@ def test_energies_of_a_static_run_that_continues():
 
 
 def test_energies_after_divided_steps():
-    """The first run is divided, the second one is not."""
+    """The first run is divided, the second one is not; see test_divided_steps."""
     at = {"N_y": 40.0, "N": 100.0}
 
     def bar(N_y, N):
@@ -397,8 +412,8 @@ def test_energies_after_divided_steps():
     first = ub.differentiate(bar, at, ub.Static(), t=(0, 0.5), dt=0.25, **options)
     second = ub.differentiate(bar, at, ub.Static(), t=(0.5, 1), dt=0.25, start=first, **options)
     assert first.solution.substeps > 2
-    with raises("of: this quantity needs material or energies", "use a smaller dt"):
-        second.of(lambda s: s.energy.state["stored"])
+    lost = second.of(lambda s: s.energy.lost["plastic"][-1])
+    assert lost == pytest.approx([20.0 * 2 * 30e-6, 40.0 * 2 * 30e-6], rel=EXACT)
 
 
 def test_runs_with_another_mesh_do_not_continue():

@@ -69,6 +69,9 @@ STENCILS: dict[tuple[int, ...], tuple[float, ...]] = {
 """Positions and weights of five-point differences: central ones, and one-sided ones at the end of
 the range of a parameter.  The weight of the position 0 makes the sum of the weights zero."""
 
+LEAST_ROOM = 1000
+"""Number of substeps of divided steps that are stored; the number of steps if it is larger."""
+
 Model = Callable[..., Scene]
 
 
@@ -371,6 +374,8 @@ class StepDerivatives:
         q0 = scene.differences(lambda x: x.q)
         reactions = scene.differences(lambda x: x.supports.reactions)
         motions = [x.time_loop.supports.motion for some in neighbours for x in some]
+        room = max(states, LEAST_ROOM)
+        substeps = self._substeps = [np.zeros((room, *n)) for n in ((3,), (size,), (P, size))]
         c = self.c = struct(
             "derivatives", parameters=P, size=size, terms=len(in_c),
             term=ffi.new("term_derivative[]", in_c), q0=q0, q1=np.zeros((P, size)),
@@ -379,7 +384,8 @@ class StepDerivatives:
             tangent=np.zeros(len(A.data)), r=np.zeros(size), v=np.zeros(size), s=np.zeros(size),
             space=np.zeros(size), range=self._change, range_time=self._time,
             range_term=self._term, range_place=self._place, kept=1, kept_q=self.q, kept_v=self.v,
-            kept_reactions=self.reactions,
+            kept_reactions=self.reactions, room=room, substep=substeps[0],
+            substep_q=substeps[1], substep_dq=substeps[2],
         )  # fmt: skip
         rates = np.zeros((V + 1, P, size))
         if equation.inertia is not None:
@@ -403,6 +409,11 @@ class StepDerivatives:
             mine[:] = other
         *_, self.reactions[0], self.q[0], rates = self.states
         self.v[0] = rates[V]
+
+    def substeps(self) -> list[Array] | None:
+        """Return the substeps of divided steps, see derivatives.c; None if there were too many."""
+        number = self.c.substeps
+        return [x[:number].copy() for x in self._substeps] if number >= 0 else None
 
     def ranges(self) -> list[Range]:
         """Return the range of each derivative."""
@@ -472,6 +483,7 @@ class Derivatives:
         self.end, self._places = (state, steps.states), steps.places
         self._start = start if case.start is None else None
         self._q, self._v, self._reactions = steps.q, steps.v, steps.reactions
+        self._substeps = steps.substeps()
         self._constrained_dofs, self.mesh = steps.constrained_dofs, case.mesh
         self.ranges = dict(zip(case.at, steps.ranges(), strict=True))
         self._enters = dict(zip(case.at, steps.enters(), strict=True))
@@ -511,8 +523,8 @@ class Derivatives:
             Derivatives; (..., P) for a quantity of shape (...), in the order of :attr:`at`.
 
         Raises:
-            ArgumentError: The quantity fails, or it needs material or energies of a run with
-                divided steps.
+            ArgumentError: The quantity fails, or it needs material or energies of a run with stages
+                in its steps, or with too many substeps.
         """
         require_function(quantity, "of: quantity", "a Solution")
         reference = _as_array(quantity(self.solution))
@@ -570,10 +582,10 @@ class Derivatives:
                     f"stages of {self.solution.scheme}; use order=2"
                 )
             first = self
-            first._require_whole_steps()
+            first._require_substeps()
             while first._start is not None:
                 first = first._start
-                first._require_whole_steps()
+                first._require_substeps()
             for p, name in enumerate(self.at):
                 # Simulations begin at the time of the first run
                 simulations = first._case.simulations(name, QUANTITY_STEP)
@@ -584,15 +596,12 @@ class Derivatives:
                 self._repeated.append(found)
         return self._repeated
 
-    def _require_whole_steps(self) -> None:
-        """Raise :class:`ArgumentError` if steps of the run were divided."""
-        before = 0 if self._start is None else self._start.solution.substeps
-        if self.solution.substeps - before != len(self.solution) - 1:
-            dynamic = has_inertia(self.solution.scheme)  # type: ignore[arg-type]
+    def _require_substeps(self) -> None:
+        """Raise :class:`ArgumentError` if too many steps of the run were divided."""
+        if self._substeps is None:
             raise ArgumentError(
-                "of: this quantity needs material or energies, and steps of the run were "
-                "divided; use a smaller dt, with which no step is divided"
-                + ("" if dynamic else ", and loads that grow from zero")
+                "of: this quantity needs material or energies, and many steps of the run were "
+                "divided; use a smaller dt"
             )
 
     def _ends(self) -> list[list[Solution]]:
@@ -628,7 +637,14 @@ class Derivatives:
         if self._start is not None:
             earlier = self._start._repeat(simulation, p, change)
             simulation.solution = Solution(earlier.scene, earlier.numbering, earlier)
-        simulation.repeat(self.solution.times[1:], self._states(p, change)["q"][1:])
+        ends, q = self.solution.times[1:], self._states(p, change)["q"][1:]
+        steps = np.column_stack([ends, ends, np.zeros(len(ends))])
+        if self._substeps is not None and len(self._substeps[0]):
+            some, here, by = self._substeps
+            at = np.searchsorted(ends, some[:, 0])
+            steps = np.insert(steps, at, some, axis=0)
+            q = np.insert(q, at, here + change * by[:, p], axis=0)
+        simulation.repeat(steps, q)
         simulation.end()
         return simulation.solution
 
