@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import partial
 from inspect import signature
@@ -33,6 +33,7 @@ from ufl_beam.errors import (
     require_number,
     require_switch,
     shorten,
+    warn,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia, order_of
 from ufl_beam.model.beams import Mesh
@@ -68,6 +69,9 @@ STENCILS: dict[tuple[int, ...], tuple[float, ...]] = {
 """Positions and weights of five-point differences: central ones, and one-sided ones at the end of
 the range of a parameter.  The weight of the position 0 makes the sum of the weights zero."""
 
+LEAST_ROOM = 1000
+"""Number of substeps of divided steps that are stored; the number of steps if it is larger."""
+
 Model = Callable[..., Scene]
 
 
@@ -101,8 +105,10 @@ def differentiate(
         scheme: Time scheme, as in :func:`simulate`.
         t: Beginning and end; s.
         dt: Time step; s.
-        start: Derivatives of an earlier run of the same model at the same values, with the same
-            scheme and mesh, which this run continues.
+        start: Derivatives of an earlier run at the same values, with the same mesh, which this run
+            continues.  If it has another scheme, such as :class:`Static` for a preload, or another
+            model, this run begins as one of :func:`simulate` with ``start``.  Two models must
+            return the same beams for the same values, see docs/derivatives.md.
         newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default the cells of the beams.
         progress: Show a progress bar in a terminal or notebook.
@@ -130,18 +136,18 @@ def differentiate(
     case = checked_case("differentiate", model, at, scheme, t0, dt, newton, mesh)
     if start is not None:
         require_kind(start, Derivatives, "differentiate: start")
-        if start.at != dict(at) or start.solution.times[-1] != t0:
+        if [*start.at.items()] != [*at.items()] or start.solution.times[-1] != t0:
             raise ArgumentError(
                 f"differentiate: start ends at t = {start.solution.times[-1]:g} s with "
-                f"{start.at}; begin there, at the same values"
+                f"{start.at}; begin there, at the same values in the same order"
             )
-        if start.solution.scheme != scheme or start.mesh != mesh:
+        if start.mesh != mesh:
             raise ArgumentError(
-                f"differentiate: start has scheme = {start.solution.scheme} and "
-                f"mesh = {start.mesh}; continue with the same ones"
+                f"differentiate: start has mesh = {start.mesh}; continue with the same one"
             )
+        case.begin_at_end_of(start)
     found = case.run(t1, dt, start, progress=progress)
-    found.require_effects()
+    found.warn_of_no_effect()
     return found
 
 
@@ -180,10 +186,13 @@ class Case:
         at: Values of the parameters.
         create: Function that creates a simulation of a scene.
         mesh: Discretization; None for the cells of the beams.
+        start: Run with another scheme or model, at whose end the simulations begin; else None.
     """
 
+    start: Derivatives | None = None
+
     def __init__(
-        self, call: str, model: Model, at: dict[str, float], create: Callable[..., Any],
+        self, call: str, model: Model, at: dict[str, float], create: partial[Simulation],
         mesh: Mesh | None,
     ) -> None:  # fmt: skip
         self._call, self._model, self.at = call, model, at
@@ -196,9 +205,28 @@ class Case:
         require_kind(scene, Scene, f"{self._call}: the result of model")
         return scene
 
-    def simulation(self, changes: Mapping[str, float]) -> Simulation:
+    def begin_at_end_of(self, start: Derivatives) -> None:
+        """Let simulations begin at the end of a run, unless they can continue its steps."""
+        known = start._case
+        self._same_model = self._model is known._model
+        schemes = [case.create.keywords["scheme"] for case in (self, known)]
+        if not self._same_model or schemes[0] != schemes[1]:
+            self.start, self._stencils = start, known._stencils
+
+    def simulation(self) -> Simulation:
         """Return a simulation in its initial state."""
-        simulation: Simulation = self.create(self.scene(changes))
+        return self._begin(self.scene({}), None if self.start is None else self.start.solution)
+
+    def _begin(self, scene: Scene, start: Solution | None) -> Simulation:
+        if start is not None and self._same_model:  # which may make new beams at each call
+            scene = start.scene
+        if start is not None and scene.beams != start.scene.beams:
+            raise ArgumentError(
+                f"{self._call}: the model is not that of start, and has other beams; let both "
+                "return the same Beam objects for the same values, by functools.cache, see "
+                "docs/derivatives.md"
+            )
+        simulation: Simulation = self.create(scene, start=start)
         return simulation
 
     def _step(self, name: str, fraction: float) -> float:
@@ -223,7 +251,12 @@ class Case:
         """Yield simulations of :meth:`scenes`."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)
-            yield from map(self.create, [*self.scenes(name, fraction)])
+            scenes = [*self.scenes(name, fraction)]
+            starts: Sequence[Solution | None] = [None] * len(scenes)
+            if self.start is not None:
+                start, p = self.start, [*self.at].index(name)
+                starts = start._ends()[p] if fraction == MODEL_STEP else start._runs()[p]
+            yield from map(self._begin, scenes, starts)
 
     def positions(self, name: str, fraction: float) -> Array:
         """Return the changes of a parameter in the scenes of :meth:`scenes`."""
@@ -238,12 +271,12 @@ class Case:
     ) -> Derivatives:
         """Simulate until ``t1`` (s) and differentiate each step, see :func:`differentiate`."""
         begin = time.perf_counter()
-        run = self.simulation({})
+        run = self.simulation()
         neighbours, weights = self.neighbours(run)
         states = step_count(t1 - run.t, dt) + 1
         steps = StepDerivatives(run, neighbours, weights, states)
         fill(run.time_loop, derivatives=steps.c)
-        if start is not None:
+        if start is not None and self.start is None:
             run.save_or_restore(Archive(run.subdomain, start.end[0]))
             steps.restore(start.end[1])
         with running(run, [], [], begin):
@@ -298,6 +331,8 @@ class StepDerivatives:
     Attributes:
         terms: Derivatives of all terms: kinds, and data of C.
         states: Derivatives of the present state of the run, as arrays that C changes.
+        places: Indices of states of terms, indices of the terms, and functions that return the
+            arrays of a term that the states are derivatives of.
         q, v: Derivatives of configurations and velocities by P parameters; (states, P, size).
         constrained_dofs: Degrees of freedom that supports hold; (number,).
         reactions: Derivatives of the forces of supports, in their axes; (states, P, number).
@@ -312,6 +347,7 @@ class StepDerivatives:
         equation, A = simulation.equation, simulation.equation.A
         scene = Neighbours(simulation, neighbours, weights, size)
         self.terms, self.states = list[Any](), list[Array]()
+        self.places = list[tuple[int, int, Callable[[Any], Array]]]()
         self._alive = list[Any]([neighbours])  # data of C
         self.owners = list[Any]()  # terms, by their index in C
         for i, term in enumerate(equation.terms):
@@ -323,6 +359,7 @@ class StepDerivatives:
             # order, the adjoint has imposed strains after beams.
             self.terms[:0] = found
             self.owners[:0] = [term] * len(found)
+            self.places += [(len(self.states) + k, i, of) for k, of in own.places.items()]
             self.states += own.states
             self._alive.append(own)
             scene.enters |= own.enters
@@ -335,25 +372,29 @@ class StepDerivatives:
         self.constrained_dofs = equation.supports.dofs
         self.reactions = np.zeros((states, P, constrained))
         q0 = scene.differences(lambda x: x.q)
+        reactions = scene.differences(lambda x: x.supports.reactions)
         motions = [x.time_loop.supports.motion for some in neighbours for x in some]
+        room = max(states, LEAST_ROOM)
+        substeps = self._substeps = [np.zeros((room, *n)) for n in ((3,), (size,), (P, size))]
         c = self.c = struct(
             "derivatives", parameters=P, size=size, terms=len(in_c),
             term=ffi.new("term_derivative[]", in_c), q0=q0, q1=np.zeros((P, size)),
-            reactions=np.zeros((P, constrained)), neighbours=weights.shape[1], weight=weights,
+            reactions=reactions, neighbours=weights.shape[1], weight=weights,
             motion=ffi.new("time_function *[]", motions), indices=A.indices,
             tangent=np.zeros(len(A.data)), r=np.zeros(size), v=np.zeros(size), s=np.zeros(size),
             space=np.zeros(size), range=self._change, range_time=self._time,
             range_term=self._term, range_place=self._place, kept=1, kept_q=self.q, kept_v=self.v,
-            kept_reactions=self.reactions,
+            kept_reactions=self.reactions, room=room, substep=substeps[0],
+            substep_q=substeps[1], substep_dq=substeps[2],
         )  # fmt: skip
         rates = np.zeros((V + 1, P, size))
         if equation.inertia is not None:
             rates = np.zeros((equation.inertia.c.number, P, size))
-            rates[V] = rates[V + 1] = scene.differences(lambda x: x.inertia.v)
+            rates[V:] = scene.differences(lambda x: x.inertia.rates).swapaxes(0, 1)
             for k in range(V, len(rates)):
                 c.rates[k] = doubles(rates[k])
             fill(c, new_rates=np.zeros(rates.shape), inertia=equation.inertia.step_product)
-        self.states += [q0, rates]
+        self.states += [reactions, q0, rates]
         self.restore(self.states)
 
     def enters(self) -> list[bool]:
@@ -366,8 +407,13 @@ class StepDerivatives:
         """Set the derivatives at the beginning of the run to the :attr:`states` of another one."""
         for mine, other in zip(self.states, states, strict=True):
             mine[:] = other
-        *_, self.q[0], rates = self.states
+        *_, self.reactions[0], self.q[0], rates = self.states
         self.v[0] = rates[V]
+
+    def substeps(self) -> list[Array] | None:
+        """Return the substeps of divided steps, see derivatives.c; None if there were too many."""
+        number = self.c.substeps
+        return [x[:number].copy() for x in self._substeps] if number >= 0 else None
 
     def ranges(self) -> list[Range]:
         """Return the range of each derivative."""
@@ -434,28 +480,31 @@ class Derivatives:
         start: Derivatives | None,
     ) -> None:  # fmt: skip
         self.solution, self.at, self._case = solution, case.at, case
-        self.end, self._start = (state, steps.states), start
+        self.end, self._places = (state, steps.states), steps.places
+        self._start = start if case.start is None else None
         self._q, self._v, self._reactions = steps.q, steps.v, steps.reactions
+        self._substeps = steps.substeps()
         self._constrained_dofs, self.mesh = steps.constrained_dofs, case.mesh
         self.ranges = dict(zip(case.at, steps.ranges(), strict=True))
+        self._enters = dict(zip(case.at, steps.enters(), strict=True))
         if start is not None:
             for name, earlier in start.ranges.items():
                 self.ranges[name] = min(earlier, self.ranges[name], key=lambda x: x.change)
-        self._enters = steps.enters()
+            for name, enters in start._enters.items():
+                self._enters[name] |= enters
         self._shifted: list[list[Solution]] = []
         self._repeated: list[list[Solution]] = []
+        self._moved_ends: list[list[Solution]] = []
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name} = {value:.6g}" for name, value in self.at.items())
         return f"<Derivatives at {values}: {self.solution!r}>"
 
-    def require_effects(self) -> None:
-        """Raise :class:`ArgumentError` if the run does not depend on a parameter."""
-        for name, enters in zip(self.at, self._enters, strict=True):
+    def warn_of_no_effect(self) -> None:
+        """Warn if the run does not depend on a parameter."""
+        for name, enters in self._enters.items():
             if not enters:
-                raise ArgumentError(
-                    f"differentiate: the run does not depend on {name}; remove it from at"
-                )
+                warn(f"differentiate: the run does not depend on {name}, so derivatives are zero")
 
     def of(self, quantity: Callable[[Solution], npt.ArrayLike]) -> Array:
         """Return the derivatives of a quantity of the run.
@@ -474,8 +523,8 @@ class Derivatives:
             Derivatives; (..., P) for a quantity of shape (...), in the order of :attr:`at`.
 
         Raises:
-            ArgumentError: The quantity fails, or it needs material or energies of a run with
-                divided steps.
+            ArgumentError: The quantity fails, or it needs material or energies of a run with stages
+                in its steps, or with too many substeps.
         """
         require_function(quantity, "of: quantity", "a Solution")
         reference = _as_array(quantity(self.solution))
@@ -533,10 +582,10 @@ class Derivatives:
                     f"stages of {self.solution.scheme}; use order=2"
                 )
             first = self
-            first._require_whole_steps()
+            first._require_substeps()
             while first._start is not None:
                 first = first._start
-                first._require_whole_steps()
+                first._require_substeps()
             for p, name in enumerate(self.at):
                 # Simulations begin at the time of the first run
                 simulations = first._case.simulations(name, QUANTITY_STEP)
@@ -547,21 +596,55 @@ class Derivatives:
                 self._repeated.append(found)
         return self._repeated
 
-    def _require_whole_steps(self) -> None:
-        """Raise :class:`ArgumentError` if steps of the run were divided."""
-        before = 0 if self._start is None else self._start.solution.substeps
-        if self.solution.substeps - before != len(self.solution) - 1:
+    def _require_substeps(self) -> None:
+        """Raise :class:`ArgumentError` if too many steps of the run were divided."""
+        if self._substeps is None:
             raise ArgumentError(
-                "of: this quantity needs material or energies, and steps of the run were "
-                "divided; use a smaller dt, with which no step is divided"
+                "of: this quantity needs material or energies, and many steps of the run were "
+                "divided; use a smaller dt"
             )
+
+    def _ends(self) -> list[list[Solution]]:
+        """Return ends of runs at neighbouring values of each parameter, to first order.
+
+        Internal variables are those of the run plus their derivatives, at which no point switches.
+        Accumulated energies are those of the run: :meth:`_runs` has others, for quantities.
+        """
+        if not self._moved_ends:
+            known, (*states, reactions, q, rates) = self.end
+            held = np.zeros(q.shape)
+            held[:, self._constrained_dofs] = reactions
+            changes = {"q": q, "reactions": held}
+            for p, name in enumerate(self.at):
+                simulations = self._case.simulations(name, MODEL_STEP)
+                positions, found = self._case.positions(name, MODEL_STEP), list[Solution]()
+                for simulation, change in zip(simulations, positions, strict=True):
+                    with closing(simulation):
+                        if (inertia := simulation.equation.inertia) is not None:
+                            changes |= zip(inertia.names, rates[V:], strict=True)
+                        both = ((k, known[k], x[p]) for k, x in changes.items() if k in known)
+                        moved = {k: here + change * x for k, here, x in both}
+                        simulation.save_or_restore(Archive(simulation.subdomain, known | moved))
+                        for k, i, of in self._places:
+                            of(simulation.equation.terms[i])[...] += change * states[k][p]
+                        simulation.end()
+                        found.append(simulation.solution)
+                self._moved_ends.append(found)
+        return self._moved_ends
 
     def _repeat(self, simulation: Simulation, p: int, change: float) -> Solution:
         """Return the states of a simulation whose motion follows from a change of a parameter."""
         if self._start is not None:
             earlier = self._start._repeat(simulation, p, change)
             simulation.solution = Solution(earlier.scene, earlier.numbering, earlier)
-        simulation.repeat(self.solution.times[1:], self._states(p, change)["q"][1:])
+        ends, q = self.solution.times[1:], self._states(p, change)["q"][1:]
+        steps = np.column_stack([ends, ends, np.zeros(len(ends))])
+        if self._substeps is not None and len(self._substeps[0]):
+            some, here, by = self._substeps
+            at = np.searchsorted(ends, some[:, 0])
+            steps = np.insert(steps, at, some, axis=0)
+            q = np.insert(q, at, here + change * by[:, p], axis=0)
+        simulation.repeat(steps, q)
         simulation.end()
         return simulation.solution
 

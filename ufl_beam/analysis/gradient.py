@@ -67,7 +67,8 @@ def gradient(
 
     The adjoint of the run goes back through its steps once, at a cost that hardly depends on the
     number of parameters.  :func:`differentiate` is cheaper for up to about ten parameters, and has
-    derivatives of any quantity.
+    derivatives of any quantity, and continues a preload with ``start``, which this function does
+    not: its run begins with the undeformed scene.
 
     The steps are recorded in parts of the run that fit into the given memory.  Each segment is
     computed twice.
@@ -114,7 +115,7 @@ def gradient(
     case = checked_case("gradient", model, at, scheme, t0, dt, newton, mesh)
     if not has_inertia(scheme) and scheme.load_weight != 1.0:
         raise ArgumentError(f"gradient: scheme = {scheme} has no adjoint; use Static()")
-    with closing(case.simulation({})) as run:
+    with closing(case.simulation()) as run:
         neighbours, weights = case.neighbours(run)
         steps = StepDerivatives(run, neighbours, weights, 1)
         number = step_count(t1 - t0, dt)

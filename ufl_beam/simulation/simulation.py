@@ -241,30 +241,43 @@ class Simulation(Stepper):
             self.give_up(failure, float(c.failed_end))
         return taken
 
-    def repeat(self, ends: Array, configurations: Array) -> None:
+    def repeat(self, steps: Array, configurations: Array) -> None:
         """Accept given configurations at the ends of steps, without solutions; keep the states.
 
         Args:
-            ends: Ends of the steps; (n,); s.
-            configurations: Configurations at these times; (n, size).
+            steps: For each substep, or step that is not divided: its end, the end of the step (s),
+                and 1 if it applies the loads at the beginning of the run, else 0; (n, 3).
+            configurations: Configurations at the ends; (n, size).
 
         Raises:
             StepFailed: A law or a function of a user fails in a step.
         """
         self.keep()
-        ends, configurations = map(np.ascontiguousarray, (ends, configurations))
+        steps, configurations = map(np.ascontiguousarray, (steps, configurations))
         columns, done = self._writer.columns, 0
         most = 1 + MOST_VALUES // columns.width
-        while done < len(ends):
-            space = self.solution.free_rows(columns, min(len(ends) - done, most))
+        self.time_loop.begin_of_run = self.t
+        ends = (steps[:, 0] == steps[:, 1]) & (steps[:, 2] == 0)  # of whole steps, or divided ones
+        while done < len(steps):
+            # Whole steps together, or all substeps of a step, which keep() stores
+            number = int(np.argmin(ends[done:])) if not ends[done:].all() else len(steps) - done
+            whole = number > 0
+            number = min(number, most) if whole else 1 + int(np.argmax(ends[done:]))
+            if whole:
+                space = self.solution.free_rows(columns, number)
+            else:
+                space = np.zeros((number, columns.width))
             with self._in_c():
-                arrays = doubles(ends[done:]), doubles(configurations[done:]), doubles(space)
+                arrays = doubles(steps[done:]), doubles(configurations[done:]), doubles(space)
                 taken: int = lib.repeat_steps(self.time_loop, len(space), *arrays)
             if taken < len(space):
                 self._fail()
-            self.solution.grow(taken)
+            if whole:
+                self.solution.grow(taken)
+                self.solution.count(self.substeps, self.iterations)
+            else:
+                self.keep()
             done += taken
-        self.solution.count(self.substeps, self.iterations)
 
     def watch(self, fractions: Array) -> ExtremesInC:
         """Return extremes of motions, and of section forces at ``fractions`` of cells.

@@ -502,7 +502,9 @@ class UserLaws(Response):
         self._work = ledger.lost, "functions"
         self._enter(entry=self._work, stored=(ledger.state, "stored"))
         self._in_steps["sign"] = 1.0
-        states, weight = np.zeros((n, len(law.state))), setting.scheme.load_weight
+        first, weight = len(STEP_INPUTS), setting.scheme.load_weight
+        self._storage = np.zeros((n, first + len(law.state)))  # inputs; only the variables are used
+        states: Any = self._storage[:, first:]
         self._variables = list(states.T)
         arguments = zip(connectors, self._laws, self._lengths, states, strict=True)
         self._each = [
@@ -526,11 +528,7 @@ class UserLaws(Response):
     ) -> list[Each] | None:
         """See the base class; differences of the functions make a table of each law."""
         n, variables = len(self._connectors), len(self._variables)
-        initial = neighbours.differences(
-            lambda term: np.array([x.state for x in term.response._each])
-        )
-        w = np.zeros((len(neighbours), n, len(STEP_INPUTS) + variables))
-        w[:, :, len(STEP_INPUTS) :] = initial
+        w = neighbours.state(lambda term: term.response._storage)
         columns = [0, 1, *range(len(STEP_INPUTS), w.shape[2])]
         J = np.zeros((n, 1 + variables, len(columns)))
         by_parameter = np.zeros((len(neighbours), n, 1 + variables))
@@ -552,7 +550,7 @@ class UserLaws(Response):
             neighbours, term, motions, row, J=J, rows=1 + variables, columns=len(columns),
             outputs=J[0].size, column=np.array(columns, dtype=np.int32), width=w.shape[2],
             variables=variables, variables_at_end=np.zeros(variables), by_parameter=by_parameter,
-            w=neighbours.state(w), w_bar=np.zeros(w[0].shape), tabulate_user=lib.run_in_python,
+            w=w, w_bar=np.zeros(w[0].shape), tabulate_user=lib.run_in_python,
             user=term.callbacks.handle(tabulate),
         )  # fmt: skip
 

@@ -232,7 +232,7 @@ class Response:
             e0_bar=e0_bar, row_bar=motions["row_bar"], viscosity_bar=viscosity_bar,
             limit_bar=limit_bar, motions=motions["strains"],
             by_geometry=motions["by_geometry"],
-            e0=neighbours.state(np.zeros((parameters, len(self._connectors)))), e1=e1, **fields,
+            e0=neighbours.state(lambda term: term.motions[0]), e1=e1, **fields,
         )  # fmt: skip
         return [in_c("connectors", c)]
 
@@ -260,14 +260,14 @@ class Response:
         """Return the fields of ``connector_derivatives`` for compiled laws with some inputs."""
         function, by, numbers = table
         column = np.array([inputs.index(name) for name in by], dtype=np.int32)
-        changes = neighbours.differences(lambda term: storage(term.response))
+        changes = neighbours.state(lambda term: storage(term.response))
         tables = np.zeros((len(self._connectors), numbers["outputs"]))
         return {
             "table": function,
             **numbers,
             "column": column,
             "J": tables,
-            "w": neighbours.state(changes),
+            "w": changes,
             "w_bar": np.zeros(changes[0].shape),
             "width": changes.shape[2],
         }
@@ -331,11 +331,13 @@ class PrescribedLaws(Response):
                 lambda term: term.response._in_steps["viscosity"]
             )
         elif self._time_functions:  # motors and actuators
-            now, end, reached = neighbours.state(np.zeros((3, *shape)))
+            now, end = np.zeros((2, *shape))
             others = [x._term_in_c for some in neighbours.terms for x in some]
             fields = {"now": now, "end": end, "neighbour": ffi.new("connector_term *[]", others)}
             if "wanted_force" in self._time_functions:
-                fields["reached"] = reached
+                fields["reached"] = neighbours.state(
+                    lambda term: term.response._in_steps["reached"]
+                )
         elif self.sticks is not None and not any(law.joint for law in self._laws):
             limits = neighbours.differences(
                 lambda term: np.array([law.force for law in term.response._laws])
@@ -586,8 +588,7 @@ class RigidPlasticLaws(Response):
             neighbours, self._forms.table, tuple(self._at), lambda laws: laws._storage
         )
         for field, name in (("limit", "_limit"), ("back_force", "_back_force")):
-            values = neighbours.differences(attrgetter(f"response.{name}"))
-            table[field] = neighbours.state(values)
+            table[field] = neighbours.state(attrgetter(f"response.{name}"))
         return self._derivatives_in_c(neighbours, term, motions, row, **table)
 
     def state(self) -> Array:

@@ -46,6 +46,8 @@ class Neighbours:
         alive: Data that C refers to.
         enters: True for a parameter on which some number of the term depends; (parameters,).
         states: Derivatives of the state of the term, see :meth:`state`.
+        places: Functions that return the arrays that :attr:`states` are derivatives of, by their
+            indices.
     """
 
     def __init__(
@@ -53,16 +55,18 @@ class Neighbours:
     ) -> None:
         self.term, self.terms, self.weights, self.size = term, terms, weights, size
         self.alive, self.states = list[Any](), list[Array]()
+        self.places: dict[int, Callable[[Any], Array]] = {}
         self.enters = np.zeros(len(terms), dtype=bool)
 
     def __len__(self) -> int:
         """Number of parameters."""
         return len(self.terms)
 
-    def state(self, values: Array) -> Array:
-        """Return ``values``, and store them as derivatives of the state of the term."""
-        self.states.append(values)
-        return values
+    def state(self, values: Callable[[Any], Array]) -> Array:
+        """Return the derivatives of an array of the state of the term, and store them."""
+        self.places[len(self.states)] = values
+        self.states.append(self.differences(values))
+        return self.states[-1]
 
     def differences(self, values: Callable[[Any], Array]) -> Array:
         """Return the derivatives of an array of the term; (parameters, *shape of the array)."""

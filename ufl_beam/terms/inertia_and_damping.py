@@ -189,6 +189,16 @@ class Inertia(Term):
         return self._rate(V_BEFORE).copy()
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of :attr:`rates` in saved data."""
+        return "velocity", BEFORE, *self.scheme.further_rates
+
+    @property
+    def rates(self) -> Array:
+        """Velocities, velocities before the last step, and further rates; (number, size)."""
+        return np.array([self._rate(k) for k in range(V, self.c.number)])
+
+    @property
     def more(self) -> tuple[Array, ...]:
         """Known further rates of the scheme."""
         return tuple(self._rate(FURTHER + k).copy() for k in range(self.c.more))
@@ -513,7 +523,8 @@ class SecondDifferences(FormForces):
         )
         by_q1 = form_derivative(strains.form, strains.kernel, kernel, self._q1)
         e1, direction = np.zeros((2, *self._e.shape))
-        e0, change = neighbours.state(np.zeros((2, len(neighbours), *self._e.shape)))
+        e0 = neighbours.state(lambda term: term._e)
+        change = neighbours.state(lambda term: term._change)
         c = struct(
             "second_difference_derivatives", differences=self._in_steps, strains=by_q1,
             force=force, e0=e0, change=change, e1=e1, direction=direction,

@@ -188,7 +188,8 @@ class DeadLoads(_AtDofs):
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
         parameters, number = neighbours.weights.shape
-        now, end, before = neighbours.state(np.zeros((3, parameters, self._size)))
+        now, end = np.zeros((2, parameters, self._size))
+        before = neighbours.state(lambda term: term._whole(term._forces[1]))
         loads = ffi.new("dead_loads *[]", [x._c for some in neighbours.terms for x in some])
         c = struct(
             "load_derivatives", parameters=parameters, size=self._size, neighbours=number,
@@ -493,7 +494,7 @@ class MovingLoads(_AtDofs):
                 "another value"
             )
         now, end = np.zeros((2, parameters, self._on_cells[0].size))
-        before = neighbours.state(neighbours.differences(lambda term: term._on_cells[2]))
+        before = neighbours.state(lambda term: term._on_cells[2])
         c = struct(
             "moving_derivatives", parameters=parameters, neighbours=number, ends_of=ends[0].size,
             loads=self._c, neighbour=ffi.new("moving_loads *[]", [x._c for x in others]),

@@ -340,13 +340,13 @@ class Points:
         """
         table, by, numbers = self._forms.table
         cells, per_cell, _ = self._storage.shape
-        change = neighbours.differences(attrgetter(f"{path}._storage"))
         c = struct(
             "point_derivatives", points=self.c, table=table, **numbers,
             unknown=self.names.index(by[1]) if by[1].startswith("new ") else 0,
             column=np.array([self.names.index(name) for name in by], dtype=np.int32),
-            J=np.zeros((cells, per_cell, numbers["outputs"])), w=neighbours.state(change),
-            e0=neighbours.state(neighbours.differences(attrgetter(f"{path}._e0"))),
+            J=np.zeros((cells, per_cell, numbers["outputs"])),
+            w=neighbours.state(attrgetter(f"{path}._storage")),
+            e0=neighbours.state(attrgetter(f"{path}._e0")),
             r=np.zeros((cells, 3)), e1=np.zeros((cells, 3)), w_bar=np.zeros(self._storage.shape),
             e0_bar=np.zeros((cells, 3)), r_bar=np.zeros((cells, 3)), **fields,
         )  # fmt: skip
@@ -356,8 +356,7 @@ class Points:
                 bar = {f"{field}_bar": np.zeros(values[0].size)}
                 fill(c, **{field: np.ascontiguousarray(values)}, **bar)
         if self.committed is not None:
-            tangents = neighbours.differences(attrgetter(f"{path}.committed"))
-            self.tangents = neighbours.state(tangents)
+            self.tangents = neighbours.state(attrgetter(f"{path}.committed"))
             elastic = neighbours.differences(attrgetter(f"{path}._elastic"))
             # An eighth of the neighbours' distance: near the scene, and 1e-12 of round-off
             step = 1 / (8 * np.abs(neighbours.weights).max(axis=1))

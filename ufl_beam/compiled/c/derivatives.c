@@ -1015,6 +1015,21 @@ int differentiate_step(derivatives *d, time_loop *m, int initial)
   return 1;
 }
 
+/* Store an accepted substep of a step to `end`. */
+void keep_substep(derivatives *d, const time_loop *m, double end)
+{
+  const size_t n = d->size, all = n * d->parameters, k = d->substeps;
+  if (d->substeps < 0 || d->substeps == d->room) {
+    d->substeps = -1;
+    return;
+  }
+  const double step[] = {m->t, end, m->applies};
+  memcpy(d->substep + 3 * k, step, sizeof step);
+  memcpy(d->substep_q + k * n, m->q, n * sizeof *m->q);
+  memcpy(d->substep_dq + k * all, d->q0, all * sizeof *d->q0);
+  ++d->substeps;
+}
+
 /* Store the derivatives at the end of a step. */
 void keep_derivatives(derivatives *d, const time_loop *m)
 {

@@ -1119,7 +1119,7 @@ int attempt_step(time_loop *m, double t1, double end);
 void take_back(time_loop *m);
 int accept_step(time_loop *m);
 int step_or_subdivide(time_loop *m, double end);
-int repeat_steps(time_loop *m, int steps, const double *ends, const double *configurations, double *rows);
+int repeat_steps(time_loop *m, int number, const double *steps, const double *configurations, double *rows);
 int take_steps(time_loop *m, int steps, const double *ends, double seconds, int keeps, double *rows);
 
 /* -- derivatives of a run by parameters, see derivatives.c --------------------------------------------- */
@@ -1158,6 +1158,11 @@ struct derivatives {
   int now;                /* index of the term */
   int kept;               /* number of stored states */
   double *kept_q, *kept_v, *kept_reactions;
+  /* Substeps within divided steps: space for some; number stored, -1 if there was too little space. Of
+   * each: its end, the end of the step, whether loads were applied (3); the configuration and its
+   * derivatives at its end. */
+  int room, substeps;
+  double *substep, *substep_q, *substep_dq;
 };
 
 /* Forces of a form differentiated by one of its coefficients, with a table of each cell. */
@@ -1393,6 +1398,7 @@ void accept_imposed_derivative(void *self, const derivatives *d, int p);
 void accept_differences_derivative(void *self, const derivatives *d, int p);
 void accept_moving_loads_derivative(void *self, const derivatives *d, int p);
 void keep_derivatives(derivatives *d, const time_loop *m);
+void keep_substep(derivatives *d, const time_loop *m, double end);
 void add_form_derivative(void *self, const derivatives *d, int p, double *r);
 void add_connectors_derivative(void *self, const derivatives *d, int p, double *r);
 void add_points_derivative(void *self, const derivatives *d, int p, double *r);

@@ -479,6 +479,7 @@ int step_or_subdivide(time_loop *m, double end)
     if (m->path) rejected = m->path->rejected;
     if (solved) {
       if (!differentiate_or_record(m, 0) || !accept_step(m)) return 0;
+      if (m->derivatives && (t1 != end || m->applies)) keep_substep(m->derivatives, m, end);
       done += some;
       /* Double the substep at the times where a larger one would begin. */
       if (done % (2 * some) == 0 && some < MOST_SUBSTEPS) some *= 2;
@@ -533,18 +534,21 @@ int take_steps(time_loop *m, int steps, const double *ends, double seconds, int 
   return steps;
 }
 
-/* Accept given configurations at the ends of steps, without solutions, and write the states into `rows`.
- * The configurations are in the axes of the plane. Returns the number of steps. */
-int repeat_steps(time_loop *m, int steps, const double *ends, const double *configurations, double *rows)
+/* Accept given configurations at the ends of steps or substeps, see keep_substep, without solutions, and
+ * write the states into `rows`. The configurations are in the axes of the plane. Returns the number of
+ * steps. */
+int repeat_steps(time_loop *m, int number, const double *steps, const double *configurations, double *rows)
 {
   equation *e = m->equation;
-  for (int k = 0; k < steps; ++k) {
+  for (int k = 0; k < number; ++k) {
+    const double t1 = steps[3 * k], end = steps[3 * k + 1];
+    m->applies = steps[3 * k + 2] != 0;
     e->raised = NOTHING;
     if (m->rates && m->prepare && !m->rates->ready) {
-      if (!solve_to(m, m->t + FIRST_TRIAL * (ends[k] - m->t), ends[k])) return k;
+      if (!solve_to(m, m->t + FIRST_TRIAL * (end - m->t), end)) return k;
       m->prepare(m->handle);
     }
-    if (!set_step(m, ends[k], ends[k]) || !begin_terms(m)) return k;
+    if (!set_step(m, t1, end) || !begin_terms(m)) return k;
     memcpy(e->unknowns, configurations + (size_t)k * m->size, m->size * sizeof *e->unknowns);
     turn_axes(e->turned, e->axes, e->unknowns, 1);
     restart(e, EXACT);
@@ -553,5 +557,5 @@ int repeat_steps(time_loop *m, int steps, const double *ends, const double *conf
     if (!measure(m) || !accept_step(m)) return k;
     keep_state(m, rows + (size_t)k * m->width);
   }
-  return steps;
+  return number;
 }
