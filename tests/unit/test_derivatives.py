@@ -558,13 +558,17 @@ def test_a_parameter_that_does_not_enter():
         beam = ub.Beam((0, 0), (1, 0), section, cells=2)
         return clamped(beam, loads=[ub.PointLoad(beam.end, force=(0, load))])
 
-    def run(at):
-        return ub.differentiate(model, at, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    def run(at, **more):
+        return ub.differentiate(model, at, ub.Static(), t=(0, 1), dt=1.0, progress=False, **more)
 
     for name in "unused", "rho":
-        with pytest.warns(ub.ModelWarning, match=f"the run does not depend on {name}, so"):
-            found = run({"load": 1.0, name: 3.0})
+        with raises(f"differentiate: the run does not depend on {name}; remove it from at"):
+            run({"load": 1.0, name: 3.0})
+        found = run({"load": 1.0, name: 3.0}, unused=[name])
         assert (found.of(tip)[..., 1] == 0).all()
+    for wrong in "rho", ["density"]:
+        with raises("differentiate: unused = ", "must be names in at"):
+            run({"load": 1.0, "rho": 3.0}, unused=wrong)
     still = ub.differentiate(
         lambda load, EI: deflected(EI=EI, force=load), {"load": 0.0, "EI": 4e3}, ub.Static(), **RUN
     )

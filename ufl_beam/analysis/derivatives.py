@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import partial
 from inspect import signature
@@ -33,7 +33,6 @@ from ufl_beam.errors import (
     require_number,
     require_switch,
     shorten,
-    warn,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia, order_of
 from ufl_beam.model.beams import Mesh
@@ -83,6 +82,7 @@ def differentiate(
     t: tuple[float, float],
     dt: float,
     start: Derivatives | None = None,
+    unused: Collection[str] = (),
     newton: Newton | None = None,
     mesh: Mesh | None = None,
     progress: bool = True,
@@ -109,6 +109,8 @@ def differentiate(
             continues.  If it has another scheme, such as :class:`Static` for a preload, or another
             model, this run begins as one of :func:`simulate` with ``start``.  Two models must
             return the same beams for the same values, see docs/derivatives.md.
+        unused: Names of parameters that may be without effect on this run, such as a mass in a
+            static preload; other parameters without effect are an error.
         newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default the cells of the beams.
         progress: Show a progress bar in a terminal or notebook.
@@ -134,6 +136,9 @@ def differentiate(
     t0, t1 = require_times(t, "differentiate")
     require_switch(progress, "differentiate: progress")
     case = checked_case("differentiate", model, at, scheme, t0, dt, newton, mesh)
+    require_kind(unused, Collection, "differentiate: unused")
+    if isinstance(unused, str) or {*unused} - {*at}:
+        raise ArgumentError(f"differentiate: unused = {unused!r} must be names in at, {[*at]}")
     if start is not None:
         require_kind(start, Derivatives, "differentiate: start")
         if [*start.at.items()] != [*at.items()] or start.solution.times[-1] != t0:
@@ -147,7 +152,7 @@ def differentiate(
             )
         case.begin_at_end_of(start)
     found = case.run(t1, dt, start, progress=progress)
-    found.warn_of_no_effect()
+    found.require_effects(unused)
     return found
 
 
@@ -500,11 +505,14 @@ class Derivatives:
         values = ", ".join(f"{name} = {value:.6g}" for name, value in self.at.items())
         return f"<Derivatives at {values}: {self.solution!r}>"
 
-    def warn_of_no_effect(self) -> None:
-        """Warn if the run does not depend on a parameter."""
+    def require_effects(self, unused: Collection[str]) -> None:
+        """Raise :class:`ArgumentError` if the run does not depend on a parameter."""
         for name, enters in self._enters.items():
-            if not enters:
-                warn(f"differentiate: the run does not depend on {name}, so derivatives are zero")
+            if not enters and name not in unused:
+                raise ArgumentError(
+                    f"differentiate: the run does not depend on {name}; remove it from at, or give "
+                    f"unused=[{name!r}] if a run with start= will depend on it"
+                )
 
     def of(self, quantity: Callable[[Solution], npt.ArrayLike]) -> Array:
         """Return the derivatives of a quantity of the run.
