@@ -599,6 +599,7 @@ TABLE = {
         at=V({"force": 1.0}, [None, 1.0, "x", {}, {"force": "x"}, {"force": NAN}]),
         scheme=V(ub.Static(), [*OBJECT, ub.Static]), t=V((0, 1), [*VECTOR, (1, 0)]),
         dt=V(0.5, [*POSITIVE, ub.Adaptive(1e-3)]), start=V(None, optional(OBJECT)),
+        unused=V((), [None, 1.0, "force", ["x"], [1.0]]),
         newton=V(None, optional(OBJECT)), **MESH, progress=V(False, SWITCH),
     ),
     "gradient": call(
