@@ -354,7 +354,7 @@ def test_divided_steps():
 
 def test_too_many_substeps(monkeypatch):
     """Energies are refused after more substeps than there is space for."""
-    monkeypatch.setattr("ufl_beam.analysis.derivatives.LEAST_ROOM", 3)
+    monkeypatch.setattr("ufl_beam.analysis.derivatives.MOST_SUBSTEPS", 3)
     at = {"N_y": 40.0, "N": 100.0}
     options = {**RUN, "dt": 1.0}
     found = ub.differentiate(lambda N_y, N: pulled(N_y, N, 1e6 / 30), at, ub.Static(), **options)

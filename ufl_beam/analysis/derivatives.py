@@ -68,7 +68,7 @@ STENCILS: dict[tuple[int, ...], tuple[float, ...]] = {
 """Positions and weights of five-point differences: central ones, and one-sided ones at the end of
 the range of a parameter.  The weight of the position 0 makes the sum of the weights zero."""
 
-LEAST_ROOM = 1000
+MOST_SUBSTEPS = 1000
 """Number of substeps of divided steps that are stored; the number of steps if it is larger."""
 
 Model = Callable[..., Scene]
@@ -379,8 +379,8 @@ class StepDerivatives:
         q0 = scene.differences(lambda x: x.q)
         reactions = scene.differences(lambda x: x.supports.reactions)
         motions = [x.time_loop.supports.motion for some in neighbours for x in some]
-        room = max(states, LEAST_ROOM)
-        substeps = self._substeps = [np.zeros((room, *n)) for n in ((3,), (size,), (P, size))]
+        most = max(states, MOST_SUBSTEPS)
+        substeps = self._substeps = [np.zeros((most, *n)) for n in ((3,), (size,), (P, size))]
         c = self.c = struct(
             "derivatives", parameters=P, size=size, terms=len(in_c),
             term=ffi.new("term_derivative[]", in_c), q0=q0, q1=np.zeros((P, size)),
@@ -389,7 +389,7 @@ class StepDerivatives:
             tangent=np.zeros(len(A.data)), r=np.zeros(size), v=np.zeros(size), s=np.zeros(size),
             space=np.zeros(size), range=self._change, range_time=self._time,
             range_term=self._term, range_place=self._place, kept=1, kept_q=self.q, kept_v=self.v,
-            kept_reactions=self.reactions, room=room, substep=substeps[0],
+            kept_reactions=self.reactions, room=most, substep=substeps[0],
             substep_q=substeps[1], substep_dq=substeps[2],
         )  # fmt: skip
         rates = np.zeros((V + 1, P, size))
@@ -466,7 +466,7 @@ class Derivatives:
     Attributes:
         solution: The run.
         at: Values of the parameters by name, in the order of the derivatives.
-        ranges: :class:`Range` of each parameter by name, including those of ``start``.
+        ranges: :class:`Range` of each parameter by name, including switches in ``start``.
         mesh: Discretization; None for the cells of the beams.
         end: State at the end of the run, and its derivatives, for a run that continues.
 
@@ -615,8 +615,8 @@ class Derivatives:
     def _ends(self) -> list[list[Solution]]:
         """Return ends of runs at neighbouring values of each parameter, to first order.
 
-        Internal variables are those of the run plus their derivatives, at which no point switches.
-        Accumulated energies are those of the run: :meth:`_runs` has others, for quantities.
+        Internal variables of the run grow by their derivatives, without a switch of any point.
+        Accumulated energies do not change; :meth:`_runs` has energies for quantities.
         """
         if not self._moved_ends:
             known, (*states, reactions, q, rates) = self.end
@@ -631,7 +631,7 @@ class Derivatives:
                         if (inertia := simulation.equation.inertia) is not None:
                             changes |= zip(inertia.names, rates[V:], strict=True)
                         both = ((k, known[k], x[p]) for k, x in changes.items() if k in known)
-                        moved = {k: here + change * x for k, here, x in both}
+                        moved = {k: value + change * x for k, value, x in both}
                         simulation.save_or_restore(Archive(simulation.subdomain, known | moved))
                         for k, i, of in self._places:
                             of(simulation.equation.terms[i])[...] += change * states[k][p]
@@ -648,10 +648,10 @@ class Derivatives:
         ends, q = self.solution.times[1:], self._states(p, change)["q"][1:]
         steps = np.column_stack([ends, ends, np.zeros(len(ends))])
         if self._substeps is not None and len(self._substeps[0]):
-            some, here, by = self._substeps
+            some, known, slopes = self._substeps
             at = np.searchsorted(ends, some[:, 0])
             steps = np.insert(steps, at, some, axis=0)
-            q = np.insert(q, at, here + change * by[:, p], axis=0)
+            q = np.insert(q, at, known + change * slopes[:, p], axis=0)
         simulation.repeat(steps, q)
         simulation.end()
         return simulation.solution

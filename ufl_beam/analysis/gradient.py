@@ -229,7 +229,7 @@ class _History:
         self, solution: Solution, of: Callable[[Solution], npt.ArrayLike],
         reduce: Callable[[Array], float],
     ) -> None:  # fmt: skip
-        self._numbering, self._of, self._reduce = solution.numbering, of, reduce
+        self._numbering, self._quantity, self._reduce = solution.numbering, of, reduce
         self._states = {"t": solution.times, "q": solution.q, "v": solution.v}
         if not len(self._states["v"]):
             self._states["v"] = np.zeros_like(self._states["q"])
@@ -251,7 +251,7 @@ class _History:
         """Return the history in a scene, for changes of the motion."""
         shifted = self._states | {name: self._states[name] + x for name, x in changes.items()}
         try:
-            values = in_scene(self._of, MotionOnly(numbering, shifted))
+            values = in_scene(self._quantity, MotionOnly(numbering, shifted))
         except Unknown:
             raise ArgumentError(
                 "gradient: the history needs more than displacements and velocities, such as "

@@ -484,7 +484,7 @@ class LinearModel(Rich):
         else:
             N, P, na = self._basis[0][y], self._basis[1][y], self._number_of_modes
             identity, more = np.eye(N.shape[1]), self._modal_stiffness
-            # Motions without mass: what the modes do not explain, at the places that they move
+            # Motions without mass: the rest beside the modes, at the places that they move
             modes, lags = N[:, :na].T @ M, N[:, na:]
             rest = np.eye(len(y)) - N[:, :na] @ modes if lags.size else np.zeros((0, len(y)))
             read = np.vstack([modes, np.linalg.pinv(lags) @ rest]) if lags.size else modes

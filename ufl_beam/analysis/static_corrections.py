@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Corrections of modal reduction: what the modes that are left out contribute by their statics."""
+"""Corrections of modal reduction: static contributions of the modes that are left out."""
 
 from __future__ import annotations
 
@@ -127,8 +127,8 @@ def corrections(
         moved = (B1 - C @ P) / z + (B2 - M @ P)
         moved[constraints] = 0.0
         loads = np.hstack([forces, moved]).astype(complex)
-        of_basis = stiffness + z * (N.T @ (C[y][:, y] @ N)) + z**2 * (N.T @ (M[y][:, y] @ N))
-        q.append(np.linalg.solve(of_basis, N.T @ loads[y]))
+        dynamic = stiffness + z * (N.T @ (C[y][:, y] @ N)) + z**2 * (N.T @ (M[y][:, y] @ N))
+        q.append(np.linalg.solve(dynamic, N.T @ loads[y]))
         missing.append(outputs(splu(csc_array(A)).solve(loads) - basis @ q[-1], z))
     by_forces = _limit(*missing)[:, : nf + nq]
     for_rates = by_forces[:, nf:]

@@ -368,7 +368,7 @@ class States:
         return found / length[:, None]
 
     def _ends(self) -> list[tuple[float, States]]:
-        """Return the states, and those at the beginnings of their steps, with their weights."""
+        """Return the states, and configurations at the beginnings of their steps, with weights."""
         e = self.equilibrium_fraction
         if e == 1.0:
             return [(e, self)]
@@ -585,7 +585,7 @@ class States:
     def momentum(self) -> Array:
         """Return momenta (p_x, p_y, L), with L about the origin; (n+1, 3); N s, N s, N m s.
 
-        They are those of beams, bodies and point masses, without masses of moving loads.
+        They contain beams, bodies and point masses, but not masses of moving loads.
 
         Raises:
             ArgumentError: The run was static.

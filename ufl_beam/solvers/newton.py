@@ -290,7 +290,7 @@ class Solver:
         good = self._factors.solve(rates[owned], z[owned], reduced=False)
         if border.crossing is not None:
             good &= self._factors.solve(border.crossing.weighted[owned], v[owned], reduced=False)
-        y, z, v = (subdomain.gather(part)[subdomain.dofs] for part in (y, z, v))
+        y, z, v = (subdomain.gather(x)[subdomain.dofs] for x in (y, z, v))
         border.correct(y, z, v)
         self.change[:], self._t[0] = y, border.t
         return not good

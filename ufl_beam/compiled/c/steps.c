@@ -356,8 +356,8 @@ static void exchange_multipliers(const time_loop *m, double *a, double *b)
 /* Take back the accepted stages of a step that is not accepted. A step of such a scheme is the same
  * in both directions of time, so the beginning of a stage, which is known, is its end in a stage
  * that goes back. All terms accept this stage; no equation is solved. Multipliers are forces of the
- * stage, found with its end: the stage that goes back has the same. Its derivatives take those of
- * the stage back, too. */
+ * stage, found with its end: the stage that goes back has the same. Its derivatives undo the
+ * derivatives of the stage, too. */
 void take_back(time_loop *m)
 {
   equation *e = m->equation;
