@@ -286,8 +286,9 @@ INTERVAL = 256
 LONGEST_WAIT = 20.0
 """Time for which a process waits for the other processes before it warns; s."""
 
-_left: list[tuple[MPI.Request, Array]] = []
-"""Abandoned comparisons; MPI needs their buffers until the communication is complete."""
+_begun: list[tuple[MPI.Request, Array]] = []
+"""Comparisons that may be incomplete.  MPI writes into their buffers until they are complete, also
+after the end of the simulation."""
 
 
 def sharing(comm: MPI.Intracomm, cells: int) -> MPI.Intracomm:
@@ -319,7 +320,6 @@ class ProcessComparison:
         self._weights: Array = subdomain.numbering.scales[subdomain.dofs] * random
         self._sum = self._size = self._times = 0.0
         self._steps, self._compared = 0, 0
-        _left[:] = [pair for pair in _left if not pair[0].Test()]
 
     def compare(self, t: float, q: Array) -> None:
         """Add the state after a step to the comparison; raise if an earlier comparison failed."""
@@ -342,9 +342,8 @@ class ProcessComparison:
     def finish(self) -> None:
         """Report to the other processes, without waiting, that this process stops."""
         if self._open:
-            before, self._open = self._pending, False
+            self._open = False
             self._post(failed=1.0)
-            _left.extend(pair for pair in (before, self._pending) if pair is not None)
             self._pending = None
 
     def _post(self, failed: float = 0.0) -> None:
@@ -352,6 +351,7 @@ class ProcessComparison:
         mine = np.array([self._sum, self._times, float(self._steps)])
         ends = np.concatenate([mine, -mine, [self._size, failed]])
         self._pending = self._comm.Iallreduce(MPI.IN_PLACE, ends, op=MPI.MAX), ends
+        _begun[:] = [*(pair for pair in _begun if not pair[0].Test()), self._pending]
         self._compared = self._steps
 
     def _complete(self) -> None:
