@@ -554,7 +554,7 @@ def _without_estimate(measurement: Measurement) -> ArgumentError:
     number = counted((len(measurement), "value", "values"))
     return ArgumentError(
         f"{WHAT}: {measurement.name} has {number}, too few to estimate a standard deviation, "
-        "since the fit can meet as many exactly; give sigma="
+        "because the parameters can be chosen so that its residuals vanish; give sigma="
     )
 
 

@@ -227,7 +227,7 @@ class Case:
             scene = start.scene
         if start is not None and scene.beams != start.scene.beams:
             raise ArgumentError(
-                f"{self._call}: the model is not that of start, and has other beams; let both "
+                f"{self._call}: model and the model of start have different beams; let both "
                 "return the same Beam objects for the same values, by functools.cache, see "
                 "docs/derivatives.md"
             )
