@@ -296,6 +296,8 @@ def _allows(one, scheme, base):
         return one.name in COLUMN and scheme in STATICS
     if scheme == FOURTH and (not one.elastic or one.name in ROUGH):
         return False
+    if scheme.startswith("EnergyMomentumDecaying") and one.name == "adaptive":
+        return False
     static, at_end = scheme in STATICS, scheme.startswith(("Newmark", "Generalized"))
     return one.statics if static else (one.dynamics and (one.at_end or not at_end))
 

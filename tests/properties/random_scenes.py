@@ -122,6 +122,7 @@ class _Writer(Laws):
         self._may_hold = self._name != "Newmark()"
         # Nothing bounds the energy of undamped Newmark, which steps that adapt would follow.
         adapts = self._chance(0.2) and not self._static and self._name != "Newmark()"
+        adapts = adapts and not self._name.startswith("EnergyMomentumDecaying")  # refused
         self._step = self._say.number(self._dt, "s")
         if adapts:
             stops = ", ".join(self._say.number(self._end * k / 4, "s") for k in (1, 2, 3))

@@ -75,6 +75,24 @@ def test_the_estimate_counts_dissipation(scheme):
     assert abs(at_end(decaying, scene.bodies[0].middle) - math.sin(6.0)) < 0.1
 
 
+def test_dissipation_by_second_differences_is_refused():
+    """Steps that grow make it first order: 0.24 m in 4 s of free fall, at any tolerance."""
+    body = ub.Body((0, 0), mass=10.0, inertia=1.0)
+    scene = ub.Scene(
+        bodies=[body],
+        loads=[ub.Gravity()],
+        initial=[ub.Velocity([body], linear=(2.0, 3.0))],
+    )
+    with pytest.raises(ub.ArgumentError, match=r"first order.*EnergyMomentum\(alpha, beta\)"):
+        run(scene, ub.Adaptive(1e-3), end=4.0, scheme=ub.EnergyMomentumDecaying(0.5))
+    with pytest.raises(ub.ArgumentError, match="must be a scheme"):
+        run(scene, ub.Adaptive(1e-3), end=4.0, scheme=3.0)
+    for scheme in (ub.EnergyMomentumDecaying(1.0), ub.EnergyMomentum(), ub.GeneralizedAlpha(0.5)):
+        solution = run(scene, ub.Adaptive(1e-3), end=4.0, scheme=scheme)  # nothing is dissipated
+        y = solution.displacement(body.middle)[-1, 1]
+        assert y == pytest.approx(3 * 4.0 - 9.81 * 4.0**2 / 2, rel=1e-12)
+
+
 def test_the_number_of_steps_goes_with_the_cube_root_of_the_tolerance():
     """Errors of steps go with dt³, their sum with dt²: an 8th of the tolerance, half the steps."""
     scene = oscillator()

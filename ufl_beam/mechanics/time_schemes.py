@@ -524,6 +524,8 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointDynamics):
         resultants  C ((e0 + e1)/2 + c (Δe - r Δe')),     Δu/dt = (v0 + v1)/2 + c (Δv - r Δv'),
 
     where Δe' and Δv' are the changes in the previous step of length dt', and r = dt/dt', at most 1.
+    They are of first order in a step that is longer than the previous one, so :class:`Adaptive`
+    refuses the scheme; isolated steps that are divided keep the second order.
 
     Without loads the energy, plus c times the energy of strains Δe and velocities Δv, never grows,
     whatever the lengths of the steps are, because

@@ -40,6 +40,7 @@ from ufl_beam.simulation.initial_state import (
     continuation,
     initial_state,
     mesh_of,
+    require_scheme,
 )
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
@@ -103,6 +104,7 @@ def simulate(
     comm = communicator(comm, "simulate: comm")
     require_switch(progress, "simulate: progress")
     t0, t1 = require_times(t)
+    require_scheme(scheme, "scheme")
     if not isinstance(dt, Adaptive):
         require_number(dt, "simulate: dt", positive=True)
         least = MOST_SUBSTEPS * math.ulp(max(abs(t0), abs(t1)))
@@ -116,6 +118,12 @@ def simulate(
         raise ArgumentError(
             "simulate: dt = Adaptive(...) estimates the error of accelerations, and a static "
             "scheme has none; give a number"
+        )
+    elif scheme.lost_fraction:
+        raise ArgumentError(
+            f"simulate: dt = Adaptive(...) with {scheme!r}: in steps that grow its dissipation is "
+            "of first order, whatever the tolerance is; give a number, or the scheme "
+            "EnergyMomentum(alpha, beta) or GeneralizedAlpha(rho_inf)"
         )
     require_count(every, "simulate: every")
     require_count(max_states, "simulate: max_states")
