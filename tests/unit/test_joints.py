@@ -201,6 +201,56 @@ def test_contradictions_are_refused_by_name():
         run(ub.Scene([one], joints=[rail], supports=[ub.Pinned(one.start), slope]))
 
 
+def test_a_linkage_in_a_singular_position_is_told_so():
+    """A flat parallelogram repeats a constraint only here; a second motor does everywhere."""
+
+    def linkage(angle, *motors):
+        a = np.array([np.cos(angle), np.sin(angle)])
+        b = np.add(a, (2, 0))
+        ends = ((0, 0), a), (a, b), ((2, 0), b)
+        parts = [body(*(np.array(x) + y) / 2, name=f"rod {i}") for i, (x, y) in enumerate(ends)]
+        pins = [(ub.ground(0, 0), parts[0].at(0, 0)), (ub.ground(2, 0), parts[2].at(2, 0))]
+        pins += [(parts[i].at(*x), parts[i + 1].at(*x)) for i, x in enumerate((a, b))]
+        turns = [ub.Turn(ub.ground(0, 0), parts[0].middle, law) for law in motors]
+        return ub.Scene(bodies=parts, joints=[ub.Revolute(*p) for p in pins], connectors=turns)
+
+    motor = ub.PrescribedMotion(lambda t: t)
+    run(linkage(0.5, motor))
+    with raises("1 of the constraints", "can be left out", "dead centre", "another position"):
+        run(linkage(0.0, motor))
+    with pytest.raises(ub.ArgumentError, match="can be left out") as refused:
+        run(linkage(0.5, motor, motor))
+    assert "position" not in str(refused.value)
+
+
+def test_bodies_pinned_to_each_other_away_from_their_centres():
+    """[closed] A double pendulum of rods of 1 m and 1 kg; both small modes of M and K by Lagrange.
+
+    Such a joint shares no unknown, and needs no `multipliers=True`.
+    """
+    upper, lower = (body(0.0, y, inertia=1 / 12) for y in (-0.5, -1.5))
+    joints = [
+        ub.Revolute(ub.ground(0, 0), upper.at(0, 0)),
+        ub.Revolute(upper.at(0, -1), lower.at(0, -1)),
+    ]
+    scene = ub.Scene(bodies=[upper, lower], joints=joints, loads=[ub.Gravity()])
+    M, K = np.array([[4 / 3, 1 / 2], [1 / 2, 1 / 3]]), 9.81 * np.diag([3 / 2, 1 / 2])
+    omega = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K)))
+    assert ub.modes(scene, 2).omega == pytest.approx(np.sort(omega), rel=1e-9)
+    for scheme in (ub.Static(), ub.EnergyMomentumStatic()):
+        hung = run(scene, scheme)
+        assert np.abs(hung.displacement(lower.middle)).max() < 1e-12
+        # Weights of one and of two rods, to the tolerance 1e-10 of Newton's method
+        forces = [hung.joint(joint).force[-1] for joint in joints]
+        np.testing.assert_allclose(forces, [[0, 19.62], [0, 9.81]], atol=1e-8)
+    with raises("free to move in 2 independent ways"):
+        ub.buckling(scene, 1)
+    # A body without inertia that is fixed to another one
+    light = ub.Body((0, -1.5))
+    fixed = [joints[0], ub.Rigid(upper.at(0, -1), light.at(0, -1))]
+    run(ub.Scene(bodies=[upper, light], joints=fixed, loads=[ub.Gravity()]))
+
+
 def test_statics_names_what_is_free():
     one = body(name="loose")
     hung = ub.Scene(bodies=[one], joints=[ub.Revolute(one.at(1, 0), ub.ground(1, 0))])

@@ -39,6 +39,12 @@ from ufl_beam.model.works import VirtualWork
 INSTEAD = "Add supports or joints, or run dynamics (EnergyMomentum)"
 """Advice if statics has no unique answer."""
 
+IF_SINGULAR = (
+    ". If a linkage repeats constraints in this position only, such as at a dead centre, where "
+    "links are in line, then begin in another position"
+)
+"""Advice if constraints repeat each other in the undeformed scene, and parts can move there."""
+
 LAST_DIGITS = 1e-12
 """Strain, rotation, or displacement by size of the scene, whose stress counts as round-off."""
 
@@ -112,6 +118,7 @@ def require_independent(scene: Scene) -> None:
         for owner in {id(owner): owner for owner in owners}.values()
     ]
     rigid = any(isinstance(getattr(owner, "law", None), RigidPlastic) for owner in owners)
+    moves = _null_space(_constraints(scene, lambda x: isinstance(x.law, HOLDING))).shape[1] > 0
     raise ModelError(
         "constraints repeat or contradict each other: "
         f"{combinations.shape[1]} of the constraints of {'; '.join(names)} can be left out. "
@@ -123,6 +130,7 @@ def require_independent(scene: Scene) -> None:
             if rigid
             else "a Spring, or a Beam instead of a rigid part"
         )
+        + moves * IF_SINGULAR
     )
 
 
@@ -209,16 +217,21 @@ def require_no_mechanism(scene: Scene) -> str:
     free = _null_space(_constraints(scene))
     if free.shape[1] == 0:
         return ""
-    moving = _moving(scene, free[:, 0])
-    more = f"; and {len(moving) - 4} more" if len(moving) > 4 else ""
-    ways = "way" if free.shape[1] == 1 else "independent ways"
-    description = (
-        f"the scene is free to move in {free.shape[1]} {ways}, so statics has no unique answer: "
-        f"{'; '.join(moving[:4])}{more}. "
-    )
+    description = describe_motions(scene, free)
     if not scene.loads:
         raise ModelError(description + INSTEAD)
     return description
+
+
+def describe_motions(scene: Scene, modes: Array) -> str:
+    """Describe independent rigid motions (u, v, size ψ) of beams and bodies, one in each column."""
+    number, moving = modes.shape[1], _moving(scene, modes[:, 0])
+    more = f"; and {len(moving) - 4} more" if len(moving) > 4 else ""
+    ways = "way" if number == 1 else "independent ways"
+    return (
+        f"the scene is free to move in {number} {ways}, so statics has no unique answer"
+        f"{', for example' * (number > 1)}: {'; '.join(moving[:4])}{more}. "
+    )
 
 
 def _center(member: Member | Body) -> Point:
@@ -320,7 +333,7 @@ def _moving(scene: Scene, mode: Array) -> list[str]:
         if abs(ψ) >= 1e-6:
             cx, cy = _center(member)
             center = (cx - v / ψ * scene.size, cy + u / ψ * scene.size)
-            x, y = (scene.size * round(c / scene.size, 9) for c in center)
+            x, y = (scene.size * round(c / scene.size, 9) + 0.0 for c in center)
             texts.append(f"{member.name} ({kind}) can turn about ({x:.4g}, {y:.4g})")
         elif max(abs(u), abs(v)) > 1e-6:
             texts.append(f"{member.name} ({kind}) can shift along ({u:.3g}, {v:.3g})")

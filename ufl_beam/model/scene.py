@@ -336,7 +336,8 @@ class Scene(Record, Rich):
     @property
     def shared_by_joints(self) -> list[list[NodeDof]]:
         """Groups of degrees of freedom that joints make equal."""
-        return [joint.equal(component) for joint in self.joints for component in joint.shared]
+        equal = (joint.equal(component) for joint in self.joints for component in joint.shared)
+        return [group for group in equal if group]  # none of two points away from centres
 
     def free_caches(self) -> None:
         """Free the memory of cached properties that only the numbering of unknowns uses."""

@@ -23,7 +23,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ModelError, StepFailed, warn
 from ufl_beam.mechanics.time_scheme import Step, stages_of, with_half_tangents
-from ufl_beam.model.constraint_checks import INSTEAD
+from ufl_beam.model.constraint_checks import INSTEAD, describe_motions
 from ufl_beam.output.recorder import StateView
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, ProcessComparison
@@ -305,12 +305,24 @@ class Stepper(StateView):
         newton.forget_zero_modes()
         if equation.evaluate(self._copy(q1)):
             K, free = free_matrix(self.subdomain, equation.A, self.supports.dofs)
-            x, scales = null_vectors(K)[1][:, -1], numbering.scales[free]
+            vectors, scales = null_vectors(K)[1], numbering.scales[free]
+            x = vectors[:, -1]
             motion = np.abs(x * scales).max()
             forces = np.linalg.norm((K @ x)[scales > 0] / scales[scales > 0])
             if forces <= FREE_STIFFNESS * newton.scale() * numbering.scene.size * motion:
-                raise ModelError(f"{free_motion}The loads do not hold it either. {INSTEAD}")
+                said = describe_motions(self.scene, self._of_members(vectors, free))
+                raise ModelError(f"{said}The loads do not hold it either. {INSTEAD}")
         self._free_motion = ""
+
+    def _of_members(self, vectors: Array, free: Array) -> Array:
+        """Return (u, v, size ψ) of the middles of beams and bodies; ``vectors`` are at ``free``."""
+        scene, numbering = self.scene, self.numbering
+        x = np.zeros((numbering.size, vectors.shape[1]))
+        x[free] = vectors
+        ends = [[numbering.node(place) for place in (beam.start, beam.end)] for beam in scene.beams]
+        ends += [2 * [numbering.node(body.middle)] for body in scene.bodies]
+        means: Array = x[np.array(ends)].mean(axis=1) * [[1.0], [1.0], [scene.size]]
+        return means.reshape(-1, x.shape[1])
 
     # -- steps ---------------------------------------------------------------------------------
 
