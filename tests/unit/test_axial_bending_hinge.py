@@ -2,7 +2,9 @@
 """Hinges that yield by axial force and moment together."""
 
 import math
+from dataclasses import dataclass
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -122,3 +124,129 @@ def test_dynamics_close_the_ledger(tmp_path):
 def test_numbers_must_be_positive():
     with raises("AxialBendingHinge: turning = 0", kind=ub.ModelError):
         ub.AxialBendingHinge(1.0, 1.0, 1.0, 1.0, 0.0)
+
+
+# -- results for engineers -------------------------------------------------------------------------
+
+LAWS = {
+    "spring": ub.Spring(3e3, law=ub.ElastoPlastic(MP)),
+    "axial and bending": ub.AxialBendingHinge(1e9, MP, along=2e5, across=1e5, turning=3e3),
+    "deteriorating": ub.IbarraKrawinkler(3e3, ub.Backbone(MP, capping=1.0)),
+    "pinching": ub.PinchingHinge(3e3, ub.Backbone(MP, capping=1.0)),
+}
+
+
+@dataclass(frozen=True)
+class Mine(ub.ConnectorLaw):
+    """A perfectly plastic hinge with three components, the first two elastic."""
+
+    stiffness: float
+    limit_moment: float
+    components: ClassVar = 3
+    entry: ClassVar = "plastic"
+    variables: ClassVar = {"plastic": 0.0}
+
+    def energy(self, motion, state):
+        x, y, turn = motion
+        return self.stiffness * (x**2 + y**2 + (turn - state.plastic) ** 2) / 2
+
+    def increments(self, motion, rate, state, dt):
+        elastic, f = motion[2] - state.plastic, ub.law_functions
+        size = f.positive(f.absolute(elastic) - self.limit_moment / self.stiffness)
+        return {"plastic": f.sign(elastic) * size}
+
+
+PINS = (ub.Clearance(stiffness=1e5, gap=1e-3, friction=0.3, radius=0.02),)
+
+
+def turned(laws):
+    """Cantilevers whose ends rotate, each on a hinge with one of the laws; uniform moments."""
+    beams, feet, supports = [], [], []
+    for k, law in enumerate(laws):
+        beam = ub.Beam((0, k), (1, k), ub.Section(EA=1e6, GA=1e6, EI=1e3, rhoA=5.0), cells=2)
+        several = getattr(law, "components", 1) > 1
+        feet.append((ub.Bushing if several else ub.Turn)(ub.ground(0, k), beam.start, law))
+        supports += [ub.Pinned(beam.start)] * (not several)
+        held = {"u": lambda t: 0.0, "v": lambda t: -0.01 * t} if law in PINS else {}
+        supports.append(ub.PrescribedDisplacement(beam.end, psi=lambda t: 0.1 * t, **held))
+        beams.append(beam)
+    return feet, ub.Scene(beams, supports=supports, connectors=feet)
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()], ids=str)
+def test_hinge_laws_have_the_results_of_a_spring_that_yields(scheme):
+    """Events, table and ledger; the moment is uniform, so all hinges turn alike."""
+    feet, scene = turned(LAWS.values())
+    events = ub.Events()
+    run = ub.simulate(scene, scheme, t=(0, 1), dt=0.02, record=events)
+    assert {event.where for event in events.found} == {*feet}
+    # The loss of a law is seen from a thousandth of its work on, within a step
+    assert {event.what for event in events.found} == {"yields"}
+    assert np.ptp([event.time for event in events.found]) < 0.021
+    rows = {row.where: row for row in run.hinges({"IO": 0.05, "CP": 0.2}).rows}
+    spring = rows[feet[0]]
+    for foot in feet:
+        # Round-off of Newton's method, 1e-9 of the forces
+        numbers = [getattr(rows[foot], name) for name in ("rotation", "plastic", "ductility")]
+        expected = [getattr(spring, name) for name in ("rotation", "plastic", "ductility")]
+        assert numbers == pytest.approx(expected, rel=1e-6)
+        assert rows[foot].state == spring.state == "CP"
+        assert rows[foot].n == run.times.tolist().index(rows[foot].time) > 0
+        # Of the first step beyond the limit the trapezoidal work is known
+        assert rows[foot].dissipated == pytest.approx(spring.dissipated, rel=0.02)
+    assert {*run.energy.lost} - {"numerical"} == {"plastic"}
+    total = sum(row.dissipated for row in rows.values())
+    assert run.energy.lost["plastic"][-1] == pytest.approx(total, rel=1e-12)
+    assert [row.where for row in run.hinges(only=[feet[1]]).rows] == [feet[1]]
+
+
+def test_hinges_of_users_with_several_components_are_listed():
+    """A law of three components yields; a pin with friction in a hole does not."""
+    feet, scene = turned([LAWS["spring"], Mine(3e3, MP), *PINS])
+    events = ub.Events()
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.02, record=events)
+    assert {event.where for event in events.found} == {*feet[:2]}
+    assert run.connector(feet[2]).dissipated[-1] > 1e-3 * run.connector(feet[2]).work[-1] > 0
+    first, second = run.hinges().rows
+    assert {first.where, second.where} == {*feet[:2]}
+    assert first.rotation == pytest.approx(second.rotation, rel=1e-6)
+    assert run.energy.lost["plastic"][-1] == pytest.approx(first.dissipated + second.dissipated)
+
+
+def test_events_of_bushings_continue_after_a_restart(tmp_path):
+    """Works and losses of all components count, before and after."""
+    feet, scene = turned([LAW, LAWS["deteriorating"]])
+    whole, parts = ub.Events(), [ub.Events() for _ in range(2)]
+    simulate = partial(ub.simulate, scene, ub.Static(), dt=0.02)
+    run = simulate(t=(0, 1), record=whole)
+    assert {event.where for event in whole.found} == {*feet}
+    kept = ub.Checkpoint(tmp_path / "run.checkpoint", every=1)
+    for events, end in zip(parts, (0.5, 1.0), strict=True):
+        last = simulate(t=(0, end), record=events, checkpoint=kept)
+    assert [*map(str, parts[1].found)] == [*map(str, whole.found)]
+    assert str(last.hinges()) == str(run.hinges())
+
+
+def test_pictures_show_hinges_of_connectors():
+    """Circles at the feet that yield, and moments over rotations; not of a pin with friction."""
+    (*feet, pin), scene = turned([*LAWS.values(), Mine(3e3, MP), *PINS])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
+    for what, n in (("damage", -1), ("shape", 0)):
+        axes = ub.plot(run, what, n=n).axes[0]
+        marks = [x.get_xydata()[0] for x in axes.lines if len(x.get_xdata()) == 1]
+        drawn = [tuple(at) for at in marks if x_is_foot(at)]
+        assert len(drawn) == (len(feet) if n else 0)
+    for foot in feet:
+        axes = ub.plot(run, "hinge", foot).axes[0]
+        history = run.connector(foot)
+        last = [np.atleast_2d(x.T)[-1, -1] for x in (history.motion, history.force)]
+        ends = [line.get_xydata()[-1] for line in axes.lines]
+        assert any(np.allclose(end, last, rtol=1e-12, atol=0) for end in ends)
+        assert f"hinge at {foot}" in axes.get_title(loc="left")
+    with raises("no rotation whose law may yield"):
+        ub.plot(run, "hinge", pin)
+
+
+def x_is_foot(at):
+    """The feet are at x = 0, and y = 0, 1, 2, ..."""
+    return abs(at[0]) < 1e-9 and abs(at[1] - round(at[1])) < 1e-9

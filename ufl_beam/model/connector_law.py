@@ -26,12 +26,12 @@ from ufl_beam.model.material_law import (
 )
 from ufl_beam.model.records import Record, parameters_by_name
 
-LOSSES = ("damping", "friction", "functions", "connectors", "contact")
+LOSSES = ("plastic", "damping", "friction", "functions", "connectors", "contact")
 """Entries of the package in the energy ledger to which a user's law may add its losses."""
 
 CONTRIBUTIONS = (
     *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
-    *("numerical", "plastic", "hinges", *LOSSES),
+    *("numerical", "hinges", *LOSSES),
 )
 """Names of all entries of the energy ledger that the package uses."""
 

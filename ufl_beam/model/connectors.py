@@ -353,12 +353,15 @@ def plastic_hinges(
 
 
 def can_yield(connector: Connector) -> bool:
-    """Return whether the law of a rotational connector may yield or break."""
+    """Return whether the law of a rotation, alone or in a :class:`Bushing`, may yield or break."""
     law = connector.law
+    if not (connector.components or (connector,))[-1].is_rotation:
+        return False
     if isinstance(law, Spring):
-        return connector.is_rotation and (law.law is not None or law.softening is not None)
-    own = isinstance(law, ConnectorLaw) and bool(law.variables)
-    return connector.is_rotation and (own or isinstance(law, RigidPlastic))
+        return law.law is not None or law.softening is not None
+    if isinstance(law, ConnectorLaw):
+        return bool(law.variables) and law.entry not in ("damping", "friction", "contact")
+    return isinstance(law, RigidPlastic)
 
 
 def law_of(connector: Connector) -> HingeLaw:

@@ -274,6 +274,7 @@ class _DeterioratingHinge(Record, ConnectorLaw):
     unloading: FromZeroOrInfinite = math.inf
     exponent: Exponent = 1.0
 
+    entry = "plastic"
     rate_independent: ClassVar[bool] = True
     modes: ClassVar[tuple[str, ...]] = "strength", "softening", "unloading"
     variables: ClassVar[Mapping[str, float]] = {
@@ -572,6 +573,7 @@ class AxialBendingHinge(Record, ConnectorLaw):
     across: Positive
     turning: Positive
 
+    entry = "plastic"
     components: ClassVar[int] = 3
     variables: ClassVar[Mapping[str, float]] = {"stretch": 0.0, "rotation": 0.0}
 

@@ -22,10 +22,12 @@ from ufl_beam.errors import (
     shorten,
 )
 from ufl_beam.model.bodies import AttachmentPoint, Member, Place, require_place
+from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector, can_yield, place_of
+from ufl_beam.model.hinge_laws import AxialBendingHinge, IbarraKrawinkler, PinchingHinge
 from ufl_beam.model.scene import Scene, attachment_points
-from ufl_beam.output.state_rows import HINGE, OWN_LAW_YIELDS, PLASTIC
+from ufl_beam.output.state_rows import HINGE, OWN_LAW_YIELDS, PLASTIC, Connection
 from ufl_beam.output.states import States
 
 # -- storeys ---------------------------------------------------------------------------------------
@@ -268,18 +270,14 @@ def hinges_of(
         if (place := place_of(hinge)).beam in chosen:
             history = states.connector(hinge)
             add(place, history.motion, history.motion, history.dissipated)
-    for connector in (x for x in scene.connectors if x in chosen and x.is_rotation):
-        law, history = connector.law, states.connector(connector)
-        if isinstance(law, RigidPlastic):
-            add(connector, history.motion, history.motion, history.dissipated)
-        elif isinstance(law, Spring) and can_yield(connector):
-            plastic = history.motion - history.force / law.stiffness
-            at_yield = _limit(scene, connector) / law.stiffness
-            add(connector, history.motion, plastic, history.dissipated, at_yield)
-        elif can_yield(connector):
+    for connector in (x for x in scene.connectors if x in chosen and can_yield(x)):
+        history = states.connector(connector)
+        least: Array | float = 0.0
+        if isinstance(connector.law, ConnectorLaw):
             least = OWN_LAW_YIELDS * np.maximum.accumulate(np.abs(history.work))
-            unknown = np.full(len(states), math.nan)
-            add(connector, history.motion, unknown, history.dissipated, least=least)
+        (motion, moment), (stiffness, limit) = rotation_of(history), _elastic(scene, connector)
+        plastic = motion - moment / stiffness
+        add(connector, motion, plastic, history.dissipated, limit / stiffness, least)
     for beam in (x for x in scene.beams if x in chosen):
         _add_cells(states, beam, add)
     rows.sort(key=lambda row: row.n if row.n >= 0 else len(states))
@@ -308,14 +306,31 @@ def _add_cells(states: States, beam: Member, add: Any) -> None:
         add(places[most], unknown, unknown, plastic.sum(axis=1))
 
 
-def _limit(scene: Scene, connector: Connector) -> float:
-    """Return the moment at which a rotational spring first yields or softens; N m; or NaN."""
+def rotation_of(history: Connection) -> tuple[Array, Array]:
+    """Return rotation (rad) and moment (N m) of a connector, or of the rotation of a bushing."""
+    motion, moment = (np.atleast_2d(x.T)[-1] for x in history[:2])
+    return motion, moment
+
+
+def _elastic(scene: Scene, connector: Connector) -> tuple[float, float]:
+    """Return the elastic stiffness of a rotation (N m/rad), and its first limit (N m), or NaN."""
     law: Any = connector.law
+    if isinstance(law, RigidPlastic):
+        return math.inf, math.nan
+    if isinstance(law, AxialBendingHinge):
+        return law.turning, law.bending
+    if isinstance(law, IbarraKrawinkler | PinchingHinge):
+        backbones = law.backbone, law.negative or law.backbone
+        return law.stiffness, min(x.yield_limit for x in backbones)
+    if not isinstance(law, Spring):
+        return math.nan, math.nan
     limit = getattr(law.law, "yield_limit", math.nan)
     if hasattr(limit, "draw"):
         limit = limit.draw(1, scene.stream_keys[connector])[0]
     softens = math.nan if law.softening is None else float(law.softening.limit)
-    return float(np.fmin(limit, softens)) if isinstance(limit, float | int) else softens
+    return law.stiffness, (
+        float(np.fmin(limit, softens)) if isinstance(limit, float | int) else softens
+    )
 
 
 def _require_limits(limits: Any) -> None:

@@ -266,7 +266,7 @@ Row = tuple[float, int, str]  # time, number of the cell or connector, kind of e
 BROKEN_FRACTION = 0.999  # dissipated fraction of the fracture energy of a hinge that "is free"
 
 
-def _breaking_law(law: object) -> HingeLaw | None:
+def breaking_law(law: object) -> HingeLaw | None:
     """Return the law of a hinge, or the softening of a spring that only breaks, or None."""
     if isinstance(law, RigidPlastic):
         return law.law
@@ -307,7 +307,8 @@ class Events(Restartable):
     """Recorder of events, for scenes with hinges, inelastic material, stops or friction.
 
     A hinge "is free" when it has dissipated 99.9 % of its fracture energy; a hardening hinge
-    "yields".  So do rotational connectors with a law of yielding or softening.  Contact and sliding
+    "yields".  So do connectors of rotations, alone or in a :class:`Bushing`, with a law of yielding
+    or softening.  Contact and sliding
     may begin and end repeatedly; all other events occur once in a cell or hinge.
 
     Args:
@@ -343,13 +344,14 @@ class Events(Restartable):
         # Hinges, which are the last connectors, and connectors that yield or break
         self._hinges = [*range(first, len(connectors))]
         self._hinges += [i for i, c in enumerate(connectors[:first]) if can_yield(c)]
+        self._components = [(i, connectors[i].component) for i in self._hinges]
         ends = [connectors[i].law for i in self._hinges]
         self._own = np.array([isinstance(law, ConnectorLaw) for law in ends], dtype=bool)
         self._work: Array = np.zeros(len(ends))  # largest works on connector laws so far
         if state is not None:
             require_arrays(state, {"work": self._work.shape})
             self._work = state["work"].copy()
-        laws = [*in_cells, *map(_breaking_law, ends)]
+        laws = [*in_cells, *map(breaking_law, ends)]
         # Energies from which on hinges are free
         breaking = [law is not None and law.limit > 0 for law in laws]
         energies = np.array([law.fracture_energy if law is not None else np.inf for law in laws])
@@ -365,7 +367,9 @@ class Events(Restartable):
         """Return flags of events in cells and hinges, (n, 3), and of contact or sliding, (m,)."""
         plastic, broken = np.max(simulation.now.points_of(0)[:, :, [PLASTIC, HINGE]], axis=1).T
         if hinges := len(self._hinges):
-            rows, breaks = simulation.connections()[self._hinges], self._breaks[-hinges:]
+            rows, breaks = simulation.connections(), self._breaks[-hinges:]
+            # The rotation of a bushing is its last component, and its loss is in the first one
+            rows = np.array([rows[k - n : k + 1].sum(axis=0) for k, n in self._components])
             self._work = np.maximum(self._work, np.abs(rows[:, WORK]))
             least = np.where(self._own, OWN_LAW_YIELDS * self._work, 0.0)
             lost = np.where(rows[:, DISSIPATED] > least, rows[:, DISSIPATED], 0.0)
@@ -404,6 +408,8 @@ class Events(Restartable):
                 where = numbering.place_of(number)
             else:
                 where = connectors[self._hinges[number - cells]]
+                bushings = (x for x in simulation.scene.connectors if where in x.components)
+                where = next(bushings, where)
             events.append(Event(t, where, what, simulation.parameter))
         self._rows += rows
         self.found += events

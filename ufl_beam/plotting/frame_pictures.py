@@ -12,6 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member
+from ufl_beam.model.connectors import can_yield
 from ufl_beam.plotting import positions, style, symbols
 from ufl_beam.plotting.inelastic_pictures import (
     circle,
@@ -157,7 +158,7 @@ def draw_frame(
         named: dict[str, Artist] = {
             words: areas[color] for color, words in meanings.items() if color in areas
         }
-        named |= draw_damage(axes, solution, n, shape.nodes)
+        named |= draw_damage(axes, solution, n, shape)
         for words, artist in named.items():
             artist.set_label(words)
         if named:
@@ -308,8 +309,9 @@ def draw_damage_state(
     from matplotlib.collections import LineCollection
 
     numbering = solution.numbering
-    for beam in solution.scene.beams[:1]:
-        solution.material(beam)  # raises if the scene is elastic
+    if not any(map(can_yield, solution.scene.connectors)):
+        for beam in solution.scene.beams[:1]:
+            solution.material(beam)  # raises if the scene is elastic
     canvas, (width, height) = plane_canvas(solution, [n], magnify, ax)
     shape, density = canvas.shape(n), dissipated_per_length(solution, n)
     length, rise = np.ptp(canvas.points(), axis=0)
@@ -336,7 +338,7 @@ def draw_damage_state(
             cracks = any(f.softening is not None for p in placed if p is not None for f in p.fibres)
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
             style.draw_bar(axes, colors, f"{title} ({prefix}J/m)")
-        if hinges := open_hinges(solution, n, shape.nodes):
+        if hinges := open_hinges(solution, n, shape.nodes, shape.at):
             for hinge in hinges:
                 axes.plot(*hinge.at, **circle(hinge.fraction))
             examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")

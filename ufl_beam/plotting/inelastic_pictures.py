@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,9 +13,11 @@ import numpy as np
 from ufl_beam.analysis.section_analysis import InteractionDiagram, MomentCurvature
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError
-from ufl_beam.model.bodies import Member, Place
+from ufl_beam.model.bodies import AttachmentPoint, Place
 from ufl_beam.model.connector_laws import HingeLaw
-from ufl_beam.model.connectors import law_of, place_of
+from ufl_beam.model.connectors import Connector, can_yield, law_of, place_of
+from ufl_beam.output.engineering_results import rotation_of
+from ufl_beam.output.history import breaking_law
 from ufl_beam.output.state_rows import HINGE, JUMP
 from ufl_beam.plotting import style
 from ufl_beam.plotting.style import BLUE, GREY, INK, ORANGE, RED, WHITE, shade, with_unit
@@ -26,23 +29,31 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
+    from ufl_beam.plotting.positions import DeformedShape
+
 
 FULLY_OPEN = 0.99  # hinges that dissipated this fraction of their fracture energy look like joints
 
 
 class OpenHinge(NamedTuple):
-    """Hinge that has opened, in a cell or at a vertex."""
+    """Hinge that has opened, in a cell or at a vertex, or connector whose rotation has yielded."""
 
-    beam: Member
+    place: AttachmentPoint
     at: Array  # drawn position; (2,); m
     fraction: float  # dissipated fraction of its fracture energy; 0 if it hardens, 1 if limit = 0
 
 
-def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
-    """Find open hinges in cells and at vertices; ``points`` are drawn positions of nodes, m."""
+def open_hinges(
+    solution: Solution, n: int, points: Array, at: Callable[[AttachmentPoint], Array] | None = None
+) -> list[OpenHinge]:
+    """Find open hinges in cells, at vertices and in connectors.
+
+    ``points`` are drawn positions of nodes (m), and ``at`` returns the drawn position of a place.
+    """
     numbering, mesh = solution.numbering, solution.numbering.mesh
     nodes = numbering.nodes_along_cells
-    hinges: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
+    # With the dissipated energy (J)
+    hinges: list[tuple[AttachmentPoint, Array, HingeLaw | None, float]] = []
     for beam in solution.scene.beams:
         laws = numbering.hinges(beam)
         if all(law is None or math.isinf(law.limit) for law in laws):
@@ -53,18 +64,26 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
         for cell, point in np.argwhere(opened):
             if (law := laws[cell]) is not None:
                 drawn, lost = points[nodes[cells[cell]]].T, at_points[cell, point, HINGE]
-                at = np.array([np.interp(mesh.points[point], mesh.nodes, x) for x in drawn])
-                hinges.append((beam, at, law, float(lost)))
+                drawn_at = np.array([np.interp(mesh.points[point], mesh.nodes, x) for x in drawn])
+                hinges.append((beam.start, drawn_at, law, float(lost)))
     for hinge, vertex in zip(solution.scene.hinges, numbering.vertices_at_hinges, strict=True):
         history = solution.connector(hinge)
         if history.motion[n] != 0.0 or history.dissipated[n] > 0.0:
             dissipated = float(history.dissipated[n])
-            hinges.append((place_of(hinge).beam, points[vertex], law_of(hinge), dissipated))
-    return [
-        # A hinge without strength is a joint.
-        OpenHinge(beam, at, min(lost / law.fracture_energy, 1.0) if law.limit > 0.0 else 1.0)
-        for beam, at, law, lost in hinges
-    ]
+            hinges.append((place_of(hinge), points[vertex], law_of(hinge), dissipated))
+    for row in solution.hinges(only=[c for c in solution.scene.connectors if can_yield(c)]).rows:
+        if isinstance(row.where, Connector) and 0 <= row.n <= solution.index(n):
+            dissipated, place = float(solution.connector(row.where).dissipated[n]), row.where.b
+            drawn_at = solution.position(place)[n] if at is None else at(place)
+            hinges.append((place, drawn_at, breaking_law(row.where.law), dissipated))
+    return [OpenHinge(place, x, _broken(law, lost)) for place, x, law, lost in hinges]
+
+
+def _broken(law: HingeLaw | None, dissipated: float) -> float:
+    """Return the dissipated fraction of a fracture energy; 1 for hinges without strength."""
+    if law is None:
+        return 0.0
+    return min(dissipated / law.fracture_energy, 1.0) if law.limit > 0.0 else 1.0
 
 
 def dissipated_per_length(solution: Solution, n: int) -> Array:
@@ -88,14 +107,14 @@ def circle(fraction: float) -> dict[str, Any]:
     return {**look, "ls": "none", "zorder": 6}
 
 
-def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[str, Artist]:
+def draw_damage(axes: Axes, solution: Solution, n: int, shape: DeformedShape) -> dict[str, Artist]:
     """Mark yielded cells and open hinges on the beams; return marks by their names in a legend."""
     named: dict[str, Artist] = {}
     yielded = np.flatnonzero(dissipated_per_length(solution, n))
-    for line in nodes[solution.numbering.nodes_along_cells[yielded]]:
+    for line in shape.nodes[solution.numbering.nodes_along_cells[yielded]]:
         (zone,) = axes.plot(*line.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8)
         named["yielded or cracked"] = zone
-    for hinge in open_hinges(solution, n, nodes):
+    for hinge in open_hinges(solution, n, shape.nodes, shape.at):
         (mark,) = axes.plot(*hinge.at, **circle(hinge.fraction))
         named["fully open hinge" if hinge.fraction >= FULLY_OPEN else "hinge, open"] = mark
     return named
@@ -147,24 +166,22 @@ def draw_interaction(diagram: InteractionDiagram, *, ax: Axes | None = None) -> 
     return style.parent_figure(axes)
 
 
-def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
+def draw_hinge(solution: Solution, place: Place | Connector, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a hinge against its jump (rad), coloured by time.
 
     The area between the curve and the axis is the energy that the hinge dissipated.  The title
     states this energy (J), and its percentage of a finite fracture energy.  At a vertex without a
-    plastic hinge, the hinge of the cell before the vertex is drawn.
+    plastic hinge, the hinge of the cell before the vertex is drawn.  A connector is drawn with its
+    rotation, if the law of the rotation may yield or break.
     """
-    history, numbering = solution.material_at(place), solution.numbering
-    hinge, cell = numbering.hinge_at(place), numbering.cell(place)
-    number = cell - int(numbering.cells_of(place.beam)[0])
-    law = numbering.hinges(place.beam)[number] if hinge is None else law_of(hinge)
-    if law is None or np.isinf(law.limit):
-        raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
-    M, jump, lost = history.forces[:, 2], history.jump, float(history.hinge[-1])
-    if hinge is None:  # of the Gauss points, the one that opened most
-        states = np.array([solution.points_of(n)[cell] for n in range(len(solution))])
-        M, jump, losses = states[:, np.abs(states[-1, :, JUMP]).argmax(), [2, JUMP, HINGE]].T
-        lost = float(losses[-1])
+    law: HingeLaw | None
+    if isinstance(place, Connector):
+        history, law = solution.connector(place), breaking_law(place.law)
+        if not can_yield(place):
+            raise ArgumentError(f"plot: {place} has no rotation whose law may yield or break")
+        (jump, M), lost = rotation_of(history), float(history.dissipated[-1])
+    else:
+        law, M, jump, lost = _hinge_at(solution, place)
     with style.panel(ax, (8.0, 5.4)) as axes:
         # Intervals in which the jump only grows or only falls; adjacent intervals share a point.
         moves = np.flatnonzero(np.diff(jump))
@@ -175,13 +192,30 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
                 jump[window], M[window], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2
             )
         _draw_path(axes, ax, solution, jump, M)
-        _label_axis(axes.xaxis, jump, "jump of rotation", "rad")
+        rotation = "rotation" if isinstance(place, Connector) else "jump of rotation"
+        _label_axis(axes.xaxis, jump, rotation, "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
-        if math.isfinite(law.fracture_energy):
+        if law is not None and math.isfinite(law.fracture_energy):
             whole = law.fracture_energy
             spent += f", {100 * lost / whole:.3g} % of {with_unit(whole, 'J')}"
         axes.set_title(f"hinge at {place}: {spent}", loc="left")
     return style.parent_figure(axes)
+
+
+def _hinge_at(solution: Solution, place: Place) -> tuple[HingeLaw, Array, Array, float]:
+    """Return law, moment (N m), jump (rad) and dissipated energy (J) of a hinge of a beam."""
+    history, numbering = solution.material_at(place), solution.numbering
+    hinge, cell = numbering.hinge_at(place), numbering.cell(place)
+    number = cell - int(numbering.cells_of(place.beam)[0])
+    law = numbering.hinges(place.beam)[number] if hinge is None else law_of(hinge)
+    if law is None or np.isinf(law.limit):
+        raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
+    if hinge is not None:
+        return law, history.forces[:, 2], history.jump, float(history.hinge[-1])
+    # Of the Gauss points, the one that opened most
+    states = np.array([solution.points_of(n)[cell] for n in range(len(solution))])
+    M, jump, losses = states[:, np.abs(states[-1, :, JUMP]).argmax(), [2, JUMP, HINGE]].T
+    return law, M, jump, float(losses[-1])
 
 
 def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:

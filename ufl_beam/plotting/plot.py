@@ -112,7 +112,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Solution            "history"           motion over time; places, ``component``, ``ax``
     Solution            "energy"            the energy ledger over time
     Solution            "dissipation"       energy losses over time; ``ax``
-    Solution            "hinge"             moment of a hinge over its jump; a place, ``ax``
+    Solution            "hinge"             moment of a hinge; a place or connector, ``ax``
     Solution            "moment-curvature"  moment of a cell; a place, ``ax``
     Modes, Buckling     "modes"             shapes side by side; ``numbers``, ``amplitude``
     Extremes            "M", "N", "V"       envelope of a section force; ``ax``
@@ -134,8 +134,8 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Args:
         shown: Object to draw.
         quantity: Quantity to draw.
-        places: Place of "hinge" and "moment-curvature"; one or a sequence of places of "history";
-            hot spot of "cycles".
+        places: Place of "hinge" and "moment-curvature", or connector of "hinge"; one or a sequence
+            of places of "history"; hot spot of "cycles".
         options: ``n`` is the index of a recorded time, negative from the end.  ``magnify`` is a
             factor on displacements.  ``times`` (s) are replaced by the nearest recorded times;
             ``count`` is a number of shapes.  ``component`` is "u", "v" or "psi", or a rate of one

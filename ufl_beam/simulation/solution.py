@@ -276,7 +276,7 @@ class Solution(States, Rich):
         """Return rotations, ductility and dissipated energy of all hinges, as a table.
 
         The rows are in the order of first yielding.  They are all hinges of zero length, open
-        hinges of cells, rotational connectors that may yield or soften, and beams with yielding or
+        hinges of cells, connectors whose rotation may yield or soften, and beams with yielding or
         cracking cells, of which only the energy is known.  See docs/results.md.
 
         Args:
