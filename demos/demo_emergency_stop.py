@@ -71,7 +71,7 @@ def run(hinges, record=()):
 
 # %%
 breaking = {0.0: ub.Softening(M_u, G_f)}
-arm, saved = run(breaking, record=ub.XDMF(output / "emergency_stop.xdmf", every=10))
+arm, saved = run(breaking, record=ub.VTKHDF(output / "emergency_stop.hdf", every=10))
 rigid_arm, bent = run({})
 
 t = saved.times

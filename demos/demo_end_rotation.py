@@ -234,8 +234,8 @@ def soften(others, rate, eta, steps, record=()):
 
 
 slow = {n: soften(n, rates[0], 0.0, 500) for n in (2, 4, 8)}
-xdmf = ub.XDMF(output / "end_rotation.xdmf", every=10)
-fast = [soften(8, rate, 2e7, 400, xdmf if rate == rates[-1] else ()) for rate in rates]
+file = ub.VTKHDF(output / "end_rotation.hdf", every=10)
+fast = [soften(8, rate, 2e7, 400, file if rate == rates[-1] else ()) for rate in rates]
 
 a = np.linspace(0.0, 1.2 * slow[8][1].jump[-1], 200)
 M_soft = M_u * np.exp(-M_u / G_f * a)

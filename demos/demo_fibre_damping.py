@@ -89,7 +89,7 @@ def fibres(τ):
 
 
 deviations = (0.01, 0.35, 0.55, 1.06)  # MPa
-files = ub.XDMF(output / "fibre_damping.xdmf", every=20)
+files = ub.VTKHDF(output / "fibre_damping.hdf", every=20)
 runs = {τ: vibrate(bar(fibres(τ)), files if τ == 1.06 else ()) for τ in deviations}
 ub.print_once(f"τ = {deviations[-1]} MPa\n{runs[deviations[-1]]}\n")
 

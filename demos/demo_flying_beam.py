@@ -118,7 +118,7 @@ assert np.all(np.abs(orders[1:] - 2) < 0.15)
 # ## Pictures
 
 # %%
-beam, flight = fly(0.05, ub.EnergyMomentum(), record=ub.XDMF(output / "flying_beam.xdmf"))
+beam, flight = fly(0.05, ub.EnergyMomentum(), record=ub.VTKHDF(output / "flying_beam.hdf"))
 ub.plot(flight, "shapes", count=17).savefig(output / "flying_beam_shapes.png")
 ub.plot(flight, "energy").savefig(output / "flying_beam_energy.png")
 

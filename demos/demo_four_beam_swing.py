@@ -13,7 +13,7 @@
 # * a point mass, a load with a table of time, massless links as stiff beams and as constraints,
 # * plastic hinges instead of the joints, as in the paper,
 # * `EnergyMomentum()` and `EnergyMomentum(alpha, beta)`, with their difference in the ledger,
-# * output files: XDMF for ParaView, a history table, pictures.
+# * output files: a time series for PyVista and ParaView, a history table, pictures.
 #
 # The problem is from N. J. Theron (1994) and section 4.3 of the paper; the numbers at the end
 # were computed with an independent program.
@@ -72,7 +72,7 @@ decaying = ub.simulate(
     t=(0.0, 2.5),
     dt=1e-3,
     record=[
-        ub.XDMF(output / "swing.xdmf", every=20),
+        ub.VTKHDF(output / "swing.hdf", every=20),
         ub.History(output / "swing.csv", [beam.start, middle, beam.end]),
     ],
 )

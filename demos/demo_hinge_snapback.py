@@ -46,7 +46,7 @@ def broken(ratio, cells=16):
         scene,
         ub.DissipationControl(energy / 40, ub.ArcLength(0.1)),
         until=lambda now: now.ledger.lost["hinges"] > 0.97 * energy,
-        record=ub.XDMF(output / f"hinge_snapback_{ratio:g}.xdmf"),
+        record=ub.VTKHDF(output / f"hinge_snapback_{ratio:g}.hdf"),
     )
     return beam, energy, path
 

@@ -110,7 +110,7 @@ sound = np.sqrt(steel["E"] / steel["rho"])  # 5172 m/s
 end = max(0.75 * bays * bay / sound, 2 * duration)  # s
 quarter = int(np.ceil(end / (duration / 2)))  # at least eight steps for the blow
 steps = 4 * quarter
-files = ub.XDMF(output / "lattice.xdmf", every=quarter)
+files = ub.VTKHDF(output / "lattice.hdf", every=quarter)
 
 solution, seconds = simulation.solution, []
 files.open(simulation)
@@ -192,5 +192,5 @@ ub.print_once("the ledger closes, and nothing overtakes sound")
 #
 # * `mpirun -n 2 python3 demos/demo_lattice.py`: the same results, in less time,
 # * `--cells 1000`: a wall of seven bays, in a second,
-# * `output/lattice.xdmf` in ParaView: *Warp By Vector* with the displacement, coloured by `M`; then
+# * `output/lattice.hdf` in ParaView: *Warp By Vector* with the displacement, coloured by `M`; then
 #   *Rescale to data range over all timesteps*, since nothing moves at t = 0.

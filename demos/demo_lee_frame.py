@@ -61,7 +61,7 @@ path = ub.follow(
     ub.ArcLength(0.05, factor=10),
     until=lambda now: now.t > 15 and len(now.solution.critical) == 2,
     steps=400,
-    record=ub.XDMF(output / "lee_frame.xdmf"),
+    record=ub.VTKHDF(output / "lee_frame.hdf"),
 )
 ub.print_once("Lee's frame\n" + str(path))
 u, v, _ = 100 * path.displacement(place).T  # cm

@@ -116,7 +116,7 @@ class Manipulator:
 
 # %%
 revolute = Manipulator(hinge=0.0)
-record = ub.XDMF(output / "manipulator.xdmf", every=40)
+record = ub.VTKHDF(output / "manipulator.hdf", every=40)
 by_length = {cell: Manipulator(cell) for cell in (0.04, 0.02, 0.01)}
 hinged = by_length[0.01]
 by_cells = {1: Manipulator(cells=1), 2: Manipulator(cells=2), 4: hinged}

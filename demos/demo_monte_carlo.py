@@ -155,7 +155,7 @@ ub.print_once(f"the first five drift by {', '.join(f'{x:.1f}' for x in drift[:5]
 
 # %%
 worst = int(np.nanargmax(study["residual drift"]))
-again = struck(**study.cases[worst], record=ub.XDMF(output / "monte_carlo.xdmf", every=2))
+again = struck(**study.cases[worst], record=ub.VTKHDF(output / "monte_carlo.hdf", every=2))
 ub.print_once(
     f"the most: {1e3 * again['residual drift']:.2f} mm with seed {study.cases[worst]['seed']}"
 )

@@ -123,7 +123,7 @@ with ub.picture((8.5, 5.5)) as figure:
 figure.savefig(output / "rotating_beam_campbell.png")
 
 ub.plot(fast).savefig(output / "rotating_beam_modes.png")
-fast.write(output / "rotating_beam.xdmf")  # the k-th shape at time k, for ParaView
+fast.write(output / "rotating_beam.hdf")  # the k-th shape at time k
 ub.print_once("\npictures:", *sorted(str(p) for p in output.glob("rotating_beam*.png")), sep="\n  ")
 
 # %% [markdown]

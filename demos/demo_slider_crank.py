@@ -159,7 +159,7 @@ class Press:
 
 
 driven = Press(controlled=False)
-controlled = Press(controlled=True, record=ub.XDMF(output / "slider_crank.xdmf", every=30))
+controlled = Press(controlled=True, record=ub.VTKHDF(output / "slider_crank.hdf", every=30))
 ub.print_once("\npress, motion given\n" + str(driven.run))
 ub.print_once("\npress, controlled\n" + str(controlled.run))
 

@@ -87,7 +87,7 @@ moment_ratio = np.abs(elastic.section_forces_at(corner)[:, 2]).max() / limit
 ub.print_once(f"without a hinge the moment at the corner reaches {moment_ratio:.3f} M_u\n")
 
 factors = (1, 1.2, 1.4, 1.6, 1.8, 2, 2.2, 10)
-files = ub.XDMF(output / "vibrating_frame.xdmf", every=100)
+files = ub.VTKHDF(output / "vibrating_frame.hdf", every=100)
 runs = {
     factor: swing(factor, 15.0 if factor in (1, 10) else 6.5, files if factor == 1 else ())
     for factor in factors

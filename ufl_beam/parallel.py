@@ -257,8 +257,10 @@ def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
     Args:
         shown: Whether the user wants a bar.
         comm: Processes that share the work.
-        options: Arguments of tqdm.
+        options: Arguments of tqdm; ``total=1.0`` is for fractions of the work, in per cent.
     """
+    if isinstance(options.get("total"), float):
+        options["bar_format"] = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}{postfix}]"
     ipython: Any = sys.modules.get("IPython")
     shell = ipython.get_ipython() if ipython else None
     if not shown or comm.rank > 0 or active_comm() != MPI.COMM_WORLD:

@@ -41,7 +41,7 @@ solution = ub.simulate(
     ub.EnergyMomentum(alpha=0.05, beta=0.05),
     t=(0.0, 0.4),
     dt=1e-3,
-    record=[ub.XDMF(folder / "frame.xdmf", every=10), ub.VTKHDF(folder / "frame.vtkhdf", every=10)],
+    record=[ub.XDMF(folder / "frame.xdmf", every=10), ub.VTKHDF(folder / "frame.hdf", every=10)],
 )
 points = [b.at(s) for b in frame.beams for s in np.linspace(0, 1, 13 if b is roof else 9)]
 points += [weight.middle, weight.at(3, 3), weight.at(2.5, 2.5)]

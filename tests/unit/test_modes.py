@@ -291,9 +291,9 @@ def test_the_largest_displacement_of_a_mode_is_one(shared_path, on_first_rank):
     height = motion.displacement(scene.beams[0].end)[:, 1]
     np.testing.assert_allclose(height, [0.2, 0, -0.2, 0, 0.2], atol=1e-9)
     found.write(shared_path / "modes.xdmf")
-    found.write(shared_path / "modes.vtkhdf")
+    found.write(shared_path / "modes.hdf")
     one = on_first_rank(lambda: read_xdmf(shared_path / "modes.xdmf"))
-    other = on_first_rank(lambda: read_vtkhdf(shared_path / "modes.vtkhdf"))
+    other = on_first_rank(lambda: read_vtkhdf(shared_path / "modes.hdf"))
     assert one.times == other.times == [0, 1, 2]
     assert all((one.of(name) == other.of(name)).all() for name in one.names)
     moments = one.of("M")[0]

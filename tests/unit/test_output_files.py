@@ -61,8 +61,8 @@ COLLISIONS = {
     "symbolic link": lambda d: [ub.History(d / "a.csv"), ub.History(d / "link.csv")],
     "hard link": lambda d: [ub.History(d / "a.csv"), ub.History(d / "hard.csv")],
     "XDMF": lambda d: [ub.XDMF(d / "a.xdmf"), ub.XDMF(d / "a.xdmf", every=2)],
-    "numbers of XDMF": lambda d: [ub.XDMF(d / "a.xdmf"), ub.History(d / "a.xdmf.bin")],
-    "VTKHDF": lambda d: [ub.VTKHDF(d / "a.vtkhdf"), ub.VTKHDF(d / "a.vtkhdf")],
+    "VTKHDF": lambda d: [ub.VTKHDF(d / "a.hdf"), ub.VTKHDF(d / "a.hdf")],
+    "copy of VTKHDF": lambda d: [ub.VTKHDF(d / "a.hdf"), ub.History(d / "a.hdf.part")],
     "of a user": lambda d: [ub.History(d / "a.csv"), Notes(d / "a.csv")],
     "table being thinned": lambda d: [ub.History(d / "a.csv", max_rows=3), Notes(d / "a.csv.part")],
 }
@@ -97,10 +97,10 @@ def test_the_same_recorder_twice(shared_path):
 
 
 @pytest.mark.parametrize(
-    "recorder", [ub.History, lambda path: ub.XDMF(path.with_suffix("")), Notes]
+    "recorder", [ub.History, lambda path: ub.VTKHDF(path.with_suffix("")), Notes]
 )
 def test_a_checkpoint_shares_no_file(recorder, shared_path):
-    path = shared_path / "a.xdmf.bin"
+    path = shared_path / "a.hdf.part"
     checkpoint = ub.Checkpoint(path, every=2)
     with pytest.raises(ub.ArgumentError, match=rf"and checkpoint would both write {path}"):
         run(recorder(path), checkpoint=checkpoint)
@@ -159,13 +159,7 @@ def test_a_check_makes_no_file_that_a_kill_could_leave(tmp_path):
     assert tmp_path.stat().st_mtime == 0
 
 
-def test_names_that_xml_cannot_hold():
-    for name in ("a\nb.xdmf", " a.xdmf"):
-        with pytest.raises(ub.ArgumentError, match="do not survive in XML; take another name"):
-            run(ub.XDMF(name))
-
-
-@pytest.mark.parametrize("name", ['a&b<c>".xdmf', "a b.xdmf", "ü✓.xdmf"])
+@pytest.mark.parametrize("name", ['a&b<c>".xdmf', " a b\n.xdmf", "ü✓.xdmf"])
 def test_names_with_odd_characters(name, shared_path, on_first_rank):
     run(ub.XDMF(shared_path / name))
     assert len(on_first_rank(lambda: read_xdmf(shared_path / name)).times) == 6
@@ -185,7 +179,7 @@ def test_a_step_costs_the_same_at_any_time(recorder, tmp_path):
     """
     beam = ub.Beam((0, 0), (4, 0), SECTION, cells=8)
     simulation = ub.Simulation(clamped(beam), ub.EnergyMomentum())
-    file = recorder(tmp_path / f"a{recorder.ending}")
+    file = recorder(tmp_path / f"a{recorder.endings[0]}")
     file.open(simulation)
 
     def transferred():
@@ -239,7 +233,6 @@ class Remove(Notes):
 REMOVED = {
     "History": (ub.History, "a.csv", "a.csv"),
     "XDMF": (ub.XDMF, "a.xdmf", "a.xdmf"),
-    "numbers of XDMF": (ub.XDMF, "a.xdmf", "a.xdmf.bin"),
     "VTKHDF": (ub.VTKHDF, "a.vtkhdf", "a.vtkhdf"),
 }
 
@@ -286,7 +279,7 @@ def test_a_disk_that_is_full(recorder, limit, tmp_path):
 
     VTKHDF allocates its space before HDF5 needs it; else the interpreter died here.
     """
-    path = tmp_path / f"a{getattr(recorder, 'ending', '.csv')}"
+    path = tmp_path / f"a{getattr(recorder, 'endings', ['.csv'])[0]}"
     run(recorder(path), steps=1)
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limits[1]))
@@ -373,11 +366,10 @@ def test_xdmf_is_complete_whenever_a_kill_comes(tmp_path, monkeypatch):
         write(writer, [n])
     kept.append((writer.complete, writer.sync()))
     writer.close()
-    begin = path.read_bytes(), Path(f"{path}.bin").read_bytes()
+    begin = path.read_bytes()
     for n in range(40):
         for pages in (0, 1, 2):
-            for name, content in zip((path, f"{path}.bin"), begin, strict=True):
-                Path(name).write_bytes(content)
+            path.write_bytes(begin)
             writer = writer_of(path, *kept[-1])
             with monkeypatch.context() as torn:
                 Torn(torn, n, pages, Killed())
@@ -397,11 +389,11 @@ def test_xdmf_is_complete_whenever_a_kill_comes(tmp_path, monkeypatch):
         writer = writer_of(path, *kept[-6])
         write(writer, range(first - 5, first))
         writer.close()
-        assert (path.read_bytes(), Path(f"{path}.bin").read_bytes()) == begin
+        assert path.read_bytes() == begin
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("n", range(3))
+@pytest.mark.parametrize("n", range(2))
 def test_an_interrupt_in_a_write_of_xdmf(n, tmp_path, monkeypatch):
     """Ctrl-C in a write: closed, or gone on with, the file is as if nothing had happened."""
     for name in ("whole", "closed", "on"):
@@ -418,7 +410,7 @@ def test_an_interrupt_in_a_write_of_xdmf(n, tmp_path, monkeypatch):
     require_steps(tmp_path / "closed.xdmf", 7)
     require_steps(tmp_path / "on.xdmf", 10)
     text, other = ((tmp_path / f"{name}.xdmf").read_text() for name in ("whole", "on"))
-    assert text.replace("whole.xdmf", "on.xdmf").split() == other.split()
+    assert text.split() == other.split()
 
 
 @pytest.mark.serial

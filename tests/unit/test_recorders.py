@@ -9,7 +9,7 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 from scenes import SECTION, clamped, rigid_chain
-from time_series import read_vtkhdf, read_xdmf
+from time_series import read_as_users_do, read_vtkhdf, read_xdmf, require_equal
 
 import ufl_beam as ub
 
@@ -39,13 +39,18 @@ def run(scene, *record, steps=6, scheme=None, **more):
 def series(request, shared_path, on_first_rank):
     """A recorder of time series, and what a reader finds in its file."""
     recorder = request.param
-    read = {ub.XDMF: read_xdmf, ub.VTKHDF: read_vtkhdf}[recorder]
-    path = shared_path / f"run{recorder.ending}"
+    reader = {ub.XDMF: read_xdmf, ub.VTKHDF: read_vtkhdf}[recorder]
+    path = shared_path / f"run{recorder.endings[0]}"
 
     def make(**more):
         return recorder(path, **more)
 
-    return make, lambda: on_first_rank(lambda: read(path))
+    def read():
+        found = reader(path)
+        require_equal(found, read_as_users_do(path))
+        return found
+
+    return make, lambda: on_first_rank(read)
 
 
 def test_time_series_hold_the_solution(series):
@@ -73,6 +78,14 @@ def test_time_series_hold_the_solution(series):
             # The same kernel on other meshes: round-off of EA
             assert np.abs(found.of(name)[n] - forces[:, component]).max() < 1e-16 * 1e4 * 10
         assert (found.of("part")[n] == 0).all()
+
+
+def test_xdmf_refuses_more_points_than_paraview_reads(shared_path, monkeypatch):
+    monkeypatch.setattr(ub.XDMF, "limit", 8.0)
+    with pytest.raises(
+        ub.ArgumentError, match=r"fields of 9 points, more than 8, as text; write a"
+    ):
+        run(scene(), ub.XDMF(shared_path / "run.xdmf"))
 
 
 def test_xdmf_has_one_grid_with_all_fields_at_each_time(shared_path, on_first_rank):

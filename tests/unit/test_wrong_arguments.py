@@ -637,7 +637,7 @@ TABLE = {
     ),
     # files
     "XDMF": call(ub.XDMF, path=V("run.xdmf", [*PATH, "run.h5"]), every=V(1, COUNT)),
-    "VTKHDF": call(ub.VTKHDF, path=V("run.vtkhdf", [*PATH, "run.h5"]), every=V(1, COUNT)),
+    "VTKHDF": call(ub.VTKHDF, path=V("run.hdf", [*PATH, "run.h5"]), every=V(1, COUNT)),
     "Solution.load": call(
         ub.Solution.load, path=V("run.h5", PATH), scene=V(None, optional(OBJECT))
     ),

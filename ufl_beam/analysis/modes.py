@@ -139,12 +139,12 @@ class Shapes(Rich, ABC):
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
-        """Write a time series for ParaView, in which the time k shows the k-th mode.
+        """Write a time series for PyVista or ParaView, in which the time k shows the k-th mode.
 
         Displacements are the sum of the state and the mode.  N, V and M belong to the mode alone.
 
         Args:
-            path: File, ending in ``.xdmf`` or ``.vtkhdf``, see :class:`XDMF`, :class:`VTKHDF`.
+            path: File, ending in ``.hdf`` or ``.xdmf``, see :class:`VTKHDF`, :class:`XDMF`.
             amplitude: Largest displacement, as a fraction of the size of the scene.
 
         Raises:
@@ -152,7 +152,7 @@ class Shapes(Rich, ABC):
         """
         require_number(amplitude, "write: amplitude", positive=True)
         self._require(0)
-        recorder = VTKHDF(path) if Path(path).suffix == VTKHDF.ending else XDMF(path)
+        recorder = VTKHDF(path) if Path(path).suffix in VTKHDF.endings else XDMF(path)
         on_first(active_comm(), lambda: self._write(recorder, amplitude))
 
     def _write(self, recorder: TimeSeries, amplitude: float) -> None:

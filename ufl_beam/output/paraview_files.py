@@ -9,7 +9,6 @@ import mmap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
-from xml.sax.saxutils import escape
 
 from mpi4py import MPI
 
@@ -138,80 +137,63 @@ PAGE, CAPACITY = mmap.PAGESIZE, 1 << 16
 
 
 class Complete(NamedTuple):
-    """Sizes of the complete steps in both files."""
+    """Sizes of the complete steps in the file."""
 
     steps: int  # number of steps
     tail: int  # position of TAIL, the end of the document
     capacity: int  # position of CLOSING, the end of the spare instruction
-    data: int  # length of the numbers; bytes
 
 
 class XdmfWriter:
-    """Writer of a time series as XDMF: XML with a grid for each step, numbers in a binary file.
+    """Writer of a time series as XDMF: one XML file with a grid and its numbers for each step.
 
     A processing instruction of spaces, ``<?spare ... ?>``, follows the text.  A step is written
     into the instruction, with new closing tags.  Then the old closing tags, which lie within one
     page of memory, are overwritten with spaces, so that the step belongs to the document.  So an
-    interrupted write leaves valid XML, and the cost of a step does not grow.  Numbers are written
-    before the text that refers to them.
+    interrupted write leaves valid XML, and the cost of a step does not grow.
+
+    The numbers are text because meshio reads no binary file with the numbers of several fields.
+    They are not rounded.
 
     For a restart, ``complete`` has the sizes after the last complete step, and ``digest`` is the
-    result of :meth:`sync`.  If the files differ, :class:`ValueError` is raised.
+    result of :meth:`sync`.  If the file differs, :class:`ValueError` is raised.
     """
 
     def __init__(
         self, path: Path, lines: Lines, fields: LineFields,
         complete: Sequence[int] | None = None, digest: bytes = b"",
     ) -> None:  # fmt: skip
-        self._name, mesh = escape(beside(path, ".bin").name), bytearray()
-        items = []
-        for values in (lines.cells.astype("<i8"), lines.points, lines.kinds):
-            items.append(self._item(values, len(mesh)))
-            mesh += values.tobytes()
-        self._mesh = (  # part of the text of each step; its numbers are written once
+        self._mesh = (  # part of the text of each step
             f'<Topology TopologyType="Polyline" NodesPerElement="2" '
-            f'NumberOfElements="{len(lines.cells)}">{items[0]}</Topology>'
-            f'<Geometry GeometryType="XYZ">{items[1]}</Geometry>'
-            f'<Attribute Name="part" AttributeType="Scalar" Center="Cell">{items[2]}</Attribute>'
+            f'NumberOfElements="{len(lines.cells)}">{_item(lines.cells)}</Topology>'
+            f'<Geometry GeometryType="XYZ">{_item(lines.points)}</Geometry>'
+            f'<Attribute Name="part" AttributeType="Scalar" Center="Cell">'
+            f"{_item(lines.kinds)}</Attribute>"
         )
-        new = complete is None
-        self.complete = Complete(*(complete or (0, len(HEAD), CAPACITY, len(mesh))))
-        self._data, self._xml = OutputFile(beside(path, ".bin"), new=new), OutputFile(path, new=new)
+        new, self._interrupted = complete is None, False
+        self.complete = Complete(*(complete or (0, len(HEAD), CAPACITY)))
+        self._xml = OutputFile(path, new=new)
         if new:
-            self._data.put(0, mesh)
             self._xml.put(0, (HEAD + TAIL).ljust(CAPACITY) + CLOSING)
         else:
             short = self._xml.size < self.complete.capacity + len(CLOSING)
             if short or self.sync() != digest:
                 self._xml.close()
-                self._data.close()
-                raise ValueError("not the files that were written up to there")
+                raise ValueError("not the file that was written up to there")
             self._cut()
-
-    def _item(self, values: Array | Index, at: int) -> str:
-        """Return the XML element for numbers at a position of the binary file."""
-        kind = "Int" if values.dtype.kind == "i" else "Float"
-        shape = " ".join(map(str, values.shape))
-        return (
-            f'<DataItem Dimensions="{shape}" NumberType="{kind}" Precision="8" Format="Binary" '
-            f'Endian="Little" Seek="{at}">{self._name}</DataItem>'
-        )
 
     def write(self, t: float, fields: LineFields) -> None:
         """Append a step with its fields."""
-        if self._data.size > self.complete.data:  # after an interrupted step
+        if self._interrupted:
             self._cut()
-        steps, tail, capacity, length = self.complete
+        self._interrupted = True
+        steps, tail, capacity = self.complete
         text = f'<Grid Name="{steps}" GridType="Uniform"><Time Value="{t!r}"/>{self._mesh}'
-        data = bytearray()
         for center, by_name in zip(("Node", "Cell"), fields, strict=True):
             for name, values in by_name.items():
                 form = "Vector" if values.ndim == 2 else "Scalar"
-                item = self._item(values, length + len(data))
                 text += f'<Attribute Name="{name}" AttributeType="{form}" Center="{center}">'
-                text += f"{item}</Attribute>"
-                data += values.tobytes()
-        self._data.put(length, data)
+                text += f"{_item(values)}</Attribute>"
         # The text goes into the instruction, with a new tail that lies within one page.
         element, start = (text + "</Grid>\n").encode(), tail + len(TAIL)
         new_tail = start + len(element)
@@ -227,36 +209,38 @@ class XdmfWriter:
             capacity = new_capacity
         self._xml.put(start, element.ljust(new_tail - start) + TAIL)  # still in the instruction
         self._xml.put(tail, b" " * len(TAIL))  # now in the document
-        self.complete = Complete(steps + 1, new_tail, capacity, length + len(data))
+        self.complete, self._interrupted = Complete(steps + 1, new_tail, capacity), False
 
     def _cut(self) -> None:
-        """Delete data after the last complete step; the document is valid at any time.
-
-        The text of a step is deleted before its numbers.
-        """
-        _, tail, capacity, length = self.complete
+        """Delete the text after the last complete step; the document is valid at any time."""
+        _, tail, capacity = self.complete
         self._xml.put(tail, TAIL)
         spare, after = tail + len(TAIL), capacity + len(CLOSING)
         self._xml.put(spare, b" " * (capacity - spare))
         self._xml.put(after, b" " * (self._xml.size - len(CLOSING) - after))
         self._xml.put(capacity, CLOSING)
         self._xml.cut(after)
-        self._data.cut(length)
 
     def sync(self) -> bytes:
-        """Flush to the disk; return SHA-256 of the document up to its tail, and of the numbers."""
-        self._data.sync()
+        """Flush to the disk; return the SHA-256 of the document up to its tail."""
         self._xml.sync()
-        return self._xml.digest(self.complete.tail) + self._data.digest(self.complete.data)
+        return self._xml.digest(self.complete.tail)
 
     def close(self) -> None:
-        """Close both files, without an incomplete last step."""
+        """Close the file, without an incomplete last step."""
         try:
-            if self._data.size > self.complete.data:
+            if self._interrupted:
                 self._cut()
         finally:
-            self._data.close()
             self._xml.close()
+
+
+def _item(values: Array | Index) -> str:
+    """Return the XML element of numbers; ``repr`` does not round them."""
+    kind, shape = "Int" if values.dtype.kind == "i" else "Float", " ".join(map(str, values.shape))
+    numbers = " ".join(map(repr, values.ravel().tolist()))
+    head = f'<DataItem Dimensions="{shape}" NumberType="{kind}" Precision="8" Format="XML">'
+    return f"{head}{numbers}</DataItem>"
 
 
 # -- VTKHDF ---------------------------------------------------------------------------------------
@@ -447,30 +431,38 @@ class TimeSeries(Restartable):
     """Base of recorders of a scene as one data set of lines, see :class:`XDMF` and :class:`VTKHDF`.
 
     Attributes:
-        ending: Suffix of the file.
-        second: Suffix that is added to the name of the file for a second file.
+        endings: Suffixes that the name of the file may have.
+        second: Suffixes that are added to the name of the file for further files.
+        limit: Largest number of points.
         writer: Class of the writer.  Its arguments are the path, lines, and fields of the first
             state; for a restart also ``complete`` and the ``sync()`` of the earlier writer.
     """
 
-    ending: ClassVar[str]
-    second: ClassVar[str]
+    endings: ClassVar[tuple[str, ...]]
+    second: ClassVar[tuple[str, ...]] = ()
+    limit: ClassVar[float] = math.inf
     writer: ClassVar[Any]
 
     def __init__(self, path: str | Path, *, every: int = 1) -> None:
         kind = type(self).__name__
         self._path = require_path(path, kind)
-        self.files = self._path, beside(self._path, self.second)
+        self.files = (self._path, *(beside(self._path, suffix) for suffix in self.second))
         require_count(every, f"{kind} {path}: every")
         self._every, self._count = every, 0
-        if self._path.suffix != self.ending:
-            raise ArgumentError(f"{kind} {path}: the name of the file must end in {self.ending}")
+        if self._path.suffix not in self.endings:
+            endings = " or ".join(self.endings)
+            raise ArgumentError(f"{kind} {path}: the name of the file must end in {endings}")
         self._writers: list[Any] = []  # one writer on the first process while it is open
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Write mesh and initial state, or delete the steps that follow a :meth:`state`."""
         self._comm: MPI.Intracomm = simulation.comm
         self._scene, self._count, before = LineData(simulation), 0, tuple[Any, ...]()
+        if (points := len(self._scene.lines.points)) > self.limit:
+            raise ArgumentError(
+                f"{type(self).__name__} {self._path}: ParaView cannot read fields of {points} "
+                f"points, more than {self.limit:.0f}, as text; write a VTKHDF file"
+            )
         if state is not None:
             self._count, *complete = map(int, state["sizes"])
             before = complete, state["digest"].tobytes()
@@ -514,7 +506,7 @@ class TimeSeries(Restartable):
 
 
 class XDMF(TimeSeries):
-    """Time series for ParaView: all fields of a step on one data set of lines.
+    """Time series for ParaView and meshio: all fields of a step on one data set of lines.
 
     Points have ``displacement`` (3 components; m) and ``rotation`` (rad), in dynamics also
     ``velocity`` (m/s) and ``angular velocity`` (rad/s).  Cells have ``N``, ``V`` (N), ``M`` (N m)
@@ -524,57 +516,48 @@ class XDMF(TimeSeries):
 
     At any moment, also after a kill, the file is valid and has all complete steps.  The cost of a
     step does not grow with the number of steps.  In path following, the time is the load factor.
+    The numbers are text, so files of :class:`VTKHDF` are opened faster if there are many cells.
 
     Args:
-        path: File, ending in ``.xdmf``; its numbers are in a second file, with ``.bin`` added to
-            the name.
+        path: File, ending in ``.xdmf``.
         every: Number of steps between written states.
 
     Raises:
-        ArgumentError: ``every`` is no positive whole number, or the path does not end in ``.xdmf``.
+        ArgumentError: ``every`` is no positive whole number, the path does not end in ``.xdmf``,
+            or (in the run) there are more than 130 000 points, which ParaView cannot read.
 
     Example:
         >>> film = ub.XDMF("beam.xdmf", every=5)
         >>> solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=film)
         >>> [path.name for path in film.files]
-        ['beam.xdmf', 'beam.xdmf.bin']
+        ['beam.xdmf']
     """
 
-    ending, second = ".xdmf", ".bin"
+    endings = (".xdmf",)
+    limit = 130e3  # libxml2 reads no text of 10 MB; a vector has up to 75 characters
     writer = XdmfWriter
-
-    def require_writable(self) -> None:
-        """Raise :class:`ArgumentError` if a file cannot be written, or XML cannot hold its name."""
-        name = self._path.name
-        if name != name.strip() or not name.isprintable():
-            raise ArgumentError(
-                f"XDMF {name!r}: spaces at the ends and characters that cannot be printed do not "
-                "survive in XML; take another name"
-            )
-        super().require_writable()
 
 
 class VTKHDF(TimeSeries):
-    """Time series for ParaView, VTK and PyVista in one HDF5 file, with the fields of :class:`XDMF`.
+    """Time series for PyVista, ParaView and VTK in one HDF5 file, with the fields of :class:`XDMF`.
 
     Each step is flushed, so the file can be read during the run.  After a kill the file has all
     complete steps, except in the microseconds in which HDF5 rearranges its index.  A restarted run
     checks the numbers and continues in a copy, because HDF5 may crash in a damaged file.
 
     Args:
-        path: File, ending in ``.vtkhdf``.
+        path: File, ending in ``.hdf`` or ``.vtkhdf``.  PyVista reads only names in ``.hdf``.
         every: Number of steps between written states.
 
     Raises:
-        ArgumentError: ``every`` is no positive whole number, or the path does not end in
-            ``.vtkhdf``.
+        ArgumentError: ``every`` is no positive whole number, or the path has another ending.
 
     Example:
-        >>> film = ub.VTKHDF("beam.vtkhdf", every=5)
+        >>> film = ub.VTKHDF("beam.hdf", every=5)
         >>> solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=film)
         >>> [path.name for path in film.files]
-        ['beam.vtkhdf', 'beam.vtkhdf.part']
+        ['beam.hdf', 'beam.hdf.part']
     """
 
-    ending, second = ".vtkhdf", ".part"
+    endings, second = (".hdf", ".vtkhdf"), (".part",)
     writer = VtkhdfWriter

@@ -48,8 +48,6 @@ from ufl_beam.simulation.step_lengths import Adaptive, AdaptiveSteps, EqualSteps
 from ufl_beam.simulation.stepper import MOST_SUBSTEPS
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
-BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}{postfix}]"
-
 
 def simulate(
     scene: Scene,
@@ -167,7 +165,7 @@ def simulate(
             pace = AdaptiveSteps(simulation, t1, dt)
         else:
             pace = EqualSteps(simulation, t1, dt)
-        bar = progress_bar(progress, comm, total=1.0, bar_format=BAR)
+        bar = progress_bar(progress, comm, total=1.0)
         take_steps(
             simulation, pace, recorders, bar, max_states=max_states, keeper=keeper, begin=begin
         )
