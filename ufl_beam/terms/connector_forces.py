@@ -36,7 +36,7 @@ from ufl_beam.terms.connector_rows import (
     Setting,
     Springs,
 )
-from ufl_beam.terms.derivatives import Each, Neighbours, differences, form_derivative, in_c
+from ufl_beam.terms.derivatives import Each, Neighbours, form_derivative, in_c
 from ufl_beam.terms.term import Callbacks, Phases, Term, beginning
 
 
@@ -328,9 +328,9 @@ class Guides(ConnectorTerm):
     """Forces that hold points on curves.
 
     In schemes whose forces act over the step, they are normal to the chord of the step and do no
-    work.  The round-off of points spoils the direction of a short chord.  If this error exceeds the
-    error by curvature, the tangent in the middle replaces the chord.  The error of either direction
-    is at most the round-off to the power of two thirds.
+    work.  The round-off of points spoils the direction of a short chord.  If the polynomial through
+    points around its end agrees with both ends up to round-off, or if the chord is extremely short,
+    the secant of the polynomial replaces the chord.
 
     The motion of a guide is the distance of the point from its curve, which is zero when a step is
     accepted.  guide_curves.c computes guides, and calls Python for points of the curves.
@@ -373,12 +373,14 @@ class Guides(ConnectorTerm):
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
         others = [term._c for some in neighbours.terms for term in some]
-        c = struct(
-            "guide_derivatives", guides=self._c, neighbours=len(others),
-            neighbour=ffi.new("guides *[]", others), tangent=np.zeros((len(self._curves), 2)),
-        )  # fmt: skip
+        parameters, number = neighbours.weights.shape
         # The state of the guides in neighbouring scenes follows from that of the guides themselves
-        return [differences(neighbours), in_c("guides", c)]
+        c = struct(
+            "guide_derivatives", guides=self._c, parameters=parameters, neighbours=number,
+            neighbour=ffi.new("guides *[]", others), weight=neighbours.weights,
+            tangent=np.zeros((len(self._curves), 2)),
+        )  # fmt: skip
+        return [in_c("guides", c)]
 
     def _begin_again(self) -> None:
         """Discard iterates, and begin at the accepted points of the curves."""

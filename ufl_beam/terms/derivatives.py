@@ -377,8 +377,9 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         return [*rates(damping.damping.rates), *tangents]
     if kind == "guides":
         g = data.guides
-        found = [(x, ffi.sizeof(ffi.typeof(x).item)) for x in (g.s0, g.s, g.step, g.frame)]
-        return [(x, size * g.number) for x, size in [*found, (g.on0, 16)]]
+        found = g.s0, g.s, g.step, g.frame, g.around
+        sizes = [(x, ffi.sizeof(ffi.typeof(x).item)) for x in found]
+        return [(x, size * g.number) for x, size in [*sizes, (g.on0, 16)]]
     if kind == "connectors":
         c, blocks = data.term.connectors, [table(data.motions), (data.dt, 8)]
         if data.by_geometry:

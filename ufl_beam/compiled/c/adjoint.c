@@ -658,14 +658,17 @@ void transpose_moving_loads(void *self, adjoint *a, const double *λ)
   for (int k = 0; of->rates && k < of->loads; ++k) transpose_moving_mass(of, a, k, λ);
 }
 
-/* The differences between scenes follow, see transpose_differences. */
 void transpose_guides(void *self, adjoint *a, const double *λ)
 {
   const guide_derivatives *m = self;
-  guides *g = m->guides;
+  const guides *g = m->guides;
   find_tangents_before(self, a->step, 0);
-  if (!g->over_step || !find_frames(g, a->d->x)) return;
-  for (int k = 0; k < g->number; ++k) {
+  for (int p = 0; p < a->parameters; ++p) {
+    memset(a->values, 0, a->size * sizeof *a->values);
+    add_changes_of_curves(m, a->d->x, p, a->values);
+    a->gradient[p] += dot(a->size, a->values, λ);
+  }
+  for (int k = 0; k < g->number && g->over_step; ++k) {
     const int32_t *dofs = g->dofs + 7 * k;
     double by_way[2];
     find_turn_of_chord(m, a->d->x, k, by_way);

@@ -856,7 +856,7 @@ void find_tangents_before(void *self, const time_step *step, const double *q1)
     expand_curve(g, k, g->s0[k], &c);
     for (int i = 0; i < 2; ++i) m->tangent[2 * k + i] = c.a[1][i] / hypot(c.a[1][0], c.a[1][1]);
   }
-  for (int i = 0; i < m->neighbours; ++i) {
+  for (int i = 0; i < m->parameters * m->neighbours; ++i) {
     guides *one = m->neighbour[i];
     memcpy(one->s0, g->s0, g->number * sizeof *g->s0);
     memcpy(one->step, g->step, g->number * sizeof *g->step);
@@ -872,15 +872,27 @@ static void find_turn_of_chord(const guide_derivatives *m, const double *q1, int
   const guides *g = m->guides;
   const guide_frame *f = g->frame + k;
   const double *t0 = m->tangent + 2 * k, t[2] = {f->n[1], -f->n[0]}, direction[2] = {f->m[1], -f->m[0]};
-  const double force = q1[g->dofs[7 * k + 6]];
+  const double force = q1[g->dofs[7 * k + 6]], along = product_of(direction, t0);
   const double chord[2] = {f->on[0] - g->on0[2 * k], f->on[1] - g->on0[2 * k + 1]};
-  const double length = hypot(chord[0], chord[1]);
+  const double way = copysign(hypot(chord[0], chord[1]), product_of(chord, t));
   double change[2];
-  if (length > g->shortest[k]) {
-    const double along = product_of(direction, t0);
-    for (int i = 0; i < 2; ++i) change[i] = (direction[i] * along - t0[i]) / copysign(length, product_of(chord, t));
-  } else change[0] = product_of(f->dm[1], t), change[1] = -product_of(f->dm[0], t);
+  for (int i = 0; i < 2; ++i) change[i] = f->smooth ? f->by_start[i] : (direction[i] * along - t0[i]) / way;
   by_way[0] = -force * change[1], by_way[1] = force * change[0];
+}
+
+/* Five-point differences of normals and distances at constant unknowns. */
+static void add_changes_of_curves(const guide_derivatives *m, const double *q1, int p, double *r)
+{
+  for (int i = p * m->neighbours; i < (p + 1) * m->neighbours; ++i) {
+    const double weight = find_frames(m->neighbour[i], q1) ? m->weight[i] : NAN;
+    for (int k = 0; k < m->guides->number; ++k) {
+      const guide_frame *f = m->guides->frame + k, *one = m->neighbour[i]->frame + k;
+      const double *normal = f->smooth ? f->secant : f->m, *other = f->smooth ? one->secant : one->m;
+      const int32_t *dofs = m->guides->dofs + 7 * k;
+      for (int j = 0; j < 2; ++j) r[dofs[1 + 2 * j]] += weight * q1[dofs[6]] * (other[j] - normal[j]);
+      r[dofs[6]] += weight * (one->distance - f->distance);
+    }
+  }
 }
 
 void add_guides_derivative(void *self, const derivatives *d, int p, double *r)
@@ -888,6 +900,7 @@ void add_guides_derivative(void *self, const derivatives *d, int p, double *r)
   const guide_derivatives *m = self;
   const guides *g = m->guides;
   const double *q0 = d->q0 + (size_t)p * d->size;
+  add_changes_of_curves(m, d->x, p, r);
   for (int k = 0; k < g->number && g->over_step; ++k) {
     const int32_t *dofs = g->dofs + 7 * k;
     const double *t0 = m->tangent + 2 * k, way = t0[0] * q0[dofs[1]] + t0[1] * q0[dofs[3]];

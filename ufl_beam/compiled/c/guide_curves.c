@@ -12,6 +12,11 @@ enum { PROJECTIONS = 50, MOST_REFINEMENTS = 20 }; /* largest numbers of polynomi
  * method; tolerance of the last projection, relative to the scene. */
 static const double TRUSTED = 32, NOTHING_LEFT = 1e-12, CLOSE_ENOUGH = 1e-9;
 
+/* Largest distances of an end of a chord from the secant of the polynomial up to which the secant is
+ * more exact, in last digits: the round-off of points, and its multiple in differences between scenes
+ * whose parameters differ by 2^-13. */
+static const double SECANT = 8, SECANT_OF_DERIVATIVES = 8192;
+
 static double product_of(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1]; }
 
 /* Compute the polynomial of the curve of guide k around the parameter s. */
@@ -82,16 +87,23 @@ static int find_nearest(const guides *g, int k, const double *p, double *on, dou
   return 0;
 }
 
-/* Direction d of a short chord, taken as the tangent in its middle; `change` gets the derivative of
- * d by the distance of the end point along the curve. */
-static void find_direction_in_middle(const guides *g, int k, double *d, double *change)
+/* Direction d of the chord of guide k as secant of the polynomial, which ends in the middle, and the
+ * derivatives of d by the ways of both ends along the curve. */
+static void find_secant(const guides *g, int k, double *d, double *by_end, double *by_start)
 {
-  curve_around c;
-  expand_curve(g, k, (g->s0[k] + g->s[k]) / 2, &c);
-  const double *slope = c.a[1], square = product_of(slope, slope);
-  for (int i = 0; i < 2; ++i) d[i] = slope[i] / sqrt(square);
-  const double bend[2] = {2 * c.a[2][0] / square, 2 * c.a[2][1] / square}, along = product_of(d, bend);
-  for (int i = 0; i < 2; ++i) change[i] = (bend[i] - d[i] * along) / 2;
+  const curve_around *c = g->around + k;
+  const double u = (g->s0[k] - g->s[k]) / g->step[k], *a1 = c->a[1];
+  double way[2], slope[2], bend[2], along[2] = {0, 0};
+  derive(c, u, way, slope, bend);
+  for (int i = 0; i < 2; ++i) d[i] = a1[i] + u * (c->a[2][i] + u * (c->a[3][i] + u * c->a[4][i]));
+  const double length = hypot(d[0], d[1]), end = length * hypot(a1[0], a1[1]), start = length * hypot(slope[0], slope[1]);
+  for (int i = 0; i < 2; ++i) {
+    d[i] /= length;
+    by_end[i] = (c->a[2][i] + u * (c->a[3][i] + u * c->a[4][i])) / end;
+    by_start[i] = (c->a[2][i] + u * (2 * c->a[3][i] + u * 3 * c->a[4][i])) / start;
+    along[0] += d[i] * by_end[i], along[1] += d[i] * by_start[i];
+  }
+  for (int i = 0; i < 2; ++i) by_end[i] -= d[i] * along[0], by_start[i] -= d[i] * along[1];
 }
 
 /* Compute the frame of guide k at the position p; returns whether p has a nearest point on the
@@ -112,14 +124,21 @@ static int find_frame(const guides *g, int k, const double *p, guide_frame *f)
      * distance). */
     const double curvature = product_of(f->n, bend) / square;
     for (int i = 0; i < 2; ++i) d[i] = t[i], change[i] = f->n[i] * curvature / (1 - curvature * f->distance);
-  } else if (length > g->shortest[k]) {
-    /* The direction changes with the point by (I - d d) t t.dp / length. */
+  } else {
+    /* The round-off of points spoils the direction of a short chord, and still more its derivatives;
+     * the secant has an error if the radius is small. */
+    find_secant(g, k, d, change, f->by_start);
+    f->secant[0] = -d[1], f->secant[1] = d[0];
+    double apart = fabs(product_of(f->secant, chord)) / last_digit(g->size + hypot(p[0], p[1]));
+    if (length <= g->shortest[k]) apart = 0;
+    else if (!(fabs(g->s0[k] - g->s[k]) <= 2 * g->step[k])) apart = INFINITY;
+    f->smooth = apart <= SECANT_OF_DERIVATIVES;
     const double way = copysign(length, product_of(chord, t));
-    for (int i = 0; i < 2; ++i) d[i] = chord[i] / way;
+    for (int i = 0; i < 2 && apart > SECANT; ++i) d[i] = chord[i] / way;
+    /* The direction changes with the point by (I - d d) t t.dp / length. */
     const double along = product_of(d, t);
-    for (int i = 0; i < 2; ++i) change[i] = (t[i] - d[i] * along) / way;
-  } else
-    find_direction_in_middle(g, k, d, change);
+    for (int i = 0; i < 2 && !f->smooth; ++i) change[i] = (t[i] - d[i] * along) / way;
+  }
   f->m[0] = -d[1], f->m[1] = d[0];
   for (int j = 0; j < 2; ++j) f->dm[0][j] = -change[1] * t[j], f->dm[1][j] = change[0] * t[j];
   f->at[0] = p[0], f->at[1] = p[1];

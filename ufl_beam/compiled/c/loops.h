@@ -374,10 +374,12 @@ typedef struct {
 
 /* Frame of a guided point: position `at` for which it is valid, or NaN; nearest point `on` of the
  * curve and its derivative by parameter steps; distance and normal n; normal m over the step, and
- * its derivative by the position. */
+ * its derivative by the position. smooth: whether derivatives of m are those of `secant`, the same
+ * normal by find_secant; by_start is the derivative of the direction of the secant. */
 typedef struct {
   double at[2], on[2], slope[2];
-  double distance, n[2], m[2], dm[2][2];
+  double distance, n[2], m[2], dm[2][2], secant[2], by_start[2];
+  int smooth;
 } guide_frame;
 
 /* Points guided along curves, see guide_curves.c. */
@@ -1299,8 +1301,9 @@ typedef struct {
  * step. */
 typedef struct {
   guides *guides;
-  int neighbours;
+  int parameters, neighbours;
   guides *const *neighbour;
+  const double *weight; /* see derivatives */
   double *tangent;
 } guide_derivatives;
 
