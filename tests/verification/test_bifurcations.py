@@ -54,7 +54,7 @@ def portal(EA, cells):
 @pytest.mark.parametrize("EA", [1e4, 1e6, 1e8])
 @pytest.mark.parametrize("make", [a_frame, column, portal])
 def test_buckling_against_follow(make, EA, control):
-    """The factor of linear buckling, but for the strains before, which are N/EA.
+    """The factor of linear buckling; only in the frame strains of N/EA bend beams before.
 
     A step is 1.5 of the factor at most, and the point is located to 1e-7 of it.
     """
@@ -63,10 +63,75 @@ def test_buckling_against_follow(make, EA, control):
     path = ub.follow(scene, control, until=lambda now: now.t > 1.2 * factor)
     (point,) = path.critical
     assert point.kind == "bifurcation"
-    assert point.factor == pytest.approx(factor, rel=factor * N / EA + 2e-7)
+    assert point.factor == pytest.approx(factor, rel=(make is a_frame) * factor * N / EA + 2e-7)
     assert (np.diff(path.factor) > 0).all()
     # Without the mode the rotation is that of the strains, at most the axial ones.
     assert np.abs(path.displacement(place)[:, 2]).max() <= 2 * path.factor[-1] * N / EA
+
+
+def stubborn(scene):
+    """Return the first bifurcation of :func:`follow`, and the two first factors of buckling."""
+    mesh = ub.Mesh(degree=3)
+    factors = ub.buckling(scene, 2, mesh=mesh).factors  # no warning is issued
+    path = ub.follow(
+        scene, ub.LoadControl(factors[0] / 3.7), mesh=mesh,
+        until=lambda now: bool(now.solution.critical),
+    )  # fmt: skip
+    return path.critical[0], factors
+
+
+def a_column(section):
+    beam = ub.Beam((0, 0), (0.6, 0.8), section, cells=8)
+    load = ub.PointLoad(beam.end, force=(-0.6, -0.8), amplitude=growing)
+    return clamped(beam, loads=[load])
+
+
+def two_columns_and_a_girder(section):
+    beams = [ub.Beam(a, b, section, cells=4) for a, b in pairwise([(0, 0), (0, 1), (1, 1), (1, 0)])]
+    left, girder, right = beams
+    loads = [ub.PointLoad(p, force=(0, -1), amplitude=growing) for p in (left.end, right.start)]
+    supports = [ub.Clamped(left.start), ub.Pinned(right.end)]
+    return rigid_chain([left, girder, right], supports=supports, loads=loads)
+
+
+def a_ring(section):
+    """A quarter under radial forces at the nodes, whose directions are constant."""
+    arc = ub.Beam.arc((0, 0), 1.0, (0, np.pi / 2), section, cells=12)
+    loads = []
+    for k in range(13):
+        angle, share = np.pi / 2 * k / 12, np.pi / 24 * (0.5 if k in (0, 12) else 1.0)
+        force = (-share * np.cos(angle), -share * np.sin(angle))
+        loads.append(ub.PointLoad(arc.at(k / 12), force=force, amplitude=growing))
+    supports = [
+        ub.PrescribedDisplacement(arc.start, v=0, psi=0),
+        ub.PrescribedDisplacement(arc.end, u=0, psi=0),
+    ]
+    return ub.Scene([arc], supports=supports, loads=loads)
+
+
+def a_column_on_a_hinge(section):
+    """The stiffness of the foot is 20 EI/L; hinges of this kind are as stiff in shear as GA."""
+    beam = ub.Beam((0, 0), (0, 1), section, cells=8)
+    law = ub.AxialBendingHinge(1e9, 1e9, along=section.EA, across=section.GA, turning=20.0)
+    foot = ub.Bushing(ub.ground(0, 0), beam.start, law, axis=(0, 1))
+    load = ub.PointLoad(beam.end, force=(0, -1), amplitude=growing)
+    return ub.Scene([beam], connectors=[foot], loads=[load])
+
+
+@pytest.mark.parametrize("ratio", [0.1, 1.0, 25.0, 1e3, 1e4])
+@pytest.mark.parametrize("make", [a_column, two_columns_and_a_girder, a_ring, a_column_on_a_hinge])
+def test_buckling_with_any_shear_stiffness(make, ratio):
+    """The factor of linear buckling, GA = 0.1 to 1e4 EA; the paths to the bifurcation are straight.
+
+    Strains are 1e-3 to 2e-2.  Tolerance: the point is located to 1e-7, and second derivatives are
+    differences with a round-off of 1e-13 times the stiffness, up to 1e-7 with GA = 1e4 EA.  The
+    nodes of the ring move on straight lines, its cells do not stay exactly straight: 1e-6.
+    """
+    EA = 2e3
+    point, factors = stubborn(make(ub.Section(EA=EA, GA=ratio * EA, EI=1.0)))
+    assert point.kind == "bifurcation"
+    assert point.factor == pytest.approx(factors[0], rel=5e-6)
+    assert 0 < factors[0] < factors[1]
 
 
 @pytest.mark.parametrize("EA", [1e4, 1e6])

@@ -359,10 +359,10 @@ class Linearization:
             "vibrations about the equilibrium give at=simulate(scene, Static(), ...)"
         )
 
-    def linear_change(self, call: str) -> Array:
+    def linear_change(self, call: str) -> tuple[Array, Callable[[Array], Array]]:
         """Compute the linear change of the configuration due to loads and prescribed motions.
 
-        ``call`` is the caller in messages.
+        ``call`` is the caller in messages.  The function returns the change by residuals (N).
         """
         simulation, supports = self._simulation, self._simulation.supports
         (r, T), Q = self._linearized(self.q), self._axes
@@ -371,16 +371,21 @@ class Linearization:
         supports.move(after, before, Step(0.0, 1.0, self.q, simulation.t, simulation.t, 1.0))
         g = Q @ (after - before)
         Z = Q[:, np.setdiff1d(np.arange(len(g)), supports.dofs)]
-        rest = Z.T @ (r + T @ g)
-        if not rest.any():
+        rest = r + T @ g
+        if not (Z.T @ rest).any():
             raise ArgumentError(
                 f"{call}: nothing acts on the scene at t = {simulation.t:g} s that does not act "
                 "in the initial state; give the scene loads, or another t"
             )
         try:
-            return np.asarray(g - Z @ splu((Z.T @ T @ Z).tocsc()).solve(rest))
+            factors = splu((Z.T @ T @ Z).tocsc())
         except RuntimeError:
             raise ArgumentError(f"{call}: the scene is free to move in its state") from None
+
+        def change(residual: Array) -> Array:
+            return np.asarray(-(Z @ factors.solve(Z.T @ residual)))
+
+        return g + change(rest), change
 
 
 @cached_forms

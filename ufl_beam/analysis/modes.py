@@ -44,7 +44,7 @@ from ufl_beam.terms.term import InCells
 
 LARGEST_ERROR = 0.1
 """Largest estimated error of a buckling factor without a warning.  The estimate is below 0.02 in
-frames under forces at their nodes, and 0.6 to 1.3 where loads along beams bend them first."""
+frames under forces at their nodes, and 0.1 to 0.7 where loads along beams bend them first."""
 
 MOST_TITLES = 4  # largest number of modes in a one-line text
 AMPLITUDE = 0.1  # largest displacement of a mode in pictures, as a fraction of the scene's size
@@ -269,7 +269,7 @@ class Buckling(Shapes):
 
     Attributes:
         factors: Load factors, ``|factor|`` ascending; negative for reversed loads; (n,).
-        errors: Estimated relative errors of the factors: of order 1 if the loads bend beams before
+        errors: Estimated relative errors of the factors; above 0.1 if the loads bend beams before
             they buckle; (n,).
 
     Example:
@@ -366,18 +366,19 @@ def computed_modes(
 def buckling(
     scene: Scene, n: int, *, t: float = 1.0, at: Solution | None = None, mesh: Mesh | None = None
 ) -> Buckling:
-    """Compute buckling load factors and modes, (K + λ K') x = 0.
+    """Compute buckling load factors and modes, (K + λ K' + λ² K''/2) x = 0.
 
     Loads and prescribed motions grow in proportion, from their values in the state ``at``, or from
-    zero without ``at`` (λ = 0), to their values at the time ``t`` (λ = 1).  K' is the derivative
-    of the stiffness along the initial tangent of this path; it includes changes of forces and of
-    displacements.  A factor 0 is exact: the state itself buckles.  The error grows with the factor
-    and with the curvature of the path.  If loads bend beams long before they buckle, factors have
-    no meaning; a warning lists these factors.
+    zero without ``at`` (λ = 0), to their values at the time ``t`` (λ = 1).  K' and K'' are the
+    derivatives of the stiffness along this path; they include changes of forces and of
+    displacements.  Factors are exact if the path is straight, as of columns and of frames under
+    forces in line with their columns; else the error grows with the factor and with the curvature
+    of the path.  If loads bend beams long before they buckle, factors have no meaning; a warning
+    lists these factors.
 
     Args:
         scene: Model.
-        n: Number of factors, from the smallest ``|λ|``.
+        n: Number of factors, from the smallest ``|λ|``; fewer if fewer are real.
         t: Time at which loads are evaluated; s.
         at: Solution of the same beams with equal joints; the loads grow from its last state.
         mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
@@ -387,6 +388,9 @@ def buckling(
             :class:`FollowerLoad`, :class:`Pressure`, :class:`RotatingFrame`,
             :class:`ImposedStrain` or
             :class:`VirtualWork`.
+
+    Warns:
+        ModelWarning: The stiffness of a shape does not vanish at its factor.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-1.0, 0))
@@ -419,14 +423,25 @@ def buckling(
     if at is None and (said := require_no_mechanism(scene)):
         raise ArgumentError(f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)")
     small = SmallMotions(scene, at, t, mesh)
-    factors, shapes, errors = small.buckling(n)
+    factors, shapes, errors, others = small.buckling(n)
+    stiff = any(beam.section.GA > 10 * beam.section.EA for beam in scene.beams)
+    remedy = (
+        "because the loads bend, turn or shorten beams first"
+        + ", which GA > 10 EA makes worse (GA = 10 EA excludes shear strains as well)" * stiff
+        + ". Give forces at the nodes instead of along beams, give at= a state closer to buckling, "
+        "follow the path with ub.follow, or find where a frequency of modes(..., at=) vanishes"
+    )
     if (wrong := errors > LARGEST_ERROR).any():
         listed = ", ".join(f"{factor:.4g}" for factor in factors[wrong])
         warn(
             f"buckling: the factors {listed} are no buckling loads: the stiffness of their shapes "
-            "does not vanish there, because the loads bend or turn beams first. Give forces at the "
-            "nodes instead of along beams, give at= a state closer to buckling, follow the "
-            "path with ub.follow, or find where a frequency of modes(..., at=) vanishes"
+            f"does not vanish there, {remedy}"
+        )
+    if not len(factors) or (others < np.abs(factors).max()).any():
+        listed = ", ".join(f"{factor:.4g}" for factor in np.sort(others)[:n])
+        warn(
+            f"buckling: factors of magnitude {listed} are complex and left out: the stiffness of "
+            f"their shapes does not vanish there, {remedy}"
         )
     stresses = _stresses(small, at)
     return Buckling(scene, small.numbering, small.q, shapes, *stresses, factors, errors)

@@ -18,6 +18,9 @@ from ufl_beam.solvers.eigensolvers import DENSE, ROUND_OFF, SHIFT, ZERO
 
 V = TypeVar("V", Array, Complex)
 
+REAL = 1e-6  # imaginary part of a buckling factor that is round-off, as a fraction
+SECOND = 1e-3  # change for second derivatives; rad, or fraction of the size of the scene
+
 MODAL_TOLERANCE = 1e-9  # coupling below this fraction of the largest damping is neglected
 
 
@@ -123,30 +126,53 @@ class SmallMotions(Linearization):
 
     # -- buckling ------------------------------------------------------------------------------
 
-    def buckling(self, n: int) -> tuple[Array, Array | Complex, Array]:
+    def buckling(self, n: int) -> tuple[Array, Array | Complex, Array, Array]:
         """Compute up to n buckling factors nearest to zero, their shapes, and estimated errors.
 
-        The shapes are (n,), (size, n) and (n,).  At a factor λ the stiffness of the shape would
-        vanish if the stiffness changed linearly.  The error is the stiffness of the shape in the
-        configuration q + λ u of the linear path u, divided by its stiffness in the state q.
+        The shapes are (n,), (size, n) and (n,).  The factors are real solutions of
+        (K + λ K' + λ² K''/2) x = 0, with derivatives along the path q + λ u + λ² w/2 of equilibria.
+        Terms of second order matter where a stiffness is large: without them, cells with the
+        normal force N lose GA (N/EA)².  The error is the stiffness of the shape in this
+        configuration, divided by its change with log λ.  The last result has the magnitudes of
+        complex solutions.
         """
-        u = self.linear_change("buckling")
+        equation, laws = self._simulation.equation, self._laws
+        u, solve = self.linear_change("buckling")
+        T1 = self._matrix(equation.tangent_change(self.q, u))
+        w = solve(T1 @ u)
+        # K''/2 along the path; the derivative of K' along u is a central difference.
+        ε = SECOND / np.abs(u * self.numbering.scales).max()
+        terms = (self.q, w, 0.5), (self.q + ε * u, u, 0.25 / ε), (self.q - ε * u, u, -0.25 / ε)
+        T2 = sum(c * self._matrix(equation.tangent_change(q, along)) for q, along, c in terms)
         right, left = self._with_laws()
-        change = csr_array(
-            left @ self._matrix(self._simulation.equation.tangent_change(self.q, u)) @ right
-        )
-        factors, x = eigensolvers.linear(self.K, -change, n, most=self.K.shape[0], definite=False)
-        x = x[:, np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)]
-        # Solve again in the space of these shapes, because works are more accurate than matrices.
-        works = self._simulation.equation.tangent_works(self.q, u, right @ x, left.T @ x)
-        factors, mix = eigensolvers.small(works[0], -works[1])
+        K1, K2 = (csr_array(left @ T @ right) for T in (T1, T2))
+        into, out_of = csr_array(T1 @ right)[laws], csr_array(left @ T1)[:, laws]
+        flexible = csr_array(into.multiply(1 / self.tangent.diagonal()[laws, None]))
+        λ, x = eigensolvers.quadratic_near_zero(self.K, K1, K2 - out_of @ flexible, n)
+        # Solve again in the space of these shapes, because works are more accurate than matrices:
+        # the symmetric linear problem of the vectors (x, λ x), real and imaginary parts.
+        λ, x = λ[λ.imag >= 0.0], x[:, λ.imag >= 0.0]
+        pairs = np.flatnonzero(λ.imag)
+        x = np.hstack([x.real, x[:, pairs].imag])
+        by = np.diag(np.append(λ, λ[pairs]).real)
+        for j, k in enumerate(pairs, len(λ)):
+            by[k, j], by[j, k] = λ[k].imag, -λ[k].imag
+        X, Y = right @ x, left.T @ x
+        W0, W1 = equation.tangent_works(self.q, u, X, Y)
+        W2 = sum(c * equation.tangent_works(q, along, X, Y)[1] for q, along, c in terms)
+        W2 = W2 - (out_of.T @ x).T @ (flexible @ x)
+        values, mixed = eigensolvers.small(W0 - by.T @ W2 @ by, -W1 - W2 @ by - by.T @ W2)
+        real = np.abs(values.imag) <= REAL * np.abs(values)
+        factors, others = values[real].real, np.abs(values[~real])
         order = np.argsort(np.abs(factors), kind="stable")[:n]
-        factors, x = factors[order], (x @ mix)[:, order]
+        factors, mix = factors[order], mixed[:, real].real[:, order]
         errors = []
-        for factor, y in zip(factors, x.T, strict=True):
-            T, after = (self._linearized(q)[1] for q in (self.q, self.q + factor * u))
-            errors.append(abs(((y @ left) @ after @ (right @ y)) / ((y @ left) @ T @ (right @ y))))
-        return *self._nearest(n, factors, x.astype(complex)), np.array(errors)
+        for λ1, a, y in zip(factors, mix.T, (x @ mix).T, strict=True):
+            after = self._linearized(self.q + λ1 * u + λ1**2 / 2 * w)[1]
+            change = λ1 * a @ (W1 + 2 * λ1 * W2) @ a  # with the logarithm of the factor
+            errors.append(abs((y @ left) @ after @ (right @ y) / change))
+        shapes = self._nearest(n, factors, (x @ mix).astype(complex))
+        return *shapes, np.array(errors), others
 
     def _with_laws(self) -> tuple[csr_array, csr_array]:
         """Return the matrices R and L that reduce the tangent T of all unknowns to K = L T R.

@@ -59,18 +59,42 @@ def linear(
     eigenvalue.  The pencil has ``most`` finite eigenvalues.  The results, (n,) and (size, n), may
     contain up to :data:`EXTRA` additional eigenvalues.
     """
-    size, n = A.shape[0], min(n + EXTRA, most)
+    values, x = _linear(A, B, min(n + EXTRA, most), shift, definite)
+    return values.real, x.real
+
+
+def _linear(
+    A: csr_array, B: csr_array, n: int, shift: float, definite: bool
+) -> tuple[Complex, Complex]:
+    size = A.shape[0]
     if size <= DENSE:
         θ, x = (_inverse_definite if definite else _inverse)((A - shift * B).toarray(), B.toarray())
-        return (1 / θ[:n] + shift).real, x[:, :n].real
+        return (1 / θ[:n] + shift).astype(complex), x[:, :n].astype(complex)
     slepc = _slepc()
     solver = slepc.EPS().create(PETSc.COMM_SELF)
     solver.setOperators(_petsc(A), _petsc(B))
     kind = slepc.EPS.ProblemType
     solver.setProblemType(kind.GHEP if definite else kind.GNHEP)
     solver.setWhichEigenpairs(slepc.EPS.Which.TARGET_MAGNITUDE)
-    values, vectors = _solved(solver, size, n, shift)
-    return values.real, vectors.real
+    return _solved(solver, size, n, shift)
+
+
+def quadratic_near_zero(
+    K: csr_array, C: csr_array, M: csr_array, n: int
+) -> tuple[Complex, Complex]:
+    """Compute the n λ of ``(K + λ C + λ² M) x = 0`` nearest to zero, with vectors x; K is regular.
+
+    For the shapes of the results see :func:`linear`.
+    """
+    size = K.shape[0]
+    first = np.abs(linear(K, -C, 1, most=size, definite=False)[0])
+    unit = first.min() if len(first) else 1.0
+    identity, none = eye_array(size), csr_array((size, size))
+    A = csr_array(block_array([[K, none], [none, identity]]))
+    B = csr_array(block_array([[-unit * C, -(unit**2) * M], [identity, none]]))
+    values, x = _linear(A, B, min(n + EXTRA, 2 * size), 0.0, definite=False)
+    finite = np.abs(values) < 1e9 * np.abs(values).min(initial=np.inf)
+    return unit * values[finite], x[:size, finite]
 
 
 def quadratic(
@@ -98,7 +122,7 @@ def quadratic(
     return _solved(solver, size, n, shift)
 
 
-def small(A: Array, B: Array) -> tuple[Array, Array]:
+def small(A: Array, B: Array) -> tuple[Complex, Complex]:
     """Compute all finite eigenvalues of a small symmetric ``A x = λ B x``, with eigenvectors.
 
     The unknowns may have any units.  The results have the shapes (n,) and (size, n).
@@ -107,7 +131,7 @@ def small(A: Array, B: Array) -> tuple[Array, Array]:
     scale = 1 / np.where(sizes > 0, sizes, 1.0)
     across = np.outer(scale, scale)
     θ, x = _inverse(A * across, B * across)
-    return (1 / θ).real, scale[:, None] * x.real
+    return 1 / θ, scale[:, None] * x
 
 
 def _inverse(A: Array, B: Array) -> tuple[Complex, Complex]:
