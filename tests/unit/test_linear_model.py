@@ -442,6 +442,74 @@ def test_reduced_model_with_dampers_is_exact_for_slow_inputs():
     assert abs(D[velocity, force]) <= 1e-9
 
 
+def sliding_bar(cells, dampers=(), EA=1e4):
+    """A bar of 3 kg that moves along its axis only, and the output N in its middle."""
+    bar = ub.Beam((0, 0), (2, 0), ub.Section(EA=EA, GA=EA, EI=EA, rhoA=1.5), cells=cells)
+    line = [ub.PrescribedDisplacement(p, v=0.0, psi=0.0) for p in (bar.start, bar.end)]
+    push = ub.PointLoad(bar.start, force=(1.0, 0), amplitude=still)
+    slides = [ub.Slide(ub.ground(0, 0), bar.start, x, axis=(1, 0)) for x in dampers]
+    scene = ub.Scene([bar], supports=line, loads=[push], connectors=slides)
+    N = ("section_forces_at", bar.at(0.5), "N")
+    return ub.linearize(scene, inputs=[push], outputs=[N], mesh=ub.Mesh(degree=3))
+
+
+@pytest.mark.parametrize("c", [0.0, 1.0, 10.0, 100.0, 1e4])
+def test_reduced_model_of_a_free_bar_on_a_damper(c):
+    """[closed] N = -EA u'(L/2), u = a cos(k (x - L)), k = ω √(ρ/EA), pushed where the damper is.
+
+    Errors are of second order in ω over the first frequency, of first order with a damper, whose
+    force on the modes that are left out changes by 1/20 of it at this frequency.
+    """
+    L, EA, rho = 2.0, 1e4, 1.5
+    model = sliding_bar(10, [ub.Damper(c)] if c else [])
+    first = np.pi / L * np.sqrt(EA / rho)
+    for n in (1, 2, 4):
+        reduced = model.reduced(n)
+        for part in (1e-3, 1e-2, 3e-2):
+            k = part * np.pi / L
+            a = 1 / (-EA * k * np.sin(k * L) + 1j * part * first * c * np.cos(k * L))
+            exact = EA * k * np.sin(k * L / 2) * a
+            error = abs(reduced.frequency_response(part * first)[0, 0, 0] / exact - 1)
+            assert error < 3 * part**2 + 0.05 * part * (c > 0.0) + 2e-5  # 10 cells
+
+
+@pytest.mark.parametrize("cells", [10, 40, 160])
+def test_reduced_model_of_rigid_modes_only(cells):
+    """[closed] N = -1/(2 cos(k L/2)) in the middle of a free bar: half of its mass follows."""
+    force = sliding_bar(cells).reduced(1).frequency_response(0.5)[0, 0, 0]
+    k = 0.5 * np.sqrt(1.5 / 1e4)
+    assert force == pytest.approx(-1 / (2 * np.cos(k)), rel=10 * (0.5 / 128) ** 2)
+
+
+@pytest.mark.parametrize("EA", [1e7, 1e10])
+def test_reduced_model_of_a_cart_with_a_stiff_mast(EA):
+    """[closed] Bernoulli's cantilever on a cart, pushed at 0.3 of its first frequency.
+
+    The mesh of 32 linear cells leaves 1e-3; round-off of the stiffness, 1e-16 EA/EI 32², does not
+    count.  All reduced models agree to (ω/ω₊)⁴.
+    """
+    M, EI, rho, L, w = 4.0, 60.0, 1.5, 2.0, 1.94
+    k = (rho * w * w / EI) ** 0.25 * L
+    ratio = (np.sin(k) * np.cosh(k) + np.cos(k) * np.sinh(k)) / (1 + np.cos(k) * np.cosh(k))
+    exact = -1 / (w * w * (M + rho * L / k * ratio))
+    section = ub.Section(EA=EA, GA=EA / 3, EI=EI, rhoA=rho, depth=0.05)
+    mast = ub.Beam((0, 0), (0, L), section, cells=32)
+    cart = ub.Body((0, 0), mass=M, inertia=1.0)
+    push = ub.PointLoad(cart.middle, force=(1.0, 0), amplitude=still)
+    rail = ub.Prismatic(ub.ground(0, 0), cart.middle, axis=(1, 0))
+    joints = [ub.Rigid(mast.start, cart.middle), rail]
+    scene = ub.Scene([mast], bodies=[cart], joints=joints, loads=[push])
+    model = model_of(scene, [push], [("displacement", cart.middle, "u")])
+    found = [model.reduced(n).frequency_response(w)[0, 0, 0] for n in (2, 3, 10)]
+    assert found == pytest.approx([exact] * 3, rel=1e-3)
+
+
+def test_reduced_model_needs_all_rigid_motions_on_which_inputs_work():
+    model = model_of(ub.Scene([BEAM], loads=[PUSH]), [PUSH], [("acceleration", BEAM.end, "v")])
+    with pytest.warns(ub.ModelWarning, match="2 modes leave out motions without.* at least 3"):
+        model.reduced(2)
+
+
 def test_tangent_damping_is_a_part_of_section_forces():
     """About the undeformed scene it is the damping with the initial stiffness."""
     found = []

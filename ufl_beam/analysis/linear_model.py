@@ -26,21 +26,15 @@ from ufl_beam.analysis.linear_model_checks import (
     require_free,
     warn_of_omissions,
 )
+from ufl_beam.analysis.modal_reduction import Equations, Reduction
 from ufl_beam.analysis.modes import require_state
 from ufl_beam.analysis.small_motions import SmallMotions
 from ufl_beam.analysis.state_space import (
-    Coordinates,
     Motion,
     constraint_forces,
     first_order,
     independent_coordinates,
     jumps,
-)
-from ufl_beam.analysis.static_corrections import (
-    Corrections,
-    Equations,
-    corrections,
-    motions_of_dampers,
 )
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.discretization.model_warnings import warn_of_masses
@@ -52,6 +46,7 @@ from ufl_beam.errors import (
     require_kind,
     require_sequence,
     shorten,
+    warn,
 )
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint
@@ -65,8 +60,6 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.eigensolvers import ROUND_OFF
 
-QUASI_STATIC = 1e-2  # frequency of the static correction, as a fraction of the lowest frequency
-ITERATIONS = 4  # of the static motions of a reduced model
 MOST_STATES = 4000  # largest number of states without modal reduction
 
 
@@ -105,10 +98,7 @@ class LinearModel(Rich):
         self.inputs, self.outputs = inputs.names, outputs.names
         rows = small._constraint_rows
         self._free, self._constraints = np.flatnonzero(~rows), np.flatnonzero(rows)  # rows of K
-        self._basis: tuple[Array, Array] | None = None  # modes and motions with unit inputs
-        self._corrections: Corrections | None = None  # of the outputs of a reduced model
-        self._modal_stiffness: Array | None = None
-        self._number_of_modes = 0
+        self._reduction: Reduction | None = None
         self._mode_names: list[str] = []
         require_free(small, inputs, outputs)
 
@@ -125,7 +115,7 @@ class LinearModel(Rich):
     @property
     def _size(self) -> str:
         """Number of states of a reduced model, else number of unknowns."""
-        if self._basis is not None:
+        if self._reduction is not None:
             return f"{len(self.states)} states"
         return counted((len(self.unknowns), "unknown", "unknowns"))
 
@@ -208,7 +198,7 @@ class LinearModel(Rich):
         constraints, then u and u' of the prescribed motions.  i are the inputs, y the outputs.  E
         is singular.  A reduced model returns the state space with a unit matrix E.
         """
-        if self._basis is not None:
+        if self._reduction is not None:
             A, B, C, D = self.state_space()
             return csr_array(np.eye(len(A))), csr_array(A), csr_array(B), csr_array(C), D
         small, (P0, P1, P2) = self._small, self._outputs.rows
@@ -258,7 +248,7 @@ class LinearModel(Rich):
         if values.ndim != 1 or not np.isfinite(values).all():
             raise ArgumentError(f"transfer_function: s = {shorten(s)} must be finite, (n,)")
         response = np.zeros((len(self.outputs), len(self.inputs), len(values)), dtype=complex)
-        if self._basis is not None:
+        if self._reduction is not None:
             A, B, C, D = self.state_space()
             for k, at in enumerate(values):
                 try:
@@ -314,67 +304,62 @@ class LinearModel(Rich):
     # -- modal reduction -----------------------------------------------------------------------
 
     def reduced(self, n: int) -> LinearModel:
-        """Return a model of the first n undamped modes, with static corrections of the outputs.
+        """Return a model of the first n undamped modes; other motions respond as in statics.
 
         The modes are those nearest to zero frequency, rigid motions included.  Damping and
         gyroscopic forces couple them.  With an unsymmetric stiffness, as of a follower force, the
         real and imaginary parts of the first n modes of :func:`modes` are the basis.  Prescribed
-        motions keep their states; the scene follows them as in statics.  The corrections, parts of
-        D and of the columns of C of rates, make the response to slow inputs exact.  Motions without
-        mass that a damper makes lag behind the modes, as in a damper in series with a spring, are
-        further states of first order.
+        motions keep their states; the scene follows them as in statics.  The motions that are left
+        out follow inputs, dampers and the inertia of the modes as in statics (mode acceleration,
+        see :class:`Reduction`), so that the response to slow inputs is exact.  Where a damper makes
+        them lag behind, as one in series with a spring or a strong one, they have further states of
+        first order.
 
         Args:
             n: Number of modes; fewer if the scene has fewer.
+
+        Warns:
+            ModelWarning: The n modes leave out motions without stiffness on which inputs work.
         """
-        n, small, nu = require_count(n, "reduced: n"), self._small, self._inputs.number_of_motions
-        x, squares, names = self._modes(n)
-        moving = np.abs(squares)[np.abs(squares) > NEGLIGIBLE * small.squares.min()]
-        s = QUASI_STATIC * float(moving.min(initial=small.squares.max())) ** 0.5
-        # Static motions P with K P = B; K may be singular, and an iteration reduces the error of
-        # the shifted matrix by the factor QUASI_STATIC² each time.
-        P = np.zeros((len(x), nu))
-        if nu:
-            shifted = splu(csc_array(small.K + s**2 * small.M))
-            for _ in range(ITERATIONS):
-                P = shifted.solve(self._loads[1][0].toarray() + s**2 * (small.M @ P))
+        n, small = require_count(n, "reduced: n"), self._small
+        x, squares, others, first, names = self._modes(n)
         F, moved = self._loads
+        works = np.abs(others.T @ F), np.abs(others).T @ abs(F)
+        if (works[0] > NEGLIGIBLE * works[1]).any():
+            warn(
+                f"reduced: {n} modes leave out motions without stiffness on which inputs work, so "
+                f"that slow responses are wrong; give at least {n + others.shape[1]}"
+            )
         equations = Equations(small.M, self._damping, small.K, F, moved, self._free)
-        omega = np.sqrt(np.maximum(np.abs(squares), moving.min(initial=small.squares.max())))
-        omega = np.resize(omega, x.shape[1])  # of real, then of imaginary parts
+        # Of real, then of imaginary parts
+        omega = np.resize(np.sqrt(np.maximum(np.abs(squares), first)), x.shape[1])
         lengths = small.lengths[small.left[self._free]]
-        lags = motions_of_dampers(equations, x, omega, P, lengths)
-        basis = np.hstack([x, lags])
-        y = self._free
-        K = basis[y].T @ (small.K.tocsr()[y][:, y] @ basis[y])
-        if self._symmetric:  # quotients of works, without round-off of K
-            K[: len(squares)] = K[:, : len(squares)] = 0.0
-            K[: len(squares), : len(squares)] = np.diag(squares)
+        exact = squares if self._symmetric else None
         model = copy.copy(self)
         for name in ("_motion", "_space", "states"):
             vars(model).pop(name, None)
-        model._basis, model._modal_stiffness = (basis, P), K
-        model._number_of_modes = x.shape[1]
-        model._mode_names = names + [f"lag {k} of dampers" for k in range(lags.shape[1])]
-        (P0, P1, P2), Z = self._outputs.rows, small._Z
-        model._corrections = corrections(
-            equations, basis, P, K,
-            lambda X, z: P0 @ (Z @ X) + z * (P1 @ (Z @ X)) + z**2 * (P2 @ (Z @ X)), s,
-        )  # fmt: skip
+        model._reduction = Reduction(equations, x, exact, others, omega, lengths)
+        lags = range(model._reduction.num_lags)
+        model._mode_names = names + [f"lag {k} of dampers" for k in lags]
         return model
 
-    def _modes(self, n: int) -> tuple[Array, Array, list[str]]:
-        """Return n modes with unit masses, their squared frequencies (rad²/s²), and their names."""
+    def _modes(self, n: int) -> tuple[Array, Array, Array, float, list[str]]:
+        """Return n modes with unit masses, their squared frequencies (rad²/s²), and their names.
+
+        Before the names come further motions without stiffness, and the least of the squared
+        frequencies that are not zero.
+        """
         small = self._small
         K, M = small.K, small.M
         if self._symmetric:
-            _, x, works, zero, _ = small.undamped(n, (K + K.T) / 2, definite=True)
+            _, x, works, zero, first = small.undamped(n, (K + K.T) / 2, definite=True)
             masses = np.sum(x * (M @ x), axis=0)
             values = np.where(zero, 0.0, works / masses)
-            order = np.argsort(np.abs(values), kind="stable")[:n]
+            order = np.argsort(np.abs(values), kind="stable")
             squares, x = values[order], (x / np.sqrt(masses))[:, order]
-            hertz = np.sqrt(np.abs(squares)) / (2 * np.pi)
-            return x, squares, [f"mode {k} ({f:.4g} Hz)" for k, f in enumerate(hertz)]
+            hertz = np.sqrt(np.abs(squares[:n])) / (2 * np.pi)
+            names = [f"mode {k} ({f:.4g} Hz)" for k, f in enumerate(hertz)]
+            return x[:, :n], squares[:n], x[:, n:][:, squares[n:] == 0.0], first, names
         # Real and imaginary parts of the modes, made orthogonal
         exponents, shapes = small.exponents(n)
         x = (small._axes.T @ shapes)[small.left] / small.scale[small.left, None]
@@ -386,7 +371,11 @@ class LinearModel(Rich):
         values, mix = np.linalg.eigh(x.T @ (M @ x))
         chosen = values > NEGLIGIBLE * values.max()
         x = x @ (mix[:, chosen] / np.sqrt(values[chosen]))
-        return x, np.abs(exponents) ** 2, [f"part {k} of the modes" for k in range(x.shape[1])]
+        squares = np.abs(exponents) ** 2
+        moving = squares[squares > NEGLIGIBLE * small.squares.min()]
+        first = float(moving.min(initial=small.squares.max()))
+        names = [f"part {k} of the modes" for k in range(x.shape[1])]
+        return x, squares, np.zeros((len(x), 0)), first, names
 
     @property
     def _symmetric(self) -> bool:
@@ -469,30 +458,22 @@ class LinearModel(Rich):
     @cached_property
     def _motion(self) -> Motion:
         """Motions as functions of states and inputs."""
+        if self._reduction is not None:
+            return self._reduction.motion
         small, y = self._small, self._free
+        if 2 * len(y) > MOST_STATES:
+            raise ArgumentError(
+                f"state_space: {2 * len(y)} states are too many for dense matrices; use "
+                "reduced(n), or descriptor() and frequency_response(omega)"
+            )
         M, C, K = (csr_array(A[y][:, y]) for A in (small.M, self._damping, small.K.tocsr()))
         F, moved = self._loads
-        more = None
-        if self._basis is None:
-            if 2 * len(y) > MOST_STATES:
-                raise ArgumentError(
-                    f"state_space: {2 * len(y)} states are too many for dense matrices; use "
-                    "reduced(n), or descriptor() and frequency_response(omega)"
-                )
-            J, h = small.K.tocsr()[self._constraints][:, y], moved[0][self._constraints].toarray()
-            coordinates = independent_coordinates(M, J, h, small.lengths[small.left[y]])
-        else:
-            N, P, na = self._basis[0][y], self._basis[1][y], self._number_of_modes
-            identity, more = np.eye(N.shape[1]), self._modal_stiffness
-            # Motions without mass: the rest beside the modes, at the places that they move
-            modes, lags = N[:, :na].T @ M, N[:, na:]
-            rest = np.eye(len(y)) - N[:, :na] @ modes if lags.size else np.zeros((0, len(y)))
-            read = np.vstack([modes, np.linalg.pinv(lags) @ rest]) if lags.size else modes
-            coordinates = Coordinates(N, P, identity[:, :na], identity[:, na:], read)
+        J, h = small.K.tocsr()[self._constraints][:, y], moved[0][self._constraints].toarray()
         names, sizes = self._names_of_motions, small.lengths[small.left[y]]
         return first_order(
-            coordinates, M, C, K, F[y], tuple(B[y].toarray() for B in moved),
-            lambda motion: names[int(np.abs(motion / sizes).argmax())], more,
+            independent_coordinates(M, J, h, sizes), M, C, K, F[y],
+            tuple(B[y].toarray() for B in moved),
+            lambda motion: names[int(np.abs(motion / sizes).argmax())],
         )  # fmt: skip
 
     @cached_property
@@ -502,18 +483,18 @@ class LinearModel(Rich):
         y, μ, ns = self._free, self._constraints, motion.states
         F, moved = self._loads
         K, Z = small.K.tocsr(), small._Z
-        if self._basis is None:
+        if self._reduction is not None:
+            rest = self._reduction.rest
+        else:
             # Forces of constraints bear what the equation of the motions misses
-            rest = F[y] @ motion.f - K[y][:, y] @ motion.y
-            rest -= (
+            missed = F[y] @ motion.f - K[y][:, y] @ motion.y
+            missed -= (
                 self._damping[y][:, y] @ motion.velocity + small.M[y][:, y] @ motion.acceleration
             )
             for B, x in zip(moved, (motion.u, motion.du, motion.ddu), strict=True):
-                rest += B[y] @ x
-            sizes = small.lengths[small.left[y]]
-            borne = constraint_forces(K[y][:, μ].toarray(), rest, sizes)
-        else:
-            borne = self._basis[0][μ] @ motion.z + self._basis[1][μ] @ motion.u
+                missed += B[y] @ x
+            sizes, rest = small.lengths[small.left[y]], np.zeros((K.shape[0], missed.shape[1]))
+            rest[μ] = constraint_forces(K[y][:, μ].toarray(), missed, sizes)
         X = Z[:, y] @ motion.y + inputs.motions @ motion.u
         dX, terms = X[:, :ns] @ motion.rates, np.abs(X[:, :ns]) @ np.abs(motion.rates)
         for rows, x, magnitudes in ((out.rows[1], X, np.abs(X)), (out.rows[2], X, np.abs(X)),
@@ -524,13 +505,9 @@ class LinearModel(Rich):
                     f"state_space: {self.outputs[i]} depends on the rate of {name}, because the "
                     "motion has no mass; give it mass, use another output, or frequency_response"
                 )
-        Y = out.rows[0] @ (X + Z[:, μ] @ borne)
+        Y = out.rows[0] @ (X + Z @ rest)
         Y[:, ns : ns + F.shape[1]] += out.direct
         Y += out.rows[1] @ dX + out.rows[2] @ (dX[:, :ns] @ motion.rates)
-        if self._corrections is not None:
-            by_inputs, by_rates, by_motions = self._corrections
-            Y += by_rates @ (motion.z[:, :ns] @ motion.rates) + by_motions @ motion.du
-            Y[:, ns:] += by_inputs
         A, B = motion.rates[:, :ns], motion.rates[:, ns:]
         return A, B[:, inputs.order], Y[:, :ns], Y[:, ns:][:, inputs.order]
 

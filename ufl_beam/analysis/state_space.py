@@ -45,7 +45,6 @@ class Motion(NamedTuple):
     y: Array
     velocity: Array
     acceleration: Array
-    z: Array  # V1 a + V0 b
     u: Array
     du: Array
     ddu: Array
@@ -90,7 +89,7 @@ def independent_coordinates(M: csr_array, J: csr_array, h: Array, sizes: Array) 
 
 def first_order(
     coordinates: Coordinates, M: csr_array, C: csr_array, K: csr_array, F: csr_array,
-    moved: tuple[Array, Array, Array], name_of: Callable[[Array], str], Kr: Array | None = None,
+    moved: tuple[Array, Array, Array], name_of: Callable[[Array], str],
 ) -> Motion:  # fmt: skip
     """Solve ``M y'' + C y' + K y = F f + B0 u + B1 u' + B2 u''`` for the rates of states.
 
@@ -102,14 +101,12 @@ def first_order(
         F: Forces of unit inputs.
         moved: B0, B1, B2.
         name_of: Function that names the largest of the motions y, for an error.
-        Kr: Stiffness of the coordinates, if it is known more accurately than its product.
 
     Raises:
         ArgumentError: Neither mass, damper nor stiffness determines a motion.
     """
     N, P, V1, V0, read = coordinates
-    Mr, Cr, product = (N.T @ (A @ N) for A in (M, C, K))
-    Kr = product if Kr is None else Kr
+    Mr, Cr, Kr = (N.T @ (A @ N) for A in (M, C, K))
     by_motions = [N.T @ (B - A @ P) for B, A in zip(moved, (K, C, M), strict=True)]
     # Bases of the motions without mass, with damping (W1) and without it (W0), and of their forces
     light = V0.T @ Cr @ V0
@@ -145,7 +142,7 @@ def first_order(
     rates = np.vstack([da, rate, dda, du, ddu])
     return Motion(
         int(at[5]), rates, N @ z + P @ u, N @ dz + P @ du, N @ (V1 @ dda) + P @ ddu,
-        z, u, du, ddu, f, np.vstack([read[:na], W1.T @ read[na:]]), P,
+        u, du, ddu, f, np.vstack([read[:na], W1.T @ read[na:]]), P,
     )  # fmt: skip
 
 
