@@ -23,7 +23,7 @@ coordinate of one place from a reference run, at ten instants, relative to the s
 The reference run is finer than all others. Errors below twice its own estimated error cannot be
 measured; the tables have "—" there. Iterations are counted per step. The imbalance of the ledger is
 a fraction of the transferred energy. The scenes are small, and times depend on the machine, so use
-the ratios of times.
+the ratios of times. All times and ratios are those of the commit below; later commits are faster.
 [`ub.tradeoff`](tradeoff.md) finds the settings for a scene of your own.
 """
 

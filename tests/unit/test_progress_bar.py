@@ -73,6 +73,22 @@ def test_a_terminal_shows_the_progress(call, at_once):
     assert shown.count("\n") == FIRST, shown
 
 
+FRACTIONS = {
+    "reference solver": lambda: simulate(newton=ub.Newton(reference=True)),
+    "derivatives": lambda: ub.differentiate(
+        lambda force: clamped(BEAM, loads=[ub.PointLoad(BEAM.end, force=(force, 0))]),
+        {"force": 1.0}, ub.Static(), t=(0, 1), dt=0.5,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("call", FRACTIONS)
+def test_fractions_are_per_cent(call, at_once):
+    """A bar of all digits of the fraction, 0.30228333333333335/1.0, tells nothing."""
+    shown = in_terminal(FRACTIONS[call])
+    assert bool(re.search(r"100%\|[^/]*\| \[[\d:]+<[\d:]+.*\]", shown)) == FIRST, shown
+
+
 @pytest.mark.parametrize("call", CALLS)
 def test_no_progress_if_it_is_not_wanted(call, at_once):
     run, _ = CALLS[call]

@@ -278,7 +278,7 @@ def test_hinges_in_cells_are_at_gauss_points(degree):
     assert lost[-1] > 0.1 * law.fracture_energy
     (row,) = found.hinges().rows
     assert row.where == beam.at(at)
-    (mark,) = open_hinges(found, -1, found.numbering.points)
+    (mark,) = open_hinges(found, -1, lambda place: place.point)
     np.testing.assert_allclose(mark.at, [at, 0.0], rtol=0, atol=1e-15)
     assert mark.fraction == pytest.approx(lost[-1] / law.fracture_energy, rel=1e-8)
     # |V| before the opening, times the distance from the end of the cell

@@ -438,8 +438,9 @@ class Range(NamedTuple):
     step, or one less.
 
     Attributes:
-        change: Size of the change of the parameter, in its unit, at the nearest of these switches;
-            infinite if there is none, or if the laws have too many conditions.
+        change: Size of the change of the parameter, in its unit, at the nearest of these switches,
+            without a sign: the switch may be on either side.  It is infinite if there is none, or
+            if the laws have too many conditions.
         time: Time of this switch; s.
         place: Cell or connector of this switch.
 

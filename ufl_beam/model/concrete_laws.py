@@ -165,7 +165,9 @@ class KentPark(_Concrete):
     The parabola begins with the stiffness C, so the strain at the strength is 2 strength/C.  After
     Scott, Park and Priestley, ACI Journal 79 (1982).  Unloading is after Karsan and Jirsa, J.
     Struct. Div. ASCE 95 (1969), by a straight line to the residual strain, as in ``Concrete01`` of
-    OpenSees; tension softens by the fracture energy over the length of the cell.
+    OpenSees, with one difference: beyond η = 2, twice the strain ε at the strength, the residual
+    strain is (0.707 (η - 2) + 0.84) ε, where Concrete01 has 0.834, by which it jumps at η = 2.
+    Tension softens by the fracture energy over the length of the cell.
 
     Args:
         strength: Largest compressive stress, positive; Pa.

@@ -147,7 +147,8 @@ class Fibres(Record):
             law; limit in Pa, energy in J/m².
 
     Raises:
-        ModelError: A law has the wrong type, or ``number`` is not a whole number from 1.
+        ModelError: A law has the wrong type, or ``number`` is not a positive whole number; when a
+            section is created: ``number`` is 1.
 
     Example:
         >>> steel = ub.Fibres(ub.ElastoPlastic(355e6, isotropic=2e9), number=16)

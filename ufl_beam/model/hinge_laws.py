@@ -405,16 +405,20 @@ class IbarraKrawinkler(_DeterioratingHinge):
 
     The moment moves elastically between two bounds, which are the backbones of both directions;
     their hardening lines stay in place (kinematic hardening).  An excursion ends where the moment
-    changes its sign.  If E of n excursions have dissipated the energies E_i, the last one causes
+    changes its sign.  If n excursions have dissipated the energies E_1 to E_n, the last one causes
 
     β = (E_n / (Λ My - sum E_i))^c
 
-    with the yield moment My of ``backbone``.  The hardening line of the direction in which the
-    moment begins to grow is then multiplied by 1 - β with Λ = ``strength``, and the intercept of
-    its falling line with the axis of moments by 1 - β with Λ = ``softening``.  A moment that was
-    reached on the falling line is never exceeded again.  The unloading stiffness is multiplied by
-    1 - β with Λ = ``unloading`` and the energy up to the reversal; it remains above a tenth of the
-    elastic one and above twice the hardening slope.  When one of the β reaches 1, the moment is
+    with the yield moment My of ``backbone`` and the sum of all n energies, E_n included.  The
+    hardening line of the direction in which the moment begins to grow is then multiplied by 1 - β
+    with Λ = ``strength``, and the intercept of its falling line with the axis of moments by 1 - β
+    with Λ = ``softening``.  The residual moment does not deteriorate: up to the ultimate rotation
+    both lines count where they are above it.  A moment that was reached on the falling line is
+    never exceeded again.  The unloading stiffness changes at each reversal from the bound: it is
+    the stiffness at the beginning of the excursion, multiplied by 1 - β with Λ = ``unloading``,
+    where E_n is the energy that this excursion has dissipated up to the reversal.  It remains above
+    a tenth of the elastic one and above twice the hardening slope, and changes neither on elastic
+    lines nor where the moment changes its sign.  When one of the β reaches 1, the moment is
     zero after the end of the excursion.  After Ibarra, Medina and Krawinkler, Earthquake Eng.
     Struct. Dyn. 34 (2005), and Lignos and Krawinkler, J. Struct. Eng. 137 (2011).
 

@@ -462,7 +462,9 @@ class States:
         Section forces satisfy the equation of the step that ends at this time, with inertia,
         damping, loads and users' virtual works.  At a support they agree with its :meth:`reaction`
         in the axes of the section, which turn with the beam.  Each cell has ``points`` equally
-        spaced points, both ends included.  Under a uniform load V is linear between the points.
+        spaced points, both ends included; their parameters ``s`` run from 0 at the start of the
+        beam to 1 at its end, and inner vertices occur twice.  Under a uniform load V is linear
+        between the points.
 
         With ``start=`` and the same scheme, a run begins with the last forces of the earlier run.
         Other static runs begin without section forces, other dynamic runs with stresses only.

@@ -5,16 +5,18 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.model.bodies import Member
+from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connectors import can_yield
 from ufl_beam.plotting import positions, style, symbols
 from ufl_beam.plotting.inelastic_pictures import (
+    OpenHinge,
     circle,
     dissipated_per_length,
     draw_damage,
@@ -45,9 +47,9 @@ LEAST_STRAIN = 1e-10  # strain up to which section forces count as round-off and
 DRAWN_AS_ZERO = 1e-4  # fraction of the largest value below which a value is drawn as zero
 ALIKE = 0.999  # values above this fraction of the peak of an area count as equal to the peak
 LABELLED = 0.15  # peaks above this fraction of the largest value are labelled
-MOST_DIAGRAMS = 60  # number of diagrams beyond which only extremes are labelled, without directions
+MOST_BEAMS = 60  # number of beams beyond which only extremes are labelled, without directions
 
-CROWDED = 0.08  # if labels cover more than this fraction of the axes, only extremes are labelled
+CROWDED = 0.08  # fraction of the axes that labels cover; the largest values are labelled first
 MOST_AREAS = 500  # largest number of areas whose ordinates labels should not cover
 MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
 
@@ -93,12 +95,16 @@ def draw_beams(axes: Axes, solution: Solution, points: Array, **line: Any) -> No
     axes.plot(*joined(lines).T, **line)
 
 
+def draw_outlines(axes: Axes, solution: Solution, shape: DeformedShape, **line: Any) -> None:
+    """Draw beams, outlines of bodies, and rods as lines."""
+    draw_beams(axes, solution, shape.nodes, **line)
+    outlines = joined(s.points for s in (*symbols.bodies(shape), *symbols.rods(shape)))
+    axes.plot(*outlines.T, **line)
+
+
 def draw_undeformed(axes: Axes, solution: Solution, canvas: Canvas) -> None:
     """Draw undeformed beams, bodies and rods in grey."""
-    shape = canvas.undeformed
-    draw_beams(axes, solution, shape.nodes, color=GREY, linewidth=1.2, zorder=1)
-    outlines = joined(s.points for s in (*symbols.bodies(shape), *symbols.rods(shape)))
-    axes.plot(*outlines.T, color=GREY, linewidth=1.2, zorder=1)
+    draw_outlines(axes, solution, canvas.undeformed, color=GREY, linewidth=1.2, zorder=1)
 
 
 def draw_shape(
@@ -139,7 +145,7 @@ def draw_frame(
     """
     sizes = np.array([np.abs(values).max() for _, values in diagrams])
     factor, prefix = style.decimal_prefix(float(sizes.max(initial=0.0)))
-    sections = [beam.section for beam, _ in diagrams]
+    sections, beams = [beam.section for beam, _ in diagrams], {beam for beam, _ in diagrams}
     stiffness = [{"N": s.EA, "V": s.GA, "M": s.EI / s.depth}[what] for s in sections]
     name, when = title
     unit = f"({prefix}{RESULTANTS[what][1]})".replace(" ", "\N{NO-BREAK SPACE}") if diagrams else ""
@@ -150,10 +156,13 @@ def draw_frame(
         peaks: list[PointLabel] = []
         if (sizes > LEAST_STRAIN * np.array(stiffness)).any():  # more than rounding
             rows = _draw_diagrams(axes, solution, shape.nodes, what, diagrams)
-            peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MOST_DIAGRAMS else 1.0)
+            peaks = _peaks(rows, factor, LABELLED if len(beams) <= MOST_BEAMS else 1.0)
         draw_beams(axes, solution, shape.nodes, color=shade(INK), linewidth=2.6, zorder=4)
         draw_strokes(axes, symbols.in_plane(shape))
         meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
+        if len(beams) > MOST_BEAMS:  # without arrows
+            for color, words in meanings.items():
+                meanings[color] = words.replace(" of the arrow", ", from start to end")
         areas = {area.get_gid(): area for area in axes.collections}
         named: dict[str, Artist] = {
             words: areas[color] for color, words in meanings.items() if color in areas
@@ -198,8 +207,8 @@ def _draw_diagrams(
     for outline, peak, k in _areas(axis, axis + ordinates, values, diagram):
         outlines[RED if peak > 0 else BLUE].append(outline)
         rows.append(np.array([peak, *axis[k], *ordinates[k]]))
-    if what != "N" and len(diagrams) <= MOST_DIAGRAMS:
-        firsts = {beam: k for k, (beam, _) in reversed([*enumerate(diagrams)])}
+    firsts = {beam: k for k, (beam, _) in reversed([*enumerate(diagrams)])}
+    if what != "N" and len(firsts) <= MOST_BEAMS:
         for k in firsts.values():
             first, *_, last = np.flatnonzero(diagram == k)
             low, high = (first + last) // 2, (first + last + 1) // 2
@@ -223,14 +232,15 @@ class PointLabel(NamedTuple):
 
 
 def _peaks(rows: Array, unit: float, least: float) -> list[PointLabel]:
-    """Choose peaks to label: first the largest and the least value, then all large peaks.
+    """Choose peaks to label: first the largest and the least value, then the other large peaks.
 
     Large peaks exceed ``least`` times the largest magnitude.  Equal peaks at a point are one peak.
     """
     values, axis, up = rows[:, 0], rows[:, 1:3], rows[:, 3:]
     ends = (1, int(values.argmax())), (-1, int(values.argmin()))
     extremes = [k for sign, k in ends if sign * values[k] > 0.0]
-    large: list[int] = [*map(int, np.flatnonzero(np.abs(values) > least * np.abs(values).max()))]
+    order, largest = np.argsort(-np.abs(values), kind="stable"), np.abs(values).max()
+    large = [int(k) for k in order if abs(values[k]) > least * largest]
     labels = {k: style.number(values[k] / unit) for k in {*extremes, *large}}
     places = np.round(axis / (1e-3 * math.hypot(*np.ptp(axis, axis=0)) or 1.0))
     chosen: dict[tuple[object, ...], int] = {}
@@ -298,13 +308,16 @@ def _areas(
 
 
 def draw_damage_state(
-    solution: Solution, *, n: int = -1, magnify: float = 1.0, ax: Axes | None = None
-) -> Figure:
+    solution: Solution, *, n: int = -1, magnify: float = 1.0,
+    limits: Mapping[str, float] = MappingProxyType({}), ax: Axes | None = None,
+) -> Figure:  # fmt: skip
     """Draw yielded cells and opened hinges on the frame at the n-th recorded time.
 
     Yielded cells are coloured by the energy that plastic strains dissipated per length (J/m).  In
     cells with fibres, the energy of cracks is added.  Opened hinges are circles, which grow with
     the dissipated fraction of the fracture energy; from 99 % on they are hollow, as joints are.
+    Hinges that harden are coloured by their largest plastic rotation so far.  With acceptance
+    ``limits`` as in :meth:`Solution.hinges`, all hinges are coloured by the limit that they meet.
     """
     from matplotlib.collections import LineCollection
 
@@ -338,15 +351,56 @@ def draw_damage_state(
             cracks = any(f.softening is not None for p in placed if p is not None for f in p.fibres)
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
             style.draw_bar(axes, colors, f"{title} ({prefix}J/m)")
-        if hinges := open_hinges(solution, n, shape.nodes, shape.at):
-            for hinge in hinges:
-                axes.plot(*hinge.at, **circle(hinge.fraction))
-            examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")
-            sizes = [axes.plot([], [], **circle(x), label=words)[0] for x, words in examples]
-            style.draw_legend(axes, ax, sizes, loc="outside upper left", ncols=3)
+        if hinges := open_hinges(solution, n, shape.at, limits):
+            _draw_hinges(axes, ax, solution, shape, hinges, limits)
         style.lay_out(axes)
         style.fit_texts(axes)
     return style.parent_figure(axes)
+
+
+def _is_joint(at: Array, ends: Array) -> bool:
+    """Return whether several ends of beams, (n, 2), are at a point; m."""
+    close = np.abs(ends - at).max(axis=1) < 1e-6 * np.ptp(ends, axis=0).max()
+    return int(close.sum()) > 1
+
+
+def _draw_hinges(
+    axes: Axes, ax: Axes | None, solution: Solution, shape: DeformedShape,
+    hinges: Sequence[OpenHinge], limits: Mapping[str, float],
+) -> None:  # fmt: skip
+    """Draw open hinges; at joints of several beams they are drawn beside the joint."""
+    colors: list[Any] = [BLUE] * len(hinges)
+    entries: list[tuple[float, str, Any]] = []  # of the legend: fraction, words, colour
+    if not all(math.isnan(hinge.fraction) for hinge in hinges):
+        examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")
+        entries += [(fraction, words, BLUE) for fraction, words in examples]
+    if limits:
+        words = [f"{name}, up to {limit:g} rad" for name, limit in limits.items()]
+        names = [*limits, f"beyond {[*limits][-1]}"]
+        shades = style.scale("YlOrRd", 0.3, 1.0, 0.0, len(limits)).to_rgba(np.arange(len(names)))
+        of_state = dict(zip(names, shades, strict=True))
+        colors = [of_state.get(hinge.state, BLUE) for hinge in hinges]
+        entries += zip([math.nan] * len(names), [*words, names[-1]], shades, strict=True)
+    elif hardened := [k for k, hinge in enumerate(hinges) if math.isnan(hinge.fraction)]:
+        rotations = np.array([hinges[k].rotation for k in hardened])
+        unit, prefix = style.decimal_prefix(float(rotations.max()))
+        rule = style.scale("YlOrRd", 0.2, 1.0, 0.0, float(rotations.max()) / unit)
+        for k, color in zip(hardened, rule.to_rgba(rotations / unit), strict=True):
+            colors[k] = color
+        style.draw_bar(axes, rule, f"plastic rotation of hinges ({prefix}rad)")
+    lines: dict[Member, Array] = {
+        beam: shape.nodes[solution.numbering.nodes_along(beam)] for beam in solution.scene.beams
+    }
+    ends = np.array([line[k] for line in lines.values() for k in (0, -1)])
+    for hinge, color in zip(hinges, colors, strict=True):
+        at, place = hinge.at, hinge.place
+        if isinstance(place, Place) and place.s in (0.0, 1.0) and _is_joint(at, ends):
+            end, inner = lines[place.beam][:2] if place.s == 0.0 else lines[place.beam][:-3:-1]
+            at = at + 0.7 * shape.canvas.unit * unit_vectors(inner - end)
+        axes.plot(*at, **circle(hinge.fraction, color))
+    handles = [axes.plot([], [], **circle(x, color), label=words)[0] for x, words, color in entries]
+    if handles:
+        style.draw_legend(axes, ax, handles, loc="outside upper left", ncols=3)
 
 
 # -- labels ------------------------------------------------------------------------------------
@@ -397,8 +451,9 @@ def write_labels(axes: Axes, peaks: Sequence[PointLabel]) -> list[Annotation]:
         {"size": font_size(13.0), "weight": "bold"},
     )
     halves = [style.half_size(axes, peak.text, **looks[peak.extreme]) for peak in peaks]
-    crowded = 4 * sum(map(np.prod, halves)) > CROWDED * np.prod(size)
-    chosen = [k for k, peak in enumerate(peaks) if peak.extreme or not crowded]
+    covered = 4 * np.cumsum([np.prod(half) for half in halves])
+    allowed = covered <= CROWDED * np.prod(size)
+    chosen = [k for k, peak in enumerate(peaks) if peak.extreme or allowed[k]]
     if not chosen:
         return []
     to_points = axes.transData + Affine2D().scale(POINTS / style.parent_figure(axes).dpi)

@@ -27,6 +27,7 @@ from ufl_beam.plotting.frame_pictures import (
     MOST,
     draw_beams,
     draw_frame,
+    draw_outlines,
     draw_undeformed,
     plane_canvas,
 )
@@ -210,7 +211,7 @@ def draw_modes(
         for k, swing, canvas, axes in zip(chosen, swings, stages, panels, strict=False):
             forward, backward = canvas.shape(0), canvas.shape(1)
             draw_undeformed(axes, swing, canvas)
-            draw_beams(axes, swing, backward.nodes, color=SKY, linewidth=1.6, zorder=2)
+            draw_outlines(axes, swing, backward, color=SKY, linewidth=1.6, zorder=2)
             draw_beams(axes, swing, forward.nodes, color=BLUE, linewidth=2.6, zorder=4)
             draw_strokes(axes, symbols.in_plane(forward))
             axes.set_title(f"{k}: {shapes.titles[k]}", loc="left")

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import pairwise
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,8 +16,8 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError
 from ufl_beam.model.bodies import AttachmentPoint, Place
 from ufl_beam.model.connector_laws import HingeLaw
-from ufl_beam.model.connectors import Connector, can_yield, law_of, place_of
-from ufl_beam.output.engineering_results import rotation_of
+from ufl_beam.model.connectors import Connector, can_yield, law_of
+from ufl_beam.output.engineering_results import hinges_of, rotation_of
 from ufl_beam.output.history import breaking_law
 from ufl_beam.output.state_rows import HINGE, JUMP
 from ufl_beam.plotting import style
@@ -40,49 +41,50 @@ class OpenHinge(NamedTuple):
 
     place: AttachmentPoint
     at: Array  # drawn position; (2,); m
-    fraction: float  # dissipated fraction of its fracture energy; 0 if it hardens, 1 if limit = 0
+    fraction: float  # dissipated fraction of its fracture energy; 1 if limit = 0, NaN if it hardens
+    rotation: float  # largest magnitude of its plastic rotation up to the n-th time; rad
+    state: str  # acceptance limit that it satisfied up to then
 
 
 def open_hinges(
-    solution: Solution, n: int, points: Array, at: Callable[[AttachmentPoint], Array] | None = None
+    solution: Solution,
+    n: int,
+    at: Callable[[AttachmentPoint], Array],
+    limits: Mapping[str, float] = MappingProxyType({}),
 ) -> list[OpenHinge]:
-    """Find open hinges in cells, at vertices and in connectors.
+    """Find hinges in cells, at vertices and in connectors that opened up to the n-th time.
 
-    ``points`` are drawn positions of nodes (m), and ``at`` returns the drawn position of a place.
+    ``at`` returns the drawn position of a place (m).  ``limits`` are acceptance limits of the
+    plastic rotation by name (rad).
     """
-    numbering, mesh = solution.numbering, solution.numbering.mesh
-    nodes = numbering.nodes_along_cells
-    # With the dissipated energy (J)
-    hinges: list[tuple[AttachmentPoint, Array, HingeLaw | None, float]] = []
-    for beam in solution.scene.beams:
-        laws = numbering.hinges(beam)
-        if all(law is None or math.isinf(law.limit) for law in laws):
+    states, found = solution.subset(0, solution.index(n) + 1), []
+    for row in hinges_of(states, limits, None, solution.parameter).rows:
+        joint = isinstance(row.where, Place) and row.rotation != 0.0  # may have no strength
+        if math.isnan(row.rotation) or not (row.n >= 0 or joint):
             continue
-        cells = numbering.cells_of(beam)
-        at_points = solution.points_of(n)[cells]
-        opened = (at_points[:, :, JUMP] != 0.0) | (at_points[:, :, HINGE] > 0.0)
-        for cell, point in np.argwhere(opened):
-            if (law := laws[cell]) is not None:
-                drawn, lost = points[nodes[cells[cell]]].T, at_points[cell, point, HINGE]
-                drawn_at = np.array([np.interp(mesh.points[point], mesh.nodes, x) for x in drawn])
-                hinges.append((beam.start, drawn_at, law, float(lost)))
-    for hinge, vertex in zip(solution.scene.hinges, numbering.vertices_at_hinges, strict=True):
-        history = solution.connector(hinge)
-        if history.motion[n] != 0.0 or history.dissipated[n] > 0.0:
-            dissipated = float(history.dissipated[n])
-            hinges.append((place_of(hinge), points[vertex], law_of(hinge), dissipated))
-    for row in solution.hinges(only=[c for c in solution.scene.connectors if can_yield(c)]).rows:
-        if isinstance(row.where, Connector) and 0 <= row.n <= solution.index(n):
-            dissipated, place = float(solution.connector(row.where).dissipated[n]), row.where.b
-            drawn_at = solution.position(place)[n] if at is None else at(place)
-            hinges.append((place, drawn_at, breaking_law(row.where.law), dissipated))
-    return [OpenHinge(place, x, _broken(law, lost)) for place, x, law, lost in hinges]
+        law = _law(solution, row.where)
+        place = row.where.b if isinstance(row.where, Connector) else row.where
+        rotation = abs(row.rotation if math.isnan(row.plastic) else row.plastic)
+        fraction = _broken(law, row.dissipated)
+        found.append(OpenHinge(place, np.array(at(place)), fraction, rotation, row.state))
+    return found
+
+
+def _law(solution: Solution, where: Place | Connector) -> HingeLaw | None:
+    """Return the law of a hinge at a vertex, in a cell or in a connector, if it may break."""
+    if isinstance(where, Connector):
+        return breaking_law(where.law)
+    numbering = solution.numbering
+    if (hinge := numbering.hinge_at(where)) is not None:
+        return law_of(hinge)
+    number = numbering.cell(where) - int(numbering.cells_of(where.beam)[0])
+    return numbering.hinges(where.beam)[number]
 
 
 def _broken(law: HingeLaw | None, dissipated: float) -> float:
     """Return the dissipated fraction of a fracture energy; 1 for hinges without strength."""
-    if law is None:
-        return 0.0
+    if law is None or (law.limit > 0.0 and math.isinf(law.fracture_energy)):
+        return math.nan
     return min(dissipated / law.fracture_energy, 1.0) if law.limit > 0.0 else 1.0
 
 
@@ -98,11 +100,14 @@ def dissipated_per_length(solution: Solution, n: int) -> Array:
     return energy / numbering.lengths(np.arange(len(numbering.cells)))
 
 
-def circle(fraction: float) -> dict[str, Any]:
-    """Return the marker style of a hinge from the dissipated fraction of its fracture energy."""
+def circle(fraction: float, color: Any = BLUE) -> dict[str, Any]:
+    """Return the marker style of a hinge from the dissipated fraction of its fracture energy.
+
+    Hinges that harden, whose fraction is NaN, have the size of half-broken hinges.
+    """
     paper = shade(WHITE)
-    inside, edge = (paper, BLUE) if fraction >= FULLY_OPEN else (BLUE, paper)
-    size = 4.0 + 6.0 * math.sqrt(fraction)
+    inside, edge = (paper, color) if fraction >= FULLY_OPEN else (color, paper)
+    size = 4.0 + 6.0 * math.sqrt(0.5 if math.isnan(fraction) else fraction)
     look: dict[str, Any] = {"marker": "o", "ms": size, "mfc": inside, "mec": edge, "mew": 1.8}
     return {**look, "ls": "none", "zorder": 6}
 
@@ -114,7 +119,7 @@ def draw_damage(axes: Axes, solution: Solution, n: int, shape: DeformedShape) ->
     for line in shape.nodes[solution.numbering.nodes_along_cells[yielded]]:
         (zone,) = axes.plot(*line.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8)
         named["yielded or cracked"] = zone
-    for hinge in open_hinges(solution, n, shape.nodes, shape.at):
+    for hinge in open_hinges(solution, n, shape.at):
         (mark,) = axes.plot(*hinge.at, **circle(hinge.fraction))
         named["fully open hinge" if hinge.fraction >= FULLY_OPEN else "hinge, open"] = mark
     return named
@@ -205,9 +210,7 @@ def draw_hinge(solution: Solution, place: Place | Connector, *, ax: Axes | None 
 def _hinge_at(solution: Solution, place: Place) -> tuple[HingeLaw, Array, Array, float]:
     """Return law, moment (N m), jump (rad) and dissipated energy (J) of a hinge of a beam."""
     history, numbering = solution.material_at(place), solution.numbering
-    hinge, cell = numbering.hinge_at(place), numbering.cell(place)
-    number = cell - int(numbering.cells_of(place.beam)[0])
-    law = numbering.hinges(place.beam)[number] if hinge is None else law_of(hinge)
+    hinge, cell, law = numbering.hinge_at(place), numbering.cell(place), _law(solution, place)
     if law is None or np.isinf(law.limit):
         raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
     if hinge is not None:

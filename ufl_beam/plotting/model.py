@@ -53,7 +53,8 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     there is no space are omitted.
     """
     require_independent(scene)
-    subject, notes = Subject(scene), model_notes(scene)
+    subject = Subject(scene)
+    notes = [*subject.hinge_notes, *model_notes(scene)]
     cells = (subject.cells, "cell", "cells")
     beams, bodies = (len(scene.beams), "beam", "beams"), (len(scene.bodies), "body", "bodies")
     title = f"model: {counted(beams, cells, bodies)}"
@@ -66,8 +67,8 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
         for k, words in enumerate(reversed(notes)):
             axes.annotate(
                 words, (0.0, 1.0), (0.0, 6.0 + line_height * k), xycoords="axes fraction",
-                textcoords="offset points", fontsize=font_size(LABEL_SIZE), color=shade(TEXT),
-                gid="notes",
+                textcoords="offset points", fontsize=font_size(LABEL_SIZE),
+                color=shade(subject.hinge_notes.get(words, TEXT)), gid="notes",
             )  # fmt: skip
         if ax is None:
             style.parent_figure(axes).set_layout_engine("none")

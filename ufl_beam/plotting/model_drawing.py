@@ -12,7 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import AttachmentPoint, Body, Member, Place, Velocity
-from ufl_beam.model.connectors import law_of, place_of
+from ufl_beam.model.connectors import Connector, law_of, place_of
 from ufl_beam.model.functions import TimeFunction, steady
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.loads import (
@@ -36,7 +36,10 @@ LOAD_LABELS, MOTIONS, CAPTIONS, NAMES = range(
 MOST_LABELS = 80  # number of labels beyond which names, and then captions, are left out
 MOST_CELLS = 300  # number of cells beyond which neither cells nor possible hinges are marked
 
+FEW_HINGES = 4  # number of equal hinges beyond which a note has their limit, instead of labels
+
 HINGE = "#B0508A"  # colour of hinges
+HINGES = HINGE, "#4B2E83", "#1B7F79", "#777777"  # colours of groups of equal hinges; last: others
 MOVED = "#A86E00"  # colour of prescribed motions: the orange of drives, dark enough for text
 HEAD, SHAFT = 0.85, 1.9  # length of the head of an arrow in units of symbols; line width in points
 
@@ -79,8 +82,26 @@ class Subject:
             max((math.hypot(*x) for x in vectors), default=0.0) or 1.0
             for vectors in (forces, lines, speeds)
         )
+        self.hinge_notes, self.hinge_colors = self._groups()
         ends = [(x[0], x[1], x[-1], x[-2]) for x in self.axes.values()]
         self._ends: Array = np.reshape(ends, (-1, 2, 2))
+
+    def _groups(self) -> tuple[dict[str, str], dict[Connector, str]]:
+        """Return colours of notes on many equal hinges, and of these hinges."""
+        alike: defaultdict[float, list[Connector]] = defaultdict(list)
+        for hinge in self.scene.hinges:
+            if place_of(hinge).s in place_of(hinge).beam.hinges:
+                alike[float(law_of(hinge).limit)].append(hinge)
+        groups = [([limit], same) for limit, same in alike.items() if len(same) > FEW_HINGES]
+        if len(others := groups[len(HINGES) - 1 :]) > 1:
+            limits = sorted(limit for some, _ in others for limit in some)
+            groups[len(HINGES) - 1 :] = [(limits, [hinge for _, same in others for hinge in same])]
+        notes, colors = dict[str, str](), dict[Connector, str]()
+        for (limits, same), color in zip(groups, HINGES, strict=False):
+            words = " to ".join(dict.fromkeys(with_unit(x, "N m") for x in (limits[0], limits[-1])))
+            notes[f"dots: {len(same)} hinges, {words}"] = color
+            colors |= dict.fromkeys(same, color)
+        return notes, colors
 
     def line(self, load: LoadAlongBeam | ImposedStrain) -> tuple[Array, Array]:
         """Return points of the axis in the span of a load, and its factors or strains at them.
@@ -220,8 +241,9 @@ def _draw_beams(drawing: Drawing) -> None:
         if place.s in (0.0, 1.0):  # beside the symbol at the end of the beam
             end, inner = axis[:2] if place.s == 0.0 else axis[:-3:-1]
             at = at + 0.7 * unit * unit_vectors(inner - end)
-        drawing.strokes["hinges"] += [disc(at, r, HINGE, HINGE, 5.2)]
-        if place.s in place.beam.hinges:
+        color = subject.hinge_colors.get(hinge, HINGE)
+        drawing.strokes["hinges"] += [disc(at, r, color, color, 5.2)]
+        if place.s in place.beam.hinges and hinge not in subject.hinge_colors:
             words = f"hinge {with_unit(float(law_of(hinge).limit), 'N m')}"
             drawing.write(words, HINGE, CAPTIONS, _around(at, r))
 

@@ -107,7 +107,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Section             "section"           outline and fibres of a cross-section; ``ax``
     Solution            "shape"             the frame at one time; ``n``, ``magnify``, ``ax``
     Solution            "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
-    Solution            "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
+    Solution            "damage"            yielded cells, opened hinges; ``n``, ``limits``, ...
     Solution            "shapes"            shapes; ``times`` or ``count``, ``magnify``, ``ax``
     Solution            "history"           motion over time; places, ``component``, ``ax``
     Solution            "energy"            the energy ledger over time
@@ -141,7 +141,8 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             ``count`` is a number of shapes.  ``component`` is "u", "v" or "psi", or a rate of one
             of them, such as "du/dt" or "d2u/dt2".  ``numbers`` are indices of modes, all by
             default.  ``amplitude`` is their largest displacement, as a fraction of the size of the
-            scene.  ``targets`` is one or several of the target displacements of a
+            scene.  ``limits`` are acceptance limits that colour hinges, as in
+            :meth:`Solution.hinges`.  ``targets`` is one or several of the target displacements of a
             pushover.  ``labels`` are texts for demand and intensity, such as
             ``("drift (1)", "spectral acceleration (m/s²)")``; by default they are the names of the
             functions of the analysis.  ``ax`` are axes to draw in, instead of a new figure.

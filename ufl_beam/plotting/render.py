@@ -377,7 +377,7 @@ class Solids:
         meshes: defaultdict[str, list[Any]] = defaultdict(list)
         self._add_strokes(meshes, shape)
         pins = [(pin, PIN) for pin in symbols.pins(shape)]
-        for hinge in open_hinges(self.solution, n, shape.nodes, shape.at):
+        for hinge in open_hinges(self.solution, n, shape.at):
             pins.append((Pin(hinge.at, True, (hinge.place,)), style.ORANGE))
         # Joints are cylinders as thick as the joined beams; equal cylinders are in one mesh.
         alike: defaultdict[tuple[float, float, str], list[Array]] = defaultdict(list)

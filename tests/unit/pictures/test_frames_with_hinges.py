@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of a frame of three bays and five storeys whose members have hinges at both ends."""
+
+import re
+
+import numpy as np
+import pytest
+from drawn import STEEL, circles, middles, storeys, texts
+from matplotlib.colors import same_color, to_hex
+
+import ufl_beam as ub
+from ufl_beam.plotting.style import GREY, SKY, scale
+
+COLUMN, GIRDER = ub.ElastoPlastic(40e3, kinematic=4e5), ub.ElastoPlastic(30e3, kinematic=3e5)
+
+
+def frame(bays, floors, law_of):
+    """The frame of `storeys` with hinges, pushed to the right by growing forces, without weight."""
+    plain = storeys(bays, floors)
+    beams = {}
+    for k, beam in enumerate(plain.beams):
+        law = law_of(k, beam)
+        beams[beam] = ub.Beam(
+            beam.start.point, beam.end.point, STEEL, cells=2, name=beam.name,
+            hinges={0: law, 1: law},
+        )  # fmt: skip
+
+    def moved(place):
+        return beams[place.beam].at(place.s)
+
+    joints = [ub.Rigid(*map(moved, joint.places)) for joint in plain.joints]
+    feet = [ub.Clamped(moved(support.place)) for support in plain.supports]
+    loads = [
+        ub.PointLoad(moved(x.place), force=(1e3, 0), amplitude=lambda t: t)
+        for x in plain.loads
+        if isinstance(x, ub.PointLoad)
+    ]
+    return ub.Scene([*beams.values()], joints=joints, supports=feet, loads=loads)
+
+
+def by_kind(k, beam):
+    return COLUMN if beam.name.startswith("C") else GIRDER
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    """Path of the frame up to a sway of 0.5 m, with the extremes of section forces."""
+    scene, extremes = frame(3, 5, by_kind), ub.Extremes()
+    top = max((beam.end for beam in scene.beams), key=lambda place: place.point[1] - place.point[0])
+    control = ub.DisplacementControl(top, "u", 0.025)
+    return ub.follow(scene, control, steps=20, record=extremes, progress=False), extremes
+
+
+# -- the model ---------------------------------------------------------------------------------
+
+
+def notes(figure):
+    """Texts of the notes and their colours, from the top."""
+    found = [x for x in figure.axes[0].texts if x.get_gid() == "notes"]
+    return {x.get_text(): x.get_color() for x in sorted(found, key=lambda x: -x.get_position()[1])}
+
+
+def test_many_equal_hinges_have_one_note():
+    """4 x 5 columns and 3 x 5 girders; the colour of the note is that of its hinges."""
+    figure = ub.plot(frame(3, 5, by_kind))
+    found = notes(figure)
+    assert [*found] == ["dots: 40 hinges, 40 kN m", "dots: 30 hinges, 30 kN m"]
+    for color, number in zip(found.values(), (40, 30), strict=True):
+        assert len(middles(figure, "hinges", fill=color)) == number
+    assert not [text for text in texts(figure) if text.startswith("hinge")]
+    # There is space for the other labels: names of members, and forces
+    assert {"C00", "B42", "1 kN × f(t)"} <= {*texts(figure)}
+
+
+def test_many_different_limits_are_three_notes_and_a_range():
+    """Each storey has its limit, 10 to 50 kN m, at 14 ends of columns and girders."""
+    figure = ub.plot(
+        frame(3, 5, lambda k, beam: ub.ElastoPlastic(1e4 * (1 + int(beam.name[1])), kinematic=1e5))
+    )
+    words = [f"dots: 14 hinges, {limit} kN m" for limit in (10, 20, 30)]
+    found = notes(figure)
+    assert [*found] == [*words, "dots: 28 hinges, 40 kN m to 50 kN m"]
+    assert [len(middles(figure, "hinges", fill=x)) for x in found.values()] == [14, 14, 14, 28]
+
+
+def test_few_equal_hinges_keep_their_labels():
+    law = ub.ElastoPlastic(2e4, kinematic=1e5)
+    beam = ub.Beam((0, 0), (8, 0), STEEL, cells=8, hinges=dict.fromkeys((0, 0.25, 0.5, 0.75), law))
+    figure = ub.plot(ub.Scene([beam], supports=[ub.Clamped(beam.start)]))
+    assert texts(figure).count("hinge 20 kN m") == 4
+    assert not notes(figure)
+
+
+# -- damage ------------------------------------------------------------------------------------
+
+
+def rotations(path, n=-1):
+    """Largest plastic rotation of each hinge that has yielded; rad."""
+    states = range(path.index(n) + 1)
+    found = [np.abs(path.connector(hinge).motion[states]).max() for hinge in path.scene.hinges]
+    return sorted(x for x in found if x > 0)
+
+
+def test_hardening_hinges_are_coloured_by_their_rotation(pushed):
+    path, _ = pushed
+    axes, bar = ub.plot(path, "damage").axes
+    marks = circles(axes)
+    expected = rotations(path)
+    assert len(marks) == len(expected) > 20
+    assert expected[-1] > 10 * expected[0]
+    assert bar.get_ylabel() == "plastic rotation of hinges (mrad)"
+    assert bar.get_ylim()[1] == pytest.approx(1e3 * expected[-1])
+    rule = scale("YlOrRd", 0.2, 1.0, 0.0, expected[-1])
+    drawn = sorted(to_hex(mark.get_markerfacecolor()) for mark in marks)
+    assert drawn == sorted(map(to_hex, rule.to_rgba(expected)))
+    assert len({*drawn}) > 10
+
+
+def test_each_hinge_at_a_joint_has_its_place(pushed):
+    """No two marks cover each other, also at joints of four members."""
+    path, _ = pushed
+    at = np.array([mark.get_xydata()[0] for mark in circles(ub.plot(path, "damage").axes[0])])
+    apart = np.linalg.norm(at[:, None] - at, axis=2) + np.eye(len(at))
+    assert apart.min() > 0.1  # m, of a frame of 15 m
+
+
+def test_hinges_are_coloured_by_acceptance_limits(pushed):
+    path, _ = pushed
+    limits = {"IO": 0.005, "LS": 0.015, "CP": 0.03}  # rad
+    for n in (8, -1):
+        figure = ub.plot(path, "damage", n=n, limits=limits)
+        words = [text.get_text() for text in figure.legends[0].get_texts()]
+        ranges = ["IO, up to 0.005 rad", "LS, up to 0.015 rad", "CP, up to 0.03 rad"]
+        assert words == [*ranges, "beyond CP"]
+        colors = [mark.get_markerfacecolor() for mark in figure.legends[0].legend_handles]
+        marks = [mark.get_markerfacecolor() for mark in circles(figure.axes[0])]
+        counts = [sum(same_color(mark, color) for mark in marks) for color in colors]
+        expected, _ = np.histogram(rotations(path, n), [0, *limits.values(), np.inf])
+        assert counts == list(expected)
+    assert min(counts) > 0  # at the end there is one of each
+
+
+def test_wrong_limits_are_refused(pushed):
+    path, _ = pushed
+    with pytest.raises(ub.ArgumentError, match=r"limits\['LS'\] = 0.01 rad is not above the limit"):
+        ub.plot(path, "damage", limits={"IO": 0.02, "LS": 0.01})
+
+
+# -- envelopes ---------------------------------------------------------------------------------
+
+
+def arrows(figure):
+    """Marks of directions of beams, which are turned triangles."""
+    marks = [line.get_marker() for line in figure.axes[0].lines]
+    return sum(isinstance(marker, tuple) and marker[:2] == (3, 0) for marker in marks)
+
+
+def test_an_envelope_has_the_arrows_of_its_legend_and_more_than_two_labels(pushed):
+    """35 beams have 70 diagrams; each label is a value of the envelope, with three digits."""
+    _, extremes = pushed
+    figure = ub.plot(extremes, "M")
+    assert arrows(figure) == 35
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words[:2] == ["M > 0: tension right of the arrow", "M < 0: tension left of the arrow"]
+    labels = [float(text.replace("−", "-")) for text in texts(figure)]
+    found = [extremes.section_forces(beam) for beam in extremes.solution.scene.beams]
+    values = np.concatenate([x for one in found for x in (one.high[:, 2], one.low[:, 2])]) / 1e3
+    assert len(labels) > 15
+    for label in labels:
+        # Labels have three digits; values within 0.1 % of a peak count as its value
+        assert np.abs(values - label).min() < 6e-3 * abs(label)
+    assert max(labels) == pytest.approx(values.max(), rel=5e-3)
+    assert min(labels) == pytest.approx(values.min(), rel=5e-3)
+
+
+def test_the_legend_names_no_arrow_without_arrows():
+    """72 beams are more than have arrows."""
+    scene, extremes = storeys(4, 8), ub.Extremes()
+    ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, record=extremes, progress=False)
+    for shown, what in ((extremes, "M"), (extremes, "V"), (extremes.solution, "M")):
+        figure = ub.plot(shown, what)
+        assert arrows(figure) == 0
+        words = [text.get_text() for text in figure.legends[0].get_texts()]
+        assert words
+        assert all(re.fullmatch(rf"{what} [<>] 0: .*, from start to end", x) for x in words)
+
+
+# -- modes -------------------------------------------------------------------------------------
+
+
+def test_modes_show_both_phases_of_bodies():
+    """The outlines of the body in both phases have opposite displacements from the grey one."""
+    mast = ub.Beam((0, 0), (0, 4), STEEL, cells=4, name="mast")
+    head = ub.Body((0, 4.5), mass=50.0, inertia=8.0, name="head")
+    stay = ub.Stretch(head.at(0.7, 4.5), ub.ground(3, 4.5), ub.Spring(1e4))
+    scene = ub.Scene(
+        [mast], bodies=[head], joints=[ub.Rigid(mast.end, head.at(0, 4))], connectors=[stay],
+        supports=[ub.Clamped(mast.start)],
+    )  # fmt: skip
+    shapes = ub.modes(scene, 1)
+    axes = ub.plot(shapes, amplitude=0.1).axes[0]
+    backward = [line.get_xydata() for line in axes.lines if same_color(line.get_color(), SKY)]
+    assert len(backward) == 2  # beams, and bodies with rods
+    moved = shapes.motion(0, amplitude=0.1, count=2)
+    u, v, angle = moved.displacement(head.middle)[1]
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    outline = next(
+        line.get_xydata() for line in axes.lines
+        if same_color(line.get_color(), GREY) and len(line.get_xydata()) == len(backward[1])
+    )  # fmt: skip
+    expected = (outline - head.center) @ turn.T + head.center + (u, v)
+    np.testing.assert_allclose(backward[1], expected, rtol=0, atol=1e-9)
