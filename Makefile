@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links test-notebook check-docs docs-pictures accelerations bench bench-test bench-compare bench-peers bench-steps bench-structures collection extremes schemes study
+.PHONY: help demo test test-mpi test-sid test-processors verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links test-notebook check-docs docs-pictures accelerations bench bench-test bench-compare bench-peers bench-steps bench-structures collection extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -37,6 +37,9 @@ test-mpi: ## unit tests on 2 ranks; properties and tests of sharing on 3
 test-sid: ## the same as `make test` on the DOLFINx of Debian sid, and a demo; builds its root once
 	@UFL_BEAM_SUITE=sid $(MAKE) --no-print-directory test
 	@UFL_BEAM_SUITE=sid ./env python3 demos/demo_roll_up.py
+
+test-processors: ## the unit tests with C for other processors and other rounding; `make test-processors every=10` a tenth of them
+	@tests/processors $(every)
 
 verify: ## the slow verification studies, then the unit tests with sanitizers
 	@./env python3 -m pytest -m slow

@@ -52,13 +52,15 @@ def pytest_pyfunc_call():
 def pytest_addoption(parser):
     """Add `--every=N`, for runs that are slow because something watches them."""
     parser.addoption("--every", type=int, default=1, help="run the first of N tests each")
+    parser.addoption("--first", type=int, default=0, help="begin after this number of tests")
 
 
 @pytest.hookimpl(trylast=True)  # after the selection by markers
 def pytest_collection_modifyitems(config, items):
     """Deselect what is marked `serial` on several ranks, and all but every N-th test."""
     serial = {i for i in items if COMM.size > 1 and i.get_closest_marker("serial")}
-    kept = [item for item in items if item not in serial][:: config.getoption("every")]
+    first, every = map(config.getoption, ("first", "every"))
+    kept = [item for item in items if item not in serial][first::every]
     chosen = set(kept)
     if deselected := [item for item in items if item not in chosen]:
         config.hook.pytest_deselected(items=deselected)

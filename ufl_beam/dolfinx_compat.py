@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import logging
+import os
+import shlex
 import sysconfig
 import warnings
 from pathlib import Path
@@ -73,6 +75,10 @@ TABULATE = (
 )
 """Parameters of an FFCx kernel in C, and the arguments of a call after the first six."""
 
+FLAGS = shlex.split(os.environ.get("UFL_BEAM_CFLAGS", ""))
+"""Compiler flags of the environment variable ``UFL_BEAM_CFLAGS`` for all C, after other flags; see
+``make test-processors``."""
+
 
 def jit_directory() -> Path:
     """Return the directory in which DOLFINx caches compiled forms."""
@@ -87,7 +93,8 @@ def _jit_options() -> dict[str, Any]:
             f"DOLFINx cannot read its options in {error.filename}: {error.strerror}; set "
             "XDG_CONFIG_HOME to a directory that can be read"
         ) from None
-    return options
+    flags = [*(options["cffi_extra_compile_args"] or []), *FLAGS]
+    return options | {"cffi_extra_compile_args": flags}
 
 
 def compile_form(form: ufl.Form, directory: Path) -> fem.Form:
@@ -95,7 +102,7 @@ def compile_form(form: ufl.Form, directory: Path) -> fem.Form:
     logger = logging.getLogger()
     handlers = logger.handlers[:]
     try:
-        return fem.form(form, jit_options={"cache_dir": directory})
+        return fem.form(form, jit_options=_jit_options() | {"cache_dir": directory})
     finally:
         logger.handlers = handlers  # FFCx does not restore them after an interrupt
 

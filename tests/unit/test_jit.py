@@ -2,12 +2,16 @@
 """C of the package: no warnings, and sanitizers that see what they are to see."""
 
 import os
+import runpy
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+import ufl
 
-from ufl_beam.compiled import c_library, jit, simd_kernels
+from ufl_beam import dolfinx_compat
+from ufl_beam.compiled import c_library, code_cache, jit, simd_kernels
 
 pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
 
@@ -127,3 +131,48 @@ def test_this_run_is_sanitized():
     assert "beyond" not in ran.stdout
     assert "heap-buffer-overflow" in ran.stderr
     assert ran.returncode != 0
+
+
+@pytest.fixture
+def empty_cache(tmp_path, monkeypatch):
+    """A cache without entries."""
+    monkeypatch.setattr(code_cache, "_place", lambda: tmp_path)
+
+
+def test_flags_of_the_user_reach_c_and_are_part_of_its_key(empty_cache, monkeypatch):
+    source = "int get(void) { return CHOSEN; }"
+    for number in (3, 4):
+        monkeypatch.setattr(jit, "FLAGS", [f"-DCHOSEN={number}"])
+        module = jit.compiled(
+            "flags", "int get(void);", lambda: source, depends_on=[source], flags=["-DCHOSEN=1"]
+        )
+        assert module.lib.get() == number
+
+
+def test_flags_of_the_user_reach_forms_and_are_part_of_their_key(empty_cache, monkeypatch):
+    mesh = dolfinx_compat.line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
+    form = dolfinx_compat.fem.Constant(mesh, 1.0) * ufl.dx(mesh)
+    key = dolfinx_compat.form_key(form)
+    monkeypatch.setattr(dolfinx_compat, "FLAGS", ["-include", "no_such_header.h"])
+    assert dolfinx_compat.form_key(form) != key
+    with pytest.raises(jit.CompilerError, match="a form cannot be compiled"):
+        jit.compiled_form(form)
+
+
+def test_flags_of_the_user_are_words_of_a_variable(monkeypatch):
+    monkeypatch.setenv("UFL_BEAM_CFLAGS", "-march=x86-64 -O1")
+    assert runpy.run_path(dolfinx_compat.__file__)["FLAGS"] == ["-march=x86-64", "-O1"]
+
+
+@pytest.mark.parametrize(
+    ("flags", "features", "wide"),
+    [
+        ([], ["AVX2"], False),
+        ([], ["AVX2", "AVX512F"], True),
+        (["-O1"], ["X86_V4"], True),
+        (["-march=x86-64-v3"], ["AVX512F"], False),
+        (["-march=x86-64-v3", "-march=x86-64-v4"], [], True),
+    ],
+)
+def test_vectors_are_as_wide_as_those_of_the_chosen_processor(flags, features, wide):
+    assert simd_kernels.has_wide_vectors(flags, features) is wide

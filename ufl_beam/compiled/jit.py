@@ -24,7 +24,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.compiled.code_cache import cached
-from ufl_beam.dolfinx_compat import TABULATE, compile_form, fem, form_key
+from ufl_beam.dolfinx_compat import FLAGS, TABULATE, compile_form, fem, form_key
 
 HEADERS = f"""\
 #include <float.h>
@@ -61,7 +61,6 @@ sanitize`."""
 
 EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else []
 """Flags appended for every library: sanitizers if ``UFL_BEAM_SANITIZE`` is set and not 0."""
-
 
 NATIVE = "-march=native"
 """Flag that lets the compiler use all instructions of the processor."""
@@ -102,7 +101,7 @@ def compiled(
         check: Function called with the newly compiled module; it may raise :class:`Refused`.
     """
     # Python's own flags have -g, and debug symbols take a fifth of the time and half of the file.
-    flags = [*flags, "-g0", "-fvisibility=hidden", *EXTRA]
+    flags = [*flags, "-g0", "-fvisibility=hidden", *FLAGS, *EXTRA]
     name = f"{stem}_{_digest(declarations, *depends_on, *flags, sys.version, repr(PROCESSOR))}"
 
     def build(directory: Path) -> ModuleType | Refused:

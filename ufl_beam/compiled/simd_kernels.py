@@ -29,11 +29,21 @@ from ufl_beam.compiled.jit import (
     compiled,
     text,
 )
+from ufl_beam.dolfinx_compat import FLAGS as COMPILER_FLAGS
 from ufl_beam.dolfinx_compat import VERSIONS
 
 LOGGER = logging.getLogger("ufl_beam")
 
-_WIDE = {"AVX512F", "X86_V4"} & {*PROCESSOR.get("baseline", ()), *PROCESSOR.get("found", ())}
+
+def has_wide_vectors(flags: list[str], features: list[str]) -> bool:
+    """Return whether compilers may use AVX-512 with ``flags``, on a processor with ``features``."""
+    march = [NATIVE, *(flag for flag in flags if flag.startswith("-march="))][-1]
+    wide = {"AVX512F", "X86_V4"} & {*features}
+    return bool(wide) if march == NATIVE else march == "-march=x86-64-v4"
+
+
+_FEATURES = [*PROCESSOR.get("baseline", ()), *PROCESSOR.get("found", ())]
+_WIDE = has_wide_vectors(COMPILER_FLAGS, _FEATURES)
 
 BATCH = 8 if _WIDE else 4
 """Number of cells that are computed at once, one for each number in a vector of AVX-512 or AVX.
