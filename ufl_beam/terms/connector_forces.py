@@ -374,11 +374,17 @@ class Guides(ConnectorTerm):
         """See the base class."""
         others = [term._c for some in neighbours.terms for term in some]
         parameters, number = neighbours.weights.shape
-        # The state of the guides in neighbouring scenes follows from that of the guides themselves
+        # The state of the other guides follows from that of the guides of the run
+        own, (e, s0, s, step), (on0, tangent) = (
+            ffi.new("guides *", self._c[0]),
+            np.zeros((4, len(self._curves))),
+            np.zeros((2, len(self._curves), 2)),
+        )
+        frame, around = (ffi.new(f"{x}[]", len(s)) for x in ("guide_frame", "curve_around"))
+        fill(own, distance=e, s0=s0, s=s, step=step, on0=on0, frame=frame, around=around)
         c = struct(
-            "guide_derivatives", guides=self._c, parameters=parameters, neighbours=number,
-            neighbour=ffi.new("guides *[]", others), weight=neighbours.weights,
-            tangent=np.zeros((len(self._curves), 2)),
+            "guide_derivatives", guides=self._c, own=own, parameters=parameters, neighbours=number,
+            neighbour=ffi.new("guides *[]", others), weight=neighbours.weights, tangent=tangent,
         )  # fmt: skip
         return [in_c("guides", c)]
 

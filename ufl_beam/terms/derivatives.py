@@ -377,9 +377,7 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         return [*rates(damping.damping.rates), *tangents]
     if kind == "guides":
         g = data.guides
-        found = g.s0, g.s, g.step, g.frame, g.around
-        sizes = [(x, ffi.sizeof(ffi.typeof(x).item)) for x in found]
-        return [(x, size * g.number) for x, size in [*sizes, (g.on0, 16)]]
+        return [(x, 8 * g.number) for x in (g.s0, g.step)]
     if kind == "connectors":
         c, blocks = data.term.connectors, [table(data.motions), (data.dt, 8)]
         if data.by_geometry:

@@ -661,8 +661,8 @@ void transpose_moving_loads(void *self, adjoint *a, const double *λ)
 void transpose_guides(void *self, adjoint *a, const double *λ)
 {
   const guide_derivatives *m = self;
-  const guides *g = m->guides;
-  find_tangents_before(self, a->step, 0);
+  const guides *g = m->own;
+  find_tangents_before(self, a->step, a->d->x);
   for (int p = 0; p < a->parameters; ++p) {
     memset(a->values, 0, a->size * sizeof *a->values);
     add_changes_of_curves(m, a->d->x, p, a->values);

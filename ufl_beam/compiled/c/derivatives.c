@@ -845,23 +845,41 @@ void accept_moving_loads_derivative(void *self, const derivatives *d, int p)
 
 /* -- guides ---------------------------------------------------------------------------------------------- */
 
-/* Unit tangents of the curves at the points before the step. Guides in neighbouring scenes begin the step at
- * the points of their curves nearest to the configuration before it. */
+/* Largest parameter step of polynomials for differences between scenes, relative to that of the guides,
+ * since these differences multiply the round-off by 2^13; its largest fraction of the radius, as the
+ * coefficients tell it; and tolerance on the slope, which tells a kink. */
+static const double WIDEST = 4, OF_RADIUS = 1. / 256, SAME_SLOPE = 1e-10;
+
+/* Unit tangents of the curves at the points before the step. Guides in all scenes begin the step at the points
+ * of their curves nearest to the configuration before it. */
 void find_tangents_before(void *self, const time_step *step, const double *q1)
 {
   const guide_derivatives *m = self;
-  const guides *g = m->guides;
-  curve_around c;
-  for (int k = 0; k < g->number; ++k) {
-    expand_curve(g, k, g->s0[k], &c);
-    for (int i = 0; i < 2; ++i) m->tangent[2 * k + i] = c.a[1][i] / hypot(c.a[1][0], c.a[1][1]);
-  }
-  for (int i = 0; i < m->parameters * m->neighbours; ++i) {
-    guides *one = m->neighbour[i];
-    memcpy(one->s0, g->s0, g->number * sizeof *g->s0);
-    memcpy(one->step, g->step, g->number * sizeof *g->step);
+  guides *own = m->own;
+  const int others = m->parameters * m->neighbours;
+  for (int i = -1; i < others; ++i) {
+    guides *one = i < 0 ? own : m->neighbour[i];
+    memcpy(one->s0, m->guides->s0, one->number * sizeof *one->s0);
+    memcpy(one->step, m->guides->step, one->number * sizeof *one->step);
     begin_guides(one, step, 0, 0);
     accept_guides(one, step, step->q0, 0);
+  }
+  for (int k = 0; k < own->number; ++k) {
+    const double *slope = own->frame[k].slope;
+    for (int i = 0; i < 2; ++i) m->tangent[2 * k + i] = slope[i] / hypot(slope[0], slope[1]);
+  }
+  for (int k = 0; k < own->number && find_frames(own, q1); ++k) {
+    guide_frame *f = own->frame + k;
+    curve_around *c = own->around + k;
+    const double x = f->slope[0], y = f->slope[1], slope = hypot(x, y);
+    double wide = WIDEST;
+    for (int j = 2; j < CURVE_POINTS; ++j)
+      wide = fmin(wide, pow(slope / hypot(c->a[j][0], c->a[j][1]), 1. / (j - 1)) * OF_RADIUS);
+    own->step[k] *= wide, f->at[0] = c->middle = NAN;
+    if (!find_frames(own, q1)) return;
+    if (wide > 1 && !(hypot(f->slope[0] / wide - x, f->slope[1] / wide - y) <= SAME_SLOPE * slope))
+      own->step[k] /= wide, f->at[0] = c->middle = NAN, wide = 1;
+    for (int i = 0; i < others; ++i) m->neighbour[i]->step[k] *= wide;
   }
 }
 
@@ -869,7 +887,7 @@ void find_tangents_before(void *self, const time_step *step, const double *q1)
  * direction of a chord depends on that point, see find_frame. */
 static void find_turn_of_chord(const guide_derivatives *m, const double *q1, int k, double *by_way)
 {
-  const guides *g = m->guides;
+  const guides *g = m->own;
   const guide_frame *f = g->frame + k;
   const double *t0 = m->tangent + 2 * k, t[2] = {f->n[1], -f->n[0]}, direction[2] = {f->m[1], -f->m[0]};
   const double force = q1[g->dofs[7 * k + 6]], along = product_of(direction, t0);
@@ -884,11 +902,11 @@ static void find_turn_of_chord(const guide_derivatives *m, const double *q1, int
 static void add_changes_of_curves(const guide_derivatives *m, const double *q1, int p, double *r)
 {
   for (int i = p * m->neighbours; i < (p + 1) * m->neighbours; ++i) {
-    const double weight = find_frames(m->neighbour[i], q1) ? m->weight[i] : NAN;
-    for (int k = 0; k < m->guides->number; ++k) {
-      const guide_frame *f = m->guides->frame + k, *one = m->neighbour[i]->frame + k;
+    const double weight = find_frames(m->own, q1) && find_frames(m->neighbour[i], q1) ? m->weight[i] : NAN;
+    for (int k = 0; k < m->own->number; ++k) {
+      const guide_frame *f = m->own->frame + k, *one = m->neighbour[i]->frame + k;
       const double *normal = f->smooth ? f->secant : f->m, *other = f->smooth ? one->secant : one->m;
-      const int32_t *dofs = m->guides->dofs + 7 * k;
+      const int32_t *dofs = m->own->dofs + 7 * k;
       for (int j = 0; j < 2; ++j) r[dofs[1 + 2 * j]] += weight * q1[dofs[6]] * (other[j] - normal[j]);
       r[dofs[6]] += weight * (one->distance - f->distance);
     }
@@ -898,7 +916,7 @@ static void add_changes_of_curves(const guide_derivatives *m, const double *q1, 
 void add_guides_derivative(void *self, const derivatives *d, int p, double *r)
 {
   const guide_derivatives *m = self;
-  const guides *g = m->guides;
+  const guides *g = m->own;
   const double *q0 = d->q0 + (size_t)p * d->size;
   add_changes_of_curves(m, d->x, p, r);
   for (int k = 0; k < g->number && g->over_step; ++k) {

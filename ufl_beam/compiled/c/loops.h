@@ -1297,10 +1297,11 @@ typedef struct {
   double *now, *end, *before; /* of the forces on cells */
 } moving_derivatives;
 
-/* Guides, the same in neighbouring scenes, and the unit tangents of their curves at the points before the
- * step. */
+/* Guides of the run, the same with other polynomials, and in neighbouring scenes; and the unit tangents of
+ * their curves at the points before the step. */
 typedef struct {
-  guides *guides;
+  const guides *guides;
+  guides *own;
   int parameters, neighbours;
   guides *const *neighbour;
   const double *weight; /* see derivatives */
