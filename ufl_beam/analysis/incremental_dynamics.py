@@ -39,7 +39,7 @@ from ufl_beam.model.beams import Mesh
 from ufl_beam.model.ground_motion import GroundMotion
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import progress_bar
-from ufl_beam.simulation.initial_state import require_scheme
+from ufl_beam.simulation.initial_state import StateOf, chosen_state, require_scheme
 from ufl_beam.simulation.run import running, take_steps
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
@@ -62,7 +62,7 @@ def incremental_dynamic_analysis(
     intensity: Callable[[GroundMotion], float] | None = None,
     scheme: Scheme | None = None,
     dt: float | None = None,
-    start: Solution | None = None,
+    start: StateOf | None = None,
     newton: Newton | None = None,
     mesh: Mesh | None = None,
     path: str | Path | None = None,
@@ -142,8 +142,7 @@ def incremental_dynamic_analysis(
         raise ArgumentError(f"{WHAT}: scheme = {chosen!r} is static; give a dynamic scheme")
     if dt is not None:
         dt = require_number(dt, f"{WHAT}: dt", positive=True)
-    if start is not None:
-        require_kind(start, Solution, f"{WHAT}: start")
+    start = chosen_state(start, f"{WHAT}: start")
     require_options(newton, mesh, progress, WHAT)
     unit = dict[str, float]()
     for key, motion in known.items():

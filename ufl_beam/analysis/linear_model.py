@@ -56,6 +56,7 @@ from ufl_beam.model.loads import Load
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.output.states import States
+from ufl_beam.simulation.initial_state import StateOf
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.eigensolvers import ROUND_OFF
@@ -524,7 +525,7 @@ def linearize(
     *,
     inputs: Sequence[Any],
     outputs: Sequence[Any],
-    at: Solution | None = None,
+    at: StateOf | None = None,
     mesh: Mesh | None = None,
 ) -> LinearModel:
     """Linearize a scene about an equilibrium, with inputs and outputs for control or vibration.
@@ -547,7 +548,8 @@ def linearize(
             ``("section_forces_at", place)`` with "N", "V", "M"; ``("connector", connector)`` with
             "motion", "rate", "force"; ``("joint", joint)`` and ``("reaction", support)`` with "x",
             "y", "moment".  Without a component, each component is an output.
-        at: Solution of the same beams with equal joints, which ends in equilibrium at rest.
+        at: Solution of the same beams with equal joints, which ends in equilibrium at rest, or
+            ``(solution, n)`` with such a state.
         mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
 
     Raises:
@@ -568,7 +570,7 @@ def linearize(
         >>> print(abs(model.frequency_response(1e-3)[0, 1]).round(6))  # as the support
         [1.]
     """
-    require_state("linearize", scene, at, mesh)
+    at = require_state("linearize", scene, at, mesh)
     sequences = {"inputs": inputs, "outputs": outputs}
     for name, some in sequences.items():
         if not require_sequence(some, f"linearize: {name}"):

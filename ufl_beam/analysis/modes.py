@@ -35,7 +35,7 @@ from ufl_beam.model.works import VirtualWork
 from ufl_beam.output.paraview_files import VTKHDF, XDMF, TimeSeries
 from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.parallel import active_comm, on_first
-from ufl_beam.simulation.initial_state import mesh_of
+from ufl_beam.simulation.initial_state import StateOf, chosen_state, mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.beam_forces import inelastic_forms, section_law
@@ -291,7 +291,7 @@ class Buckling(Shapes):
         ]
 
 
-def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None = None) -> Modes:
+def modes(scene: Scene, n: int, *, at: StateOf | None = None, mesh: Mesh | None = None) -> Modes:
     """Compute natural frequencies, damping ratios and shapes of small vibrations.
 
     The vibrations are about the undeformed, unloaded scene, or about the last state of the solution
@@ -309,7 +309,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     Args:
         scene: Model.
         n: Number of modes, from the lowest frequency; fewer if the scene has fewer.
-        at: Solution of the same beams with equal joints; vibrations are about its last state.
+        at: Solution of the same beams with equal joints; vibrations are about its last state, or
+            about the n-th stored state of ``(solution, n)``.
         mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
 
     Raises:
@@ -327,7 +328,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     """
     require_kind(scene, Scene, "modes: scene")
     n = require_count(n, "modes: n")
-    require_state("modes", scene, at, mesh)
+    at = require_state("modes", scene, at, mesh)
     return computed_modes(scene, n, at, mesh)
 
 
@@ -364,7 +365,7 @@ def computed_modes(
 
 
 def buckling(
-    scene: Scene, n: int, *, t: float = 1.0, at: Solution | None = None, mesh: Mesh | None = None
+    scene: Scene, n: int, *, t: float = 1.0, at: StateOf | None = None, mesh: Mesh | None = None
 ) -> Buckling:
     """Compute buckling load factors and modes, (K + λ K' + λ² K''/2) x = 0.
 
@@ -380,7 +381,8 @@ def buckling(
         scene: Model.
         n: Number of factors, from the smallest ``|λ|``; fewer if fewer are real.
         t: Time at which loads are evaluated; s.
-        at: Solution of the same beams with equal joints; the loads grow from its last state.
+        at: Solution of the same beams with equal joints; the loads grow from its last state, or
+            from the n-th stored state of ``(solution, n)``.
         mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
 
     Raises:
@@ -401,7 +403,7 @@ def buckling(
     """
     require_kind(scene, Scene, "buckling: scene")
     n = require_count(n, "buckling: n")
-    require_state("buckling", scene, at, mesh)
+    at = require_state("buckling", scene, at, mesh)
     require_number(t, "buckling: t")
     for load in (*scene.loads, *scene.works):
         if isinstance(load, VirtualWork) or (isinstance(load, Load) and not load.dead):
@@ -453,18 +455,21 @@ def _stresses(small: SmallMotions, at: Solution | None) -> tuple[tuple[Array, Ar
     return law, np.zeros((lib.CELL_NUMBERS, count)) if at is None else at.cell_resultants(-1)
 
 
-def require_state(what: str, scene: Scene, at: Solution | None, mesh: Mesh | None) -> None:
-    """Raise unless the last state of ``at``, or without it the undeformed scene, is a state.
+def require_state(
+    what: str, scene: Scene, at: StateOf | None, mesh: Mesh | None
+) -> Solution | None:
+    """Return the solution that ends with the state ``at``, None for the undeformed scene, or raise.
 
     ``what`` is the function that needs the state.
     """
     require_kind(scene, Scene, f"{what}: scene")
     if at is None:
         require_no_prestress(scene, what, "give at=, a static solution")
-        return
-    require_kind(at, Solution, f"{what}: at")
-    if not DofNumbering(scene, mesh_of(at, mesh)).agrees(at.numbering):
+    elif (at := chosen_state(at, f"{what}: at")) and not DofNumbering(
+        scene, mesh_of(at, mesh)
+    ).agrees(at.numbering):
         raise ArgumentError(
             f"{what}: at is a solution of other beams, joints or cells; use the same Beam "
             "objects, joined alike, and the same Mesh"
         )
+    return at

@@ -34,6 +34,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Content, add_prefix, remove_prefix, require_arrays
 from ufl_beam.output.recorder import Recorder, checked_recorders
 from ufl_beam.parallel import communicator, progress_bar
+from ufl_beam.simulation.initial_state import StateOf, chosen_state
 from ufl_beam.simulation.run import running, take_steps
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import NAMED, Solution
@@ -136,7 +137,7 @@ def follow(
     *,
     until: Callable[[Simulation], bool] | None = None,
     steps: int = 200,
-    start: Solution | Branch | None = None,
+    start: StateOf | Branch | None = None,
     record: Sequence[Recorder] | Recorder = (),
     newton: Newton | None = None,
     mesh: Mesh | None = None,
@@ -158,7 +159,8 @@ def follow(
         until: Function that ends the path after the first step for which it is true, as in
             ``until=lambda now: now.displacement(tip)[1] < -0.5``; ``now.t`` is the load factor.
         steps: Largest number of steps.
-        start: Branch of a :class:`CriticalPoint`, or a solution that the path continues.
+        start: Branch of a :class:`CriticalPoint`, or a solution that the path continues, also
+            ``(solution, n)`` from its n-th stored state.
         record: Recorders of files or results, as in :func:`simulate`.
         newton: Tolerances and PETSc options; line searches and Krylov methods are not used.
         mesh: Discretization; by default the mesh of ``start``, or the cells of the beams.
@@ -186,10 +188,9 @@ def follow(
     control.require(scene)
     require_count(steps, "follow: steps")
     require_switch(progress, "follow: progress")
-    if start is not None:
-        require_kind(start, (Solution, Branch), "follow: start")
     recorders, outputs = checked_recorders(record, comm, "follow")
-    branch, state = (start, start.state) if isinstance(start, Branch) else (None, start)
+    branch = start if isinstance(start, Branch) else None
+    state = branch.state if branch else chosen_state(start, "follow: start")
     t0 = 0.0 if state is None else float(state.times[-1])
     _require_load_factor(scene, t0)
     began = time.perf_counter()

@@ -29,7 +29,7 @@ from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.section_forces import Diagram, ForcesAlongCells
-from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.initial_state import StateOf, chosen_state
 
 RULES = "CQC", "SRSS"
 LEAST_MASS = 0.9  # fraction of the mass that modes should have; EN 1998-1:2004, 4.3.3.3.1
@@ -166,7 +166,7 @@ def response_spectrum_analysis(
     direction: tuple[float, float] = (1.0, 0.0),
     damping: float = 0.05,
     rule: str = "CQC",
-    at: Solution | None = None,
+    at: StateOf | None = None,
     mesh: Mesh | None = None,
 ) -> SpectralResponse:
     """Compute peak responses of a structure to a spectrum by its modes.
@@ -215,8 +215,7 @@ def response_spectrum_analysis(
         raise ArgumentError(f"{what}: rule = {shorten(rule)} must be one of {', '.join(RULES)}")
     if mesh is not None:
         require_kind(mesh, Mesh, f"{what}: mesh")
-    if at is not None:
-        require_kind(at, Solution, f"{what}: at")
+    at = chosen_state(at, f"{what}: at")
     spectral_accelerations(spectrum, np.zeros(0), what)
     if scene.works:
         raise ArgumentError(f"{what}: {scene.works[0]}: works are left out of section forces")

@@ -70,6 +70,10 @@ class PresentState(ABC):
         """Return the present displacement and rotation (u, v, ψ) of a place; (3,); m, m, rad."""
         return np.asarray(self.now.displacement(place)[0])
 
+    def position(self, place: AttachmentPoint) -> Array:
+        """Return the present coordinates of a place; (2,); m."""
+        return np.asarray(self.now.position(place)[0])
+
     def velocity(self, place: AttachmentPoint) -> Array:
         """Return the present velocity (du/dt, dv/dt, dψ/dt) of a place; (3,); m/s, m/s, rad/s.
 

@@ -25,7 +25,7 @@ from ufl_beam.discretization.work_forms import statement
 from ufl_beam.errors import ArgumentError, require_kind, shorten, warn
 from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import DEFAULT_MESH, Mesh
-from ufl_beam.model.connector_laws import RIGID
+from ufl_beam.model.connector_laws import RIGID, Coulomb, Guide
 from ufl_beam.model.constraint_checks import (
     require_independent,
     require_inertia,
@@ -38,6 +38,9 @@ from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.solution import Solution
+
+StateOf = Solution | tuple[Solution, int]
+"""State of a solution: its last one, or the n-th stored one of (solution, n)."""
 
 
 @no_garbage_collection()
@@ -94,6 +97,44 @@ def require_scheme(scheme: Any, what: str) -> None:
             f"{what}: {type(scheme).__name__} cannot be hashed, and forms are kept by scheme; "
             "decorate the class with @dataclass(frozen=True)"
         ) from None
+
+
+def chosen_state(given: StateOf | None, what: str) -> Solution | None:
+    """Return the solution that ends with a state: a solution, or its part up to (solution, n).
+
+    Raises:
+        ArgumentError: There is no such state, or its internal variables are not known.
+    """
+    if given is None:
+        return None
+    solution, n = given if isinstance(given, tuple) and len(given) == 2 else (given, -1)
+    require_kind(solution, Solution, what)
+    require_kind(n, (int, np.integer), f"{what}: n of (solution, n)")
+    if (n := solution.index(n)) == len(solution) - 1:
+        return solution
+    scene, numbering = solution.scene, solution.numbering
+    owners = [numbering.middle(int(cell)).beam.name for cell in numbering.inelastic_cells[:1]]
+    owners += [str(c) for c in scene.all_connectors if remembers(c.law)]
+    if owners:
+        raise ArgumentError(
+            f"{what}: {owners[0]} has internal variables, and solutions have those of their last "
+            f"state only; end a run at {solution.parameter.at(solution.times[n])}, or call "
+            "snapshot() of a Simulation there"
+        )
+    part = type(solution)(scene, numbering, solution)
+    part._blocks = solution.subset(0, n + 1)._blocks
+    reactions = np.zeros(numbering.size)
+    for support, forces in zip(scene.supports, part.column("reactions")[:,][-1], strict=True):
+        held = [*support.held]
+        reactions[numbering.node(support.place)[held]] = forces[held]
+    part.internal = {"reactions": reactions} if np.isfinite(reactions).all() else {}
+    return part
+
+
+def remembers(law: Any) -> bool:
+    """Return whether the forces of a connector law depend on more than the present motion."""
+    names = "law", "softening", "variables", "holds", "state", "sample"
+    return isinstance(law, Coulomb | Guide) or any(getattr(law, name, None) for name in names)
 
 
 def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:

@@ -21,9 +21,11 @@ from ufl_beam.errors import (
     ConvergenceError,
     StepFailed,
     require_count,
+    require_function,
     require_kind,
     require_number,
     require_switch,
+    shorten,
     warn,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
@@ -36,7 +38,9 @@ from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.checkpoint import Checkpoint, CheckpointFile, checksum_at
 from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch
 from ufl_beam.simulation.initial_state import (
+    StateOf,
     checked_numbering,
+    chosen_state,
     continuation,
     initial_state,
     mesh_of,
@@ -58,7 +62,8 @@ def simulate(
     record: Sequence[Recorder] | Recorder = (),
     every: int = 1,
     max_states: int = sys.maxsize,
-    start: Solution | None = None,
+    start: StateOf | None = None,
+    until: Callable[[Simulation], bool] | None = None,
     newton: Newton | None = None,
     mesh: Mesh | None = None,
     checkpoint: Checkpoint | None = None,
@@ -78,8 +83,11 @@ def simulate(
         every: Number of steps between stored states; the last state is always stored.
         max_states: Largest number of stored states, besides the initial and the last state.  If a
             run has more, every other state is deleted and ``every`` is doubled.
-        start: Solution whose last state is the initial state, with the same beams.  Joints may be
-            removed, or added where places coincide.
+        start: Solution whose last state is the initial state, with the same beams, or
+            ``(solution, n)`` for its n-th stored state, if no law has internal variables.  Joints
+            may be removed, or added where places coincide.
+        until: Function that ends the run after the first step for which it is true, as in
+            ``until=lambda now: now.displacement(tip)[1] < -0.5``; by default the run ends at t[1].
         newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default as in ``start``, or the cells of the beams.
         checkpoint: File from which the run continues if the script is run again.
@@ -125,8 +133,9 @@ def simulate(
         )
     require_count(every, "simulate: every")
     require_count(max_states, "simulate: max_states")
-    if start is not None:
-        require_kind(start, Solution, "start")
+    start = chosen_state(start, "start")
+    if until is not None:
+        require_function(until, "simulate: until", "the Simulation")
     if checkpoint is not None:
         require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
     files = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
@@ -140,7 +149,7 @@ def simulate(
         number = step_count(t1 - t0, cast(float, dt))
         return simulate_by_reference(
             scene, scheme, newton, (t0, t1), number, start=start, mesh=mesh, every=every,
-            max_states=max_states, comm=comm, progress=progress,
+            max_states=max_states, comm=comm, progress=progress, until=until,
         )  # fmt: skip
     with ExitStack() as stack:
         keeper: CheckpointFile | None = None
@@ -167,8 +176,9 @@ def simulate(
             pace = EqualSteps(simulation, t1, dt)
         bar = progress_bar(progress, comm, total=1.0)
         take_steps(
-            simulation, pace, recorders, bar, max_states=max_states, keeper=keeper, begin=begin
-        )
+            simulation, pace, recorders, bar, max_states=max_states, until=until, keeper=keeper,
+            begin=begin,
+        )  # fmt: skip
     return solution
 
 
@@ -191,7 +201,8 @@ def take_steps(
         recorders: Recorders of each step.
         bar: Progress bar.
         max_states: Largest number of stored states, see :func:`simulate`.
-        until: Condition; the run ends after the first step with a state that satisfies it.
+        until: Condition; the run ends after the first step with a state that satisfies it.  It
+            may differ between processes.
         keeper: Writer of checkpoints.
         begin: ``time.perf_counter()`` at the beginning of the run, for checkpoints; s.
     """
@@ -199,7 +210,7 @@ def take_steps(
     tolerance = LEDGER_TOLERANCE * simulation.solver.c.rtol
     watch = LedgerWatch(simulation.numbering, simulation.scheme, tolerance)
 
-    def after_step() -> bool:
+    def after_step() -> None:
         solution.time_error = pace.error
         if recorders or keeper is not None:
             simulation.comparison.synchronize()  # raises before processes write different results
@@ -213,13 +224,17 @@ def take_steps(
                 watch.last_checked = len(solution) - 1
         for recorder in recorders:
             recorder.write(simulation)
-        if keeper is not None and (keeper.due(pace.steps) or pace.finished):
-            keeper.write(simulation, pace, time.perf_counter() - begin)
-        return until is not None and bool(until(simulation))
+
+    def satisfied() -> bool:
+        if until is None:
+            return False
+        found = simulation.together(require_answer, until, simulation)
+        return simulation.subdomain.largest(found) > 0
 
     if keeper is not None and keeper.content:
         simulation.together(keeper.resume, simulation, pace)
         print_once(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
+        ended = satisfied()
     else:
         for recorder in recorders:
             simulation.together(recorder.open, simulation)
@@ -234,14 +249,24 @@ def take_steps(
             else:
                 left = solution.every - pace.steps % solution.every
                 pace.advance(left if quiet else 1)
-                ended = simulation.together(after_step)
-                if until is not None:  # the condition may differ between processes
-                    ended = simulation.subdomain.largest(ended) > 0
+                simulation.together(after_step)
+                ended = satisfied()
+                if keeper is not None and (keeper.due(pace.steps) or pace.finished or ended):
+                    spent = time.perf_counter() - begin
+                    simulation.together(keeper.write, simulation, pace, spent)
             if not bar.disable:
                 bar.set_postfix_str(simulation.parameter.at(simulation.t), refresh=False)
                 bar.update(pace.progress - bar.n)
     simulation.end()
     simulation.together(simulation.warn, watch.faults(solution, solution.every, last=True))
+
+
+def require_answer(until: Callable[[Any], bool], now: Any) -> bool:
+    """Return whether the condition ``until`` is satisfied; raise unless it is True or False."""
+    answer = until(now)
+    if not isinstance(answer, bool | np.bool_):
+        raise ArgumentError(f"until returned {shorten(answer)}; it must return True or False")
+    return bool(answer)
 
 
 def check_ledger(simulation: Simulation) -> None:
@@ -319,7 +344,7 @@ def require_times(t: tuple[float, float], call: str = "simulate") -> tuple[float
 def simulate_by_reference(
     scene: Scene, scheme: Scheme, newton: Newton, times: tuple[float, float], number: int, *,
     start: Solution | None, mesh: Mesh | None, every: int, max_states: int, comm: MPI.Intracomm,
-    progress: bool,
+    progress: bool, until: Callable[[Any], bool] | None = None,
 ) -> Solution:  # fmt: skip
     """Simulate by the reference solver, in ``number`` equal steps between the two ``times`` (s).
 
@@ -371,6 +396,8 @@ def simulate_by_reference(
                         solution.downsample()
                         solution.every *= 2
                 bar.update(k / number - bar.n)
+                if until is not None and require_answer(until, solver):
+                    break
     except StepFailed as failure:
         raise ConvergenceError(
             f"no equilibrium after t = {solver.t:.9g} s: {failure}. {scheme.advice}",

@@ -18,7 +18,7 @@ from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.discretization.state_transfer import same_unknowns
-from ufl_beam.errors import ArgumentError, StepFailed, require_kind, require_number, shorten
+from ufl_beam.errors import ArgumentError, StepFailed, require_number, shorten
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.loads import RotatingFrame
@@ -30,7 +30,9 @@ from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, communicator, sharing
 from ufl_beam.simulation.diagnosis import no_equilibrium
 from ufl_beam.simulation.initial_state import (
+    StateOf,
     checked_numbering,
+    chosen_state,
     continuation,
     initial_state,
     mesh_of,
@@ -59,8 +61,9 @@ class Simulation(Stepper):
         scene: Model.
         scheme: :class:`Static`, :class:`EnergyMomentum` or another scheme, see docs/schemes.md.
         t0: Time of the initial state; s.
-        start: Solution whose last state is the initial state, with the same beams.  Joints may be
-            removed, or added where places coincide.
+        start: Solution whose last state is the initial state, with the same beams, or
+            ``(solution, n)`` for its n-th stored state.  Joints may be removed, or added where
+            places coincide.
         newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default as in ``start``, or the cells of the beams.
         comm: Processes that share the scene; by default all, or in a :func:`study` this process
@@ -93,7 +96,7 @@ class Simulation(Stepper):
         scheme: Scheme,
         *,
         t0: float = 0.0,
-        start: Solution | None = None,
+        start: StateOf | None = None,
         newton: Newton | None = None,
         mesh: Mesh | None = None,
         comm: MPI.Intracomm | None = None,
@@ -107,8 +110,7 @@ class Simulation(Stepper):
             raise ArgumentError(
                 f"kind = {shorten(kind)} must be a class of solutions, such as Path"
             )
-        if start is not None:
-            require_kind(start, Solution, "start")
+        start = chosen_state(start, "start")
         fresh = start is None
         numbering, free_motion = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=fresh)
         subdomain = Subdomain(numbering, sharing(comm, len(numbering.cells)))
