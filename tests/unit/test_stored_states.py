@@ -174,6 +174,31 @@ def test_a_condition_returns_true_or_false():
         ub.simulate(SWINGS, ub.EnergyMomentum(), t=(0, 1), dt=0.1, until=3)
 
 
+def test_a_simulation_without_stored_states_says_how_to_store_them():
+    """In each use of its solution; it has states after keep()."""
+    simulation = ub.Simulation(SWINGS, ub.EnergyMomentum())
+    for _ in range(3):
+        simulation.step_to(simulation.t + 0.01)
+    empty, words = simulation.solution, ("no state is stored", "keep()", "snapshot()")
+    assert all(word in str(empty) and word in repr(empty) for word in words)
+    for use in (
+        lambda: empty.displacement(BEAM.end), lambda: empty.position(BEAM.end), lambda: empty.q,
+        lambda: empty.energy, lambda: empty.section_forces(BEAM), lambda: empty.shape(BEAM),
+        lambda: ub.simulate(SWINGS, ub.Static(), t=(0, 1), dt=1.0, start=empty),
+        lambda: ub.modes(SWINGS, 1, at=empty), lambda: ub.plot(empty),
+        lambda: ub.modes(SWINGS, 1, at=(empty, 0)),
+    ):  # fmt: skip
+        with raises(*words):
+            use()
+    simulation.keep()
+    assert empty.times == pytest.approx([0.03], rel=1e-15)
+    now = simulation.snapshot()
+    simulation.close()
+    assert np.array_equal(now.q, empty.q)
+    rest = ub.simulate(SWINGS, ub.EnergyMomentum(), t=(0.03, 0.05), dt=0.01, start=now)
+    assert rest.times[-1] == 0.05
+
+
 def test_a_simulation_knows_positions():
     """Of beams and bodies, as its solution."""
     simulation = ub.Simulation(SWINGS, ub.EnergyMomentum())

@@ -18,7 +18,7 @@ from ufl_beam.model.functions import Constant, Curve, Timed
 from ufl_beam.model.law_functions import Values, larger, positive, smaller, sqrt
 from ufl_beam.model.material_law import MaterialLaw, State, require_law
 from ufl_beam.model.material_laws import DuvautLions, ElastoPlastic
-from ufl_beam.model.records import Instance, NotNegative, Positive, Record
+from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Record
 from ufl_beam.model.softening_laws import (
     LinearSoftening,
     Softening,
@@ -124,6 +124,20 @@ class Controller(Record):
         )
 
 
+@dataclass(frozen=True)
+class _FreeAt(MaterialLaw):
+    """Linear elastic law without stress at a given strain."""
+
+    free: float
+    elastic: ClassVar[bool] = True  # type: ignore[misc]
+
+    def stress(self, strain: Values, state: State) -> Values:  # noqa: D102
+        return self.C * (strain - self.free)
+
+    def elastic_energy(self, strain: Values, state: State) -> Values:  # noqa: D102
+        return self.C * (strain - self.free) ** 2 / 2
+
+
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Spring(Record):
@@ -133,9 +147,11 @@ class Spring(Record):
         stiffness: Elastic stiffness; N/m or N m/rad.
         law: Law of yielding; limit in N or N m, moduli in the unit of the stiffness.
         softening: Law of fracture; limit in N or N m, energy in J.
+        free: Motion without force, in an elastic spring; m or rad.  For a :class:`Stretch` it is
+            the free length minus the distance of the places in the undeformed scene.
 
     Raises:
-        ModelError: The stiffness is not positive.
+        ModelError: The stiffness is not positive, or a spring with ``free`` has another law.
 
     Example:
         >>> spring = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e6))  # N/m
@@ -148,11 +164,21 @@ class Spring(Record):
     stiffness: Positive
     law: Annotated[MaterialLaw | None, require_law] = None
     softening: Annotated[SofteningLaw | None, require_softening] = None
+    free: Number = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.law is not None and (fault := self.law.fault(self.stiffness, 1.0)):
             raise ModelError(f"Spring: {type(self.law).__name__}: {fault}")
+        if self.free and (self.law or self.softening):
+            raise ModelError("Spring: free is for an elastic spring; leave law and softening out")
+
+    @property
+    def bulk(self) -> MaterialLaw:
+        """Law of the spring as a material point whose strain is the motion."""
+        if self.free:
+            return _FreeAt(self.free)
+        return self.law or ElastoPlastic(yield_limit=math.inf)
 
 
 @closed(OWN_LAW)

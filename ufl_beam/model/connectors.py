@@ -27,7 +27,7 @@ from ufl_beam.model.checks import require_kind, require_vector
 from ufl_beam.model.connector_law import ConnectorLaw, require_connector_law
 from ufl_beam.model.connector_laws import HingeLaw, Law, RigidPlastic, Spring
 from ufl_beam.model.functions import Point
-from ufl_beam.model.records import Record, Vector
+from ufl_beam.model.records import Record, Text, Vector
 
 
 def _require_law(law: Any, what: str) -> None:
@@ -55,6 +55,7 @@ class Connector(Record, ABC):
         law: Law of the force.
         axis: Unit vector, for motions along an axis.
         corner: Point that moves with the node of ``a`` and replaces place a in the motion, or None.
+        name: Name in results and messages, by default made of the class and the places.
         component: Index of the motion in the law of a :class:`Bushing`, otherwise 0.
         components: Connectors of the components of a :class:`Bushing`, otherwise empty.
 
@@ -75,6 +76,7 @@ class Connector(Record, ABC):
     law: LawField
     axis: Point = (1.0, 0.0)
     corner: Point | None = None
+    name: str = ""
     component: int = 0
     components: tuple[Connector, ...] = ()
 
@@ -90,7 +92,7 @@ class Connector(Record, ABC):
             )
 
     def __str__(self) -> str:
-        return f"{self.kind}({self.a}, {self.b})"
+        return self.name or f"{self.kind}({self.a}, {self.b})"
 
     _label = __str__
 
@@ -151,6 +153,8 @@ class Turn(Connector):
     a: PlaceField
     b: PlaceField
     law: LawField
+    _: KW_ONLY
+    name: Text = ""
     motion = "turning"
 
 
@@ -169,6 +173,8 @@ class Stretch(Connector):
     a: PlaceField
     b: PlaceField
     law: LawField
+    _: KW_ONLY
+    name: Text = ""
     motion = "stretching"
 
     def __post_init__(self) -> None:
@@ -185,6 +191,7 @@ class Slide(Connector):
         b: Place that moves along the axis.
         law: Law of the force along the axis.
         axis: Direction in the undeformed scene; from ``a`` to ``b`` by default.
+        name: Name in results and messages.
 
     Raises:
         ModelError: An axis of zero length.
@@ -199,6 +206,7 @@ class Slide(Connector):
     law: LawField
     _: KW_ONLY
     axis: Point = None  # type: ignore[assignment]  # replaced by a unit vector
+    name: Text = ""
     motion = "sliding"
 
     def __post_init__(self) -> None:
@@ -220,6 +228,7 @@ class Bushing(Connector):
         b: Place that moves; it may be at the point of ``a``.
         law: A :class:`ConnectorLaw` with two or three components, such as :class:`Clearance`.
         axis: Direction of the first component in the undeformed scene.
+        name: Name in results and messages.
 
     Raises:
         ModelError: A law of one component, or an axis of zero length.
@@ -238,6 +247,7 @@ class Bushing(Connector):
     law: Annotated[ConnectorLaw, _require_law]
     _: KW_ONLY
     axis: Vector = (1.0, 0.0)
+    name: Text = ""
     motion = "sliding"
 
     def __post_init__(self) -> None:
@@ -256,7 +266,9 @@ class Bushing(Connector):
         x, y = self.axis
         motions = (("sliding", (x, y)), ("sliding", (-y, x)), ("turning", (x, y)))
         return tuple(
-            Component("Bushing", motion, self.a, self.b, self.law, along, component=i)
+            Component(
+                "Bushing", motion, self.a, self.b, self.law, along, component=i, name=self.name
+            )
             for i, (motion, along) in enumerate(motions[: self.law.components])
         )
 
@@ -273,6 +285,7 @@ class Component(Connector):
     axis: Point = (1.0, 0.0)
     corner: Point | None = None
     component: int = 0
+    name: str = ""
 
     @property
     def kind(self) -> str:

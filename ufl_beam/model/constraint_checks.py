@@ -355,9 +355,9 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
             at_rest, strained = (law.elastic_forces(e, state)[i][0] for e in ends)
             if abs(at_rest) > abs(strained - at_rest):
                 wrong.append((connector, law, "a force at no motion"))
-        elif isinstance(law, Spring) and law.law is not None:
-            if law.law.stressed((np.float64(law.stiffness),), (moved,)):
-                wrong.append((connector, law.law, "a stress at no strain"))
+        elif isinstance(law, Spring):
+            if law.bulk.stressed((np.float64(law.stiffness),), (moved,)):
+                wrong.append((connector, law.law or law, "a stress at no strain"))
     for beam in scene.beams:
         for points in beam.section.section_points(None):
             strains = LAST_DIGITS * np.abs(points.strains) @ [1.0, 1.0, 1.0 / scene.size]

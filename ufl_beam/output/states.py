@@ -55,6 +55,12 @@ SHORTEST_CHORD = 1e-5
 """Length of a chord of a guide whose direction has few digits, as a fraction of the size."""
 
 
+NO_STATE = (
+    "no state is stored; keep() of a Simulation stores the present one, snapshot() returns it as a "
+    "solution for start="
+)
+
+
 class Cells:
     """Objects that compute results of all cells of a scene; each is created at its first access.
 
@@ -164,6 +170,8 @@ class States:
     def index(self, n: int) -> int:
         """Return the index of the n-th state from the beginning; raise ArgumentError without it."""
         number, n = len(self), operator.index(n)
+        if not number:
+            raise ArgumentError(NO_STATE)
         if not -number <= n < number:
             raise ArgumentError(
                 f"n = {n}: the solution kept {number} times; give {-number} to {number - 1}"
@@ -181,6 +189,8 @@ class States:
 
     def column(self, name: str) -> Column:
         """Return the column ``name`` of all states that have it; (n+1, ...)."""
+        if name == "q":
+            self.index(0)  # raises if there is none
         return Column(self._blocks, name)
 
     def _row(self, name: str, n: int) -> Array:
@@ -310,6 +320,9 @@ class States:
 
     def joint(self, joint: Joint) -> JointHistory:
         """Return the motion between the first two places of a joint, and its force on the second.
+
+        Forces are known of joints made with ``multipliers=True``, and of joints that are always
+        constrained by forces, such as :class:`Link`, see docs/joints.md.
 
         Raises:
             ArgumentError: The joint is not in the scene, or the second place shares unknowns with
@@ -582,6 +595,7 @@ class States:
     @property
     def energy(self) -> Energy:
         """Energy ledger of all states."""
+        self.index(0)  # raises if there is none
         return Energy(*self.ledger())
 
     def momentum(self) -> Array:

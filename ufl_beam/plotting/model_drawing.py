@@ -274,7 +274,8 @@ def _name_bodies_and_connectors(drawing: Drawing) -> None:
             ]
         units = ("N m", "rad") if connector.is_rotation else ("N", "m")
         words = symbols.law_symbol(connector.law).words(connector.law, *units)
-        drawing.write(words, TEXT, CAPTIONS, spots)
+        name = f"{connector.name}, " * bool(connector.name)
+        drawing.write(name + words, TEXT, CAPTIONS, spots)
 
 
 # -- arrows ------------------------------------------------------------------------------------

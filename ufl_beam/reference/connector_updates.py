@@ -306,7 +306,7 @@ class _SpringLaw(LawInStep):
 
     def __init__(self, connector: Connector, setting: Setting) -> None:
         super().__init__(connector, setting)
-        law, softening = self.law.law or ElastoPlastic(yield_limit=np.inf), self.law.softening
+        law, softening = self.law.bulk, self.law.softening
         key = [setting.numbering.scene.stream_keys[connector]]
         section_points = SectionPoints(
             strains=np.eye(1, 3), weights=np.ones(1), stiffness=np.array([self.law.stiffness]),

@@ -201,8 +201,7 @@ def take_steps(
         recorders: Recorders of each step.
         bar: Progress bar.
         max_states: Largest number of stored states, see :func:`simulate`.
-        until: Condition; the run ends after the first step with a state that satisfies it.  It
-            may differ between processes.
+        until: Condition; the run ends after the first step with a state that satisfies it.
         keeper: Writer of checkpoints.
         begin: ``time.perf_counter()`` at the beginning of the run, for checkpoints; s.
     """
@@ -225,11 +224,9 @@ def take_steps(
         for recorder in recorders:
             recorder.write(simulation)
 
-    def satisfied() -> bool:
-        if until is None:
-            return False
-        found = simulation.together(require_answer, until, simulation)
-        return simulation.subdomain.largest(found) > 0
+    def satisfied() -> bool:  # on any process
+        answer = until is not None and simulation.together(require_answer, until, simulation)
+        return until is not None and simulation.subdomain.largest(answer) > 0
 
     if keeper is not None and keeper.content:
         simulation.together(keeper.resume, simulation, pace)

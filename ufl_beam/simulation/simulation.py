@@ -55,7 +55,8 @@ MOST_VALUES = 2**20
 class Simulation(Stepper):
     """Time stepper of a scene: its present state, and steps to later states.
 
-    :func:`simulate` is a loop over steps; use this class for loops of your own.
+    :func:`simulate` is a loop over steps; use this class for loops of your own.  Steps are not
+    stored: :meth:`keep` appends the present state to :attr:`solution`.
 
     Args:
         scene: Model.
@@ -72,7 +73,7 @@ class Simulation(Stepper):
 
     Attributes:
         t: Time; s.
-        solution: Solution so far.
+        solution: States stored by :meth:`keep`, or ``steps_to(..., keep=True)``; empty at first.
         substeps: Number of substeps so far; an undivided step counts as one substep.
         comparison: Comparison of the processes if each of them computes a small scene as a whole.
 
@@ -80,8 +81,11 @@ class Simulation(Stepper):
         >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
         >>> while simulation.t < 1:
         ...     simulation.step_to(simulation.t + 0.05)
+        ...     simulation.keep()
         >>> print((1e3 * simulation.displacement(beam.end)).round(1))  # mm, mm, mrad
         [ -0.1 -18.9 -14.3]
+        >>> len(simulation.solution)
+        20
         >>> simulation.close()
     """
 

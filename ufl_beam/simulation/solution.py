@@ -52,7 +52,7 @@ from ufl_beam.output.serialization import (
     to_data,
 )
 from ufl_beam.output.state_rows import HINGE
-from ufl_beam.output.states import States
+from ufl_beam.output.states import NO_STATE, States
 from ufl_beam.parallel import active_comm, on_first
 
 UNKNOWN = -2
@@ -309,6 +309,8 @@ class Solution(States, Rich):
 
     def summary(self) -> list[str]:
         """Return lines on the model, the run, and embedded hinges that opened."""
+        if not len(self):
+            return [str(self.numbering), NO_STATE]
         ends = " to ".join(f"{t:g}" for t in (*self.times[:1], *self.times[-1:]))
         lines = [
             str(self.numbering),
@@ -326,7 +328,8 @@ class Solution(States, Rich):
         return lines
 
     def __str__(self) -> str:
-        said = *self.summary(), str(self.energy), self.imbalance_message, self.warnings
+        energy = str(self.energy) if len(self) else ""
+        said = *self.summary(), energy, self.imbalance_message, self.warnings
         return "\n".join(filter(None, said))
 
     def __repr__(self) -> str:

@@ -366,7 +366,7 @@ class Springs(Response):
             strains=np.array([[1.0, 0.0, 0.0]]),
             weights=np.ones(1),
             stiffness=np.array([law.stiffness]),
-            laws=((law.law or ElastoPlastic(yield_limit=np.inf), 1),),
+            laws=((law.bulk, 1),),
             rest=np.zeros(3),
             softening=softening if softening is not None and softening.opens else None,
             breaking=slice(0, None),
