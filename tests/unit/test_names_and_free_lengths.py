@@ -115,7 +115,7 @@ def test_components_of_a_bushing_have_its_name():
 
 
 def test_names_are_in_files(tmp_path):
-    body, parts, scene = strut()
+    *_, scene = strut()
     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05)
     run.save(tmp_path / "run.h5")
     loaded = ub.Solution.load(tmp_path / "run.h5")

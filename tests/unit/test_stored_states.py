@@ -168,8 +168,9 @@ def test_conditions_may_use_recorders_and_survive_a_restart(tmp_path):
 
 
 def test_a_condition_returns_true_or_false():
-    with raises("until returned None", "True or False"):
-        ub.simulate(SWINGS, ub.EnergyMomentum(), t=(0, 1), dt=0.1, until=lambda now: None)
+    for wrong in (None, np.zeros(3) < 1):
+        with raises("until returned", "True or False"):
+            ub.simulate(SWINGS, ub.EnergyMomentum(), t=(0, 1), dt=0.1, until=lambda now: wrong)  # noqa: B023
     with raises("simulate: until = 3 must be a function"):
         ub.simulate(SWINGS, ub.EnergyMomentum(), t=(0, 1), dt=0.1, until=3)
 

@@ -343,21 +343,23 @@ TABLE = {
     "Guided": call(
         ub.Guided, place=PLACE, curve=V(lambda s: (1 + s, 0), [*CURVE, None])
     ),
-    "Turn": call(ub.Turn, a=PLACE, b=V(OTHER.end, NO_PLACE), law=V(SPRING, OBJECT)),
-    "Stretch": call(ub.Stretch, a=PLACE, b=V(OTHER.end, NO_PLACE), law=V(SPRING, OBJECT)),
-    "Slide": call(
-        ub.Slide,
-        a=PLACE, b=V(OTHER.end, NO_PLACE), law=V(SPRING, OBJECT), axis=V(None, optional(VECTOR)),
-    ),
+    **{
+        kind.__name__: call(
+            kind,
+            a=PLACE, b=V(OTHER.end, NO_PLACE), law=V(SPRING, OBJECT), name=V("strut", TEXT),
+            **({"axis": V(None, optional(VECTOR))} if kind is ub.Slide else {}),
+        )
+        for kind in (ub.Turn, ub.Stretch, ub.Slide)
+    },
     "Bushing": call(
         ub.Bushing,
         a=PLACE, b=V(OTHER.end, NO_PLACE), law=V(ub.Clearance(1.0, gap=1.0), OBJECT),
-        axis=V((1.0, 0.0), VECTOR),
+        axis=V((1.0, 0.0), VECTOR), name=V("pin", TEXT),
     ),
     "Spring": call(
         ub.Spring,
         stiffness=V(1.0, POSITIVE), law=V(None, optional(OBJECT)),
-        softening=V(None, optional(OBJECT)),
+        softening=V(None, optional(OBJECT)), free=V(0.0, NUMBER),
     ),
     "Damper": call(ub.Damper, viscosity=V(1.0, POSITIVE)),
     "Stop": call(
@@ -540,7 +542,8 @@ TABLE = {
         scene=V(SCENE, OBJECT), scheme=V(ub.Static(), [*OBJECT, ub.Static]),
         t=V((0, 1), [*VECTOR, (1, 0)]), dt=V(0.5, POSITIVE), every=V(1, COUNT),
         max_states=V(10, COUNT),
-        checkpoint=V(None, optional(OBJECT)), progress=V(False, SWITCH), **ALONG,
+        checkpoint=V(None, optional(OBJECT)), progress=V(False, SWITCH),
+        until=V(None, optional(FUNCTION)), **ALONG,
     ),
     "Simulation": call(
         ub.Simulation,

@@ -188,9 +188,11 @@ def follow(
     control.require(scene)
     require_count(steps, "follow: steps")
     require_switch(progress, "follow: progress")
+    if start is not None:
+        require_kind(start, (Solution, Branch, tuple), "follow: start")
     recorders, outputs = checked_recorders(record, comm, "follow")
     branch = start if isinstance(start, Branch) else None
-    state = branch.state if branch else chosen_state(start, "follow: start")
+    state = start.state if isinstance(start, Branch) else chosen_state(start, "follow: start")
     t0 = 0.0 if state is None else float(state.times[-1])
     _require_load_factor(scene, t0)
     began = time.perf_counter()

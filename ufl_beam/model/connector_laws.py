@@ -129,12 +129,12 @@ class _FreeAt(MaterialLaw):
     """Linear elastic law without stress at a given strain."""
 
     free: float
-    elastic: ClassVar[bool] = True  # type: ignore[misc]
+    elastic: ClassVar[bool] = True
 
-    def stress(self, strain: Values, state: State) -> Values:  # noqa: D102
+    def stress(self, strain: Values, state: State) -> Values:
         return self.C * (strain - self.free)
 
-    def elastic_energy(self, strain: Values, state: State) -> Values:  # noqa: D102
+    def elastic_energy(self, strain: Values, state: State) -> Values:
         return self.C * (strain - self.free) ** 2 / 2
 
 

@@ -92,9 +92,10 @@ class Connector(Record, ABC):
             )
 
     def __str__(self) -> str:
-        return self.name or f"{self.kind}({self.a}, {self.b})"
+        return self.name or self._label()
 
-    _label = __str__
+    def _label(self) -> str:
+        return f"{self.kind}({self.a}, {self.b})"
 
     @property
     def kind(self) -> str:

@@ -259,9 +259,9 @@ def take_steps(
 
 
 def require_answer(until: Callable[[Any], bool], now: Any) -> bool:
-    """Return whether the condition ``until`` is satisfied; raise unless it is True or False."""
+    """Return whether the condition ``until`` is satisfied; raise if it has no answer."""
     answer = until(now)
-    if not isinstance(answer, bool | np.bool_):
+    if answer is None or (isinstance(answer, np.ndarray) and answer.size != 1):
         raise ArgumentError(f"until returned {shorten(answer)}; it must return True or False")
     return bool(answer)
 
