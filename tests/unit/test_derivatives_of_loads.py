@@ -68,6 +68,15 @@ def moving_mass(speed=1.3, bend=0.3, mass=0.5, rate=3.0):
     return scene_of(100.0, lambda b: ub.MovingLoad(b, place, (0, -3), sine(rate), mass=mass))
 
 
+def passing_mass(start=0.2, speed=5.0, bend=0.3, mass=0.5):
+    """A mass that comes at 0.04 s and leaves at 0.43 s."""
+
+    def place(t):
+        return -start + speed * t + bend * t**2
+
+    return scene_of(100.0, lambda b: ub.MovingLoad(b, place, (0, -3), mass=mass))
+
+
 def drag(v, w, q, c, k, t):
     speed = (v[0] ** 2 + v[1] ** 2 + 1e-3) ** 0.5
     return -c * speed * (v[0] * w[0] + v[1] * w[1]) - k * q[1] * w[1] * (1 + t)
@@ -339,6 +348,21 @@ def test_adjoint_is_the_same_sum(model, scheme):
         pytest.skip("forces by velocities")
     at = dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
     options = {"t": (0, 1), "dt": 0.05}
+    run = ub.differentiate(model, at, scheme, **options, progress=False)
+    direct = run.of(lambda run: run.q[-1, 4])
+    found = ub.gradient(model, at, scheme, **options, of=lambda run: run.q[:, 4])
+    np.testing.assert_allclose(found, direct, rtol=1e-8, atol=1e-10 * np.abs(direct).max())
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("scheme", [*DYNAMIC, ub.EnergyMomentumDecaying(), ub.Newmark()], ids=repr)
+@pytest.mark.parametrize("model", [moving_mass, passing_mass])
+def test_derivatives_by_a_mass_that_comes_and_goes(model, scheme):
+    """Its velocity is a state of its own; the adjoint is the same sum, see the test above."""
+    at = dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
+    options = {"t": (0, 0.6), "dt": 0.03}
+    error, _ = disagreement(model, scheme, 0.6, 0.03)
+    assert error < SAME
     run = ub.differentiate(model, at, scheme, **options, progress=False)
     direct = run.of(lambda run: run.q[-1, 4])
     found = ub.gradient(model, at, scheme, **options, of=lambda run: run.q[:, 4])

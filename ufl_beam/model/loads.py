@@ -294,16 +294,17 @@ class MovingLoad(Load):
     distributed force with the same resultant, so that there bending moments have errors up to
     0.15 times the force times the length of the cell.
 
-    In dynamics, the acceleration of the mass is the one of the axis at its place, plus
-    s̈ t + (2 ṡ ψ̇ + ṡ² κ) n with the distance s and the rotation ψ and curvature κ of the axis; t
-    and n are tangent and normal of the cross-section.  The kinetic energy of the mass on the beam
-    is part of "kinetic" in the ledger, from the beginning if the mass is then on the beam; "loads"
-    contains the energy that the drive of the mass supplies, and with which the mass enters and
-    leaves.  ``Gravity`` does not weigh this mass:
-    ``force`` contains its weight.  Analyses of modes ignore it.  For the kinetic energy the speed
-    is a difference of positions over 1e-5 s.  A mass that is exactly at a node at the time of an
-    equation belongs to one of both cells, and round-off decides to which; a curved axis has a kink
-    at the node, so that two runs with the same data may differ by the error of the mesh.
+    In dynamics, the mass has the velocity v = ∂r/∂t + ṡ ∂r/∂s of the point r(s, t) of the axis at
+    its distance s, and the acceleration dv/dt, which includes the terms of Coriolis and of the
+    curvature.  A kink of r between two cells changes the momentum of the mass by the opposite of
+    what the beam receives.  A scheme without numerical damping keeps small oscillations of the
+    velocity of the mass and of forces near it after such kinks; they change sign in each step, and
+    displacements hardly have them.  A mass that comes to the beam has at once the velocity of the
+    axis there.  The kinetic energy of the mass on the beam is part of "kinetic" in the ledger, from
+    the beginning if the mass is then on the beam; "loads" contains the energy that the drive of the
+    mass supplies, and with which the mass enters and leaves.  ``Gravity`` does not weigh this mass:
+    ``force`` contains its weight.  Analyses of modes ignore it.  Where the mass begins, its speed
+    is a difference of positions over 1e-4 s.
 
     Args:
         beam: Beam along which the force moves, or a sequence of beams, each of which starts where

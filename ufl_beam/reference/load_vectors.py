@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -199,8 +200,8 @@ class PressureForce(LoadForce):
 class MovingForce(LoadForce):
     """Force and mass that move along a route of beams.
 
-    Substeps in statics apply a part of the change of the nodal forces.  The axis at the mass has
-    the tangent and the curvature of the rotations.
+    Substeps in statics apply a part of the change of the nodal forces.  The mass has rates of its
+    own, with which the scheme gives it the velocity of the axis at its place in each step.
     """
 
     def __init__(self, load: MovingLoad, setting: Setting, inertia: Inertia | None) -> None:
@@ -208,6 +209,7 @@ class MovingForce(LoadForce):
         self._numbering, self._moving = setting.numbering, load
         self._inertia = inertia if load.mass else None
         self._reached_forces = self._on_cell(0.0, np.zeros(2))
+        self._rates: list[Array] | None = None  # velocity, velocity before the last step, further
         if self._inertia is not None:
             self.stored = {"kinetic": 0.0}
 
@@ -240,62 +242,68 @@ class MovingForce(LoadForce):
         size = value_at(self.time, t, self.load)
         return self._on_cell(t, size * np.array(self._moving.force))
 
-    def _direction(self, cell: int, shapes: Array, slopes: Array, ψ: Array) -> tuple[float, float]:
-        """Return angle and curvature of the axis at a place of a cell with the rotations ψ."""
-        (first, last), h = (
-            self._numbering.axis_angles[cell],
-            self._numbering.lengths(np.array([cell]))[0],
-        )
-        ends = np.array([0.0, 1.0, *self._numbering.mesh.nodes[1:-1]])
-        return float(first + (shapes @ ends) * (last - first) + shapes @ ψ), float(
-            (last - first) / h + slopes @ ψ
-        )
+    def _velocity(self, t: float, q: Array, v: Array, speed: float) -> Array:
+        """Return the velocity of the axis at the place of the mass, which moves with ``speed``."""
+        at = self._at(t)
+        assert at is not None
+        cell, dofs, shapes, slopes = at
+        points = self._numbering.points[self._numbering.nodes_of_cells[cell]]
+        place = (points - points[0]).T + q[dofs[:2]]
+        return np.asarray(v[dofs[:2]] @ shapes + speed * (place @ slopes))
 
-    def _speeds(self, step: Step) -> tuple[float, float]:
-        """Return speed and acceleration along the beam at the time of the loads."""
-        half, load = step.dt / 2, self._moving
-        before, now, after = (
-            value_at(load.position, step.load_time + k * half, load) for k in (-1, 0, 1)
+    def _speed(self, t: float, before: float, after: float) -> float:
+        """Return the speed along the beam from places at times before and after ``t``."""
+        ends = (value_at(self._moving.position, t + x, self._moving) for x in (-before, after))
+        return (-next(ends) + next(ends)) / (before + after)
+
+    def _mass_step(self, step: Step, q1: Array) -> tuple[Array, Array] | None:
+        """Return the step of the mass in the rates of the scheme, and its acceleration."""
+        inertia, rates = self._inertia, self._rates
+        if inertia is None or rates is None or self._at(step.load_time) is None:
+            return None
+        s = nodal_step(self.scheme, step.q0, q1, self._numbering.rotations)
+        rows = inertia.scheme.coefficients(step.dt, inertia.last_dt, len(inertia.more))[:2]
+        speed = self._speed(step.load_time, step.dt / 2, step.dt / 2)
+        at_axis = self._velocity(
+            step.load_time, self.place(step, q1), combined(rows[1], s, inertia), speed
         )
-        return (after - before) / step.dt, (after - 2 * now + before) / half**2
+        known = [sum(c * x for c, x in zip(row[1:], rates, strict=False)) for row in rows]
+        mine = np.asarray((at_axis - known[1]) / rows[1][0], dtype=np.float64)
+        return mine, np.asarray(known[0] + rows[0][0] * mine)
 
     def _mass_forces(self, step: Step, q1: Array) -> tuple[Array, Array, Array]:
         """Return nodal forces of the mass, :attr:`on_nodes`, and the derivative of the forces."""
-        inertia, at, slope = self._inertia, self._at(step.load_time), np.zeros((self.size,) * 2)
-        if inertia is None or at is None:
+        inertia, slope, found = self._inertia, np.zeros((self.size,) * 2), self._mass_step(step, q1)
+        if found is None or inertia is None:
             return *self._on_cell(step.load_time, np.zeros(2)), slope
-        cell, dofs, shapes, slopes = at
-        s = nodal_step(self.scheme, step.q0, q1, self._numbering.rotations)
+        at = self._at(step.load_time)
+        assert at is not None
+        _, dofs, shapes, slopes = at
         rows = inertia.scheme.coefficients(step.dt, inertia.last_dt, len(inertia.more))[:2]
-        a, v = (combined(row, s, inertia) for row in rows)
-        θ, κ = self._direction(cell, shapes, slopes, self.place(step, q1)[dofs[2]])
-        speed, gain = self._speeds(step)
-        t, n = np.array([math.cos(θ), math.sin(θ)]), np.array([-math.sin(θ), math.cos(θ)])
-        across = 2 * speed * (shapes @ v[dofs[2]]) + speed**2 * κ
-        force = -self._moving.mass * (a[dofs[:2]] @ shapes + gain * t + across * n)
-        c_a, c_v = (row[0] for row in rows)
-        w, half = self.scheme.load_weight, s[dofs[2]] / 2 * self.scheme.half_tangents
-        by_rotation = np.outer(n, 2 * speed * c_v * (1 + half**2) * shapes + w * speed**2 * slopes)
-        by_ψ = -self._moving.mass * (by_rotation + w * np.outer(gain * n - across * t, shapes))
+        speed = self._speed(step.load_time, step.dt / 2, step.dt / 2)
+        by_node = rows[1][0] * shapes + self.scheme.load_weight * speed * slopes
+        factor = -self._moving.mass * rows[0][0] / rows[1][0]
         for k in (0, 1):
-            for column, row_values in (
-                (dofs[k], -self._moving.mass * c_a * shapes),
-                (dofs[2], by_ψ[k]),
-            ):
-                slope[np.ix_(dofs[k], column)] += np.outer(shapes, row_values)
-        return *self._on_cell(step.load_time, force), slope
+            slope[np.ix_(dofs[k], dofs[k])] += factor * np.outer(shapes, by_node)
+        return *self._on_cell(step.load_time, -self._moving.mass * found[1]), slope
 
-    def _kinetic(self, t: float, q: Array, v: Array) -> float:
-        """Return the kinetic energy of the mass, zero outside of the route."""
-        if (at := self._at(t)) is None:
-            return 0.0
-        cell, dofs, shapes, slopes = at
-        dt, load = 1e-5, self._moving
-        p = [value_at(load.position, t + k * dt, load) for k in range(3)]
-        speed = (4 * p[1] - 3 * p[0] - p[2]) / (2 * dt)
-        θ, _ = self._direction(cell, shapes, slopes, q[dofs[2]])
-        velocity = v[dofs[:2]] @ shapes + speed * np.array([math.cos(θ), math.sin(θ)])
-        return float(self._moving.mass / 2 * velocity @ velocity)
+    def _enter(self, t: float, q: Array, rates: Sequence[Array]) -> None:
+        """Set the rates of the mass to those of the axis at its place; None outside of the route.
+
+        ``rates`` are velocities and further rates of the nodes.
+        """
+        self._rates = None
+        if self._at(t) is not None:
+            h = 1e-4  # s
+            speed = 2 * self._speed(t, 0.0, h) - self._speed(t, 0.0, 2 * h)
+            v, *more = (self._velocity(t, q, x, speed * (k == 0)) for k, x in enumerate(rates))
+            self._rates = [v, v, *more]
+        self._count()
+
+    def _count(self) -> None:
+        """Set the kinetic energy."""
+        v = np.zeros(2) if self._rates is None else self._rates[0]
+        self.stored = {"kinetic": float(self._moving.mass / 2 * v @ v)}
 
     def forces(self, q: Array) -> Response:
         """Return the forces of the latest step, and their derivative, which is zero."""
@@ -318,9 +326,35 @@ class MovingForce(LoadForce):
         super().accept(step, q1, s)
         self._reached_forces = self._end_forces
         if self._inertia is not None:
-            energy = self._kinetic(step.t1, q1, self._inertia.after(s)[0])
-            self.supplied["loads"] += energy - self.stored["kinetic"]
-            self.stored = {"kinetic": energy}
+            before, found, inertia = (
+                self.stored["kinetic"],
+                self._mass_step(step, q1),
+                self._inertia,
+            )
+            if found is None or self._rates is None:
+                self._enter(step.t1, q1, inertia.after(s))
+            else:
+                known, last = self._after(step, found[0]), self._rates[0]
+                self._rates = [known[0], last, *known[1:]]
+                if self._at(step.t1) is None:
+                    self._rates = None
+                self._count()
+            self.supplied["loads"] += self.stored["kinetic"] - before
+
+    def _after(self, step: Step, mine: Array) -> list[Array]:
+        """Return velocity and further rates of the mass after its step ``mine``."""
+        inertia, rates = self._inertia, self._rates
+        assert inertia is not None
+        assert rates is not None
+        rows = inertia.scheme.coefficients(step.dt, inertia.last_dt, len(inertia.more)).rates
+        known = (mine, *rates)
+        return [sum((c * x for c, x in zip(row, known, strict=False)), np.zeros(2)) for row in rows]
+
+    def prepare(self, step: Step, q1: Array) -> None:
+        """Take further rates of the mass from a trial step."""
+        found = self._mass_step(step, q1)
+        if found is not None and self._rates is not None:
+            self._rates = [*self._rates[:2], *self._after(step, found[0])[1:]]
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
         """Return the load at time ``t``, which is assumed in equilibrium with the initial state."""
@@ -331,15 +365,18 @@ class MovingForce(LoadForce):
         return self.force
 
     def begin_energy(self, t: float, q: Array, v: Array) -> None:
-        """Set the kinetic energy of the mass at the time ``t``."""
+        """Set the rates of the mass at the time ``t``."""
         if self._inertia is not None:
-            self.stored = {"kinetic": self._kinetic(t, q, v)}
+            self._enter(t, q, [v])
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore the forces in the last step, if the next work uses those of a mass."""
-        if self._inertia is not None and self.scheme.weight_of_before:
+        """Save or restore the forces in the last step and the rates of the mass."""
+        if self._inertia is not None:
             number = self._numbering.scene.loads.index(self._moving)
             self._before = archive.vector(f"moving mass {number}", self._before)
+            rates = archive.vector(f"rates of moving mass {number}", np.ravel(self._rates or []))
+            self._rates = [*rates.reshape(-1, 2)] or None
+            self._count()
 
 
 class FrameForce(LoadForce):

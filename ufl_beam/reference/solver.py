@@ -276,7 +276,11 @@ class Solver(PresentState):
         if inertia is not None and inertia.scheme.further_rates and not inertia.more:
             # A short trial step gives the initial accelerations.
             t = self.t + TRIAL_STEP * (t1 - self.t)
-            q1, s = self._solve(Step.create(self.scheme, self.t, t, t1, self.q))
+            trial = Step.create(self.scheme, self.t, t, t1, self.q)
+            q1, s = self._solve(trial)
+            for load in self.loads:
+                if isinstance(load, MovingForce):
+                    load.prepare(trial, q1)
             inertia.more = inertia.after(s)[1:]
             self.supports.before = self.supports.reactions
             for group in self.connectors:

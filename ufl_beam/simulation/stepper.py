@@ -287,6 +287,8 @@ class Stepper(StateView):
         q1 = self._copy(c.x)
         for group in self.connector_terms:
             group.commit(q1)
+        for load in self.equation.loads:
+            load.prepare(q1)
 
     def _require_stiffness(self, step: Any, q1: Any, s: Any) -> None:
         """Raise if the loads do not resist a motion that only loads can resist.

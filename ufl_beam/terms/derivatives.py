@@ -302,7 +302,9 @@ def in_c(kind: str, data: Any) -> Each:
 
 def functions(kind: str) -> list[Any]:
     """Return the functions of ``term_derivative`` of loops.h for a kind; null if there is none."""
-    found = LINEARIZE.get(kind), f"add_{kind}_derivative", ACCEPT.get(kind)
+    accept = ACCEPT.get(kind)
+    trial = accept if kind == "moving_loads" else None
+    found = LINEARIZE.get(kind), f"add_{kind}_derivative", accept, trial
     has = (name if name and hasattr(lib, name) else None for name in found)
     return [ffi.addressof(lib, name) if name else ffi.NULL for name in has]
 
@@ -326,7 +328,7 @@ TRANSPOSES = {
     "pressures": ("", "transpose_pressures", ""),
     "frame": ("", "transpose_frame", ""),
     "imposed": ("", "transpose_imposed", ""),
-    "moving_loads": ("", "transpose_moving_loads", ""),
+    "moving_loads": ("transpose_moving_state", "transpose_moving_loads", "finish_moving_loads"),
     "guides": ("", "transpose_guides", ""),
     "damping": ("", "transpose_damping", ""),
 }
@@ -369,7 +371,14 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         rate = ffi.addressof(product, "rate")  # C exchanges the vectors at this address
         return [(rate, 8 * product.size), (product.half, 8 * product.rotations)]
     if kind == "moving_loads":
-        return rates(data.loads.rates) if data.loads.rates else []
+        loads = data.loads
+        if not loads.rates:
+            return []
+        return [
+            *rates(loads.rates),
+            (loads.state, 16 * lib.MOST_RATES * loads.loads),
+            (loads.on, 4 * loads.loads),
+        ]
     if kind == "damping":
         damping = data.damping
         groups = [damping.group[g] for g in range(damping.groups)]

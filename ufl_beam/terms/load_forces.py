@@ -101,6 +101,9 @@ class LoadTerm(Term):
     def begin_energy(self, t: float, q: Array, v: Array) -> None:
         """Set the energies of the state that begins a dynamic run without :meth:`carry_on`."""
 
+    def prepare(self, q1: Array) -> None:
+        """Take rates besides velocities from a trial step that ends at ``q1``."""
+
 
 class _AtDofs(LoadTerm):
     """Loads that act at some degrees of freedom, with sizes that are functions of time.
@@ -401,8 +404,10 @@ class Pressures(_AtDofs):
 class MovingLoads(_AtDofs):
     """Forces and masses that move along beams: consistent nodal forces of the cell of each.
 
-    The axis at a mass has the tangent and the curvature of the rotations, without shear and
-    stretch: rotations are continuous between cells, slopes of displacements are not.
+    A mass has the velocity of the point of the axis that it is at: v = ṙ + ṡ r', of the
+    displacements alone.  Its momentum is a state of its own, so that it gains at a kink of the
+    axis, between two cells, what the axis loses, and r'' is not needed.  The time scheme gives it
+    the acceleration that fits these velocities.
     """
 
     def __init__(
@@ -415,7 +420,7 @@ class MovingLoads(_AtDofs):
         rates: Any,
     ) -> None:
         self._ledger, numbering, mesh = ledger, subdomain.numbering, subdomain.numbering.mesh
-        self._scheme = scheme
+        self._scheme, self._counts = scheme, float(subdomain.comm.rank == 0)
         self._positions = [(load.position, load) for load in loads]
         cells = [np.concatenate([numbering.cells_of(x) for x in load.route]) for load in loads]
         order: Index = np.flatnonzero(np.isin(subdomain.cells, np.concatenate(cells)))
@@ -447,19 +452,20 @@ class MovingLoads(_AtDofs):
             weight_of_before=scheme.weight_of_before,
         )  # fmt: skip
         self._A, tangent, self._kinetic = A, None, np.zeros(len(loads))
-        angles = numbering.axis_angles[self._cells]
-        self._load_data = {"given": forces, "mass": mass, "ends": ends, "angles": angles}
+        self._state, self._on = np.zeros((len(loads), lib.MOST_RATES, 2)), np.zeros(len(loads), "i")
+        points = numbering.points[numbering.nodes_of_cells[self._cells]]
+        places = (points - points[:, :1]).transpose(0, 2, 1).reshape(dofs.shape)
+        self._load_data = {"given": forces, "mass": mass, "ends": ends, "places": places}
         self._heavy = rates is not None and bool(mass.any())
         if self._heavy:
-            whole, n = subdomain.cell_dofs[order], 2 * len(mesh.nodes)
-            rows, columns = np.broadcast_arrays(whole[:, :n, None], whole[:, None, :])
+            both = dofs.reshape(len(order), 2, -1)  # x and y
+            rows, columns = np.broadcast_arrays(both[..., None], both[:, :, None])
             fill(
-                self._c, rates=rates, mass=mass, kinetic=self._kinetic,
-                here=np.full(len(loads), -1, dtype=np.int32), motion=np.zeros((len(loads), 3)),
-                freedom=whole.astype(np.int32),
-                entry=A.positions(rows.ravel(), columns.ravel()),
-                angle=angles, part=scheme.load_weight,
-                half_tangents=scheme.half_tangents,
+                self._c, rates=rates, mass=mass, kinetic=self._kinetic, state=self._state,
+                on=self._on, here=np.full(len(loads), lib.OFF, dtype=np.int32),
+                motion=np.zeros((len(loads), 2)), freedom=dofs.astype(np.int32),
+                entry=A.positions(rows.ravel(), columns.ravel()), place=places,
+                part=scheme.load_weight, totals=ffi.new("int[]", self._state.size),
             )  # fmt: skip
             tangent = loop("add_tangent_of_moving_masses", self._c)
         self.loops = loop("subtract_moving_loads", self._c), tangent
@@ -469,7 +475,7 @@ class MovingLoads(_AtDofs):
         """Return the loops that begin and accept a step."""
         self._callbacks = callbacks
         c = fill(
-            self._c, factor=callbacks.time_functions(self._in_time),
+            self._c, factor=callbacks.time_functions(self._in_time), equation=callbacks.c,
             position=callbacks.time_functions(self._positions),
         )  # fmt: skip
         c.work = self._ledger.supplied.pointer("loads")
@@ -499,8 +505,10 @@ class MovingLoads(_AtDofs):
             "moving_derivatives", parameters=parameters, neighbours=number, ends_of=ends[0].size,
             loads=self._c, neighbour=ffi.new("moving_loads *[]", [x._c for x in others]),
             weight=neighbours.weights, given=change("given"), mass=mass, ends=ends,
-            angle=change("angles"), motion=np.zeros((parameters, len(self._kinetic), 3)),
-            now=now, end=end, before=before,
+            place=change("places"), motion=np.zeros((parameters, len(self._kinetic), 2)),
+            state=neighbours.state(lambda term: term._state), state_bar=np.zeros(self._state.shape),
+            moved=np.zeros((parameters, len(self._kinetic), 2)),
+            moved_bar=np.zeros((len(self._kinetic), 2)), now=now, end=end, before=before,
         )  # fmt: skip
         return [in_c("moving_loads", c)]
 
@@ -512,34 +520,48 @@ class MovingLoads(_AtDofs):
         step = struct("time_step", load_time=t, fraction=1.0, at=1.0, dt=1.0)
         rates, self._c.rates = self._c.rates, ffi.NULL
         lib.begin_moving_loads(self._c, step, ffi.NULL, ffi.NULL)
-        if v is not None:
-            self.begin_energy(t, q, v)
         self._callbacks.synchronize()
         self._on_cells[2] = self._on_cells[0]
         self.add_residual(q, np.zeros(self._size))
         self._c.rates = rates
+        if v is not None:
+            self.begin_energy(t, q, v)
         self._forces[1] = self._forces[0]
         if past is not None and past.has("moving masses"):
             self._forces[1] = past.added("moving masses", self._whole(self._forces[1]))[self.dofs]
+            self._masses_in(past)
         return self._whole(self._forces[0])
 
     def begin_energy(self, t: float, q: Array, v: Array) -> None:
         """Set the kinetic energies of the masses at the time ``t``."""
         if self._heavy:
-            lib.start_moving_masses(self._c, t, doubles(q), doubles(v))
+            lib.start_moving_masses(self._c, t, doubles(q))
             self._callbacks.synchronize()
 
     def pass_on(self, archive: Archive) -> None:
-        """Save the forces of the last step, if masses add to them and the next work uses them."""
-        if self._heavy and self._c.weight_of_before:
+        """Save the rates of the masses, and the forces of the last step, to which they add."""
+        if self._heavy:
             archive.added("moving masses", self._whole(self._forces[1]))
+            self._masses_in(archive)
+
+    def prepare(self, q1: Array) -> None:
+        """Take further rates of the masses from a trial step."""
+        if self._heavy:
+            lib.take_rates_of_masses(self._c, doubles(q1))
+
+    def _masses_in(self, archive: Archive) -> None:
+        """Save or restore which masses are on the beams, their rates and kinetic energies."""
+        rates = np.column_stack([self._on, self._state.reshape(len(self._on), -1)])
+        rates = archive.rows("rates of moving masses", np.arange(len(rates)), rates, known=True)
+        self._on[:], self._state[:] = rates[:, 0], rates[:, 1:].reshape(self._state.shape)
+        v = self._state[:, 1] * self._counts  # on one process only
+        self._kinetic[:] = self._load_data["mass"] / 2 * (v * v).sum(axis=1)
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the forces in the equation of the last step, and at its end."""
         self._forces[:] = archive.added("moving loads", self._whole(self._forces[1]))[self.dofs]
         self._on_cells[:] = archive.rows("moving loads", self._cells, self._on_cells[2])
-        for k, energy in enumerate(self._kinetic):
-            self._kinetic[k] = archive.total(f"energy of moving mass {k}", energy)
+        self._masses_in(archive)
 
 
 def _in_order(mesh: Mesh) -> list[int]:

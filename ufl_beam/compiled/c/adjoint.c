@@ -611,32 +611,68 @@ void transpose_imposed(void *self, adjoint *a, const double *λ)
   }
 }
 
-/* Derivatives by the motions before the step, from the forces of mass k; see add_moving_mass_derivative. */
-static void transpose_moving_mass(const moving_loads *of, adjoint *a, int k, const double *λ)
+/* Rates of masses after the step: derivatives by the state at its end, and by the steps of masses. */
+void transpose_moving_state(void *self, adjoint *a)
 {
+  const moving_derivatives *m = self;
+  moving_loads *of = (moving_loads *)m->loads;
+  const rates *r = of->rates;
+  const int n = of->nodes, initial = a->d->initial;
   const double *q1 = a->d->x;
-  double x = 0, y = 0; /* derivatives by the acceleration of the mass */
-  on_axis at;
-  if (!find_on_axis(of, k, q1, &at)) return;
-  for (int j = 0; j < of->nodes; ++j) {
-    x += of->mass[k] * at.shape[j] * λ[at.x[j]];
-    y += of->mass[k] * at.shape[j] * λ[at.y[j]];
+  if (!r) return;
+  begin_moving_loads(of, a->step, 0, 0);
+  for (int k = 0; k < of->loads; ++k) {
+    double *bar = m->state_bar + 2 * MOST_RATES * k, *step = m->moved_bar + 2 * k, after[2 * MOST_RATES];
+    on_axis at;
+    memcpy(after, bar, sizeof after);
+    step[0] = step[1] = 0;
+    if (of->here[k] != OFF) {
+      find_mass(of, k, q1, &at);
+      for (int l = 0; l < 2; ++l) {
+        for (int j = initial ? 3 : 1; j < MOST_RATES; ++j) bar[2 * j + l] = 0;
+        if (!initial) bar[2 + l] = after[4 + l];
+        for (int i = initial; i <= r->now->gives; ++i) {
+          const double one = after[2 * (i ? 2 + i : 1) + l];
+          step[l] += r->now->rates[i][0] * one;
+          for (int j = 1; j < r->number; ++j) bar[2 * j + l] += r->now->rates[i][j] * one;
+        }
+      }
+      for (int i = 0; i < 2 * n; ++i) a->q1[at.dof[i]] += mass_by_node(of, &at, i % n) * step[i / n];
+    } else if (!initial) {
+      memset(bar, 0, sizeof after);
+      if (!find_at(of, k, a->step->t1, &at)) continue;
+      after[2] += after[4], after[3] += after[5], after[4] = after[5] = 0;
+      for (int p = 0; p < a->parameters; ++p) {
+        double by[2 * MOST_RATES] = {0};
+        enter_derivative(m, p, k, at, a->step, q1, by);
+        a->gradient[p] += dot(2 * MOST_RATES, by, after);
+      }
+      for (int i = 0; i < 2 * n; ++i) {
+        a->q1[at.dof[i]] += at.speed * at.slope[i % n] * after[2 + i / n];
+        for (int j = 1; j < r->number; ++j) a->rates[j][at.dof[i]] += at.shape[i % n] * after[2 * j + i / n];
+      }
+    }
   }
-  const double along = x * at.c + y * at.s, across = y * at.c - x * at.s;
-  const double angle = at.acceleration * across - at.turn * along;
-  const double spin = 2 * at.speed * across, curvature = at.speed * at.speed * across;
-  for (int j = 0; j < of->nodes; ++j) {
-    const int psi = at.psi[j];
-    const double half = step_of(of, q1, psi, 1) / 2, grows = of->half_tangents ? 1 + half * half : 1;
-    a->q0[psi] += (1 - of->part) * (at.shape[j] * angle + at.slope[j] * curvature);
-    a->q0[psi] -= at.velocity[0] * grows * at.shape[j] * spin;
-    a->q0[at.x[j]] -= at.inertia[0] * at.shape[j] * x;
-    a->q0[at.y[j]] -= at.inertia[0] * at.shape[j] * y;
-    for (int i = 1; i < of->rates->number; ++i) {
-      if (at.velocity[i] != 0) a->rates[i][psi] += at.velocity[i] * at.shape[j] * spin;
-      if (at.inertia[i] == 0) continue;
-      a->rates[i][at.x[j]] += at.inertia[i] * at.shape[j] * x;
-      a->rates[i][at.y[j]] += at.inertia[i] * at.shape[j] * y;
+}
+
+/* Derivatives by the motions before the step, from the forces of mass k and from its step; see
+ * add_moving_mass_derivative. */
+static void transpose_moving_mass(const moving_derivatives *m, adjoint *a, int k, const double *λ)
+{
+  const moving_loads *of = m->loads;
+  const rates *r = of->rates;
+  const int n = of->nodes;
+  on_axis at;
+  if (!find_mass(of, k, a->d->x, &at)) return;
+  for (int l = 0; l < 2; ++l) {
+    double x = 0, *bar = m->state_bar + 2 * MOST_RATES * k + l;
+    for (int j = 0; j < n; ++j) x += of->mass[k] * at.shape[j] * λ[at.dof[n * l + j]];
+    const double v = (m->moved_bar[2 * k + l] + r->now->inertia[0] * x) / r->now->velocity[0];
+    for (int i = 1; i < r->number; ++i) bar[2 * i] += r->now->inertia[i] * x - r->now->velocity[i] * v;
+    for (int j = 0; j < n; ++j) {
+      const int dof = at.dof[n * l + j];
+      a->q0[dof] += ((1 - of->part) * at.speed * at.slope[j] - r->now->velocity[0] * at.shape[j]) * v;
+      for (int i = 1; i < r->number; ++i) a->rates[i][dof] += r->now->velocity[i] * at.shape[j] * v;
     }
   }
 }
@@ -652,10 +688,19 @@ void transpose_moving_loads(void *self, adjoint *a, const double *λ)
     for (int i = 0; i < all; ++i) a->gradient[p] -= m->now[(size_t)p * all + i] * λ[of->dof[of->at[i]]];
     if (!of->rates) continue;
     memset(a->values, 0, a->size * sizeof *a->values);
+    memset(m->moved, 0, 2 * (size_t)of->loads * a->parameters * sizeof *m->moved);
     for (int k = 0; k < of->loads; ++k) add_moving_mass_derivative(m, a->d->x, 0, p, k, a->values);
-    a->gradient[p] += dot(a->size, a->values, λ);
+    a->gradient[p] += dot(a->size, a->values, λ) + dot(2 * of->loads, m->moved_bar, m->moved + 2 * (size_t)p * of->loads);
   }
-  for (int k = 0; of->rates && k < of->loads; ++k) transpose_moving_mass(of, a, k, λ);
+  for (int k = 0; of->rates && k < of->loads; ++k) transpose_moving_mass(m, a, k, λ);
+}
+
+void finish_moving_loads(void *self, adjoint *a)
+{
+  const moving_derivatives *m = self;
+  const int all = 2 * MOST_RATES * m->loads->loads;
+  for (int p = 0; m->loads->rates && p < a->parameters; ++p)
+    a->gradient[p] += dot(all, m->state_bar, m->state + (size_t)p * all);
 }
 
 void transpose_guides(void *self, adjoint *a, const double *λ)
@@ -741,12 +786,12 @@ int go_back(adjoint *a, time_loop *m)
   memcpy(&numbers, from, sizeof numbers), from += sizeof numbers;
   if (of) m->rates->now = &numbers;
   for (int k = 0; k < a->blocks; ++k) memcpy(*a->block[k], from, a->length[k]), from += a->length[k];
-  d->x = m->x, a->step = &m->step;
+  d->x = m->x, a->step = &m->step, d->initial = initial;
   memset(a->q0, 0, a->size * sizeof *a->q0);
   memcpy(a->q_bar, a->q1, a->size * sizeof *a->q_bar);
   if (initial) memset(a->q1, 0, a->size * sizeof *a->q1);
   for (int k = d->terms - 1; k >= 0; --k)
-    if (a->term[k].state && !initial) a->term[k].state(d->term[k].self, a);
+    if (a->term[k].state && (!initial || d->term[k].accept_trial)) a->term[k].state(d->term[k].self, a);
   if (of) transpose_rates(a, m, initial);
   /* λ = -K^-T q1_bar, in the axes of supports, where held motions are prescribed */
   memcpy(d->tangent, e->tangent, e->indptr[e->size] * sizeof *d->tangent);

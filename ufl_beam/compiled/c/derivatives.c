@@ -734,24 +734,22 @@ void differentiate_moving_loads(void *self, const time_step *step, const double 
     memset(end, 0, all * sizeof *end);
     for (int k = 0; k < of->loads; ++k) {
       const double t = step->load_time, factor = value_at(of->factor + k, t), half = step->dt / 2;
+      double *motion = m->motion + 2 * ((size_t)p * of->loads + k);
       const double *given = of->given + 2 * k, *by = m->given + 2 * ((size_t)p * of->loads + k);
-      double way[3] = {0, change_of_position(m, p, k, t), 0}, *motion = m->motion + 3 * ((size_t)p * of->loads + k);
       double s, shape[4], slope[4], change = 0;
       const int i = find_loaded_cell(of, k, value_at(of->position + k, t), &s);
       if (i < 0) continue;
       for (int j = p * m->neighbours; j < (p + 1) * m->neighbours; ++j)
         change += m->weight[j] * (value_at(m->neighbour[j]->factor + k, t) - factor);
-      const double ds = change_in_cell(m, p, i, s, way[1]);
+      const double ds = change_in_cell(m, p, i, s, change_of_position(m, p, k, t));
       double *on = end + 2 * n * of->cell[i];
       find_shapes(of, s, shape, slope);
       for (int l = 0; l < 2; ++l)
         for (int j = 0; j < n; ++j)
           on[n * l + j] += (change * given[l] + factor * by[l]) * shape[j] + factor * given[l] * slope[j] * ds;
       if (!of->rates) continue;
-      for (int j = 0; j < 3; j += 2) way[j] = change_of_position(m, p, k, t + (j - 1) * half);
       motion[0] = ds;
-      motion[1] = (way[2] - way[0]) / step->dt;
-      motion[2] = (way[2] - 2 * way[1] + way[0]) / (half * half);
+      motion[1] = (change_of_position(m, p, k, t + half) - change_of_position(m, p, k, t - half)) / step->dt;
     }
     for (int i = 0; i < all; ++i) {
       end[i] = before[i] + step->fraction * (end[i] - before[i]);
@@ -770,61 +768,77 @@ static void find_bends(const moving_loads *m, double s, double *bend)
   }
 }
 
-/* Derivative of rate_at at constant unknowns. `grows` is the derivative of the step by its end. Without d,
- * the motions before the step are constant. */
-static double change_of_rate(const derivatives *d, const rates *r, const double *row, int p, int dof, double grows)
+/* Derivative of find_velocity at constant unknowns, for derivatives ds of the fraction of cell i and `faster`
+ * of the speed. Without d, the motions before the step are constant. */
+static void change_of_velocity(const moving_derivatives *m, const derivatives *d, int p, const on_axis *a, int i,
+                               double s, double ds, double faster, const double *row, double part, const double *q,
+                               double *out)
 {
-  if (!d) return 0;
-  double sum = -row[0] * grows * d->q0[(size_t)p * d->size + dof];
-  for (int j = 1; j < r->number; ++j)
-    if (row[j] != 0) sum += row[j] * d->rates[j][(size_t)p * d->size + dof];
-  return sum;
+  const moving_loads *of = m->loads;
+  const rates *r = of->rates;
+  const int n = of->nodes;
+  const double length = of->ends[2 * i + 1] - of->ends[2 * i];
+  const double *ends = m->ends + (size_t)p * m->ends_of + 2 * i, stretch = (ends[1] - ends[0]) / length;
+  const double *place = of->place + 2 * n * a->cell, *moved = m->place + 2 * n * ((size_t)p * of->cells + a->cell);
+  double bend[4];
+  find_bends(of, s, bend);
+  out[0] = out[1] = 0;
+  for (int i = 0; i < 2 * n; ++i) {
+    const int dof = a->dof[i], j = i % n;
+    const double change = q[dof] - of->q0[dof], *dq0 = d ? d->q0 + (size_t)p * d->size + dof : 0;
+    const double turn = faster * a->slope[j] + a->speed * (bend[j] / length * ds - a->slope[j] * stretch);
+    double *sum = out + i / n;
+    *sum += a->slope[j] * length * ds * rate_at(r, row, dof, change) + turn * (place[i] + of->q0[dof] + part * change)
+      + a->speed * a->slope[j] * moved[i];
+    if (!d) continue;
+    *sum += (a->speed * a->slope[j] * (1 - part) - a->shape[j] * row[0]) * *dq0;
+    for (int k = 1; k < r->number; ++k)
+      if (row[k] != 0) *sum += a->shape[j] * row[k] * d->rates[k][(size_t)p * d->size + dof];
+  }
 }
 
-/* Derivative of the forces of mass k at q1, see subtract_moving_loads and find_on_axis. Without d, the
- * motions before the step are constant. */
+/* Derivatives of the forces of mass k at q1 and of its step, at constant unknowns. Without d, its motion and
+ * those of the nodes before the step are constant. */
 static void add_moving_mass_derivative(const moving_derivatives *m, const double *q1, const derivatives *d, int p,
                                        int k, double *r)
 {
   const moving_loads *of = m->loads;
-  const double *motion = m->motion + 3 * ((size_t)p * of->loads + k), ds = motion[0];
-  on_axis a;
-  if (!find_on_axis(of, k, q1, &a)) return;
+  const scheme_numbers *now = of->rates->now;
+  const size_t at = (size_t)p * of->loads + k;
+  const double *motion = m->motion + 2 * at, heavier = m->mass[at];
   const int i = of->here[k], n = of->nodes;
-  const double s = of->motion[3 * k], length = of->ends[2 * i + 1] - of->ends[2 * i];
-  const double *longer = m->ends + (size_t)p * m->ends_of + 2 * i, stretch = (longer[1] - longer[0]) / length;
-  const double *ends = of->angle + 2 * a.cell, *turned = m->angle + 2 * ((size_t)p * of->cells + a.cell);
-  double bend[4], angle = turned[0] + s * (turned[1] - turned[0]) + ds * (ends[1] - ends[0]), spin = 0;
-  double curvature = (turned[1] - turned[0]) / length - stretch * a.curvature, rate = 0;
-  double x = a.acceleration * a.c - a.turn * a.s, y = a.acceleration * a.s + a.turn * a.c, dx = 0, dy = 0;
-  find_bends(of, s, bend);
-  for (int j = 0; j < n; ++j) {
-    const int dof = a.psi[j];
-    const double psi = of->q0[dof] + of->part * (q1[dof] - of->q0[dof]);
-    const double change = d ? (1 - of->part) * d->q0[(size_t)p * d->size + dof] : 0;
-    const double half = step_of(of, q1, dof, 1) / 2, grows = of->half_tangents ? 1 + half * half : 1;
-    const double slope = a.slope[j] * length * ds; /* derivative of the shape function */
-    angle += slope * psi + a.shape[j] * change;
-    curvature += bend[j] / length * ds * psi + a.slope[j] * change;
-    spin += slope * rate_at(of->rates, a.velocity, dof, 2 * half)
-      + a.shape[j] * change_of_rate(d, of->rates, a.velocity, p, dof, grows);
-    rate += a.shape[j] * rate_at(of->rates, a.velocity, dof, 2 * half);
-    const double ax = rate_at(of->rates, a.inertia, a.x[j], step_of(of, q1, a.x[j], 0));
-    const double ay = rate_at(of->rates, a.inertia, a.y[j], step_of(of, q1, a.y[j], 0));
-    x += a.shape[j] * ax, y += a.shape[j] * ay;
-    dx += slope * ax + a.shape[j] * change_of_rate(d, of->rates, a.inertia, p, a.x[j], 1);
-    dy += slope * ay + a.shape[j] * change_of_rate(d, of->rates, a.inertia, p, a.y[j], 1);
+  double *step = m->moved + 2 * at;
+  on_axis a;
+  if (!find_mass(of, k, q1, &a)) return;
+  const double stretch = (of->ends[2 * i + 1] - of->ends[2 * i]) * motion[0];
+  change_of_velocity(m, d, p, &a, i, of->motion[2 * k], motion[0], motion[1], now->velocity, of->part, q1, step);
+  for (int l = 0; l < 2; ++l) {
+    double sum = 0;
+    for (int j = 1; d && j < of->rates->number; ++j) {
+      const double rate = m->state[2 * (MOST_RATES * at + j) + l];
+      step[l] -= now->velocity[j] * rate, sum += now->inertia[j] * rate;
+    }
+    step[l] /= now->velocity[0];
+    sum += now->inertia[0] * step[l];
+    for (int j = 0; j < n; ++j)
+      r[a.dof[n * l + j]] += (heavier * a.shape[j] + of->mass[k] * a.slope[j] * stretch) * a.acceleration[l]
+        + of->mass[k] * a.shape[j] * sum;
   }
-  const double turn = 2 * (motion[1] * rate + a.speed * spin)
-    + 2 * a.speed * motion[1] * a.curvature + a.speed * a.speed * curvature;
-  const double along = motion[2] - a.turn * angle, across = turn + a.acceleration * angle;
-  dx += along * a.c - across * a.s, dy += along * a.s + across * a.c;
-  const double mass = of->mass[k], heavier = m->mass[(size_t)p * of->loads + k];
-  for (int j = 0; j < n; ++j) {
-    const double share = heavier * a.shape[j] + mass * a.slope[j] * length * ds;
-    r[a.x[j]] += share * x + mass * a.shape[j] * dx;
-    r[a.y[j]] += share * y + mass * a.shape[j] * dy;
-  }
+}
+
+/* Derivatives by a parameter of the rates of a point of the axis to which mass k has come; see enter_mass.
+ * The state at the end of the step is constant. */
+static void enter_derivative(const moving_derivatives *m, int p, int k, on_axis a, const time_step *step,
+                             const double *q1, double *out)
+{
+  const moving_loads *of = m->loads;
+  double s, change[3];
+  const int i = find_loaded_cell(of, k, value_at(of->position + k, step->t1), &s);
+  for (int j = 0; j < 3; ++j) change[j] = change_of_position(m, p, k, step->t1 + j * OF_SPEED);
+  const double ds = change_in_cell(m, p, i, s, change[0]);
+  double faster = (4 * change[1] - 3 * change[0] - change[2]) / (2 * OF_SPEED);
+  for (int c = 0; c <= of->rates->now->gives; ++c, a.speed = faster = 0)
+    change_of_velocity(m, 0, p, &a, i, s, ds, faster, of->rates->now->rates[c], 1, q1, out + 2 * (c ? 2 + c : 1));
 }
 
 void add_moving_loads_derivative(void *self, const derivatives *d, int p, double *r)
@@ -839,8 +853,31 @@ void add_moving_loads_derivative(void *self, const derivatives *d, int p, double
 void accept_moving_loads_derivative(void *self, const derivatives *d, int p)
 {
   const moving_derivatives *m = self;
-  const size_t all = 2 * (size_t)m->loads->nodes * m->loads->cells;
-  memcpy(m->before + p * all, m->end + p * all, all * sizeof *m->end);
+  const moving_loads *of = m->loads;
+  const int n = of->nodes;
+  const size_t all = 2 * (size_t)n * of->cells;
+  const double *dq1 = d->q1 + (size_t)p * d->size;
+  if (!d->initial) memcpy(m->before + p * all, m->end + p * all, all * sizeof *m->end);
+  for (int k = 0; of->rates && k < of->loads; ++k) {
+    const scheme_numbers *now = of->rates->now;
+    const size_t at = (size_t)p * of->loads + k;
+    double *old = m->state + 2 * MOST_RATES * at, new[2 * MOST_RATES] = {0};
+    on_axis a;
+    if (find_mass(of, k, d->x, &a)) {
+      double *step = m->moved + 2 * at;
+      for (int i = 0; i < 2 * n; ++i) step[i / n] += mass_by_node(of, &a, i % n) * dq1[a.dof[i]];
+      put_new_rates(of->rates, old, step, d->initial, new);
+    } else if (d->initial) continue;
+    else if (find_at(of, k, d->step->t1, &a)) {
+      enter_derivative(m, p, k, a, d->step, d->x, new);
+      for (int c = 0; c <= now->gives; ++c)
+        for (int i = 0, j = c ? 2 + c : 1; i < 2 * n; ++i)
+          new[2 * j + i / n] += a.shape[i % n] * d->rates[j][(size_t)p * d->size + a.dof[i]]
+            + (c ? 0 : a.speed * a.slope[i % n] * dq1[a.dof[i]]);
+      new[4] = new[2], new[5] = new[3];
+    }
+    memcpy(old, new, sizeof new);
+  }
 }
 
 /* -- guides ---------------------------------------------------------------------------------------------- */
@@ -1036,12 +1073,13 @@ int differentiate_step(derivatives *d, time_loop *m, int initial)
   memcpy(m->s, d->s, n * sizeof *d->s);
   if (failed) return 0;
   if (product) advance_rates(d, m, product, initial);
-  if (initial) return 1;
-  d->t = m->step.t1;
+  d->t = m->step.t1, d->initial = initial;
   for (d->now = 0; d->now < d->terms; ++d->now) {
     const term_derivative *term = d->term + d->now;
-    for (int p = 0; term->accept && p < d->parameters; ++p) term->accept(term->self, d, p);
+    void (*accept)(void *, const derivatives *, int) = initial ? term->accept_trial : term->accept;
+    for (int p = 0; accept && p < d->parameters; ++p) accept(term->self, d, p);
   }
+  if (initial) return 1;
   memcpy(d->q0, d->q1, (size_t)d->parameters * n * sizeof *d->q0);
   return 1;
 }

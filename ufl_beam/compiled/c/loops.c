@@ -161,6 +161,11 @@ void add_tangent_of_pressures(void *self, const double *q, double *tangent)
   }
 }
 
+static int on_route(const moving_loads *m, int k, double distance)
+{
+  return m->ends[2 * m->first[k]] <= distance && distance <= m->ends[2 * m->first[k + 1] - 1];
+}
+
 /* Index of the cell of load k at a distance, or -1 if it is not on the beam or not on this process;
  * and its place in the cell, from 0 to 1. */
 static int find_loaded_cell(const moving_loads *m, int k, double distance, double *s)
@@ -184,20 +189,13 @@ static void find_shapes(const moving_loads *m, double s, double *value, double *
   }
 }
 
-/* State of the axis at a mass, and its convective acceleration, of which `turn` is along the normal. */
+/* A point of the axis that moves along it. */
 typedef struct {
   double shape[4], slope[4]; /* slope: by the length of the axis */
-  double c, s, turn, acceleration, speed, curvature;
-  const double *inertia, *velocity;
-  const int32_t *x, *y, *psi;
+  double speed, step[2], acceleration[2];
+  const int32_t *dof;
   int cell;
 } on_axis;
-
-static double step_of(const moving_loads *m, const double *q, int dof, int turns)
-{
-  const double change = q[dof] - m->q0[dof];
-  return turns && m->half_tangents ? 2 * tan(change / 2) : change;
-}
 
 /* A row of coefficients times the rates at a degree of freedom, for the step s. */
 static double rate_at(const rates *r, const double *row, int dof, double s)
@@ -208,27 +206,51 @@ static double rate_at(const rates *r, const double *row, int dof, double s)
   return sum;
 }
 
-static int find_on_axis(const moving_loads *m, int k, const double *q, on_axis *a)
+/* The point at a fraction of cell i of the arrays of `first`; returns whether this process has it. */
+static int find_on_axis(const moving_loads *m, int i, double place, double speed, on_axis *a)
 {
-  const int i = m->here[k], n = m->nodes;
   if (i < 0) return 0;
-  const double place = m->motion[3 * k], length = m->ends[2 * i + 1] - m->ends[2 * i];
   find_shapes(m, place, a->shape, a->slope);
-  a->cell = m->cell[i], a->speed = m->motion[3 * k + 1], a->acceleration = m->motion[3 * k + 2];
-  a->x = m->freedom + 3 * n * a->cell, a->y = a->x + n, a->psi = a->y + n;
-  a->inertia = m->rates->now->inertia, a->velocity = m->rates->now->velocity;
-  const double *ends = m->angle + 2 * a->cell;
-  double angle = ends[0] + place * (ends[1] - ends[0]), spin = 0;
-  a->curvature = (ends[1] - ends[0]) / length;
-  for (int j = 0; j < n; ++j) {
-    const int dof = a->psi[j];
-    const double psi = m->q0[dof] + m->part * (q[dof] - m->q0[dof]);
-    a->slope[j] /= length;
-    angle += a->shape[j] * psi, a->curvature += a->slope[j] * psi;
-    spin += a->shape[j] * rate_at(m->rates, a->velocity, dof, step_of(m, q, dof, 1));
+  for (int j = 0; j < m->nodes; ++j) a->slope[j] /= m->ends[2 * i + 1] - m->ends[2 * i];
+  a->cell = m->cell[i], a->speed = speed, a->dof = m->freedom + 2 * m->nodes * a->cell;
+  return 1;
+}
+
+/* Velocity of the point: of the axis, by a row of coefficients, plus the speed times its tangent. */
+static void find_velocity(const moving_loads *m, const on_axis *a, const double *row, double part, const double *q,
+                          double *v)
+{
+  const int n = m->nodes;
+  v[0] = v[1] = 0;
+  for (int i = 0; i < 2 * n; ++i) {
+    const double start = m->q0[a->dof[i]], change = q[a->dof[i]] - start;
+    v[i / n] += a->shape[i % n] * rate_at(m->rates, row, a->dof[i], change)
+      + a->speed * a->slope[i % n] * (m->place[2 * n * a->cell + i] + start + part * change);
   }
-  a->c = cos(angle), a->s = sin(angle);
-  a->turn = 2 * a->speed * spin + a->speed * a->speed * a->curvature;
+}
+
+/* Derivative of the step of a mass by the displacements of node j at the end of the step. */
+static double mass_by_node(const moving_loads *m, const on_axis *a, int j)
+{
+  return a->shape[j] + m->part * a->speed * a->slope[j] / m->rates->now->velocity[0];
+}
+
+/* Step of mass k, with which the scheme gives it the velocity of its point in the equation of the step,
+ * and its acceleration. So kinks of the axis, too, change the momentum of the mass by what the axis
+ * loses. */
+static int find_mass(const moving_loads *m, int k, const double *q, on_axis *a)
+{
+  if (!find_on_axis(m, m->here[k], m->motion[2 * k], m->motion[2 * k + 1], a)) return 0;
+  const scheme_numbers *now = m->rates->now;
+  find_velocity(m, a, now->velocity, m->part, q, a->step);
+  for (int l = 0; l < 2; ++l) {
+    const double *rate = m->state + 2 * MOST_RATES * k + l;
+    double sum = 0;
+    for (int j = 1; j < m->rates->number; ++j)
+      a->step[l] -= now->velocity[j] * rate[2 * j], sum += now->inertia[j] * rate[2 * j];
+    a->step[l] /= now->velocity[0];
+    a->acceleration[l] = sum + now->inertia[0] * a->step[l];
+  }
   return 1;
 }
 
@@ -242,16 +264,8 @@ void subtract_moving_loads(void *self, const double *q, double *r)
     for (int i = 0; i < 2 * n; ++i) e[3 * n * k + i] = -m->now[2 * n * k + i];
   for (int k = 0; m->rates && k < m->loads; ++k) {
     on_axis a;
-    if (!find_on_axis(m, k, q, &a)) continue;
-    double x = a.acceleration * a.c - a.turn * a.s, y = a.acceleration * a.s + a.turn * a.c;
-    for (int j = 0; j < n; ++j) {
-      x += a.shape[j] * rate_at(m->rates, a.inertia, a.x[j], step_of(m, q, a.x[j], 0));
-      y += a.shape[j] * rate_at(m->rates, a.inertia, a.y[j], step_of(m, q, a.y[j], 0));
-    }
-    for (int j = 0; j < n; ++j) {
-      e[3 * n * a.cell + j] += m->mass[k] * a.shape[j] * x;
-      e[3 * n * a.cell + n + j] += m->mass[k] * a.shape[j] * y;
-    }
+    if (!find_mass(m, k, q, &a)) continue;
+    for (int i = 0; i < 2 * n; ++i) e[3 * n * a.cell + i] += m->mass[k] * a.shape[i % n] * a.acceleration[i / n];
   }
   for (int k = 0; k < m->cells; ++k)
     for (int i = 0; i < 2 * n; ++i) m->force[m->at[2 * n * k + i]] -= e[3 * n * k + i];
@@ -264,23 +278,10 @@ void add_tangent_of_moving_masses(void *self, const double *q, double *tangent)
   const int n = m->nodes;
   for (int k = 0; k < m->loads; ++k) {
     on_axis a;
-    if (!find_on_axis(m, k, q, &a)) continue;
-    for (int i = 0; i < n; ++i) {
-      /* Derivatives of the convective acceleration by a rotation: along the normal and the tangent */
-      const double half = step_of(m, q, a.psi[i], 1) / 2;
-      const double spin = a.velocity[0] * (m->half_tangents ? 1 + half * half : 1);
-      const double along = -m->part * a.turn * a.shape[i];
-      const double across = m->part * (a.acceleration * a.shape[i] + a.speed * a.speed * a.slope[i])
-        + 2 * a.speed * spin * a.shape[i];
-      const double x = along * a.c - across * a.s, y = along * a.s + across * a.c;
-      for (int j = 0; j < n; ++j) {
-        const int32_t *entry = m->entry + 6 * n * n * a.cell + 3 * n * j, *below = entry + 3 * n * n;
-        const double size = m->mass[k] * a.shape[j];
-        tangent[entry[i]] += size * a.inertia[0] * a.shape[i];
-        tangent[below[n + i]] += size * a.inertia[0] * a.shape[i];
-        tangent[entry[2 * n + i]] += size * x, tangent[below[2 * n + i]] += size * y;
-      }
-    }
+    if (!find_on_axis(m, m->here[k], m->motion[2 * k], m->motion[2 * k + 1], &a)) continue;
+    for (int i = 0; i < 2 * n * n; ++i)
+      tangent[m->entry[2 * n * n * a.cell + i]] +=
+        m->mass[k] * a.shape[i / n % n] * m->rates->now->inertia[0] * mass_by_node(m, &a, i % n);
   }
 }
 

@@ -777,6 +777,8 @@ typedef struct {
 
 /* Forces and masses that move along beams, see MovingLoads. Forces on a cell are x of its nodes, then
  * y. */
+/* Of a mass: on the cell of another process; without effect in this step. */
+enum { ELSEWHERE = -1, OFF = -2 };
 typedef struct rates rates;
 typedef struct {
   int loads, cells, nodes, size; /* nodes: of a cell; size: of `dof` */
@@ -794,19 +796,23 @@ typedef struct {
   double weight_of_before, *work;
   /* If a load has a mass in dynamics; otherwise none: */
   const rates *rates;
+  const equation *equation;
+  const int *totals;        /* TOTAL for each number in `state` */
   const double *mass;
   double *kinetic, *stored; /* energy of each mass in the accepted state; entry of the ledger */
-  int32_t *here;            /* index of the cell of each mass in the arrays of `first`, or -1 */
-  double *motion;           /* of each mass: fraction of the cell, speed, acceleration along the beam */
-  const int32_t *freedom;   /* degrees of freedom of each cell: x, y, rotations */
-  const int32_t *entry;     /* entries of the tangent: 2 nodes x 3 nodes of each cell */
-  const double *angle;      /* directions of the undeformed axis at both ends of each cell */
+  double *state;            /* rates of each mass, MOST_RATES x 2; the first ones are not used */
+  int32_t *on;              /* whether each mass is on its beams in the accepted state */
+  int32_t *here;            /* index of the cell of each mass in the arrays of `first`; ELSEWHERE or OFF */
+  double *motion;           /* of each mass: fraction of the cell, speed along the beam */
+  const int32_t *freedom;   /* displacements of each cell: x, y */
+  const int32_t *entry;     /* entries of the tangent: for x, then y, nodes x nodes of each cell */
+  const double *place;      /* positions of the nodes of the undeformed cells from the first one: x, y */
   const double *q0;         /* configuration at the beginning of the step */
   double part;              /* fraction of the increment at which loads act */
-  int half_tangents;        /* whether rotations have the nodal step 2 tan(change / 2) */
 } moving_loads;
 
-void start_moving_masses(const moving_loads *m, double t, const double *q, const double *v);
+void start_moving_masses(moving_loads *m, double t, const double *q);
+void take_rates_of_masses(moving_loads *m, const double *q1);
 
 /* Vectors of loads at some degrees of freedom times functions of time, see DeadLoads. */
 typedef struct {
@@ -1135,6 +1141,7 @@ typedef struct {
   void (*linearize)(void *self, const time_step *step, const double *q1);
   void (*add)(void *self, const derivatives *d, int p, double *r);
   void (*accept)(void *self, const derivatives *d, int p);
+  void (*accept_trial)(void *self, const derivatives *d, int p); /* of a step with `initial`; or none */
 } term_derivative;
 
 /* Derivatives of the state of a run. Arrays have a row for each parameter. */
@@ -1152,6 +1159,7 @@ struct derivatives {
   const int32_t *indices; /* columns of the tangent */
   double *tangent, *r, *v, *s, *space;
   const time_step *step;  /* the step; s: of the nodes */
+  int initial;            /* whether further rates of the scheme are taken from the step, and nothing else */
   /* Nearest switch of each parameter to another piece of the run, to first order: change of the parameter;
    * time; index of the term, and of the point or connector in it. */
   double *range, *range_time;
@@ -1292,8 +1300,10 @@ typedef struct {
   const moving_loads *loads;
   const moving_loads *const *neighbour;
   const double *weight;       /* see derivatives */
-  const double *given, *mass, *ends, *angle; /* derivatives of the numbers of moving_loads */
-  double *motion;             /* derivatives of the motions of masses */
+  const double *given, *mass, *ends, *place; /* derivatives of the numbers of moving_loads */
+  double *motion, *state;     /* derivatives of the motions and rates of masses */
+  double *moved;              /* derivatives of the steps of masses at constant unknowns, 2 of each */
+  double *state_bar, *moved_bar; /* of the adjoint */
   double *now, *end, *before; /* of the forces on cells */
 } moving_derivatives;
 
@@ -1380,7 +1390,9 @@ void transpose_differences(void *self, adjoint *a, const double *lambda);
 void transpose_followers(void *self, adjoint *a, const double *lambda);
 void transpose_pressures(void *self, adjoint *a, const double *lambda);
 void transpose_frame(void *self, adjoint *a, const double *lambda);
+void transpose_moving_state(void *self, adjoint *a);
 void transpose_moving_loads(void *self, adjoint *a, const double *lambda);
+void finish_moving_loads(void *self, adjoint *a);
 void transpose_guides(void *self, adjoint *a, const double *lambda);
 void transpose_damping(void *self, adjoint *a, const double *lambda);
 void finish_form(void *self, adjoint *a);

@@ -161,13 +161,11 @@ static void find_moving_loads(const moving_loads *m, double t, double *out)
 void begin_moving_loads(void *self, const time_step *step, const double *q1, const double *s)
 {
   const moving_loads *m = self;
-  const double half = step->dt / 2;
-  for (int k = 0; m->rates && k < m->loads; ++k) { /* speed and acceleration by differences */
-    double place[3], *motion = m->motion + 3 * k;
-    for (int j = 0; j < 3; ++j) place[j] = value_at(m->position + k, step->load_time + (j - 1) * half);
-    m->here[k] = m->mass[k] > 0 ? find_loaded_cell(m, k, place[1], motion) : -1;
+  for (int k = 0; m->rates && k < m->loads; ++k) { /* speed by a difference */
+    double place[3], *motion = m->motion + 2 * k;
+    for (int j = 0; j < 3; ++j) place[j] = value_at(m->position + k, step->load_time + (j - 1) * step->dt / 2);
+    m->here[k] = m->on[k] && on_route(m, k, place[1]) ? find_loaded_cell(m, k, place[1], motion) : OFF;
     motion[1] = (place[2] - place[0]) / step->dt;
-    motion[2] = (place[2] - 2 * place[1] + place[0]) / (half * half);
   }
   if (m->rates) ((moving_loads *)self)->q0 = step->q0;
   find_moving_loads(m, step->load_time, m->end);
