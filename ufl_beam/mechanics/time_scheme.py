@@ -96,7 +96,10 @@ class Scheme(Protocol):
 
     @property
     def half_tangents(self) -> bool:
-        """Whether forces work on 2 tan(Δψ/2) of a rotation, else on Δψ."""
+        """Whether forces work on 2 tan(Δψ/2) of a rotation, else on Δψ.
+
+        With Δψ, a step that turns a rigid part by more than 0.5 rad is subdivided.
+        """
 
     @property
     def limits_rotation(self) -> bool:

@@ -87,7 +87,8 @@ class Static(_ForcesAtEnd):
     The ledger computes works by the trapezoidal rule.  Its imbalance is of second order in the step
     and measures the error.  A step is divided if the work of the forces differs from the stored and
     dissipated energy by more than 5 % of the sum of both, because the step may have jumped to
-    another branch of equilibria.
+    another branch of equilibria.  It is also divided if it turns a rigid part by more than 0.5 rad,
+    because linkages have several assemblies without energy.
 
     Example:
         >>> run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)

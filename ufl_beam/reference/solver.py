@@ -23,7 +23,8 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering, turned
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, has_inertia, nodal_step, stages_of
-from ufl_beam.model.connector_laws import Controller, Coulomb, has_friction
+from ufl_beam.model.bodies import Body, Member
+from ufl_beam.model.connector_laws import Controller, Coulomb, PrescribedMotion, has_friction
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import RotatingFrame
@@ -42,6 +43,10 @@ from ufl_beam.reference.load_vectors import MovingForce, Supports, all_loads
 
 LARGEST_ROTATION = 0.75 * math.pi
 """Rotation of a node above which a step is cut, as 2 tan(Δψ/2) is infinite at π; rad."""
+
+LARGEST_RIGID_ROTATION, BENT = 0.5, 1 / 50
+"""Largest rotation of a part without strain in a step, rad; relative difference of rotations of the
+nodes of a beam up to which it counts as such."""
 
 MOST_SUBSTEPS = 2**12
 """Largest number of substeps of a step."""
@@ -330,6 +335,11 @@ class Solver(PresentState):
                 f"a node turns by {rotation:.3g} rad in the step, more than the limit of 0.75 π; "
                 "reduce dt"
             )
+        if (
+            not (self.scheme.half_tangents and self.inertia is not None)
+            and (rotation := self._largest_rigid_rotation(q1)) > LARGEST_RIGID_ROTATION
+        ):
+            raise StepFailed(f"a rigid part turns by {rotation:.3g} rad in the step")
         in_beams = sum(beam.change(step, q1) for beam in self.beams)
         in_connectors = sum(group.change(step, q1) for group in self.connectors)
         if self.inertia is None:
@@ -339,6 +349,27 @@ class Solver(PresentState):
     def _largest_rotation(self, q1: Array) -> float:
         """Return the largest rotation of a node in the step to ``q1``; rad."""
         return float(np.abs(q1 - self.q)[self.numbering.rotations].max(initial=0.0))
+
+    def _largest_rigid_rotation(self, q1: Array) -> float:
+        """Return the largest rotation of a body, a beam without strain or a rod of fixed length."""
+        scene, numbering, rotations = self.scene, self.numbering, [0.0]
+        members: list[Member | Body] = [*scene.beams, *scene.bodies]
+        for member in members:
+            changes = (q1 - self.q)[numbering.nodes_of(member)[1][:, 2]]
+            if np.ptp(changes) <= BENT * (largest := float(np.abs(changes).max())):
+                rotations.append(largest)
+        for connector, dofs in zip(
+            scene.all_connectors, numbering.dofs_of_connectors[:, :6], strict=True
+        ):
+            if connector.stretches and isinstance(connector.law, PrescribedMotion):
+                vectors = []
+                for q in (self.q, q1):
+                    u, v, ψ = q[dofs].reshape(3, 2)
+                    arms = np.array([complex(*arm) for arm in connector.arms])
+                    moved = u + 1j * v + (np.exp(1j * ψ) - 1) * arms
+                    vectors.append(complex(*connector.apart) + moved[1] - moved[0])
+                rotations.append(abs(np.angle(vectors[1] / vectors[0])))
+        return max(rotations)
 
     def _require_path(self, q1: Array, s: Array, in_beams: float, in_connectors: float) -> None:
         """Raise :class:`StepFailed` if a static step leads far away or to another branch.

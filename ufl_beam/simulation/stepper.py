@@ -23,6 +23,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ModelError, StepFailed, warn
 from ufl_beam.mechanics.time_scheme import Step, stages_of, with_half_tangents
+from ufl_beam.model.connector_laws import PrescribedMotion
 from ufl_beam.model.constraint_checks import INSTEAD, describe_motions
 from ufl_beam.output.recorder import StateView
 from ufl_beam.output.states import States
@@ -93,6 +94,13 @@ class Prediction:
 LARGEST_ROTATION = 0.75 * math.pi
 """Largest rotation of a node in a step; rad.  Algorithmic strains are valid up to π."""
 
+LARGEST_RIGID_ROTATION = 0.5
+"""Largest rotation of a part that a step turns without strain, in statics and if forces work on Δψ.
+
+A linkage has several assemblies, which no energy tells apart.  In longer steps Newton's method may
+find another one than the assembly to which the motion leads; docs/schemes.md has measurements.
+"""
+
 LEAST_AT_REST, LEAST_IN_MOTION = 2, 1
 """Least numbers of Newton iterations in statics and in dynamics.  Newton's method stops earlier
 only if the residual is far below the tolerance.
@@ -119,6 +127,27 @@ If nodes rotate that far in so short a time, the scene jumps, and shorter subste
 
 MOST_SUBSTEPS: int = lib.MOST_SUBSTEPS
 """Largest number of substeps of a step."""
+
+
+def rigid_parts(subdomain: Subdomain) -> Any:
+    """Create ``rigid_parts`` of loops.h: beams, bodies, and rods of fixed length."""
+    numbering, connectors = subdomain.numbering, subdomain.numbering.scene.all_connectors
+    rotations = subdomain.cell_dofs[:, -(numbering.mesh.degree + 1) :]
+    beams = np.repeat(numbering.beam_of_cell[subdomain.cells], rotations.shape[1])
+    pairs = np.unique(np.column_stack([beams, rotations.ravel()]), axis=0)
+    last = np.flatnonzero(np.diff(pairs[:, 0], append=-1)) + 1
+    bodies = subdomain.body_dofs[:, 2]
+    here = [connectors[i] for i in subdomain.connectors]
+    rods = [k for k, c in enumerate(here) if c.stretches and isinstance(c.law, PrescribedMotion)]
+    geometry = [(*here[k].arms[0], *here[k].arms[1], *here[k].apart) for k in rods]
+    return struct(
+        "rigid_parts", members=len(last) + len(bodies), rods=len(rods),
+        end=np.append(last, len(pairs) + 1 + np.arange(len(bodies))).astype(np.int32),
+        rotation=np.append(pairs[:, 1], bodies).astype(np.int32),
+        dof=subdomain.connector_dofs[rods, :6].astype(np.int32),
+        geometry=np.array(geometry).ravel(),
+        largest_turn=LARGEST_RIGID_ROTATION,
+    )  # fmt: skip
 
 
 class Trial(NamedTuple):
@@ -226,6 +255,8 @@ class Stepper(StateView):
             fill(self.time_loop, x=np.zeros(subdomain.size))
         if path is not None:
             fill(self.time_loop, path=path.c)
+        if not (scheme.half_tangents and in_motion):
+            fill(self.time_loop, parts=rigid_parts(subdomain))
         self._alive: list[Any] = [opens]
         self._watches = list[Any]()  # extremes that C updates after each step
         self._force_watch = ForceWatch(equation.connector_terms, self.controllers, self.scene.size)
@@ -427,6 +458,11 @@ class Stepper(StateView):
             raise StepFailed(
                 f"a node turns by {c.turn:.3g} rad in the step, more than the limit of 0.75 π; "
                 "reduce dt"
+            )
+        if failure == lib.PART_TURNS_TOO_FAR:
+            raise StepFailed(
+                f"a rigid part turns by {c.parts.turn:.3g} rad in the step, more than the limit of "
+                f"{LARGEST_RIGID_ROTATION:g}: the mechanism may leap to another assembly; reduce dt"
             )
         if failure == lib.NO_DERIVATIVE:
             at = f"{c.failed_end:.9g} s"

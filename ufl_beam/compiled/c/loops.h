@@ -1038,12 +1038,21 @@ typedef struct {
   int32_t *free;
 } openable;
 
+/* Parts that a step may turn without strain. */
+typedef struct {
+  int members, rods;
+  const int32_t *end, *rotation; /* rotations of the nodes of each beam or body, and their ends in `rotation` */
+  const int32_t *dof;            /* of each rod between two places: u, v and rotation of both nodes */
+  const double *geometry;        /* of each rod, undeformed: arms of both places, vector between them */
+  double turn, largest_turn;     /* largest rotation in the step; its limit */
+} rigid_parts;
+
 enum { MOST_SUBSTEPS = 4096 }; /* largest number of substeps of a step */
 
 /* Reasons why a step is not accepted. */
 enum failure {
-  SUCCEEDS, RAISED, NO_EQUILIBRIUM, APPLIED_TOO_FAST, TURNS_TOO_FAR, GIVES_ENERGY, LEAVES_MECHANISM, LEAPS,
-  NO_DERIVATIVE
+  SUCCEEDS, RAISED, NO_EQUILIBRIUM, APPLIED_TOO_FAST, TURNS_TOO_FAR, PART_TURNS_TOO_FAR, GIVES_ENERGY,
+  LEAVES_MECHANISM, LEAPS, NO_DERIVATIVE
 };
 
 /* Numbers of a state and their place in its row. They are contiguous, or are added from the indices
@@ -1069,6 +1078,7 @@ typedef struct {
   int rotations, half_tangents, multipliers;
   const int32_t *rotation, *half_tangent, *multiplier;
   double turn, largest_turn; /* largest rotation in the step; limit of it, infinite if there is none */
+  rigid_parts *parts; /* whose rotation is limited; or none */
   rates *rates;       /* in dynamics */
   int admissions, checks_laws; /* checks of laws; whether any process has checks */
   const admission_call *admission;

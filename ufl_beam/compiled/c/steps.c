@@ -221,8 +221,42 @@ static int fails(time_loop *m, enum failure why)
   return 0;
 }
 
+/* Beams turn rigidly if the rotations of their nodes differ by at most this fraction. */
+static const double BENT = 1. / 50;
+
+/* Largest rotation of a part that the step from q0 to q1 turns without strain. A rod is a vector. */
+static double largest_rigid_turn(const rigid_parts *p, const double *q0, const double *q1)
+{
+  double turn = 0;
+  for (int g = 0, k = 0; g < p->members; ++g) {
+    double least = INFINITY, most = -INFINITY;
+    for (; k < p->end[g]; ++k) {
+      const double x = q1[p->rotation[k]] - q0[p->rotation[k]];
+      least = fmin(least, x), most = fmax(most, x);
+    }
+    const double size = fmax(fabs(least), fabs(most));
+    if (most - least <= BENT * size) turn = fmax(turn, size);
+  }
+  for (int g = 0; g < p->rods; ++g) {
+    const int32_t *dof = p->dof + 6 * g;
+    const double *arms = p->geometry + 6 * g, *q[] = {q0, q1};
+    double x[2], y[2];
+    for (int i = 0; i < 2; ++i) {
+      x[i] = arms[4], y[i] = arms[5];
+      for (int k = 0; k < 2; ++k) {
+        const double *a = arms + 2 * k, sign = 2 * k - 1;
+        const double c = cos(q[i][dof[4 + k]]) - 1, s = sin(q[i][dof[4 + k]]);
+        x[i] += sign * (q[i][dof[k]] + c * a[0] - s * a[1]);
+        y[i] += sign * (q[i][dof[2 + k]] + s * a[0] + c * a[1]);
+      }
+    }
+    turn = fmax(turn, fabs(atan2(x[0] * y[1] - x[1] * y[0], x[0] * x[1] + y[0] * y[1])));
+  }
+  return turn;
+}
+
 /* Compute the end of the step in the axes of the plane and the step of the nodes; check that no
- * node rotates further than allowed. */
+ * node and no rigid part rotates further than allowed. */
 static int measure(time_loop *m)
 {
   equation *e = m->equation;
@@ -237,6 +271,10 @@ static int measure(time_loop *m)
   if (m->applies && m->turn > m->applying_turn && m->short_part * m->step.dt > m->applied_by - m->begin_of_run)
     return fails(m, APPLIED_TOO_FAST);
   if (!(m->turn <= m->largest_turn)) return fails(m, TURNS_TOO_FAR);
+  if (m->parts) {
+    m->parts->turn = over_processes(e, LARGEST, largest_rigid_turn(m->parts, m->q, m->x));
+    if (!(m->parts->turn <= m->parts->largest_turn)) return fails(m, PART_TURNS_TOO_FAR);
+  }
   for (int k = 0; k < m->half_tangents; ++k) {
     const int i = m->half_tangent[k];
     m->s[i] = 2 * tan(m->s[i] / 2);
