@@ -245,5 +245,5 @@ ub.print_once("linear and exponential decay told apart")
 #
 # * `mean = 1e6`: the homogeneous bar yields in a few periods, then vibrates elastically,
 # * a tenth of the speed: only the weakest fibres yield, and the damping is much smaller,
-# * `ub.TruncatedNormal` instead of `ub.Normal`: no fibre yields at once,
+# * `ub.TruncatedNormal` instead of `ub.Normal`: no fibre has the yield stress zero,
 # * `v=0.0, psi=0.0` left out and `linear=(0, speed)`: the bar is a cantilever that bends.

@@ -4,8 +4,9 @@
 # A flexible beam hangs from two rigid links and carries a heavy mass at mid-span.  A short push
 # makes it swing out.  At t = 0.64 s the left link and the left half of the beam become straight and
 # snap taut.  The impact excites axial vibrations a thousand times faster than the swing.  With a
-# scheme that conserves energy these vibrations never decay; a dissipative scheme removes them
-# without changing the swing.
+# scheme that conserves energy these vibrations never decay; a dissipative scheme removes them.  Up to
+# the snap both schemes agree within 5 µm.  Afterwards the dissipative scheme loses a fifth of the
+# energy, 13 of 64 mJ until 2.5 s, and the mass is then 6.5 mm away from its conserving motion.
 #
 # This demo shows
 #
@@ -281,6 +282,9 @@ assert conserving.energy.worst < 1e-9
 assert decaying.energy.worst < 1e-9
 for solution in (exact, fine, hinged_conserving, hinged_decaying):
     assert solution.energy.worst < 1e-9
+apart = np.linalg.norm((decaying.position(middle) - conserving.position(middle)), axis=1)
+assert apart[smooth].max() < 5e-6  # m
+assert abs(apart[-1] - 6.46e-3) < 1e-5
 for solution in (conserving, decaying, exact, fine, hinged_conserving, hinged_decaying):
     assert solution.iterations <= 5 * solution.substeps
 

@@ -191,6 +191,6 @@ ub.print_once("the ledger closes, and nothing overtakes sound")
 # ## Try this
 #
 # * `mpirun -n 2 python3 demos/demo_lattice.py`: the same results, in less time,
-# * `--cells 1000`: a wall of seven bays, in a second,
+# * `--cells 1000`: a wall of seven bays, in a few seconds,
 # * `output/lattice.hdf` in ParaView: *Warp By Vector* with the displacement, coloured by `M`; then
 #   *Rescale to data range over all timesteps*, since nothing moves at t = 0.

@@ -115,10 +115,10 @@ def decays(run):
     free = solution.times > impulse.times[-1]
     t, (u, v, _) = solution.times[free], solution.displacement(corner)[free].T
     (times, highest), (_, lowest) = (ub.peaks(t, x, prominence=0.2) for x in (u, -u))
-    n = PERIODS + 1
+    n = min(PERIODS + 1, len(highest), len(lowest))
     horizontal = ub.fit_decay(times[:n], (highest[:n] + lowest[:n]) / 2)
     times, sinking = ub.peaks(t, -v, prominence=0.1)
-    n = 2 * PERIODS + 1
+    n = min(2 * PERIODS + 1, len(sinking) - 1)
     vertical = ub.fit_decay(times[:n], (sinking[:n] + sinking[1 : n + 1]) / 2)
     return horizontal, vertical
 
@@ -270,5 +270,6 @@ ub.print_once("trend of Table 2 reproduced")
 # ## Try this
 #
 # * `fracture = 0.3`: the hinge opens completely in the first swing; how large is the damping then?
-# * `peak = 12.5`: the hinge never opens, and all decrements are zero,
+# * `peak = 12.0`: the hinge never opens and dissipates nothing; the decrements that the peaks seem to
+#   show are below 0.002, because modes exchange energy,
 # * `ub.LinearSoftening` instead of `ub.Softening`: the resistance vanishes completely.
