@@ -394,8 +394,8 @@ ub.print_once(
 #
 # ## Try this
 #
-# * `G_f = 25.0` without the assertion `M_u**2 / G_f < EI / L`: the hinge snaps back, so static steps
-#   find no equilibrium,
+# * `G_f = 25.0` without the assertion `M_u**2 / G_f < EI / L`: the hinge snaps back, so static
+#   steps find no equilibrium,
 # * `kinematic` instead of `isotropic`, and rotate the end back: which elastic range shifts or
 #   grows?
 # * `DuvautLions(2e7 / E)`, the relaxation time of the paper: 5.8963, 5.9881, 6.9056 kN cm.

@@ -4,9 +4,9 @@
 # A flexible beam hangs from two rigid links and carries a heavy mass at mid-span.  A short push
 # makes it swing out.  At t = 0.64 s the left link and the left half of the beam become straight and
 # snap taut.  The impact excites axial vibrations a thousand times faster than the swing.  With a
-# scheme that conserves energy these vibrations never decay; a dissipative scheme removes them.  Up to
-# the snap both schemes agree within 5 µm.  Afterwards the dissipative scheme loses a fifth of the
-# energy, 13 of 64 mJ until 2.5 s, and the mass is then 6.5 mm away from its conserving motion.
+# scheme that conserves energy these vibrations never decay; a dissipative scheme removes them.
+# Up to the snap both schemes agree within 5 µm.  Afterwards the dissipative scheme loses a fifth of
+# the energy, 13 of 64 mJ until 2.5 s, and the mass is then 6.5 mm away from its conserving motion.
 #
 # This demo shows
 #

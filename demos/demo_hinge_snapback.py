@@ -149,5 +149,5 @@ assert np.isclose(np.max(F), M_u / L, rtol=1e-3)
 # ## Try this
 #
 # * `ub.ArcLength(0.001)` alone: where does it end, and with which message?
-# * ratio 0.3 with a second clamp at `beam.end`, and hinge and load at `beam.at(0.5)`: the load rises
-#   on while the hinge opens, because the halves of the beam become stretched.
+# * ratio 0.3 with a second clamp at `beam.end`, and hinge and load at `beam.at(0.5)`: the load
+#   rises on while the hinge opens, because the halves of the beam become stretched.

@@ -270,6 +270,6 @@ ub.print_once("trend of Table 2 reproduced")
 # ## Try this
 #
 # * `fracture = 0.3`: the hinge opens completely in the first swing; how large is the damping then?
-# * `peak = 12.0`: the hinge never opens and dissipates nothing; the decrements that the peaks seem to
-#   show are below 0.002, because modes exchange energy,
+# * `peak = 12.0`: the hinge never opens and dissipates nothing; the decrements of the peaks are
+#   below 0.002, because modes exchange energy,
 # * `ub.LinearSoftening` instead of `ub.Softening`: the resistance vanishes completely.
