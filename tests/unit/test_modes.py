@@ -555,3 +555,98 @@ def test_buckling_about_a_state_needs_loads_that_grow():
         ub.buckling(scene, 1, at=at)
     whole, rest = ub.buckling(scene, 1).factors[0], ub.buckling(scene, 1, t=2.0, at=at).factors[0]
     assert 1.0 + rest == pytest.approx(whole, rel=1e-2)
+
+
+def spinning(rate):
+    """A free beam that turns about its middle; it bends at 22.4 √(EI/ρAL⁴) = 35 rad/s."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=6)
+    turn = ub.Velocity([beam], angular=rate, about=(1.0, 0.0))
+    scene = ub.Scene([beam], initial=[turn])
+    return scene, ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.02), dt=0.01)
+
+
+def test_a_state_that_turns_is_refused():
+    """Its modes need centrifugal and Coriolis forces: (rate/frequency)² of the stiffness.
+
+    Without them the free rotation of the beam, however slow, has about its rate as a frequency.
+    """
+    for rate in (0.1, -20.0):
+        scene, run = spinning(rate)
+        with pytest.raises(ub.ArgumentError, match=r"modes: at turns: .* rad/s.* RotatingFrame"):
+            ub.modes(scene, 4, at=run)
+    beam = scene.beams[0]
+    held = clamped(beam, loads=[ub.PointLoad(beam.end, (-1.0, 0))])
+    with pytest.raises(ub.ArgumentError, match=r"buckling: at turns: .* rad/s.* RotatingFrame"):
+        ub.buckling(held, 1, at=run)
+
+
+def test_a_vibrating_state_is_no_spin():
+    """The tip of a cantilever moves by 1 % of its length; its frequencies do not depend on this."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=6)
+    kick = ub.PointLoad(beam.end, force=(0, 0.4), amplitude=lambda t: float(t < 0.05))
+    scene = clamped(beam, loads=[kick])
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.3), dt=0.01)
+    assert np.abs(run.v[-1]).max() > 1e-3
+    bent = ub.modes(scene, 1, at=run).omega
+    assert bent == pytest.approx(ub.modes(scene, 1).omega, rel=1e-3)
+
+
+def propped(law, *loads):
+    """A beam on two bearings and a connector under its middle."""
+    section = ub.Section(EA=2e9, GA=8e8, EI=5e6, rhoA=50.0)
+    beam = ub.Beam((0, 0), (6, 0), section, cells=8)
+    support = ub.Slide(ub.ground(3, 0), beam.at(0.5), law, axis=(0, 1))
+    bearings = [ub.Pinned(beam.start), ub.Roller(beam.end)]
+    return ub.Scene([beam], supports=bearings, connectors=[support], loads=loads)
+
+
+def linearized(scene, at=None):
+    tip = ("displacement", scene.beams[0].end, "psi")
+    return ub.linearize(scene, inputs=[scene.loads[0]], outputs=[tip], at=at)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        ub.Stop(4e6, low=0.0), ub.Stop(4e6, high=0.0), ub.Stop(4e6, low=0.0, high=0.0),
+        ub.ForceLaw(lambda e, de: 4e6 * min(e, 0.0)),
+    ],
+    ids=["low", "high", "both", "own"],
+)  # fmt: skip
+def test_a_stop_that_just_touches_is_named(law):
+    """It counts as open in modes, buckling and linear models, though any load may close it."""
+    scene = propped(law)
+    push = ub.PointLoad(scene.beams[0].end, (-1.0, 0), amplitude=lambda t: t)
+    scene = replace(scene, loads=[push])
+    for name, call in (
+        ("modes", lambda: ub.modes(scene, 1)), ("buckling", lambda: ub.buckling(scene, 1)),
+        ("linearize", lambda: linearized(scene)),
+    ):  # fmt: skip
+        with pytest.warns(ub.ModelWarning, match=f"{name}: Slide.*at a limit.*Give at="):
+            call()
+
+
+def test_a_stop_that_is_pressed_or_open_is_not_named():
+    """Nor are laws with a slope that varies smoothly; the pressed stop is as stiff as a spring."""
+    smooth = [ub.ForceLaw(lambda e, de: 1e6 * e**3), ub.ForceLaw(lambda e, de: 1e6 * e * abs(e))]
+    for law in (ub.Stop(4e6, low=-1e-3), ub.Spring(4e6), *smooth):
+        scene = propped(law)
+        ub.modes(scene, 1)  # no warning is issued
+    scene = propped(ub.Stop(4e6, low=0.0), ub.Gravity())
+    pressed = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
+    found = ub.modes(scene, 1, at=pressed).omega
+    assert found == pytest.approx(ub.modes(propped(ub.Spring(4e6)), 1).omega, rel=1e-4)
+
+
+def test_crossed_ties_that_hang_slack_are_named():
+    section = ub.Section(EA=2e9, GA=8e8, EI=5e6, rhoA=50.0)
+    left, right = (ub.Beam((x, 0), (x, 3), section) for x in (0, 4))
+    top = ub.Beam((0, 3), (4, 3), section)
+    tie = ub.Stop(1e7, high=0.0)
+    ties = [ub.Stretch(left.start, right.end, tie), ub.Stretch(right.start, left.end, tie)]
+    scene = ub.Scene(
+        [left, right, top], supports=[ub.Clamped(left.start), ub.Clamped(right.start)],
+        joints=[ub.Rigid(left.end, top.start), ub.Rigid(top.end, right.end)], connectors=ties,
+    )  # fmt: skip
+    with pytest.warns(ub.ModelWarning, match="modes: Stretch.*, Stretch.*at a limit"):
+        ub.modes(scene, 1)

@@ -557,8 +557,8 @@ def linearize(
             input or output.
 
     Warns:
-        ModelWarning: Some beams have no mass, a controller or sliding friction is left out, or
-            internal variables of a law of a connector relax.
+        ModelWarning: Some beams have no mass, a controller or sliding friction is left out, a stop
+            just touches, or internal variables of a law of a connector relax.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(0, 1.0))

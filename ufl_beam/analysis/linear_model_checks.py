@@ -104,11 +104,23 @@ def warn_of_omissions(small: Linearization, inputs: Sequence[Any]) -> None:
         if isinstance(connector.law, Controller) and connector not in inputs:
             warn(f"linearize: {connector}: the force of the controller is constant")
     warn_of_relaxation("linearize", small)
+    warn_of_limits("linearize", small)
     for group in small._simulation.equation.connector_terms:
         if isinstance(group.connectors[0].law, Coulomb) and group.response.sticks is not None:
             for connector, sticks in zip(group.connectors, group.response.sticks, strict=True):
                 if not sticks:
                     warn(f"linearize: {connector}: sliding friction is left out")
+
+
+def warn_of_limits(call: str, small: Linearization) -> None:
+    """Warn of connectors at a limit in the state, such as stops that just touch."""
+    if touching := small.touching():
+        names = ", ".join(map(str, touching[:NAMED])) + ", ..." * (len(touching) > NAMED)
+        warn(
+            f"{call}: {names}: the motion of the state is at a limit, beside which the stiffness "
+            "differs, as of a stop that just touches, which counts as open. Give at=, a state "
+            "under loads or a preload that close or open it"
+        )
 
 
 def warn_of_relaxation(call: str, small: Linearization) -> None:

@@ -29,6 +29,7 @@ from ufl_beam.errors import ArgumentError, ModelWarning
 from ufl_beam.mechanics.time_scheme import Coefficients, Step
 from ufl_beam.mechanics.time_schemes import Newmark, Static
 from ufl_beam.model.beams import Mesh
+from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import MovingLoad
@@ -37,12 +38,14 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.beam_forces import inelastic_forms, section_law
 from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.connector_forces import ConnectorForces
 from ufl_beam.terms.term import InCells
 
 BALANCED = 1e-13  # forces below this fraction of the stiffness times the scene's size are round-off
 CHANGE = 1e-6  # change for difference quotients; rad, or fraction of the size of the scene
 SLOWER = 10.0  # ratio of two steps in which forces of laws are compared
 RELAXES = 1e-6  # difference of viscosities from two steps that is not round-off, as a fraction
+KINK = 1e-3  # difference of stiffnesses beside a motion that is a kink, as a fraction
 AT_REST = 1e150  # time step after which rates vanish; its square does not overflow; s
 
 
@@ -192,6 +195,28 @@ class Linearization:
         relaxes = apart > np.maximum(RELAXES * size, RELAXES * largest)
         where = dict(zip(self.numbering.multipliers, self.scene.all_connectors, strict=True))
         return [where[law] for law in laws[relaxes]]
+
+    def touching(self) -> list[Connector]:
+        """Return connectors whose stiffness differs on both sides of their motion in the state."""
+        T, multipliers, found = self.tangent.tocsc(), self.numbering.multipliers, list[Connector]()
+        for group in self._simulation.equation.connector_terms:
+            laws = ConnectorLaw | ForceLaw
+            if not (
+                isinstance(group, ConnectorForces) and isinstance(group.connectors[0].law, laws)
+            ):
+                continue
+            for i, connector in enumerate(group.connectors):
+                along = T[:, [group.forces_at[i]]].toarray()[:, 0] * self.lengths
+                along[multipliers] = 0.0
+                step = CHANGE * self.lengths[self._motion_of(connector)]
+                apart = step * along * self.lengths / max(along @ along, 1e-300)
+                around = [self.q + part * apart for part in (0.0, -1.0, 1.0, -0.5, 0.5)]
+                slopes = np.array([group.rows(q)[i, :-2].copy() for q in around])
+                jumps, inner = np.abs(slopes[1:] - slopes[0]).max(axis=-1).reshape(2, 2)
+                # A slope that varies smoothly changes by half as much in half the distance.
+                if ((jumps > KINK * np.abs(slopes).max()) & (inner > 0.6 * jumps)).any():
+                    found.append(connector)
+        return found
 
     def participation(self, direction: Array) -> tuple[Array, float]:
         """Return M r for a translation r of all nodes along a unit vector, and the moving mass.

@@ -15,7 +15,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.analysis.constant_loads import AT, duration
-from ufl_beam.analysis.linear_model_checks import warn_of_relaxation
+from ufl_beam.analysis.linear_model_checks import warn_of_limits, warn_of_relaxation
 from ufl_beam.analysis.small_motions import SmallMotions
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.c_library import lib
@@ -46,6 +46,7 @@ LARGEST_ERROR = 0.1
 """Largest estimated error of a buckling factor without a warning.  The estimate is below 0.02 in
 frames under forces at their nodes, and 0.1 to 0.7 where loads along beams bend them first."""
 
+SPIN = 0.1  # mean rate of turning that is an error, as a fraction of the first frequency
 MOST_TITLES = 4  # largest number of modes in a one-line text
 AMPLITUDE = 0.1  # largest displacement of a mode in pictures, as a fraction of the scene's size
 
@@ -314,12 +315,12 @@ def modes(scene: Scene, n: int, *, at: StateOf | None = None, mesh: Mesh | None 
         mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
 
     Raises:
-        ArgumentError: The call or the scene is wrong, nothing that moves has mass, or the scene
-            has a :class:`RotatingFrame` and ``at`` is not given.
+        ArgumentError: The call or the scene is wrong, nothing that moves has mass, the scene has a
+            :class:`RotatingFrame` and ``at`` is not given, or ``at`` turns.
 
     Warns:
-        ModelWarning: The undeformed scene is no equilibrium, some beams have no mass, or internal
-            variables of a law of a connector relax.
+        ModelWarning: The undeformed scene is no equilibrium, some beams have no mass, a stop just
+            touches, or internal variables of a law of a connector relax.
 
     Example:
         >>> shapes = ub.modes(scene, 3, mesh=ub.Mesh(refine=4))
@@ -352,11 +353,14 @@ def computed_modes(
         if at is None:
             scene = replace(scene, loads=())  # with loads, this state would be no equilibrium
     small = SmallMotions(scene, at, mesh=mesh)
+    if at is not None:
+        require_no_spin("modes", small, at)
     if at is None and (said := small.unbalanced()):
         warn(said)
     if not small.M.data.any():
         raise ArgumentError("modes: nothing that can move has mass; give sections rho or rhoA")
     warn_of_masses(scene)
+    warn_of_limits("modes", small)
     if damped:
         warn_of_relaxation("modes", small)
     exponents, shapes = small.exponents(n, damped=damped)
@@ -386,13 +390,15 @@ def buckling(
         mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
 
     Raises:
-        ArgumentError: The call is wrong; the scene is free to move; nothing acts on it; or it has a
+        ArgumentError: The call is wrong; the scene is free to move; nothing acts on it; ``at``
+            turns; or the scene has a
             :class:`FollowerLoad`, :class:`Pressure`, :class:`RotatingFrame`,
             :class:`ImposedStrain` or
             :class:`VirtualWork`.
 
     Warns:
-        ModelWarning: The stiffness of a shape does not vanish at its factor.
+        ModelWarning: The stiffness of a shape does not vanish at its factor, or a stop just
+            touches.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-1.0, 0))
@@ -425,6 +431,9 @@ def buckling(
     if at is None and (said := require_no_mechanism(scene)):
         raise ArgumentError(f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)")
     small = SmallMotions(scene, at, t, mesh)
+    if at is not None:
+        require_no_spin("buckling", small, at)
+    warn_of_limits("buckling", small)
     factors, shapes, errors, others = small.buckling(n)
     stiff = any(beam.section.GA > 10 * beam.section.EA for beam in scene.beams)
     remedy = (
@@ -473,3 +482,22 @@ def require_state(
             "objects, joined alike, and the same Mesh"
         )
     return at
+
+
+def require_no_spin(call: str, small: SmallMotions, at: Solution) -> None:
+    """Raise if a beam or body turns fast in the last state of ``at``; ``call`` is the caller."""
+    if not len(at.v) or not small.M.data.any():
+        return
+    numbering, scene = small.numbering, small.scene
+    first = small.undamped(1, (small.K + small.K.T) / 2, definite=True)[-1] ** 0.5
+    parts = [*scene.rigid_bodies, *scene.beams]
+    turning = [dofs[2:] for dofs in numbering.dofs_of_bodies]
+    turning += [numbering.dofs[numbering.nodes_along(beam), 2] for beam in scene.beams]
+    for name, dofs in zip(parts, turning, strict=True):
+        if (rate := abs(at.v[-1][dofs].mean())) > SPIN * first:
+            raise ArgumentError(
+                f"{call}: at turns: {name} by {rate:.3g} rad/s, beside a first frequency of "
+                f"{first:.3g} rad/s; its centrifugal and Coriolis forces would be missing. Put a "
+                "RotatingFrame of this rate in the scene, and give its state of steady rotation, "
+                "or give a state at rest"
+            )
