@@ -487,15 +487,9 @@ def test_a_start_with_a_new_joint_of_places_apart_is_refused():
     """The hinge has turned by 2 rad/s · 1 s; a rigid joint would have to turn it back."""
     turns = [ub.Velocity([x], angular=w, about=(1, 0)) for x, w in ((GIRDER, 0.0), (RIGHT, 2.0))]
     rigid = in_line(ub.Rigid)
-    for end, says in (
-        (1.0, "positions differ by...rad at"),
-        (1e-9, "velocities differ by...rad/s at"),
-    ):
-        hinged = run(
-            ub.Scene([GIRDER, RIGHT], joints=[HINGE], initial=turns), t=(0, end), dt=end / 8
-        )
-        with raises(f"start: the new scene joins places whose {says}...psi of"):
-            run(rigid, start=hinged)
+    hinged = run(ub.Scene([GIRDER, RIGHT], joints=[HINGE], initial=turns), t=(0, 1), dt=1 / 8)
+    with raises("start: the new scene joins places whose positions differ by...rad at...psi of"):
+        run(rigid, start=hinged)
     still = run(in_line(ub.Revolute))
     assert len(run(rigid, start=still).times) > 1
 

@@ -3,21 +3,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from mpi4py import MPI
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.discretization.function_spaces import Fields, applied, mass_form, point_masses
+from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import ModelError
-from ufl_beam.model.bodies import GROUND
+from ufl_beam.mechanics.impacts import ROUND_OFF, Excess
+from ufl_beam.model.bodies import GROUND, Body, node
 from ufl_beam.model.connectors import Connector
 
 APART = 1e-6
-"""Largest difference between two places that a new joint may connect: in positions, relative to the
-size of the scene; in rotations, in rad; in velocities, relative to the largest velocity in the
-scene times max(size of the scene in m, 1)."""
+"""Largest difference between the positions of two places that a new joint may connect, relative to
+the size of the scene; in rotations, in rad."""
 
 CELL_TABLES = ("cells", "changes of strains")
 """Tables of internal variables of cells; the other tables are of connectors."""
@@ -42,10 +44,10 @@ class Transfer:
         # ``connectors`` maps indices of connectors from the new scene to the old scene.
         known: dict[object, list[int]] = {}
         for i, connector in enumerate(old.scene.all_connectors):
-            known.setdefault(_geometry(connector), []).append(i)
+            known.setdefault(geometry(connector), []).append(i)
         connectors: dict[int, int] = {}
         for i, connector in enumerate(new.scene.all_connectors):
-            if candidates := known.get(_geometry(connector)):
+            if candidates := known.get(geometry(connector)):
                 connectors[i] = candidates.pop(0)
         self._connector_map = {a: b for b, a in connectors.items()}
         self._to = np.concatenate([new_dofs, new.multipliers[list(connectors)]])
@@ -76,42 +78,65 @@ class Transfer:
 
     def state(self, q: Array) -> Array:
         """Map a configuration to the new numbering; raise if places of a new joint are apart."""
-        size = self._new.scene.size
-        return self._map(q, lambda c: APART * (size if c < 2 else 1.0), ("m", "rad"), "positions")
+        mapped = self._map(q)
+        mismatch = np.abs(mapped[self._to] - q[self._from])
+        moving = len(self._to) - len(self._connector_map)
+        for c, unit in enumerate(("m", "m", "rad")):
+            component = mismatch[c:moving:3]
+            allowed = APART * (self._new.scene.size if c < 2 else 1.0)
+            if component.size and component.max() > allowed:
+                where = self._new.describe(int(self._to[c + 3 * int(np.argmax(component))]))
+                raise ModelError(
+                    "start: the new scene joins places whose positions differ by "
+                    f"{component.max():.3g} {unit} at the end of the solution: {where}. Connect "
+                    "them by springs, or start from a solution in which their positions are equal"
+                )
+        return self._on_ground(mapped)
 
-    def velocity(self, v: Array) -> Array:
-        """Map velocities to the new numbering; raise if places of a new joint differ in them."""
-        fastest = float(np.abs(v).max(initial=0.0)) * max(self._new.scene.size, 1.0)
-        return self._map(v, lambda c: APART * fastest, ("m/s", "rad/s"), "velocities")
+    def velocity(self, v: Array) -> tuple[Array, Excess | None]:
+        """Map velocities to the new numbering.
 
-    def _map(
-        self, x: Array, allowed: Callable[[int], float], units: tuple[str, str], how: str
-    ) -> Array:
+        The second result is the momentum and energy of the velocities of places that begin to share
+        an unknown, if they differ; they are in addition to those of the first result.
+        """
+        mapped = self._on_ground(self._map(v))
+        gaps = np.abs(mapped[self._to] - v[self._from]) * self._new.scales[self._to]
+        if gaps.max() <= ROUND_OFF * np.abs(v * self._old.scales).max():
+            return mapped, None
+        new, old = (Fields(Subdomain(x, MPI.COMM_SELF)) for x in (self._new, self._old))
+        # Each cell has unknowns of its own.
+        own = np.arange(new.cell_dofs.size, dtype=np.int32).reshape(new.cell_dofs.shape)
+        q1, momentum = new.element.q1, np.zeros(own.size)
+        kernel = new.kernel(applied(mass_form(new.element), q1), q1, own)
+        at, apart = new.cell_dofs.ravel(), v[old.cell_dofs.ravel()] - mapped[new.cell_dofs.ravel()]
+        kernel.add(apart, momentum)
+        excess, energy = np.zeros(self._new.size), apart @ momentum / 2
+        np.add.at(excess, at, momentum)
+        for place, mass, inertia in point_masses(self._old.scene):
+            if isinstance(node(place), Body) and node(place) not in self._new.scene.rigid_bodies:
+                continue
+            gap = v[self._old.node(place)] - mapped[self._new.node(place)]
+            of_mass = np.array([mass, mass, inertia]) * gap
+            excess[self._new.node(place)] += of_mass
+            energy += of_mass @ gap / 2
+        return mapped, (excess, float(energy))
+
+    def _map(self, x: Array) -> Array:
         mapped = np.zeros(self._new.size)
         mapped[self._to] = x[self._from]
-        mismatch = np.abs(mapped[self._to] - x[self._from])
-        moving = len(self._to) - len(self._connector_map)
-        for c in range(3):
-            component = mismatch[c:moving:3]
-            if component.size and component.max() > allowed(c):
-                where = self._new.describe(int(self._to[c + 3 * int(np.argmax(component))]))
-                unit = units[c == 2]
-                raise ModelError(
-                    f"start: the new scene joins places whose {how} differ by "
-                    f"{component.max():.3g} {unit} at the end of the solution: {where}. Connect "
-                    f"them by springs, or start from a solution in which their {how} are equal"
-                )
-        if GROUND in self._new.scene.rigid_bodies:
-            mapped[self._new.node(GROUND.middle)] = 0.0
         return mapped
+
+    def _on_ground(self, x: Array) -> Array:
+        if GROUND in self._new.scene.rigid_bodies:
+            x[self._new.node(GROUND.middle)] = 0.0
+        return x
 
     def internal(self, state: State) -> State:
         """Map internal variables, forces and stored rates to the numbering of the new scene."""
         mapped: State = {}
         for name, values in state.items():
             if values.ndim == 1:
-                mapped[name] = np.zeros(self._new.size)
-                mapped[name][self._to] = values[self._from]
+                mapped[name] = self._map(values) if len(values) == self._old.size else values
             elif name.rpartition(",")[0] in CELL_TABLES:
                 mapped[name] = values
             else:
@@ -125,7 +150,7 @@ class Transfer:
 def same_unknowns(old: DofNumbering, new: DofNumbering) -> bool:
     """Return whether degrees of freedom and connectors have equal numbers in two scenes."""
     connectors = (
-        [_geometry(connector) for connector in numbering.scene.all_connectors]
+        [geometry(connector) for connector in numbering.scene.all_connectors]
         for numbering in (old, new)
     )
     return (
@@ -136,7 +161,8 @@ def same_unknowns(old: DofNumbering, new: DofNumbering) -> bool:
     )
 
 
-def _geometry(connector: Connector) -> object:
+def geometry(connector: Connector) -> object:
+    """Return a key that is equal for connectors of the same places and kind of law."""
     return (
         connector.motion,
         connector.a,

@@ -31,7 +31,7 @@ LOSSES = ("plastic", "damping", "friction", "functions", "connectors", "contact"
 
 CONTRIBUTIONS = (
     *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
-    *("numerical", "hinges", *LOSSES),
+    *("numerical", "impacts", "hinges", *LOSSES),
 )
 """Names of all entries of the energy ledger that the package uses."""
 

@@ -22,6 +22,7 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering, turned
 from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.impacts import motions_of
 from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, has_inertia, nodal_step, stages_of
 from ufl_beam.model.bodies import Body, Member
 from ufl_beam.model.connector_laws import Controller, Coulomb, PrescribedMotion, has_friction
@@ -104,6 +105,8 @@ class Solver(PresentState):
         forces: All forces of the scene, inner forces first.
     """
 
+    _impacts: Any = None
+
     def __init__(
         self, numbering: DofNumbering, scheme: Scheme, t: float, q: Array, v: Array, *, rtol: float,
         max_iterations: int, petsc: dict[str, Any],
@@ -149,6 +152,8 @@ class Solver(PresentState):
         self.inertia = None
         if has_inertia(scheme):
             self.inertia = Inertia(setting, scheme, self.supports.stop(v))
+            if motions_of(scene):
+                setting.loses("impacts")
         inertia = [] if self.inertia is None else [self.inertia]
         self.loads = all_loads(setting, self.inertia, t)
         self.inner: list[Force] = [*self.beams, *self.connectors]
@@ -233,6 +238,22 @@ class Solver(PresentState):
         together = {name: np.concatenate(arrays) for name, arrays in archive.saved.items()}
         return {n: x if x.ndim == 1 else x[np.argsort(x[:, 0])] for n, x in together.items()}
 
+    def meet(self, impacts: Any, impact: Any, checked: float) -> None:
+        """Enter the impact with which the run begins, if there is one.
+
+        After the time ``checked`` (s), ``impacts`` finds impacts where prescribed rates jump.
+        """
+        self._impacts, self._met = impacts, checked
+        self._enter(impact)
+
+    def _enter(self, impact: Any) -> None:
+        """Change the velocities by an impact, if there is one."""
+        if impact is not None and self.inertia is not None:
+            self.inertia.v = self.inertia.v_before = impact.v
+            self.inertia.more = ()
+            groups = [(group.indices, group.work) for group in self.connectors]
+            self._impacts.enter(impact, self.ledger, groups)
+
     # -- a step, and its substeps ----------------------------------------------------------------
 
     def step_to(self, t1: float) -> None:
@@ -278,6 +299,10 @@ class Solver(PresentState):
         If ``at_rest`` is a time, the loads of that time are applied, and nodes must not turn far.
         """
         inertia = self.inertia
+        if self._impacts is not None and inertia is not None:
+            counts = self._impacts.after(self.last_dt, self.t, t1, self._met)
+            arguments = self.q, inertia.v, self.t, counts, self.internal()
+            self._enter(self._impacts.find(*arguments, longest=(t1 - self.t) / 4))
         if inertia is not None and inertia.scheme.further_rates and not inertia.more:
             # A short trial step gives the initial accelerations.
             t = self.t + TRIAL_STEP * (t1 - self.t)

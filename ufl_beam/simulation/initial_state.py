@@ -23,6 +23,7 @@ from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.discretization.work_forms import statement
 from ufl_beam.errors import ArgumentError, require_kind, shorten, warn
+from ufl_beam.mechanics.impacts import Excess
 from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import DEFAULT_MESH, Mesh
 from ufl_beam.model.connector_laws import RIGID, Coulomb, Guide
@@ -155,24 +156,34 @@ def continuation(start: Solution | None, scene: Scene, t0: float) -> tuple[float
 
     If it did, no force has jumped, so accelerations and forces of its last step are still valid.
     """
-    if start is None or start.scene is not scene:
+    if start is None or start.scene is not scene or not same_time(start, t0):
         return t0, False
-    end = float(start.times[-1])
-    same = abs(end - t0) <= SAME_TIME * float(np.abs(start.times[[0, -1]]).max())
-    return (end, True) if same else (t0, False)
+    return float(start.times[-1]), True
 
 
-def initial_state(numbering: DofNumbering, start: Solution | None) -> tuple[Array, Array, State]:
-    """Return the initial configuration and velocities of a run, (size,), and internal variables."""
+def same_time(start: Solution, t0: float) -> bool:
+    """Return whether a run ended at the time ``t0`` (s), up to round-off."""
+    slack = SAME_TIME * float(np.abs(start.times[[0, -1]]).max())
+    return abs(float(start.times[-1]) - t0) <= slack
+
+
+def initial_state(
+    numbering: DofNumbering, start: Solution | None
+) -> tuple[Array, Array, State, Excess | None]:
+    """Return the state with which a run begins.
+
+    It consists of the configuration and velocities, (size,) each, the internal variables, and the
+    excess of momentum of velocities that differ where ``start`` had separate unknowns.
+    """
     v = _initial_velocity(numbering)
     if start is None:
-        return np.zeros(numbering.size), v, {}
+        return np.zeros(numbering.size), v, {}, None
     q0, v0 = start.q[-1], start.v[-1] if len(start.v) else None
     if same_unknowns(start.numbering, numbering):
-        return q0, v if v0 is None else v0, start.internal
+        return q0, v if v0 is None else v0, start.internal, None
     transfer = Transfer(start.numbering, numbering)
-    q = transfer.state(q0)
-    return q, v if v0 is None else transfer.velocity(v0), transfer.internal(start.internal)
+    after, excess = (v, None) if v0 is None else transfer.velocity(v0)
+    return transfer.state(q0), after, transfer.internal(start.internal), excess
 
 
 def _initial_velocity(numbering: DofNumbering) -> Array:
@@ -194,8 +205,29 @@ def _initial_velocity(numbering: DofNumbering) -> Array:
             v[dofs] = new
     v = np.nan_to_num(v)
     if numbering.scene.initial:
+        _require_shared(numbering, v)
         _require_agreement(numbering, v)
     return v
+
+
+def _require_shared(numbering: DofNumbering, v: Array) -> None:
+    """Check that parts with mass but without :class:`Velocity` are joined to no moving unknown."""
+    scene = numbering.scene
+    given = {part for velocity in scene.initial for part in velocity.beams}
+    parts: list[Any] = [b for b in scene.beams if b.section.rhoA or b.section.rhoI]
+    parts += [b for b in scene.bodies if b.mass or b.inertia]
+    speeds = np.abs(v * numbering.scales)
+    for part in (part for part in parts if part not in given):
+        points, dofs = numbering.nodes_of(part)
+        moving = speeds[dofs].max(axis=1) > 1e-9 * speeds.max()
+        if moving.any():
+            x, y = points[np.argmax(moving)]
+            rate = np.abs(v[dofs[np.argmax(moving)]]).max()
+            raise ArgumentError(
+                f"Velocity: {part.name} has none, but at ({x:g}, {y:g}) it is joined to a part "
+                f"that moves at {rate:.3g} m/s or rad/s; give all joined parts velocities that "
+                "agree"
+            )
 
 
 def _require_agreement(numbering: DofNumbering, v: Array) -> None:

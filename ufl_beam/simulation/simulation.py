@@ -18,7 +18,8 @@ from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.discretization.state_transfer import same_unknowns
-from ufl_beam.errors import ArgumentError, StepFailed, require_number, shorten
+from ufl_beam.errors import ArgumentError, ModelError, StepFailed, require_number, shorten
+from ufl_beam.mechanics.impacts import Impact, motions_of
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.loads import RotatingFrame
@@ -29,6 +30,7 @@ from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWrite
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, communicator, sharing
 from ufl_beam.simulation.diagnosis import no_equilibrium
+from ufl_beam.simulation.impacts import Impacts
 from ufl_beam.simulation.initial_state import (
     StateOf,
     checked_numbering,
@@ -38,7 +40,12 @@ from ufl_beam.simulation.initial_state import (
     mesh_of,
 )
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_equation import StaticPath, StepEquation, forces_of_scene
+from ufl_beam.simulation.step_equation import (
+    StaticPath,
+    StepEquation,
+    equation_of_scene,
+    forces_of_scene,
+)
 from ufl_beam.simulation.stepper import Stepper
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
@@ -118,11 +125,25 @@ class Simulation(Stepper):
         fresh = start is None
         numbering, free_motion = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=fresh)
         subdomain = Subdomain(numbering, sharing(comm, len(numbering.cells)))
-        together, q, v, internal = Agreement(subdomain.comm), *initial_state(numbering, start)
+        together, (q, v, internal, excess) = (
+            Agreement(subdomain.comm),
+            initial_state(numbering, start),
+        )
         t0, same = continuation(start, scene, t0)
         equation = StepEquation(subdomain, scheme, t0, v[subdomain.dofs], together)
         inertia, q_local, loaded = equation.inertia, q[subdomain.dofs], list[Array]()
         goes_on = same and "reactions" in internal and start is not None and not len(start.v)
+        moves, met = bool(motions_of(scene)), -math.inf  # met: rates do not contradict until then
+        dynamic = start is not None and len(start.v) > 0
+        moving = start if dynamic and (v.any() or excess is not None) else None
+        if inertia is not None and (moves or (moving is not None and not same)):
+            alone = subdomain.alone
+            impacts = Impacts(equation if alone else equation_of_scene(numbering, scheme, t0))
+            self._impacts = impacts
+            if not (same and dynamic):
+                v, met = (subdomain.gather(inertia.v), t0) if moving is None else (v, met)
+                at = q, v, t0, impacts.at_start(t0, moving), internal, excess
+                self._meet(equation, together(impacts.find, *at))
         if not fresh or (inertia is not None and inertia.scheme.further_rates):
             rates = None if inertia is None else inertia.v
             past = Archive(subdomain, internal) if same else None
@@ -152,7 +173,12 @@ class Simulation(Stepper):
         if forces is not None or inertia is not None:
             equation.cell_forces.begin(forces)
         super().__init__(comm, equation, newton, t0, q_local, path, solution, together, free_motion)
-        self._begun_at = before
+        self._begun_at, self._met = before, met
+        if same:
+            self.prediction.carry_on(Archive(subdomain, internal))
+        if inertia is not None and moves:
+            fill(self.time_loop, meet_jumps=lib.time_in_python, next_jump=-math.inf)
+            self.time_loop.impacts = equation.callbacks.handle(self._meet_jumps)
         solution.needs_start = solution.equilibrium_fraction < 1 or self.cell_forces.needs_q0
         solution.forces_from_record = (
             self.cell_forces.forces_from_record
@@ -167,6 +193,45 @@ class Simulation(Stepper):
         if inertia is not None and (scene.all_connectors or scene.supports):
             motions = self.connections()[:, 0] if scene.all_connectors else np.zeros(0)
             together(warn_of_jumps, numbering, t0, q, motions)
+
+    # -- impacts -------------------------------------------------------------------------------
+
+    def _meet_jumps(self, t1: float) -> float:
+        """Let velocities meet rates that have jumped before a step to ``t1``.
+
+        Returns the time from which on rates may jump again.
+        """
+        c, t, impacts = self.time_loop, self.time_loop.t, self._impacts
+        counts = impacts.after(c.prediction.dt, t, t1, self._met)
+        if any(counts):
+            state, q = None, self._copy(c.q)
+            if not self.subdomain.alone:
+                archive = Archive(self.subdomain)
+                for term in self.connector_terms:
+                    term.save_or_restore(archive, q)
+                state = archive.state()
+            q, v = (self.subdomain.gather(x).copy() for x in (q, self.inertia.v))
+            impact = impacts.find(q, v, t, counts, state, longest=(t1 - t) / 4)
+            if impact is not None and (c.derivatives or c.adjoint):
+                raise ModelError(
+                    f"the run has no derivative: at t = {t:.9g} s the rate of a prescribed motion "
+                    "jumps; let the rate grow in time, or begin the run there"
+                )
+            self._meet(self.equation, impact)
+            self._moved(t)
+        return impacts.next_check(t + 1e-9 * (t1 - t))
+
+    def _meet(self, equation: StepEquation, impact: Impact | None) -> None:
+        """Change the velocities of this process by an impact, if there is one."""
+        if impact is None:
+            return
+        inertia, v = equation.inertia, impact.v[equation.subdomain.dofs]
+        assert inertia is not None
+        inertia.commit(v, v, inertia.c.last_dt)
+        inertia.keep()  # accelerations are unknown
+        groups = [(term.indices, dict(term.recorded)["work"]) for term in equation.connector_terms]
+        share = float(equation.subdomain.comm.rank == 0)
+        self._impacts.enter(impact, equation.ledger, groups, share)
 
     # -- stepping ------------------------------------------------------------------------------
 
@@ -412,14 +477,14 @@ class Simulation(Stepper):
             extremes.gather()
         # Iterations of failed steps count, too.
         self.solution.substeps, self.solution.iterations = self.substeps, self.iterations
-        self.solution.internal = self.equation.internal_variables(self.q, self.t)
+        self.solution.internal = self.equation.internal_variables(self.q, self.t, self.prediction)
 
     def snapshot(self) -> Solution:
         """Return the present state as a solution for ``start=``; all processes call it."""
         self.comparison.synchronize()
         now = Solution(self.scene, self.numbering, self.solution)
         self.keep(now)
-        now.internal = self.equation.internal_variables(self.q, self.t)
+        now.internal = self.equation.internal_variables(self.q, self.t, self.prediction)
         return now
 
     def save_or_restore(self, archive: Archive) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 from mpi4py import MPI
@@ -21,6 +21,7 @@ from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import NOWHERE, Archive, State
 from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.impacts import motions_of
 from ufl_beam.mechanics.time_scheme import Scheme, Step, has_inertia
 from ufl_beam.model.connector_laws import has_friction
 from ufl_beam.model.constraint_checks import friction_repeats
@@ -137,6 +138,8 @@ class StepEquation:
             inertia.commit(v, v, math.inf)
             if inertia.loses_energy:
                 ledger.lost["numerical"] += 0.0
+            if motions_of(scene):
+                ledger.lost["impacts"] += 0.0
             others.append(inertia)
         for damping in scene.damping:
             others += damping_forces(damping, fields, *setting, inertia, self.inelastic)
@@ -199,9 +202,13 @@ class StepEquation:
 
     # -- continued runs ------------------------------------------------------------------------
 
-    def internal_variables(self, q: Array, t: float) -> State:
-        """Return the data of this state for ``start=``: variables, reactions, rates and forces."""
+    def internal_variables(self, q: Array, t: float, prediction: Any) -> State:
+        """Return the data of this state for ``start=``.
+
+        They are internal variables, reactions, rates, forces, and the ``prediction`` of steps.
+        """
         archive = Archive(self.subdomain)
+        prediction.save_or_restore(archive)
         self.controllers.save_or_restore(archive, t)
         for term in (*self.inelastic, *self.connector_terms):
             term.save_or_restore(archive, q)
@@ -414,19 +421,18 @@ class StepEquation:
         return works[0], works[1]
 
 
+def equation_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> StepEquation:
+    """Return the equation of the whole scene on this process."""
+    subdomain, still = Subdomain(numbering, MPI.COMM_SELF), np.zeros(numbering.size)
+    return StepEquation(subdomain, scheme, t0, still, Agreement(subdomain.comm))
+
+
 def forces_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Callable[..., Array]:
     """Return a function like :meth:`CellForces.forces_from_record` for all cells of a scene.
 
     The first call of the function makes the equation of the whole scene, without communication.
     """
-
-    @cache
-    def equation() -> StepEquation:
-        subdomain = Subdomain(numbering, MPI.COMM_SELF)
-        return StepEquation(
-            subdomain, scheme, t0, np.zeros(numbering.size), Agreement(subdomain.comm)
-        )
-
+    equation = cache(partial(equation_of_scene, numbering, scheme, t0))
     return lambda *state: equation().cell_forces.forces_from_record(*state)
 
 

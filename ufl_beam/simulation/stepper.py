@@ -69,6 +69,12 @@ class Prediction:
             size = {"scene": subdomain.numbering.scene.size, "unknowns": subdomain.numbering.size}
             fill(self.c, second=self._second, weight=weights, **size)
 
+    def carry_on(self, archive: Archive) -> None:
+        """Restore the data of a run that ended in the present state, if it has all of them."""
+        needed = ["last dt"] + ["second difference"] * self._in_motion
+        if all(map(archive.has, needed + ["known ends of stages"] * bool(len(self._past)))):
+            self.save_or_restore(archive)
+
     def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the data, in the numbering of the scene; see state_io.py."""
         self.c.dt = archive.number("last dt", self.c.dt)

@@ -35,6 +35,7 @@ class Supports:
         entries: Matrix entries in the rows and columns of ``dofs``; diagonal entries of ``dofs``.
         pivots: Values of the diagonal entries of ``dofs`` in the constrained matrix.
         turned, axes: Number of supports with rotated axes; their ``turned_axes`` of loops.h.
+        motions: Each moving local degree of freedom, its function of time, and its support.
         moving: Local degrees of freedom whose values depend on time.
         work: True if any support of the scene, on any process, moves.
     """
@@ -42,7 +43,7 @@ class Supports:
     def __init__(self, subdomain: Subdomain, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
         turned: list[tuple[Any, ...]] = []
         constrained: list[int] = []
-        self._motions: list[tuple[int, TimeFunction, Support]] = []
+        self.motions: list[tuple[int, TimeFunction, Support]] = []
         if GROUND in subdomain.numbering.scene.rigid_bodies:
             constrained.extend(subdomain.local(subdomain.numbering.node(GROUND.middle)))
         for support in subdomain.numbering.scene.supports:
@@ -53,10 +54,10 @@ class Supports:
                 local_dofs = subdomain.local(dofs[[component]])
                 constrained.extend(local_dofs)
                 if component in support.moving:
-                    self._motions.extend((dof, motion, support) for dof in local_dofs)
+                    self.motions.extend((dof, motion, support) for dof in local_dofs)
         self.turned, self.axes, self._alive = len(turned), ffi.new("turned_axes[]", turned), turned
         self.dofs = np.array(sorted(constrained), dtype=np.int64)
-        self.moving = np.array([dof for dof, *_ in self._motions], dtype=np.int64)
+        self.moving = np.array([dof for dof, *_ in self.motions], dtype=np.int64)
         is_constrained = np.zeros(A.size, dtype=bool)
         is_constrained[self.dofs] = True
         columns, rows = np.flatnonzero(is_constrained[A.indices]), A.entries_of(self.dofs)
@@ -91,13 +92,13 @@ class Supports:
 
     def move(self, x: Array, x0: Array, step: Step) -> None:
         """Set prescribed values in ``x``, the end of a step that begins with unknowns ``x0``."""
-        for dof, motion, support in self._motions:
+        for dof, motion, support in self.motions:
             target = value_at(motion, step.motion_time, support)
             x[dof] = x0[dof] + step.fraction * (target - x0[dof])
 
     def in_c(self, callbacks: Callbacks) -> Any:
         """Return ``moving_supports`` of loops.h: prescribed motions, and the work of reactions."""
-        moves = [(motion, support) for _, motion, support in self._motions]
+        moves = [(motion, support) for _, motion, support in self.motions]
         entry = self._ledger.supplied.pointer("supports") if self.work else ffi.NULL
         return struct(
             "moving_supports", held=len(self.dofs), hold=self.dofs.astype(np.int32),

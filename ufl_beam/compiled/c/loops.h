@@ -1110,6 +1110,11 @@ typedef struct {
   double (*stop)(void *handle, double t); /* next time at which a step must stop; or none */
   void (*prepare)(void *handle); /* takes further rates of the scheme from a trial step; or none */
   void *stops, *handle;
+  /* Lets velocities meet rates that have jumped before the next step, to t1, and returns the time of the
+   * next check; or none. See simulation/impacts.py. */
+  double (*meet_jumps)(void *handle, double t1);
+  void *impacts;
+  double next_jump;
   /* While loads that act from the beginning are applied: beginning and end of that time; largest
    * rotation of a node in a substep; substeps that are shorter by the factor short_part may exceed
    * it. */

@@ -450,11 +450,21 @@ static int take_stages(time_loop *m, double t1)
  * velocities. */
 static const double FIRST_TRIAL = 1. / 16;
 
-/* Solve the step to t1, a substep of one to `end`; the state changes only if it is accepted. */
+/* Let velocities meet prescribed rates that have jumped up to the beginning of a step to t1. */
+static int meet_jumps(time_loop *m, double t1)
+{
+  if (!m->meet_jumps || m->t + 1e-9 * (t1 - m->t) < m->next_jump) return 1;
+  m->next_jump = m->meet_jumps(m->impacts, t1);
+  return raised_anywhere(m->equation) == NOTHING || fails(m, RAISED);
+}
+
+/* Solve the step to t1, a substep of one to `end`; the state changes only if it is accepted, except for
+ * velocities that rates contradict. */
 int attempt_step(time_loop *m, double t1, double end)
 {
   m->equation->raised = NOTHING;
   take_back(m); /* an attempt that was not accepted */
+  if (!meet_jumps(m, t1)) return 0;
   if (m->rates && m->prepare && !m->rates->ready) {
     if (!solve_to(m, m->t + FIRST_TRIAL * (t1 - m->t), t1) || !differentiate_or_record(m, 1)) return 0;
     m->prepare(m->handle);
@@ -582,6 +592,7 @@ int repeat_steps(time_loop *m, int number, const double *steps, const double *co
     const double t1 = steps[3 * k], end = steps[3 * k + 1];
     m->applies = steps[3 * k + 2] != 0;
     e->raised = NOTHING;
+    if (!meet_jumps(m, t1)) return k;
     if (m->rates && m->prepare && !m->rates->ready) {
       if (!solve_to(m, m->t + FIRST_TRIAL * (end - m->t), end)) return k;
       m->prepare(m->handle);
