@@ -242,4 +242,5 @@ assert np.abs(computed_peaks / tested_peaks - 1).max() < 0.11
 # * `hardening=0.02`: the forces at large displacements rise,
 # * a spring for the slip of the bars: `Turn(ground(0, 0), column.start, Spring(...))` and a support
 #   `Pinned` instead of `Clamped`,
-# * `ub.KentPark.confined` instead of `ub.Mander`, with `E=1000 * f_c`.
+# * `ub.KentPark.confined` instead of `ub.Mander`, with `E=1000 * f_c` and `cells=6`; with 8 cells
+#   Newton's method fails in the last cycles, at t = 110.

@@ -358,12 +358,6 @@ def draw_damage_state(
     return style.parent_figure(axes)
 
 
-def _is_joint(at: Array, ends: Array) -> bool:
-    """Return whether several ends of beams, (n, 2), are at a point; m."""
-    close = np.abs(ends - at).max(axis=1) < 1e-6 * np.ptp(ends, axis=0).max()
-    return int(close.sum()) > 1
-
-
 def _draw_hinges(
     axes: Axes, ax: Axes | None, solution: Solution, shape: DeformedShape,
     hinges: Sequence[OpenHinge], limits: Mapping[str, float],
@@ -391,10 +385,11 @@ def _draw_hinges(
     lines: dict[Member, Array] = {
         beam: shape.nodes[solution.numbering.nodes_along(beam)] for beam in solution.scene.beams
     }
-    ends = np.array([line[k] for line in lines.values() for k in (0, -1)])
+    ends = np.reshape([line[k] for line in lines.values() for k in (0, -1)], (-1, 2))
     for hinge, color in zip(hinges, colors, strict=True):
         at, place = hinge.at, hinge.place
-        if isinstance(place, Place) and place.s in (0.0, 1.0) and _is_joint(at, ends):
+        several = sum(np.abs(ends - at).max(axis=1) < 1e-6 * solution.scene.size) > 1
+        if several and isinstance(place, Place) and place.s in (0.0, 1.0):
             end, inner = lines[place.beam][:2] if place.s == 0.0 else lines[place.beam][:-3:-1]
             at = at + 0.7 * shape.canvas.unit * unit_vectors(inner - end)
         axes.plot(*at, **circle(hinge.fraction, color))

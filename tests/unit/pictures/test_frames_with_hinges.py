@@ -140,6 +140,23 @@ def test_hinges_are_coloured_by_acceptance_limits(pushed):
     assert min(counts) > 0  # at the end there is one of each
 
 
+def test_damage_of_a_mechanism_without_beams():
+    """A wheel whose yielding spring is turned by 0.1 rad; beyond 2 N m / 40 N m it yields."""
+    wheel = ub.Body((0, 0), mass=1.0, inertia=1.0)
+    law = ub.Spring(40.0, law=ub.ElastoPlastic(2.0, kinematic=10.0))
+    joint = ub.Revolute(ub.ground(0, 0), wheel.middle)
+    turn = ub.Turn(ub.ground(0, 0), wheel.middle, law)
+    motion = ub.PrescribedMotion(lambda t: 0.1 * t)
+    drive = ub.Turn(ub.ground(0, 0), wheel.middle, motion)
+    scene = ub.Scene(bodies=[wheel], joints=[joint], connectors=[turn, drive])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, progress=False)
+    axes, bar = ub.plot(run, "damage").axes
+    assert len(circles(axes)) == 1
+    plastic = 0.1 - run.connector(turn).force[-1] / 40.0
+    assert plastic > 0.01
+    assert bar.get_ylim()[1] == pytest.approx(1e3 * plastic)  # mrad
+
+
 def test_wrong_limits_are_refused(pushed):
     path, _ = pushed
     with pytest.raises(ub.ArgumentError, match=r"limits\['LS'\] = 0.01 rad is not above the limit"):
