@@ -24,6 +24,7 @@ SCRIPT = Path(__file__).with_name("restart_scenes.py")
 RUNS = {
     "midpoint": (machine, ub.EnergyMomentum(0.05, 0.02), 0.2, 0.005),
     "adaptive": (machine, ub.EnergyMomentum(0.05, 0.02), 0.1, ub.Adaptive(1e-4)),
+    "judged": (bend, ub.EnergyMomentum(0.05, 0.02), 2.0, ub.Adaptive(2e-3)),
     "decaying": (bend, ub.EnergyMomentumDecaying(), 5.0, 0.1),
     "Newmark": (bend, ub.Newmark(0.6, 0.35), 5.0, 0.1),
     "generalized-alpha": (bend, ub.GeneralizedAlpha(), 5.0, 0.1),
@@ -64,6 +65,7 @@ def assert_same_numbers(one, other):
         assert np.abs(np.nan_to_num(one[name] - other[name])).max(initial=0.0) <= 1e-7 * size, name
 
 
+@pytest.mark.filterwarnings("ignore:Adaptive")  # the controllers of the machine remember
 @pytest.mark.parametrize("kind", RUNS)
 def test_a_run_that_goes_on_is_the_run(kind, shared_path):
     """Twice stopped; to the last bit, on several processes but for sums over them."""
@@ -75,6 +77,7 @@ def test_a_run_that_goes_on_is_the_run(kind, shared_path):
     if MPI.COMM_WORLD.size == 1:
         assert_same_bits(arrays_of(solution), arrays_of(whole))
         assert str(solution).split("wall")[1:] == str(whole).split("wall")[1:]
+        assert repr(solution.time_error) == repr(whole.time_error)
     assert_same_numbers(arrays_of(solution), arrays_of(whole))
     # What must remember has something to remember
     lost = whole.energy.lost

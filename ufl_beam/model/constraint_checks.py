@@ -410,6 +410,23 @@ def require_rates(scene: Scene, scheme: Rated) -> None:
         )
 
 
+def parts_that_switch(scene: Scene) -> Iterator[tuple[str, str]]:
+    """Yield names of parts of a scene that may slide, touch, yield or break, with a reason."""
+    for beam in scene.beams:
+        if beam.section.section_points(beam.section.hinge):
+            yield beam.name, "may yield or break"
+    for connector in scene.all_connectors:
+        law, name = connector.law, f"{type(connector.law).__name__} of {connector}"
+        if isinstance(law, Coulomb):
+            yield name, "dissipates"
+        elif isinstance(law, RigidPlastic) or (
+            isinstance(law, Spring) and (law.law is not None or law.softening is not None)
+        ):
+            yield name, "may yield or break"
+        elif isinstance(law, ConnectorLaw):
+            yield name, "may dissipate, and may have kinks"
+
+
 def require_smooth(scene: Scene, scheme: object) -> None:
     """Raise :class:`ModelError` if a part of a scene dissipates or has kinks.
 
@@ -417,18 +434,12 @@ def require_smooth(scene: Scene, scheme: object) -> None:
     time, and smooth in a step.
     """
     wrong = [(type(x).__name__, "dissipates") for x in scene.damping]
-    for beam in scene.beams:
-        if beam.section.section_points(beam.section.hinge):
-            wrong.append((beam.name, "may yield or break"))
+    wrong += parts_that_switch(scene)
     for connector in scene.all_connectors:
         law, name = connector.law, f"{type(connector.law).__name__} of {connector}"
-        if isinstance(law, Damper | Coulomb):
+        if isinstance(law, Damper):
             wrong.append((name, "dissipates"))
-        elif isinstance(law, RigidPlastic) or (
-            isinstance(law, Spring) and (law.law is not None or law.softening is not None)
-        ):
-            wrong.append((name, "may yield or break"))
-        elif isinstance(law, ConnectorLaw | ForceLaw | Controller):
+        elif isinstance(law, ForceLaw | Controller):
             wrong.append((name, "may dissipate, and may have kinks"))
     for load in scene.loads:
         if isinstance(load, MovingLoad):

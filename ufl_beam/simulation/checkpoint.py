@@ -187,7 +187,7 @@ class CheckpointFile:
                 Archive(simulation.subdomain, remove_prefix("state/", content))
             )
             solution.resume(remove_prefix("history/", content))
-            pace.restore(content["pace"])
+            pace.restore(content["pace"] | remove_prefix("pace/", content))
             solution.seconds = float(content["seconds"])
         solution.substeps, solution.iterations = simulation.substeps, simulation.iterations
         solution.time_error = pace.error
@@ -240,8 +240,12 @@ class CheckpointFile:
 
         solution, archive = simulation.solution, Archive(simulation.subdomain)
         simulation.save_or_restore(archive)
+        state = pace.state()
+        arrays = {name: values for name, values in state.items() if isinstance(values, np.ndarray)}
         content = {
-            "seconds": solution.seconds + seconds, "pace": pace.state(),
+            "seconds": solution.seconds + seconds,
+            "pace": {name: state[name] for name in state if name not in arrays},
+            **add_prefix("pace/", arrays),
             "stateful": simulation.together(states), "warnings": solution.warnings,
             **add_prefix("state/", archive.state()),
         }  # fmt: skip

@@ -31,9 +31,12 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.impacts import motions_of
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
+from ufl_beam.model.connector_laws import Controller
+from ufl_beam.model.constraint_checks import parts_that_switch
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Output, reserved
 from ufl_beam.output.recorder import Recorder, checked_recorders
+from ufl_beam.output.serialization import Description
 from ufl_beam.parallel import communicator, print_once, progress_bar
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.checkpoint import Checkpoint, CheckpointFile, checksum_at
@@ -51,7 +54,14 @@ from ufl_beam.simulation.initial_state import (
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
 from ufl_beam.simulation.step_equation import equation_of_scene
-from ufl_beam.simulation.step_lengths import Adaptive, AdaptiveSteps, EqualSteps, step_count
+from ufl_beam.simulation.step_lengths import (
+    Adaptive,
+    AdaptiveSteps,
+    EqualSteps,
+    JudgedSteps,
+    Pilot,
+    step_count,
+)
 from ufl_beam.simulation.stepper import MOST_SUBSTEPS
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
@@ -172,9 +182,20 @@ def simulate(
         solution = simulation.solution
         solution.every, solution.building = every, time.perf_counter() - begin
         stack.enter_context(running(simulation, recorders, outputs, begin))
-        pace: EqualSteps | AdaptiveSteps  # `error`: sum of estimated errors, or NaN
+        pace: EqualSteps | AdaptiveSteps | JudgedSteps  # `error`: see Solution.time_error
         if isinstance(dt, Adaptive):
             pace = AdaptiveSteps(simulation, t1, dt)
+            if any(parts_that_switch(scene)):
+                if has_memory(scene):
+                    pace.error = math.nan
+                    simulation.warn([NOT_KNOWN])
+                else:
+                    pilot = Pilot(
+                        scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh,
+                        comm=simulation.subdomain.comm,
+                    )  # fmt: skip
+                    stack.callback(pilot.close)
+                    pace = JudgedSteps(simulation, pilot, t1, dt)
         else:
             pace = EqualSteps(simulation, t1, dt)
         bar = progress_bar(progress, comm, total=1.0)
@@ -323,6 +344,21 @@ def running(
             simulation.solution.seconds += time.perf_counter() - begin
     if simulation.comm.rank == 0:
         Opened(simulation.solution).warn(simulation.scheme)
+
+
+NOT_KNOWN = (
+    "Adaptive: the error is not known, and time_error is NaN: steps that may contain sliding, "
+    "contact, yielding or breaking are taken twice to judge them, but a function with a state(), a "
+    "random generator, or a Controller with a sample time must be called once"
+)
+"""Warning of runs whose steps cannot be taken twice."""
+
+
+def has_memory(scene: Scene) -> bool:
+    """Return whether forces of a scene may depend on the number of calls of functions."""
+    laws = (connector.law for connector in scene.all_connectors)
+    sampled = any(isinstance(law, Controller) and law.sample for law in laws)
+    return sampled or bool(Description({"scene": scene}).stateful)
 
 
 def require_times(t: tuple[float, float], call: str = "simulate") -> tuple[float, float]:

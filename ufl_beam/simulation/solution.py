@@ -69,8 +69,9 @@ class Solution(States, Rich):
         numbering: Vertices, cells and degrees of freedom of the scene.
         substeps: Number of substeps; an undivided step counts as one substep.
         iterations: Number of Newton iterations.
-        time_error: Sum of the estimated errors of all steps, see :class:`Adaptive`; NaN with equal
-            steps.
+        time_error: Sum of the estimated errors of all steps, or in scenes that may slide, touch,
+            yield or break, the largest estimated error so far, see :class:`Adaptive`; NaN with
+            equal steps.
         seconds: Wall time of the run with the setup of the simulation; s.
         building: Wall time of the setup in :func:`simulate`, which is not saved; s.
         every: Number of steps between stored states.

@@ -4,21 +4,39 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any, NoReturn
 
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.discretization.state_io import Archive, State
 from ufl_beam.errors import StepFailed, require_number, require_sequence
 from ufl_beam.mechanics.time_scheme import nodal_step, order_of, stages_of
+from ufl_beam.output.output_files import add_prefix, remove_prefix
 from ufl_beam.quadrature import gauss_rule
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
 
 GROWTH = 1.5
 """Largest ratio of the length of a step to the length of the previous step."""
+
+LASTS = 10
+"""Number of mean steps over which a wrong velocity counts as a wrong displacement at a switch."""
+
+OUTSTANDING = 4
+"""Ratio of an error of velocities to the last one from which on a step contains a switch."""
+
+LOCATED = 1e-9
+"""Least length of a step that is divided because of a switch, as a fraction of the run."""
+
+HALVES = 8
+"""Tolerance divided by the tolerance of half steps, whose errors are of third order."""
+
+REMAINING = 1.5
+"""Error of steps divided by their difference to half steps: 4/3 at second order, 2 at first."""
 
 MOST = 2**14
 """Largest number of steps of one call of C, which returns earlier if steps take long."""
@@ -90,6 +108,11 @@ class Adaptive:
     integrators, the tolerance applies to one step; the sum over a run is
     :attr:`Solution.time_error`.  Errors of the spatial discretization are not included.
 
+    In scenes that may slide, touch, yield or break, a second simulation runs ahead in half steps,
+    and locates these switches by short steps.  There :attr:`Solution.time_error` is an estimate of
+    the largest error of a position or rotation during the run, from the difference of both; the run
+    takes about three times as long.
+
     Steps end at the times of every :class:`Table` in the scene, at the times in an attribute
     ``kinks`` of other functions of time, at ``stops``, and at samples of controllers.
 
@@ -130,11 +153,29 @@ class Adaptive:
             require_number(stop, f"Adaptive: stops[{i}]")
 
 
-class AdaptiveSteps:
+class _Steps:
+    """Base of steps with variable lengths."""
+
+    def __init__(self, simulation: Simulation, t1: float) -> None:
+        self._simulation, self._t0, self._t1 = simulation, simulation.t, t1
+        self.steps, self.error = 0, 0.0
+
+    @property
+    def finished(self) -> bool:
+        """True if the end of the run is reached."""
+        return self._simulation.t == self._t1
+
+    @property
+    def progress(self) -> float:
+        """Fraction of the duration of the run that has passed."""
+        return (self._simulation.t - self._t0) / (self._t1 - self._t0)
+
+
+class AdaptiveSteps(_Steps):
     """Steps whose error is estimated and limited."""
 
     def __init__(self, simulation: Simulation, t1: float, control: Adaptive) -> None:
-        self._simulation, self._t0, self._t1 = simulation, simulation.t, t1
+        super().__init__(simulation, t1)
         t0 = simulation.t
         self._tolerance = control.tolerance
         self._longest = control.longest or t1 - t0
@@ -156,32 +197,25 @@ class AdaptiveSteps:
         M = simulation.inertia.M
         masses = np.bincount(M.rows(), weights=np.abs(M.data), minlength=subdomain.size)
         self._massless = np.flatnonzero(masses == 0.0)
-        self.steps, self.error = 0, 0.0
         self._order, stages = order_of(simulation.scheme), stages_of(simulation.scheme)
         self._rule = composition_error(stages) if len(stages) > 1 else MIDPOINT_ERROR
 
-    @property
-    def finished(self) -> bool:
-        """True if the end of the run is reached."""
-        return self._simulation.t == self._t1
-
-    @property
-    def progress(self) -> float:
-        """Fraction of the duration of the run that has passed."""
-        return (self._simulation.t - self._t0) / (self._t1 - self._t0)
-
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
         """Take one step whose error is below the tolerance; ``keep`` stores its end."""
-        simulation, t = self._simulation, self._simulation.t
-        stop = next(stop for stop in self._stops if stop > t)
-        stop = simulation.controllers.next_sample(simulation.t, stop)
+        simulation = self._simulation
         while True:
+            t = simulation.t  # earlier if the previous step is taken again
+            stop = next(stop for stop in self._stops if stop > t)
+            stop = simulation.controllers.next_sample(t, stop)
             try:
                 trial, error = self._solve_and_estimate_error(stop)
                 dt = trial.step.t1 - t
                 change = 0.9 * (self._tolerance / max(error, 1e-300)) ** (1 / (1 + self._order))
                 if error <= self._tolerance:
-                    break
+                    if (shorter := self._shorter(trial)) == 0.0:
+                        break
+                    self._dt = shorter
+                    continue
                 self._dt = dt * max(change, 0.1)
                 simulation.take_back()
                 failure = StepFailed(
@@ -192,7 +226,7 @@ class AdaptiveSteps:
                 failure, self._dt = reason, self._dt / 4
             if self._dt < self._shortest:
                 simulation.give_up(failure, t + self._dt)
-        simulation.accept(trial)
+        self._accept(trial)
         self.error += error
         self.steps += 1
         self._dt = min(dt * min(change, GROWTH), self._longest)
@@ -200,6 +234,13 @@ class AdaptiveSteps:
         self._fresh = simulation.t == stop
         if keep:
             simulation.keep()
+
+    def _shorter(self, trial: Trial) -> float:
+        """Return a shorter length if a step with a small error is refused, else 0; s."""
+        return 0.0
+
+    def _accept(self, trial: Trial) -> None:
+        self._simulation.accept(trial)
 
     def _solve_and_estimate_error(self, stop: float) -> tuple[Trial, float]:
         """Solve the next step and estimate its error, as defined by :class:`Adaptive`."""
@@ -248,18 +289,25 @@ class AdaptiveSteps:
 
     def _largest_error(self, error: Array, t: float, dt: float) -> float:
         """Return the largest of the errors of motions, and of loads in the step from ``t`` on."""
-        simulation, supports = self._simulation, self._simulation.supports
-        supports.into_axes(error)
-        error[supports.dofs] = 0.0
+        load_error = self._simulation.together(self._load_error, t, dt)
+        return max(self._free_size(error), self._simulation.subdomain.largest(load_error))
+
+    def _free_size(self, motion: Array) -> float:
+        """Return the size of a motion apart from supports; sets parts without inertia to zero."""
+        supports = self._simulation.supports
+        supports.into_axes(motion)
+        motion[supports.dofs] = 0.0
         # Motions without inertia follow the other motions, and jump with a load.
-        error[self._massless] = 0.0
-        supports.into_plane(error)
-        moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
-        rotations = np.abs(error[self._rotations]).max(initial=0.0)
-        load_error = simulation.together(self._load_error, t, dt)
-        return simulation.subdomain.largest(
-            float(max(moves / simulation.scene.size, rotations, load_error))
-        )
+        motion[self._massless] = 0.0
+        supports.into_plane(motion)
+        return self.size_of(motion)
+
+    def size_of(self, motion: Array) -> float:
+        """Return the largest displacement, in sizes of the scene, or rotation; rad."""
+        moves = np.hypot(motion[self._x], motion[self._y]).max(initial=0.0)
+        rotations = np.abs(motion[self._rotations]).max(initial=0.0)
+        largest = float(max(moves / self._simulation.scene.size, rotations))
+        return self._simulation.subdomain.largest(largest)
 
     def _load_error(self, t: float, dt: float) -> float:
         """Return the largest error of the scheme's rule for the integral of a load over the step.
@@ -286,3 +334,153 @@ class AdaptiveSteps:
         self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]
 
     _STATE = ("steps", "error", "_dt", "_fresh")
+
+
+# -- switches --------------------------------------------------------------------------------------
+
+
+class Pilot(Simulation):
+    """Second simulation of a scene that switches; it runs ahead of the run, in half steps."""
+
+    def warn(self, warnings: Iterable[str], *, local: bool = False) -> None:
+        """Issue no warnings, because the run issues them."""
+
+    def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:
+        """Raise ``failure``; :attr:`failed_end` is the end of the shortest step."""
+        self.failed_end = end
+        raise failure
+
+
+class PilotSteps(AdaptiveSteps):
+    """Adaptive steps that locate switches, such as the beginning of sliding, contact or yielding.
+
+    A step contains a switch if the acceleration changes as it did not in the step before.  The
+    change times the length of the step is an error of velocities.  The step is shortened until this
+    error, times :data:`LASTS` mean steps, is below the tolerance.  A switch in the second half of a
+    step is seen in the next step only.  So if the change remains however short the next step is,
+    the step before it is taken again, in shorter steps.
+
+    Attributes:
+        taken: Time and configuration at the ends of the last steps, and whether a later step cannot
+            change them.
+        saved: State before the last step.
+    """
+
+    def __init__(self, pilot: Pilot, t1: float, control: Adaptive) -> None:
+        super().__init__(pilot, t1, control)
+        self.taken = list[tuple[float, Array, bool]]()
+        self.saved: State = {}
+        # Acceleration before the last step, and the length of its step, 0 if there is none
+        self._before: Array = np.zeros(pilot.subdomain.size)
+        self._before_dt = self._last_error = self._error = 0.0
+
+    def _shorter(self, trial: Trial) -> float:
+        """Return a shorter length if the step or the previous one contains a switch, else 0; s.
+
+        In the second case the state returns to the beginning of the previous step.
+        """
+        simulation, inertia, dt = self._simulation, self._simulation.inertia, trial.step.dt
+        self._error = 0.0
+        if self._fresh or not self.steps:  # at stops the acceleration may jump
+            return 0.0
+        last = float(simulation.prediction.c.dt)
+        a = (inertia.v - inertia.v_before) / last
+        change = (inertia.after(trial.s, dt)[0] - inertia.v) / dt - a
+        new = self._free_size(change)
+        if self._before_dt:
+            slope = (a - self._before) / (last + self._before_dt)
+            new = min(new, self._free_size(change - slope * (last + dt)))
+        new *= LASTS / 12 * (simulation.t - self._t0) / self.steps
+        self._error = new * max(dt, last)
+        limit = max(self._tolerance, OUTSTANDING * self._last_error)
+        least = 4 * LOCATED * (self._t1 - self._t0)
+        if new * dt > limit and dt > least:
+            return dt / 4
+        if new * last > limit and last > least and (self.saved or dt > last / 3):
+            if dt <= last / 3:
+                self.take_again()
+                self._first_dt = last / 4
+            return last / 4
+        return 0.0
+
+    def advance(self, most: int = 1, *, keep: bool = False) -> None:
+        """Take one step, or take the previous step again and this one; see the base class."""
+        self._first_dt = self._dt
+        super().advance(most, keep=keep)
+        self.taken = [*self.taken[-3:], (self._simulation.t, self._simulation.q, self._fresh)]
+
+    def _accept(self, trial: Trial) -> None:
+        """Save the state, and accept the step."""
+        archive, inertia = Archive(self._simulation.subdomain), self._simulation.inertia
+        dt, self._dt = self._dt, self._first_dt  # so that a step is taken again to the last bit
+        self._save_or_restore(archive)
+        self.saved, self._dt = archive.state(), dt
+        last = float(self._simulation.prediction.c.dt)
+        self._before[:] = (inertia.v - inertia.v_before) / last
+        self._before_dt = 0.0 if self._fresh else last
+        self._last_error = self._error
+        super()._accept(trial)
+
+    def take_again(self) -> None:
+        """Return to the state before the last step."""
+        self._save_or_restore(Archive(self._simulation.subdomain, self.saved))
+        self._simulation.time_loop.next_jump = -math.inf  # of rates, to be found again
+        self.saved = {}
+
+    def _save_or_restore(self, archive: Archive) -> None:
+        self._simulation.save_or_restore(archive)
+        self._before = archive.at_dofs("acceleration before", self._before)
+        self._before_dt = archive.number("step of acceleration", self._before_dt)
+        self._last_error = archive.number("error of velocities", self._last_error)
+        self.restore({name: archive.number(name, x) for name, x in self.state().items()})
+        number = int(archive.number("steps taken", len(self.taken)))
+        steps = [*self.taken, *[(0.0, self._before, False)] * number][:number]
+        for k, (t, q, final) in enumerate(steps):
+            final = archive.number(f"final {k}", final) > 0
+            steps[k] = archive.number(f"end {k}", t), archive.at_dofs(f"q at {k}", q), final
+        self.taken = steps
+
+
+class JudgedSteps(_Steps):
+    """Adaptive steps of a scene that switches; each consists of two steps of a pilot.
+
+    Their error is estimated from the difference of both runs.
+
+    Attributes:
+        error: Largest estimated error of positions and rotations so far.
+    """
+
+    def __init__(self, simulation: Simulation, pilot: Pilot, t1: float, control: Adaptive) -> None:
+        super().__init__(simulation, t1)
+        self._pilot = pilot
+        self._ahead = PilotSteps(pilot, t1, replace(control, tolerance=control.tolerance / HALVES))
+
+    def advance(self, most: int = 1, *, keep: bool = False) -> None:
+        """Take one step, or the last half of one; ``keep`` stores its end."""
+        ahead, simulation = self._ahead, self._simulation
+        while True:
+            new = [step for step in ahead.taken if step[0] > simulation.t]
+            if len(new) > 2 or any(final for *_, final in new[:2]):
+                break
+            try:
+                ahead.advance()
+            except StepFailed as failure:
+                if not new:
+                    simulation.give_up(failure, self._pilot.failed_end)
+                break
+        t, q, _ = new[len(new) > 1 and not new[0][2]]
+        while simulation.t < t:
+            simulation.steps_to(np.array([t]), keep=keep)
+        self.steps += 1
+        self.error = max(self.error, REMAINING * ahead.size_of(simulation.q - q))
+
+    def state(self) -> dict[str, Any]:
+        """Return steps, error, and the state of the pilot before its last step."""
+        return {"steps": self.steps, "error": self.error, **add_prefix("pilot/", self._ahead.saved)}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Restore :meth:`state`; the last step of the pilot is taken again."""
+        self.steps, self.error = int(state["steps"]), float(state["error"])
+        self._ahead.saved = remove_prefix("pilot/", state)
+        self._ahead.take_again()
+        self._ahead.advance()
