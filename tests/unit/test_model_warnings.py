@@ -5,6 +5,7 @@ import math
 import re
 import sys
 import warnings
+from dataclasses import replace
 from itertools import pairwise
 
 from mpi4py import MPI
@@ -178,7 +179,89 @@ def test_beams_that_touch_without_a_joint(shift, names):
     a, b = beam(name="a"), beam((1 + shift, 0), (2, 0), name="b")
     with warns(*names[:2], "touch", names[2], "Join them with Rigid or Revolute"):
         begin(a, b)
-    begin(a, b, scheme=ub.Static(), supports=[ub.Clamped(a.start), ub.Clamped(b.start)])
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(
+    "analysis",
+    [
+        lambda x, end: ub.simulate(x, ub.Static(), t=(0, 1), dt=1.0),
+        lambda x, end: ub.simulate(
+            x, ub.Static(), t=(0, 1), dt=1.0, newton=ub.Newton(reference=True)
+        ),
+        lambda x, end: ub.modes(x, 1),
+        lambda x, end: ub.buckling(x, 1),
+        lambda x, end: ub.pushover(x, end, 1e-3, pattern=x.loads),
+        lambda x, end: ub.follow(x, ub.LoadControl(0.5), steps=2),
+        lambda x, end: ub.load_combinations(
+            replace(x, loads=[]), {"Q": x.loads}, {"1": {"Q": 1.0}, "2": {"Q": 1.5}}
+        ),
+        lambda x, end: ub.response_spectrum_analysis(
+            replace(x, loads=[]), lambda T: 1.0, n=2, direction=(1, 0)
+        ),
+        lambda x, end: ub.linearize(
+            replace(x, loads=[]), inputs=[x.supports[0]], outputs=[("displacement", end, "u")]
+        ),
+    ],
+)
+def test_each_analysis_warns_once_of_beams_that_touch(analysis):
+    a, b = beam((0, 0), (0, 1), name="a"), beam((0, 1), (1, 1), name="b")
+    push = ub.PointLoad(a.end, force=(1.0, -1.0), amplitude=lambda t: t)
+    x = ub.Scene([a, b], supports=[ub.Clamped(a.start), ub.Clamped(b.end)], loads=[push])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        analysis(x, a.end)
+    assert ["touch" in str(w.message) for w in caught].count(True) == 1
+
+
+# -- connectors without effect ---------------------------------------------------------------------
+
+SOFT = ub.Spring(1e3)
+
+
+@pytest.mark.parametrize(
+    ("joints", "connect", "supports", "named"),
+    [
+        (ub.Rigid, lambda a, b: ub.Turn(a.end, b.start, SOFT), (), "Rigid(a.end"),
+        (
+            lambda a, b: ub.Rigid(a, b, multipliers=True),
+            lambda a, b: ub.Turn(a.end, b.start, ub.Damper(1.0)), (), "Rigid(a.end",
+        ),
+        (ub.Revolute, lambda a, b: ub.Slide(a.end, b.start, SOFT, axis=(1, 0)), (), "Revolute("),
+        (
+            lambda a, b: ub.Revolute(a, b, multipliers=True),
+            lambda a, b: ub.Slide(a.end, b.start, SOFT, axis=(1, 1)), (), "Revolute(",
+        ),
+        (
+            ub.Revolute,
+            lambda a, b: ub.Bushing(a.end, b.start, ub.Clearance(stiffness=1e6, gap=1e-3)),
+            (), "Revolute(",
+        ),
+        (
+            ub.Revolute, lambda a, b: ub.Turn(ub.ground(0, 0), a.start, SOFT), ub.Clamped,
+            "Clamped",
+        ),
+    ],
+)  # fmt: skip
+def test_connectors_whose_motion_is_held(joints, connect, supports, named):
+    a, b = beam((0, 0), (1, 0), name="a"), beam((1, 0), (2, 0), name="b")
+    held = [supports(a.start)] if supports else [ub.Pinned(a.start)]
+    more = {"joints": [joints(a.end, b.start)], "connectors": [connect(a, b)], "supports": held}
+    with warns("its motion is held at zero by", named, "Revolute"):
+        begin(a, b, **more)
+
+
+def test_connectors_whose_motion_is_free_do_not_warn():
+    a, b = beam((0, 0), (1, 0), name="a"), beam((1, 0), (2, 0), name="b")
+    turned = ub.PrescribedDisplacement(a.start, u=0.0, v=0.0, psi=lambda t: t)
+    begin(
+        a, b, joints=[ub.Revolute(a.end, b.start)], supports=[turned],
+        connectors=[
+            ub.Turn(a.end, b.start, SOFT), ub.Turn(ub.ground(0, 0), a.start, SOFT),
+            ub.Stretch(a.start, b.end, SOFT),
+        ],
+    )  # fmt: skip
+    # no warning is issued
 
 
 def test_an_end_that_touches_the_middle_of_a_beam():

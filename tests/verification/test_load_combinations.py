@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Load combinations: closed forms of a cantilever, runs of the scene, combinations that fail."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -116,6 +117,32 @@ def test_mistakes_are_named():
         ub.load_combinations(SCENE, CASES, {"A": {"wnd": 1.0}})
     with raises("cases['spin']: forces of a RotatingFrame have no factor"):
         ub.load_combinations(SCENE, {"spin": [ub.RotatingFrame(rate=1.0)]}, {"A": {"spin": 1.0}})
+
+
+def test_loads_that_act_twice_or_not_at_all_are_named():
+    """Cases act with their values at 1 s; the scene's own loads act in all combinations."""
+    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
+    beam = ub.Beam((0, 0), (2, 0), section)
+    loaded = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+    row = {"1": {"G": 1.0}}
+    with pytest.raises(ub.ArgumentError, match=r"Gravity of cases\['G'\].*replace\(scene, loads"):
+        ub.load_combinations(loaded, {"G": loaded.loads}, row)
+    bare = replace(loaded, loads=[])
+    quake = ub.GroundMotion(0.01, [0, 1, 2, -1, 0]).acceleration
+    for amplitude, said in (
+        (quake, "no force at t = 1 s"),
+        (lambda t: math.sin(math.pi * t), "no force at t = 1 s"),
+        (ub.ramp(10.0), "amplitude 0.1 at t = 1 s, .* and 1 from 10 s"),
+    ):
+        case = [ub.Gravity((0, -1), amplitude=amplitude)]
+        with pytest.warns(ub.ModelWarning, match=said):
+            ub.load_combinations(bare, {"G": case}, row)
+    gone = ub.MovingLoad(beam, lambda t: 3.0 * t, (0, -1.0))
+    with pytest.warns(ub.ModelWarning, match="not on its beam at t = 1 s"):
+        ub.load_combinations(bare, {"G": [gone]}, row)
+    for amplitude in (lambda t: t, lambda t: 2.0, ub.ramp(1.0)):
+        point = ub.PointLoad(beam.end, force=(0, -1e3), amplitude=amplitude)
+        ub.load_combinations(bare, {"G": [point]}, row)  # no warning is issued
 
 
 def test_dampers_and_damping_bear_nothing():

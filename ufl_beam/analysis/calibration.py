@@ -26,6 +26,7 @@ from ufl_beam.errors import (
     ArgumentError,
     ConvergenceError,
     ModelWarning,
+    each_warning_once,
     require_all,
     require_count,
     require_function,
@@ -93,6 +94,7 @@ Model = Callable[..., Scene]
 Entry = float | tuple[float, float | None, float | None]  # start, or start with bounds
 
 
+@each_warning_once()
 def calibrate(
     model: Model,
     parameters: Mapping[str, Entry],

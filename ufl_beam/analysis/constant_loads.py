@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from ufl_beam.errors import ConvergenceError, require_kind, require_switch
 from ufl_beam.mechanics.time_schemes import Static
@@ -38,6 +41,25 @@ def require_options(newton: object, mesh: object, progress: object, what: str) -
 def size_of(load: Load) -> float:
     """Return the factor on a load at the time :data:`AT`."""
     return value_at(load.amplitude, AT, load)
+
+
+def effect_at(load: Any) -> str:
+    """Describe a load that has no effect at the time :data:`AT`, or changes later; else empty."""
+    size, last, times = size_of(load), load.amplitude, np.linspace(0.0, AT, 41)
+    with suppress(Exception):  # the function need not exist before the time AT
+        if abs(size) <= 1e-9 * max(abs(float(last(t))) for t in times):
+            size = 0.0  # as sin(π t)
+    if size == 0.0:
+        return f"has no force at t = {AT:g} s, and that value counts; give it its final amplitude"
+    on = load.length if isinstance(load, MovingLoad) else 0.0
+    if on and not 0.0 <= value_at(load.position, AT, load) <= on:
+        return f"is not on its beam at t = {AT:g} s, and that place counts"
+    if isinstance(last, Table) and last.times[-1] > AT and last.values[-1] != size:
+        return (
+            f"has the amplitude {size:g} at t = {AT:g} s, which counts, and {last.values[-1]:g} "
+            f"from {last.times[-1]:g} s on; give it its final amplitude"
+        )
+    return ""
 
 
 def duration(scene: Scene) -> float:

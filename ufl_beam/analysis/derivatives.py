@@ -28,6 +28,7 @@ from ufl_beam.display import in_one_line
 from ufl_beam.errors import (
     ArgumentError,
     ModelWarning,
+    each_warning_once,
     require_function,
     require_kind,
     require_number,
@@ -74,6 +75,7 @@ MOST_SUBSTEPS = 1000
 Model = Callable[..., Scene]
 
 
+@each_warning_once()
 def differentiate(
     model: Model,
     at: Mapping[str, float],

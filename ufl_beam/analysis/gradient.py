@@ -23,7 +23,13 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import Archive
-from ufl_beam.errors import ArgumentError, StepFailed, require_function, require_number
+from ufl_beam.errors import (
+    ArgumentError,
+    StepFailed,
+    each_warning_once,
+    require_function,
+    require_number,
+)
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import Mesh
 from ufl_beam.simulation.run import require_times
@@ -50,6 +56,7 @@ def last(history: Array) -> float:
     return float(history[-1])
 
 
+@each_warning_once()
 def gradient(
     model: Model,
     at: Mapping[str, float],

@@ -26,6 +26,7 @@ from ufl_beam.analysis.parameter_study import study
 from ufl_beam.errors import (
     ArgumentError,
     ConvergenceError,
+    each_warning_once,
     require_all,
     require_function,
     require_kind,
@@ -52,6 +53,7 @@ WHAT = "incremental_dynamic_analysis"
 Measure = Callable[[Solution], npt.ArrayLike]
 
 
+@each_warning_once()
 def incremental_dynamic_analysis(
     build: Callable[[GroundMotion], Scene],
     motions: Sequence[GroundMotion],

@@ -41,6 +41,7 @@ from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.display import Rich, counted
 from ufl_beam.errors import (
     ArgumentError,
+    each_warning_once,
     require_array,
     require_count,
     require_kind,
@@ -520,6 +521,7 @@ class LinearModel(Rich):
 # -- the function ----------------------------------------------------------------------------------
 
 
+@each_warning_once()
 def linearize(
     scene: Scene,
     *,

@@ -23,14 +23,16 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import cached_forms
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel
+from ufl_beam.discretization.model_warnings import warn_of_touching
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.errors import ArgumentError, ModelWarning
+from ufl_beam.errors import ArgumentError, ModelWarning, each_warning_once
 from ufl_beam.mechanics.time_scheme import Coefficients, Step
 from ufl_beam.mechanics.time_schemes import Newmark, Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connectors import Connector
+from ufl_beam.model.constraint_checks import warn_of_held_motions
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import MovingLoad
 from ufl_beam.model.scene import Scene
@@ -84,11 +86,13 @@ class Linearization:
             loads = [replace(x, mass=0.0) if isinstance(x, MovingLoad) else x for x in scene.loads]
             scene = replace(scene, loads=loads)
         # All processes compute all matrices, so that no result depends on their number.
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), each_warning_once(anew=True):
             warnings.simplefilter("ignore", ModelWarning)  # these warnings concern runs
             simulation = Simulation(
                 scene, _Standstill(), t0=time, start=at, mesh=mesh, comm=MPI.COMM_SELF
             )
+        warn_of_touching(simulation.numbering)
+        warn_of_held_motions(scene)
         if t is not None:
             simulation.t = t
         self.scene, self._simulation = scene, simulation

@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ufl_beam.analysis.constant_loads import AT, duration, grown, require_options
+from ufl_beam.analysis.constant_loads import AT, duration, effect_at, grown, require_options
 from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.errors import (
     ArgumentError,
     ArgumentTypeError,
     ConvergenceError,
+    each_warning_once,
     require_all,
     require_count,
     require_kind,
@@ -30,6 +31,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
 
 
+@each_warning_once()
 def load_combinations(
     scene: Scene,
     cases: Mapping[str, Sequence[Load]],
@@ -43,7 +45,8 @@ def load_combinations(
     """Compute the equilibrium under each combination of load cases.
 
     Results of nonlinear models cannot be superposed, so each combination is a static run.  The
-    loads of its cases grow together from zero to the factor times their value at t = 1 s.  Loads
+    loads of its cases grow together from zero to the factor times their value at t = 1 s: a pulse
+    that has ended gives nothing, and a ramp of 10 s a tenth of the load.  Loads
     and motions of the scene itself act in every combination, unchanged.  They grow so slowly that
     dampers and viscous laws bear nothing.  Only if loads or motions of the scene depend on time, a
     run is from 0 to 1 s in real time.  Damping of the scene is ignored.  All runs have the same
@@ -64,7 +67,8 @@ def load_combinations(
         ConvergenceError: No combination has an equilibrium.
 
     Warns:
-        ModelWarning: A combination has no equilibrium; the envelope leaves it out.
+        ModelWarning: A combination has no equilibrium; the envelope leaves it out.  Or a load of a
+            case has no force at 1 s, or a ``Table`` or ``ramp`` still changes after 1 s.
 
     Example:
         >>> free = ub.Scene([beam], supports=scene.supports)
@@ -86,6 +90,14 @@ def load_combinations(
                 f"{what}: cases[{name!r}]: forces of a RotatingFrame have no factor; give the "
                 "frame to the scene"
             )
+        for load in loads[name]:
+            if any(load is other for other in scene.loads):
+                raise ArgumentError(
+                    f"{what}: {load} of cases[{name!r}] is in the scene, too, and would act twice; "
+                    "give replace(scene, loads=[]), or leave it out of the case"
+                )
+            if said := effect_at(load):
+                warn(f"{what}: {load} of cases[{name!r}] {said}")
     scene = replace(scene, damping=())
     span = duration(scene)
     factors = dict[str, dict[str, float]]()

@@ -24,7 +24,14 @@ from ufl_beam.discretization.function_spaces import Fields, Strains
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Rich
-from ufl_beam.errors import ArgumentError, require_count, require_kind, require_number, warn
+from ufl_beam.errors import (
+    ArgumentError,
+    each_warning_once,
+    require_count,
+    require_kind,
+    require_number,
+    warn,
+)
 from ufl_beam.mechanics.time_schemes import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint
@@ -292,6 +299,7 @@ class Buckling(Shapes):
         ]
 
 
+@each_warning_once()
 def modes(scene: Scene, n: int, *, at: StateOf | None = None, mesh: Mesh | None = None) -> Modes:
     """Compute natural frequencies, damping ratios and shapes of small vibrations.
 
@@ -368,6 +376,7 @@ def computed_modes(
     return Modes(scene, small.numbering, small.q, shapes, *stresses, exponents)
 
 
+@each_warning_once()
 def buckling(
     scene: Scene, n: int, *, t: float = 1.0, at: StateOf | None = None, mesh: Mesh | None = None
 ) -> Buckling:

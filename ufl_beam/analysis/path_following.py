@@ -21,6 +21,7 @@ from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
     ArgumentError,
     StepFailed,
+    each_warning_once,
     require_count,
     require_function,
     require_kind,
@@ -131,6 +132,7 @@ class Path(Solution):
         return np.concatenate([[0.0], np.cumsum(steps)])
 
 
+@each_warning_once()
 def follow(
     scene: Scene,
     control: Control,

@@ -28,6 +28,7 @@ from ufl_beam.discretization.function_spaces import point_masses
 from ufl_beam.errors import (
     ArgumentError,
     ConvergenceError,
+    each_warning_once,
     require_all,
     require_count,
     require_kind,
@@ -62,6 +63,7 @@ Shape = Callable[[AttachmentPoint], float]
 """Function of a place: its displacement in a mode, with any factor."""
 
 
+@each_warning_once()
 def pushover(
     scene: Scene,
     place: Place,

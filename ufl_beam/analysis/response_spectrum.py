@@ -16,6 +16,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.display import Rich
 from ufl_beam.errors import (
     ArgumentError,
+    each_warning_once,
     require_count,
     require_kind,
     require_number,
@@ -158,6 +159,7 @@ class SpectralResponse(Rich):
         )
 
 
+@each_warning_once()
 def response_spectrum_analysis(
     scene: Scene,
     spectrum: Spectrum,

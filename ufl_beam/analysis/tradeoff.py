@@ -23,6 +23,7 @@ from ufl_beam.errors import (
     ArgumentError,
     ConvergenceError,
     TradeoffError,
+    each_warning_once,
     require_all,
     require_function,
     require_kind,
@@ -67,6 +68,7 @@ Quantity = Callable[[Solution], npt.ArrayLike]
 Value = TypeVar("Value")
 
 
+@each_warning_once()
 def tradeoff(
     scene: Scene,
     quantities: Mapping[str, Quantity],

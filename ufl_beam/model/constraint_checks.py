@@ -13,12 +13,13 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigsh
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ModelError
+from ufl_beam.errors import ModelError, warn
 from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body, Member, Node, NodeDof, node
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connector_laws import (
     HOLDING,
     RESISTING,
+    RIGID,
     Controller,
     Coulomb,
     Damper,
@@ -373,6 +374,57 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
             f"{what}: {type(stressed).__name__} of {owner} bears {force}, so that the undeformed "
             f"scene is not in equilibrium; {instead}"
         )
+
+
+def warn_of_held_motions(scene: Scene) -> None:
+    """Warn of springs, dampers and hinges whose motion joints or supports hold at zero.
+
+    The gradient of such a motion is a combination of constraints of joints between the same places,
+    or vanishes at all free degrees of freedom.
+    """
+    same, moving = scene.representatives, [(s.place, c) for s in scene.supports for c in s.moving]
+    free = {same[node(place), c] for place, c in moving} if scene.connectors else set()
+
+    def gradient(connector: Connector) -> tuple[Row, dict[NodeDof, float]]:
+        ends = zip((connector.a, connector.b), connector.rigidly(), strict=True)
+        row: Row = [(node(end), factors) for end, factors in ends]
+        sums: dict[NodeDof, float] = defaultdict(float)
+        for carrier, factors in row:
+            for component, factor in enumerate(factors):
+                sums[same[carrier, component]] += factor
+        left = {k: x for k, x in sums.items() if abs(x) > 1e-12 and (k in free or k not in fixed)}
+        return row, left
+
+    fixed, between = _fixed(scene) if scene.connectors else set(), defaultdict(list)
+    for joint in scene.joints if scene.connectors else ():
+        for holder in joint.holders:
+            if holder.law is RIGID:
+                between[frozenset((node(holder.a), node(holder.b)))].append((holder, joint))
+    for owner in scene.connectors:
+        names = list[str]()
+        for part in owner.components or (owner,):
+            row, left = gradient(part)
+            holders = between[frozenset((node(part.a), node(part.b)))] if left else []
+            rows = [gradient(holder)[1] for holder, _ in holders]
+            dofs = [*dict.fromkeys(dof for x in (left, *rows) for dof in x)]
+            G, wanted = (
+                np.array([[x.get(k, 0.0) for k in dofs] for x in y]) for y in (rows, [left])
+            )
+            shares = np.linalg.lstsq(G.T, wanted[0], rcond=None)[0] if rows else np.zeros(0)
+            missed = wanted[0] - (shares @ G if rows else 0.0)
+            if (
+                isinstance(part.law, (*HOLDING, RigidPlastic))
+                or np.abs(missed).max(initial=0) > 1e-9
+            ):
+                break
+            names += [str(j) for (_, j), x in zip(holders, shares, strict=True) if abs(x) > 1e-9]
+            names += map(str, () if left else _supports_and_joints_at(scene, [row]))
+        else:
+            warn(
+                f"{owner}: its motion is held at zero by {'; '.join(dict.fromkeys(names))}, so "
+                "that it bears nothing and has no effect. Leave the motion free, with Revolute "
+                "instead of Rigid or Pinned instead of Clamped, or leave out the connector"
+            )
 
 
 class Rated(Protocol):

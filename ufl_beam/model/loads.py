@@ -343,6 +343,16 @@ class MovingLoad(Load):
         """The beams in the order of the distance."""
         return (self.beam,) if isinstance(self.beam, Member) else tuple(self.beam)
 
+    @property
+    def length(self) -> float:
+        """Length of the beams, of their cells without refinement, and its round-off; m."""
+        length = 0.0
+        for beam in self.route:
+            ends = sorted({*(i / beam.cells for i in range(beam.cells + 1)), *beam.corners})
+            points = [beam.at(s).point for s in ends]
+            length += sum(math.dist(a, b) for a, b in pairwise(points))
+        return length * (1.0 + 1e-9)
+
 
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)

@@ -34,6 +34,7 @@ from ufl_beam.model.constraint_checks import (
     require_no_prestress,
     require_rates,
     require_smooth,
+    warn_of_held_motions,
 )
 from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
@@ -76,8 +77,8 @@ def checked_numbering(
     warn_of_far_points(scene)
     warn_of_free_hinges(scene)
     numbering = DofNumbering(scene, mesh)
-    if has_inertia(scheme):
-        warn_of_touching(numbering)
+    warn_of_touching(numbering)
+    warn_of_held_motions(scene)
     return numbering, free_motion
 
 
