@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, pairwise
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -20,6 +20,7 @@ from ufl_beam.model.bodies import GROUND, BodyPoint, Place, moves_with_node
 from ufl_beam.model.connector_laws import RIGID, PrescribedMotion
 from ufl_beam.model.connectors import place_of
 from ufl_beam.model.functions import value_at
+from ufl_beam.model.joints import Release
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 
@@ -142,15 +143,21 @@ def _contacts(points: Array, first: Index) -> tuple[Index, Index, Array]:
 def _groups(numbering: DofNumbering) -> Index:
     """Return the group number of each node of the beams; connected nodes are in one group.
 
-    Nodes are connected if they share the degree of freedom u or have a connector between them.
-    Supports of u and v connect nodes to the ground.
+    Nodes are connected if they share the degree of freedom u, or have a :class:`Release` or a
+    connector between them.  Supports of u and v connect nodes to the ground.
     """
     connectors = numbering.dofs_of_connectors[:, :2]
     fixed = [s.place for s in numbering.scene.supports if {0, 1} <= s.held.keys()]
     has_ground = GROUND in numbering.scene.rigid_bodies
     ground = int(numbering.node(GROUND.middle)[0]) if has_ground else numbering.size
     to_ground = np.array([(numbering.node(place)[0], ground) for place in fixed], dtype=np.int64)
-    pairs = np.concatenate([connectors, to_ground.reshape(-1, 2)])
+    joined = [
+        (numbering.node(a)[0], numbering.node(b)[0])
+        for joint in numbering.scene.joints if isinstance(joint, Release)
+        for a, b in pairwise(joint.places)
+    ]  # fmt: skip
+    others = np.array(joined, dtype=np.int64).reshape(-1, 2)
+    pairs = np.concatenate([connectors, to_ground.reshape(-1, 2), others])
     (group,) = _connected(numbering.size + 1, pairs)
     return np.asarray(group[numbering.dofs[:, 0]])
 
