@@ -239,6 +239,69 @@ def test_who_asks_for_a_velocity_is_told():
     simulation.close()
 
 
+# -- leaps to other branches -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("dt", "reference"), [(1.0, False), (0.25, False), (0.01, False), (0.01, True)]
+)
+def test_a_straight_rope_sags_under_its_weight(dt, reference):
+    """[closed] H of the parabola, from w² S³/(24 H²) = H S/EA: 27 515 N for EI = 0.
+
+    Its force is the third power of its sag, so that works differ by a factor of 2 in the first step
+    however short it is.  EI and the sag, 2.3 % of the span, change H by less than half a percent.
+    """
+    S, EA, weight, cells = 100.0, 2e7, 50.0, 12 if reference else 60
+    section = ub.Section(EA=EA, GA=1e7, EI=1e3, rhoA=weight / 9.81)
+    rope = ub.Beam((0, 0), (S, 0), section, cells=cells)
+    ends = [ub.Pinned(rope.start), ub.Pinned(rope.end)]
+    scene = ub.Scene([rope], supports=ends, loads=[ub.Gravity(amplitude=lambda t: t)])
+    end = 3 * dt if dt < 0.1 else 1.0
+    newton = ub.Newton(reference=reference)
+    found = ub.simulate(scene, ub.Static(), t=(0, end), dt=dt, newton=newton)
+    pull = -found.reaction(ends[0])[-1, 0]
+    if end == 1.0:
+        assert pull == pytest.approx((EA * (weight * S) ** 2 / 24) ** (1 / 3), rel=5e-3)
+    assert found.substeps < 8 + 20 / dt  # a few substeps from the straight state
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-12])
+def test_a_shallow_truss_is_refused_at_its_limit_load(scale):
+    """[closed] k (h² - x²) x/L³ in the middle of two rods has its limit at x = h/√3, at any scale
+    of the forces; no step beyond is taken, also not the first one from the unloaded truss."""
+    EA, h, L = 1e4 * scale, 0.1, 1.0
+    section = ub.Section(EA=EA, GA=EA, EI=1.0 * scale)
+    rods = [ub.Beam((x, 0), (0, h), section, cells=1) for x in (-L, L)]
+    limit = 2 * EA / (2 * np.hypot(L, h) ** 3) * (h**2 - h**2 / 3) * h / np.sqrt(3)
+    push = ub.PointLoad(rods[0].end, force=(0, -1.3 * limit), amplitude=lambda t: t)
+    scene = ub.Scene(
+        rods, joints=[ub.Revolute(rods[0].end, rods[1].end)],
+        supports=[ub.Pinned(rod.start) for rod in rods], loads=[push],
+    )  # fmt: skip
+    for dt in (1.0, 0.1):
+        with pytest.raises(ub.ConvergenceError) as ended:
+            ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt)
+        # The rods rotate by 0.1 rad, so that the limit is met to 1 %.
+        assert ended.value.time == pytest.approx(1 / 1.3, rel=0.02)
+
+
+def test_a_start_in_equilibrium_stays():
+    """Loads that joints alone bear move nothing: works are round-off, which no check may judge."""
+    for angle in np.linspace(0, 6.2, 20):
+        r = np.array([np.cos(angle), np.sin(angle)])
+        links = [ub.Body(tuple((i + 0.5) * r), mass=1.0, inertia=1 / 12) for i in range(2)]
+        ground = ub.ground(0, 0)
+        pins = [(ground, links[0].at(0, 0)), (links[0].at(*r), links[1].at(*r))]
+        pairs = [(ground, links[0].middle), (links[0].middle, links[1].middle)]
+        scene = ub.Scene(
+            bodies=links, joints=[ub.Revolute(*pin, multipliers=True) for pin in pins],
+            connectors=[ub.Turn(*pair, ub.Spring(10.0)) for pair in pairs],
+            loads=[ub.Gravity(acceleration=tuple(9.81 * r))],
+        )  # fmt: skip
+        found = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
+        assert np.abs(found.displacement(links[1].middle)).max() < 1e-12
+
+
 # -- what only loads hold -------------------------------------------------------------------------
 
 ROD = ub.Section(EA=1e6, GA=1e6, EI=1e4, rhoA=1.0)
