@@ -369,8 +369,8 @@ def _draw_hinges(
         examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")
         entries += [(fraction, words, BLUE) for fraction, words in examples]
     if limits:
-        words = [f"{name}, up to {limit:g} rad" for name, limit in limits.items()]
-        names = [*limits, f"beyond {[*limits][-1]}"]
+        words, names = [f"{x}, up to {y:g} rad" for x, y in limits.items()], [*limits]
+        names.append(f"beyond {names[-1]}")
         shades = style.scale("YlOrRd", 0.3, 1.0, 0.0, len(limits)).to_rgba(np.arange(len(names)))
         of_state = dict(zip(names, shades, strict=True))
         colors = [of_state.get(hinge.state, BLUE) for hinge in hinges]
@@ -382,9 +382,8 @@ def _draw_hinges(
         for k, color in zip(hardened, rule.to_rgba(rotations / unit), strict=True):
             colors[k] = color
         style.draw_bar(axes, rule, f"plastic rotation of hinges ({prefix}rad)")
-    lines: dict[Member, Array] = {
-        beam: shape.nodes[solution.numbering.nodes_along(beam)] for beam in solution.scene.beams
-    }
+    nodes_along = solution.numbering.nodes_along
+    lines: dict[Member, Array] = {b: shape.nodes[nodes_along(b)] for b in solution.scene.beams}
     ends = np.reshape([line[k] for line in lines.values() for k in (0, -1)], (-1, 2))
     for hinge, color in zip(hinges, colors, strict=True):
         at, place = hinge.at, hinge.place
