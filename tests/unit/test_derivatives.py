@@ -352,6 +352,30 @@ def test_divided_steps():
     assert lost == pytest.approx([(N - 2 * N_y) * L / H, N_y * L / H], rel=EXACT)
 
 
+@pytest.mark.parametrize("near", [1e-4, 1e-6, 1.1e-8])
+def test_energies_beside_a_switch(near):
+    """The bar has just begun to flow: it dissipates N_y (N - N_y) L/H, on one side of the switch.
+
+    Round-off of the differences: 1e-16 N_y over steps of a fifth of the distance, times 10.
+    """
+    L, H, N_y = 2.0, 1e6 / 30, 40.0
+    at = {"N_y": N_y, "N": N_y * (1 + near)}
+    found = ub.differentiate(lambda N_y, N: pulled(N_y, N, H), at, ub.Static(), **RUN)
+    assert found.ranges["N"].change == pytest.approx(near * N_y, rel=1e-3)
+    lost = found.of(lambda s: s.energy.lost["plastic"][-1])
+    assert lost == pytest.approx(
+        [-N_y * L / H, N_y * L / H], rel=max(1e-15 / (near / 5), 1e-6) + near
+    )
+
+
+def test_energies_at_a_switch():
+    """Differences cannot keep to one side of a switch that is nearer than their round-off."""
+    at = {"N": 40.0 * (1 + 1e-11)}
+    found = ub.differentiate(lambda N: pulled(40.0, N, 1e6 / 30), at, ub.Static(), **RUN)
+    with pytest.warns(ub.ModelWarning, match="of: a change of N by 4e-10 is a switch of the run"):
+        found.of(lambda s: s.energy.lost["plastic"][-1])
+
+
 def test_too_many_substeps(monkeypatch):
     """Energies are refused after more substeps than there is space for."""
     monkeypatch.setattr("ufl_beam.analysis.derivatives.MOST_SUBSTEPS", 3)

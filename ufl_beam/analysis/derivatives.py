@@ -34,6 +34,7 @@ from ufl_beam.errors import (
     require_number,
     require_switch,
     shorten,
+    warn,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia, order_of
 from ufl_beam.model.beams import Mesh
@@ -60,6 +61,12 @@ QUANTITY_STEP = 2.0**-17
 
 It is small because quantities, such as largest values, may be smooth in pieces only.  The round-off
 is 1e-11 of the quantity."""
+
+LEAST_STEP = 2.0**-30
+"""Least relative change of a parameter for differences of energies and material, where a switch of
+the run is near.  The round-off is 1e-6 of the quantity."""
+
+FARTHEST = 5.0  # steps of a difference that a switch must be away
 
 STENCILS: dict[tuple[int, ...], tuple[float, ...]] = {
     (-2, -1, 1, 2): (1 / 12, -8 / 12, 8 / 12, -1 / 12),
@@ -262,7 +269,7 @@ class Case:
             starts: Sequence[Solution | None] = [None] * len(scenes)
             if self.start is not None:
                 start, p = self.start, [*self.at].index(name)
-                starts = start._ends()[p] if fraction == MODEL_STEP else start._runs()[p]
+                starts = start._ends()[p] if fraction == MODEL_STEP else start._runs(p, fraction)
             yield from map(self._begin, scenes, starts)
 
     def positions(self, name: str, fraction: float) -> Array:
@@ -501,7 +508,7 @@ class Derivatives:
             for name, enters in start._enters.items():
                 self._enters[name] |= enters
         self._shifted: list[list[Solution]] = []
-        self._repeated: list[list[Solution]] = []
+        self._repeated: dict[tuple[int, float], list[Solution]] = {}
         self._moved_ends: list[list[Solution]] = []
 
     def __repr__(self) -> str:
@@ -539,13 +546,16 @@ class Derivatives:
         """
         require_function(quantity, "of: quantity", "a Solution")
         reference = _as_array(quantity(self.solution))
+        fractions = [QUANTITY_STEP] * len(self.at)
         try:
             changes = [self._differences(quantity, reference, some) for some in self._motions()]
         except Unknown:
-            changes = [self._differences(quantity, reference, some) for some in self._runs()]
+            fractions = [self._fraction(name) for name in self.at]
+            runs = (self._runs(p, fraction) for p, fraction in enumerate(fractions))
+            changes = [self._differences(quantity, reference, some) for some in runs]
         found = [
-            np.tensordot(self._case.weights(name, QUANTITY_STEP), row, axes=1)
-            for name, row in zip(self.at, changes, strict=True)
+            np.tensordot(self._case.weights(name, fraction), row, axes=1)
+            for name, fraction, row in zip(self.at, fractions, changes, strict=True)
         ]
         return np.stack(found, axis=-1)
 
@@ -584,9 +594,21 @@ class Derivatives:
                 self._shifted.append([MotionOnly(n, self._states(p, x)) for n, x in pairs])
         return self._shifted
 
-    def _runs(self) -> list[list[Solution]]:
-        """Return whole solutions at neighbouring values of each parameter."""
-        if not self._repeated:
+    def _fraction(self, name: str) -> float:
+        """Return the relative step of a parameter between runs, which do not reach a switch."""
+        switch = self.ranges[name].change / (abs(self.at[name]) or 1.0)
+        if switch < FARTHEST * LEAST_STEP:
+            warn(
+                f"of: a change of {name} by {self.ranges[name].change:.2g} is a switch of the run, "
+                "which differences of material and energies cross: their derivatives are wrong "
+                "if it matters. Choose another value, or compare with runs"
+            )
+            return QUANTITY_STEP
+        return min(QUANTITY_STEP, switch / FARTHEST)
+
+    def _runs(self, p: int, fraction: float) -> list[Solution]:
+        """Return whole solutions at values of parameter p, in steps of a fraction of it."""
+        if (p, fraction) not in self._repeated:
             if order_of(self.solution.scheme) > 2:  # type: ignore[arg-type]
                 raise ArgumentError(
                     "of: this quantity needs section forces, material or energies between the "
@@ -597,15 +619,15 @@ class Derivatives:
             while first._start is not None:
                 first = first._start
                 first._require_substeps()
-            for p, name in enumerate(self.at):
-                # Simulations begin at the time of the first run
-                simulations = first._case.simulations(name, QUANTITY_STEP)
-                changes, found = self._case.positions(name, QUANTITY_STEP), list[Solution]()
-                for simulation, change in zip(simulations, changes, strict=True):
-                    with closing(simulation):
-                        found.append(self._repeat(simulation, p, change))
-                self._repeated.append(found)
-        return self._repeated
+            name, found = [*self.at][p], list[Solution]()
+            # Simulations begin at the time of the first run
+            simulations = first._case.simulations(name, fraction)
+            changes = self._case.positions(name, fraction)
+            for simulation, change in zip(simulations, changes, strict=True):
+                with closing(simulation):
+                    found.append(self._repeat(simulation, p, change))
+            self._repeated[p, fraction] = found
+        return self._repeated[p, fraction]
 
     def _require_substeps(self) -> None:
         """Raise :class:`ArgumentError` if too many steps of the run were divided."""

@@ -73,9 +73,10 @@ def gradient(
     """Differentiate one number of a run by many parameters of the scene.
 
     The adjoint of the run goes back through its steps once, at a cost that hardly depends on the
-    number of parameters.  :func:`differentiate` is cheaper for up to about ten parameters, and has
-    derivatives of any quantity, and continues a preload with ``start``, which this function does
-    not: its run begins with the undeformed scene.
+    number of parameters.  But four simulations are made for each parameter, to difference the
+    numbers of the scene: with 48 parameters, of 250 steps, the whole costs 20 to 88 plain runs, the
+    more the fewer cells.  :func:`differentiate` has derivatives of any quantity, and continues a
+    preload with ``start``, which this function does not: its run begins with the undeformed scene.
 
     The steps are recorded in parts of the run that fit into the given memory.  Each segment is
     computed twice.
