@@ -650,3 +650,17 @@ def test_crossed_ties_that_hang_slack_are_named():
     )  # fmt: skip
     with pytest.warns(ub.ModelWarning, match="modes: Stretch.*, Stretch.*at a limit"):
         ub.modes(scene, 1)
+
+
+def test_fast_decays_are_modes():
+    """High vibrations with `KelvinVoigt` have a slow and a fast decay, as the linear model."""
+    section = ub.Section(EA=1e5, GA=3e4, EI=10.0, rhoA=1.0, rhoI=1e-3)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4)
+    push = ub.PointLoad(beam.end, force=(0, 1.0))
+    scene = clamped(beam, loads=[push], damping=[ub.KelvinVoigt(0.03)])
+    found = ub.modes(scene, 100).exponents
+    model = ub.linearize(scene, inputs=[push], outputs=[("displacement", beam.end, "v")])
+    expected = np.linalg.eigvals(model.state_space()[0])
+    found = np.append(found, found[np.abs(found.imag) > 1e-9 * np.abs(found)].conj())
+    assert len(found) == len(expected) == 24
+    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(expected), rtol=1e-6)

@@ -46,7 +46,11 @@ class SmallMotions(Linearization):
             s, motions = np.sqrt((-values).astype(complex)), x.astype(complex)
         else:
             s, motions = self._damped(C, x[:, zero], n, first**0.5)
-        finite = (np.abs(s) ** 2 <= 1e3 * highest) & (s.imag >= 0)
+        finite = s.imag >= 0
+        if K.shape[0] > DENSE:  # SLEPc finds infinite exponents, too
+            heavy = M.diagonal() > 0.0
+            fastest = (np.abs(C.diagonal()[heavy]) / M.diagonal()[heavy]).max()
+            finite &= np.abs(s) <= 30 * max(highest**0.5, fastest)
         return self._nearest(n, s[finite], motions[:, finite])
 
     def undamped(
