@@ -10,12 +10,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
-from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array
 from ufl_beam.model.connector_laws import RIGID, PrescribedMotion
@@ -62,8 +58,9 @@ def rate_after(f: TimeFunction | None, t: float, longest: float) -> tuple[float,
             values = [float(f(t + i * h)) for i in range(5)]  # type: ignore[misc]
         except Exception:  # a function of a user may end soon after t
             continue
-        rates.append(float(WEIGHTS[0] @ values) / h)
-        largest = max(largest, *(abs(x - values[0]) / h for x in values))
+        if all(map(math.isfinite, values)):
+            rates.append(float(WEIGHTS[0] @ values) / h)
+            largest = max(largest, *(abs(x - values[0]) / h for x in values))
     changes = np.abs(np.diff(rates[1:]))
     return rates[2 + int(np.argmin(changes))] if len(changes) else rates[-1], largest
 
@@ -86,59 +83,3 @@ def may_jump(f: TimeFunction | None, t0: float, t1: float) -> bool:
         return False
     second = sorted(np.abs(np.diff(values, 2)).tolist())
     return bool(second[-1] > UNEVEN * second[2] + 16 * math.ulp(max(map(abs, values))))
-
-
-class Impact(NamedTuple):
-    """Velocities and energies of a plastic impact."""
-
-    v: Array  # velocities after the impact
-    works: Array  # of the impulses of the constraints; J
-    lost: float  # energy; J
-
-
-def find_impact(
-    M: csr_array, G: csr_array, held: int, v: Array, scales: Array, rates: Array,
-    counts: Sequence[bool], excess: Excess | None, *, within: bool,
-) -> Impact | None:  # fmt: skip
-    """Return an impact, or None if no velocity contradicts a constraint.
-
-    Args:
-        M: Masses; those of unknowns without mass are zero.
-        G: Derivatives of the n constraints by the unknowns; (n, size).
-        held: Number of supports among the constraints.  They are the first rows, orthonormal.
-        v: Velocities before the impact.
-        scales: Factors that make motions dimensionless; zero for other unknowns.
-        rates: Rates of the constraints and their sizes, see :func:`rate_after`; (n, 2).
-        counts: Constraints that are checked.  If one is contradicted, all are satisfied.
-        excess: See :data:`Excess`; None without a change of the unknowns.
-        within: Whether the impact is within a run, whose steps have errors.
-    """
-    (wanted, sizes), now, masses = rates.T, G @ v, M.diagonal()
-    fastest = np.abs(v * scales).max(initial=0.0)
-    speeds = np.divide(fastest, scales, out=np.zeros(len(v)), where=scales > 0)
-    slack = ROUND_OFF * (abs(G) @ speeds) + STEP_ERROR * within * np.abs(now)
-    slack += max(ROUND_OFF, STEP_ERROR * within) * (sizes + np.abs(wanted))
-    if excess is None and not (np.array(counts) & (np.abs(now - wanted) > slack)).any():
-        return None
-    momentum, energy = excess or (np.zeros(len(v)), 0.0)
-    # Velocities that supports prescribe are known.  The others, in the plane P, are scaled by D.
-    E, G, missing = G[:held], G[held:], wanted - now
-    P, given = eye_array(len(v)) - E.T @ E, E.T @ missing[:held]
-    # Unknowns without mass get so little that the others do not notice.
-    light = 1e-9 * float(masses[masses > 0].min(initial=1e9))
-    D = diags_array(np.where(masses > 0, masses, light) ** -0.5)
-    own, B = (
-        D @ (P @ M @ P + E.T @ E + diags_array((masses <= 0) * light)) @ D,
-        csr_array(G @ P @ D),
-    )
-    norms = np.sqrt(B.power(2).sum(axis=1))
-    norms[norms == 0.0] = math.inf  # only supports move these places
-    B = diags_array(1 / norms) @ B
-    soft = -1e-15 * eye_array(len(norms))  # constraints may depend on each other
-    right = D @ (P @ (momentum - M @ given)), (missing[held:] - G @ given) / norms
-    x = splu(csc_array(block_array([[own, B.T], [B, soft]]))).solve(np.concatenate(right))
-    change, impulses = given + P @ (D @ x[: len(v)]), -x[len(v) :] / norms
-    of_supports = E @ (M @ change - momentum - G.T @ impulses)
-    works, after = np.append(of_supports, impulses) * wanted, v + change
-    kinetic = (v @ (M @ v) - after @ (M @ after)) / 2 + v @ momentum + energy
-    return Impact(after, works, float(kinetic + works.sum()))

@@ -5,18 +5,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array, vstack
+from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.state_io import Archive, State
 from ufl_beam.discretization.state_transfer import geometry
 from ufl_beam.mechanics.impacts import (
+    ROUND_OFF,
+    STEP_ERROR,
     Excess,
-    Impact,
-    find_impact,
     may_jump,
     motion_of,
     motions_of,
@@ -28,6 +30,14 @@ from ufl_beam.model.connector_laws import HOLDING
 from ufl_beam.simulation.initial_state import same_time
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
+
+
+class Impact(NamedTuple):
+    """Velocities and energies of a plastic impact."""
+
+    v: Array  # velocities after the impact
+    works: Array  # of the impulses of the constraints; J
+    lost: float  # energy; J
 
 
 class Impacts:
@@ -64,11 +74,11 @@ class Impacts:
             term.add_tangent(q)
         tangent = csr_array((A.data.copy(), A.indices, A.indptr), shape=(A.size, A.size))
         A.data[:] = before
-        units = np.zeros((len(self.held), A.size))
-        units[np.arange(len(self.held)), self.held] = 1.0
-        units = np.array([equation.supports.in_plane(unit) for unit in units]).reshape(-1, A.size)
+        units = csr_array(eye_array(A.size, format="csr")[self.held])
+        if equation.supports.turned:
+            units = csr_array(np.array([*map(equation.supports.in_plane, units.toarray())]))
         forces = np.array([dof for term in self._terms for dof in term.forces_at], dtype=int)
-        return csr_array(vstack([csr_array(units), tangent[forces]]))
+        return csr_array(vstack([units, tangent[forces]]))
 
     def at_start(self, t: float, start: Solution | None) -> list[bool]:
         """Return which constraints may be contradicted when a run begins at ``t``.
@@ -118,13 +128,42 @@ class Impacts:
         """
         if not any(counts) and excess is None:
             return None
-        rates = np.array([rate_after(f, t, longest) for f in self.functions]).reshape(-1, 2)
-        inertia, scales = self._equation.inertia, self._equation.subdomain.numbering.scales
-        assert inertia is not None
-        M = csr_array((inertia.M.data, inertia.M.indices, inertia.M.indptr), shape=(len(v), len(v)))
-        G, within = self._gradients(q, t, state), math.isfinite(longest)
-        arguments = v, scales, rates, counts, excess
-        return find_impact(M, G, len(self.held), *arguments, within=within)
+        pairs = np.array([rate_after(f, t, longest) for f in self.functions]).reshape(-1, 2)
+        (wanted, sizes), G, M = pairs.T, self._gradients(q, t, state), self._masses
+        now, masses, scales = G @ v, M.diagonal(), self._equation.subdomain.numbering.scales
+        fastest = np.abs(v * scales).max(initial=0.0)
+        speeds = np.divide(fastest, scales, out=np.zeros(len(v)), where=scales > 0)
+        error = STEP_ERROR if math.isfinite(longest) else 0.0
+        slack = ROUND_OFF * (abs(G) @ speeds) + error * np.abs(now)
+        slack += max(ROUND_OFF, error) * (sizes + np.abs(wanted))
+        if excess is None and not (np.array(counts) & (np.abs(now - wanted) > slack)).any():
+            return None
+        momentum, energy = excess or (np.zeros(len(v)), 0.0)
+        # Supports prescribe some velocities.  The others, in the plane P, are scaled by D.
+        E, G, missing = G[: len(self.held)], G[len(self.held) :], wanted - now
+        P, given = eye_array(len(v)) - E.T @ E, E.T @ missing[: len(self.held)]
+        # Unknowns without mass get so little that the others do not notice.
+        light = 1e-9 * float(masses[masses > 0].min(initial=1e9))
+        D = diags_array(np.where(masses > 0, masses, light) ** -0.5)
+        own = D @ (P @ M @ P + E.T @ E + diags_array((masses <= 0) * light)) @ D
+        B = csr_array(G @ P @ D)
+        norms = np.sqrt(B.power(2).sum(axis=1))
+        norms[norms == 0.0] = math.inf  # only supports move these places
+        B = diags_array(1 / norms) @ B
+        soft = -1e-15 * eye_array(len(norms))  # constraints may depend on each other
+        right = D @ (P @ (momentum - M @ given)), (missing[len(self.held) :] - G @ given) / norms
+        x = splu(csc_array(block_array([[own, B.T], [B, soft]]))).solve(np.concatenate(right))
+        change, impulses = given + P @ (D @ x[: len(v)]), -x[len(v) :] / norms
+        of_supports = E @ (M @ change - momentum - G.T @ impulses)
+        works, after = np.append(of_supports, impulses) * wanted, v + change
+        kinetic = (v @ (M @ v) - after @ (M @ after)) / 2 + v @ momentum + energy
+        return Impact(after, works, float(kinetic + works.sum()))
+
+    @cached_property
+    def _masses(self) -> csr_array:
+        assert self._equation.inertia is not None
+        M = self._equation.inertia.M
+        return csr_array((M.data, M.indices, M.indptr), shape=(M.size, M.size))
 
     def enter(self, impact: Impact, ledger: Any, groups: Iterable[Any], share: float = 1.0) -> None:
         """Enter the ``share`` of an impact in a ledger.

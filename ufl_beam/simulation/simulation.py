@@ -19,7 +19,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import ArgumentError, ModelError, StepFailed, require_number, shorten
-from ufl_beam.mechanics.impacts import Impact, motions_of
+from ufl_beam.mechanics.impacts import motions_of
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.loads import RotatingFrame
@@ -30,7 +30,7 @@ from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWrite
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, communicator, sharing
 from ufl_beam.simulation.diagnosis import no_equilibrium
-from ufl_beam.simulation.impacts import Impacts
+from ufl_beam.simulation.impacts import Impact, Impacts
 from ufl_beam.simulation.initial_state import (
     StateOf,
     checked_numbering,
