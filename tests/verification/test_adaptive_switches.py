@@ -310,6 +310,7 @@ class Counter:
         return t
 
 
+@pytest.mark.serial  # the first process warns
 @pytest.mark.parametrize("kind", ["load", "sampled controller"])
 def test_functions_that_remember_leave_the_error_unknown(kind):
     """They are called once for each step, and the run says that nobody judges it."""
