@@ -284,7 +284,7 @@ class Buckling(Shapes):
         >>> load = ub.PointLoad(beam.end, force=(-1e6, 0))
         >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
         >>> print(ub.buckling(column, 2).factors.round(1))  # on 1 MN
-        [ 8.8 96.8]
+        [ 8.8 95.4]
     """
 
     factors: Array
