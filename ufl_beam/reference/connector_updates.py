@@ -218,6 +218,10 @@ class _Known(LawInStep):
 # -- energies, resistances and springs -----------------------------------------------------------
 
 
+PATH_PARTS = 256
+"""Parts of the path of a step for the work of a law, whose error is (1/256)²/8 at a kink."""
+
+
 class _EnergyLaw(LawInStep):
     """Law with an energy and a resistance, such as the law of a stop."""
 
@@ -267,9 +271,17 @@ class _EnergyLaw(LawInStep):
         lengths = np.array([self.length, self.length, 1.0])[: np.size(e1)]
         return around(self._forces, e1, small_increment(self.e0, e1, lengths))
 
+    def _work(self, e1: Motions, work: float) -> float:
+        """Return the ``work`` of a step; of a rate-independent law, along the path of the step."""
+        if not (self.law.rate_independent and self.setting.scheme.weight_of_before):
+            return work
+        e0, Δe = np.atleast_1d(self.e0), np.atleast_1d(e1) - np.atleast_1d(self.e0)
+        powers = [self._forces(e0 + x * Δe) @ Δe for x in np.linspace(0, 1, PATH_PARTS + 1)]
+        return float(np.trapezoid(powers) / PATH_PARTS)
+
     def change(self, e1: Motions, work: float) -> float:
         if self.entry:
-            return work
+            return self._work(e1, work)
         return float(self._energy(e1, self.after(e1, 0.0)[2])) - self.z["held"]
 
     def accept(self, e1: Motions, work: float) -> None:
@@ -285,7 +297,7 @@ class _EnergyLaw(LawInStep):
             )
             self.setting.ledger.lost["numerical"] += numerical
         if self.entry:
-            lost = work - (stored - self.z["held"]) - numerical
+            lost = self._work(e1, work) - (stored - self.z["held"]) - numerical
             super().accept(e1, lost)
             self.z["dissipated"] += lost
         self.z |= {f"state {name}": float(x[0]) for name, x in vars(new).items()}

@@ -436,7 +436,7 @@ class Solver(PresentState):
             )
 
     def _stiffens(self, q1: Array, s: Array) -> bool:
-        """Return whether internal forces grow all along the straight line of a step.
+        """Return whether internal forces grow faster and faster along the line of a step.
 
         Between stable states before and after a leap they fall.
         """
@@ -449,7 +449,8 @@ class Solver(PresentState):
         for part in (0.25, 0.5, 0.75, 1.0):
             self.response(self.supports.axes @ (self.q + part * (q1 - self.q)))
             works.append(self._inner @ s)
-        return bool(np.all(np.diff(works) >= 0))
+        growths = np.diff(works)
+        return bool(growths[0] >= 0 and np.all(np.diff(growths) >= 0))
 
     def _accept(self, step: Step, q1: Array, s: Array) -> None:
         """Accept the end of a step, and enter works and losses in the ledger."""

@@ -453,8 +453,8 @@ class StaticPath:
     the step stores and dissipates.  Otherwise Newton's method may have found another branch of
     equilibria, beyond a limit load or where softening releases more energy than it dissipates.
     The ``slack`` of the scheme limits the imbalance of work.  The work of the residual that
-    Newton's method leaves does not count.  A step is accepted, too, if the internal forces grow all
-    along the straight line from its beginning to its end, as in a straight rope that begins to sag.
+    Newton's method leaves does not count.  A step is accepted, too, if the internal forces grow
+    faster and faster along the straight line from its beginning to its end, as in a straight rope.
 
     The initial state, ``q`` at ``t0``, is in equilibrium with the vectors ``loads``.  Reactions are
     set from this equilibrium, unless the run ``goes_on`` from a static run of the same scene,

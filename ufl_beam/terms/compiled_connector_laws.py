@@ -155,6 +155,7 @@ class CompiledLaws(Response):
         self._c = struct(
             "connector_laws", width=len(columns), variables=len(law.variables), w=w,
             force=self._forms.force, end=self._forms.end, loses=not law.elastic,
+            along_path=int(law.rate_independent and scheme.weight_of_before > 0.0),
             stored=self._stored, lost=lost, answer=self._answer, sum=np.zeros(2),
         )  # fmt: skip
         self.in_c = {"laws": self._c}

@@ -119,11 +119,47 @@ static const double *end_of_law(const connectors *c, int i)
   return p->answer;
 }
 
+/* Power of the law of connector i after a fraction of the step to the latest motions; J per step. */
+static double power_at(const connectors *c, int i, double fraction)
+{
+  const connector_laws *p = c->laws;
+  const int n = c->components;
+  double *w = p->w + i * p->width, s[12], power = 0; /* for up to three components */
+  const double *e1 = c->e1 + n * i;
+  for (int j = 0; j < n; ++j) w[j] = w[n + j] + fraction * (e1[j] - w[n + j]);
+  ask_law(p->force, w, n + n * n, s);
+  for (int j = 0; j < n; ++j) power += s[j] * (e1[j] - w[n + j]);
+  return power;
+}
+
+/* Largest number of halvings of a path, and error of Simpson's rule as a fraction of the work. */
+enum { HALVINGS = 14 };
+static const double WORK_ERROR = 1e-7;
+
+/* Work between the fractions a and b by Simpson's rule, halved where the powers have kinks. */
+static double work_between(const connectors *c, int i, double a, double b, double at_a, double at_b, int halvings,
+                           double size)
+{
+  const double middle = (a + b) / 2, at = power_at(c, i, middle), mean = (at_a + at_b) / 2;
+  if (halvings >= 3 && (halvings == HALVINGS || fabs(at - mean) * (b - a) <= WORK_ERROR * size))
+    return (b - a) * (mean + 2 * at) / 3;
+  return work_between(c, i, a, middle, at_a, at, halvings + 1, size)
+       + work_between(c, i, middle, b, at, at_b, halvings + 1, size);
+}
+
+/* Work of a rate-independent law along the straight path of the step, whose forces are exact. */
+static double work_on_path(const connectors *c, int i)
+{
+  const double before = power_at(c, i, 0), now = power_at(c, i, 1);
+  return work_between(c, i, 0, 1, before, now, 0, fabs(before) + fabs(now) + fabs(power_at(c, i, 0.5)));
+}
+
 /* Accept the latest motions as the new state of connector i, which has taken the work `work`. */
 static void commit_law(const connectors *c, int i, double work)
 {
   const connector_laws *p = c->laws;
   const int n = c->components;
+  if (p->along_path) work = work_on_path(c, i);
   const double *s = end_of_law(c, i);
   if (p->loses) {
     const double lost = work - (s[LAW_STORED] - p->stored[i]) - s[LAW_NUMERICAL];

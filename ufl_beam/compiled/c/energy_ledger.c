@@ -424,7 +424,8 @@ void change_of_connectors(void *self, const double *q1, energy_change *sum)
   const int loses = !c->laws || c->laws->loses, n = c->components;
   for (int j = 0; j < n * c->number; ++j) {
     const double work = taken_by(c, j, q1);
-    taken += loses ? work : 0;
+    if (c->laws && c->laws->along_path) taken += j % n ? 0 : work_on_path(c, j / n);
+    else taken += loses ? work : 0;
     sum->effort += fabs(work);
   }
   for (int i = 0; !loses && i < c->number; ++i)

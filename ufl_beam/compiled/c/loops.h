@@ -315,6 +315,7 @@ typedef struct {
   kernel *force, *end;        /* forces and their derivatives by the motions; outputs at the end of a step */
   int width, variables;
   int loses;                  /* 1: work that is not stored is dissipated; 0: the ledger stays open by it */
+  int along_path;             /* whether the work of a step is that of the law on its path */
   double *w;                  /* data of the kernels, `width` numbers of each connector */
   double *stored, *lost;      /* energy in the accepted state; energy dissipated by each since the
                                * beginning */

@@ -283,14 +283,14 @@ static int measure(time_loop *m)
   return 1;
 }
 
-/* Whether the internal forces, without a choice of branches, grow all along the straight line of a
- * static step. Between stable states before and after a leap they fall. The force of a straight rope
+/* Whether the internal forces, without a choice of branches, grow faster and faster along the straight
+ * line of a static step. Between stable states before and after a leap they fall. The force of a straight rope
  * is the third power of its sag, so that works do not tell, however short the step is. */
 static int stiffens(time_loop *m)
 {
   equation *e = m->equation;
   int grows = !m->opens && !e->border && over_processes(e, LARGEST, e->again.number) == 0;
-  double last = over_processes(e, TOTAL, work_in_step(m->size, 0, 1, m->path->force, m->path->force, m->s));
+  double growth = 0, last = over_processes(e, TOTAL, work_in_step(m->size, 0, 1, m->path->force, m->path->force, m->s));
   memcpy(m->guess, m->x, m->size * sizeof *m->x);
   for (int k = 1; grows && k <= 4; ++k) { /* ends at the end of the step, whose forces remain */
     for (int i = 0; i < m->size; ++i)
@@ -298,8 +298,8 @@ static int stiffens(time_loop *m)
     turn_axes(e->turned, e->axes, e->unknowns, 1);
     residual_at(e, e->unknowns);
     const double now = over_processes(e, TOTAL, work_in_step(m->size, 0, 0, e->inner_force, e->inner_force, m->s));
-    grows = now >= last && raised_anywhere(e) == NOTHING;
-    last = now;
+    grows = now - last >= growth && raised_anywhere(e) == NOTHING;
+    growth = now - last, last = now;
   }
   return grows;
 }
