@@ -485,3 +485,86 @@ def test_good_scenes_are_silent():
     )
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.02), dt=0.01, comm=MPI.COMM_SELF)
     assert np.isfinite(solution.q).all()
+
+
+# -- numbers in other units ------------------------------------------------------------------------
+
+STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
+
+
+def square(**more):
+    return ub.Section.rectangle(b=0.1, h=0.1, **(STEEL | more))
+
+
+def still(*loads):
+    bar = beam((0, 0), (2, 0), square())
+    loads = [load(bar) for load in loads]
+    scene = ub.Scene([bar], supports=[ub.Clamped(bar.start)], loads=loads)
+    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, comm=MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: square(E=210e3), "E is in Pa"),
+        (lambda: square(E=210.0), "E is in Pa"),
+        (lambda: square(rho=7.85), "rho in kg/m³"),
+        (lambda: square(E=30e3, rho=2500.0), "E is in Pa"),
+        (lambda: square(fibres=ub.Fibres(ub.ElastoPlastic(355.0))), "yield strain 1.69e-09"),
+        (lambda: ub.Rayleigh.with_ratios(5.0, (10.0, 60.0)), "damping ratio 5; 0.05 is 5 %"),
+        (lambda: ub.ImposedStrain(beam(), axial=20.0), "imposed strain 20"),
+        (
+            lambda: ub.ImposedStrain.temperature(beam(), 20.0, 1e-5, gradient=100.0),
+            "curvature times depth",
+        ),
+        (lambda: ub.ImposedStrain.tendon(beam(), 1e12), "imposed strain -1e+06|strain 1e+06"),
+        (lambda: ub.imperfect(ub.Scene([beam()]), sway=5.0), "inclination 5"),
+        (lambda: ub.imperfect(ub.Scene([b := beam()]), bow={b: 6.7}), "bow 6.7"),
+        (lambda: ub.HotSpot.fibre(beam(section=square()).start, y=100.0, E=210e9), "y is in m"),
+        (lambda: still(lambda b: ub.MovingLoad(b, lambda t: 100 + t, (0, -1))), "does not act"),
+        (
+            lambda: still(lambda b: ub.Gravity(), lambda b: ub.MovingLoad(b, lambda t: t, mass=1)),
+            "its mass has no weight",
+        ),
+    ],
+)  # fmt: skip
+def test_numbers_that_are_likely_in_other_units(make, said):
+    with pytest.warns(ub.ModelWarning, match=said.replace("+", r"\+")):
+        make()
+
+
+def test_a_target_of_a_pushover_beyond_the_scene():
+    bar = beam((0, 0), (2, 0), square())
+    scene = ub.Scene([bar], supports=[ub.Clamped(bar.start)])
+    with warns("target over the size of the scene -25"), pytest.raises(ub.ArgumentError):
+        ub.pushover(scene, bar.end, -50.0, component="v", pattern="none")
+
+
+@pytest.mark.parametrize(
+    ("E", "rho", "limit"), [(210e9, 7850.0, 355e6), (1e6, 1000.0, 1e4), (11e9, 500.0, 30e6)]
+)
+def test_steel_rubber_and_timber_are_plausible(E, rho, limit):
+    square(E=E, rho=rho, fibres=ub.Fibres(ub.ElastoPlastic(limit)))  # no warning is issued
+
+
+@pytest.mark.parametrize(
+    ("damping", "rate"),
+    [
+        (ub.Rayleigh(stiffness=1e-5), 2.0),
+    ],
+)
+def test_rayleigh_damping_of_a_beam_that_turns(damping, rate):
+    """The boom turns by 0.3 rad until it rests, and strains store hardly anything."""
+
+    def turn(damping, rate):
+        boom = beam((0, 0), (2, 0), square())
+        scene = ub.Scene(
+            [boom], supports=[ub.Pinned(boom.start)], damping=[damping],
+            initial=[ub.Velocity((boom,), angular=rate, about=(0, 0))],
+        )  # fmt: skip
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=5e-3, comm=MPI.COMM_SELF)
+
+    with warns("resists rigid turning", "Use KelvinVoigt"):
+        turn(damping, rate)
+    turn(ub.KelvinVoigt(1e-5), rate)  # no warning is issued
+    turn(damping, 0.1)  # no warning is issued

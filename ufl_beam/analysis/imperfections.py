@@ -13,6 +13,7 @@ import numpy as np
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, require_count, require_kind, require_number
+from ufl_beam.model import plausibility
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body, BodyPoint, Place
 from ufl_beam.model.functions import Curve, Point
@@ -58,12 +59,14 @@ def imperfect(
     require_number(sway, "imperfect: sway")
     require_number(amplitude, "imperfect: amplitude")
     require_count(k, "imperfect: k", at_least=0)
+    plausibility.check("imperfect", "inclination", sway)
     bows = {} if bow is None else bow
     require_kind(bows, Mapping, "imperfect: bow")
     for beam, size in bows.items():
         if beam not in scene.beams:
             raise ArgumentError(f"imperfect: bow: {beam} is not in the scene")
         require_number(size, f"imperfect: bow of {beam.name}")
+        plausibility.check(f"imperfect: {beam.name}", "bow", size)
         for joint in scene.joints:
             if any(isinstance(x, Place) and x.beam is beam and 0 < x.s < 1 for x in joint.places):
                 raise ArgumentError(

@@ -36,6 +36,7 @@ from ufl_beam.errors import (
     shorten,
     warn,
 )
+from ufl_beam.model import plausibility
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint, Place
 from ufl_beam.model.connectors import law_of, place_of
@@ -127,6 +128,8 @@ def pushover(
         raise ArgumentError("pushover: target = 0 leads nowhere; give a displacement in m")
     if not isinstance(component, str) or component not in COMPONENTS[:2]:
         raise ArgumentError(f"pushover: component = {shorten(component)} must be 'u' or 'v'")
+    far = target / scene.size
+    plausibility.check("pushover", "target over the size of the scene", far)
     steps = require_count(steps, "pushover: steps")
     require_options(newton, mesh, progress, "pushover")
     control = DisplacementControl(place, component, target / steps)

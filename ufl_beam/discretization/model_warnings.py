@@ -16,11 +16,13 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.caches import cached_by_structure
 from ufl_beam.discretization.dof_numbering import DofNumbering, turned
 from ufl_beam.errors import warn
+from ufl_beam.model import plausibility
 from ufl_beam.model.bodies import GROUND, BodyPoint, Place, moves_with_node
-from ufl_beam.model.connector_laws import RIGID, PrescribedMotion
+from ufl_beam.model.connector_laws import RIGID, Clearance, PrescribedMotion
 from ufl_beam.model.connectors import place_of
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.joints import Release
+from ufl_beam.model.loads import Gravity, MovingLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 
@@ -61,6 +63,29 @@ def warn_of_rates(scene: Scene) -> None:
                 f"{work} takes v, which is (q1 - q0)/dt also in a static run: this work carries "
                 "part of the loads, as a damper does. Leave it out of the scene of a preload; if "
                 "slow motion in time is meant, filter this warning"
+            )
+
+
+def warn_of_loads(scene: Scene, t: tuple[float, float]) -> None:
+    """Warn of moving loads that are never on their beam or have no weight, and of large gaps."""
+    heavy = any(isinstance(load, Gravity) for load in scene.loads)
+    for connector in scene.connectors:
+        if isinstance(connector.law, Clearance):
+            gap = connector.law.gap / scene.size
+            plausibility.check(str(connector), "gap over the size of the scene", gap)
+    for load in scene.loads:
+        if not isinstance(load, MovingLoad):
+            continue
+        places = np.array([value_at(load.position, x, load) for x in np.linspace(*t, 41)])
+        if (places < 0.0).all() or (places > load.length).all():
+            warn(
+                f"{load}: its position is from {places.min():.3g} to {places.max():.3g} m in the "
+                f"run, and never on its route of {load.length:.3g} m, so that it does not act"
+            )
+        if heavy and load.mass and load.force == (0.0, 0.0):
+            warn(
+                f"{load}: its mass has no weight, because Gravity does not act on it; give "
+                "force=(0, -9.81 mass)"
             )
 
 

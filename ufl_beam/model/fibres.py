@@ -19,6 +19,7 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import ModelError
+from ufl_beam.model import plausibility
 from ufl_beam.model.checks import require_count, require_kind, require_number
 from ufl_beam.model.functions import Point
 from ufl_beam.model.law_functions import Values
@@ -211,6 +212,12 @@ class PlacedFibres:
             if core is not None:
                 raise ModelError("Section: core without fibres; give the law of the cover, too")
             return None
+        for each in (fibres, core):
+            limit = getattr(getattr(each, "law", None), "yield_limit", math.inf)
+            if (
+                isinstance(limit, float) and 1e-10 * E < limit < math.inf
+            ):  # less is a number without a unit
+                plausibility.check("Section: fibres", "yield strain", limit / E)
         if fibres.number < 2:
             raise ModelError("Fibres: number = 1 has no bending stiffness; use 2 or more")
         low, high, shapes = shape.bottom, shape.top, [shape]

@@ -12,6 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, closed
+from ufl_beam.model import plausibility
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import Member
 from ufl_beam.model.checks import require_kind, require_number, require_vector
@@ -84,7 +85,10 @@ class ImposedStrain(Load):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.strains(np.array(self.span))
+        axial, _, curvature = abs(self.strains(np.array(self.span))).max(axis=0)
+        bent = float(curvature) * self.beam.section.depth
+        plausibility.check(str(self), "imposed strain", float(axial))
+        plausibility.check(str(self), "imposed curvature times depth", bent)
 
     def __str__(self) -> str:
         return f"ImposedStrain of {self.beam.name}"

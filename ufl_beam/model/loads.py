@@ -23,7 +23,7 @@ from ufl_beam.errors import (
     require_vector,
     shorten,
 )
-from ufl_beam.model import checks
+from ufl_beam.model import checks, plausibility
 from ufl_beam.model.bodies import Beams, Member, PlaceField, ground, moves_with_node
 from ufl_beam.model.connector_laws import PrescribedForce
 from ufl_beam.model.connectors import Component, Connector
@@ -506,6 +506,7 @@ class Rayleigh(Record):
                 f"factors mass = {mass:.3g}, stiffness = {stiffness:.3g}, which must not be "
                 "negative; give positive ratios that differ less than the frequencies"
             )
+        plausibility.check(what, "damping ratio", max(z1, z2))
         return cls(mass=mass, stiffness=stiffness, tangent=tangent)
 
 

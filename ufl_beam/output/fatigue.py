@@ -24,6 +24,7 @@ from ufl_beam.errors import (
     require_number,
     require_row,
 )
+from ufl_beam.model import plausibility
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.records import Instance, Positive, Record
 from ufl_beam.output.recorder import Restartable, StateView
@@ -308,6 +309,8 @@ class HotSpot(Record):
         require_number(E, f"HotSpot {place}: E", positive=True)
         require_number(factor, f"HotSpot {place}: factor", positive=True)
         section = place.beam.section
+        far = y / section.depth
+        plausibility.check(f"HotSpot {place}", "distance from the axis over the depth", far)
         per_N, per_M = factor * E / section.EA, -factor * E * y / section.EI
         return cls(place, lambda N, V, M: per_N * N + per_M * M)
 

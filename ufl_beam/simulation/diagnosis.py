@@ -21,6 +21,7 @@ from ufl_beam.errors import (
     NoNumber,
     Reversal,
     StepFailed,
+    warn,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
@@ -32,6 +33,7 @@ from ufl_beam.model.connector_laws import (
     Stop,
 )
 from ufl_beam.model.constraint_checks import INSTEAD
+from ufl_beam.model.loads import Rayleigh
 from ufl_beam.model.material_law import MaterialLaw, dissipation_must_grow, has_quadratic_energies
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC, WORK
@@ -497,3 +499,25 @@ class LedgerWatch:
             falls[f"{place.beam.name}, cell at s = {place.s:.3g}: "] = float(fall)
         worst = max(falls, key=lambda name: falls[name], default="")
         return worst if worst and falls[worst] > 0.0 else ""
+
+
+TURNED = 0.2
+"""Rotation of beams beyond which Rayleigh damping of their stiffness is warned of; rad."""
+
+
+def warn_of_rayleigh(solution: Solution) -> None:
+    """Warn of Rayleigh damping with the initial stiffness, which resists rigid turning.
+
+    Beams have turned far, and the run has lost ten times what strains ever stored.
+    """
+    damping = [x for x in solution.scene.damping if isinstance(x, Rayleigh) and x.stiffness]
+    if not len(solution) or all(x.tangent for x in damping):
+        return
+    turns = np.abs(solution.q[:, solution.numbering.dofs[:, 2]]).max()
+    lost, stored = solution.energy["damping"][-1], solution.energy["stored"].max()
+    if turns > TURNED and lost > 10 * stored:
+        warn(
+            f"{damping[0]}: it resists rigid turning, and beams have turned by {turns:.2g} rad; "
+            f"damping has taken {lost:.3g} J, and strains have stored at most {stored:.3g} J. Use "
+            "KelvinVoigt(stiffness), with the same number, which damps strains only"
+        )

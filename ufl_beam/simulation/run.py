@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 import numpy as np
 
+from ufl_beam.discretization.model_warnings import warn_of_loads
 from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import (
     ArgumentError,
@@ -40,7 +41,7 @@ from ufl_beam.output.serialization import Description
 from ufl_beam.parallel import communicator, print_once, progress_bar
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.checkpoint import Checkpoint, CheckpointFile, checksum_at
-from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch
+from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch, warn_of_rayleigh
 from ufl_beam.simulation.impacts import Impacts
 from ufl_beam.simulation.initial_state import (
     StateOf,
@@ -144,6 +145,8 @@ def simulate(
             "of first order, whatever the tolerance is; give a number, or the scheme "
             "EnergyMomentum(alpha, beta) or GeneralizedAlpha(rho_inf)"
         )
+    if isinstance(scene, Scene):
+        warn_of_loads(scene, (t0, t1))
     require_count(every, "simulate: every")
     require_count(max_states, "simulate: max_states")
     start = chosen_state(start, "start")
@@ -344,6 +347,7 @@ def running(
             simulation.solution.seconds += time.perf_counter() - begin
     if simulation.comm.rank == 0:
         Opened(simulation.solution).warn(simulation.scheme)
+        warn_of_rayleigh(simulation.solution)
 
 
 NOT_KNOWN = (
