@@ -501,7 +501,7 @@ class LedgerWatch:
         return worst if worst and falls[worst] > 0.0 else ""
 
 
-TURNED = 0.2
+TURNED = 0.05
 """Rotation of beams beyond which Rayleigh damping of their stiffness is warned of; rad."""
 
 
