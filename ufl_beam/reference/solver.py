@@ -419,6 +419,8 @@ class Solver(PresentState):
         size = abs(work) + abs(in_beams)
         size += sum(float(np.abs(group.taken(q1)).sum()) for group in self._groups)
         size += sum((abs(beam.work_on_imposed()) for beam in self.beams), 0.0)
+        others = size - abs(work) - abs(in_beams) + abs(in_connectors)
+        only_beams = others <= self.scheme.slack * abs(in_beams)
         energies = (abs(x) for account in vars(self.ledger).values() for x in account.values())
         slack = self.scheme.slack * size + sys.float_info.min
         slack += KINK_WORK * (sum(energies) + self._rejected)
@@ -428,7 +430,7 @@ class Solver(PresentState):
         far = self.scene.size * float(np.linalg.norm(moves)) + 0.01 * moved
         slack += self._rtol * self._scale() * far
         change = in_beams + in_connectors
-        if abs(work - change) > slack and not self._stiffens(q1, s):
+        if abs(work - change) > slack and not (only_beams and self._stiffens(q1, s)):
             self._rejected = self._rejected or size
             raise StepFailed(
                 f"the step stores and dissipates {change:.3e} J, but the forces along it do "

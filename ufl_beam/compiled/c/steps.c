@@ -343,7 +343,8 @@ static int followed(time_loop *m)
    * In shorter steps that energy vanishes with the square of the step, and the energy of a leap does
    * not. */
   if (fabs(p->work - p->stored) <= slack + p->kink * (of[THROUGH] + p->rejected)) return 1;
-  if (stiffens(m)) return 1;
+  /* Between both ends the forces of connectors are not those of their laws. */
+  if (of[EFFORT] + fabs(of[CONNECTORS]) <= p->slack * fabs(of[BEAMS]) && stiffens(m)) return 1;
   if (p->rejected == 0) p->rejected = size;
   return fails(m, LEAPS);
 }
