@@ -29,6 +29,8 @@ from ufl_beam.errors import (
     each_warning_once,
     require_function,
     require_number,
+    require_returned,
+    shorten,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import Mesh
@@ -53,7 +55,7 @@ MAX_BYTES = 2.0**28
 
 def last(history: Array) -> float:
     """Return the last value of a history."""
-    return float(history[-1])
+    return history[-1]  # type: ignore[no-any-return]
 
 
 @each_warning_once()
@@ -101,7 +103,7 @@ def gradient(
 
     Raises:
         ArgumentError: As in :func:`differentiate`; the history depends on something else than the
-            motion at its times; or steps were divided.
+            motion at its times; ``reduce`` returns no finite number; or steps were divided.
 
     Example:
         >>> def frame(**EI):
@@ -254,6 +256,7 @@ class _History:
                 f"gradient: the history is not finite at t = {solution.times[n]:g} s; return "
                 "finite values, and leave out those that reduce does not need"
             )
+        self._number(reference)  # raises if it is none
 
     def _in(self, numbering: DofNumbering, **changes: Array) -> Array:
         """Return the history in a scene, for changes of the motion."""
@@ -265,7 +268,19 @@ class _History:
                 "gradient: the history needs more than displacements and velocities, such as "
                 "forces or energies; use differentiate"
             ) from None
-        return np.asarray(values, dtype=np.float64)
+        try:
+            return np.asarray(values).astype(np.float64, casting="same_kind")
+        except (TypeError, ValueError):
+            raise ArgumentError(
+                f"gradient: of returned {shorten(values)}; it must return a history of real numbers"
+            ) from None
+
+    def _number(self, history: Array) -> float:
+        """Return the number that is made of a history."""
+        what, shape = "gradient: reduce, by default the last value,", history.shape
+        return require_returned(
+            self._reduce(history), what, f"a history of shape {shape}", finite=True
+        )
 
     def change_in(self, numbering: DofNumbering) -> float:
         """Return the change of the number in another scene with the same motion.
@@ -275,7 +290,7 @@ class _History:
         history = self._in(numbering)
         if np.array_equal(history, self._reference, equal_nan=True):
             return 0.0
-        return self._reduce(history) - self._reduce(self._reference)
+        return self._number(history) - self._number(self._reference)
 
     def _by_values(self) -> Array:
         """Return the derivatives of the number by the values of the history; (n+1, k)."""
@@ -287,7 +302,7 @@ class _History:
             def number(change: float, at: tuple[int, int] = (n, k)) -> float:
                 changed = rows.copy()
                 changed[at] += change
-                return self._reduce(changed.reshape(reference.shape))
+                return self._number(changed.reshape(reference.shape))
 
             by_rows[n, k] = _slope(number, float(np.abs(rows[:, k]).max()))
         return by_rows

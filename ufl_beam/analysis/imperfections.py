@@ -12,7 +12,7 @@ import numpy as np
 
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ArgumentError, require_count, require_kind, require_number
+from ufl_beam.errors import ArgumentError, require_count, require_kind, require_number, shorten
 from ufl_beam.model import plausibility
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body, BodyPoint, Place
@@ -61,7 +61,11 @@ def imperfect(
     require_count(k, "imperfect: k", at_least=0)
     plausibility.check("imperfect", "inclination", sway)
     bows = {} if bow is None else bow
-    require_kind(bows, Mapping, "imperfect: bow")
+    if not isinstance(bows, Mapping) or not all(isinstance(beam, Beam) for beam in bows):
+        raise ArgumentError(
+            f"imperfect: bow = {shorten(bow)} must be a dict of beams of the scene, as in "
+            'bow={scene["column"]: 1 / 300}'
+        )
     for beam, size in bows.items():
         if beam not in scene.beams:
             raise ArgumentError(f"imperfect: bow: {beam} is not in the scene")

@@ -22,7 +22,7 @@ from ufl_beam.analysis.incremental_dynamics_result import (
     NO_EQUILIBRIUM,
     DemandCurves,
 )
-from ufl_beam.analysis.parameter_study import study
+from ufl_beam.analysis.parameter_study import WrongResult, study
 from ufl_beam.errors import (
     ArgumentError,
     ConvergenceError,
@@ -253,5 +253,8 @@ class StepsToLimit:
             sizes = np.empty(0)
         sizes = sizes[~np.isnan(sizes)]  # the first row of many results is NaN
         if not len(sizes) or not np.isfinite(sizes).all():
-            raise ArgumentError(f"{WHAT}: measure returned {shorten(value)}, not finite numbers")
+            raise WrongResult(
+                f"{WHAT}: measure returned {shorten(value)} at t = {self._solution.times[-1]:g} s, "
+                "not finite numbers; numpy.nan_to_num replaces NaN of a first row"
+            )
         self.demand = float(sizes.max())

@@ -312,12 +312,18 @@ def _distributed(
             future.cancel()
 
 
+class WrongResult(ArgumentError):
+    """Error of a member that ends the study, because other members would have the same error."""
+
+
 def _run(case: Case) -> Record:
     """Run one member on this process; its exception is an outcome, a wrong result is raised."""
     begin = time.perf_counter()
     try:
         with alone():
             returned = _MEMBER.get()(**case)
+    except WrongResult:
+        raise
     except Exception as error:
         return f"{type(error).__name__}: {error}", time.perf_counter() - begin
     seconds = time.perf_counter() - begin

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from textwrap import shorten as shortened
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from ufl_beam.analysis.pushover_result import HingeFormation, Pushover
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering, values_at
 from ufl_beam.discretization.function_spaces import point_masses
+from ufl_beam.display import FACTOR, Parameter
 from ufl_beam.errors import (
     ArgumentError,
     ConvergenceError,
@@ -59,6 +61,11 @@ MODES = 6  # number of modes among which the one with the largest effective mass
 LEAST_MOTION = 1e-6  # of the control place, as a fraction of the largest motion of the scene
 SAME = 2e-6  # fraction of the target that the end of a path may miss, twice AT_END
 NAMED_FROM = 0.99  # hinges with this fraction of their limit are named if the path ends early
+MOST_NAMED, MOST_CHARACTERS = 8, 400  # hinges, and characters of an error, in ``failure``
+BASE_SHEAR = Parameter(
+    "base shear (N)", "base shear {} N", "a change of the base shear by {:.3g} N",
+    "base shear [N]", FACTOR.progress,
+)  # fmt: skip
 MOST_STEPS = 20  # largest number of steps of a path, in multiples of the steps asked for
 Shape = Callable[[AttachmentPoint], float]
 """Function of a place: its displacement in a mode, with any factor."""
@@ -191,12 +198,14 @@ def pushover(
     path, events, failure = _follow(
         loaded, control, target, steps, start, newton=newton, mesh=mesh, progress=progress
     )
+    path.parameter = BASE_SHEAR
     displacement = path.displacement(place)[:, axis]
     displacement = displacement - displacement[0]
     hinges = tuple(_formations(events, path, displacement))
     if failure:
         named = [f"{hinge.where} {hinge.what}" for hinge in hinges]
         named += [f"{at} is at its limit" for at in _at_limit(path)]
+        named = named[:MOST_NAMED] + [f"{len(named) - MOST_NAMED} more"] * (len(named) > MOST_NAMED)
         failure = (
             f"the path ends at {component} = {displacement[-1]:.4g} m of {target:g} m, with a base "
             f"shear of {path.factor[-1]:.4g} N; hinges: {'; '.join(named) or 'none'}. {failure}"
@@ -342,7 +351,7 @@ def _follow(
         path = error.solution
         if len(path) < 2:
             raise
-        return path, events, str(error)
+        return path, events, shortened(str(error), MOST_CHARACTERS, placeholder=" ...")
     left = before + target - float(path.displacement(control.place)[-1, axis])
     ended_early = abs(left) > SAME * max(abs(target), abs(before + target))
     return path, events, "too many steps" if ended_early else ""

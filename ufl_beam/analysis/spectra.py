@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,11 +34,14 @@ def spectral_accelerations(spectrum: Any, periods: Array, what: str) -> Array:
     else:
         table = [getattr(spectrum, name, None) for name in ("periods", "pseudo_acceleration")]
         try:
+            if isinstance(spectrum, Mapping):
+                raise TypeError
             T, a = spectrum if table[1] is None else table
         except (TypeError, ValueError):
             raise ArgumentError(
                 f"{what}: spectrum = {shorten(spectrum)} must be a function of the period (s) that "
-                "returns m/s², or a pair (periods, accelerations)"
+                "returns m/s², or a pair (periods, accelerations), such as ([*d], [*d.values()]) "
+                "of a dict"
             ) from None
         T, a = (require_row(x, f"{what}: spectrum") for x in (T, a))
         if len(T) != len(a) or not (np.diff(T) > 0).all():

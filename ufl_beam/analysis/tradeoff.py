@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -36,7 +37,7 @@ from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import alone, communicator, progress_bar
 from ufl_beam.simulation.initial_state import require_scheme
-from ufl_beam.simulation.run import require_times, simulate
+from ufl_beam.simulation.run import interrupt, require_times, simulate
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_lengths import Adaptive
 from ufl_beam.solvers.newton_options import Newton
@@ -45,6 +46,7 @@ MESHES = Mesh(degree=2), Mesh()  # meshes that are compared by default
 NEWTONS = (Newton(),)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
 WRONG = "ArgumentError: "  # in the message of a failure that no refinement can avoid
+LATE = "TradeoffError: "  # in the message of a run that was ended
 
 LEAST_USED = 0.3  # least error of the recommended run, as a fraction of a tolerance
 # Largest uncertainty of a limit, as a fraction of a tolerance.  The sum of an error of LEAST_USED
@@ -108,7 +110,7 @@ def tradeoff(
         newton: Options of Newton's method, or several.  The search uses the
             first options; one coarse run with each of the others compares them.  The
             recommendation uses the fastest options that change the quantities little.
-        max_seconds: Largest total wall time of the runs; s.
+        max_seconds: Largest total wall time of the runs; a run in progress is ended then; s.
         progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run uses one process, and several run at a time.  Simultaneous runs
             disturb each other's times: leave cores idle if times matter.
@@ -253,6 +255,7 @@ class _Runs:
     runs: dict[Refinement, Run] = field(default_factory=dict, init=False)
     failed: dict[Refinement, str] = field(default_factory=dict, init=False)  # reasons of failures
     spent: float = field(default=0.0, init=False)  # wall time of all runs; s
+    begun: float = field(default_factory=time.perf_counter, init=False)  # s
 
     def begin(self, family: int) -> None:
         """Do a run that compiles, of one step if ``dt`` is a number; then do the coarsest run."""
@@ -261,8 +264,7 @@ class _Runs:
         until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
         with alone():
             try:
-                settings = vars(self.setting(first))
-                simulate(self.scene, t=(self.t[0], until), progress=False, **settings)
+                self._simulate(until, self.setting(first))
                 self._store(first, self._member(*first))
                 self.bar.update(1)
             except ConvergenceError as error:
@@ -301,6 +303,8 @@ class _Runs:
                 self._store(refinement, {name: done[name][k] for name in done.results})
             elif WRONG in failed[k]:
                 raise ArgumentError(failed[k].partition(WRONG)[2])
+            elif LATE in failed[k] and not optional:
+                raise TradeoffError(failed[k].partition(LATE)[2])
             else:
                 self.failed[refinement] = failed[k]
 
@@ -350,12 +354,27 @@ class _Runs:
         )
         return min(times, default=0.0)
 
+    def _simulate(self, until: float, setting: Setting) -> Solution:
+        """Simulate until a time (s); raise :class:`TradeoffError` when ``max_seconds`` are over."""
+
+        def require_time() -> None:
+            if time.perf_counter() > self.begun + self.max_seconds:
+                raise TradeoffError(
+                    f"max_seconds = {self.max_seconds:g} s are over, which ended the run {setting}"
+                )
+
+        token = interrupt.set(require_time)
+        try:
+            return simulate(self.scene, t=(self.t[0], until), progress=False, **vars(setting))
+        finally:
+            interrupt.reset(token)
+
     def _member(
         self, family: int, refine: str | Fraction, level: float, newton: int
     ) -> dict[str, Any]:
         """Compute one run, as a member of a study."""
         setting = self.setting(Refinement(family, Fraction(refine), level, newton))
-        solution = simulate(self.scene, t=self.t, progress=False, **vars(setting))
+        solution = self._simulate(self.t[1], setting)
         content: dict[str, Any] = {
             "seconds": solution.seconds,
             "building": solution.building,

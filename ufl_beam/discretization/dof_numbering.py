@@ -177,6 +177,15 @@ class DofNumbering:
 
     # -- beams, vertices, cells ------------------------------------------------------------------
 
+    def _lacks(self, member: Member | Body) -> str:
+        """Return the message that a beam or body is not in the scene."""
+        if any(member.name == x.name for x in (*self.scene.beams, *self.scene.bodies)):
+            return (
+                "is not in the scene, which has another object of this name, as after imperfect; "
+                f"use scene[{member.name!r}] of this scene"
+            )
+        return "is not in the scene"
+
     def _index(self, beam: Member) -> int:
         """Return the index of a beam of the scene."""
         number = self._beam_indices.get(beam)
@@ -184,7 +193,7 @@ class DofNumbering:
             return number
         if not isinstance(beam, Member):
             raise ModelError(f"beam = {shorten(beam)} is not a Beam")
-        raise ModelError(f"{beam.name} is not in the scene")
+        raise ModelError(f"{beam.name} {self._lacks(beam)}")
 
     def parameters(self, beam: Member) -> Array:
         """Return the parameters s of the vertices of a beam, from 0 (start) to 1 (end)."""
@@ -321,7 +330,7 @@ class DofNumbering:
         """Return the cell at a place, and the position of the place in the cell, from 0 to 1."""
         require_kind(place, Place, "place")
         if place.beam not in self._beam_indices:
-            raise ModelError(f"{place}: {place.beam.name} is not in the scene")
+            raise ModelError(f"{place}: {place.beam.name} {self._lacks(place.beam)}")
         i = self._beam_indices[place.beam]
         s = self._parameters[i]
         left = min(max(bisect_left(s, place.s) - 1, 0), len(s) - 2)
@@ -395,7 +404,7 @@ class DofNumbering:
         if not isinstance(carrier, Body):
             return np.asarray(self.dofs[self.vertex(carrier)])
         if carrier not in self.scene.rigid_bodies:
-            raise ModelError(f"{point}: {carrier.name} is not in the scene")
+            raise ModelError(f"{point}: {carrier.name} {self._lacks(carrier)}")
         return np.asarray(self.dofs_of_bodies[self.scene.rigid_bodies.index(carrier)])
 
     @cached_property

@@ -133,6 +133,9 @@ def _potential_forms(
 
 def _returned(work: Work, known: Mapping[str, Any], element: Element) -> Expr:
     """Return the expression of the function of a work, or raise :class:`ModelError`."""
+    wanted = "an energy per length of components of q, such as k * q[1] ** 2 / 2"
+    if isinstance(work, VirtualWork):
+        wanted = "a virtual work per length, linear in components of w, such as f * w[1]"
     try:
         value = work.density(**{name: known[name] for name in work.used_arguments})
     except ModelError:
@@ -142,12 +145,12 @@ def _returned(work: Work, known: Mapping[str, Any], element: Element) -> Expr:
     if not isinstance(value, Expr):
         raise ModelError(
             f"{work}: the function returned {shorten(value)}; it must return an expression of UFL, "
-            "an energy per length"
+            f"{wanted}"
         )
     if value.ufl_shape or value.ufl_free_indices:
         raise ModelError(
             f"{work}: the function returned a tensor of shape {value.ufl_shape}; it must return a "
-            "scalar, such as a product with a component of w"
+            f"scalar, {wanted}"
         )
     if any(domain != element.space.mesh.ufl_domain() for domain in extract_domains(value)):
         raise ModelError(

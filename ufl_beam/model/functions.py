@@ -291,7 +291,10 @@ class Table:
 def require_time_function(function: TimeFunction, what: str) -> None:
     """Raise :class:`ModelError` unless ``function`` returns a number at t = 0."""
     if not callable(function):
-        raise ModelError(f"{what} = {shorten(function)} must be a function of t, such as ub.Table")
+        raise ModelError(
+            f"{what} = {shorten(function)} must be a function of t, such as ub.Table, or "
+            "motion.acceleration of a GroundMotion"
+        )
     try:
         value_at(function, 0.0, what)
     except ModelError:

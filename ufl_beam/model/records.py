@@ -24,6 +24,7 @@ from weakref import WeakKeyDictionary
 from ufl_beam.display import compact_repr
 from ufl_beam.errors import (
     ArgumentError,
+    ArgumentTypeError,
     ModelError,
     require_kind,
     require_number,
@@ -50,6 +51,21 @@ NAMING = ("name", "place", "beam", "a", "b", "rail", "slider")
 """Fields used in the name of a record; errors in these fields name only the class."""
 
 
+RENAMED = {"time": "amplitude", "limit": "yield_limit"}
+"""Present names of arguments, by former names."""
+
+
+@cache
+def _keywords(record: type[Any]) -> tuple[str, ...]:
+    """Return the names of the arguments of a record; none if it takes any."""
+    parameters = [*inspect.signature(record.__init__).parameters.values()][1:]
+    return (
+        ()
+        if any(x.kind is x.VAR_KEYWORD for x in parameters)
+        else tuple(x.name for x in parameters if x.kind is not x.VAR_POSITIONAL)
+    )
+
+
 class Record:
     """Base of frozen dataclasses that check their fields by annotations ``Annotated[T, check]``.
 
@@ -60,6 +76,16 @@ class Record:
 
     _refused: ClassVar[type[ArgumentError]] = ModelError
     """Class of the error for a wrong field; ArgumentError in records outside a model."""
+
+    def __new__(cls, *_: Any, **named: Any) -> Any:
+        """Raise :class:`ArgumentError` for unknown keywords, before ``__init__``."""
+        known = _keywords(cls)
+        for name in named if known else ():
+            if name not in known:
+                new = RENAMED.get(name, "")
+                remedy = f"give {new}=" if new in known else f"the arguments are {', '.join(known)}"
+                raise ArgumentTypeError(f"{cls.__name__} has no argument {name!r}; {remedy}")
+        return super().__new__(cls)
 
     def __repr__(self) -> str:
         return compact_repr(self)  # for dataclasses with ``repr=False``

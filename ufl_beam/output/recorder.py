@@ -257,15 +257,16 @@ def checked_recorders(
     record: Sequence[Recorder] | Recorder, comm: MPI.Intracomm, call: str, *others: Output
 ) -> tuple[tuple[Recorder, ...], list[Output]]:
     """Check the recorders of a run; return recorders and all outputs, including ``others``."""
-    recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
+    one = isinstance(record, Recorder | type)
+    recorders: Any = (record,) if one else require_sequence(record, "record")
     outputs = []
     for i, recorder in enumerate(recorders):
         name = f"record[{i}]"
         if not isinstance(recorder, Recorder):
-            raise ArgumentError(
-                f"{call}: {name} = {shorten(recorder)} is not a Recorder; derive your own classes "
-                "from ub.Recorder"
-            )
+            remedy = "derive your own classes from ub.Recorder"
+            if isinstance(recorder, type):
+                remedy = f"create one, recorder = {recorder.__name__}(...), before the run"
+            raise ArgumentError(f"{call}: {name} = {shorten(recorder)} is not a Recorder; {remedy}")
         if why := unlike(recorder, Recorder):
             kind = type(recorder).__name__
             raise ArgumentError(f"{call}: {name}: {kind} is not a recorder: {why}")

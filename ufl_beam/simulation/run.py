@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from contextvars import ContextVar
 from itertools import chain
 from typing import Any, cast
 
@@ -65,6 +66,9 @@ from ufl_beam.simulation.step_lengths import (
 )
 from ufl_beam.simulation.stepper import MOST_SUBSTEPS
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
+
+interrupt: ContextVar[Callable[[], None]] = ContextVar("interrupt", default=lambda: None)
+"""Function that runs call between calls of C; it raises an exception to end the run."""
 
 
 def simulate(
@@ -266,6 +270,7 @@ def take_steps(
     with bar:
         quiet = until is None and keeper is None and all(r.by_itself for r in recorders)
         while not (pace.finished or ended):
+            interrupt.get()()
             if quiet and solution.every == 1 and max_states == sys.maxsize:
                 pace.advance(sys.maxsize, keep=True)
                 solution.time_error = pace.error
@@ -443,6 +448,7 @@ def simulate_by_reference(
         with progress_bar(progress, comm, total=1.0) as bar:
             for k in range(1, number + 1):
                 end = t1 if k == number else t0 + (t1 - t0) * k / number
+                interrupt.get()()
                 solver.step_to(end)
                 if k % solution.every == 0 or k == number:
                     keep()
