@@ -168,7 +168,7 @@ def test_the_wall_time_of_a_tradeoff_ends_a_run_in_progress(dt):
             scene, {"tip": lambda s: s.displacement(BEAM.end)[-1, 0]}, scheme=ub.EnergyMomentum(),
             t=(0, 10), dt=dt, tolerance=1e-3, max_seconds=2.0, progress=False,
         )  # fmt: skip
-    assert 0 < len(calls) <= 2.5 / 0.02 + 50  # of 1000 steps; the last calls are those of a step
+    assert len(calls) < 500  # 100 in two seconds; the coarsest run has 1000 steps or more
 
 
 # -- pushover ------------------------------------------------------------------------------------

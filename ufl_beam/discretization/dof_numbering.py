@@ -179,7 +179,8 @@ class DofNumbering:
 
     def _lacks(self, member: Member | Body) -> str:
         """Return the message that a beam or body is not in the scene."""
-        if any(member.name == x.name for x in (*self.scene.beams, *self.scene.bodies)):
+        members: tuple[Member | Body, ...] = (*self.scene.beams, *self.scene.bodies)
+        if any(member.name == x.name for x in members):
             return (
                 "is not in the scene, which has another object of this name, as after imperfect; "
                 f"use scene[{member.name!r}] of this scene"

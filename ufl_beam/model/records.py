@@ -79,7 +79,7 @@ class Record:
 
     def __new__(cls, *_: Any, **named: Any) -> Any:
         """Raise :class:`ArgumentError` for unknown keywords, before ``__init__``."""
-        known = _keywords(cls)
+        known = _keywords(cls)  # type: ignore[arg-type]
         for name in named if known else ():
             if name not in known:
                 new = RENAMED.get(name, "")
