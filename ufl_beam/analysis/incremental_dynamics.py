@@ -254,7 +254,7 @@ class StepsToLimit:
         sizes = sizes[~np.isnan(sizes)]  # the first row of many results is NaN
         if not len(sizes) or not np.isfinite(sizes).all():
             raise WrongResult(
-                f"{WHAT}: measure returned {shorten(value)} at t = {self._solution.times[-1]:g} s, "
-                "not finite numbers; numpy.nan_to_num replaces NaN of a first row"
+                f"{WHAT}: measure returned {shorten(value)}, not finite numbers, of the states up "
+                f"to t = {self._solution.times[-1]:g} s; no run can be judged"
             )
         self.demand = float(sizes.max())
