@@ -33,12 +33,8 @@ from ufl_beam.analysis.critical_points import CriticalPoint as CriticalPoint
 from ufl_beam.analysis.derivatives import Derivatives as Derivatives
 from ufl_beam.analysis.derivatives import Range as Range
 from ufl_beam.analysis.derivatives import differentiate
-from ufl_beam.analysis.free_decay import (
-    Decay as Decay,
-)
-from ufl_beam.analysis.free_decay import (
-    Envelope as Envelope,
-)
+from ufl_beam.analysis.free_decay import Decay as Decay
+from ufl_beam.analysis.free_decay import Envelope as Envelope
 from ufl_beam.analysis.free_decay import (
     damping,
     damping_ratio,
@@ -169,17 +165,8 @@ from ufl_beam.output.engineering_results import HingeTable as HingeTable
 from ufl_beam.output.engineering_results import Storeys as Storeys
 from ufl_beam.output.extremes import Extent as Extent
 from ufl_beam.output.extremes import Extremes
-from ufl_beam.output.fatigue import (
-    Cycles as Cycles,
-)
-from ufl_beam.output.fatigue import (
-    Fatigue,
-    Gerber,
-    Goodman,
-    HotSpot,
-    SNCurve,
-    rainflow,
-)
+from ufl_beam.output.fatigue import Cycles as Cycles
+from ufl_beam.output.fatigue import Fatigue, Gerber, Goodman, HotSpot, SNCurve, rainflow
 from ufl_beam.output.history import Event as Event
 from ufl_beam.output.history import Events, History
 from ufl_beam.output.output_files import version

@@ -341,7 +341,7 @@ class LinearModel(Rich):
         for name in ("_motion", "_space", "states"):
             vars(model).pop(name, None)
         model._reduction = Reduction(equations, x, exact, others, omega, lengths)
-        lags = range(model._reduction.num_lags)
+        lags = range(len(model._reduction.motion.read) - x.shape[1])
         model._mode_names = names + [f"lag {k} of dampers" for k in lags]
         return model
 

@@ -63,13 +63,13 @@ class SmallMotions(Linearization):
         """
         solve = partial(eigensolvers.linear, matrix, self.M, n, most=self.most, definite=definite)
         values, x = solve(shift=-SHIFT * self.squares.min())
-        works, zero = self._works(x)
-        first = np.abs(values[~zero]).min(initial=self.squares.max())
+        works, zero = self._works(x.real)
+        first = np.abs(values[~zero].real).min(initial=self.squares.max())
         if zero.any():
             # A second shift is far from zero eigenvalues, whose huge inverses cost digits.
             values, x = solve(shift=-first / 2)
-            works, zero = self._works(x)
-        return values, x, works, zero, first
+            works, zero = self._works(x.real)
+        return values.real, x.real, works, zero, first
 
     def _works(self, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
         """Return works xᵀ K x (J) of the columns of x, and whether each may be round-off."""

@@ -55,11 +55,7 @@ extern "Python" void begin_in_python(void *handle, double t, double dt);
 
 _SOURCE = "\n".join([HEADERS, DECLARATIONS, *(text(f"{name}.c") for name in SOURCES)])
 module = compiled(
-    "ufl_beam_loops",
-    DECLARATIONS + _CALLBACKS,
-    lambda: _SOURCE,
-    depends_on=[_SOURCE],
-    flags=FLAGS,
+    "ufl_beam_loops", DECLARATIONS + _CALLBACKS, lambda: _SOURCE, depends_on=[_SOURCE], flags=FLAGS
 )
 ffi: Any = module.ffi
 lib: Any = module.lib

@@ -12,16 +12,7 @@ from typing import Annotated, Any, ClassVar
 
 from ufl_beam.errors import ModelError
 from ufl_beam.model.checks import require_number
-from ufl_beam.model.law_functions import (
-    Values,
-    below,
-    exp,
-    larger,
-    log,
-    positive,
-    smaller,
-    where,
-)
+from ufl_beam.model.law_functions import Values, below, exp, larger, log, positive, smaller, where
 from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.records import NotNegative, Positive, Record
 from ufl_beam.model.softening_laws import LinearSoftening, SofteningLaw, require_softening

@@ -170,20 +170,12 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
 
     if not any(map(holds, scene.all_connectors)):
         return [], np.zeros((0, 0))
-    same, fixed = scene.representatives, _fixed(scene)
     turned = (support for support in scene.supports if support.angle)
-    rows = [*_rows(scene, holds, turned)]
-    combined: list[dict[NodeDof, float]] = []
+    rows, fixed = [*_rows(scene, holds, turned)], _fixed(scene)
+    combined = [_gradient(scene, row, fixed) for _, row in rows]
     rows_at: dict[NodeDof, set[int]] = defaultdict(set)
-    for number, (_, row) in enumerate(rows):
-        sums: dict[NodeDof, float] = defaultdict(float)
-        for carrier, factors in row:
-            for component, factor in enumerate(factors):
-                if factor:
-                    sums[same[carrier, component]] += factor
-        # Factors at both ends that act on the same degree of freedom cancel to round-off.
-        combined.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
-        for dof in combined[-1]:
+    for number, gradient in enumerate(combined):
+        for dof in gradient:
             rows_at[dof].add(number)
     left = set(range(len(rows)))
     alone = [dof for dof, indices in rows_at.items() if len(indices) == 1]
@@ -205,6 +197,16 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
     ]
     gradients = _matrix(terms, (max(len(columns), 1), len(indices)))
     return [rows[number] for number in indices], _null_space(gradients)
+
+
+def _gradient(scene: Scene, row: Row, fixed: set[NodeDof]) -> dict[NodeDof, float]:
+    """Return the factors of a constraint at the degrees of freedom that are not ``fixed``."""
+    sums: dict[NodeDof, float] = defaultdict(float)
+    for carrier, factors in row:
+        for component, factor in enumerate(factors):
+            sums[scene.representatives[carrier, component]] += factor
+    # Factors at both ends that act on the same degree of freedom cancel to round-off.
+    return {dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed}
 
 
 def require_no_mechanism(scene: Scene) -> str:
@@ -382,43 +384,29 @@ def warn_of_held_motions(scene: Scene) -> None:
     The gradient of such a motion is a combination of constraints of joints between the same places,
     or vanishes at all free degrees of freedom.
     """
-    same, moving = scene.representatives, [(s.place, c) for s in scene.supports for c in s.moving]
-    free = {same[node(place), c] for place, c in moving} if scene.connectors else set()
-
-    def gradient(connector: Connector) -> tuple[Row, dict[NodeDof, float]]:
-        ends = zip((connector.a, connector.b), connector.rigidly(), strict=True)
-        row: Row = [(node(end), factors) for end, factors in ends]
-        sums: dict[NodeDof, float] = defaultdict(float)
-        for carrier, factors in row:
-            for component, factor in enumerate(factors):
-                sums[same[carrier, component]] += factor
-        left = {k: x for k, x in sums.items() if abs(x) > 1e-12 and (k in free or k not in fixed)}
-        return row, left
-
-    fixed, between = _fixed(scene) if scene.connectors else set(), defaultdict(list)
-    for joint in scene.joints if scene.connectors else ():
+    if not scene.connectors:
+        return
+    moving = [(node(s.place), c) for s in scene.supports for c in s.moving]
+    fixed = _fixed(scene) - {scene.representatives[dof] for dof in moving}
+    rows, between = dict[object, Row](_rows(scene, lambda _: True, ())), defaultdict(list)
+    for joint in scene.joints:
         for holder in joint.holders:
             if holder.law is RIGID:
-                between[frozenset((node(holder.a), node(holder.b)))].append((holder, joint))
+                between[frozenset(end for end, _ in rows[holder])].append((holder, joint))
     for owner in scene.connectors:
         names = list[str]()
         for part in owner.components or (owner,):
-            row, left = gradient(part)
-            holders = between[frozenset((node(part.a), node(part.b)))] if left else []
-            rows = [gradient(holder)[1] for holder, _ in holders]
-            dofs = [*dict.fromkeys(dof for x in (left, *rows) for dof in x)]
-            G, wanted = (
-                np.array([[x.get(k, 0.0) for k in dofs] for x in y]) for y in (rows, [left])
-            )
-            shares = np.linalg.lstsq(G.T, wanted[0], rcond=None)[0] if rows else np.zeros(0)
-            missed = wanted[0] - (shares @ G if rows else 0.0)
-            if (
-                isinstance(part.law, (*HOLDING, RigidPlastic))
-                or np.abs(missed).max(initial=0) > 1e-9
-            ):
+            held = between[frozenset(end for end, _ in rows[part])]
+            gradients = [_gradient(scene, rows[x], fixed) for x in (*(x for x, _ in held), part)]
+            dofs = [*dict.fromkeys(dof for x in gradients for dof in x)]
+            *others, own = np.array([[x.get(dof, 0.0) for dof in dofs] for x in gradients])
+            G = np.reshape(others, (len(held), len(dofs))).T
+            shares = np.linalg.lstsq(G, own, rcond=None)[0]
+            free = np.abs(own - G @ shares).max(initial=0.0) > 1e-9
+            if free or isinstance(part.law, (*HOLDING, RigidPlastic)):
                 break
-            names += [str(j) for (_, j), x in zip(holders, shares, strict=True) if abs(x) > 1e-9]
-            names += map(str, () if left else _supports_and_joints_at(scene, [row]))
+            names += [str(j) for (_, j), x in zip(held, shares, strict=True) if abs(x) > 1e-9]
+            names += map(str, () if own.any() else _supports_and_joints_at(scene, [rows[part]]))
         else:
             warn(
                 f"{owner}: its motion is held at zero by {'; '.join(dict.fromkeys(names))}, so "

@@ -21,12 +21,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.display import compact_repr
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.file_system import require_path
-from ufl_beam.model.checks import (
-    raising_model_errors,
-    require_count,
-    require_number,
-    require_row,
-)
+from ufl_beam.model.checks import raising_model_errors, require_count, require_number, require_row
 from ufl_beam.model.functions import Table
 from ufl_beam.model.records import Positive, Record, Text
 

@@ -50,7 +50,6 @@ Instance = Annotated[T, require_kind]
 NAMING = ("name", "place", "beam", "a", "b", "rail", "slider")
 """Fields used in the name of a record; errors in these fields name only the class."""
 
-
 RENAMED = {"time": "amplitude", "limit": "yield_limit"}
 """Present names of arguments, by former names."""
 
@@ -58,12 +57,9 @@ RENAMED = {"time": "amplitude", "limit": "yield_limit"}
 @cache
 def _keywords(record: type[Any]) -> tuple[str, ...]:
     """Return the names of the arguments of a record; none if it takes any."""
-    parameters = [*inspect.signature(record.__init__).parameters.values()][1:]
-    return (
-        ()
-        if any(x.kind is x.VAR_KEYWORD for x in parameters)
-        else tuple(x.name for x in parameters if x.kind is not x.VAR_POSITIONAL)
-    )
+    _, *arguments = inspect.signature(record.__init__).parameters.values()
+    takes_any = any(x.kind is x.VAR_KEYWORD for x in arguments)
+    return () if takes_any else tuple(x.name for x in arguments)
 
 
 class Record:

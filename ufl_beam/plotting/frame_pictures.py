@@ -382,15 +382,13 @@ def _draw_hinges(
         for k, color in zip(hardened, rule.to_rgba(rotations / unit), strict=True):
             colors[k] = color
         style.draw_bar(axes, rule, f"plastic rotation of hinges ({prefix}rad)")
-    nodes_along = solution.numbering.nodes_along
-    lines: dict[Member, Array] = {b: shape.nodes[nodes_along(b)] for b in solution.scene.beams}
-    ends = np.reshape([line[k] for line in lines.values() for k in (0, -1)], (-1, 2))
+    ends = [shape.at(end) for beam in solution.scene.beams for end in (beam.start, beam.end)]
     for hinge, color in zip(hinges, colors, strict=True):
         at, place = hinge.at, hinge.place
-        several = sum(np.abs(ends - at).max(axis=1) < 1e-6 * solution.scene.size) > 1
+        several = sum(math.dist(at, end) < 1e-6 * solution.scene.size for end in ends) > 1
         if several and isinstance(place, Place) and place.s in (0.0, 1.0):
-            end, inner = lines[place.beam][:2] if place.s == 0.0 else lines[place.beam][:-3:-1]
-            at = at + 0.7 * shape.canvas.unit * unit_vectors(inner - end)
+            inner = solution.numbering.nodes_along(place.beam)[1 if place.s == 0.0 else -2]
+            at = at + 0.7 * shape.canvas.unit * unit_vectors(shape.nodes[inner] - at)
         axes.plot(*at, **circle(hinge.fraction, color))
     handles = [axes.plot([], [], **circle(x, color), label=words)[0] for x, words, color in entries]
     if handles:

@@ -47,11 +47,9 @@ class OpenHinge(NamedTuple):
 
 
 def open_hinges(
-    solution: Solution,
-    n: int,
-    at: Callable[[AttachmentPoint], Array],
+    solution: Solution, n: int, at: Callable[[AttachmentPoint], Array],
     limits: Mapping[str, float] = MappingProxyType({}),
-) -> list[OpenHinge]:
+) -> list[OpenHinge]:  # fmt: skip
     """Find hinges in cells, at vertices and in connectors that opened up to the n-th time.
 
     ``at`` returns the drawn position of a place (m).  ``limits`` are acceptance limits of the
@@ -62,10 +60,12 @@ def open_hinges(
         joint = isinstance(row.where, Place) and row.rotation != 0.0  # may have no strength
         if math.isnan(row.rotation) or not (row.n >= 0 or joint):
             continue
-        law = _law(solution, row.where)
+        law, fraction = _law(solution, row.where), math.nan
+        if law is not None and (law.limit == 0.0 or math.isfinite(law.fracture_energy)):
+            # A hinge without strength is a joint.
+            fraction = min(row.dissipated / law.fracture_energy, 1.0) if law.limit else 1.0
         place = row.where.b if isinstance(row.where, Connector) else row.where
         rotation = abs(row.rotation if math.isnan(row.plastic) else row.plastic)
-        fraction = _broken(law, row.dissipated)
         found.append(OpenHinge(place, np.array(at(place)), fraction, rotation, row.state))
     return found
 
@@ -79,13 +79,6 @@ def _law(solution: Solution, where: Place | Connector) -> HingeLaw | None:
         return law_of(hinge)
     number = numbering.cell(where) - int(numbering.cells_of(where.beam)[0])
     return numbering.hinges(where.beam)[number]
-
-
-def _broken(law: HingeLaw | None, dissipated: float) -> float:
-    """Return the dissipated fraction of a fracture energy; 1 for hinges without strength."""
-    if law is None or (law.limit > 0.0 and math.isinf(law.fracture_energy)):
-        return math.nan
-    return min(dissipated / law.fracture_energy, 1.0) if law.limit > 0.0 else 1.0
 
 
 def dissipated_per_length(solution: Solution, n: int) -> Array:
@@ -186,7 +179,15 @@ def draw_hinge(solution: Solution, place: Place | Connector, *, ax: Axes | None 
             raise ArgumentError(f"plot: {place} has no rotation whose law may yield or break")
         (jump, M), lost = rotation_of(history), float(history.dissipated[-1])
     else:
-        law, M, jump, lost = _hinge_at(solution, place)
+        points, law = solution.material_at(place), _law(solution, place)
+        if law is None or np.isinf(law.limit):
+            raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
+        M, jump, losses = points.forces[:, 2], points.jump, points.hinge
+        if solution.numbering.hinge_at(place) is None:  # of the Gauss point that opened most
+            cell = solution.numbering.cell(place)
+            states = np.array([solution.points_of(n)[cell] for n in range(len(solution))])
+            M, jump, losses = states[:, np.abs(states[-1, :, JUMP]).argmax(), [2, JUMP, HINGE]].T
+        lost = float(losses[-1])
     with style.panel(ax, (8.0, 5.4)) as axes:
         # Intervals in which the jump only grows or only falls; adjacent intervals share a point.
         moves = np.flatnonzero(np.diff(jump))
@@ -205,20 +206,6 @@ def draw_hinge(solution: Solution, place: Place | Connector, *, ax: Axes | None 
             spent += f", {100 * lost / whole:.3g} % of {with_unit(whole, 'J')}"
         axes.set_title(f"hinge at {place}: {spent}", loc="left")
     return style.parent_figure(axes)
-
-
-def _hinge_at(solution: Solution, place: Place) -> tuple[HingeLaw, Array, Array, float]:
-    """Return law, moment (N m), jump (rad) and dissipated energy (J) of a hinge of a beam."""
-    history, numbering = solution.material_at(place), solution.numbering
-    hinge, cell, law = numbering.hinge_at(place), numbering.cell(place), _law(solution, place)
-    if law is None or np.isinf(law.limit):
-        raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
-    if hinge is not None:
-        return law, history.forces[:, 2], history.jump, float(history.hinge[-1])
-    # Of the Gauss points, the one that opened most
-    states = np.array([solution.points_of(n)[cell] for n in range(len(solution))])
-    M, jump, losses = states[:, np.abs(states[-1, :, JUMP]).argmax(), [2, JUMP, HINGE]].T
-    return law, M, jump, float(losses[-1])
 
 
 def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:

@@ -15,12 +15,7 @@ import numpy as np
 from ufl_beam.compiled.c_library import doubles, ffi, integers, struct
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
-from ufl_beam.model.connector_laws import (
-    Controller,
-    Coulomb,
-    ForceLaw,
-    Running,
-)
+from ufl_beam.model.connector_laws import Controller, Coulomb, ForceLaw, Running
 from ufl_beam.model.connectors import Connector
 
 SAMPLE_TOLERANCE = 1e-9

@@ -25,13 +25,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
-from ufl_beam.model.connector_laws import (
-    Coulomb,
-    Damper,
-    ForceLaw,
-    Spring,
-    Stop,
-)
+from ufl_beam.model.connector_laws import Coulomb, Damper, ForceLaw, Spring, Stop
 from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.model.loads import Rayleigh
 from ufl_beam.model.material_law import MaterialLaw, dissipation_must_grow, has_quadratic_energies

@@ -429,11 +429,8 @@ def simulate_by_reference(
         if goes_on or has_inertia(scheme):
             solver.on_nodes, solver.q_before = start.cell_resultants(-1), start.before(-1)
     solution = Solution(scene, numbering)
-    solution.equilibrium_fraction, solution.needs_start, solution.scheme = (
-        between,
-        between < 1,
-        scheme,
-    )
+    solution.equilibrium_fraction, solution.needs_start = between, between < 1
+    solution.scheme = scheme
     solution.every, solution.building = every, time.perf_counter() - begin
 
     def keep() -> None:

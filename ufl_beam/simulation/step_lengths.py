@@ -23,20 +23,11 @@ from ufl_beam.simulation.stepper import Trial
 GROWTH = 1.5
 """Largest ratio of the length of a step to the length of the previous step."""
 
-LASTS = 10
-"""Number of mean steps over which a wrong velocity counts as a wrong displacement at a switch."""
-
-OUTSTANDING = 4
-"""Ratio of an error of velocities to the last one from which on a step contains a switch."""
-
-LOCATED = 1e-9
-"""Least length of a step that is divided because of a switch, as a fraction of the run."""
-
-HALVES = 8
-"""Tolerance divided by the tolerance of half steps, whose errors are of third order."""
-
-REMAINING = 1.5
-"""Error of steps divided by their difference to half steps: 4/3 at second order, 2 at first."""
+LASTS = 10  # mean steps over which a wrong velocity is a wrong displacement at a switch
+OUTSTANDING = 4  # error of velocities, divided by the last one, from which a step has a switch
+LOCATED = 1e-9  # least length of a step that is divided at a switch, as a fraction of the run
+HALVES = 8  # tolerance divided by that of half steps, whose errors are of third order
+REMAINING = 1.5  # error of steps by their difference to half steps: 4/3 at order 2, 2 at order 1
 
 MOST = 2**14
 """Largest number of steps of one call of C, which returns earlier if steps take long."""
@@ -64,23 +55,43 @@ def step_count(time: float, dt: float) -> int:
     return max(1, math.ceil(time / dt * (1 - 1e-9)))
 
 
-class EqualSteps:
-    """Steps of equal length, a little shorter than ``dt`` if the run is no multiple of ``dt``."""
+class Steps:
+    """Base of the steps of a run from its beginning to its end."""
 
-    def __init__(self, simulation: Simulation, t1: float, dt: float) -> None:
+    _STATE: tuple[str, ...] = ("steps", "error")
+
+    def __init__(self, simulation: Simulation, t1: float) -> None:
         self._simulation, self._t0, self._t1 = simulation, simulation.t, t1
-        self._all = step_count(t1 - simulation.t, dt)
-        self.steps, self.error = 0, math.nan
+        self.steps, self.error = 0, 0.0
 
     @property
     def finished(self) -> bool:
-        """True if all steps have been taken."""
-        return self.steps == self._all
+        """True if the end of the run is reached."""
+        return self._simulation.t == self._t1
 
     @property
     def progress(self) -> float:
-        """Fraction of the steps that have been taken."""
-        return self.steps / self._all
+        """Fraction of the duration of the run that has passed."""
+        return (self._simulation.t - self._t0) / (self._t1 - self._t0)
+
+    def state(self) -> dict[str, Any]:
+        """Return the data that determine the next step, and the number of steps."""
+        return {name: float(getattr(self, name)) for name in self._STATE}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Restore the data of :meth:`state`."""
+        for name in self._STATE:
+            setattr(self, name, type(getattr(self, name))(state[name]))
+
+
+class EqualSteps(Steps):
+    """Steps of equal length, a little shorter than ``dt`` if the run is no multiple of ``dt``."""
+
+    _STATE = ("steps",)
+
+    def __init__(self, simulation: Simulation, t1: float, dt: float) -> None:
+        super().__init__(simulation, t1)
+        self._all, self.error = step_count(t1 - simulation.t, dt), math.nan
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
         """Take up to ``most`` steps, in substeps if they fail; ``keep`` stores their states."""
@@ -88,14 +99,6 @@ class EqualSteps:
         ends = self._t0 + (self._t1 - self._t0) * steps / self._all
         ends[steps == self._all] = self._t1  # exactly, for a run that goes on at this time
         self.steps += self._simulation.steps_to(ends, keep=keep)
-
-    def state(self) -> dict[str, float]:
-        """Return the number of steps."""
-        return {"steps": float(self.steps)}
-
-    def restore(self, state: dict[str, float]) -> None:
-        """Restore the number of steps."""
-        self.steps = int(state["steps"])
 
 
 @dataclass(frozen=True)
@@ -153,26 +156,10 @@ class Adaptive:
             require_number(stop, f"Adaptive: stops[{i}]")
 
 
-class _Steps:
-    """Base of steps with variable lengths."""
-
-    def __init__(self, simulation: Simulation, t1: float) -> None:
-        self._simulation, self._t0, self._t1 = simulation, simulation.t, t1
-        self.steps, self.error = 0, 0.0
-
-    @property
-    def finished(self) -> bool:
-        """True if the end of the run is reached."""
-        return self._simulation.t == self._t1
-
-    @property
-    def progress(self) -> float:
-        """Fraction of the duration of the run that has passed."""
-        return (self._simulation.t - self._t0) / (self._t1 - self._t0)
-
-
-class AdaptiveSteps(_Steps):
+class AdaptiveSteps(Steps):
     """Steps whose error is estimated and limited."""
+
+    _STATE = ("steps", "error", "_dt", "_fresh")
 
     def __init__(self, simulation: Simulation, t1: float, control: Adaptive) -> None:
         super().__init__(simulation, t1)
@@ -322,18 +309,14 @@ class AdaptiveSteps(_Steps):
             error = max(error, abs(float(weights @ values)) / (self._largest[i] or 1.0))
         return error * dt / (self._t1 - self._t0)
 
-    def state(self) -> dict[str, float]:
-        """Return the data that determine the next step, the number of steps, and the error sum."""
-        largest = {f"largest {i}": value for i, value in enumerate(self._largest)}
-        return {**{name: float(getattr(self, name)) for name in self._STATE}, **largest}
+    def state(self) -> dict[str, Any]:
+        """Return the numbers of the base class, and the largest loads so far."""
+        return super().state() | {f"largest {i}": x for i, x in enumerate(self._largest)}
 
-    def restore(self, state: dict[str, float]) -> None:
+    def restore(self, state: dict[str, Any]) -> None:
         """Restore the numbers of :meth:`state`."""
-        for name in self._STATE:
-            setattr(self, name, type(getattr(self, name))(state[name]))
+        super().restore(state)
         self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]
-
-    _STATE = ("steps", "error", "_dt", "_fresh")
 
 
 # -- switches --------------------------------------------------------------------------------------
@@ -368,7 +351,7 @@ class PilotSteps(AdaptiveSteps):
 
     def __init__(self, pilot: Pilot, t1: float, control: Adaptive) -> None:
         super().__init__(pilot, t1, control)
-        self.taken = list[tuple[float, Array, bool]]()
+        self.taken = [(pilot.t, pilot.q, False)] * 4
         self.saved: State = {}
         # Acceleration before the last step, and the length of its step, 0 if there is none
         self._before: Array = np.zeros(pilot.subdomain.size)
@@ -407,7 +390,7 @@ class PilotSteps(AdaptiveSteps):
         """Take one step, or take the previous step again and this one; see the base class."""
         self._first_dt = self._dt
         super().advance(most, keep=keep)
-        self.taken = [*self.taken[-3:], (self._simulation.t, self._simulation.q, self._fresh)]
+        self.taken = [*self.taken[1:], (self._simulation.t, self._simulation.q, self._fresh)]
 
     def _accept(self, trial: Trial) -> None:
         """Save the state, and accept the step."""
@@ -433,15 +416,12 @@ class PilotSteps(AdaptiveSteps):
         self._before_dt = archive.number("step of acceleration", self._before_dt)
         self._last_error = archive.number("error of velocities", self._last_error)
         self.restore({name: archive.number(name, x) for name, x in self.state().items()})
-        number = int(archive.number("steps taken", len(self.taken)))
-        steps = [*self.taken, *[(0.0, self._before, False)] * number][:number]
-        for k, (t, q, final) in enumerate(steps):
+        for k, (t, q, final) in enumerate(self.taken):
             final = archive.number(f"final {k}", final) > 0
-            steps[k] = archive.number(f"end {k}", t), archive.at_dofs(f"q at {k}", q), final
-        self.taken = steps
+            self.taken[k] = archive.number(f"end {k}", t), archive.at_dofs(f"q at {k}", q), final
 
 
-class JudgedSteps(_Steps):
+class JudgedSteps(Steps):
     """Adaptive steps of a scene that switches; each consists of two steps of a pilot.
 
     Their error is estimated from the difference of both runs.
@@ -476,11 +456,11 @@ class JudgedSteps(_Steps):
 
     def state(self) -> dict[str, Any]:
         """Return steps, error, and the state of the pilot before its last step."""
-        return {"steps": self.steps, "error": self.error, **add_prefix("pilot/", self._ahead.saved)}
+        return {**super().state(), **add_prefix("pilot/", self._ahead.saved)}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restore :meth:`state`; the last step of the pilot is taken again."""
-        self.steps, self.error = int(state["steps"]), float(state["error"])
+        super().restore(state)
         self._ahead.saved = remove_prefix("pilot/", state)
         self._ahead.take_again()
         self._ahead.advance()

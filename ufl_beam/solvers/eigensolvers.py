@@ -52,21 +52,14 @@ def _petsc(A: csr_array) -> PETSc.Mat:
 
 def linear(
     A: csr_array, B: csr_array, n: int, *, most: int, shift: float = 0.0, definite: bool
-) -> tuple[Array, Array]:
+) -> tuple[Complex, Complex]:
     """Compute the n eigenvalues of ``A x = λ B x`` nearest to ``shift``, with eigenvectors.
 
     A and B are symmetric, and ``A - shift B`` is regular.  With ``definite``, B has no negative
     eigenvalue.  The pencil has ``most`` finite eigenvalues.  The results, (n,) and (size, n), may
     contain up to :data:`EXTRA` additional eigenvalues.
     """
-    values, x = _linear(A, B, min(n + EXTRA, most), shift, definite)
-    return values.real, x.real
-
-
-def _linear(
-    A: csr_array, B: csr_array, n: int, shift: float, definite: bool
-) -> tuple[Complex, Complex]:
-    size = A.shape[0]
+    size, n = A.shape[0], min(n + EXTRA, most)
     if size <= DENSE:
         θ, x = (_inverse_definite if definite else _inverse)((A - shift * B).toarray(), B.toarray())
         return (1 / θ[:n] + shift).astype(complex), x[:, :n].astype(complex)
@@ -87,12 +80,12 @@ def quadratic_near_zero(
     For the shapes of the results see :func:`linear`.
     """
     size = K.shape[0]
-    first = np.abs(linear(K, -C, 1, most=size, definite=False)[0])
-    unit = first.min() if len(first) else 1.0
+    first = linear(K, -C, 1, most=size, definite=False)[0].real
+    unit = np.abs(first).min() if len(first) else 1.0
     identity, none = eye_array(size), csr_array((size, size))
     A = csr_array(block_array([[K, none], [none, identity]]))
     B = csr_array(block_array([[-unit * C, -(unit**2) * M], [identity, none]]))
-    values, x = _linear(A, B, min(n + EXTRA, 2 * size), 0.0, definite=False)
+    values, x = linear(A, B, n, most=2 * size, definite=False)
     finite = np.abs(values) < 1e9 * np.abs(values).min(initial=np.inf)
     return unit * values[finite], x[:size, finite]
 

@@ -14,13 +14,7 @@ from petsc4py import PETSc
 
 from ufl_beam.compiled.c_library import ffi, petsc
 from ufl_beam.display import compact_repr
-from ufl_beam.errors import (
-    ArgumentError,
-    require_count,
-    require_kind,
-    require_switch,
-    require_text,
-)
+from ufl_beam.errors import ArgumentError, require_count, require_kind, require_switch, require_text
 from ufl_beam.model.records import Positive, Record
 from ufl_beam.parallel import Agreement
 

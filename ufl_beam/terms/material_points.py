@@ -35,14 +35,7 @@ from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
 from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms, with_shared_nodes
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.point_equations import (
-    End,
-    PointEquations,
-    curved,
-    inputs,
-    prefixed,
-    rows,
-)
+from ufl_beam.mechanics.point_equations import End, PointEquations, curved, inputs, prefixed, rows
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Kind, SectionPoints
