@@ -11,6 +11,9 @@ import ufl_beam as ub
 from ufl_beam.plotting.model import model_notes, scene_load_caption
 from ufl_beam.plotting.model_drawing import Subject, draw
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*are of no material")
+
+
 PARTS = ("joints", "supports", "loads", "masses", "initial", "damping", "connectors")
 
 

@@ -128,7 +128,7 @@ def sprung(law):
 def controlled(scene):
     """The same scene with a controller, so that its steps are in Python."""
     (beam,) = scene.beams
-    push = ub.Slide(ub.ground(1, 0), beam.end, ub.Controller(lambda now: 0.0), axis=(0, 1))
+    push = ub.Slide(ub.ground(0.5, 0), beam.at(0.5), ub.Controller(lambda now: 0.0), axis=(0, 1))
     return ub.Scene([beam], supports=scene.supports, connectors=[*scene.connectors, push])
 
 

@@ -316,6 +316,7 @@ def test_forces_of_the_beginning_do_their_work(scheme):
     assert np.log2(np.divide(worst[:-1], worst[1:])).min() > 1.8
 
 
+@pytest.mark.filterwarnings("ignore:.*it resists rigid turning")
 def test_moving_supports_and_joints_of_multipliers_with_generalized_alpha():
     """A body that turns on the ground and pulls a beam whose end is moved: second order."""
 

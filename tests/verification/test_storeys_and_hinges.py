@@ -280,15 +280,14 @@ def test_accelerations_of_an_oscillator_are_of_second_order(scheme):
     np.testing.assert_allclose(np.divide(*errors), 4.0, rtol=0.1)
 
 
-def test_means_of_two_rows_do_not_alternate():
-    """A support that starts with the velocity V from rest: its velocities are 0, 2V, 0, 2V, ..."""
+def test_a_support_that_starts_at_once_has_no_acceleration():
+    """From rest it has the velocity V after an impact; it does not alternate between 0 and 2V."""
     V, dt = 0.5, 0.01
     beam = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e6, GA=1e6, EI=1e3, rhoA=1.0, rhoI=1e-3))
     foot = ub.PrescribedDisplacement(beam.start, u=lambda t: V * t, v=0.0, psi=0.0)
     run = ub.simulate(ub.Scene([beam], supports=[foot]), ub.EnergyMomentum(), t=(0, 0.1), dt=dt)
     a = run.acceleration(beam.start)[1:, 0]
-    np.testing.assert_allclose(a, 2 * V / dt * (-1.0) ** np.arange(10), rtol=1e-9)
-    np.testing.assert_allclose(a[1:] + a[:-1], 0.0, atol=1e-9 * V / dt)
+    np.testing.assert_allclose(a, 0.0, atol=1e-9 * V / dt)
 
 
 def test_statics_have_no_accelerations():

@@ -12,6 +12,8 @@ from scipy.integrate import solve_ivp
 
 import ufl_beam as ub
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*it resists rigid turning and flow")
+
 PLAIN = {"EA": 1e4, "GA": 4e3, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.01}  # N, N, N m², kg/m, kg m
 
 # -- an oscillator: a bar without mass that yields, with a mass at its end -----------------------

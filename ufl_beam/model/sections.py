@@ -163,8 +163,8 @@ class Section(Record):
             more |= {"rhoA": rho * A, "rhoI": rho * I}
         if not -1.0 < require_number(nu, "Section: nu") <= 0.5:
             raise ModelError(f"Section: nu = {nu} must lie in (-1, 0.5]")
-        if rho and E > 0.0:
-            plausibility.check("Section", "speed of sound sqrt(E/rho)", math.sqrt(E / rho))
+        if rho:
+            plausibility.check_material(E, rho)
         GA = shear_factor * A * E / (2 * (1 + nu))
         EA, EI = (E * A, E * I) if fibres is None else (fibres.EA, fibres.EI)
         return cls(EA=EA, GA=GA, EI=EI, fibres=fibres, **more)

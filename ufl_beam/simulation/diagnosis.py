@@ -511,7 +511,8 @@ def warn_of_rayleigh(solution: Solution) -> None:
     lost, stored = solution.energy["damping"][-1], solution.energy["stored"].max()
     if turns > TURNED and lost > 10 * stored:
         warn(
-            f"{damping[0]}: it resists rigid turning, and beams have turned by {turns:.2g} rad; "
-            f"damping has taken {lost:.3g} J, and strains have stored at most {stored:.3g} J. Use "
-            "KelvinVoigt(stiffness), with the same number, which damps strains only"
+            f"{damping[0]}: it resists rigid turning and flow; beams have turned by {turns:.2g} "
+            f"rad, damping has taken {lost:.3g} J, and strains have stored at most {stored:.3g} J. "
+            "Use KelvinVoigt(stiffness), with the same number, which damps strains only, or "
+            "tangent=True if cells flow"
         )
