@@ -19,8 +19,7 @@ import numpy.typing as npt
 
 T = TypeVar("T")
 
-LONGEST = 80
-"""Largest number of characters of a value in a message."""
+LONGEST = 80  # largest number of characters of a value in a message
 
 BYTES_PER_CELL = 400
 """Lower bound of the memory per cell on each process, for vertices and dof indices; bytes."""

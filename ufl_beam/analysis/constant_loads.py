@@ -19,8 +19,7 @@ from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
 
-AT = 1.0
-"""Time at which loads are evaluated: the end of a static run from 0 to 1; s."""
+AT = 1.0  # time at which loads are evaluated: the end of a static run from 0 to 1; s
 
 REST = 1e12
 """Duration of a run to an equilibrium at rest, in which the forces of dampers and viscous laws

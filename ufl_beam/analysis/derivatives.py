@@ -614,12 +614,7 @@ class Derivatives:
                     "of: this quantity needs section forces, material or energies between the "
                     f"stages of {self.solution.scheme}; use order=2"
                 )
-            first = self
-            first._require_substeps()
-            while first._start is not None:
-                first = first._start
-                first._require_substeps()
-            name, found = [*self.at][p], list[Solution]()
+            first, name, found = self._first(), [*self.at][p], list[Solution]()
             # Simulations begin at the time of the first run
             simulations = first._case.simulations(name, fraction)
             changes = self._case.positions(name, fraction)
@@ -629,13 +624,14 @@ class Derivatives:
             self._repeated[p, fraction] = found
         return self._repeated[p, fraction]
 
-    def _require_substeps(self) -> None:
-        """Raise :class:`ArgumentError` if too many steps of the run were divided."""
+    def _first(self) -> Derivatives:
+        """Return the first of the runs; raise if too many steps of a run were divided."""
         if self._substeps is None:
             raise ArgumentError(
                 "of: this quantity needs material or energies, and many steps of the run were "
                 "divided; use a smaller dt"
             )
+        return self if self._start is None else self._start._first()
 
     def _ends(self) -> list[list[Solution]]:
         """Return ends of runs at neighbouring values of each parameter, to first order.

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import closing
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -49,13 +50,7 @@ ALIKE = 1e-9  # relative difference of slopes by small and large steps that coun
 FINER = 2.0**-6
 """Ratio of steps of differences of histories and numbers, see :func:`_slope`."""
 
-MAX_BYTES = 2.0**28
-"""Memory for recorded steps; bytes."""
-
-
-def last(history: Array) -> float:
-    """Return the last value of a history."""
-    return history[-1]  # type: ignore[no-any-return]
+MAX_BYTES = 2.0**28  # memory for recorded steps; bytes
 
 
 @each_warning_once()
@@ -67,7 +62,7 @@ def gradient(
     t: tuple[float, float],
     dt: float,
     of: Callable[[Solution], npt.ArrayLike],
-    reduce: Callable[[Array], float] = last,
+    reduce: Callable[[Array], float] = itemgetter(-1),
     newton: Newton | None = None,
     mesh: Mesh | None = None,
     max_bytes: float = MAX_BYTES,
@@ -277,10 +272,9 @@ class _History:
 
     def _number(self, history: Array) -> float:
         """Return the number that is made of a history."""
-        what, shape = "gradient: reduce, by default the last value,", history.shape
-        return require_returned(
-            self._reduce(history), what, f"a history of shape {shape}", finite=True
-        )
+        what = "gradient: reduce, by default the last value,"
+        given = f"a history of shape {history.shape}"
+        return require_returned(self._reduce(history), what, given, finite=True)
 
     def change_in(self, numbering: DofNumbering) -> float:
         """Return the change of the number in another scene with the same motion.

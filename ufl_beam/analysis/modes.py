@@ -361,8 +361,7 @@ def computed_modes(
         if at is None:
             scene = replace(scene, loads=())  # with loads, this state would be no equilibrium
     small = SmallMotions(scene, at, mesh=mesh)
-    if at is not None:
-        require_no_spin("modes", small, at)
+    require_no_spin("modes", small, at)
     if at is None and (said := small.unbalanced()):
         warn(said)
     if not small.M.data.any():
@@ -440,29 +439,23 @@ def buckling(
     if at is None and (said := require_no_mechanism(scene)):
         raise ArgumentError(f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)")
     small = SmallMotions(scene, at, t, mesh)
-    if at is not None:
-        require_no_spin("buckling", small, at)
+    require_no_spin("buckling", small, at)
     warn_of_limits("buckling", small)
     factors, shapes, errors, others = small.buckling(n)
     stiff = any(beam.section.GA > 10 * beam.section.EA for beam in scene.beams)
-    remedy = (
-        "because the loads bend, turn or shorten beams first"
-        + ", which GA > 10 EA makes worse (GA = 10 EA excludes shear strains as well)" * stiff
+    wrong = (
+        ": the stiffness of their shapes does not vanish there, because the loads bend, turn or "
+        "shorten beams first"
+        + ", which GA > 10 EA makes worse (GA = 10 EA excludes shear strains as well)"
+        * stiff
         + ". Give forces at the nodes instead of along beams, give at= a state closer to buckling, "
         "follow the path with ub.follow, or find where a frequency of modes(..., at=) vanishes"
     )
-    if (wrong := errors > LARGEST_ERROR).any():
-        listed = ", ".join(f"{factor:.4g}" for factor in factors[wrong])
-        warn(
-            f"buckling: the factors {listed} are no buckling loads: the stiffness of their shapes "
-            f"does not vanish there, {remedy}"
-        )
+    if listed := ", ".join(f"{x:.4g}" for x in factors[errors > LARGEST_ERROR]):
+        warn(f"buckling: the factors {listed} are no buckling loads{wrong}")
     if not len(factors) or (others < np.abs(factors).max()).any():
-        listed = ", ".join(f"{factor:.4g}" for factor in np.sort(others)[:n])
-        warn(
-            f"buckling: factors of magnitude {listed} are complex and left out: the stiffness of "
-            f"their shapes does not vanish there, {remedy}"
-        )
+        listed = ", ".join(f"{x:.4g}" for x in np.sort(others)[:n])
+        warn(f"buckling: factors of magnitude {listed} are complex and left out{wrong}")
     stresses = _stresses(small, at)
     return Buckling(scene, small.numbering, small.q, shapes, *stresses, factors, errors)
 
@@ -493,9 +486,9 @@ def require_state(
     return at
 
 
-def require_no_spin(call: str, small: SmallMotions, at: Solution) -> None:
+def require_no_spin(call: str, small: SmallMotions, at: Solution | None) -> None:
     """Raise if a beam or body turns fast in the last state of ``at``; ``call`` is the caller."""
-    if not len(at.v) or not small.M.data.any():
+    if at is None or not len(at.v) or not small.M.data.any():
         return
     numbering, scene = small.numbering, small.scene
     first = small.undamped(1, (small.K + small.K.T) / 2, definite=True)[-1] ** 0.5

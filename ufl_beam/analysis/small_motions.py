@@ -20,7 +20,6 @@ V = TypeVar("V", Array, Complex)
 
 REAL = 1e-6  # imaginary part of a buckling factor that is round-off, as a fraction
 SECOND = 1e-3  # change for second derivatives; rad, or fraction of the size of the scene
-
 MODAL_TOLERANCE = 1e-9  # coupling below this fraction of the largest damping is neglected
 
 

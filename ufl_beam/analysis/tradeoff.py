@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextvars import copy_context
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
@@ -47,7 +48,6 @@ NEWTONS = (Newton(),)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
 WRONG = "ArgumentError: "  # in the message of a failure that no refinement can avoid
 LATE = "TradeoffError: "  # in the message of a run that was ended
-
 LEAST_USED = 0.3  # least error of the recommended run, as a fraction of a tolerance
 # Largest uncertainty of a limit, as a fraction of a tolerance.  The sum of an error of LEAST_USED
 # and this uncertainty is the tolerance.
@@ -363,11 +363,9 @@ class _Runs:
                     f"max_seconds = {self.max_seconds:g} s are over, which ended the run {setting}"
                 )
 
-        token = interrupt.set(require_time)
-        try:
-            return simulate(self.scene, t=(self.t[0], until), progress=False, **vars(setting))
-        finally:
-            interrupt.reset(token)
+        context, t = copy_context(), (self.t[0], until)
+        context.run(interrupt.set, require_time)
+        return context.run(simulate, self.scene, t=t, progress=False, **vars(setting))
 
     def _member(
         self, family: int, refine: str | Fraction, level: float, newton: int

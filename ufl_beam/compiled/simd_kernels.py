@@ -152,7 +152,7 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
     for signs in ([1.0], [1.0], [-1.0, 1.0], [-1.0, 1.0]):
         w = random.uniform(0.1, 1.0, (width, BATCH)) * random.choice(signs, (width, BATCH))
         x = np.array([[0.0, 0.0, 0.0, 1.0, 0.5, 0.0]]).T + random.uniform(-0.1, 0.1, (6, BATCH))
-        c, (single, several) = (random.uniform(0.1, 0.9, constants), np.zeros((2, entries, BATCH)))
+        c, (single, several) = random.uniform(0.1, 0.9, constants), np.zeros((2, entries, BATCH))
         address = module.ffi.cast("void *", kernel)
         module.lib.compute_both(address, *map(at, (w, c, x, single, several)))
         scale = np.abs(single).max(axis=0, where=np.isfinite(single), initial=0.0)

@@ -32,8 +32,7 @@ TOUCHING = 1e-3
 JUMP = 1e-6
 """Largest initial jump without a warning: an angle in rad, or a fraction of the scene's size."""
 
-FAR_OUT = 10.0
-"""Largest distance from the centre of a body without a warning, in radii of gyration."""
+FAR_OUT = 10.0  # largest distance from the centre of a body without a warning, in radii of gyration
 
 
 def warn_of_masses(scene: Scene) -> None:
@@ -178,14 +177,11 @@ def _groups(numbering: DofNumbering) -> Index:
     fixed = [s.place for s in numbering.scene.supports if {0, 1} <= s.held.keys()]
     has_ground = GROUND in numbering.scene.rigid_bodies
     ground = int(numbering.node(GROUND.middle)[0]) if has_ground else numbering.size
-    to_ground = np.array([(numbering.node(place)[0], ground) for place in fixed], dtype=np.int64)
-    joined = [
-        (numbering.node(a)[0], numbering.node(b)[0])
-        for joint in numbering.scene.joints if isinstance(joint, Release)
-        for a, b in pairwise(joint.places)
-    ]  # fmt: skip
-    others = np.array(joined, dtype=np.int64).reshape(-1, 2)
-    pairs = np.concatenate([connectors, to_ground.reshape(-1, 2), others])
+    others = [(numbering.node(place)[0], ground) for place in fixed]
+    for joint in numbering.scene.joints:
+        if isinstance(joint, Release):
+            others += pairwise(numbering.node(place)[0] for place in joint.places)
+    pairs = np.concatenate([connectors, np.array(others, dtype=np.int64).reshape(-1, 2)])
     (group,) = _connected(numbering.size + 1, pairs)
     return np.asarray(group[numbering.dofs[:, 0]])
 

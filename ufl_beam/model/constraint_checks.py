@@ -49,8 +49,7 @@ IF_SINGULAR = (
 LAST_DIGITS = 1e-12
 """Strain, rotation, or displacement by size of the scene, whose stress counts as round-off."""
 
-DENSE = 90
-"""Largest number of unknowns for which the null space comes from a dense decomposition."""
+DENSE = 90  # largest number of unknowns for which the null space comes from a dense decomposition
 
 
 def require_inertia(scene: Scene) -> None:
@@ -457,11 +456,10 @@ def parts_that_switch(scene: Scene) -> Iterator[tuple[str, str]]:
             yield beam.name, "may yield or break"
     for connector in scene.all_connectors:
         law, name = connector.law, f"{type(connector.law).__name__} of {connector}"
+        yields = isinstance(law, Spring) and (law.law or law.softening)
         if isinstance(law, Coulomb):
             yield name, "dissipates"
-        elif isinstance(law, RigidPlastic) or (
-            isinstance(law, Spring) and (law.law is not None or law.softening is not None)
-        ):
+        elif yields or isinstance(law, RigidPlastic):
             yield name, "may yield or break"
         elif isinstance(law, ConnectorLaw):
             yield name, "may dissipate, and may have kinks"

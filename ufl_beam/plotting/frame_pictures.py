@@ -48,7 +48,6 @@ DRAWN_AS_ZERO = 1e-4  # fraction of the largest value below which a value is dra
 ALIKE = 0.999  # values above this fraction of the peak of an area count as equal to the peak
 LABELLED = 0.15  # peaks above this fraction of the largest value are labelled
 MOST_BEAMS = 60  # number of beams beyond which only extremes are labelled, without directions
-
 CROWDED = 0.08  # fraction of the axes that labels cover; the largest values are labelled first
 MOST_AREAS = 500  # largest number of areas whose ordinates labels should not cover
 MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
@@ -159,14 +158,13 @@ def draw_frame(
             peaks = _peaks(rows, factor, LABELLED if len(beams) <= MOST_BEAMS else 1.0)
         draw_beams(axes, solution, shape.nodes, color=shade(INK), linewidth=2.6, zorder=4)
         draw_strokes(axes, symbols.in_plane(shape))
-        meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
-        if len(beams) > MOST_BEAMS:  # without arrows
-            for color, words in meanings.items():
-                meanings[color] = words.replace(" of the arrow", ", from start to end")
         areas = {area.get_gid(): area for area in axes.collections}
-        named: dict[str, Artist] = {
-            words: areas[color] for color, words in meanings.items() if color in areas
-        }
+        named: dict[str, Artist] = {}
+        for color, words in zip((RED, BLUE), SIGNS.get(what, ()), strict=False):
+            if len(beams) > MOST_BEAMS:  # without arrows
+                words = words.replace(" of the arrow", ", from start to end")
+            if color in areas:
+                named[words] = areas[color]
         named |= draw_damage(axes, solution, n, shape)
         for words, artist in named.items():
             artist.set_label(words)
@@ -366,8 +364,7 @@ def _draw_hinges(
     colors: list[Any] = [BLUE] * len(hinges)
     entries: list[tuple[float, str, Any]] = []  # of the legend: fraction, words, colour
     if not all(math.isnan(hinge.fraction) for hinge in hinges):
-        examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")
-        entries += [(fraction, words, BLUE) for fraction, words in examples]
+        entries += [(0.1, "hinge, 10 % broken", BLUE), (0.5, "50 %", BLUE), (1, "fully open", BLUE)]
     if limits:
         words, names = [f"{x}, up to {y:g} rad" for x, y in limits.items()], [*limits]
         names.append(f"beyond {names[-1]}")

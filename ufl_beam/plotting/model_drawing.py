@@ -35,7 +35,6 @@ LOAD_LABELS, MOTIONS, CAPTIONS, NAMES = range(
 )  # ranks of labels: labels of loads are placed first
 MOST_LABELS = 80  # number of labels beyond which names, and then captions, are left out
 MOST_CELLS = 300  # number of cells beyond which neither cells nor possible hinges are marked
-
 FEW_HINGES = 4  # number of equal hinges beyond which a note has their limit, instead of labels
 
 HINGE = "#B0508A"  # colour of hinges

@@ -53,10 +53,7 @@ class ElasticBeams(CellForce):
         r, losses = scheme.resultants(C, e0, e1, element.constant), []
         if scheme.alpha:
             losses.append(2 * element.constant(scheme.alpha) * elastic_energy(e1 - e0, C))
-        self._decays, self._change_before = (
-            bool(scheme.lost_fraction),
-            element.at_points(3),
-        )
+        self._decays, self._change_before = bool(scheme.lost_fraction), element.at_points(3)
         acting = (
             scheme.weight_of_before * scheme.resultants(C, e0, e0, element.constant)
             + (1 - scheme.weight_of_before) * r

@@ -16,13 +16,7 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import perpendicular, split
-from ufl_beam.mechanics.time_scheme import (
-    Step,
-    acting,
-    combined,
-    has_inertia,
-    nodal_step,
-)
+from ufl_beam.mechanics.time_scheme import Step, acting, combined, has_inertia, nodal_step
 from ufl_beam.model.bodies import GROUND, moves_with_node
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.imposed_strains import ImposedStrain

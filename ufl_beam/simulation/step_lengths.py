@@ -20,17 +20,13 @@ from ufl_beam.quadrature import gauss_rule
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
 
-GROWTH = 1.5
-"""Largest ratio of the length of a step to the length of the previous step."""
-
+GROWTH = 1.5  # largest ratio of the length of a step to the length of the previous step
 LASTS = 10  # mean steps over which a wrong velocity is a wrong displacement at a switch
 OUTSTANDING = 4  # error of velocities, divided by the last one, from which a step has a switch
 LOCATED = 1e-9  # least length of a step that is divided at a switch, as a fraction of the run
 HALVES = 8  # tolerance divided by that of half steps, whose errors are of third order
 REMAINING = 1.5  # error of steps by their difference to half steps: 4/3 at order 2, 2 at order 1
-
-MOST = 2**14
-"""Largest number of steps of one call of C, which returns earlier if steps take long."""
+MOST = 2**14  # largest number of steps of one call of C, which returns earlier if steps take long
 
 Rule = tuple[Array, Array]
 """Fractions of a step at which a function is sampled, and weights of the samples; both (n,)."""
@@ -159,7 +155,7 @@ class Adaptive:
 class AdaptiveSteps(Steps):
     """Steps whose error is estimated and limited."""
 
-    _STATE = ("steps", "error", "_dt", "_fresh")
+    _STATE: tuple[str, ...] = ("steps", "error", "_dt", "_fresh")
 
     def __init__(self, simulation: Simulation, t1: float, control: Adaptive) -> None:
         super().__init__(simulation, t1)
@@ -349,6 +345,8 @@ class PilotSteps(AdaptiveSteps):
         saved: State before the last step.
     """
 
+    _STATE = (*AdaptiveSteps._STATE, "_before_dt", "_last_error")
+
     def __init__(self, pilot: Pilot, t1: float, control: Adaptive) -> None:
         super().__init__(pilot, t1, control)
         self.taken = [(pilot.t, pilot.q, False)] * 4
@@ -413,8 +411,6 @@ class PilotSteps(AdaptiveSteps):
     def _save_or_restore(self, archive: Archive) -> None:
         self._simulation.save_or_restore(archive)
         self._before = archive.at_dofs("acceleration before", self._before)
-        self._before_dt = archive.number("step of acceleration", self._before_dt)
-        self._last_error = archive.number("error of velocities", self._last_error)
         self.restore({name: archive.number(name, x) for name, x in self.state().items()})
         for k, (t, q, final) in enumerate(self.taken):
             final = archive.number(f"final {k}", final) > 0

@@ -13,17 +13,13 @@ from scipy.sparse import block_array, csr_array, eye_array
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.csr import Csr
 
-TOLERANCE = 1e-12
-"""Tolerance of the residual of an eigenpair, relative to its eigenvalue."""
+TOLERANCE = 1e-12  # tolerance of the residual of an eigenpair, relative to its eigenvalue
 
 SHIFT = 1e-13
 """Shift relative to the least squared frequency of a dof alone; round-off hides smaller shifts."""
 
-EXTRA = 8
-"""Number of additional eigenvalues, so that none of several close eigenvalues is missed."""
-
-DENSE = 200
-"""Number of unknowns up to which LAPACK finds all eigenvalues with their multiplicities."""
+EXTRA = 8  # number of additional eigenvalues, so that none of several close eigenvalues is missed
+DENSE = 200  # number of unknowns up to which LAPACK finds all eigenvalues with their multiplicities
 
 ROUND_OFF = 64 * float(np.finfo(np.float64).eps)
 """Bound on the round-off of a matrix, relative to its largest entry."""

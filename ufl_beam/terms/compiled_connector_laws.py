@@ -426,10 +426,7 @@ class UserLaw:
         by_rate: Array = np.zeros(1 + len(before))
         if math.isfinite(dt):  # a path takes infinite time, in which rates do not change
             by_rate = by(rate, max(abs(rate), size / dt), 0.0, 1.0, 0.0)
-        columns = [
-            weight * by_motion + by_rate / dt,
-            (1.0 - weight) * by_motion - by_rate / dt,
-        ]
+        columns = [weight * by_motion + by_rate / dt, (1.0 - weight) * by_motion - by_rate / dt]
         for direction, old, new in zip(np.eye(len(before)), before, after, strict=True):
             largest = max(abs(old), abs(new), size)
             columns.append(by(new - old, largest, 0.0, 0.0, direction))

@@ -566,11 +566,7 @@ class RigidPlasticLaws(Response):
             direction_before=direction_before,
         )  # fmt: skip
         self.in_c = {"rigid_plastic": self._c}
-        self._in_steps = {
-            "dt_of_law": INPUTS.index("dt"),
-            "hardened": self._stored,
-            "loss": loss,
-        }
+        self._in_steps = {"dt_of_law": INPUTS.index("dt"), "hardened": self._stored, "loss": loss}
 
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Return the energy dissipated in a step to the motions ``e1``; J.
