@@ -22,8 +22,7 @@ T = TypeVar("T", bound=tuple[Any, ...])
 P = ParamSpec("P")
 Cached = TypeVar("Cached")
 
-MOST_CACHED = 64
-"""Largest number of cached results of each function."""
+MOST_CACHED = 64  # largest number of cached results of each function
 
 LARGEST = 2**16
 """Largest size of the arguments of a cached result: bytes of arrays plus values of whole numbers.

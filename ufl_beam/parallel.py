@@ -36,14 +36,12 @@ with warnings.catch_warnings():
 
 T = TypeVar("T")
 
-GRACE = 3.0
-"""Time for which a failed process waits for the other processes; s."""
+GRACE = 3.0  # time for which a failed process waits for the other processes; s
 
 FAILED = 32_749
 """Tag of messages of processes that end with an exception; MPI guarantees tags up to 32767."""
 
-DELAY = 0.5
-"""Time before a progress bar is shown, and between its updates; s."""
+DELAY = 0.5  # time before a progress bar is shown, and between its updates; s
 
 _ACTIVE: ContextVar[MPI.Intracomm] = ContextVar("processes of a scene", default=MPI.COMM_WORLD)
 
@@ -282,11 +280,8 @@ Measured with lattices on two cores: at some 3 000 cells each, two processes are
 6 000 cells each they are 1.2 times as fast.
 """
 
-INTERVAL = 256
-"""Largest number of steps between comparisons."""
-
-LONGEST_WAIT = 20.0
-"""Time for which a process waits for the other processes before it warns; s."""
+INTERVAL = 256  # largest number of steps between comparisons
+LONGEST_WAIT = 20.0  # time for which a process waits for the other processes before it warns; s
 
 _begun: list[tuple[MPI.Request, Array]] = []
 """Comparisons that may be incomplete.  MPI writes into their buffers until they are complete, also

@@ -66,7 +66,6 @@ SINGULAR = 1e-6
 undetermined, as a fraction of the largest one; derivatives have errors of 1e-7."""
 
 INVOLVED = 0.1  # least component of a parameter in a singular direction that is named
-
 CORRELATED = 0.99  # correlation above which a warning is issued
 
 WIDE = 1.0
@@ -78,9 +77,7 @@ STALLED, LEAST_MOVE = 0.5, 1e-6
 deviations, and in the search variables, in which errors of derivatives move the end."""
 
 RESTARTS = 3  # most further searches from such an end
-
 HALVINGS = 8  # most attempts to find a start at which all runs succeed
-
 AT_BOUND = 1e-4  # distance from a bound that counts as zero, in the search variables
 
 FAILURES = ConvergenceError, ArgumentError  # of runs during a search

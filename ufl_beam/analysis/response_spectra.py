@@ -24,8 +24,7 @@ The error of yielding oscillators is of second order; see
 tests/verification/test_ground_motions.py.
 """
 
-RATIO = 1.05
-"""Ratio of successive strengths in the search for a ductility."""
+RATIO = 1.05  # ratio of successive strengths in the search for a ductility
 
 
 @in_one_line

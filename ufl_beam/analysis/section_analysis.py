@@ -29,17 +29,13 @@ from ufl_beam.model.fibres import Fibres
 from ufl_beam.model.sections import Section
 from ufl_beam.terms.material_points import Points
 
-SUBSTEPS = 1024
-"""Number of smallest substeps in a step of curvature and axial force."""
+SUBSTEPS = 1024  # number of smallest substeps in a step of curvature and axial force
 
 TOLERANCE = 1e-13
 """Error of N, as a fraction of EA times the largest strain so far, up to which N is met."""
 
-MOST_STRAIN = 10.0
-"""Largest axial strain among those that are tried."""
-
-MOST_ITERATIONS = 200
-"""Largest number of corrections of the axial strain in a substep."""
+MOST_STRAIN = 10.0  # largest axial strain among those that are tried
+MOST_ITERATIONS = 200  # largest number of corrections of the axial strain in a substep
 
 
 class _State:

@@ -25,8 +25,7 @@ from ufl_beam.model.checks import (
 from ufl_beam.model.functions import Curve, Point, tangent_within
 from ufl_beam.model.records import NotNegative, Number, Record, Text, Vector
 
-TOGETHER = 1e-9
-"""Largest distance at which two places of a beam coincide, as a fraction of a cell."""
+TOGETHER = 1e-9  # largest distance at which two places of a beam coincide, as a fraction of a cell
 
 
 class Member(ABC):

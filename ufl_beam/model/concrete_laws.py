@@ -18,11 +18,8 @@ from ufl_beam.model.records import NotNegative, Positive, Record
 from ufl_beam.model.softening_laws import LinearSoftening, SofteningLaw, require_softening
 from ufl_beam.quadrature import gauss_rule
 
-TINY = 1e-30
-"""Strain that replaces zero in divisors and logarithms."""
-
-BEYOND = 1e30
-"""Finite number instead of an infinite strain."""
+TINY = 1e-30  # strain that replaces zero in divisors and logarithms
+BEYOND = 1e30  # finite number instead of an infinite strain
 
 NO_TENSION = LinearSoftening(0.0, 1.0)
 

@@ -31,14 +31,12 @@ OWN_LAW = "state a ConnectorLaw of your own"
 FALL = 0.1
 """Longest fall to zero strength after the ultimate rotation, as a fraction of this rotation."""
 
-LEAST_STIFFNESS = 0.1
-"""Smallest unloading stiffness, as a fraction of the elastic stiffness."""
+LEAST_STIFFNESS = 0.1  # smallest unloading stiffness, as a fraction of the elastic stiffness
 
 STEEPER = 1.1
 """Smallest unloading stiffness after pinching, divided by the slope of the reloading path."""
 
-UNBOUNDED = 1e100
-"""Number that stands for infinity, for which compiled expressions would be NaN."""
+UNBOUNDED = 1e100  # number that stands for infinity, for which compiled expressions would be NaN
 
 FromZeroOrInfinite = Annotated[float, partial(require_number, positive=True, infinite=True)]
 Exponent = Annotated[float, partial(require_number, at_least=1.0)]

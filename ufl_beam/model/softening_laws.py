@@ -41,8 +41,7 @@ round-off, or to 1e-10 of the energy if the step contains a kink.
 MOST_INTERVALS = 10_000
 """Number of intervals above which adaptive quadrature stops, as for a law with noise."""
 
-DECADES = 20
-"""Laws are sampled at openings from 10**-DECADES to 10**DECADES; m or rad."""
+DECADES = 20  # laws are sampled at openings from 10**-DECADES to 10**DECADES; m or rad
 
 
 class SofteningLaw(ABC):

@@ -239,8 +239,7 @@ class WrongReader(ArgumentError):
 NPY: Any = np.lib.format
 """NumPy's reader and writer of arrays, which has no type annotations."""
 
-DIGEST = 64
-"""Number of bytes of the checksum at the end of a file."""
+DIGEST = 64  # number of bytes of the checksum at the end of a file
 
 END = re.compile(rb"(?s).*?(\w+ of ufl_beam, \d+); written by ufl_beam ([!-~]+); sha256 \w{64}")
 """Pattern of the end of a file; its groups are the format and the version of the package."""

@@ -35,7 +35,6 @@ RESULTANTS = {"N": ("axial force", "N"), "V": ("shear force", "N"), "M": ("bendi
 
 POINTS = 72.0  # points per inch
 CSS_DPI = 80.0  # pixels on an HTML page per inch of a figure
-
 FONT = 13.0  # default size of texts; points
 FRAME = "#888888"  # colour of axes and their ticks
 

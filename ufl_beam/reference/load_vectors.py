@@ -44,8 +44,7 @@ from ufl_beam.reference.cell_forms import (
     point_masses,
 )
 
-AT_REST = 1e300
-"""Largest step length in forms, so large that all rates vanish; s."""
+AT_REST = 1e300  # largest step length in forms, so large that all rates vanish; s
 
 
 class LoadForce(Force, ABC):

@@ -24,8 +24,7 @@ from ufl_beam.reference.cell_forms import Search, Setting
 CLOSED, FLOWING = 0.0, 1.0
 """Values of the flag of a discontinuity that did not grow, or did grow, in the last step."""
 
-IMAGINARY = 1e-200
-"""Size of a complex step; its square does not change the value."""
+IMAGINARY = 1e-200  # size of a complex step; its square does not change the value
 
 EPS = float(np.finfo(float).eps)
 

@@ -116,11 +116,8 @@ ALTERNATIONS = 20
 
 Changes are counted from step to step, or from sample to sample."""
 
-SUSPICIOUS = 5
-"""Number of such changes up to the failure of a run that the error reports."""
-
-LEAST_CHANGE = 0.5
-"""Least size of a counted change, as a fraction of the largest force so far."""
+SUSPICIOUS = 5  # number of such changes up to the failure of a run that the error reports
+LEAST_CHANGE = 0.5  # least size of a counted change, as a fraction of the largest force so far
 
 LEAST_MOTION = 1e-9
 """Least motion of a connector in the step of a counted change; in sizes of the scene, or rad."""

@@ -47,8 +47,7 @@ the least force that a message names, relative to the largest force."""
 SOFT = 1e-3
 """Stiffness up to which a connector or cell is soft, as a fraction of its elastic stiffness."""
 
-YIELDED = 0.5
-"""The same fraction, up to which a message on a limit load names a connector or cell."""
+YIELDED = 0.5  # the same fraction, up to which a message on a limit load names a connector or cell
 
 PROBE_DISTANCE = 1e-3
 """Distance of the probe state from the initial state of a step; in sizes of the scene, or rad.  The
@@ -70,8 +69,7 @@ step, the smallest substep, gives 1/64; a tenth allows for larger distances."""
 LEDGER_TOLERANCE = 10.0
 """Largest relative imbalance of a ledger that should be exact, as a multiple of ``Newton.rtol``."""
 
-NAMED = 3
-"""Largest number of names that a message lists."""
+NAMED = 3  # largest number of names that a message lists
 
 MOST_LISTED = 12
 """Largest number of connectors and cells that a message lists as parts of a mechanism."""
@@ -347,8 +345,7 @@ def _list(names: list[str], most: int = NAMED) -> str:
 
 # -- signs in the ledger of a run ------------------------------------------------------------------
 
-GROUP_SIZE = 100
-"""Number of steps in a group; numerical losses are summed over each group."""
+GROUP_SIZE = 100  # number of steps in a group; numerical losses are summed over each group
 
 LARGE_LOSS = 5.0
 """Least numerical loss in a group that is reported, as a multiple of the largest energy of the
@@ -357,8 +354,7 @@ scene in the group.
 A motion that the steps resolve loses a small fraction of its energy in each step.
 """
 
-SMALL_LOSS = 1e-6
-"""Numerical loss that is never reported, as a fraction of the energy transferred."""
+SMALL_LOSS = 1e-6  # numerical loss that is never reported, as a fraction of the energy transferred
 
 
 class LedgerWatch:

@@ -11,14 +11,12 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Subdomain
 
-DENSE = 300
-"""Number of unknowns up to which null vectors come from a singular value decomposition."""
+DENSE = 300  # number of unknowns up to which null vectors come from a singular value decomposition
 
 SINGULAR = 1e-12
 """Largest singular value that counts as zero, of a matrix whose entries are scaled to about 1."""
 
-ROUNDS = 40
-"""Largest number of scaling passes."""
+ROUNDS = 40  # largest number of scaling passes
 
 
 def free_matrix(subdomain: Subdomain, A: Csr, constrained: Index) -> tuple[csc_array, Index]:

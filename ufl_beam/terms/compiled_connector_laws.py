@@ -289,8 +289,7 @@ RELATIVE_STEP = 2.0**-13
 LEAST_CHANGE = 1e-3
 """Least change of an input in a step that differences resolve, as a fraction of its size."""
 
-ALIKE = 1e-8
-"""Relative difference of derivatives by small and large steps that counts as round-off."""
+ALIKE = 1e-8  # relative difference of derivatives by small and large steps that counts as round-off
 
 
 def _five_point(function: Callable[[float], Array], change: float, size: float) -> Array:
