@@ -10,6 +10,7 @@ from functools import cached_property
 from petsc4py import PETSc
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.caches import cached_by_structure
@@ -51,6 +52,10 @@ class Csr:
     def size(self) -> int:
         """Number of rows of the matrix."""
         return len(self.indptr) - 1
+
+    def sparse(self) -> csr_array:
+        """Return the matrix as an array of SciPy, which shares the data."""
+        return csr_array((self.data, self.indices, self.indptr), shape=(self.size, self.size))
 
     def narrow(self) -> bool:
         """Return whether each row has at most 256 entries, so that a byte can number them."""

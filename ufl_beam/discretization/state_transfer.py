@@ -3,23 +3,31 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 from mpi4py import MPI
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.discretization.function_spaces import Fields, applied, mass_form, point_masses
+from ufl_beam.discretization.function_spaces import Fields, mass_matrix
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import ModelError
-from ufl_beam.mechanics.impacts import ROUND_OFF, Excess
-from ufl_beam.model.bodies import GROUND, Body, node
+from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connectors import Connector
 
 APART = 1e-6
 """Largest difference between the positions of two places that a new joint may connect, relative to
 the size of the scene; in rotations, in rad."""
+
+ROUND_OFF = 1e-6
+"""Largest difference of velocities that is not an impact, relative to all velocities."""
+
+Excess = tuple[Array, float]
+"""Momentum and kinetic energy (J) before an impact in addition to those of the velocities: of parts
+with different velocities that begin to share an unknown."""
 
 CELL_TABLES = ("cells", "changes of strains")
 """Tables of internal variables of cells; the other tables are of connectors."""
@@ -99,27 +107,19 @@ class Transfer:
         The second result is the momentum and energy of the velocities of places that begin to share
         an unknown, if they differ; they are in addition to those of the first result.
         """
-        mapped = self._on_ground(self._map(v))
-        gaps = np.abs(mapped[self._to] - v[self._from]) * self._new.scales[self._to]
-        if gaps.max() <= ROUND_OFF * np.abs(v * self._old.scales).max():
+        mapped, new = self._on_ground(self._map(v)), self._new
+        gaps, fastest = v[self._from] - mapped[self._to], np.abs(v * self._old.scales).max()
+        if np.abs(gaps * new.scales[self._to]).max() <= ROUND_OFF * fastest:
             return mapped, None
-        new, old = (Fields(Subdomain(x, MPI.COMM_SELF)) for x in (self._new, self._old))
-        # Each cell has unknowns of its own.
-        own = np.arange(new.cell_dofs.size, dtype=np.int32).reshape(new.cell_dofs.shape)
-        q1, momentum = new.element.q1, np.zeros(own.size)
-        kernel = new.kernel(applied(mass_form(new.element), q1), q1, own)
-        at, apart = new.cell_dofs.ravel(), v[old.cell_dofs.ravel()] - mapped[new.cell_dofs.ravel()]
-        kernel.add(apart, momentum)
-        excess, energy = np.zeros(self._new.size), apart @ momentum / 2
-        np.add.at(excess, at, momentum)
-        for place, mass, inertia in point_masses(self._old.scene):
-            if isinstance(node(place), Body) and node(place) not in self._new.scene.rigid_bodies:
-                continue
-            gap = v[self._old.node(place)] - mapped[self._new.node(place)]
-            of_mass = np.array([mass, mass, inertia]) * gap
-            excess[self._new.node(place)] += of_mass
-            energy += of_mass @ gap / 2
-        return mapped, (excess, float(energy))
+        own = np.arange(3 * (len(new.dofs) + len(new.dofs_of_bodies))).reshape(-1, 3)
+        apart = copy(new)  # nodes have unknowns of their own
+        apart.dofs, apart.dofs_of_bodies = np.split(own, [len(new.dofs)])
+        apart.size = own.size + new.size
+        gap = np.append(gaps, np.zeros(apart.size - len(gaps)))
+        momentum = mass_matrix(Fields(Subdomain(apart, MPI.COMM_SELF))).sparse() @ gap
+        excess = np.zeros(new.size)
+        np.add.at(excess, self._to, momentum[: len(gaps)])
+        return mapped, (excess, float(gap @ momentum / 2))
 
     def _map(self, x: Array) -> Array:
         mapped = np.zeros(self._new.size)

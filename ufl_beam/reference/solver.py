@@ -22,7 +22,6 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering, turned
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.impacts import motions_of
 from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, has_inertia, nodal_step, stages_of
 from ufl_beam.model.bodies import Body, Member
 from ufl_beam.model.connector_law import ForceLaw
@@ -110,9 +109,10 @@ class Solver(PresentState):
 
     Attributes:
         forces: All forces of the scene, inner forces first.
+        impacts: Finds impacts where prescribed rates jump; None if no rate does.
     """
 
-    _impacts: Any = None
+    impacts: Any = None
 
     def __init__(
         self, numbering: DofNumbering, scheme: Scheme, t: float, q: Array, v: Array, *, rtol: float,
@@ -159,8 +159,6 @@ class Solver(PresentState):
         self.inertia = None
         if has_inertia(scheme):
             self.inertia = Inertia(setting, scheme, self.supports.stop(v))
-            if motions_of(scene):
-                setting.loses("impacts")
         inertia = [] if self.inertia is None else [self.inertia]
         self.loads = all_loads(setting, self.inertia, t)
         self.inner: list[Force] = [*self.beams, *self.connectors]
@@ -245,21 +243,13 @@ class Solver(PresentState):
         together = {name: np.concatenate(arrays) for name, arrays in archive.saved.items()}
         return {n: x if x.ndim == 1 else x[np.argsort(x[:, 0])] for n, x in together.items()}
 
-    def meet(self, impacts: Any, impact: Any, checked: float) -> None:
-        """Enter the impact with which the run begins, if there is one.
-
-        After the time ``checked`` (s), ``impacts`` finds impacts where prescribed rates jump.
-        """
-        self._impacts, self._met = impacts, checked
-        self._enter(impact)
-
-    def _enter(self, impact: Any) -> None:
-        """Change the velocities by an impact, if there is one."""
+    def meet(self, impact: Any) -> None:
+        """Change the velocities by an impact, if there is one; see :attr:`impacts`."""
         if impact is not None and self.inertia is not None:
             self.inertia.v = self.inertia.v_before = impact.v
             self.inertia.more = ()
             groups = [(group.indices, group.work) for group in self.connectors]
-            self._impacts.enter(impact, self.ledger, groups)
+            self.impacts.enter(impact, self.ledger, groups)
 
     # -- a step, and its substeps ----------------------------------------------------------------
 
@@ -306,10 +296,11 @@ class Solver(PresentState):
         If ``at_rest`` is a time, the loads of that time are applied, and nodes must not turn far.
         """
         inertia = self.inertia
-        if self._impacts is not None and inertia is not None:
-            counts = self._impacts.after(self.last_dt, self.t, t1, self._met)
-            arguments = self.q, inertia.v, self.t, counts, self.internal()
-            self._enter(self._impacts.find(*arguments, longest=(t1 - self.t) / 4))
+        if self.impacts is not None and inertia is not None:
+            counts = self.impacts.after(self.last_dt, self.t, t1)
+            state = self.internal() if any(counts) else {}
+            at = self.q, inertia.v, self.t, counts, state
+            self.meet(self.impacts.find(*at, longest=(t1 - self.t) / 4))
         if inertia is not None and inertia.scheme.further_rates and not inertia.more:
             # A short trial step gives the initial accelerations.
             t = self.t + TRIAL_STEP * (t1 - self.t)

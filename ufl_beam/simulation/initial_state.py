@@ -20,10 +20,9 @@ from ufl_beam.discretization.model_warnings import (
     warn_of_touching,
 )
 from ufl_beam.discretization.state_io import State
-from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
+from ufl_beam.discretization.state_transfer import Excess, Transfer, same_unknowns
 from ufl_beam.discretization.work_forms import statement
 from ufl_beam.errors import ArgumentError, require_kind, shorten, warn
-from ufl_beam.mechanics.impacts import Excess
 from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import DEFAULT_MESH, Mesh
 from ufl_beam.model.connector_laws import RIGID, Coulomb, Guide

@@ -30,7 +30,6 @@ from ufl_beam.errors import (
     shorten,
     warn,
 )
-from ufl_beam.mechanics.impacts import motions_of
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connector_laws import Controller
@@ -43,7 +42,7 @@ from ufl_beam.parallel import communicator, print_once, progress_bar
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.checkpoint import Checkpoint, CheckpointFile, checksum_at
 from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch, warn_of_rayleigh
-from ufl_beam.simulation.impacts import Impacts
+from ufl_beam.simulation.impacts import impacts_of
 from ufl_beam.simulation.initial_state import (
     StateOf,
     checked_numbering,
@@ -55,7 +54,6 @@ from ufl_beam.simulation.initial_state import (
 )
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
-from ufl_beam.simulation.step_equation import equation_of_scene
 from ufl_beam.simulation.step_lengths import (
     Adaptive,
     AdaptiveSteps,
@@ -400,26 +398,18 @@ def simulate_by_reference(
     newton = checked_newton(newton, comm)
     begin, (t0, t1) = time.perf_counter(), times
     numbering, _ = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=start is None)
-    q, v, internal, excess = initial_state(numbering, start)
+    q, v, internal, _ = state = initial_state(numbering, start)
     t0, same = continuation(start, scene, t0)
-    dynamic = start is not None and len(start.v) > 0
-    moving = start if dynamic and (v.any() or excess is not None) else None
-    impacts, impact, moves = None, None, has_inertia(scheme) and bool(motions_of(scene))
-    if has_inertia(scheme) and (moves or (moving is not None and not same)):
-        impacts = Impacts(whole := equation_of_scene(numbering, scheme, t0))
-        if moving is None:
-            whole.supports.stop(v)
-        if not (same and dynamic):
-            counts = impacts.at_start(t0, moving)
-            impact = impacts.find(q, v, t0, counts, internal, excess)
-            v = v if impact is None else impact.v
+    impacts, impact = impacts_of(numbering, scheme, t0, start, same, state)
+    v = v if impact is None else impact.v
     options: dict[str, Any] = {"max_iterations": newton.max_iterations, "petsc": newton.petsc}
     solver = Solver(numbering, scheme, t0, q, v, rtol=newton.rtol, **options)
     between = float(scheme.average(0.0, 1.0))
     solver.start(None if start is None else internal, same=same)
-    if impacts is not None:
-        met = t0 if moving is None and not (same and dynamic) else -math.inf
-        solver.meet(impacts, impact, met if moves else math.inf)
+    solver.impacts = impacts
+    if impacts is not None and impacts.moves:
+        solver.ledger.lost["impacts"] += 0.0
+    solver.meet(impact)
     if (
         start is not None
         and start.equilibrium_fraction == between

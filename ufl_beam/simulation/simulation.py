@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from functools import cached_property, partial
 from itertools import chain
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from mpi4py import MPI
 
@@ -19,7 +19,6 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import ArgumentError, ModelError, StepFailed, require_number, shorten
-from ufl_beam.mechanics.impacts import motions_of
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.loads import RotatingFrame
@@ -30,7 +29,7 @@ from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWrite
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, communicator, sharing
 from ufl_beam.simulation.diagnosis import no_equilibrium
-from ufl_beam.simulation.impacts import Impact, Impacts
+from ufl_beam.simulation.impacts import Impact, impacts_of
 from ufl_beam.simulation.initial_state import (
     StateOf,
     checked_numbering,
@@ -40,12 +39,7 @@ from ufl_beam.simulation.initial_state import (
     mesh_of,
 )
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_equation import (
-    StaticPath,
-    StepEquation,
-    equation_of_scene,
-    forces_of_scene,
-)
+from ufl_beam.simulation.step_equation import StaticPath, StepEquation, forces_of_scene
 from ufl_beam.simulation.stepper import Stepper
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
@@ -125,25 +119,18 @@ class Simulation(Stepper):
         fresh = start is None
         numbering, free_motion = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=fresh)
         subdomain = Subdomain(numbering, sharing(comm, len(numbering.cells)))
-        together, (q, v, internal, excess) = (
-            Agreement(subdomain.comm),
-            initial_state(numbering, start),
-        )
+        together, state = Agreement(subdomain.comm), initial_state(numbering, start)
+        q, v, internal, _ = state
         t0, same = continuation(start, scene, t0)
         equation = StepEquation(subdomain, scheme, t0, v[subdomain.dofs], together)
         inertia, q_local, loaded = equation.inertia, q[subdomain.dofs], list[Array]()
         goes_on = same and "reactions" in internal and start is not None and not len(start.v)
-        moves, met = bool(motions_of(scene)), -math.inf  # met: rates do not contradict until then
-        dynamic = start is not None and len(start.v) > 0
-        moving = start if dynamic and (v.any() or excess is not None) else None
-        if inertia is not None and (moves or (moving is not None and not same)):
-            alone = subdomain.alone
-            impacts = Impacts(equation if alone else equation_of_scene(numbering, scheme, t0))
-            self._impacts = impacts
-            if not (same and dynamic):
-                v, met = (subdomain.gather(inertia.v), t0) if moving is None else (v, met)
-                at = q, v, t0, impacts.at_start(t0, moving), internal, excess
-                self._meet(equation, together(impacts.find, *at))
+        whole = equation if subdomain.alone else None
+        impacts, impact = together(impacts_of, numbering, scheme, t0, start, same, state, whole)
+        self._impacts: Any = impacts
+        if moves := impacts is not None and impacts.moves:
+            equation.ledger.lost["impacts"] += 0.0
+        self._meet(equation, impact)
         if not fresh or (inertia is not None and inertia.scheme.further_rates):
             rates = None if inertia is None else inertia.v
             past = Archive(subdomain, internal) if same else None
@@ -173,10 +160,10 @@ class Simulation(Stepper):
         if forces is not None or inertia is not None:
             equation.cell_forces.begin(forces)
         super().__init__(comm, equation, newton, t0, q_local, path, solution, together, free_motion)
-        self._begun_at, self._met = before, met
+        self._begun_at = before
         if same:
             self.prediction.carry_on(Archive(subdomain, internal))
-        if inertia is not None and moves:
+        if moves:
             fill(self.time_loop, meet_jumps=lib.time_in_python, next_jump=-math.inf)
             self.time_loop.impacts = equation.callbacks.handle(self._meet_jumps)
         solution.needs_start = solution.equilibrium_fraction < 1 or self.cell_forces.needs_q0
@@ -202,14 +189,9 @@ class Simulation(Stepper):
         Returns the time from which on rates may jump again.
         """
         c, t, impacts = self.time_loop, self.time_loop.t, self._impacts
-        counts = impacts.after(c.prediction.dt, t, t1, self._met)
-        if any(counts):
-            state, q = None, self._copy(c.q)
-            if not self.subdomain.alone:
-                archive = Archive(self.subdomain)
-                for term in self.connector_terms:
-                    term.save_or_restore(archive, q)
-                state = archive.state()
+        if any(counts := impacts.after(c.prediction.dt, t, t1)):
+            q, alone = self._copy(c.q), self.subdomain.alone
+            state = {} if alone else self.equation.internal_variables(q, t, self.prediction)
             q, v = (self.subdomain.gather(x).copy() for x in (q, self.inertia.v))
             impact = impacts.find(q, v, t, counts, state, longest=(t1 - t) / 4)
             if impact is not None and (c.derivatives or c.adjoint):
@@ -219,7 +201,7 @@ class Simulation(Stepper):
                 )
             self._meet(self.equation, impact)
             self._moved(t)
-        return impacts.next_check(t + 1e-9 * (t1 - t))
+        return float(impacts.next_check(t + 1e-9 * (t1 - t)))
 
     def _meet(self, equation: StepEquation, impact: Impact | None) -> None:
         """Change the velocities of this process by an impact, if there is one."""

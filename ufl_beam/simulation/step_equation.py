@@ -21,7 +21,6 @@ from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import NOWHERE, Archive, State
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.impacts import motions_of
 from ufl_beam.mechanics.time_scheme import Scheme, Step, has_inertia
 from ufl_beam.model.connector_laws import has_friction
 from ufl_beam.model.constraint_checks import friction_repeats
@@ -138,8 +137,6 @@ class StepEquation:
             inertia.commit(v, v, math.inf)
             if inertia.loses_energy:
                 ledger.lost["numerical"] += 0.0
-            if motions_of(scene):
-                ledger.lost["impacts"] += 0.0
             others.append(inertia)
         for damping in scene.damping:
             others += damping_forces(damping, fields, *setting, inertia, self.inelastic)
