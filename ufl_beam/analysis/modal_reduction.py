@@ -50,7 +50,6 @@ class Reduction:
         rest: r and the forces of constraints, at all unknowns, as functions of the same.
 
     Args:
-        equations: Equations of small motions.
         x: Modes, in columns; with mass 1.
         squares: Squared frequencies of the modes, if they are eigenvectors of K; rad²/s².
         others: Motions without stiffness among the modes that are left out.
@@ -75,24 +74,22 @@ class Reduction:
         for _ in range(2):  # the second time reduces round-off
             change, z = solve(B0 - K @ P)
             P = P + change + by_modes @ z[:n]
-        viscous = (C + C.T) / 2
         # Of inexact modes only motions without mass lag behind: springs hold the others.
         held = np.where((M.diagonal() > 0.0) & (not exact), abs(K).max() / ROUND_OFF, 0.0)
-        damping = equations._replace(C=viscous, K=K + diags_array(held))
+        damping = equations._replace(C=(C + C.T) / 2, K=K + diags_array(held))
         v = lags(damping, W, np.hstack([x, P]), omega, lengths)
-        r, damped = v.shape[1], viscous @ v
+        r, damped = v.shape[1], damping.C @ v
         solve = _bordered(K, np.hstack([W, damped]))
         at = np.cumsum([0, n, r, n, nu, nu, nf, nu])
         q, b, dq, u, du, f, ddu = (np.eye(at[-1])[i:j] for i, j in pairwise(at))
         loads = F @ f - forces @ q - (K @ v) @ b
         by_rates = (B1 - C @ P) @ du + (B2 - M @ P) @ ddu - (C @ x) @ dq
         loads[y] += by_rates[y]
-        self.rest, rates = solve(loads)
-        constraints = np.setdiff1d(np.arange(size), y)
-        self.rest[constraints] += (x @ q + P @ u)[constraints]
+        rest, rates = solve(loads)
+        constraints = np.isin(np.arange(size), y, invert=True)[:, None]
         # Rates of lags with mass are left out, like r'.
         light = np.where(M.diagonal()[:, None] == 0.0, v, 0.0)
-        self.rest += (v - light) @ b
+        self.rest = rest + constraints * (x @ q + P @ u) + (v - light) @ b
         ddq, db = rates[:n] - own[:, None] * q, rates[W.shape[1] :]
         toward = (M @ x)[y].T
         beside = np.linalg.solve(v.T @ damped, damped.T)[:, y]
