@@ -23,6 +23,7 @@ from ufl_beam.model.connector_laws import (
     Controller,
     Coulomb,
     Damper,
+    PrescribedForce,
     RigidPlastic,
     Spring,
     Stop,
@@ -380,6 +381,7 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
 def warn_of_held_motions(scene: Scene) -> None:
     """Warn of springs, dampers and hinges whose motion joints or supports hold at zero.
 
+    Motors are left out, because a state for their start may hold them.
     The gradient of such a motion is a combination of constraints of joints between the same places,
     or vanishes at all free degrees of freedom.
     """
@@ -402,7 +404,7 @@ def warn_of_held_motions(scene: Scene) -> None:
             G = np.reshape(others, (len(held), len(dofs))).T
             shares = np.linalg.lstsq(G, own, rcond=None)[0]
             free = np.abs(own - G @ shares).max(initial=0.0) > 1e-9
-            if free or isinstance(part.law, (*HOLDING, RigidPlastic)):
+            if free or isinstance(part.law, (*HOLDING, RigidPlastic, Controller, PrescribedForce)):
                 break
             names += [str(j) for (_, j), x in zip(held, shares, strict=True) if abs(x) > 1e-9]
             names += map(str, () if own.any() else _supports_and_joints_at(scene, [rows[part]]))
