@@ -277,7 +277,7 @@ def differences(
 LINEARIZE = {
     "form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads",
     "connectors": "tabulate_connectors", "second_differences": "tabulate_second_differences",
-    "differences": "begin_neighbours", "moving_loads": "differentiate_moving_loads",
+    "differences": "begin_neighbours",
     "guides": "find_tangents_before", "imposed": "find_imposed_directions",
     "damping": "tabulate_damping",
 }  # fmt: skip

@@ -455,8 +455,7 @@ class MovingLoads(_AtDofs):
         self._state, self._on = np.zeros((len(loads), lib.MOST_RATES, 2)), np.zeros(len(loads), "i")
         points = numbering.points[numbering.nodes_of_cells[self._cells]]
         places = (points - points[:, :1]).transpose(0, 2, 1).reshape(dofs.shape)
-        self._load_data = {"given": forces, "mass": mass, "ends": ends, "places": places}
-        self._heavy = rates is not None and bool(mass.any())
+        self._mass, self._heavy = mass, rates is not None and bool(mass.any())
         if self._heavy:
             both = dofs.reshape(len(order), 2, -1)  # x and y
             rows, columns = np.broadcast_arrays(both[..., None], both[:, :, None])
@@ -478,7 +477,7 @@ class MovingLoads(_AtDofs):
             self._c, factor=callbacks.time_functions(self._in_time), equation=callbacks.c,
             position=callbacks.time_functions(self._positions),
         )  # fmt: skip
-        c.work = self._ledger.supplied.pointer("loads")
+        c.work, c.run = self._ledger.supplied.pointer("loads"), c
         energies = []
         if self._heavy:
             c.stored = self._ledger.state.pointer("kinetic")
@@ -488,29 +487,23 @@ class MovingLoads(_AtDofs):
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
         parameters, number = neighbours.weights.shape
-        others = [x for some in neighbours.terms for x in some]
-
-        def change(name: str) -> Array:
-            return neighbours.differences(lambda term: term._load_data[name])
-
-        mass, ends = change("mass"), change("ends")
-        if has_inertia(self._scheme) and mass[:, self._load_data["mass"] == 0.0].any():
+        own = {"run": self._c, "rates": self._c.rates, "state": self._state, "on": self._on}
+        others = [fill(x._c, **own) for some in neighbours.terms for x in some]
+        change = neighbours.differences(lambda term: term._mass)
+        if has_inertia(self._scheme) and change[:, self._mass == 0.0].any():
             raise ArgumentError(
                 "differentiate: a moving load has no mass for the value of a parameter; choose "
                 "another value"
             )
-        now, end = np.zeros((2, parameters, self._on_cells[0].size))
-        before = neighbours.state(lambda term: term._on_cells[2])
         c = struct(
-            "moving_derivatives", parameters=parameters, neighbours=number, ends_of=ends[0].size,
-            loads=self._c, neighbour=ffi.new("moving_loads *[]", [x._c for x in others]),
-            weight=neighbours.weights, given=change("given"), mass=mass, ends=ends,
-            place=change("places"), motion=np.zeros((parameters, len(self._kinetic), 2)),
-            state=neighbours.state(lambda term: term._state), state_bar=np.zeros(self._state.shape),
-            moved=np.zeros((parameters, len(self._kinetic), 2)),
-            moved_bar=np.zeros((len(self._kinetic), 2)), now=now, end=end, before=before,
+            "moving_derivatives", parameters=parameters, neighbours=number, loads=self._c,
+            neighbour=ffi.new("moving_loads *[]", others), weight=neighbours.weights,
+            nowhere=np.zeros(self._on_cells[0].size), state_bar=np.zeros(self._state.shape),
+            moved_bar=np.zeros((len(self._mass), 2)),
+            state=neighbours.state(lambda term: term._state),
         )  # fmt: skip
-        return [in_c("moving_loads", c)]
+        by_numbers = differences(neighbours, lambda term: [term._on_cells[2]])
+        return [by_numbers, in_c("moving_loads", c)]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them.
@@ -555,7 +548,7 @@ class MovingLoads(_AtDofs):
         rates = archive.rows("rates of moving masses", np.arange(len(rates)), rates, known=True)
         self._on[:], self._state[:] = rates[:, 0], rates[:, 1:].reshape(self._state.shape)
         v = self._state[:, 1] * self._counts  # on one process only
-        self._kinetic[:] = self._load_data["mass"] / 2 * (v * v).sum(axis=1)
+        self._kinetic[:] = self._mass / 2 * (v * v).sum(axis=1)
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the forces in the equation of the last step, and at its end."""

@@ -611,23 +611,41 @@ void transpose_imposed(void *self, adjoint *a, const double *λ)
   }
 }
 
+/* Derivatives by the motions of the axis, from those by a velocity of a point; see find_velocity. */
+static void transpose_velocity(const moving_loads *of, adjoint *a, const on_axis *at, const double *row, double part,
+                               const double *v)
+{
+  for (int i = 0; i < 2 * of->nodes; ++i) {
+    const int dof = at->dof[i], j = i % of->nodes, l = i / of->nodes;
+    const double here = at->shape[j] * v[l], turn = at->speed * at->slope[j] * v[l];
+    a->q1[dof] += row[0] * here + part * turn;
+    a->q0[dof] += (1 - part) * turn - row[0] * here;
+    for (int k = 1; k < of->rates->number; ++k) a->rates[k][dof] += row[k] * here;
+  }
+}
+
 /* Rates of masses after the step: derivatives by the state at its end, and by the steps of masses. */
 void transpose_moving_state(void *self, adjoint *a)
 {
   const moving_derivatives *m = self;
   moving_loads *of = (moving_loads *)m->loads;
   const rates *r = of->rates;
-  const int n = of->nodes, initial = a->d->initial;
+  const int n = of->nodes, initial = a->d->initial, all = 2 * MOST_RATES * of->loads;
   const double *q1 = a->d->x;
+  double by[all];
   if (!r) return;
   begin_moving_loads(of, a->step, 0, 0);
+  for (int j = 0; j < m->parameters * m->neighbours; ++j) begin_moving_loads((void *)m->neighbour[j], a->step, 0, 0);
+  for (int p = 0; p < a->parameters; ++p) {
+    find_changes_of_rates(m, p, a->step->t1, q1, initial, by);
+    a->gradient[p] += dot(all, by, m->state_bar);
+  }
   for (int k = 0; k < of->loads; ++k) {
     double *bar = m->state_bar + 2 * MOST_RATES * k, *step = m->moved_bar + 2 * k, after[2 * MOST_RATES];
     on_axis at;
     memcpy(after, bar, sizeof after);
     step[0] = step[1] = 0;
-    if (of->here[k] != OFF) {
-      find_mass(of, k, q1, &at);
+    if (find_mass(of, k, q1, &at)) {
       for (int l = 0; l < 2; ++l) {
         for (int j = initial ? 3 : 1; j < MOST_RATES; ++j) bar[2 * j + l] = 0;
         if (!initial) bar[2 + l] = after[4 + l];
@@ -641,58 +659,36 @@ void transpose_moving_state(void *self, adjoint *a)
     } else if (!initial) {
       memset(bar, 0, sizeof after);
       if (!find_at(of, k, a->step->t1, &at)) continue;
-      after[2] += after[4], after[3] += after[5], after[4] = after[5] = 0;
-      for (int p = 0; p < a->parameters; ++p) {
-        double by[2 * MOST_RATES] = {0};
-        enter_derivative(m, p, k, at, a->step, q1, by);
-        a->gradient[p] += dot(2 * MOST_RATES, by, after);
-      }
-      for (int i = 0; i < 2 * n; ++i) {
-        a->q1[at.dof[i]] += at.speed * at.slope[i % n] * after[2 + i / n];
-        for (int j = 1; j < r->number; ++j) a->rates[j][at.dof[i]] += at.shape[i % n] * after[2 * j + i / n];
+      after[2] += after[4], after[3] += after[5];
+      for (int j = 1; j < r->number; ++j, at.speed = 0) { /* by the rates after the step */
+        double row[MOST_RATES] = {0};
+        row[j] = j != 2;
+        transpose_velocity(of, a, &at, row, 1, after + 2 * j);
       }
     }
   }
 }
 
-/* Derivatives by the motions before the step, from the forces of mass k and from its step; see
- * add_moving_mass_derivative. */
-static void transpose_moving_mass(const moving_derivatives *m, adjoint *a, int k, const double *λ)
-{
-  const moving_loads *of = m->loads;
-  const rates *r = of->rates;
-  const int n = of->nodes;
-  on_axis at;
-  if (!find_mass(of, k, a->d->x, &at)) return;
-  for (int l = 0; l < 2; ++l) {
-    double x = 0, *bar = m->state_bar + 2 * MOST_RATES * k + l;
-    for (int j = 0; j < n; ++j) x += of->mass[k] * at.shape[j] * λ[at.dof[n * l + j]];
-    const double v = (m->moved_bar[2 * k + l] + r->now->inertia[0] * x) / r->now->velocity[0];
-    for (int i = 1; i < r->number; ++i) bar[2 * i] += r->now->inertia[i] * x - r->now->velocity[i] * v;
-    for (int j = 0; j < n; ++j) {
-      const int dof = at.dof[n * l + j];
-      a->q0[dof] += ((1 - of->part) * at.speed * at.slope[j] - r->now->velocity[0] * at.shape[j]) * v;
-      for (int i = 1; i < r->number; ++i) a->rates[i][dof] += r->now->velocity[i] * at.shape[j] * v;
-    }
-  }
-}
-
+/* Derivatives by the motions before the step, from the forces of masses and from their steps. */
 void transpose_moving_loads(void *self, adjoint *a, const double *λ)
 {
   const moving_derivatives *m = self;
   const moving_loads *of = m->loads;
-  const int all = 2 * of->nodes * of->cells;
+  const rates *r = of->rates;
+  const int n = of->nodes;
   begin_moving_loads((void *)of, a->step, 0, 0);
-  differentiate_moving_loads(self, a->step, 0);
-  for (int p = 0; p < a->parameters; ++p) {
-    for (int i = 0; i < all; ++i) a->gradient[p] -= m->now[(size_t)p * all + i] * λ[of->dof[of->at[i]]];
-    if (!of->rates) continue;
-    memset(a->values, 0, a->size * sizeof *a->values);
-    memset(m->moved, 0, 2 * (size_t)of->loads * a->parameters * sizeof *m->moved);
-    for (int k = 0; k < of->loads; ++k) add_moving_mass_derivative(m, a->d->x, 0, p, k, a->values);
-    a->gradient[p] += dot(a->size, a->values, λ) + dot(2 * of->loads, m->moved_bar, m->moved + 2 * (size_t)p * of->loads);
+  for (int k = 0; r && k < of->loads; ++k) {
+    double v[2];
+    on_axis at;
+    if (!find_mass(of, k, a->d->x, &at)) continue;
+    for (int l = 0; l < 2; ++l) {
+      double x = 0, *bar = m->state_bar + 2 * MOST_RATES * k + l;
+      for (int j = 0; j < n; ++j) x += of->mass[k] * at.shape[j] * λ[at.dof[n * l + j]];
+      v[l] = (m->moved_bar[2 * k + l] + r->now->inertia[0] * x) / r->now->velocity[0];
+      for (int i = 1; i < r->number; ++i) bar[2 * i] += r->now->inertia[i] * x - r->now->velocity[i] * v[l];
+    }
+    transpose_velocity(of, a, &at, r->now->velocity, of->part, v);
   }
-  for (int k = 0; of->rates && k < of->loads; ++k) transpose_moving_mass(m, a, k, λ);
 }
 
 void finish_moving_loads(void *self, adjoint *a)

@@ -704,180 +704,59 @@ void add_frame_derivative(void *self, const derivatives *d, int p, double *r)
 
 /* -- moving loads --------------------------------------------------------------------------------------- */
 
-/* Derivative of the position of load k at a time. Forces of neighbouring scenes would not do: they have
- * kinks where loads pass from cell to cell. */
-static double change_of_position(const moving_derivatives *m, int p, int k, double t)
-{
-  const double here = value_at(m->loads->position + k, t);
-  double sum = 0;
-  for (int j = p * m->neighbours; j < (p + 1) * m->neighbours; ++j)
-    sum += m->weight[j] * (value_at(m->neighbour[j]->position + k, t) - here);
-  return sum;
-}
+/* Differences between scenes give the derivatives by numbers and functions of time. Neighbouring scenes have the
+ * cells and the rates of masses of the run: forces have kinks where loads pass from cell to cell. */
 
-/* Derivative of the place s in cell i, from 0 to 1, for the derivative of the distance. */
-static double change_in_cell(const moving_derivatives *m, int p, int i, double s, double distance)
+/* Masses with derivatives as motions and rates, in which their steps are linear at constant cells. */
+static moving_loads in_direction(const moving_derivatives *m, const derivatives *d, int p, rates *along)
 {
-  const double *ends = m->loads->ends + 2 * i, *change = m->ends + (size_t)p * m->ends_of + 2 * i;
-  return (distance - change[0] - s * (change[1] - change[0])) / (ends[1] - ends[0]);
-}
-
-/* Derivatives of the forces without masses, and of the motions of the masses along their beams. */
-void differentiate_moving_loads(void *self, const time_step *step, const double *q1)
-{
-  const moving_derivatives *m = self;
-  const moving_loads *of = m->loads;
-  const int n = of->nodes, all = 2 * n * of->cells;
-  for (int p = 0; p < m->parameters; ++p) {
-    double *end = m->end + (size_t)p * all, *now = m->now + (size_t)p * all;
-    const double *before = m->before + (size_t)p * all;
-    memset(end, 0, all * sizeof *end);
-    for (int k = 0; k < of->loads; ++k) {
-      const double t = step->load_time, factor = value_at(of->factor + k, t), half = step->dt / 2;
-      double *motion = m->motion + 2 * ((size_t)p * of->loads + k);
-      const double *given = of->given + 2 * k, *by = m->given + 2 * ((size_t)p * of->loads + k);
-      double s, shape[4], slope[4], change = 0;
-      const int i = find_loaded_cell(of, k, value_at(of->position + k, t), &s);
-      if (i < 0) continue;
-      for (int j = p * m->neighbours; j < (p + 1) * m->neighbours; ++j)
-        change += m->weight[j] * (value_at(m->neighbour[j]->factor + k, t) - factor);
-      const double ds = change_in_cell(m, p, i, s, change_of_position(m, p, k, t));
-      double *on = end + 2 * n * of->cell[i];
-      find_shapes(of, s, shape, slope);
-      for (int l = 0; l < 2; ++l)
-        for (int j = 0; j < n; ++j)
-          on[n * l + j] += (change * given[l] + factor * by[l]) * shape[j] + factor * given[l] * slope[j] * ds;
-      if (!of->rates) continue;
-      motion[0] = ds;
-      motion[1] = (change_of_position(m, p, k, t + half) - change_of_position(m, p, k, t - half)) / step->dt;
-    }
-    for (int i = 0; i < all; ++i) {
-      end[i] = before[i] + step->fraction * (end[i] - before[i]);
-      now[i] = before[i] + step->at * (end[i] - before[i]);
-    }
-  }
-}
-
-/* Second derivatives of the shape functions by the place s. */
-static void find_bends(const moving_loads *m, double s, double *bend)
-{
-  for (int j = 0; j < m->nodes; ++j) {
-    bend[j] = 0;
-    for (int power = m->nodes - 1; power > 1; --power)
-      bend[j] = bend[j] * s + power * (power - 1) * m->polynomial[j * m->nodes + power];
-  }
-}
-
-/* Derivative of find_velocity at constant unknowns, for derivatives ds of the fraction of cell i and `faster`
- * of the speed. Without d, the motions before the step are constant. */
-static void change_of_velocity(const moving_derivatives *m, const derivatives *d, int p, const on_axis *a, int i,
-                               double s, double ds, double faster, const double *row, double part, const double *q,
-                               double *out)
-{
-  const moving_loads *of = m->loads;
-  const rates *r = of->rates;
-  const int n = of->nodes;
-  const double length = of->ends[2 * i + 1] - of->ends[2 * i];
-  const double *ends = m->ends + (size_t)p * m->ends_of + 2 * i, stretch = (ends[1] - ends[0]) / length;
-  const double *place = of->place + 2 * n * a->cell, *moved = m->place + 2 * n * ((size_t)p * of->cells + a->cell);
-  double bend[4];
-  find_bends(of, s, bend);
-  out[0] = out[1] = 0;
-  for (int i = 0; i < 2 * n; ++i) {
-    const int dof = a->dof[i], j = i % n;
-    const double change = q[dof] - of->q0[dof], *dq0 = d ? d->q0 + (size_t)p * d->size + dof : 0;
-    const double turn = faster * a->slope[j] + a->speed * (bend[j] / length * ds - a->slope[j] * stretch);
-    double *sum = out + i / n;
-    *sum += a->slope[j] * length * ds * rate_at(r, row, dof, change) + turn * (place[i] + of->q0[dof] + part * change)
-      + a->speed * a->slope[j] * moved[i];
-    if (!d) continue;
-    *sum += (a->speed * a->slope[j] * (1 - part) - a->shape[j] * row[0]) * *dq0;
-    for (int k = 1; k < r->number; ++k)
-      if (row[k] != 0) *sum += a->shape[j] * row[k] * d->rates[k][(size_t)p * d->size + dof];
-  }
-}
-
-/* Derivatives of the forces of mass k at q1 and of its step, at constant unknowns. Without d, its motion and
- * those of the nodes before the step are constant. */
-static void add_moving_mass_derivative(const moving_derivatives *m, const double *q1, const derivatives *d, int p,
-                                       int k, double *r)
-{
-  const moving_loads *of = m->loads;
-  const scheme_numbers *now = of->rates->now;
-  const size_t at = (size_t)p * of->loads + k;
-  const double *motion = m->motion + 2 * at, heavier = m->mass[at];
-  const int i = of->here[k], n = of->nodes;
-  double *step = m->moved + 2 * at;
-  on_axis a;
-  if (!find_mass(of, k, q1, &a)) return;
-  const double stretch = (of->ends[2 * i + 1] - of->ends[2 * i]) * motion[0];
-  change_of_velocity(m, d, p, &a, i, of->motion[2 * k], motion[0], motion[1], now->velocity, of->part, q1, step);
-  for (int l = 0; l < 2; ++l) {
-    double sum = 0;
-    for (int j = 1; d && j < of->rates->number; ++j) {
-      const double rate = m->state[2 * (MOST_RATES * at + j) + l];
-      step[l] -= now->velocity[j] * rate, sum += now->inertia[j] * rate;
-    }
-    step[l] /= now->velocity[0];
-    sum += now->inertia[0] * step[l];
-    for (int j = 0; j < n; ++j)
-      r[a.dof[n * l + j]] += (heavier * a.shape[j] + of->mass[k] * a.slope[j] * stretch) * a.acceleration[l]
-        + of->mass[k] * a.shape[j] * sum;
-  }
-}
-
-/* Derivatives by a parameter of the rates of a point of the axis to which mass k has come; see enter_mass.
- * The state at the end of the step is constant. */
-static void enter_derivative(const moving_derivatives *m, int p, int k, on_axis a, const time_step *step,
-                             const double *q1, double *out)
-{
-  const moving_loads *of = m->loads;
-  double s, change[3];
-  const int i = find_loaded_cell(of, k, value_at(of->position + k, step->t1), &s);
-  for (int j = 0; j < 3; ++j) change[j] = change_of_position(m, p, k, step->t1 + j * OF_SPEED);
-  const double ds = change_in_cell(m, p, i, s, change[0]);
-  double faster = (4 * change[1] - 3 * change[0] - change[2]) / (2 * OF_SPEED);
-  for (int c = 0; c <= of->rates->now->gives; ++c, a.speed = faster = 0)
-    change_of_velocity(m, 0, p, &a, i, s, ds, faster, of->rates->now->rates[c], 1, q1, out + 2 * (c ? 2 + c : 1));
+  moving_loads of = *m->loads;
+  *along = *of.rates;
+  for (int j = 1; j < along->number; ++j) along->rate[j] = d->rates[j] + (size_t)p * d->size;
+  of.rates = along, of.place = m->nowhere, of.q0 = d->q0 + (size_t)p * d->size;
+  of.state = m->state + 2 * MOST_RATES * (size_t)p * of.loads;
+  return of;
 }
 
 void add_moving_loads_derivative(void *self, const derivatives *d, int p, double *r)
 {
   const moving_derivatives *m = self;
-  const moving_loads *of = m->loads;
-  const int all = 2 * of->nodes * of->cells;
-  for (int i = 0; i < all; ++i) r[of->dof[of->at[i]]] -= m->now[(size_t)p * all + i];
-  for (int k = 0; of->rates && k < of->loads; ++k) add_moving_mass_derivative(m, d->x, d, p, k, r);
+  rates along;
+  on_axis a;
+  if (!m->loads->rates) return;
+  const moving_loads of = in_direction(m, d, p, &along);
+  memset(d->space, 0, d->size * sizeof *r);
+  for (int k = 0; k < of.loads; ++k)
+    for (int i = 0; find_mass(&of, k, d->space, &a) && i < 2 * of.nodes; ++i)
+      r[a.dof[i]] += of.mass[k] * a.shape[i % of.nodes] * a.acceleration[i / of.nodes];
+}
+
+/* Derivatives of the rates of masses after the step by a parameter, at constant motions and rates before it. */
+static void find_changes_of_rates(const moving_derivatives *m, int p, double t, const double *q1, int initial,
+                                  double *out)
+{
+  const int all = 2 * MOST_RATES * m->loads->loads;
+  double own[all], one[all];
+  find_new_rates(m->loads, t, q1, initial, own);
+  memset(out, 0, all * sizeof *out);
+  for (int j = p * m->neighbours; j < (p + 1) * m->neighbours; ++j) {
+    find_new_rates(m->neighbour[j], t, q1, initial, one);
+    for (int i = 0; i < all; ++i) out[i] += m->weight[j] * (one[i] - own[i]);
+  }
 }
 
 void accept_moving_loads_derivative(void *self, const derivatives *d, int p)
 {
   const moving_derivatives *m = self;
-  const moving_loads *of = m->loads;
-  const int n = of->nodes;
-  const size_t all = 2 * (size_t)n * of->cells;
-  const double *dq1 = d->q1 + (size_t)p * d->size;
-  if (!d->initial) memcpy(m->before + p * all, m->end + p * all, all * sizeof *m->end);
-  for (int k = 0; of->rates && k < of->loads; ++k) {
-    const scheme_numbers *now = of->rates->now;
-    const size_t at = (size_t)p * of->loads + k;
-    double *old = m->state + 2 * MOST_RATES * at, new[2 * MOST_RATES] = {0};
-    on_axis a;
-    if (find_mass(of, k, d->x, &a)) {
-      double *step = m->moved + 2 * at;
-      for (int i = 0; i < 2 * n; ++i) step[i / n] += mass_by_node(of, &a, i % n) * dq1[a.dof[i]];
-      put_new_rates(of->rates, old, step, d->initial, new);
-    } else if (d->initial) continue;
-    else if (find_at(of, k, d->step->t1, &a)) {
-      enter_derivative(m, p, k, a, d->step, d->x, new);
-      for (int c = 0; c <= now->gives; ++c)
-        for (int i = 0, j = c ? 2 + c : 1; i < 2 * n; ++i)
-          new[2 * j + i / n] += a.shape[i % n] * d->rates[j][(size_t)p * d->size + a.dof[i]]
-            + (c ? 0 : a.speed * a.slope[i % n] * dq1[a.dof[i]]);
-      new[4] = new[2], new[5] = new[3];
-    }
-    memcpy(old, new, sizeof new);
-  }
+  const int all = 2 * MOST_RATES * m->loads->loads;
+  double by_motion[all], by_numbers[all];
+  rates along;
+  if (!m->loads->rates) return;
+  const moving_loads of = in_direction(m, d, p, &along);
+  find_new_rates(&of, d->step->t1, d->q1 + (size_t)p * d->size, d->initial, by_motion);
+  find_changes_of_rates(m, p, d->step->t1, d->x, d->initial, by_numbers);
+  for (int i = 0; i < all; ++i)
+    if (!d->initial || i % (2 * MOST_RATES) >= 6) of.state[i] = by_motion[i] + by_numbers[i];
 }
 
 /* -- guides ---------------------------------------------------------------------------------------------- */
@@ -1072,13 +951,13 @@ int differentiate_step(derivatives *d, time_loop *m, int initial)
   }
   memcpy(m->s, d->s, n * sizeof *d->s);
   if (failed) return 0;
-  if (product) advance_rates(d, m, product, initial);
   d->t = m->step.t1, d->initial = initial;
   for (d->now = 0; d->now < d->terms; ++d->now) {
     const term_derivative *term = d->term + d->now;
     void (*accept)(void *, const derivatives *, int) = initial ? term->accept_trial : term->accept;
     for (int p = 0; accept && p < d->parameters; ++p) accept(term->self, d, p);
   }
+  if (product) advance_rates(d, m, product, initial);
   if (initial) return 1;
   memcpy(d->q0, d->q1, (size_t)d->parameters * n * sizeof *d->q0);
   return 1;

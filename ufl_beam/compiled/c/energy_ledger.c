@@ -110,22 +110,16 @@ void accept_pressures(void *self, const time_step *step, const double *q1, const
   memcpy(p->before, p->end, p->loads * sizeof *p->end);
 }
 
-static const double OF_SPEED = 1e-4; /* s */
-
-/* Speed of mass k along its beam at a time, by a parabola through later places: some t begin at 0. */
-static double speed_at(const moving_loads *m, int k, double t)
-{
-  const double dt = OF_SPEED;
-  const time_function *p = m->position + k;
-  return (4 * value_at(p, t + dt) - 3 * value_at(p, t) - value_at(p, t + 2 * dt)) / (2 * dt);
-}
-
-/* The point of the axis at mass k at a time; returns whether this process has it. */
+/* The point of the axis at mass k at a time; returns whether this process has it. The speed is that of a
+ * parabola through later places: some t begin at 0. */
 static int find_at(const moving_loads *m, int k, double t, on_axis *a)
 {
-  double place;
-  const int i = m->mass[k] > 0 ? find_loaded_cell(m, k, value_at(m->position + k, t), &place) : OFF;
-  return i >= 0 && find_on_axis(m, i, place, speed_at(m, k, t), a);
+  const double dt = 1e-4; /* s */
+  double place, p[3];
+  const int i = m->mass[k] > 0 ? find_loaded_cell(m, k, t, &place) : OFF;
+  if (i < 0) return 0;
+  for (int j = 0; j < 3; ++j) p[j] = value_at(m->position + k, t + j * dt);
+  return find_on_axis(m, i, place, (4 * p[1] - 3 * p[0] - p[2]) / (2 * dt), a);
 }
 
 /* Take new rates of the masses, which processes have added up, and the kinetic energies of the masses that
@@ -136,55 +130,55 @@ static void take_rates(moving_loads *m, double t, double *new)
   if (e->agree) e->agree(e->handle, 2 * MOST_RATES * m->loads, m->totals, new);
   for (int k = 0; k < m->loads; ++k) {
     const double *v = new + 2 * MOST_RATES * k + 2;
-    on_axis a;
-    m->on[k] = m->mass[k] > 0 && on_route(m, k, value_at(m->position + k, t));
-    m->kinetic[k] = find_at(m, k, t, &a) ? m->mass[k] / 2 * (v[0] * v[0] + v[1] * v[1]) : 0;
+    double place;
+    const int i = m->mass[k] > 0 ? find_loaded_cell(m, k, t, &place) : OFF;
+    m->on[k] = i != OFF;
+    m->kinetic[k] = i >= 0 ? m->mass[k] / 2 * (v[0] * v[0] + v[1] * v[1]) : 0;
   }
   memcpy(m->state, new, 2 * MOST_RATES * m->loads * sizeof *new);
 }
 
-/* Rates of a mass after its step, or after an `initial` one, which gives rates besides the velocities. */
-static void put_new_rates(const rates *r, const double *old, const double *step, int initial, double *new)
+/* Rates of the masses on this process after a step to q1 at the time t, or those besides velocities after an
+ * `initial` one. A mass that comes has the rates of its point of the axis, and 0 for its speed in further
+ * rates, as accelerations. */
+static void find_new_rates(const moving_loads *m, double t, const double *q1, int initial, double *new)
 {
-  const scheme_numbers *now = r->now;
-  for (int l = 0; l < 2; ++l) {
-    for (int j = 1; j < 3; ++j) new[2 * j + l] = old[2 * (initial ? j : 1) + l];
-    for (int i = initial; i <= now->gives; ++i) {
-      double sum = now->rates[i][0] * step[l];
-      for (int j = 1; j < r->number; ++j) sum += now->rates[i][j] * old[2 * j + l];
-      new[2 * (i ? 2 + i : 1) + l] = sum;
+  const rates *r = m->rates;
+  memset(new, 0, 2 * MOST_RATES * m->loads * sizeof *new);
+  for (int k = 0; k < m->loads; ++k) {
+    double place, *to = new + 2 * MOST_RATES * k;
+    const double *old = m->state + 2 * MOST_RATES * k;
+    on_axis a;
+    if (!initial && find_loaded_cell(m, k, t, &place) == OFF) continue;
+    if (find_mass(m, k, q1, &a)) {
+      for (int i = initial; i <= r->now->gives; ++i)
+        for (int l = 0; l < 2; ++l) {
+          double sum = r->now->rates[i][0] * a.step[l];
+          for (int j = 1; j < r->number; ++j) sum += r->now->rates[i][j] * old[2 * j + l];
+          to[2 * (i ? 2 + i : 1) + l] = sum;
+        }
+      to[4] = old[2], to[5] = old[3];
+    } else if (!initial && m->here[k] == OFF && find_at(m, k, t, &a)) {
+      for (int i = 0; i <= r->now->gives; ++i, a.speed = 0)
+        find_velocity(m, &a, r->now->rates[i], 1, q1, to + 2 * (i ? 2 + i : 1));
+      to[4] = to[2], to[5] = to[3];
     }
   }
-}
-
-static void find_new_rates(const moving_loads *m, int k, const double *q1, int initial, double *new)
-{
-  on_axis a;
-  if (find_mass(m, k, q1, &a)) put_new_rates(m->rates, m->state + 2 * MOST_RATES * k, a.step, initial, new);
-}
-
-/* Rates of a mass that has come to the point of the axis: those of the point, and 0 for its speed in
- * further rates, as accelerations. */
-static void enter_mass(const moving_loads *m, on_axis *a, const double *const *row, int rows, const double *q1,
-                       double *new)
-{
-  for (int i = 0; i < rows; ++i) {
-    find_velocity(m, a, row[i], 1, q1, new + 2 * (i ? 2 + i : 1));
-    a->speed = 0;
-  }
-  new[4] = new[2], new[5] = new[3];
 }
 
 /* Set the rates of the masses in the state with the configuration q at the time t. */
 void start_moving_masses(moving_loads *m, double t, const double *q)
 {
-  const double row[MOST_RATES] = {0, 1}, *rows[] = {row};
+  const double row[MOST_RATES] = {0, 1};
   double new[2 * MOST_RATES * m->loads];
   memset(new, 0, sizeof new);
   m->q0 = q;
   for (int k = 0; k < m->loads; ++k) {
+    double *v = new + 2 * MOST_RATES * k + 2;
     on_axis a;
-    if (find_at(m, k, t, &a)) enter_mass(m, &a, rows, 1, q, new + 2 * MOST_RATES * k);
+    if (!find_at(m, k, t, &a)) continue;
+    find_velocity(m, &a, row, 1, q, v);
+    v[2] = v[0], v[3] = v[1];
   }
   take_rates(m, t, new);
 }
@@ -198,39 +192,25 @@ void add_energy_of_moving_masses(void *self, const time_step *step, const double
 /* Take further rates of the scheme, such as accelerations, from a trial step to q1. */
 void take_rates_of_masses(moving_loads *m, const double *q1)
 {
-  for (int k = 0; k < m->loads; ++k) {
-    double new[2 * MOST_RATES] = {0}, *state = m->state + 2 * MOST_RATES * k;
-    find_new_rates(m, k, q1, 1, new);
-    if (m->equation->agree) m->equation->agree(m->equation->handle, 2 * MOST_RATES, m->totals, new);
-    memcpy(state + 6, new + 6, sizeof new - 6 * sizeof *new);
-  }
-}
-
-/* Rates after a step; the drives supply the energies that the masses gain beside the works of forces. */
-static void advance_masses(moving_loads *m, const time_step *step, const double *q1)
-{
-  const scheme_numbers *now = m->rates->now;
-  const double *rows[MOST_RATES];
-  double new[2 * MOST_RATES * m->loads];
-  memset(new, 0, sizeof new);
-  for (int i = 0; i <= now->gives; ++i) rows[i] = now->rates[i];
-  for (int k = 0; k < m->loads; ++k) {
-    on_axis a;
-    *m->work -= m->kinetic[k];
-    if (!on_route(m, k, value_at(m->position + k, step->t1))) continue;
-    if (m->here[k] != OFF) find_new_rates(m, k, q1, 0, new + 2 * MOST_RATES * k);
-    else if (find_at(m, k, step->t1, &a))
-      enter_mass(m, &a, rows, 1 + now->gives, q1, new + 2 * MOST_RATES * k);
-  }
-  take_rates(m, step->t1, new);
-  for (int k = 0; k < m->loads; ++k) *m->work += m->kinetic[k];
+  const int all = 2 * MOST_RATES * m->loads;
+  double new[all];
+  find_new_rates(m, 0, q1, 1, new);
+  if (m->equation->agree) m->equation->agree(m->equation->handle, all, m->totals, new);
+  for (int i = 0; i < all; ++i)
+    if (i % (2 * MOST_RATES) >= 6) m->state[i] = new[i];
 }
 
 void accept_moving_loads(void *self, const time_step *step, const double *q1, const double *s)
 {
   moving_loads *m = self;
   *m->work += work_in_step(m->size, m->dof, m->weight_of_before, m->force_before, m->force, s);
-  if (m->rates) advance_masses(m, step, q1);
+  if (m->rates && m == m->run) { /* the drives supply what the masses gain beside the works of forces */
+    double new[2 * MOST_RATES * m->loads];
+    find_new_rates(m, step->t1, q1, 0, new);
+    for (int k = 0; k < m->loads; ++k) *m->work -= m->kinetic[k];
+    take_rates(m, step->t1, new);
+    for (int k = 0; k < m->loads; ++k) *m->work += m->kinetic[k];
+  }
   memcpy(m->force_before, m->force, m->size * sizeof *m->force);
   memcpy(m->before, m->end, 2 * (size_t)m->nodes * m->cells * sizeof *m->end);
 }

@@ -161,19 +161,18 @@ void add_tangent_of_pressures(void *self, const double *q, double *tangent)
   }
 }
 
-static int on_route(const moving_loads *m, int k, double distance)
+/* Index of the cell of load k at a time, OFF if it is not on the beam, or ELSEWHERE; and its place in the cell,
+ * from 0 to 1. In a neighbouring scene the cell is that of the run. */
+static int find_loaded_cell(const moving_loads *m, int k, double t, double *s)
 {
-  return m->ends[2 * m->first[k]] <= distance && distance <= m->ends[2 * m->first[k + 1] - 1];
-}
-
-/* Index of the cell of load k at a distance, or -1 if it is not on the beam or not on this process;
- * and its place in the cell, from 0 to 1. */
-static int find_loaded_cell(const moving_loads *m, int k, double distance, double *s)
-{
+  const moving_loads *run = m->run;
+  const double distance = value_at(run->position + k, t);
   int i = m->first[k];
-  while (i < m->first[k + 1] && !(distance <= m->ends[2 * i + 1])) ++i;
-  if (i == m->first[k + 1] || distance < m->ends[2 * i] || m->cell[i] < 0) return -1;
-  *s = (distance - m->ends[2 * i]) / (m->ends[2 * i + 1] - m->ends[2 * i]);
+  while (i < m->first[k + 1] && !(distance <= run->ends[2 * i + 1])) ++i;
+  if (i == m->first[k + 1] || distance < run->ends[2 * i]) return OFF;
+  if (m->cell[i] < 0) return ELSEWHERE;
+  const double here = m == run ? distance : value_at(m->position + k, t);
+  *s = (here - m->ends[2 * i]) / (m->ends[2 * i + 1] - m->ends[2 * i]);
   return i;
 }
 

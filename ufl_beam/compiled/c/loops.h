@@ -781,8 +781,10 @@ typedef struct {
 /* Of a mass: on the cell of another process; without effect in this step. */
 enum { ELSEWHERE = -1, OFF = -2 };
 typedef struct rates rates;
-typedef struct {
+typedef struct moving_loads moving_loads;
+struct moving_loads {
   int loads, cells, nodes, size; /* nodes: of a cell; size: of `dof` */
+  const moving_loads *run;  /* these loads, or those of the run in a neighbouring scene, see derivatives.c */
   const int32_t *dof;       /* degrees of freedom that may be loaded */
   const int32_t *at;        /* index in `dof` of each displacement of a cell */
   const int32_t *first;     /* first cell of each load, in the next two arrays; and their number */
@@ -810,7 +812,7 @@ typedef struct {
   const double *place;      /* positions of the nodes of the undeformed cells from the first one: x, y */
   const double *q0;         /* configuration at the beginning of the step */
   double part;              /* fraction of the increment at which loads act */
-} moving_loads;
+};
 
 void start_moving_masses(moving_loads *m, double t, const double *q);
 void take_rates_of_masses(moving_loads *m, const double *q1);
@@ -1310,17 +1312,15 @@ typedef struct {
   double *here;              /* forces of the scene */
 } term_differences;
 
-/* Derivatives of moving loads. Arrays have a row for each parameter. */
+/* Derivatives of moving loads by the motion. Arrays have a row for each parameter. */
 typedef struct {
-  int parameters, neighbours, ends_of; /* ends_of: length of a row of `ends` */
+  int parameters, neighbours;
   const moving_loads *loads;
   const moving_loads *const *neighbour;
-  const double *weight;       /* see derivatives */
-  const double *given, *mass, *ends, *place; /* derivatives of the numbers of moving_loads */
-  double *motion, *state;     /* derivatives of the motions and rates of masses */
-  double *moved;              /* derivatives of the steps of masses at constant unknowns, 2 of each */
-  double *state_bar, *moved_bar; /* of the adjoint */
-  double *now, *end, *before; /* of the forces on cells */
+  const double *weight;          /* see derivatives */
+  const double *nowhere;         /* zeros, for `place` of the loads */
+  double *state;                 /* derivatives of the rates of masses */
+  double *state_bar, *moved_bar; /* of the adjoint: by these rates, and by the steps of masses */
 } moving_derivatives;
 
 /* Guides of the run, the same with other polynomials, and in neighbouring scenes; and the unit tangents of
@@ -1415,7 +1415,6 @@ void finish_form(void *self, adjoint *a);
 void finish_points(void *self, adjoint *a);
 int differentiate_step(derivatives *d, time_loop *m, int initial);
 void begin_neighbours(void *self, const time_step *step, const double *q1);
-void differentiate_moving_loads(void *self, const time_step *step, const double *q1);
 void find_tangents_before(void *self, const time_step *step, const double *q1);
 void tabulate_damping(void *self, const time_step *step, const double *q1);
 void add_damping_derivative(void *self, const derivatives *d, int p, double *r);

@@ -147,7 +147,7 @@ static void find_moving_loads(const moving_loads *m, double t, double *out)
   for (int k = 0; k < m->loads; ++k) {
     const double factor = value_at(m->factor + k, t);
     double s, shape[4];
-    const int i = find_loaded_cell(m, k, value_at(m->position + k, t), &s);
+    const int i = find_loaded_cell(m, k, t, &s);
     if (i < 0) continue;
     double *on = out + 2 * n * m->cell[i];
     find_shapes(m, s, shape, 0);
@@ -162,10 +162,9 @@ void begin_moving_loads(void *self, const time_step *step, const double *q1, con
 {
   const moving_loads *m = self;
   for (int k = 0; m->rates && k < m->loads; ++k) { /* speed by a difference */
-    double place[3], *motion = m->motion + 2 * k;
-    for (int j = 0; j < 3; ++j) place[j] = value_at(m->position + k, step->load_time + (j - 1) * step->dt / 2);
-    m->here[k] = m->on[k] && on_route(m, k, place[1]) ? find_loaded_cell(m, k, place[1], motion) : OFF;
-    motion[1] = (place[2] - place[0]) / step->dt;
+    const double t = step->load_time, half = step->dt / 2;
+    m->here[k] = m->on[k] ? find_loaded_cell(m, k, t, m->motion + 2 * k) : OFF;
+    m->motion[2 * k + 1] = (value_at(m->position + k, t + half) - value_at(m->position + k, t - half)) / step->dt;
   }
   if (m->rates) ((moving_loads *)self)->q0 = step->q0;
   find_moving_loads(m, step->load_time, m->end);
