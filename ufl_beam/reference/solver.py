@@ -38,12 +38,7 @@ from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.output.recorder import PresentState
 from ufl_beam.output.state_rows import BEFORE, FORCES, Block, Columns, Connection
 from ufl_beam.output.states import States
-from ufl_beam.reference.beam_residuals import (
-    ElasticBeams,
-    Inertia,
-    YieldingBeams,
-    damping_forces,
-)
+from ufl_beam.reference.beam_residuals import ElasticBeams, Inertia, YieldingBeams, damping_forces
 from ufl_beam.reference.cell_forms import Archive, Force, Response, Setting
 from ufl_beam.reference.connector_residuals import Connectors, all_connectors
 from ufl_beam.reference.load_vectors import MovingForce, Supports, all_loads

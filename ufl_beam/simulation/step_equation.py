@@ -34,12 +34,7 @@ from ufl_beam.terms.connector_forces import connector_terms
 from ufl_beam.terms.connector_rows import Setting
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.imposed_strains import CellStrains, ImposedStrains
-from ufl_beam.terms.inertia_and_damping import (
-    BEFORE,
-    Inertia,
-    SecondDifferences,
-    damping_forces,
-)
+from ufl_beam.terms.inertia_and_damping import BEFORE, Inertia, SecondDifferences, damping_forces
 from ufl_beam.terms.load_forces import DeadLoads, FrameForces, LoadTerm, load_terms
 from ufl_beam.terms.material_points import create_entries
 from ufl_beam.terms.term import Callbacks, Term
