@@ -465,6 +465,7 @@ class MovingLoads(_AtDofs):
                 motion=np.zeros((len(loads), 2)), freedom=dofs.astype(np.int32),
                 entry=A.positions(rows.ravel(), columns.ravel()), place=places,
                 part=scheme.load_weight, totals=ffi.new("int[]", self._state.size),
+                space=np.zeros(4 * self._state.size),
             )  # fmt: skip
             tangent = loop("add_tangent_of_moving_masses", self._c)
         self.loops = loop("subtract_moving_loads", self._c), tangent

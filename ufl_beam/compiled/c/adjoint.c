@@ -612,14 +612,14 @@ void transpose_imposed(void *self, adjoint *a, const double *λ)
 }
 
 /* Derivatives by the motions of the axis, from those by a velocity of a point; see find_velocity. */
-static void transpose_velocity(const moving_loads *of, adjoint *a, const on_axis *at, const double *row, double part,
+static void transpose_velocity(const moving_loads *of, adjoint *a, const on_axis *at, const double *row, double fraction,
                                const double *v)
 {
   for (int i = 0; i < 2 * of->nodes; ++i) {
     const int dof = at->dof[i], j = i % of->nodes, l = i / of->nodes;
     const double here = at->shape[j] * v[l], turn = at->speed * at->slope[j] * v[l];
-    a->q1[dof] += row[0] * here + part * turn;
-    a->q0[dof] += (1 - part) * turn - row[0] * here;
+    a->q1[dof] += row[0] * here + fraction * turn;
+    a->q0[dof] += (1 - fraction) * turn - row[0] * here;
     for (int k = 1; k < of->rates->number; ++k) a->rates[k][dof] += row[k] * here;
   }
 }
@@ -632,7 +632,7 @@ void transpose_moving_state(void *self, adjoint *a)
   const rates *r = of->rates;
   const int n = of->nodes, initial = a->d->initial, all = 2 * MOST_RATES * of->loads;
   const double *q1 = a->d->x;
-  double by[all];
+  double *by = of->space + 2 * all;
   if (!r) return;
   begin_moving_loads(of, a->step, 0, 0);
   for (int j = 0; j < m->parameters * m->neighbours; ++j) begin_moving_loads((void *)m->neighbour[j], a->step, 0, 0);

@@ -736,7 +736,7 @@ static void find_changes_of_rates(const moving_derivatives *m, int p, double t, 
                                   double *out)
 {
   const int all = 2 * MOST_RATES * m->loads->loads;
-  double own[all], one[all];
+  double *own = m->loads->space, *one = own + all;
   find_new_rates(m->loads, t, q1, initial, own);
   memset(out, 0, all * sizeof *out);
   for (int j = p * m->neighbours; j < (p + 1) * m->neighbours; ++j) {
@@ -749,7 +749,7 @@ void accept_moving_loads_derivative(void *self, const derivatives *d, int p)
 {
   const moving_derivatives *m = self;
   const int all = 2 * MOST_RATES * m->loads->loads;
-  double by_motion[all], by_numbers[all];
+  double *by_motion = m->loads->space + 2 * all, *by_numbers = by_motion + all;
   rates along;
   if (!m->loads->rates) return;
   const moving_loads of = in_direction(m, d, p, &along);
@@ -788,14 +788,14 @@ void find_tangents_before(void *self, const time_step *step, const double *q1)
     guide_frame *f = own->frame + k;
     curve_around *c = own->around + k;
     const double x = f->slope[0], y = f->slope[1], slope = hypot(x, y);
-    double wide = WIDEST;
+    double ratio = WIDEST;
     for (int j = 2; j < CURVE_POINTS; ++j)
-      wide = fmin(wide, pow(slope / hypot(c->a[j][0], c->a[j][1]), 1. / (j - 1)) * OF_RADIUS);
-    own->step[k] *= wide, f->at[0] = c->middle = NAN;
+      ratio = fmin(ratio, pow(slope / hypot(c->a[j][0], c->a[j][1]), 1. / (j - 1)) * OF_RADIUS);
+    own->step[k] *= ratio, f->at[0] = c->middle = NAN;
     if (!find_frames(own, q1)) return;
-    if (wide > 1 && !(hypot(f->slope[0] / wide - x, f->slope[1] / wide - y) <= SAME_SLOPE * slope))
-      own->step[k] /= wide, f->at[0] = c->middle = NAN, wide = 1;
-    for (int i = 0; i < others; ++i) m->neighbour[i]->step[k] *= wide;
+    if (ratio > 1 && !(hypot(f->slope[0] / ratio - x, f->slope[1] / ratio - y) <= SAME_SLOPE * slope))
+      own->step[k] /= ratio, f->at[0] = c->middle = NAN, ratio = 1;
+    for (int i = 0; i < others; ++i) m->neighbour[i]->step[k] *= ratio;
   }
 }
 

@@ -170,8 +170,8 @@ static void find_new_rates(const moving_loads *m, double t, const double *q1, in
 void start_moving_masses(moving_loads *m, double t, const double *q)
 {
   const double row[MOST_RATES] = {0, 1};
-  double new[2 * MOST_RATES * m->loads];
-  memset(new, 0, sizeof new);
+  double *new = m->space;
+  memset(new, 0, 2 * MOST_RATES * m->loads * sizeof *new);
   m->q0 = q;
   for (int k = 0; k < m->loads; ++k) {
     double *v = new + 2 * MOST_RATES * k + 2;
@@ -193,7 +193,7 @@ void add_energy_of_moving_masses(void *self, const time_step *step, const double
 void take_rates_of_masses(moving_loads *m, const double *q1)
 {
   const int all = 2 * MOST_RATES * m->loads;
-  double new[all];
+  double *new = m->space;
   find_new_rates(m, 0, q1, 1, new);
   if (m->equation->agree) m->equation->agree(m->equation->handle, all, m->totals, new);
   for (int i = 0; i < all; ++i)
@@ -205,7 +205,7 @@ void accept_moving_loads(void *self, const time_step *step, const double *q1, co
   moving_loads *m = self;
   *m->work += work_in_step(m->size, m->dof, m->weight_of_before, m->force_before, m->force, s);
   if (m->rates && m == m->run) { /* the drives supply what the masses gain beside the works of forces */
-    double new[2 * MOST_RATES * m->loads];
+    double *new = m->space;
     find_new_rates(m, step->t1, q1, 0, new);
     for (int k = 0; k < m->loads; ++k) *m->work -= m->kinetic[k];
     take_rates(m, step->t1, new);

@@ -216,7 +216,7 @@ static int find_on_axis(const moving_loads *m, int i, double place, double speed
 }
 
 /* Velocity of the point: of the axis, by a row of coefficients, plus the speed times its tangent. */
-static void find_velocity(const moving_loads *m, const on_axis *a, const double *row, double part, const double *q,
+static void find_velocity(const moving_loads *m, const on_axis *a, const double *row, double fraction, const double *q,
                           double *v)
 {
   const int n = m->nodes;
@@ -224,7 +224,7 @@ static void find_velocity(const moving_loads *m, const on_axis *a, const double 
   for (int i = 0; i < 2 * n; ++i) {
     const double start = m->q0[a->dof[i]], change = q[a->dof[i]] - start;
     v[i / n] += a->shape[i % n] * rate_at(m->rates, row, a->dof[i], change)
-      + a->speed * a->slope[i % n] * (m->place[2 * n * a->cell + i] + start + part * change);
+      + a->speed * a->slope[i % n] * (m->place[2 * n * a->cell + i] + start + fraction * change);
   }
 }
 

@@ -803,7 +803,7 @@ struct moving_loads {
   const int *totals;        /* TOTAL for each number in `state` */
   const double *mass;
   double *kinetic, *stored; /* energy of each mass in the accepted state; entry of the ledger */
-  double *state;            /* rates of each mass, MOST_RATES x 2; the first ones are not used */
+  double *state, *space;    /* rates of each mass, MOST_RATES x 2; the first ones are not used; 4 times this space */
   int32_t *on;              /* whether each mass is on its beams in the accepted state */
   int32_t *here;            /* index of the cell of each mass in the arrays of `first`; ELSEWHERE or OFF */
   double *motion;           /* of each mass: fraction of the cell, speed along the beam */
