@@ -13,7 +13,10 @@ WRITTEN = re.compile(
     r'\b(?:state|supplied|lost)"?(?:\[|\.pointer\(|, )"(\w+)"'  # ledger.lost["..."], (lost, "...")
     r'|\b_?entry\b[^=\n]* = "(\w+)"'  # of a class
 )
-WRITERS = "terms/*.py", "reference/*.py", "model/connector_law*.py", "simulation/step_equation.py"
+WRITERS = (
+    "terms/*.py", "reference/*.py", "model/connector_law*.py",
+    "simulation/step_equation.py", "simulation/impacts.py",
+)  # fmt: skip
 
 
 def test_the_page_of_results_lists_all_entries_of_the_ledger():

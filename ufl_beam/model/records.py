@@ -75,6 +75,8 @@ class Record:
 
     def __new__(cls, *_: Any, **named: Any) -> Any:
         """Raise :class:`ArgumentError` for unknown keywords, before ``__init__``."""
+        if cls.__init__ is object.__init__:
+            raise TypeError(f"{cls.__name__} is a base class; use a class derived from it")
         known = _keywords(cls)  # type: ignore[arg-type]
         for name in named if known else ():
             if name not in known:
