@@ -83,11 +83,11 @@ def test_springs_with_a_free_length_are_elastic():
 # -- names -------------------------------------------------------------------------------------
 
 
-def test_names_tell_connectors_of_the_same_places_apart(tmp_path, on_first_rank):
+def test_names_tell_connectors_of_the_same_places_apart(shared_path, on_first_rank):
     """In tables, files, events, messages and pictures."""
     _, parts, scene = strut(ub.Spring(K))
     assert [*map(str, parts)] == ["spring", "damper", "stop"]
-    table = ub.History(tmp_path / "run.csv", connectors=parts)
+    table = ub.History(shared_path / "run.csv", connectors=parts)
     events = ub.Events()
     scene = ub.Scene(
         scene.beams, bodies=scene.bodies, joints=scene.joints, connectors=parts,
@@ -95,7 +95,7 @@ def test_names_tell_connectors_of_the_same_places_apart(tmp_path, on_first_rank)
     )  # fmt: skip
     ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=1e-2, record=[table, events])
     if on_first_rank:
-        header = (tmp_path / "run.csv").read_text().splitlines()[0]
+        header = (shared_path / "run.csv").read_text().splitlines()[0]
         assert "force spring, Spring [N]" in header
         assert "force damper, Damper [N]" in header
     assert "stop touches" in str(events.found[0])
@@ -114,10 +114,10 @@ def test_components_of_a_bushing_have_its_name():
     assert [str(x) for x in loaded.all_connectors] == ["pin", "pin"]
 
 
-def test_names_are_in_files(tmp_path):
+def test_names_are_in_files(shared_path):
     *_, scene = strut()
     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05)
-    run.save(tmp_path / "run.h5")
-    loaded = ub.Solution.load(tmp_path / "run.h5")
+    run.save(shared_path / "run.h5")
+    loaded = ub.Solution.load(shared_path / "run.h5")
     assert [c.name for c in loaded.scene.connectors] == ["spring", "damper", "stop"]
     assert loaded.scene.connectors[0].law.free == -0.2

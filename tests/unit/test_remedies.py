@@ -89,6 +89,7 @@ def test_a_path_on_which_nothing_moves_says_so():
         ub.follow(scene, ub.LoadControl(0.5), steps=2)
 
 
+@pytest.mark.serial
 def test_a_measure_without_numbers_ends_an_incremental_dynamic_analysis():
     """In its first run, which is the only one that is built after the check of ``build``."""
     built = []
