@@ -457,7 +457,7 @@ class MovingLoads(_AtDofs):
         places = (points - points[:, :1]).transpose(0, 2, 1).reshape(dofs.shape)
         self._mass, self._heavy = mass, rates is not None and bool(mass.any())
         if self._heavy:
-            both = dofs.reshape(len(order), 2, -1)  # x and y
+            both = dofs.reshape(len(order), 2, len(mesh.nodes))  # x and y
             rows, columns = np.broadcast_arrays(both[..., None], both[:, :, None])
             fill(
                 self._c, rates=rates, mass=mass, kinetic=self._kinetic, state=self._state,
