@@ -492,7 +492,10 @@ class LedgerWatch:
 
 
 TURNED = 0.05
-"""Rotation of beams beyond which Rayleigh damping of their stiffness is warned of; rad."""
+"""Rotation of beams beyond which Rayleigh damping of their stiffness is warned of; rad.
+
+A rigid rotation θ has the linear strain 1 - cos θ = 0.00125, which is that of steel that yields.
+"""
 
 
 def warn_of_rayleigh(solution: Solution) -> None:
