@@ -388,3 +388,12 @@ def test_wrong_schemes_are_refused(scheme, scene, message):
 def test_numbers_out_of_range(make, message):
     with pytest.raises(ub.ArgumentError, match=message):
         make()
+
+
+def test_parameters_may_be_integers():
+    """EnergyMomentum(alpha=0, beta=0) is EnergyMomentum()."""
+    runs = [
+        go(swing(cells=2), scheme, 0.01, 10).q
+        for scheme in (ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0, beta=0))
+    ]
+    np.testing.assert_array_equal(*runs)

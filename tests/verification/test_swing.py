@@ -104,6 +104,9 @@ def test_loss_of_energy():
     )
     mid = solution.displacement(places(solution)[0])[row(solution, 1.0), :2]
     np.testing.assert_allclose(mid, (0.2211, 0.1186), rtol=0, atol=0.51e-4)
+    # [calc] with more dissipation: half a unit of the fourth decimal
+    for more, left in ((0.05, 0.0469), (0.5, 0.0316)):
+        assert run(alpha=more).energy.total[-1] == pytest.approx(left, rel=0, abs=0.51e-4)
     assert (np.diff(solution.energy["numerical"]) >= 0).all()
 
 

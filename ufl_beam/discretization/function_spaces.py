@@ -84,7 +84,7 @@ class Element:
 
     def constant(self, value: float) -> fem.Constant:
         """Create a number that can change without a new compilation of forms."""
-        return fem.Constant(self._cell, value)
+        return fem.Constant(self._cell, float(value))
 
     def dx(self, degree: int) -> ufl.Measure:
         """Return the measure of the cells; a form has only one measure, see compiled_forms.py.
