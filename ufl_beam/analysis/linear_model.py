@@ -26,14 +26,13 @@ from ufl_beam.analysis.linear_model_checks import (
     require_free,
     warn_of_omissions,
 )
-from ufl_beam.analysis.modal_reduction import Equations, Reduction
+from ufl_beam.analysis.modal_reduction import reduced_motion
 from ufl_beam.analysis.modes import require_state
 from ufl_beam.analysis.small_motions import SmallMotions
 from ufl_beam.analysis.state_space import (
     Motion,
     constraint_forces,
     first_order,
-    independent_coordinates,
     jumps,
 )
 from ufl_beam.arrays import Array, Complex
@@ -100,7 +99,7 @@ class LinearModel(Rich):
         self.inputs, self.outputs = inputs.names, outputs.names
         rows = small._constraint_rows
         self._free, self._constraints = np.flatnonzero(~rows), np.flatnonzero(rows)  # rows of K
-        self._reduction: Reduction | None = None
+        self._reduction: tuple[Motion, Array] | None = None  # of a reduced model
         self._mode_names: list[str] = []
         require_free(small, inputs, outputs)
 
@@ -313,7 +312,7 @@ class LinearModel(Rich):
         real and imaginary parts of the first n modes of :func:`modes` are the basis.  Prescribed
         motions keep their states; the scene follows them as in statics.  The motions that are left
         out follow inputs, dampers and the inertia of the modes as in statics (mode acceleration,
-        see :class:`Reduction`), so that the response to slow inputs is exact.  Where a damper makes
+        see :func:`reduced_motion`), so that the response to slow inputs is exact.  Where a damper makes
         them lag behind, as one in series with a spring or a strong one, they have further states of
         first order.
 
@@ -332,7 +331,6 @@ class LinearModel(Rich):
                 f"reduced: {n} modes leave out motions without stiffness on which inputs work, so "
                 f"that slow responses are wrong; give at least {n + others.shape[1]}"
             )
-        equations = Equations(small.M, self._damping, small.K, F, moved, self._free)
         # Of real, then of imaginary parts
         omega = np.resize(np.sqrt(np.maximum(np.abs(squares), first)), x.shape[1])
         lengths = small.lengths[small.left[self._free]]
@@ -340,8 +338,10 @@ class LinearModel(Rich):
         model = copy.copy(self)
         for name in ("_motion", "_space", "states"):
             vars(model).pop(name, None)
-        model._reduction = Reduction(equations, x, exact, others, omega, lengths)
-        lags = range(len(model._reduction.motion.read) - x.shape[1])
+        model._reduction = reduced_motion(
+            small.M, self._damping, small.K, F, moved, self._free, x, exact, others, omega, lengths
+        )
+        lags = range(len(model._motion.read) - x.shape[1])
         model._mode_names = names + [f"lag {k} of dampers" for k in lags]
         return model
 
@@ -461,7 +461,7 @@ class LinearModel(Rich):
     def _motion(self) -> Motion:
         """Motions as functions of states and inputs."""
         if self._reduction is not None:
-            return self._reduction.motion
+            return self._reduction[0]
         small, y = self._small, self._free
         if 2 * len(y) > MOST_STATES:
             raise ArgumentError(
@@ -473,8 +473,7 @@ class LinearModel(Rich):
         J, h = small.K.tocsr()[self._constraints][:, y], moved[0][self._constraints].toarray()
         names, sizes = self._names_of_motions, small.lengths[small.left[y]]
         return first_order(
-            independent_coordinates(M, J, h, sizes), M, C, K, F[y],
-            tuple(B[y].toarray() for B in moved),
+            M, C, K, F[y], tuple(B[y].toarray() for B in moved), J, h, sizes,
             lambda motion: names[int(np.abs(motion / sizes).argmax())],
         )  # fmt: skip
 
@@ -486,7 +485,7 @@ class LinearModel(Rich):
         F, moved = self._loads
         K, Z = small.K.tocsr(), small._Z
         if self._reduction is not None:
-            rest = self._reduction.rest
+            rest = self._reduction[1]
         else:
             # Forces of constraints bear what the equation of the motions misses
             missed = F[y] @ motion.f - K[y][:, y] @ motion.y

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import block_array, csc_array, csr_array, diags_array
@@ -19,22 +18,12 @@ from ufl_beam.solvers.eigensolvers import ROUND_OFF
 FOLLOWS = 1e-4  # change of a motion by the forces of its own rate, as a fraction, that is left out
 
 
-class Equations(NamedTuple):
-    """Equations ``M x'' + C x' + K x = F f + B0 u + B1 u' + B2 u''`` with rows of constraints.
-
-    ``free`` are the rows of motions; the other unknowns are the forces of constraints.
-    """
-
-    M: csr_array
-    C: csr_array
-    K: csr_array
-    F: csr_array
-    moved: tuple[csr_array, csr_array, csr_array]
-    free: Index
-
-
-class Reduction:
-    """Motions ``x = Φ q + v b + P u + r`` with modes Φ, lags v of dampers, and a static rest r.
+def reduced_motion(
+    M: csr_array, C: csr_array, K: csr_array, F: csr_array,
+    moved: tuple[csr_array, csr_array, csr_array], y: Index, x: Array, squares: Array | None,
+    others: Array, omega: Array, lengths: Array,
+) -> tuple[Motion, Array]:  # fmt: skip
+    """Return motions ``Φ q + v b + P u + r`` with modes Φ, lags v of dampers, and a static rest r.
 
     With M-orthonormal Φ and static P, the equations of q, b and r are, without forces of r',
 
@@ -45,59 +34,60 @@ class Reduction:
     equilibrium with the inertia of the modes, rigid ones included: S. Rubin, AIAA Journal 13
     (1975); R. R. Craig and A. J. Kurdila, Fundamentals of Structural Dynamics (2006).
 
-    Attributes:
-        motion: Motions as functions of states and inputs; ``y`` without r.
-        rest: r and the forces of constraints, at all unknowns, as functions of the same.
+    The results are functions of states and inputs: the motions, whose ``y`` lacks r; and r with the
+    forces of constraints, at all unknowns.
 
     Args:
+        M: Mass in ``M x'' + C x' + K x = F f + B0 u + B1 u' + B2 u''`` with rows of constraints.
+        C: Damping.
+        K: Stiffness.
+        F: Forces of unit inputs.
+        moved: B0, B1, B2.
+        y: Rows of motions; the other unknowns are the forces of constraints.
         x: Modes, in columns; with mass 1.
         squares: Squared frequencies of the modes, if they are eigenvectors of K; rad²/s².
         others: Motions without stiffness among the modes that are left out.
         omega: Frequencies at which to compare lags with modes; rad/s.
         lengths: Size of the scene for displacements, 1 for rotations, of the free rows.
     """
-
-    def __init__(
-        self, equations: Equations, x: Array, squares: Array | None, others: Array, omega: Array,
-        lengths: Array,
-    ) -> None:  # fmt: skip
-        M, C, K, F, (B0, B1, B2), y = equations
-        n, nu, nf, W = x.shape[1], B0.shape[1], F.shape[1], M @ np.hstack([x, others])
-        size, exact = len(x), squares is not None
-        own, solve = np.zeros(n) if squares is None else squares, _bordered(K, W)
-        forces = np.zeros(x.shape) if exact else K @ x  # of modes, in equilibrium with inertia
-        # K⁻¹ M Φ without motions that have no stiffness
-        flexible, z = solve(forces)
-        stiffness = np.diag(own) + z[:n]
-        by_modes = (x - flexible) @ np.linalg.pinv(stiffness, 0.0 if exact else ROUND_OFF)
-        P = np.zeros((size, nu))
-        for _ in range(2):  # the second time reduces round-off
-            change, z = solve(B0 - K @ P)
-            P = P + change + by_modes @ z[:n]
-        # Of inexact modes only motions without mass lag behind: springs hold the others.
-        held = np.where((M.diagonal() > 0.0) & (not exact), abs(K).max() / ROUND_OFF, 0.0)
-        damping = equations._replace(C=(C + C.T) / 2, K=K + diags_array(held))
-        v = lags(damping, W, np.hstack([x, P]), omega, lengths)
-        r, damped = v.shape[1], damping.C @ v
-        solve = _bordered(K, np.hstack([W, damped]))
-        at = np.cumsum([0, n, r, n, nu, nu, nf, nu])
-        q, b, dq, u, du, f, ddu = (np.eye(at[-1])[i:j] for i, j in pairwise(at))
-        loads = F @ f - forces @ q - (K @ v) @ b
-        by_rates = (B1 - C @ P) @ du + (B2 - M @ P) @ ddu - (C @ x) @ dq
-        loads[y] += by_rates[y]
-        rest, rates = solve(loads)
-        constraints = np.isin(np.arange(size), y, invert=True)[:, None]
-        # Rates of lags with mass are left out, like r'.
-        light = np.where(M.diagonal()[:, None] == 0.0, v, 0.0)
-        self.rest = rest + constraints * (x @ q + P @ u) + (v - light) @ b
-        ddq, db = rates[:n] - own[:, None] * q, rates[W.shape[1] :]
-        toward = (M @ x)[y].T
-        beside = np.linalg.solve(v.T @ damped, damped.T)[:, y]
-        read = np.vstack([toward, beside - (beside @ x[y]) @ toward])
-        self.motion = Motion(
-            int(at[5]), np.vstack([dq, db, ddq, du, ddu]), (x @ q + light @ b + P @ u)[y],
-            (x @ dq + light @ db + P @ du)[y], (x @ ddq + P @ ddu)[y], u, du, ddu, f, read, P[y],
-        )  # fmt: skip
+    (B0, B1, B2), n = moved, x.shape[1]
+    nu, nf, W = B0.shape[1], F.shape[1], M @ np.hstack([x, others])
+    size, exact = len(x), squares is not None
+    own, solve = np.zeros(n) if squares is None else squares, _bordered(K, W)
+    forces = np.zeros(x.shape) if exact else K @ x  # of modes, in equilibrium with inertia
+    # K⁻¹ M Φ without motions that have no stiffness
+    flexible, z = solve(forces)
+    stiffness = np.diag(own) + z[:n]
+    by_modes = (x - flexible) @ np.linalg.pinv(stiffness, 0.0 if exact else ROUND_OFF)
+    P = np.zeros((size, nu))
+    for _ in range(2):  # the second time reduces round-off
+        change, z = solve(B0 - K @ P)
+        P = P + change + by_modes @ z[:n]
+    # Of inexact modes only motions without mass lag behind: springs hold the others.
+    held = np.where((M.diagonal() > 0.0) & (not exact), abs(K).max() / ROUND_OFF, 0.0)
+    damping = (C + C.T) / 2
+    v = lags(damping, K + diags_array(held), B1, y, W, np.hstack([x, P]), omega, lengths)
+    r, damped = v.shape[1], damping @ v
+    solve = _bordered(K, np.hstack([W, damped]))
+    at = np.cumsum([0, n, r, n, nu, nu, nf, nu])
+    q, b, dq, u, du, f, ddu = (np.eye(at[-1])[i:j] for i, j in pairwise(at))
+    loads = F @ f - forces @ q - (K @ v) @ b
+    by_rates = (B1 - C @ P) @ du + (B2 - M @ P) @ ddu - (C @ x) @ dq
+    loads[y] += by_rates[y]
+    rest, rates = solve(loads)
+    constraints = np.isin(np.arange(size), y, invert=True)[:, None]
+    # Rates of lags with mass are left out, like r'.
+    light = np.where(M.diagonal()[:, None] == 0.0, v, 0.0)
+    rest = rest + constraints * (x @ q + P @ u) + (v - light) @ b
+    ddq, db = rates[:n] - own[:, None] * q, rates[W.shape[1] :]
+    toward = (M @ x)[y].T
+    beside = np.linalg.solve(v.T @ damped, damped.T)[:, y]
+    read = np.vstack([toward, beside - (beside @ x[y]) @ toward])
+    motion = Motion(
+        int(at[5]), np.vstack([dq, db, ddq, du, ddu]), (x @ q + light @ b + P @ u)[y],
+        (x @ dq + light @ db + P @ du)[y], (x @ ddq + P @ ddu)[y], u, du, ddu, f, read, P[y],
+    )  # fmt: skip
+    return motion, rest
 
 
 def _bordered(K: csr_array, W: Array) -> Callable[[Array], tuple[Array, Array]]:
@@ -119,14 +109,16 @@ def _bordered(K: csr_array, W: Array) -> Callable[[Array], tuple[Array, Array]]:
     return solve
 
 
-def lags(equations: Equations, W: Array, x: Array, omega: Array, lengths: Array) -> Array:
+def lags(
+    C: csr_array, K: csr_array, B1: csr_array, y: Index, W: Array, x: Array, omega: Array,
+    lengths: Array,
+) -> Array:  # fmt: skip
     """Return motions besides x, the modes and P, that dampers make lag behind; (size, number).
 
     The rest r follows the forces of dampers on x as in statics, without forces of its own rate.
     Where these change it, as in a damper in series with a spring, or beside a strong damper, it
     needs a state of first order.  The result is a basis of such motions.
     """
-    _, C, K, _, (_, B1, _), y = equations
     by_rates = np.pad(B1.toarray(), ((0, 0), (len(omega), 0)))  # of prescribed motions
     forces, terms = C @ x - by_rates, abs(C) @ np.abs(x) + np.abs(by_rates)
     forces[np.setdiff1d(np.arange(len(x)), y)] = 0.0

@@ -19,19 +19,6 @@ SINGULAR = 1e-12  # eigenvalue or pivot that is zero, as a fraction of the large
 ABSENT = 1e-9  # coefficient that is round-off, as a fraction of the sum of its terms
 
 
-class Coordinates(NamedTuple):
-    """Coordinates of the motions y that constraints allow: y = N (V1 a + V0 b) + P u.
-
-    The motions u are prescribed, a have mass, and b have none.
-    """
-
-    N: Array
-    P: Array
-    V1: Array
-    V0: Array
-    read: Array  # matrix that returns (a, b) for y - P u
-
-
 class Motion(NamedTuple):
     """Motions as linear functions of states and inputs; one column each.
 
@@ -53,11 +40,12 @@ class Motion(NamedTuple):
     P: Array
 
 
-def independent_coordinates(M: csr_array, J: csr_array, h: Array, sizes: Array) -> Coordinates:
-    """Solve constraints ``J y = h u`` for dependent motions, and separate motions without mass.
+def _coordinates(M: csr_array, J: csr_array, h: Array, sizes: Array) -> tuple[Array, ...]:
+    """Solve constraints ``J y = h u`` for dependent motions: y = N (V1 a + V0 b) + P u.
 
-    ``sizes`` make motions dimensionless.  Coordinates are independent motions themselves, unless
-    combinations of them have no mass.
+    The coordinates a have mass, and b have none.  They are independent motions themselves, unless
+    combinations of them have no mass.  The result is N, P, V1, V0 and the matrix that returns
+    (a, b) for y - P u.
     """
     n, (m, nu) = J.shape[1], h.shape
     N, P, independent = np.eye(n), np.zeros((n, nu)), np.arange(n)
@@ -84,28 +72,30 @@ def independent_coordinates(M: csr_array, J: csr_array, h: Array, sizes: Array) 
         V1, V0 = turned[:, heavy], np.hstack([V0, turned[:, ~heavy]])
     pick = np.zeros((len(independent), n))
     pick[np.arange(len(independent)), independent] = 1.0
-    return Coordinates(N, P, V1, V0, np.linalg.solve(np.hstack([V1, V0]), pick))
+    return N, P, V1, V0, np.linalg.solve(np.hstack([V1, V0]), pick)
 
 
 def first_order(
-    coordinates: Coordinates, M: csr_array, C: csr_array, K: csr_array, F: csr_array,
-    moved: tuple[Array, Array, Array], name_of: Callable[[Array], str],
+    M: csr_array, C: csr_array, K: csr_array, F: csr_array, moved: tuple[Array, Array, Array],
+    J: csr_array, h: Array, sizes: Array, name_of: Callable[[Array], str],
 ) -> Motion:  # fmt: skip
     """Solve ``M y'' + C y' + K y = F f + B0 u + B1 u' + B2 u''`` for the rates of states.
 
     Args:
-        coordinates: Coordinates of the motions; constraint forces do no work on them.
         M: Mass of the motions y.
         C: Their damping and gyroscopic forces.
         K: Their stiffness.
         F: Forces of unit inputs.
         moved: B0, B1, B2.
+        J: Constraints ``J y = h u``.
+        h: Their motions.
+        sizes: Numbers that make motions dimensionless.
         name_of: Function that names the largest of the motions y, for an error.
 
     Raises:
         ArgumentError: Neither mass, damper nor stiffness determines a motion.
     """
-    N, P, V1, V0, read = coordinates
+    N, P, V1, V0, read = _coordinates(M, J, h, sizes)
     Mr, Cr, Kr = (N.T @ (A @ N) for A in (M, C, K))
     by_motions = [N.T @ (B - A @ P) for B, A in zip(moved, (K, C, M), strict=True)]
     # Bases of the motions without mass, with damping (W1) and without it (W0), and of their forces
