@@ -312,9 +312,9 @@ class LinearModel(Rich):
         real and imaginary parts of the first n modes of :func:`modes` are the basis.  Prescribed
         motions keep their states; the scene follows them as in statics.  The motions that are left
         out follow inputs, dampers and the inertia of the modes as in statics (mode acceleration,
-        see :func:`reduced_motion`), so that the response to slow inputs is exact.  Where a damper makes
-        them lag behind, as one in series with a spring or a strong one, they have further states of
-        first order.
+        see :func:`reduced_motion`), so that the response to slow inputs is exact.  Where a damper
+        makes them lag behind, as one in series with a spring or a strong one, they have further
+        states of first order.
 
         Args:
             n: Number of modes; fewer if the scene has fewer.

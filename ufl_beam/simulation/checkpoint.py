@@ -187,7 +187,7 @@ class CheckpointFile:
                 Archive(simulation.subdomain, remove_prefix("state/", content))
             )
             solution.resume(remove_prefix("history/", content))
-            pace.restore(content["pace"] | remove_prefix("pace/", content))
+            pace.restore(remove_prefix("pace/", content))
             solution.seconds = float(content["seconds"])
         solution.substeps, solution.iterations = simulation.substeps, simulation.iterations
         solution.time_error = pace.error
@@ -240,12 +240,9 @@ class CheckpointFile:
 
         solution, archive = simulation.solution, Archive(simulation.subdomain)
         simulation.save_or_restore(archive)
-        state = pace.state()
-        arrays = {name: values for name, values in state.items() if isinstance(values, np.ndarray)}
         content = {
             "seconds": solution.seconds + seconds,
-            "pace": {name: state[name] for name in state if name not in arrays},
-            **add_prefix("pace/", arrays),
+            **add_prefix("pace/", {name: np.array(x) for name, x in pace.state().items()}),
             "stateful": simulation.together(states), "warnings": solution.warnings,
             **add_prefix("state/", archive.state()),
         }  # fmt: skip

@@ -187,47 +187,33 @@ def initial_state(
 
 
 def _initial_velocity(numbering: DofNumbering) -> Array:
-    """Return the velocities that :class:`Velocity` gives to beams, and zero elsewhere; (size,)."""
-    v: Array = np.full(numbering.size, np.nan)
-    for velocity in numbering.scene.initial:
-        for beam in velocity.beams:
-            points, dofs = numbering.nodes_of(beam)
-            new = np.array([velocity.at(x, y) for x, y in points])
-            turning = abs(velocity.angular)
-            size = np.hypot(*new.T[:2]).max() + turning * numbering.scene.size
-            apart = np.abs(v[dofs] - new) > 1e-9 * np.array([size, size, turning])
-            if apart.any():
-                x, y = points[np.flatnonzero(apart.any(axis=1))[0]]
-                raise ArgumentError(
-                    f"Velocity: {beam.name} gets two different velocities at ({x:g}, {y:g}), "
-                    "from itself or from a beam that it is joined to"
-                )
-            v[dofs] = new
-    v = np.nan_to_num(v)
-    if numbering.scene.initial:
-        _require_shared(numbering, v)
-        _require_agreement(numbering, v)
-    return v
+    """Return the velocities that :class:`Velocity` gives to parts, and zero elsewhere; (size,).
 
-
-def _require_shared(numbering: DofNumbering, v: Array) -> None:
-    """Check that parts with mass but without :class:`Velocity` are joined to no moving unknown."""
-    scene = numbering.scene
-    given = {part for velocity in scene.initial for part in velocity.beams}
+    Parts with mass but without :class:`Velocity` are at rest.
+    """
+    scene, scales = numbering.scene, numbering.scales
+    v, fastest = np.full(numbering.size, np.nan), 0.0
     parts: list[Any] = [b for b in scene.beams if b.section.rhoA or b.section.rhoI]
     parts += [b for b in scene.bodies if b.mass or b.inertia]
-    speeds = np.abs(v * numbering.scales)
-    for part in (part for part in parts if part not in given):
+    given: list[tuple[Any, Any]] = [(part, x.at) for x in scene.initial for part in x.beams]
+    rest = [(part, lambda *_: np.zeros(3)) for part in parts if part not in dict(given)]
+    for part, at in given + rest * bool(given):
         points, dofs = numbering.nodes_of(part)
-        moving = speeds[dofs].max(axis=1) > 1e-9 * speeds.max()
-        if moving.any():
-            x, y = points[np.argmax(moving)]
-            rate = np.abs(v[dofs[np.argmax(moving)]]).max()
+        new = np.array([at(x, y) for x, y in points])
+        fastest = max(fastest, np.abs(new * scales[dofs]).max())
+        apart = (np.abs(v[dofs] - new) * scales[dofs] > 1e-9 * fastest).any(axis=1)
+        if apart.any():
+            (x, y), rate = points[apart][0], np.nanmax(np.abs(v[dofs[apart][0]]))
             raise ArgumentError(
-                f"Velocity: {part.name} has none, but at ({x:g}, {y:g}) it is joined to a part "
-                f"that moves at {rate:.3g} m/s or rad/s; give all joined parts velocities that "
-                "agree"
+                f"Velocity: {part.name} gets two different velocities at ({x:g}, {y:g}), from "
+                "itself, zero by default, or from a part that it is joined to and that moves at "
+                f"{rate:.3g} m/s or rad/s; give all joined parts velocities that agree"
             )
+        v[dofs] = new
+    v = np.nan_to_num(v)
+    if given:
+        _require_agreement(numbering, v)
+    return v
 
 
 def _require_agreement(numbering: DofNumbering, v: Array) -> None:

@@ -340,8 +340,8 @@ class PilotSteps(AdaptiveSteps):
     the step before it is taken again, in shorter steps.
 
     Attributes:
-        taken: Time and configuration at the ends of the last steps, and whether a later step cannot
-            change them.
+        taken: Time and configuration at the ends of steps, and whether a later step cannot change
+            them.
         saved: State before the last step.
     """
 
@@ -349,7 +349,7 @@ class PilotSteps(AdaptiveSteps):
 
     def __init__(self, pilot: Pilot, t1: float, control: Adaptive) -> None:
         super().__init__(pilot, t1, control)
-        self.taken = [(pilot.t, pilot.q, False)] * 4
+        self.taken = list[tuple[float, Array, bool]]()
         self.saved: State = {}
         # Acceleration before the last step, and the length of its step, 0 if there is none
         self._before: Array = np.zeros(pilot.subdomain.size)
@@ -388,7 +388,7 @@ class PilotSteps(AdaptiveSteps):
         """Take one step, or take the previous step again and this one; see the base class."""
         self._first_dt = self._dt
         super().advance(most, keep=keep)
-        self.taken = [*self.taken[1:], (self._simulation.t, self._simulation.q, self._fresh)]
+        self.taken.append((self._simulation.t, self._simulation.q, self._fresh))
 
     def _accept(self, trial: Trial) -> None:
         """Save the state, and accept the step."""
@@ -407,14 +407,12 @@ class PilotSteps(AdaptiveSteps):
         self._save_or_restore(Archive(self._simulation.subdomain, self.saved))
         self._simulation.time_loop.next_jump = -math.inf  # of rates, to be found again
         self.saved = {}
+        del self.taken[-1:]
 
     def _save_or_restore(self, archive: Archive) -> None:
         self._simulation.save_or_restore(archive)
         self._before = archive.at_dofs("acceleration before", self._before)
         self.restore({name: archive.number(name, x) for name, x in self.state().items()})
-        for k, (t, q, final) in enumerate(self.taken):
-            final = archive.number(f"final {k}", final) > 0
-            self.taken[k] = archive.number(f"end {k}", t), archive.at_dofs(f"q at {k}", q), final
 
 
 class JudgedSteps(Steps):
@@ -435,7 +433,7 @@ class JudgedSteps(Steps):
         """Take one step, or the last half of one; ``keep`` stores its end."""
         ahead, simulation = self._ahead, self._simulation
         while True:
-            new = [step for step in ahead.taken if step[0] > simulation.t]
+            new = ahead.taken = [step for step in ahead.taken if step[0] > simulation.t]
             if len(new) > 2 or any(final for *_, final in new[:2]):
                 break
             try:
