@@ -33,6 +33,12 @@ static double dot(size_t size, const double *x, const double *y)
   return sum;
 }
 
+/* Add the products of `bar` with the rows of a table, one for each parameter, to the gradient. */
+static void add_products(adjoint *a, size_t size, const double *bar, const double *rows)
+{
+  for (int p = 0; bar && rows && p < a->parameters; ++p) a->gradient[p] += dot(size, bar, rows + p * size);
+}
+
 /* -- forms --------------------------------------------------------------------------------------------- */
 
 void transpose_form(void *self, adjoint *a, const double *λ)
@@ -50,8 +56,7 @@ void transpose_form(void *self, adjoint *a, const double *λ)
 void finish_form(void *self, adjoint *a)
 {
   const form_derivative *f = self;
-  for (int p = 0; f->bar && f->stride && p < a->parameters; ++p)
-    a->gradient[p] += dot(f->stride, f->bar, f->direction + (size_t)p * f->stride);
+  add_products(a, f->stride, f->bar, f->direction);
 }
 
 /* Work of the derivative by coordinates on λ, for each parameter. */
@@ -348,20 +353,14 @@ void finish_points(void *self, adjoint *a)
   const point_derivatives *m = self;
   const points *p = m->points;
   const size_t all = (size_t)p->cells * p->of_cell * p->width, strains = 3 * (size_t)p->cells;
-  const int one = 3 * p->components * p->of_cell;
-  for (int q = 0; q < a->parameters; ++q) {
-    double sum = dot(all, m->w_bar, m->w + q * all) + dot(strains, m->e0_bar, m->e0 + q * strains);
-    if (m->B) sum += dot(one, m->B_bar, m->B + (size_t)q * one);
-    if (m->weight) sum += dot(p->of_cell, m->weight_bar, m->weight + (size_t)q * p->of_cell);
-    if (m->rest) sum += dot(3, m->rest_bar, m->rest + 3 * q);
-    if (m->tangents) {
-      sum += dot(3 * strains, m->tangents_bar, m->tangents + 3 * q * strains);
-      sum += dot(strains, m->elastic_bar, m->elastic + q * strains);
-    }
-    const form_derivative *g = m->by_geometry;
-    if (g) sum += dot(g->stride, g->bar, g->direction + (size_t)q * g->stride);
-    a->gradient[q] += sum;
-  }
+  add_products(a, all, m->w_bar, m->w);
+  add_products(a, strains, m->e0_bar, m->e0);
+  add_products(a, 3 * p->components * p->of_cell, m->B_bar, m->B);
+  add_products(a, p->of_cell, m->weight_bar, m->weight);
+  add_products(a, 3, m->rest_bar, m->rest);
+  add_products(a, 3 * strains, m->tangents_bar, m->tangents);
+  add_products(a, strains, m->elastic_bar, m->elastic);
+  if (m->by_geometry) finish_form(m->by_geometry, a);
 }
 
 /* -- connectors ---------------------------------------------------------------------------------------- */
@@ -478,14 +477,10 @@ void finish_connectors(void *self, adjoint *a)
   const connector_derivatives *m = self;
   const connectors *c = m->term->connectors;
   const size_t all = (size_t)m->width * c->number;
-  const form_derivative *g = m->by_geometry;
-  for (int p = 0; p < a->parameters; ++p) {
-    double sum = all ? dot(all, m->w_bar, m->w + p * all) : 0;
-    if (m->viscosity) sum += dot(c->number, m->viscosity_bar, m->viscosity + (size_t)p * c->number);
-    if (c->friction && !c->laws) sum += dot(c->number, m->limit_bar, m->limit + (size_t)p * c->number);
-    if (g) sum += dot(g->stride, g->bar, g->direction + (size_t)p * g->stride);
-    a->gradient[p] += sum;
-  }
+  add_products(a, all, m->w_bar, m->w);
+  add_products(a, c->number, m->viscosity_bar, m->viscosity);
+  if (c->friction && !c->laws) add_products(a, c->number, m->limit_bar, m->limit);
+  if (m->by_geometry) finish_form(m->by_geometry, a);
 }
 
 /* -- inertia, damping, loads ----------------------------------------------------------------------------- */
@@ -605,8 +600,7 @@ void transpose_imposed(void *self, adjoint *a, const double *λ)
   begin_imposed_strains((void *)m->here, a->step, 0, 0);
   find_imposed_directions(self, a->step, 0);
   for (int g = 0; g < m->here->groups; ++g) {
-    for (int p = 0; p < a->parameters; ++p)
-      a->gradient[p] += dot(m->size[g], m->bar[g], m->direction[g] + (size_t)p * m->size[g]);
+    add_products(a, m->size[g], m->bar[g], m->direction[g]);
     memset(m->bar[g], 0, m->size[g] * sizeof(double));
   }
 }
@@ -694,9 +688,7 @@ void transpose_moving_loads(void *self, adjoint *a, const double *λ)
 void finish_moving_loads(void *self, adjoint *a)
 {
   const moving_derivatives *m = self;
-  const int all = 2 * MOST_RATES * m->loads->loads;
-  for (int p = 0; m->loads->rates && p < a->parameters; ++p)
-    a->gradient[p] += dot(all, m->state_bar, m->state + (size_t)p * all);
+  if (m->loads->rates) add_products(a, 2 * MOST_RATES * m->loads->loads, m->state_bar, m->state);
 }
 
 void transpose_guides(void *self, adjoint *a, const double *λ)
@@ -830,9 +822,6 @@ void finish_adjoint(adjoint *a, time_loop *m)
   derivatives *d = a->d;
   for (int k = 0; k < d->terms; ++k)
     if (a->term[k].finish) a->term[k].finish(d->term[k].self, a);
-  for (int p = 0; p < a->parameters; ++p) {
-    a->gradient[p] += dot(a->size, a->q1, d->q0 + (size_t)p * a->size);
-    for (int j = 1; m->rates && j < m->rates->number; ++j)
-      a->gradient[p] += dot(a->size, a->rates[j], d->rates[j] + (size_t)p * a->size);
-  }
+  add_products(a, a->size, a->q1, d->q0);
+  for (int j = 1; m->rates && j < m->rates->number; ++j) add_products(a, a->size, a->rates[j], d->rates[j]);
 }

@@ -4,6 +4,7 @@
  *
  * A step that fails leaves the state unchanged and is divided into substeps.
  */
+#include <complex.h>
 
 /* -- prediction of the end of a step, from which Newton's method starts; see stepper.py ---------------- */
 
@@ -240,17 +241,14 @@ static double largest_rigid_turn(const rigid_parts *p, const double *q0, const d
   for (int g = 0; g < p->rods; ++g) {
     const int32_t *dof = p->dof + 6 * g;
     const double *arms = p->geometry + 6 * g, *q[] = {q0, q1};
-    double x[2], y[2];
+    double complex rod[2];
     for (int i = 0; i < 2; ++i) {
-      x[i] = arms[4], y[i] = arms[5];
-      for (int k = 0; k < 2; ++k) {
-        const double *a = arms + 2 * k, sign = 2 * k - 1;
-        const double c = cos(q[i][dof[4 + k]]) - 1, s = sin(q[i][dof[4 + k]]);
-        x[i] += sign * (q[i][dof[k]] + c * a[0] - s * a[1]);
-        y[i] += sign * (q[i][dof[2 + k]] + s * a[0] + c * a[1]);
-      }
+      rod[i] = arms[4] + I * arms[5];
+      for (int k = 0; k < 2; ++k)
+        rod[i] += (2 * k - 1) * (q[i][dof[k]] + I * q[i][dof[2 + k]]
+          + (arms[2 * k] + I * arms[2 * k + 1]) * (cexp(I * q[i][dof[4 + k]]) - 1));
     }
-    turn = fmax(turn, fabs(atan2(x[0] * y[1] - x[1] * y[0], x[0] * x[1] + y[0] * y[1])));
+    turn = fmax(turn, fabs(carg(rod[1] * conj(rod[0]))));
   }
   return turn;
 }
