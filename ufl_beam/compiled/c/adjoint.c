@@ -670,7 +670,6 @@ void transpose_moving_loads(void *self, adjoint *a, const double *λ)
   const moving_loads *of = m->loads;
   const rates *r = of->rates;
   const int n = of->nodes;
-  begin_moving_loads((void *)of, a->step, 0, 0);
   for (int k = 0; r && k < of->loads; ++k) {
     double v[2];
     on_axis at;

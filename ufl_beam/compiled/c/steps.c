@@ -475,12 +475,18 @@ static int take_stages(time_loop *m, double t1)
  * velocities. */
 static const double FIRST_TRIAL = 1. / 16;
 
-/* Let velocities meet prescribed rates that have jumped up to the beginning of a step to t1. */
-static int meet_jumps(time_loop *m, double t1)
+/* Let velocities meet prescribed rates that have jumped up to the beginning of a step to t1, a substep of one
+ * to `end`, and take further rates of the scheme from a trial step. */
+static int find_rates(time_loop *m, double t1, double end)
 {
-  if (!m->meet_jumps || m->t + 1e-9 * (t1 - m->t) < m->next_jump) return 1;
-  m->next_jump = m->meet_jumps(m->impacts, t1);
-  return raised_anywhere(m->equation) == NOTHING || fails(m, RAISED);
+  if (m->meet_jumps && m->t + 1e-9 * (t1 - m->t) >= m->next_jump) {
+    m->next_jump = m->meet_jumps(m->impacts, t1);
+    if (raised_anywhere(m->equation) != NOTHING) return fails(m, RAISED);
+  }
+  if (!m->rates || !m->prepare || m->rates->ready) return 1;
+  if (!solve_to(m, m->t + FIRST_TRIAL * (end - m->t), end) || !differentiate_or_record(m, 1)) return 0;
+  m->prepare(m->handle);
+  return 1;
 }
 
 /* Solve the step to t1, a substep of one to `end`; the state changes only if it is accepted, except for
@@ -489,11 +495,7 @@ int attempt_step(time_loop *m, double t1, double end)
 {
   m->equation->raised = NOTHING;
   take_back(m); /* an attempt that was not accepted */
-  if (!meet_jumps(m, t1)) return 0;
-  if (m->rates && m->prepare && !m->rates->ready) {
-    if (!solve_to(m, m->t + FIRST_TRIAL * (t1 - m->t), t1) || !differentiate_or_record(m, 1)) return 0;
-    m->prepare(m->handle);
-  }
+  if (!find_rates(m, t1, t1)) return 0;
   if (m->stages <= 1) return solve_to(m, t1, end);
   if (take_stages(m, t1) && solve_to(m, t1, end)) return 1;
   if (m->taken && m->equation->raised == NOTHING && m->adjoint) fails(m, NO_DERIVATIVE); /* the record has the stages */
@@ -617,12 +619,7 @@ int repeat_steps(time_loop *m, int number, const double *steps, const double *co
     const double t1 = steps[3 * k], end = steps[3 * k + 1];
     m->applies = steps[3 * k + 2] != 0;
     e->raised = NOTHING;
-    if (!meet_jumps(m, t1)) return k;
-    if (m->rates && m->prepare && !m->rates->ready) {
-      if (!solve_to(m, m->t + FIRST_TRIAL * (end - m->t), end)) return k;
-      m->prepare(m->handle);
-    }
-    if (!set_step(m, t1, end) || !begin_terms(m)) return k;
+    if (!find_rates(m, t1, end) || !set_step(m, t1, end) || !begin_terms(m)) return k;
     memcpy(e->unknowns, configurations + (size_t)k * m->size, m->size * sizeof *e->unknowns);
     turn_axes(e->turned, e->axes, e->unknowns, 1);
     restart(e, EXACT);
