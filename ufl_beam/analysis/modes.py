@@ -491,7 +491,8 @@ def require_no_spin(call: str, small: SmallMotions, at: Solution | None) -> None
     if at is None or not len(at.v) or not small.M.data.any():
         return
     first = small.undamped(1, (small.K + small.K.T) / 2, definite=True)[-1] ** 0.5
-    for part in (*small.scene.rigid_bodies, *small.scene.beams):
+    parts: list[Any] = [*small.scene.rigid_bodies, *small.scene.beams]
+    for part in parts:
         rotations = small.numbering.nodes_of(part)[1][:, 2]
         if (rate := abs(at.v[-1][rotations].mean())) > SPIN * first:
             raise ArgumentError(

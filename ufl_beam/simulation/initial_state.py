@@ -191,8 +191,8 @@ def _initial_velocity(numbering: DofNumbering) -> Array:
 
     Parts with mass but without :class:`Velocity` are at rest.
     """
-    scene, scales = numbering.scene, numbering.scales
-    v, fastest = np.full(numbering.size, np.nan), 0.0
+    scene, scales, fastest = numbering.scene, numbering.scales, 0.0
+    v: Array = np.full(numbering.size, np.nan)
     parts: list[Any] = [b for b in scene.beams if b.section.rhoA or b.section.rhoI]
     parts += [b for b in scene.bodies if b.mass or b.inertia]
     given: list[tuple[Any, Any]] = [(part, x.at) for x in scene.initial for part in x.beams]
