@@ -431,6 +431,8 @@ failure.savefig(output / "end_rotation_softening.png")
 beam = ub.Beam((0, 0), (L, 0), section(hardening(ub.DuvautLions(2e7 / (E + K)))), cells=40)
 half_circle = turn([beam], np.pi, rates[-1], steps=100)
 ub.plot(half_circle, "shapes", count=9).savefig(output / "end_rotation_shapes.png")
+broken = soften(40, rates[0], 0.0, 500)[2]
+ub.plot(broken, "shapes", count=9).savefig(output / "end_rotation_broken.png")
 ub.print_once(
     "\npictures and data:", *sorted(str(p) for p in output.glob("end_rotation*")), sep="\n  "
 )
