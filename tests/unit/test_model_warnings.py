@@ -511,6 +511,20 @@ def still(*loads):
         (lambda: square(rho=7.85), "are of no material"),
         (lambda: square(E=30e3, rho=2500.0), "are of no material"),
         (lambda: square(fibres=ub.Fibres(ub.ElastoPlastic(355.0))), "yield strain 1.69e-09"),
+        (lambda: square(fibres=ub.Fibres(ub.ElastoPlastic(0.355))), "yield strain 1.69e-12"),
+        (
+            lambda: square(E=27e9, rho=2400.0, fibres=ub.Fibres(ub.Mander(30e6, 0.2))),
+            "strain over strength / E 180; 0.002 is 0.2 %",
+        ),
+        (lambda: ub.SNCurve(range=71.0), "stress range 71; it is in Pa"),
+        (
+            lambda: ub.ImposedStrain.tendon(beam(), 1e3, ub.Table([0, 10], [0.0, 0.01])),
+            "end of a table along the beam 10; s is from 0 to 1",
+        ),
+        (
+            lambda: ub.LineLoad(beam(), (0, -1e3), profile=ub.Table([0, 10], [1.0, 0.5])),
+            "profile: end of a table along the beam 10",
+        ),
         (lambda: ub.Rayleigh.with_ratios(5.0, (10.0, 60.0)), "damping ratio 5; 0.05 is 5 %"),
         (lambda: ub.ImposedStrain(beam(), axial=20.0), "imposed strain 20"),
         (

@@ -34,7 +34,7 @@ GROWING = ub.Scene(
     loads=[ub.PointLoad(BEAM.end, force=(1, 0), amplitude=lambda t: t)],
 )
 STEEL = {"E": 210e9, "nu": 0.3}
-LAW = ub.ElastoPlastic(1.0)
+LAW = ub.ElastoPlastic(1e8)
 BREAKS = ub.Softening(10.0, 5.0)
 SPRING = ub.Spring(1.0)
 BACKBONE = ub.Backbone(1.0, 1.0)

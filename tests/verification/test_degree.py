@@ -309,6 +309,23 @@ def test_a_cell_is_a_mixed_member(degree):
     np.testing.assert_allclose(M, force[1] * arm, rtol=0, atol=most)
 
 
+@pytest.mark.parametrize("cells", [4, 8])
+def test_the_base_of_linear_cells_bears_more_than_the_section(cells):
+    """[closed] L / (L - h/2) times fy b d²/4: the middle of the first cell flows in all layers.
+
+    Hardening adds 4e-4, and the rotation of the tip is 1e-3.
+    """
+    law = ub.Fibres(ub.ElastoPlastic(1.0, isotropic=1.0), number=6)
+    section = ub.Section.rectangle(0.1, 0.1, E=1e6, nu=0.2, fibres=law)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
+    push = ub.PointLoad(beam.end, force=(0, 1e-4), amplitude=lambda t: t)
+    foot = ub.Clamped(beam.start)
+    scene = ub.Scene([beam], supports=[foot], loads=[push])
+    path = ub.follow(scene, ub.DisplacementControl(beam.end, "v", 1e-4), steps=10)
+    borne = abs(path.reaction(foot)[-1, 2]) / (0.1 * 0.1**2 / 4)
+    assert borne == pytest.approx(1 / (1 - 1 / (2 * cells)), rel=1e-3)
+
+
 @pytest.mark.parametrize("degree", [2, 3])
 def test_buckling_of_one_and_two_cells(degree):
     """[closed] π²/4 of a cantilever; deformations before buckling change it by 2.5e-8."""

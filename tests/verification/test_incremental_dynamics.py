@@ -234,6 +234,8 @@ def test_mistakes_are_named():
         analysis([motion(1)], [1.0], intensity=lambda record: record.peak**2)
     with raises("if the motion is doubled; give an intensity that is proportional"):
         analysis([motion(1)], [1.0], intensity=lambda record: 3.0)
+    with pytest.warns(ub.ModelWarning, match="does build use its argument"):
+        analysis([motion(1)], [1.0, 2.0], build=lambda _: shaken(WEAK, motion(1)))
     with raises("measure returned None, not finite numbers"):
         analysis([motion(1)], [1.0], measure=lambda run: None)
 

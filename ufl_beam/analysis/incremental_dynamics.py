@@ -33,6 +33,7 @@ from ufl_beam.errors import (
     require_number,
     require_row,
     shorten,
+    warn,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.mechanics.time_schemes import EnergyMomentum
@@ -113,6 +114,9 @@ def incremental_dynamic_analysis(
             motion.
         RuntimeError: All runs failed for other reasons than a missing equilibrium.
 
+    Warns:
+        ModelWarning: The demands of each motion are equal at all intensities.
+
     Example:
         >>> pulse = ub.GroundMotion(0.02, np.sin(10 * np.arange(0, 1, 0.02)))
         >>> def build(motion):
@@ -185,6 +189,8 @@ def incremental_dynamic_analysis(
     demand, end, outcome = (
         results[name].reshape(len(known), len(levels)) for name in ("demand", "end", "outcome")
     )
+    if len(levels) > 1 and (demand == demand[:, :1]).all():
+        warn(f"{WHAT}: no demand depends on the intensity; does build use its argument?")
     names = tuple(motion.name for motion in known.values())
     by_default = "peak acceleration (m/s²)" if intensity is None else "intensity"
     labels = _name(measure, "demand"), _name(intensity, by_default)

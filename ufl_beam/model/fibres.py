@@ -21,6 +21,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import ModelError
 from ufl_beam.model import plausibility
 from ufl_beam.model.checks import require_count, require_kind, require_number
+from ufl_beam.model.concrete_laws import Mander
 from ufl_beam.model.functions import Point
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import MaterialLaw, require_law, uniform
@@ -212,12 +213,14 @@ class PlacedFibres:
             if core is not None:
                 raise ModelError("Section: core without fibres; give the law of the cover, too")
             return None
-        for each in (fibres, core):
-            limit = getattr(getattr(each, "law", None), "yield_limit", math.inf)
-            if (
-                isinstance(limit, float) and 1e-10 * E < limit < math.inf
-            ):  # less is a number without a unit
+        for law in (each.law for each in (fibres, core) if each is not None):
+            limit = getattr(law, "yield_limit", math.inf)
+            if isinstance(limit, float) and 0.0 < limit < math.inf:
                 plausibility.check("Section: fibres", "yield strain", limit / E)
+            if isinstance(law, Mander):
+                plausibility.check(
+                    "Mander", "strain over strength / E", law.strain * E / law.strength
+                )
         if fibres.number < 2:
             raise ModelError("Fibres: number = 1 has no bending stiffness; use 2 or more")
         low, high, shapes = shape.bottom, shape.top, [shape]

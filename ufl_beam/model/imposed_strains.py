@@ -15,19 +15,17 @@ from ufl_beam.errors import ModelError, closed
 from ufl_beam.model import plausibility
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import Member
-from ufl_beam.model.checks import require_kind, require_number, require_vector
+from ufl_beam.model.checks import require_kind, require_number
 from ufl_beam.model.functions import Timed, TimeFunction, steady
-from ufl_beam.model.loads import Load, Profile, profile_at, require_span
+from ufl_beam.model.loads import Load, Profile, profile_at, require_profile, require_span
 from ufl_beam.model.records import Instance
 
 
 def require_along(value: object, what: str) -> Profile:
     """Return ``value`` as a pair of numbers at both ends or as a function of s, or raise."""
-    if callable(value):
-        return value
     if isinstance(value, Real):
         return (require_number(value, what),) * 2
-    return require_vector(value, what)
+    return require_profile(value, what)
 
 
 Along = Annotated[Profile | float, require_along]

@@ -27,7 +27,7 @@ from ufl_beam.model import checks, plausibility
 from ufl_beam.model.bodies import Beams, Member, PlaceField, ground, moves_with_node
 from ufl_beam.model.connector_laws import PrescribedForce
 from ufl_beam.model.connectors import Component, Connector
-from ufl_beam.model.functions import Timed, TimeFunction, steady, value_at
+from ufl_beam.model.functions import Table, Timed, TimeFunction, steady, value_at
 from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Record, Switch, Vector
 
 
@@ -139,7 +139,9 @@ Profile = tuple[float, float] | Callable[[float], float]
 
 def require_profile(profile: object, what: str) -> Profile:
     """Return ``profile`` as two finite numbers or a function of s, or raise."""
-    return profile if callable(profile) else require_vector(profile, what)
+    if isinstance(profile, Table):
+        plausibility.check(what, "end of a table along the beam", float(profile.times[-1]))
+    return profile if callable(profile) else checks.require_vector(profile, what)
 
 
 def profile_at(s: Array, profile: Profile, span: tuple[float, float], what: str) -> Array:

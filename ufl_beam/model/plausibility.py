@@ -17,6 +17,9 @@ RANGES = {
     "target over the size of the scene": (0.0, 1.0, "; the target is a displacement in m"),
     "distance from the axis over the depth": (0.0, 1.0, "; y is in m"),
     "gap over the size of the scene": (0.0, 0.1, "; a gap is in m"),
+    "stress range": (1e4, math.inf, "; it is in Pa"),
+    "strain over strength / E": (0.0, 50.0, "; 0.002 is 0.2 %"),
+    "end of a table along the beam": (0.0, 1.5, "; s is from 0 to 1, not in m"),
 }
 """Smallest and largest absolute values without a warning, and a hint."""
 

@@ -129,6 +129,8 @@ class SNCurve(Record):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.range >= 10.0:  # less is a number without a unit
+            plausibility.check("SNCurve", "stress range", self.range)
         if self.limit < self.knee < math.inf:
             raise ArgumentError(
                 f"SNCurve: limit = {self.limit:g} cycles lies before the knee, {self.knee:g}"
