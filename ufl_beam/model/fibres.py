@@ -21,7 +21,6 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import ModelError
 from ufl_beam.model import plausibility
 from ufl_beam.model.checks import require_count, require_kind, require_number
-from ufl_beam.model.concrete_laws import Mander
 from ufl_beam.model.functions import Point
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import MaterialLaw, require_law, uniform
@@ -217,10 +216,10 @@ class PlacedFibres:
             limit = getattr(law, "yield_limit", math.inf)
             if isinstance(limit, float) and 0.0 < limit < math.inf:
                 plausibility.check("Section: fibres", "yield strain", limit / E)
-            if isinstance(law, Mander):
-                plausibility.check(
-                    "Mander", "strain over strength / E", law.strain * E / law.strength
-                )
+            strain, strength = (getattr(law, x, None) for x in ("strain", "strength"))
+            if isinstance(strain, float) and isinstance(strength, float):  # of Mander
+                ratio = strain * E / strength
+                plausibility.check("Section: fibres", "strain over strength / E", ratio)
         if fibres.number < 2:
             raise ModelError("Fibres: number = 1 has no bending stiffness; use 2 or more")
         low, high, shapes = shape.bottom, shape.top, [shape]
