@@ -58,3 +58,40 @@ def test_order_in_time(alpha, order, dt, viscosity):
         measured = self_convergence(answer)
         np.testing.assert_allclose(measured, order, rtol=0, atol=0.1)
         assert abs(measured[-1] - order) < 0.03
+
+
+@pytest.mark.parametrize(("relaxation", "order"), [(0.05, 2), (0.0, 1)])
+def test_a_yield_limit_keeps_the_order_if_flow_is_viscous(relaxation, order):
+    """A bar with a mass flows in turns: the dissipated energy is of second order by viscosity.
+
+    With a relaxation time of a twentieth of the period the rate of flow is continuous where it
+    begins.  Without viscosity it jumps somewhere within a step, which makes an error of first order
+    that depends on the place in the step.  Hence the mean order of 25 to 200 steps in a period: an
+    error of twice or half of the trend at one end is a third of an order.
+    """
+    stiffness, mass = 1.0, 1.0
+    period = 2 * math.pi * math.sqrt(mass / stiffness)
+    law = ub.ElastoPlastic(
+        0.25e-4, kinematic=4 * stiffness, viscosity=ub.DuvautLions(relaxation * period)
+    )
+    section = ub.Section(EA=stiffness, GA=1.0, EI=1.0, axial=law)
+    bar = ub.Beam((0, 0), (1, 0), section, cells=1)
+    block = ub.Body((1, 0), mass=mass)
+    guide = ub.PrescribedDisplacement(bar.end, v=0, psi=0)
+    scene = clamped(
+        bar,
+        guide,
+        bodies=[block],
+        joints=[ub.Rigid(bar.end, block.middle)],
+        initial=[ub.Velocity([block], linear=(1e-4, 0))],
+    )
+
+    def lost(steps):
+        end = {"t": (0, 2 * period), "dt": period / steps}
+        run = ub.simulate(scene, ub.EnergyMomentum(), newton=ub.Newton(rtol=1e-12), **end)
+        assert_balanced(run.energy)
+        return run.energy.lost["plastic"][:: steps // 25]
+
+    exact = lost(3200)
+    errors = [np.abs(lost(steps) - exact).max() for steps in (25, 50, 100, 200)]
+    assert math.log2(errors[0] / errors[-1]) / 3 == pytest.approx(order, abs=1 / 3)
