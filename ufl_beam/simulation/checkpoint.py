@@ -242,7 +242,7 @@ class CheckpointFile:
         simulation.save_or_restore(archive)
         content = {
             "seconds": solution.seconds + seconds,
-            **add_prefix("pace/", {name: np.array(x) for name, x in pace.state().items()}),
+            **add_prefix("pace/", pace.state()),
             "stateful": simulation.together(states), "warnings": solution.warnings,
             **add_prefix("state/", archive.state()),
         }  # fmt: skip

@@ -222,8 +222,8 @@ def _require_agreement(numbering: DofNumbering, v: Array) -> None:
     Joined parts that move apart are an error, because they would vibrate.  Supports that cancel
     all velocities of a beam are an error; supports that cancel some of them cause a warning.
     """
-    size, nodes = numbering.scene.size, np.vstack([numbering.dofs, numbering.dofs_of_bodies])
-    fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()
+    size, speeds = numbering.scene.size, np.abs(v * numbering.scales)
+    fastest = size * speeds.max()
     for connector, dofs in zip(
         numbering.scene.all_connectors, numbering.dofs_of_connectors, strict=True
     ):
@@ -242,7 +242,7 @@ def _require_agreement(numbering: DofNumbering, v: Array) -> None:
         for support in numbering.scene.supports if not support.moving and not support.angle
         for c in support.held
     }  # fmt: skip
-    moving = np.abs(v) > 1e-9 * np.abs(v).max() * max(numbering.scene.size, 1.0)
+    moving = speeds > 1e-9 * speeds.max()
     columns = np.vstack([numbering.dofs, numbering.dofs_of_bodies]).T
     for beam in (beam for velocity in numbering.scene.initial for beam in velocity.beams):
         dofs = np.unique(numbering.nodes_of(beam)[1])

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 
@@ -70,14 +70,15 @@ class Steps:
         """Fraction of the duration of the run that has passed."""
         return (self._simulation.t - self._t0) / (self._t1 - self._t0)
 
-    def state(self) -> dict[str, Any]:
-        """Return the data that determine the next step, and the number of steps."""
-        return {name: float(getattr(self, name)) for name in self._STATE}
+    def state(self) -> State:
+        """Return the data that determine the next step, and the number of steps; (n,) each."""
+        return {name: np.array(getattr(self, name), dtype=float, ndmin=1) for name in self._STATE}
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: State) -> None:
         """Restore the data of :meth:`state`."""
         for name in self._STATE:
-            setattr(self, name, type(getattr(self, name))(state[name]))
+            kind, values = type(getattr(self, name)), [*map(float, state[name])]
+            setattr(self, name, values if kind is list else kind(values[0]))
 
 
 class EqualSteps(Steps):
@@ -155,7 +156,7 @@ class Adaptive:
 class AdaptiveSteps(Steps):
     """Steps whose error is estimated and limited."""
 
-    _STATE: tuple[str, ...] = ("steps", "error", "_dt", "_fresh")
+    _STATE: tuple[str, ...] = ("steps", "error", "_dt", "_fresh", "_largest")
 
     def __init__(self, simulation: Simulation, t1: float, control: Adaptive) -> None:
         super().__init__(simulation, t1)
@@ -305,15 +306,6 @@ class AdaptiveSteps(Steps):
             error = max(error, abs(float(weights @ values)) / (self._largest[i] or 1.0))
         return error * dt / (self._t1 - self._t0)
 
-    def state(self) -> dict[str, Any]:
-        """Return the numbers of the base class, and the largest loads so far."""
-        return super().state() | {f"largest {i}": x for i, x in enumerate(self._largest)}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Restore the numbers of :meth:`state`."""
-        super().restore(state)
-        self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]
-
 
 # -- switches --------------------------------------------------------------------------------------
 
@@ -412,7 +404,8 @@ class PilotSteps(AdaptiveSteps):
     def _save_or_restore(self, archive: Archive) -> None:
         self._simulation.save_or_restore(archive)
         self._before = archive.at_dofs("acceleration before", self._before)
-        self.restore({name: archive.number(name, x) for name, x in self.state().items()})
+        now = {name: (np.arange(len(x)), x[:, None]) for name, x in self.state().items()}
+        self.restore({name: archive.rows(name, *now[name], known=True)[:, 0] for name in now})
 
 
 class JudgedSteps(Steps):
@@ -448,11 +441,11 @@ class JudgedSteps(Steps):
         self.steps += 1
         self.error = max(self.error, REMAINING * ahead.size_of(simulation.q - q))
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """Return steps, error, and the state of the pilot before its last step."""
-        return {**super().state(), **add_prefix("pilot/", self._ahead.saved)}
+        return super().state() | add_prefix("pilot/", self._ahead.saved)
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: State) -> None:
         """Restore :meth:`state`; the last step of the pilot is taken again."""
         super().restore(state)
         self._ahead.saved = remove_prefix("pilot/", state)
