@@ -238,25 +238,24 @@ def _require_agreement(numbering: DofNumbering, v: Array) -> None:
                 "or rad/s; give all joined parts velocities that agree"
             )
     supports = {
-        int(numbering.node(support.place)[c]): support
+        int(numbering.node(support.place)[c]): (support, c)
         for support in numbering.scene.supports if not support.moving and not support.angle
         for c in support.held
     }  # fmt: skip
     moving = speeds > 1e-9 * speeds.max()
-    columns = np.vstack([numbering.dofs, numbering.dofs_of_bodies]).T
     for beam in (beam for velocity in numbering.scene.initial for beam in velocity.beams):
         dofs = np.unique(numbering.nodes_of(beam)[1])
         dofs = dofs[moving[dofs]]
-        lost = dofs[np.isin(dofs, [*supports])]
-        if not len(lost):
+        lost = [supports[dof] for dof in dofs.tolist() if dof in supports]
+        if not lost:
             continue
-        support = supports[int(lost[0])]
+        support, _ = lost[0]
         if len(lost) == len(dofs):
             raise ArgumentError(
                 f"Velocity: {beam.name} does not move, because {support} holds it; remove the "
                 "support or the velocity"
             )
-        names = ", ".join(COMPONENTS[c] for c in range(3) if np.isin(columns[c], lost).any())
+        names = ", ".join(COMPONENTS[c] for c in sorted({c for _, c in lost}))
         warn(
             f"Velocity of {beam.name}: {support} prescribes {names}, so that the velocity at its "
             "place is zero from the start but the rest of the beam moves, which is an impact. Give "
