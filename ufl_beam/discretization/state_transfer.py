@@ -88,17 +88,15 @@ class Transfer:
         """Map a configuration to the new numbering; raise if places of a new joint are apart."""
         mapped = self._map(q)
         mismatch = np.abs(mapped[self._to] - q[self._from])
-        moving = len(self._to) - len(self._connector_map)
-        for c, unit in enumerate(("m", "m", "rad")):
-            component = mismatch[c:moving:3]
-            allowed = APART * (self._new.scene.size if c < 2 else 1.0)
-            if component.size and component.max() > allowed:
-                where = self._new.describe(int(self._to[c + 3 * int(np.argmax(component))]))
-                raise ModelError(
-                    "start: the new scene joins places whose positions differ by "
-                    f"{component.max():.3g} {unit} at the end of the solution: {where}. Connect "
-                    "them by springs, or start from a solution in which their positions are equal"
-                )
+        worst = int(np.argmax(relative := mismatch * self._new.scales[self._to]))
+        if relative[worst] > APART:
+            unit = "rad" if self._to[worst] in self._new.rotations else "m"
+            raise ModelError(
+                f"start: the new scene joins places whose positions differ by {mismatch[worst]:.3g} "
+                f"{unit} at the end of the solution: {self._new.describe(int(self._to[worst]))}. "
+                "Connect them by springs, or start from a solution in which their positions are "
+                "equal"
+            )
         return self._on_ground(mapped)
 
     def velocity(self, v: Array) -> tuple[Array, Excess | None]:
