@@ -203,13 +203,11 @@ class Linearization:
     def touching(self) -> list[Connector]:
         """Return connectors whose stiffness differs on both sides of their motion in the state."""
         T, multipliers, found = self.tangent.tocsc(), self.numbering.multipliers, list[Connector]()
-        for group in self._simulation.equation.connector_terms:
-            laws = ConnectorLaw | ForceLaw
-            if not (
-                isinstance(group, ConnectorForces) and isinstance(group.connectors[0].law, laws)
-            ):
-                continue
+        groups = (x for x in self._simulation.connector_terms if isinstance(x, ConnectorForces))
+        for group in groups:
             for i, connector in enumerate(group.connectors):
+                if not isinstance(connector.law, ConnectorLaw | ForceLaw):
+                    break
                 along = T[:, [group.forces_at[i]]].toarray()[:, 0] * self.lengths
                 along[multipliers] = 0.0
                 step = CHANGE * self.lengths[self._motion_of(connector)]

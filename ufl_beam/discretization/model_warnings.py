@@ -273,29 +273,16 @@ def warn_of_jumps(numbering: DofNumbering, t: float, q: Array, motions: Array) -
 
     ``motions`` are the relative motions of the connectors in this state; (num_connectors,).
     """
-    q = q.copy()
-    for support in numbering.scene.supports:
-        dofs = numbering.node(support.place)[:2]
-        q[dofs] = turned(q[dofs], np.full(1, -support.angle))[0]
-    starts = [
-        (
-            f"{support}: {COMPONENTS[c]}",
-            q[numbering.node(support.place)[c]],
-            value_at(f, t, support),
-            c == 2,
-        )
-        for support in numbering.scene.supports
-        for c, f in support.moving.items()
-    ] + [
-        (
-            f"{connector}: its motion",
-            value,
-            value_at(connector.law.motion, t, connector),
-            connector.is_rotation,
-        )
-        for connector, value in zip(numbering.scene.all_connectors, motions, strict=True)
-        if isinstance(connector.law, PrescribedMotion) and connector.law is not RIGID
-    ]
+    starts = list[tuple[str, float, float, bool]]()
+    for s in numbering.scene.supports:
+        x = q[numbering.node(s.place)]
+        x[:2] = turned(x[:2], np.full(1, -s.angle))[0]
+        moving = s.moving.items()
+        starts += [(f"{s}: {COMPONENTS[c]}", x[c], value_at(f, t, s), c == 2) for c, f in moving]
+    for c, motion in zip(numbering.scene.all_connectors, motions, strict=True):
+        if isinstance(c.law, PrescribedMotion) and c.law is not RIGID:
+            target = value_at(c.law.motion, t, c)
+            starts.append((f"{c}: its motion", motion, target, c.is_rotation))
     for name, value, target, is_rotation in starts:
         if abs(target - value) > JUMP * (1.0 if is_rotation else numbering.scene.size):
             unit = "rad" if is_rotation else "m"

@@ -92,10 +92,10 @@ class Transfer:
         if relative[worst] > APART:
             unit = "rad" if self._to[worst] in self._new.rotations else "m"
             raise ModelError(
-                f"start: the new scene joins places whose positions differ by {mismatch[worst]:.3g} "
-                f"{unit} at the end of the solution: {self._new.describe(int(self._to[worst]))}. "
-                "Connect them by springs, or start from a solution in which their positions are "
-                "equal"
+                "start: the new scene joins places whose positions differ by "
+                f"{mismatch[worst]:.3g} {unit} at the end of the solution: "
+                f"{self._new.describe(int(self._to[worst]))}. Connect them by springs, or start "
+                "from a solution in which their positions are equal"
             )
         return self._on_ground(mapped)
 
