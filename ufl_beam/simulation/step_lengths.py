@@ -7,13 +7,12 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NoReturn
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.state_io import Archive, State
-from ufl_beam.errors import StepFailed, require_number, require_sequence
+from ufl_beam.errors import ConvergenceError, StepFailed, require_number, require_sequence
 from ufl_beam.mechanics.time_scheme import nodal_step, order_of, stages_of
 from ufl_beam.output.output_files import add_prefix, remove_prefix
 from ufl_beam.quadrature import gauss_rule
@@ -316,11 +315,6 @@ class Pilot(Simulation):
     def warn(self, warnings: Iterable[str], *, local: bool = False) -> None:
         """Issue no warnings, because the run issues them."""
 
-    def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:
-        """Raise ``failure``; :attr:`failed_end` is the end of the shortest step."""
-        self.failed_end = end
-        raise failure
-
 
 class PilotSteps(AdaptiveSteps):
     """Adaptive steps that locate switches, such as the beginning of sliding, contact or yielding.
@@ -419,7 +413,6 @@ class JudgedSteps(Steps):
 
     def __init__(self, simulation: Simulation, pilot: Pilot, t1: float, control: Adaptive) -> None:
         super().__init__(simulation, t1)
-        self._pilot = pilot
         self._ahead = PilotSteps(pilot, t1, replace(control, tolerance=control.tolerance / HALVES))
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
@@ -431,9 +424,9 @@ class JudgedSteps(Steps):
                 break
             try:
                 ahead.advance()
-            except StepFailed as failure:
+            except ConvergenceError:
                 if not new:
-                    simulation.give_up(failure, self._pilot.failed_end)
+                    raise
                 break
         t, q, _ = new[len(new) > 1 and not new[0][2]]
         while simulation.t < t:
