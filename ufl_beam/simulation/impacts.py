@@ -119,10 +119,9 @@ class Impacts:
         self._functions += [motion_of(connector.law) for connector in connectors]
         self.moves = any(f is not None for f in self._functions)
         # Supports and motors are the same as in another scene if they have the same function.
-        self._keys: list[object] = [id(f) for f in self._functions]
-        for k, connector in enumerate(connectors, start=len(self._held)):
-            if self._functions[k] is None:
-                self._keys[k] = geometry(connector)
+        fixed = [None] * len(self._held) + [geometry(connector) for connector in connectors]
+        pairs = zip(self._functions, fixed, strict=True)
+        self._keys = [key if f is None else id(f) for f, key in pairs]
 
     def _gradients(self, q: Array, t: float, state: State) -> csr_array:
         """Return the derivatives of the constraints at the configuration ``q``."""
