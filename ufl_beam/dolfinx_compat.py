@@ -31,7 +31,7 @@ try:
     import dolfinx
     import ffcx
     import ufl
-    from dolfinx import cpp, jit
+    from dolfinx import cpp, graph, jit
     from dolfinx import fem as fem
     from dolfinx import mesh as mesh
 except ImportError as error:  # pragma: no cover - depends on the machine
@@ -125,11 +125,25 @@ def pack(form: fem.Form) -> tuple[Array, Array]:
     return cpp.fem.pack_constants(form._cpp_object), packed
 
 
-def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:
-    """Create a plane mesh of straight cells (num_cells, 2) on this process; points (n, 2) in m."""
+def line_mesh(
+    points: Array,
+    cells: npt.NDArray[np.int64],
+    comm: MPI.Intracomm = MPI.COMM_SELF,
+    ranks: npt.NDArray[np.int32] | None = None,
+) -> mesh.Mesh:
+    """Create a plane mesh of straight cells (num_cells, 2); points (n, 2) in m.
+
+    ``ranks`` has the process of each cell if there are several; all pass the whole mesh.
+    """
     line = ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(2,)))
-    more = {} if VERSION < (0, 10) else {"max_facet_to_cell_links": 2}
-    return mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=points, e=line, **more)
+    most = int(np.bincount(cells.ravel()).max(initial=2))
+    more: dict[str, Any] = {} if VERSION < (0, 10) else {"max_facet_to_cell_links": most}
+    if ranks is not None:
+        parts = (np.array_split(x, comm.size)[comm.rank] for x in (cells, points, ranks))
+        mine: Any = [*parts]
+        cells, points, to = mine[0], mine[1], graph.adjacencylist(mine[2][:, None])
+        more["partitioner"] = lambda *_: to
+    return mesh.create_mesh(comm, cells=cells, x=points, e=line, **more)
 
 
 def cell_coordinates(domain: mesh.Mesh) -> Array:

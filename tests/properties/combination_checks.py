@@ -20,6 +20,7 @@ from combination_case import (
     results,
 )  # fmt: skip
 from helpers import stop_after
+from old_reference.solver import Solver as OldSolver
 from user_classes import CONNECTOR_LAWS, LAWS, SOFTENING, LargestCurvature
 
 import ufl_beam as ub
@@ -369,13 +370,30 @@ def with_guesses(case, newton):
     laws, but if a solver takes the states of the other for equilibria, it has the same.
     """
     ends, q = case.exact.solution.times, case.exact.solution.q
-    find = Solver._equilibrium
+    find, solve, find_by_old, times = (
+        Solver._equilibrium, Solver._solve, OldSolver._equilibrium, [0.0, 0.0],
+    )  # fmt: skip
 
-    def find_near(solver, guess, step):
-        at = np.flatnonzero(np.abs(ends - step.t1) < 1e-9 * step.dt)
-        return find(solver, solver.supports.axes @ q[at[0]] if len(at) else guess, step)
+    def solve_to(solver, step):
+        times[:] = step.t1, step.dt
+        return solve(solver, step)
 
-    with mock.patch.object(Solver, "_equilibrium", find_near):
+    def at_end(t1, dt):
+        return np.flatnonzero(np.abs(ends - t1) < 1e-9 * dt)
+
+    def find_near(solver, guess):
+        at, frame = at_end(*times), solver.frame
+        return find(solver, (frame.E.T @ q[at[0]])[frame.mine] if len(at) else guess)
+
+    def find_near_by_old(solver, guess, step):
+        at = at_end(step.t1, step.dt)
+        return find_by_old(solver, solver.supports.axes @ q[at[0]] if len(at) else guess, step)
+
+    with (
+        mock.patch.object(Solver, "_solve", solve_to),
+        mock.patch.object(Solver, "_equilibrium", find_near),
+        mock.patch.object(OldSolver, "_equilibrium", find_near_by_old),
+    ):
         return case.run(newton=newton)
 
 

@@ -17,6 +17,7 @@ functionals.  A time scheme replaces strains and variations by its own, see
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import ufl
 from ufl.core.expr import Expr
@@ -32,13 +33,19 @@ def hu_washizu(W: Energy, q: Expr, D: Expr, r: Expr, axis: Axis) -> Expr:
     return W(D) + ufl.dot(r, strain(q, axis) - D)  # P(26)
 
 
-def incompatible(α: Expr, axis: Axis) -> Expr:
-    """Return the strain that a jump α of the rotation causes in the bulk; it unloads the cell.
+def strain_by_jump(jump: Any, length: Any) -> Any:
+    """Return the strain that a jump causes in the bulk of a cell, for UFL expressions and arrays.
 
-    The jump adds α (H - N) to the rotation, with Heaviside's function H and a linear function N,
-    P(69).  This strain is the derivative of -α N; the derivative of α H acts in the hinge only.
+    A jump α of the rotation adds α (H - N) to the rotation, with Heaviside's function H and a
+    linear function N, P(69).  This curvature is the derivative of -α N; the derivative of α H acts
+    in the hinge only.  The opening of a crack (m) unloads a fibre in the same way.
     """
-    return ufl.as_vector([0, 0, -α / axis.h])  # P(71)!
+    return -jump / length  # P(71)!
+
+
+def incompatible(α: Expr, axis: Axis) -> Expr:
+    """Return the strains (Σ, Γ, K) that a jump α of the rotation causes in the bulk."""
+    return ufl.as_vector([0, 0, strain_by_jump(α, axis.h)])
 
 
 def enhanced_strain(q: Expr, α: Expr, axis: Axis) -> Expr:

@@ -18,6 +18,7 @@ from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_pre_traversal
 
 from ufl_beam.compiled.c_library import names
+from ufl_beam.mechanics.functional import strain_by_jump
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.fibres import Kind, SectionPoints
 from ufl_beam.model.law_functions import Values, absolute, positive
@@ -131,7 +132,10 @@ class PointEquations:
         jump = at["jump"] + θ * at["direction"] * at["growth"]
         ends = zip(rows(law, "before"), rows(law, "strain"), strict=True)
         return law.as_argument(
-            tuple((1 - θ) * at[e0] + θ * at[e1] - jump / at["length"] for e0, e1 in ends)
+            tuple(
+                (1 - θ) * at[e0] + θ * at[e1] + strain_by_jump(jump, at["length"])
+                for e0, e1 in ends
+            )
         )
 
     def changes(self, at: At) -> State:
@@ -197,10 +201,10 @@ class PointEquations:
         """Return changes and energies at the end of the step."""
         law, softening, θ, a = self.law(at), self.softening(at), at["theta"], at["growth"]
         argument, zero = law.as_argument, 0 * a
-        relieved, length = at["jump"], at["length"]
-        e0 = tuple(at[n] - relieved / length for n in rows(law, "before"))
-        relieved = relieved + at["direction"] * a
-        e1 = tuple(at[n] - relieved / length for n in rows(law, "strain"))
+        jump, length = at["jump"], at["length"]
+        e0 = tuple(at[n] + strain_by_jump(jump, length) for n in rows(law, "before"))
+        jump = jump + at["direction"] * a
+        e1 = tuple(at[n] + strain_by_jump(jump, length) for n in rows(law, "strain"))
         de = tuple(y - x for x, y in zip(e0, e1, strict=True))
 
         at_θ, old = self.changes(at), self.state(at)

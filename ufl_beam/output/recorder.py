@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Parameter
-from ufl_beam.errors import ArgumentError, require_sequence, shorten
+from ufl_beam.errors import ArgumentError, require_sequence, shorten, warn
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.connectors import Connector
@@ -30,6 +30,7 @@ from ufl_beam.output.state_rows import FORCE, Connection, connection, connector_
 from ufl_beam.output.states import States
 from ufl_beam.parallel import on_first
 from ufl_beam.solvers.newton import Solver
+from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.beam_forces import Cells, InelasticBeams
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.inertia_and_damping import Inertia
@@ -121,6 +122,7 @@ class StateView(PresentState):
     beams: list[Cells]
     inelastic: list[InelasticBeams]
     solver: Solver  # Newton's method
+    newton: Newton  # its options
     controllers: Any  # `Controllers` of the simulation
 
     @property
@@ -160,6 +162,17 @@ class StateView(PresentState):
             True
         """
         return self.solver.snes
+
+    def warn(self, warnings: Iterable[str], *, local: bool = False) -> None:
+        """Store warnings that the solution does not have yet, and issue them on rank 0.
+
+        With ``local``, each process issues its own warnings.
+        """
+        for said in warnings:
+            if said not in self.solution.warnings:
+                self.solution.warnings += f"{said}\n"
+                if local or self.comm.rank == 0:
+                    warn(said)
 
     def velocities(self) -> list[Array]:
         """Return a list with the velocities in the order of :attr:`q`; empty in statics."""

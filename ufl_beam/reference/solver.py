@@ -1,537 +1,228 @@
 # SPDX-License-Identifier: MIT
-"""Solver of a scene in time: the steps, and the state between steps.
-
-:meth:`Solver.step_to` takes a step: substeps, initial guess, search for points that open, SNES with
-the sum of all forces, check of static branches, acceptance.
-"""
+"""Steps of a scene in time, as the theory states them; PETSc's SNES finds the end of each step."""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections import defaultdict
-from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
+from mpi4py import MPI
 from petsc4py import PETSc
 
+import basix
 import numpy as np
-from scipy.sparse import csr_array
+from dolfinx import la
+from dolfinx.fem import petsc
+from scipy.sparse import csr_array, diags_array
 
-from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import DofNumbering, turned
+from ufl_beam.arrays import Array, State
+from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, has_inertia, nodal_step, stages_of
-from ufl_beam.model.bodies import Body, Member
-from ufl_beam.model.connector_law import ForceLaw
-from ufl_beam.model.connector_laws import (
-    Controller,
-    Coulomb,
-    PrescribedMotion,
-    RigidPlastic,
-    has_friction,
-)
-from ufl_beam.model.connectors import Connector
-from ufl_beam.model.constraint_checks import friction_repeats
-from ufl_beam.model.loads import RotatingFrame
+from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, has_inertia, nodal_step
+from ufl_beam.model.bodies import Body, Member, moves_with_node
+from ufl_beam.model.functions import still, value_at
+from ufl_beam.model.loads import Gravity, LineLoad, PointLoad, Rayleigh
 from ufl_beam.output.recorder import PresentState
-from ufl_beam.output.state_rows import BEFORE, FORCES, Block, Columns, Connection
-from ufl_beam.output.states import States
-from ufl_beam.reference.beam_residuals import ElasticBeams, Inertia, YieldingBeams, damping_forces
-from ufl_beam.reference.cell_forms import Archive, Force, Response, Setting
-from ufl_beam.reference.connector_residuals import Connectors, all_connectors
-from ufl_beam.reference.load_vectors import MovingForce, Supports, all_loads
+from ufl_beam.reference.connectors import connectors_of, masses
+from ufl_beam.reference.forms import Fields
+from ufl_beam.reference.frame import Frame
+from ufl_beam.reference.hinges import Hinge
+from ufl_beam.reference.points import Points
+
+ADD, SAME = PETSc.InsertMode.ADD_VALUES, PETSc.Mat.Structure.SAME_NONZERO_PATTERN
+REASONS = PETSc.SNES.ConvergedReason
+
+OPTIONS = {
+    "snes_type": "newtonls", "ksp_type": "preonly", "pc_type": "lu",
+    "pc_factor_mat_solver_type": "mumps",
+}  # fmt: skip
+"""Options of PETSc, which those of :class:`Newton` replace."""
+
+SMALL_STEP, LAST_DIGITS = 1e-9, 1e-15
+"""Newton's method ends after a correction of motions below these parts of the motions, or of the
+scene: the next error is of the size of the square of the correction."""
 
 LARGEST_ROTATION = 0.75 * math.pi
-"""Rotation of a node above which a step is cut, as 2 tan(Δψ/2) is infinite at π; rad."""
+"""Largest rotation of a node in a step, as 2 tan(Δψ/2) is infinite at π; rad."""
 
 LARGEST_RIGID_ROTATION, BENT = 0.5, 1 / 50
-"""Largest rotation of a part without strain in a step, rad; relative difference of rotations of the
-nodes of a beam up to which it counts as such."""
+"""Largest rotation of a part without strain in a static step, rad; relative difference of rotations
+of the nodes of a beam up to which it counts as such."""
 
 MOST_SUBSTEPS = 2**12
 """Largest number of substeps of a step."""
 
-FIRST_TOLERANCE = 1e-4
-"""Factor on the tolerance for the guess, in statics also for the first iterate."""
+APPLYING, APPLYING_ROTATION, SHORT_SUBSTEP = 1 / 8, 0.02, 512
+"""Fraction of the first step in which loads of the initial time are applied, if equilibrium holds
+inside steps; largest rotation of a node in a substep of it, rad; its number of substeps from which
+this limit does not apply."""
 
-STALL_LIMIT = 8
-"""Newton's method stops after this number of iterations that do not halve the least residual."""
+EXCESS_DECAY, EXCESS_TOLERANCE = 0.7, 1e-9
+"""Fraction of the largest excess above which points open; its power n in the n-th round.  Largest
+difference of excesses that count as equal."""
 
-TRIAL_STEP = 1 / 16
-"""Length of the trial step for initial accelerations, as a fraction of the first step."""
-
-APPLYING = 1 / 8
-"""Fraction of the first step, at its beginning, in which loads of the initial time are applied."""
-
-APPLYING_ROTATION = 0.02
-"""Largest rotation of a node in a substep while these loads are applied; rad."""
-
-SHORT_SUBSTEP = 512
-"""Time in which these loads are applied, divided by the longest substep without this limit."""
-
-EXCESS_DECAY = 0.7
-"""Fraction of the largest excess above which points open; its power n in the n-th repetition."""
-
-EXCESS_TOLERANCE = 1e-9
-"""Largest difference of excesses that count as equal."""
-
-LARGEST_MOTION = 1e3
-"""Largest motion in a static step that is no mechanism; rad, or divided by the scene's size."""
+MOST_ROUNDS, MOST_RETURNS = 40, 3
+"""Largest number of rounds, and of those in which hinges turn back."""
 
 KINK_WORK = 1e-6
-"""Largest difference of work and energy due to kinks of laws, relative to the ledger's sum."""
-
-SAMPLE_TOLERANCE = 1e-9
-"""Largest distance of the end of a step from a sample time, divided by the sample interval."""
-
-REASONS = PETSc.SNES.ConvergedReason
+"""Largest difference of work and energy by kinks of laws, relative to the sum of the ledger."""
 
 
 class Solver(PresentState):
-    """State of a scene, and its time steps; controllers get this object as the simulation.
+    """State of a scene, and its steps.
+
+    Vectors of the scene are whole on every process; functions and matrices are distributed.
 
     Args:
-        numbering: Numbering of the degrees of freedom.
-        scheme: Time scheme.
+        numbering: Numbering of the scene, with cells of degree 1.
+        scheme: Static, EnergyMomentum or EnergyMomentumStatic.
         t: Time of the initial state; s.
-        q: Initial configuration; (size,).
-        v: Initial velocities; (size,).
-        rtol: Tolerance of the residual, relative to the forces in the scene.
-        max_iterations: Largest number of iterations before a step is cut.
-        petsc: Options of SNES, without a prefix.
+        newton: Options of Newton's method.
+        comm: Processes that share the mesh.
+        impacts: Finds impacts where prescribed rates jump; None if no rate does.
 
     Attributes:
-        forces: All forces of the scene, inner forces first.
-        impacts: Finds impacts where prescribed rates jump; None if no rate does.
+        frame: Mesh, and joints and supports as q = C x + g(t).
+        fields: Functions and forms of a step.
+        points: Material points of the cells of this process.
+        connectors: Joints, motors and hinges of zero length of the scene.
+        y: Coordinates of the scene, see :class:`Frame`; y1 at the end of the step.
+        q: Configuration of the scene; q1 at the end of the step.
+        v: Velocities of the scene.
+        s: Steps of the nodes on which forces do work.
+        load: Loads in the step.
+        energies: Sum of all energies so far; J.
     """
 
-    impacts: Any = None
+    energies = 0.0
+    on_cells_before: Array
+    reached: Array
+    v: Array
+    y: Array
 
     def __init__(
-        self, numbering: DofNumbering, scheme: Scheme, t: float, q: Array, v: Array, *, rtol: float,
-        max_iterations: int, petsc: dict[str, Any],
+        self, numbering: DofNumbering, scheme: Scheme, t: float, *, newton: Any,
+        comm: MPI.Intracomm, impacts: Any = None,
     ) -> None:  # fmt: skip
-        self.scene, self.numbering, self.scheme, scene = (
-            numbering.scene,
-            numbering,
-            scheme,
-            numbering.scene,
-        )
-        self.t, self.q, self.q_before, self.last_dt = t, q, q, math.inf
-        self.substeps = self.iterations = 0
-        self._rejected = 0.0  # energy of the first attempt of a step that leapt; J
-        controlled = [
-            connector
-            for connector in scene.all_connectors
-            if isinstance(connector.law, Controller | Coulomb)
+        self.scene, self.numbering, self.scheme = numbering.scene, numbering, scheme
+        self.t, self.newton, self.comm, self.impacts = t, newton, comm, impacts
+        self.frame = frame = Frame(numbering, comm)
+        self.fields, self.dynamic = Fields(frame, scheme), has_inertia(scheme)
+        self.substeps, self.iterations, self.last_dt, self._rejected = 0, 0, math.inf, 0.0
+        self.points = list[Points]()
+        for kind, cells in numbering.inelastic:
+            mine = np.flatnonzero(np.isin(frame.cells, cells))
+            self.points.append(Points(kind, mine, numbering, self.fields, scheme))
+        self.connectors, self.masses = connectors_of(numbering, scheme), masses(numbering)
+        hinges = [hinge for group in self.connectors for hinge in group.hinges.values()]
+        self.opening: list[Points | Hinge] = [
+            *hinges,
+            *(p for p in self.points if p.kind.softening),
         ]
-        frictional = [
-            connector for connector in scene.all_connectors if has_friction(connector.law)
-        ]
-        self.requested_forces: dict[Connector, float] = dict.fromkeys(controlled, 0.0)
-        self.rates: dict[Connector, float] = dict.fromkeys([*controlled, *frictional], 0.0)
-        self.samples: dict[Connector, tuple[float, int]] = {}  # first time, last number
-        laws = {
-            connector: connector.law
-            for connector in controlled
-            if isinstance(connector.law, Controller)
-        }
-        self._sampled = {connector: law.sample for connector, law in laws.items() if law.sample}
-
-        repeats = friction_repeats(scene)
-        setting = Setting(numbering, scheme, self.requested_forces, self.rates, repeats)
-        self.ledger, self.search, self.supports = setting.ledger, setting.search, Supports(setting)
-        rest = np.arange(len(numbering.cells))
-        self.yielding: list[YieldingBeams] = []
-        for section_points, cells in numbering.inelastic:
-            self.yielding.append(YieldingBeams(cells, section_points, setting, t))
-            rest = np.setdiff1d(rest, cells)
-        elastic = [ElasticBeams(rest, setting, t)] if len(rest) else []
-        self.beams: list[ElasticBeams | YieldingBeams] = [*self.yielding, *elastic]
-        self.connectors = all_connectors(setting)
-        self.inertia = None
-        if has_inertia(scheme):
-            self.inertia = Inertia(setting, scheme, self.supports.stop(v))
-        inertia = [] if self.inertia is None else [self.inertia]
-        self.loads = all_loads(setting, self.inertia, t)
-        self.inner: list[Force] = [*self.beams, *self.connectors]
-        damping = damping_forces(setting, self.inertia, self.yielding)
-        self.forces: list[Force] = [*self.inner, *self.loads, *inertia, *damping]
-        self._groups = [group for group in self.connectors if isinstance(group, Connectors)]
-        candidates = (law.opens for group in self._groups for law in group.laws)
-        self._candidates: list[Any] = [
-            candidate for candidate in candidates if candidate is not None
-        ]
-        self._candidates += [beams.points for beams in self.yielding if beams.points.softens]
-
-        self._weights: Array = np.ones(numbering.size)  # make forces and moments comparable
-        self._weights[numbering.rotations] = 1 / self.scene.size
-        self._weights[numbering.multipliers] = 0.0
-        self._rtol, self._max_iterations, self._petsc = rtol, max_iterations, petsc
-        self._x = q
-        self._K: Array = np.zeros((numbering.size, numbering.size))
-        self._inner: Array = np.zeros(numbering.size)  # inner forces in the latest residual
-        self._inner_before: Array = self._inner
-        self._error: Exception | None = None
+        self.parts: list[Points | Hinge] = [*hinges, *self.points]
+        self.r, self.rate = fem.Function(frame.V), fem.Function(frame.V)
+        self._add_loads()
         self._make_snes()
 
-    def start(self, internal: dict[str, Array] | None, *, same: bool) -> None:
-        """Begin with the internal variables of another run, if there are any.
+    def start(self, q: Array, v: Array, internal: State | None, *, same: bool) -> None:
+        """Begin with a configuration, velocities, and the internal variables of another run.
 
-        ``same`` is True if scene and time are as at the end of that run, so that no force has
-        jumped.
+        ``same`` is True if scene and time are as at the end of that run.
         """
-        scheme, variables = self.scheme, dict(internal or {})
-        self._continues = internal is not None
-        v = None if self.inertia is None else self.inertia.v
-        loads: Array = np.zeros(self.numbering.size)
-        if self._continues or (has_inertia(scheme) and scheme.further_rates):
-            loads = sum((load.equilibrium(self.t, self.q, v) for load in self.loads), loads)
-            for beam in self.beams:
-                beam.imposed.start(self.t)
-        elif v is not None:
-            for load in self.loads:
-                if isinstance(load, MovingForce):
-                    load.begin_energy(self.t, self.q, v)
-        known = same and "reactions" in variables
-        if not same:  # rates and forces of the last step belong to the forces before the jump
-            lasting = (n for n, x in variables.items() if x.ndim == 2 or n == "reactions")
-            variables = {n: variables[n] for n in lasting if not n.startswith("changes of strains")}
-        self.internal(variables)
-        for force in self.forces:
-            force.start(self.q)
-        if not self._continues:
-            self.q = self.q.copy()
-            for group in self.connectors:
-                self.q[group.forces_at] = group.before = group.at_rest
-        # Forces of beams at rest are computed in a step that is too short for viscous flow.
-        short = Step.create(scheme, 0.0, sys.float_info.min, sys.float_info.min, self.q)
-        for beam in self.beams:
-            self._inner_before = self._inner_before + beam.response(short, self.q)[0]
-        self.on_nodes = sum(beam.on_nodes for beam in self.beams)
-        if self.inertia is None:
-            step = Step.create(scheme, self.t, self.t + 1.0, self.t + 1.0, self.q)
-            step = step._replace(load_time=self.t, motion_time=self.t)
-            for group in self.connectors:
-                group.begin(step)
-                self._inner_before = self._inner_before + group.response(step, self.q)[0]
-            if not known:
-                self.supports.store_reactions(self.supports.axes @ (self._inner_before - loads))
-                self.supports.before = self.supports.reactions
-        self._sum_energies()
+        frame, fields = self.frame, self.fields
+        self.fresh, self.q, self.q_before, self.y = internal is None, q, q, frame.E.T @ q
+        self.y_before, rates = self.y, frame.E.T @ v
+        rates[frame.held[[f == still for f in frame.motions]]] = 0.0  # at fixed supports
+        self.v = frame.E @ rates
+        fields.q0.x.array[:] = fields.q1.x.array[:] = q[frame.dofs]
+        strains = fields.strains()
+        for points in self.points:
+            points.start(strains, internal or {})
+            # Forces of beams at rest are computed in a step that is too short for viscous flow.
+            points.begin(sys.float_info.min, hold=True)
+            points.return_map(strains, stiff=False)
+        for group in self.connectors:
+            group.e0 = group.motions(q)
+        self.reached = self.factors = self._factors() * (not self.fresh)
+        self.load = self.factors @ self.of_loads
+        self.on_cells_before = fields.forces_on_cells(fields.on_cells[0])
+        self.elastic = self.elastic_energy()
 
-    def internal(self, variables: Mapping[str, Array] | None = None) -> dict[str, Array]:
-        """Return the data that later steps need, by name; ``variables`` replace them first."""
-        archive, supports = Archive(variables or {}), self.supports
-        supports.before = supports.reactions = archive.vector("reactions", supports.before)
-        for force in self.forces:
-            force.save_or_restore(archive)
-        for connector, value in self.requested_forces.items():
-            sample = self.samples.get(connector, (math.nan, math.nan))
-            at = np.array([self.scene.all_connectors.index(connector)])
-            (row,) = archive.rows("asked", at, np.array([[value, *sample, self.t]]))
-            self.requested_forces[connector] = float(row[0])
-            if math.isfinite(row[1]) and row[3] == self.t:
-                self.samples[connector] = float(row[1]), int(row[2])
-        together = {name: np.concatenate(arrays) for name, arrays in archive.saved.items()}
-        return {n: x if x.ndim == 1 else x[np.argsort(x[:, 0])] for n, x in together.items()}
+    # -- loads -----------------------------------------------------------------------------------
 
-    def meet(self, impact: Any) -> None:
-        """Change the velocities by an impact, if there is one; see :attr:`impacts`."""
-        if impact is not None and self.inertia is not None:
-            self.inertia.v = self.inertia.v_before = impact.v
-            self.inertia.more = ()
-            groups = [(group.indices, group.work) for group in self.connectors]
-            self.impacts.enter(impact, self.ledger, groups)
-
-    # -- a step, and its substeps ----------------------------------------------------------------
-
-    def step_to(self, t1: float) -> None:
-        """Go to the time ``t1``, in one step or, if it fails, in substeps.
-
-        Raises:
-            StepFailed: Even the smallest substep failed; the state is the end of the last
-                successful substep.
-        """
-        scheme, scene = self.scheme, self.scene
-        at_end = has_inertia(scheme) or scheme.average(0.0, 1.0) == 1.0
-        if self.substeps == 0 and not self._continues and not at_end:
-            frames = any(isinstance(load, RotatingFrame) for load in scene.loads)
-            if frames or scene.works or any(f(self.t) != 0 for _, f in scene.time_functions()):
-                # Loads of the initial time are applied first, in a fraction of the step.
-                begin, end = self.t, self.t + APPLYING * (t1 - self.t)
-                self._in_substeps(end, partial(self._attempt, end=end, at_rest=begin))
-                self.last_dt = math.inf  # the next guess does not extrapolate these substeps
-        while self.t != t1:
-            end = self._next_sample(t1)
-            self._in_substeps(end, partial(self._attempt, end=end))
-
-    def _in_substeps(self, t1: float, attempt: Callable[[float], None]) -> None:
-        """Go to ``t1`` at once, or in substeps: halves, quarters, and so on."""
-        t0, done, substep = self.t, 0, MOST_SUBSTEPS
-        self._rejected = 0.0
-        while done < MOST_SUBSTEPS:
-            last = done + substep == MOST_SUBSTEPS
-            try:
-                attempt(t1 if last else t0 + (t1 - t0) * (done + substep) / MOST_SUBSTEPS)
-            except StepFailed:
-                if substep == 1:
-                    raise
-                substep //= 2
-                continue
-            done += substep
-            if done % (2 * substep) == 0 and substep < MOST_SUBSTEPS:
-                substep *= 2  # a larger substep can begin here
-
-    def _attempt(self, t1: float, end: float, at_rest: float | None = None) -> None:
-        """Take the substep to ``t1`` of a whole step to ``end``.
-
-        If ``at_rest`` is a time, the loads of that time are applied, and nodes must not turn far.
-        """
-        inertia = self.inertia
-        if self.impacts is not None and inertia is not None:
-            counts = self.impacts.after(self.last_dt, self.t, t1)
-            state = self.internal() if any(counts) else {}
-            at = self.q, inertia.v, self.t, counts, state
-            self.meet(self.impacts.find(*at, longest=(t1 - self.t) / 4))
-        if inertia is not None and inertia.scheme.further_rates and not inertia.more:
-            # A short trial step gives the initial accelerations.
-            t = self.t + TRIAL_STEP * (t1 - self.t)
-            trial = Step.create(self.scheme, self.t, t, t1, self.q)
-            q1, s = self._solve(trial)
-            for load in self.loads:
-                if isinstance(load, MovingForce):
-                    load.prepare(trial, q1)
-            inertia.more = inertia.after(s)[1:]
-            self.supports.before = self.supports.reactions
-            for group in self.connectors:
-                group.before = q1[group.forces_at]
-        t0, begun = self.t, list[float]()  # begun: times at which stages have begun; s
-        try:
-            for fraction in np.cumsum(stages_of(self.scheme)[:-1]):
-                t = t0 + fraction * (t1 - t0)
-                step = Step.create(self.scheme, self.t, t, t, self.q)
-                self._accept(step, *self._solve(step))
-                begun.append(step.t0)
-            step = Step.create(self.scheme, self.t, t1, end, self.q)
-            self._finish(step, end, at_rest)
-        except StepFailed:
-            for t in reversed(begun):  # the equation is the same in both directions of time
-                step = Step.create(self.scheme, self.t, t, t, self.q)
-                self._accept(step, *self._solve(step))
-            self.substeps -= 2 * len(begun)
-            raise
-        self.substeps -= len(begun)  # stages are no substeps
-
-    def _finish(self, step: Step, end: float, at_rest: float | None) -> None:
-        """Solve and accept a step, or the last stage of a step; see :meth:`_attempt`."""
-        if at_rest is not None:
-            step = step._replace(load_time=at_rest, motion_time=at_rest)
-        q1, s = self._solve(step)
-        short = at_rest is None or SHORT_SUBSTEP * step.dt <= end - at_rest
-        if not short and self._largest_rotation(q1) > APPLYING_ROTATION:
-            raise StepFailed("a node turns too far while the loads at the beginning are applied")
-        self._accept(step, q1, s)
-
-    def _solve(self, step: Step) -> tuple[Array, Array]:
-        """Return the end configuration of a step, and the nodal step on which forces do work."""
-        q0, axes = self.q, self.supports.axes
-        self.evaluate()
-        self.begin(step)
-        guess = axes @ (q0 + step.dt / self.last_dt * (q0 - self.q_before))
-        self.supports.move(guess, axes @ q0, step)
-        q1 = np.asarray(axes.T @ self._equilibrium(guess, step))
-        s = nodal_step(self.scheme, q0, q1, self.numbering.rotations)
-        s[self.numbering.multipliers] = 0.0
-        if (
-            self.scheme.limits_rotation
-            and not (rotation := self._largest_rotation(q1)) <= LARGEST_ROTATION
+    def _add_loads(self) -> None:
+        """Compute forces of dead loads for factors of one, on the scene and on cells."""
+        loads, fields, cells = self.scene.loads, self.fields, len(self.frame.cells)
+        self.of_loads = np.zeros((len(loads), self.numbering.size))
+        self.of_loads_on_cells = np.zeros((len(loads), cells, 2, 3))
+        density = fields.at_points((3,), degree=9)
+        whole, apart = fields.load(density)
+        for load, forces, on_cells in zip(
+            loads, self.of_loads, self.of_loads_on_cells, strict=True
         ):
-            raise StepFailed(
-                f"a node turns by {rotation:.3g} rad in the step, more than the limit of 0.75 π; "
-                "reduce dt"
-            )
-        if (
-            not (self.scheme.half_tangents and self.inertia is not None)
-            and (rotation := self._largest_rigid_rotation(q1)) > LARGEST_RIGID_ROTATION
-        ):
-            raise StepFailed(f"a rigid part turns by {rotation:.3g} rad in the step")
-        in_beams = sum(beam.change(step, q1) for beam in self.beams)
-        in_connectors = sum(group.change(step, q1) for group in self.connectors)
-        if self.inertia is None:
-            self._require_path(q1, s, in_beams, in_connectors)
-        return q1, s
+            density.x.array[:] = 0.0
+            self._set_load(load, forces, density.x.array.reshape(cells, -1, 3))
+            forces += self._total(self._assembled(whole))
+            on_cells[:] = fields.forces_on_cells(apart)
 
-    def _largest_rotation(self, q1: Array) -> float:
-        """Return the largest rotation of a node in the step to ``q1``; rad."""
-        return float(np.abs(q1 - self.q)[self.numbering.rotations].max(initial=0.0))
+    def _set_load(self, load: Any, forces: Array, values: Array) -> None:
+        """Set the forces of a dead load at nodes, and along beams at five points of each cell."""
+        numbering, cells = self.numbering, self.frame.cells
+        if isinstance(load, PointLoad) and moves_with_node(load.place):
+            np.add.at(forces, numbering.node(load.place), [*load.force, load.moment])
+        elif isinstance(load, LineLoad):
+            X, _ = basix.make_quadrature(basix.CellType.interval, 9)
+            s, i = numbering.parameters(load.beam), cells - numbering.cells_of(load.beam)[0]
+            i = i[on := (i >= 0) & (i < len(s) - 1)]
+            factors = load.factors((s[i, None] + np.diff(s)[i, None] * X.T).ravel())
+            values[on] = factors.reshape(len(i), -1, 1) * (*load.force, load.moment)
+        elif isinstance(load, Gravity):
+            g = np.array([*load.acceleration, 0.0])
+            values[:] = self.fields.rho.x.array[::2, None, None] * g
+            at = np.concatenate([numbering.dofs[:, :2], numbering.dofs_of_bodies[:, :2]])
+            forces[at] = self.masses[at] * g[:2]
 
-    def _largest_rigid_rotation(self, q1: Array) -> float:
-        """Return the largest rotation of a body, a beam without strain or a rod of fixed length."""
-        scene, numbering, rotations = self.scene, self.numbering, [0.0]
-        members: list[Member | Body] = [*scene.beams, *scene.bodies]
-        for member in members:
-            changes = (q1 - self.q)[numbering.nodes_of(member)[1][:, 2]]
-            if np.ptp(changes) <= BENT * (largest := float(np.abs(changes).max())):
-                rotations.append(largest)
-        for connector, dofs in zip(
-            scene.all_connectors, numbering.dofs_of_connectors[:, :6], strict=True
-        ):
-            if connector.stretches and isinstance(connector.law, PrescribedMotion):
-                vectors = []
-                for q in (self.q, q1):
-                    u, v, ψ = q[dofs].reshape(3, 2)
-                    arms = np.array([complex(*arm) for arm in connector.arms])
-                    moved = u + 1j * v + (np.exp(1j * ψ) - 1) * arms
-                    vectors.append(complex(*connector.apart) + moved[1] - moved[0])
-                rotations.append(abs(np.angle(vectors[1] / vectors[0])))
-        return max(rotations)
-
-    def _require_path(self, q1: Array, s: Array, in_beams: float, in_connectors: float) -> None:
-        """Raise :class:`StepFailed` if a static step leads far away or to another branch.
-
-        Along a path of equilibria the work of the internal forces equals the energy that the step
-        stores and dissipates.
-        """
-        moves = np.abs(s) / self.scene.size
-        moves[self.numbering.rotations] *= self.scene.size
-        if not moves.max(initial=0.0) <= LARGEST_MOTION:
-            raise StepFailed("points that yield or have opened leave a mechanism")
-        if math.isinf(self.scheme.slack):
-            return
-        work = float(acting(self.scheme, self._inner_before, self._inner) @ s)
-        size = abs(work) + abs(in_beams)
-        size += sum(float(np.abs(group.taken(q1)).sum()) for group in self._groups)
-        size += sum((abs(beam.work_on_imposed()) for beam in self.beams), 0.0)
-        others = size - abs(work) - abs(in_beams) + abs(in_connectors)
-        only_beams = others <= self.scheme.slack * abs(in_beams)
-        energies = (abs(x) for account in vars(self.ledger).values() for x in account.values())
-        slack = self.scheme.slack * size + sys.float_info.min
-        slack += KINK_WORK * (sum(energies) + self._rejected)
-        slack += float(self._round_off(self.supports.axes @ q1) @ np.abs(s))
-        # Newton's method leaves a residual, and violations of constraints of 1 % of its tolerance.
-        moved = min(float((np.abs(q1) * (self._weights > 0)).max()), self.scene.size)
-        far = self.scene.size * float(np.linalg.norm(moves)) + 0.01 * moved
-        slack += self._rtol * self._scale() * far
-        change = in_beams + in_connectors
-        if abs(work - change) > slack and not (only_beams and self._stiffens(q1, s)):
-            self._rejected = self._rejected or size
-            raise StepFailed(
-                f"the step stores and dissipates {change:.3e} J, but the forces along it do "
-                f"{work:.3e} J of work: it leaps to another branch of equilibria"
-            )
-
-    def _stiffens(self, q1: Array, s: Array) -> bool:
-        """Return whether internal forces grow faster and faster along the line of a step.
-
-        Between stable states before and after a leap they fall.
-        """
-        laws = [connector.law for connector in self.scene.all_connectors]
-        if self._candidates or any(
-            isinstance(law, RigidPlastic | ForceLaw) or has_friction(law) for law in laws
-        ):
-            return False
-        works = [self._inner_before @ s]
-        for part in (0.25, 0.5, 0.75, 1.0):
-            self.response(self.supports.axes @ (self.q + part * (q1 - self.q)))
-            works.append(self._inner @ s)
-        growths = np.diff(works)
-        return bool(growths[0] >= 0 and np.all(np.diff(growths) >= 0))
-
-    def _accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Accept the end of a step, and enter works and losses in the ledger."""
-        self._inner_before = self._inner
-        for force in self.forces:
-            force.accept(step, q1, s)
-        self.supports.accept(s)
-        self.on_nodes = sum(force.on_nodes for force in self.forces)
-        self.q_before, self.last_dt = self.q, step.dt
-        self.q, self.t, self.substeps = q1, step.t1, self.substeps + 1
-        self._sum_energies()
-
-    def _sum_energies(self) -> None:
-        """Sum the stored energies of forces in the accepted state."""
-        total: dict[str, float] = defaultdict(float)
-        for name, energy in (item for force in self.forces for item in force.stored.items()):
-            total[name] += energy
-        self.ledger.state = dict(total)
-
-    # -- openings --------------------------------------------------------------------------------
-
-    def _equilibrium(self, guess: Array, step: Step) -> Array:
-        """Find the equilibrium of a step without unnecessary opening and slip.
-
-        A point or connector that does not flow at the beginning stays closed if an equilibrium
-        exists in which it bears at most its limit.  If several exceed their limits, the largest
-        excesses open first.
-        """
-        if not self._candidates:
-            return self._newton(guess)
-        self.search.hold, self.search.over = True, False
-        try:
-            x, times = self._newton(guess), 0
-            while excess := max(float(np.max(candidate.excess)) for candidate in self._candidates):
-                least = EXCESS_DECAY**times * excess - EXCESS_TOLERANCE
-                for candidate in self._candidates:
-                    candidate.released |= (candidate.excess > 0) & (candidate.excess >= least)
-                x, times = self._newton(x), times + 1
-            return x
-        except StepFailed:
-            if not self.search.over:
-                raise  # nothing was kept closed
-        finally:
-            self.search.hold = False
-            for candidate in self._candidates:
-                candidate.released = False
-        self.begin(step)
-        return self._newton(guess)
+    def _factors(self, t: float | None = None) -> Array:
+        """Return the factors of the loads at a time, by default at the beginning of the step."""
+        t = self.t if t is None else t
+        return np.array([value_at(load.amplitude, t, load) for load in self.scene.loads])
 
     # -- the equation of a step ------------------------------------------------------------------
 
-    def begin(self, step: Step) -> None:
-        """Begin a step, and reset data of iterates."""
-        self._step = step
-        for group in self.connectors:
-            group.begin(step)
-
-    def response(self, x: Array) -> Response:
-        """Return the residual at ``x`` and its derivative, in the axes of the supports."""
-        axes, q1, step = self.supports.axes, self.supports.axes.T @ x, self._step
-        responses = [force.response(step, q1) for force in self.forces]
-        n, none = len(self.inner), np.zeros(len(x))
-        self._inner = sum((r for r, _ in responses[:n]), none)
-        r = np.asarray(axes @ sum((r for r, _ in responses[n:]), self._inner))
-        self.supports.store_reactions(r)
-        K = sum((K for _, K in responses), np.zeros((len(x), len(x))))
-        return r, np.asarray(axes @ K @ axes.T)
-
-    # -- Newton's method -------------------------------------------------------------------------
-
     def _make_snes(self) -> None:
-        """Make the SNES of steps, whose unknowns are the free degrees of freedom."""
-        petsc, n = self._petsc, len(self.supports.free)
-        self._vector, f = (PETSc.Vec().createSeq(n) for _ in range(2))
-        matrix = PETSc.Mat().createAIJ((n, n), comm=PETSc.COMM_SELF)
-        matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
-        matrix.setUp()
-        self.snes = snes = PETSc.SNES().create(PETSc.COMM_SELF)
+        """Make the matrices of a step, and SNES with the options of the run."""
+        frame, fields, comm = self.frame, self.fields, self.comm
+        self.K = petsc.assemble_matrix(fields.tangent)
+        self.K.assemble()
+        dampers = [(x.mass, x.stiffness) for x in self.scene.damping if isinstance(x, Rayleigh)]
+        self.rayleigh = a0, a1 = np.sum(dampers, axis=0) if dampers else (0.0, 0.0)
+        if self.dynamic:  # inertia, and damping
+            forms = fields.mass, fields.stiffness
+            self.M, self.damping = (petsc.assemble_matrix(form) for form in forms)
+            for A in (self.M, self.damping):
+                A.assemble()
+            self.damping.scale(a1)
+            self.damping.axpy(a0, self.M, SAME)
+            self.damping_of_masses, self.scaled = a0 * self.masses, self.M.copy()
+        self.CKC = self.K.ptap(frame.C)
+        self.x, f = (frame.C.createVecRight() for _ in range(2))
+        A, sizes = self.CKC.copy(), (len(frame.mine), len(frame.order))
+        pattern = PETSc.Mat().createAIJ((sizes, sizes), csr=self._rows(self._pattern()), comm=comm)
+        A.axpy(1.0, pattern, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        A.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        self.weights = self.numbering.scales[frame.mine]
+        self.snes = snes = PETSc.SNES().create(comm)
         snes.setOptionsPrefix("ub_")
-        snes.setFunction(self._function, f)
-        snes.setJacobian(self._jacobian, matrix)
+        snes.setFunction(self._residual, f)
+        snes.setJacobian(self._jacobian, A)
         snes.setConvergenceTest(self._converged)
-        snes.setTolerances(max_it=self._max_iterations)
-        snes.setType("newtonls")
-        snes.ksp.setType("preonly")
-        snes.ksp.pc.setType("lu")
-        snes.ksp.pc.setFactorSolverType("mumps")
-        self._set(petsc)
-        search = "snes_linesearch_type"  # if not set: full steps, then backtracking if they fail
-        self._searches = [{}] if search in petsc else [{search: "basic"}, {search: "bt"}]
+        snes.setTolerances(max_it=self.newton.max_iterations)
+        self._set(OPTIONS | self.newton.petsc)
 
     def _set(self, values: dict[str, Any]) -> None:
-        """Set options of the SNES."""
+        """Set options of SNES."""
         options = PETSc.Options("ub_")
         for name, value in values.items():
             options[name] = value
@@ -539,25 +230,232 @@ class Solver(PresentState):
         for name in values:
             options.delValue(name)
 
-    def _newton(self, guess: Array) -> Array:
-        """Find the equilibrium from a guess, by SNES; both are in the axes of the supports."""
-        for search in self._searches:
-            self._set(search)
-            self._x, self._error = guess, None
-            self._last, self._best, self._slow = math.inf, math.inf, 0
-            self._vector.array_w[:] = guess[self.supports.free]
-            reason = self._iterate()
-            if self._error is not None and not isinstance(self._error, StepFailed):
-                raise self._error
-            if reason > 0:
-                return self._all(self._vector)
-            self.begin(self._step)
-        raise self._error or self._failure(reason)
+    def _assembled(self, form: fem.Form) -> Array:
+        """Return an assembled form on V at the degrees of freedom that this process owns."""
+        self.r.x.array[:] = 0.0
+        fem.assemble_vector(self.r.x.array, form)
+        self.r.x.scatter_reverse(la.InsertMode.add)
+        return np.asarray(self.r.x.petsc_vec.array)
+
+    def _total(self, forces: Array) -> Array:
+        """Return forces on the scene, on all processes, from those on owned dofs of V."""
+        whole: Array = np.zeros(self.numbering.size)
+        np.add.at(whole, self.frame.dofs[: len(forces)], forces)
+        self.comm.Allreduce(MPI.IN_PLACE, whole)
+        return whole
+
+    def _residual(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+        """Compute Cᵀ r - F of the step that ends at q1 = C x + g."""
+        frame, fields, q1, r = self.frame, self.fields, self.fields.q1.x, self.r.x.petsc_vec
+        frame.C.mult(x, q1.petsc_vec)
+        q1.scatter_forward()
+        q1.array[:] += frame.g(self.motions)
+        strains = fields.strains()
+        for points in self.points:
+            points.return_map(strains, stiff=self.stiff)
+        self._assembled(fields.force)
+        if self.dynamic:  # equation (78)
+            self._add(self.M, self.coefficients.inertia)
+            self._add(self.damping, self.coefficients.velocity)
+        frame.C.multTranspose(r, f)
+        if self.connectors or self.masses.any():
+            self.q1 = frame.E @ frame.coordinates(x, self.motions)
+        f.array_w[:] += (frame.E.T @ (self._further_forces() - self.load))[frame.mine]
+
+    def _add(self, A: PETSc.Mat, row: Any) -> None:
+        """Add the product of a matrix and a rate of the step to the residual."""
+        q0, q1 = self.fields.q0.x.array, self.fields.q1.x.array
+        s = nodal_step(self.scheme, q0, q1, np.arange(2, len(q0), 3))
+        self.rate.x.array[:] = row[0] * s + row[1] * self.v[self.frame.dofs]
+        A.multAdd(self.rate.x.petsc_vec, self.r.x.petsc_vec, self.r.x.petsc_vec)
+
+    def _further_forces(self) -> Array:
+        """Return forces of connectors, bodies and point masses at ``q1``; (size,)."""
+        r: Array = np.zeros(self.numbering.size)
+        for group in self.connectors:
+            r += group.residual(self.q1)
+        if self.dynamic and self.masses.any():
+            s, c = (
+                nodal_step(self.scheme, self.q, self.q1, self.numbering.rotations),
+                self.coefficients,
+            )
+            r += self.masses * (c.inertia[0] * s + c.inertia[1] * self.v)
+            r += self.damping_of_masses * (c.velocity[0] * s + c.velocity[1] * self.v)
+        return r
+
+    def _further_tangent(self) -> csr_array:
+        """Return the derivative of these forces by the coordinates; (size, size)."""
+        slope: Array = np.zeros(self.numbering.size)
+        if self.dynamic:
+            c, at = self.coefficients, self.numbering.rotations
+            slope += c.inertia[0] * self.masses + c.velocity[0] * self.damping_of_masses
+            if self.scheme.half_tangents:
+                slope[at] /= np.cos((self.q1 - self.q)[at] / 2) ** 2
+        K = sum((group.tangent() for group in self.connectors), diags_array(slope).tocsr())
+        return csr_array(self.frame.E.T @ K @ self.frame.E)
+
+    def _pattern(self) -> csr_array:
+        """Return a matrix without zeros where :meth:`_further_tangent` may have entries."""
+        E, K = abs(self.frame.E), diags_array(np.ones(self.numbering.size)).tocsr()
+        return csr_array(E.T @ sum((x.tangent(ones=True) for x in self.connectors), K) @ E)
+
+    def _rows(self, K: csr_array) -> tuple[Any, Any, Array]:
+        """Return the rows of the unknowns of this process, for PETSc."""
+        rows = csr_array(K[self.frame.mine][:, self.frame.order]).sorted_indices()
+        return rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data
+
+    def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
+        """Compute Cᵀ K C, and the derivatives of the other forces."""
+        self.K.zeroEntries()
+        petsc.assemble_matrix(self.K, self.fields.tangent)
+        self.K.assemble()
+        if self.dynamic:
+            c, q0, q1 = self.coefficients, self.fields.q0.x.array, self.fields.q1.x.array
+            self.M.copy(self.scaled, SAME)
+            self.scaled.scale(c.inertia[0])
+            self.scaled.axpy(c.velocity[0], self.damping, SAME)
+            self.rate.x.array[:] = 1.0
+            if self.scheme.half_tangents:
+                self.rate.x.array[2::3] /= np.cos((q1 - q0)[2::3] / 2) ** 2
+            self.scaled.diagonalScale(R=self.rate.x.petsc_vec)
+            self.K.axpy(1.0, self.scaled, SAME)
+        self.K.ptap(self.frame.C, result=self.CKC)
+        P.zeroEntries()
+        P.axpy(1.0, self.CKC, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        if self.connectors or self.masses.any():
+            P.setValuesCSR(*self._rows(self._further_tangent()), addv=ADD)
+            P.assemble()
+
+    def _converged(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> Any:
+        """Stop after a correction so small that the next one would be round-off."""
+        if not math.isfinite(norms[2]):
+            return REASONS.DIVERGED_FNORM_NAN
+        if norms[2] == 0.0:
+            return REASONS.CONVERGED_FNORM_ABS
+        if iteration == 0:
+            return REASONS.CONVERGED_ITERATING
+        vectors = snes.getSolutionUpdate(), snes.getSolution()
+        sizes = (np.max(np.abs(self.weights * x.array_r), initial=0.0) for x in vectors)
+        correction, motion = self._largest(*sizes)
+        small = correction <= max(SMALL_STEP * motion, LAST_DIGITS)
+        return REASONS.CONVERGED_SNORM_RELATIVE if small else REASONS.CONVERGED_ITERATING
+
+    def _largest(self, *values: float) -> Array:
+        """Return the largest values on all processes; NaN counts as infinite."""
+        largest = np.nan_to_num(np.array(values, dtype=np.float64), nan=np.inf)
+        self.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
+        return largest
+
+    # -- a step, and its substeps ----------------------------------------------------------------
+
+    def step_to(self, t1: float) -> None:
+        """Go to the time ``t1``, in one step or, if it fails, in substeps.
+
+        Raises:
+            StepFailed: Even the smallest substep failed.
+        """
+        at_end = self.dynamic or self.scheme.average(0.0, 1.0) == 1.0
+        first = self.substeps == 0 and self.fresh and not at_end
+        if first and any(f(self.t) != 0 for _, f in self.scene.time_functions()):
+            self._in_substeps(self.t + APPLYING * (t1 - self.t), at_rest=self.t)
+            self.last_dt = math.inf  # the next guess does not extrapolate these substeps
+        self._in_substeps(t1)
+
+    def _in_substeps(self, t1: float, at_rest: float | None = None) -> None:
+        """Go to ``t1`` at once, or in substeps: halves, quarters, and so on.
+
+        If ``at_rest`` is a time, the loads of that time are applied, and nodes must not turn far.
+        """
+        t0, done, substep, self._rejected = self.t, 0, MOST_SUBSTEPS, 0.0
+        while done < MOST_SUBSTEPS:
+            last = done + substep == MOST_SUBSTEPS
+            end = t1 if last else t0 + (t1 - t0) * (done + substep) / MOST_SUBSTEPS
+            step = Step.create(self.scheme, self.t, end, t1, self.q)
+            if at_rest is not None:
+                step = step._replace(load_time=at_rest, motion_time=at_rest)
+            try:
+                turn = self._solve(step)
+                short = SHORT_SUBSTEP * step.dt <= t1 - t0
+                if at_rest is not None and turn > APPLYING_ROTATION and not short:
+                    raise StepFailed("a node turns too far while the first loads are applied")
+            except StepFailed:
+                if substep == 1:
+                    raise
+                substep //= 2
+                continue
+            self.accept(step)
+            done += substep
+            if done % (2 * substep) == 0 and substep < MOST_SUBSTEPS:
+                substep *= 2  # a larger substep can begin here
+
+    def _solve(self, step: Step) -> float:
+        """Find the end of a step; return the largest rotation of a node; rad."""
+        frame, ratio = self.frame, step.dt / self.last_dt
+        if self.dynamic:
+            self._meet_jumps(step)
+            scheme: Any = self.scheme
+            self.coefficients = scheme.coefficients(step.dt, self.last_dt, 0)
+        held = self.y[frame.held]
+        ends = np.array([value_at(f, step.motion_time, "support") for f in frame.motions])
+        self.motions = held + step.fraction * (ends - held)
+        self.growths = step.fraction * (self._factors(step.load_time) - self.reached)
+        self.factors = self.reached + step.at * self.growths
+        self.load = self.factors @ self.of_loads
+        for group in self.connectors:
+            group.begin(step)
+        guess = (self.y + ratio * (self.y - self.y_before))[frame.mine]
+        for hold in (True, False):
+            for part in self.parts:
+                part.begin(step.dt, hold=hold)
+            try:
+                self._equilibrium(guess)
+                break
+            except StepFailed:
+                if not hold or not self.opening:
+                    raise
+        return self._check(step)
+
+    def _equilibrium(self, guess: Array) -> None:
+        """Find an equilibrium in which nothing opens without need: largest excesses open first."""
+        hinges, turned_back = [part for part in self.opening if isinstance(part, Hinge)], 0
+        for k in range(MOST_ROUNDS):
+            self._newton(guess)
+            back = sum(hinge.turns_back() for hinge in hinges)
+            excess = max((float(np.max(p.excess, initial=0.0)) for p in self.opening), default=0.0)
+            (excess,) = map(float, self._largest(excess))
+            if not back and excess == 0.0:
+                return
+            if (turned_back := turned_back + bool(back)) > MOST_RETURNS:
+                break
+            for part in self.opening:
+                part.release(EXCESS_DECAY**k * excess - EXCESS_TOLERANCE)
+            guess = self.x.array.copy()
+        raise StepFailed("hinges open and close again and again")
+
+    def _newton(self, guess: Array) -> None:
+        """Run SNES: full steps, a line search, elastic tangents of closed points, full steps again.
+
+        Points around an opening hinge unload, which their own tangents do not predict.
+        """
+        search = "snes_linesearch_type"
+        attempts = [("basic", False, True), ("bt", False, True)]
+        if self.points:
+            attempts += [("basic", True, True), ("basic", False, False)]
+        for kind, self.stiff, anew in attempts:
+            self._set({search: self.newton.petsc.get(search, kind)})
+            if anew:
+                self.x.array_w[:] = guess
+            if (reason := self._iterate()) > 0:
+                return
+        names = {v: k for k, v in vars(REASONS).items() if isinstance(v, int)}
+        failure = StepFailed(f"Newton's method did not converge ({names.get(reason, reason)})")
+        failure.reason = str(names.get(reason, reason))
+        raise failure
 
     def _iterate(self) -> int:
         """Iterate with SNES; return its reason to stop."""
         try:
-            self.snes.solve(None, self._vector)
+            self.snes.solve(None, self.x)
         except PETSc.Error as error:  # also raised if a callback is interrupted
             cause: BaseException = error
             while cause.__cause__ is not None:
@@ -569,155 +467,91 @@ class Solver(PresentState):
         self.iterations += self.snes.getIterationNumber()
         return int(self.snes.getConvergedReason())
 
-    def _all(self, vector: PETSc.Vec) -> Array:
-        """Return all degrees of freedom from a vector of the free ones."""
-        x = self._x.copy()
-        x[self.supports.free] = vector.array_r
-        return x
+    def _check(self, step: Step) -> float:
+        """Raise :class:`StepFailed` if a step turns a part too far, or leaps to another branch."""
+        numbering, frame, scheme = self.numbering, self.frame, self.scheme
+        self.y1 = frame.coordinates(self.x, self.motions)
+        self.q1 = frame.E @ self.y1
+        self.s = nodal_step(scheme, self.q, self.q1, numbering.rotations)
+        self.s[numbering.multipliers] = 0.0
+        turn = float(np.abs(self.q1 - self.q)[numbering.rotations].max(initial=0.0))
+        if scheme.limits_rotation and not turn <= LARGEST_ROTATION:
+            raise StepFailed(
+                f"a node turns by {turn:.3g} rad in the step, more than the limit of 0.75 π; "
+                "reduce dt"
+            )
+        self.on_cells = self.fields.forces_on_cells(self.fields.on_cells[0])
+        if not (scheme.half_tangents and self.dynamic):
+            self._require_small_turns()
+        if not self.dynamic and math.isfinite(scheme.slack):
+            self._require_path()
+        return turn
 
-    def _function(self, snes: PETSc.SNES, vector: PETSc.Vec, f: PETSc.Vec) -> None:
-        """Compute the residual of the free degrees of freedom; NaN after an error stops SNES."""
-        try:
-            self._r, self._K = self.response(self._all(vector))
-        except Exception as error:  # of a user's function
-            self._error = error
-        if self._error is not None:
-            self._r = np.full(self.numbering.size, np.nan)
-        f.array_w[:] = self._r[self.supports.free]
+    def _require_small_turns(self) -> None:
+        """Raise if a step turns a body, or a beam without strain, by more than the limit."""
+        members: list[Member | Body] = [*self.scene.beams, *self.scene.bodies]
+        for member in members:
+            turns = (self.q1 - self.q)[self.numbering.nodes_of(member)[1][:, 2]]
+            largest = float(np.abs(turns).max())
+            if np.ptp(turns) <= BENT * largest and largest > LARGEST_RIGID_ROTATION:
+                raise StepFailed(f"{member.name} turns by {largest:.3g} rad in the step")
 
-    def _jacobian(self, snes: PETSc.SNES, vector: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
-        """Set the derivative with respect to the free degrees of freedom."""
-        K = csr_array(self._K[np.ix_(self.supports.free, self.supports.free)])
-        if not np.isfinite(K.data).all():
-            self._error = self._error or StepFailed("the tangent has entries that are no numbers")
-            K.data[:] = 0.0
-        P.zeroEntries()
-        P.setValuesCSR(*(x.astype(PETSc.IntType) for x in (K.indptr, K.indices)), K.data)
-        P.assemble()
+    def _require_path(self) -> None:
+        """Raise if the work of the internal forces in a step is not the change of the energy."""
+        steps = self.s[self.numbering.dofs[self.numbering.cells[self.frame.cells]]]
+        work = np.sum(acting(self.scheme, self.on_cells_before, self.on_cells) * steps)
+        change = self.elastic_energy() - self.elastic
+        change += sum(points.change() for points in self.points)
+        sums = np.array([work, change])
+        self.comm.Allreduce(MPI.IN_PLACE, sums)
+        work, change = map(float, sums)
+        size = abs(work) + abs(change)
+        slack = self.scheme.slack * size + KINK_WORK * (self.energies + self._rejected)
+        if abs(work - change) > slack + 8 * self.random_work(self.q1, self.s):
+            self._rejected = self._rejected or size
+            raise StepFailed(
+                f"the step stores and dissipates {change:.3e} J, but the forces along it do "
+                f"{work:.3e} J of work: it leaps to another branch of equilibria"
+            )
 
-    def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> Any:
-        """Stop if the residual is small relative to the forces, or as small as round-off allows."""
-        x, r = self._all(snes.getSolution()), self._r.copy()
-        r[self.supports.constrained] = 0.0
-        size = self._norm(r)
-        if not math.isfinite(size):
-            return REASONS.DIVERGED_FNORM_NAN
-        scale = self._scale()
-        moved = min(float(np.max(np.abs(x) * (self._weights > 0), initial=0.0)), self.scene.size)
-        q1 = self.supports.axes.T @ x
-        residual = max(
-            (c.relative_residual(q1, r, scale, moved) for c in self.connectors), default=0.0
-        )
-        # A guess that just meets the tolerance would ignore a small load beside large loads.
-        least = 1 if self.inertia is not None else 2
-        enough = self._rtol * scale * (FIRST_TOLERANCE if iteration < least else 1.0)
-        if size <= enough and residual <= self._rtol:
-            return REASONS.CONVERGED_FNORM_ABS
-        digits = 8 * self._norm(self._round_off(x)) if iteration > 1 else 0.0
-        # A residual of round-off is no longer halved by Newton's method.
-        stays = size <= digits and size > self._last / 2
-        if iteration > 1 and stays and residual <= max(self._rtol, 1e-10):
-            return REASONS.CONVERGED_FNORM_ABS
-        self._last, self._slow = size, self._slow + 1
-        if size <= self._best / 2:
-            self._best, self._slow = size, 0
-        return REASONS.DIVERGED_DTOL if self._slow > STALL_LIMIT else REASONS.CONVERGED_ITERATING
+    def random_work(self, q: Array, s: Array) -> float:
+        """Return the work that round-off of a configuration does on a step ``s``; J."""
+        diagonal = self.K.getDiagonal().array
+        dofs = self.frame.dofs[: len(diagonal)]
+        works = diagonal * np.spacing(np.abs(q[dofs])) * s[dofs]
+        return math.sqrt(self.comm.allreduce(float(works @ works)))
 
-    def _scale(self) -> float:
-        """Return the size of the forces in the scene; N."""
-        return self._norm(self._inner) + sum(self._norm(load.force) for load in self.loads)
-
-    def _norm(self, forces: Array) -> float:
-        """Return the norm of forces, and of moments divided by the size of the scene; N."""
-        return float(np.linalg.norm(self._weights * forces))
-
-    def _round_off(self, x: Array) -> Array:
-        """Return the residuals that round-off of the motions causes; N, N m."""
-        motions = np.abs(x) * (self._weights > 0)
-        return np.asarray(np.abs(self._K) @ np.spacing(motions))
-
-    def _failure(self, reason: int) -> StepFailed:
-        names = {v: k for k, v in vars(REASONS).items() if isinstance(v, int)}
-        r = np.abs(self._r) * self._weights
-        r[self.supports.constrained] = 0.0
-        failure = StepFailed(
-            f"Newton's method did not converge ({names.get(reason, reason)}); residual "
-            f"{np.linalg.norm(r):.3e} N"
-        )
-        failure.residuals = self.numbering.worst(np.nan_to_num(r))
-        failure.reason = str(names.get(reason, reason))
-        return failure
-
-    # -- controllers and friction ----------------------------------------------------------------
-
-    def evaluate(self) -> None:
-        """Evaluate controllers and limits of friction; store the rates of motions with friction."""
-        for connector in self.requested_forces:
-            due = self._due(connector) if connector in self._sampled else None
-            if due is None or due != self.samples.get(connector):
-                self.requested_forces[connector] = connector.law.evaluate(self, connector)  # type: ignore[union-attr]
-            if due is not None:
-                self.samples[connector] = due
-        if self.inertia is not None:
-            groups = (group for group in self._groups if self.rates.keys() & {*group.connectors})
-            for group in groups:
-                rates = group.rates(self.q, self.inertia.v)
-                self.rates.update(zip(group.connectors, map(float, rates), strict=True))
-
-    def _due(self, connector: Connector) -> tuple[float, int]:
-        """Return the first sample time of a controller, s, and the index of the due sample."""
-        sample, (first, _) = self._sampled[connector], self.samples.get(connector, (self.t, -1))
-        digits = SAMPLE_TOLERANCE * sample + 4 * math.ulp(max(self.t, first, key=abs))
-        return first, math.floor((self.t - first + digits) / sample)
-
-    def _next_sample(self, end: float) -> float:
-        """Return the next sample time of a controller, or ``end`` if that comes first; s."""
-        stop = end
-        for connector, sample in self._sampled.items():
-            first, number = self._due(connector)
-            at = first + (number + 1) * sample
-            if (
-                self.t
-                < at
-                < stop - SAMPLE_TOLERANCE * sample - 4 * math.ulp(max(at, stop, key=abs))
-            ):
-                stop = at
-        return stop
-
-    # -- the state, by objects of the scene ------------------------------------------------------
-
-    def connections(self) -> Array:
-        """Return the columns of ``Connection`` for all connectors; (num_connectors, 5)."""
-        table = np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
+    def accept(self, step: Step) -> None:
+        """Accept the end of a step."""
+        if self.dynamic:
+            of_step, of_v, *_ = self.coefficients.rates[0]
+            self.v = of_step * self.s + of_v * self.v  # equation (87)
+        for part in self.parts:
+            part.accept()
         for group in self.connectors:
-            table[group.indices] = group.columns(self.q)
-        return table
+            group.e0 = group.motions(self.q1)
+        self.reached, self.last_dt = self.reached + self.growths, step.dt
+        self.y_before, self.q_before, self.y, self.q = self.y, self.q, self.y1, self.q1
+        self.t, self.substeps = step.t1, self.substeps + 1
+        self.fields.q0.x.array[:] = self.fields.q1.x.array
+        self.on_cells_before, self.elastic = self.on_cells, self.elastic_energy()
 
-    @property
-    def now(self) -> States:
-        """Present state as a solution; initial static reactions belong to the initial forces."""
-        reactions = np.array(self.supports.forces())
-        for k, support in enumerate(self.scene.supports):  # in the axes of the support
-            reactions[k, :2] = turned(reactions[k, :2], np.full(1, -support.angle))[0]
-        degree = self.numbering.mesh.degree
-        material = np.zeros((len(self.numbering.inelastic_cells), degree, 6))
-        for beams in self.yielding:
-            rows = np.searchsorted(self.numbering.inelastic_cells, beams.cells.cell_indices)
-            material[rows] += beams.material()
-        state = {"t": np.array(self.t), "q": self.q, "reactions": reactions}
-        if self.inertia is not None:
-            state["v"] = self.inertia.v
-        for account, energies in vars(self.ledger).items():
-            state |= {f"{account}: {name}": np.array(value) for name, value in energies.items()}
-        state |= {
-            "connectors": self.connections(), "material": material.reshape(-1, 6),
-            FORCES: np.zeros((9, len(self.numbering.cells))) + self.on_nodes,
-        }  # fmt: skip
-        between = float(self.scheme.average(0.0, 1.0))
-        if between < 1:
-            state[BEFORE] = self.q_before
-        columns = Columns({name: np.shape(values) for name, values in state.items()})
-        row = np.concatenate([np.ravel(values) for values in state.values()])
-        now = States(self.numbering, None, Block(columns, row[None], 1))
-        now.equilibrium_fraction, now.needs_start = between, between < 1
-        return now
+    def _meet_jumps(self, step: Step) -> None:
+        """Let velocities meet rates of motions that have jumped."""
+        if self.impacts is not None:
+            counts = self.impacts.after(self.last_dt, self.t, step.t1)
+            self.meet(self.impacts.find(self.q, self.v, self.t, counts, {}, longest=step.dt / 4))
+
+    def meet(self, impact: Any) -> None:
+        """Change the velocities by an impact, if there is one."""
+        if impact is not None:
+            self.v = impact.v
+
+    def elastic_energy(self) -> float:
+        """Return the energy of the elastic cells of this process at ``q1``; J."""
+        return float(fem.assemble_scalar(self.fields.potential))
+
+    def close(self) -> None:
+        """Destroy the PETSc objects."""
+        for thing in (self.snes, self.K, self.CKC, self.x, self.frame.C):
+            thing.destroy()

@@ -10,18 +10,15 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from itertools import chain
-from typing import Any, cast
+from typing import Any
 
 from mpi4py import MPI
 
 import numpy as np
 
 from ufl_beam.discretization.model_warnings import warn_of_loads
-from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import (
     ArgumentError,
-    ConvergenceError,
-    StepFailed,
     require_count,
     require_function,
     require_kind,
@@ -39,19 +36,15 @@ from ufl_beam.output.output_files import Output, reserved
 from ufl_beam.output.recorder import Recorder, checked_recorders
 from ufl_beam.output.serialization import Description
 from ufl_beam.parallel import communicator, print_once, progress_bar
-from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.checkpoint import Checkpoint, CheckpointFile, checksum_at
 from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch, warn_of_rayleigh
-from ufl_beam.simulation.impacts import impacts_of
 from ufl_beam.simulation.initial_state import (
     StateOf,
-    checked_numbering,
     chosen_state,
-    continuation,
-    initial_state,
     mesh_of,
     require_scheme,
 )
+from ufl_beam.simulation.reference_run import ReferenceRun
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
 from ufl_beam.simulation.step_lengths import (
@@ -63,7 +56,7 @@ from ufl_beam.simulation.step_lengths import (
     step_count,
 )
 from ufl_beam.simulation.stepper import MOST_SUBSTEPS
-from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
+from ufl_beam.solvers.newton_options import Newton, require_plain
 
 interrupt: ContextVar[Callable[[], None]] = ContextVar("interrupt", default=lambda: None)
 """Function that runs call between calls of C; it raises an exception to end the run."""
@@ -159,16 +152,11 @@ def simulate(
     files = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
     recorders, outputs = checked_recorders(record, comm, "simulate", *files)
     begin = time.perf_counter()
-    if isinstance(newton, Newton) and newton.reference:
-        if isinstance(dt, Adaptive):
-            require_plain(newton, "adaptive steps, dt = Adaptive(...)")
-        if recorders or checkpoint is not None:
-            require_plain(newton, "recorders" if recorders else "checkpoint")
-        number = step_count(t1 - t0, cast(float, dt))
-        return simulate_by_reference(
-            scene, scheme, newton, (t0, t1), number, start=start, mesh=mesh, every=every,
-            max_states=max_states, comm=comm, progress=progress, until=until,
-        )  # fmt: skip
+    by_reference = isinstance(newton, Newton) and newton.reference
+    if isinstance(dt, Adaptive):
+        require_plain(newton, "adaptive steps, dt = Adaptive(...)")
+    if checkpoint is not None:
+        require_plain(newton, "checkpoint")
     with ExitStack() as stack:
         keeper: CheckpointFile | None = None
         if checkpoint is not None:
@@ -181,10 +169,9 @@ def simulate(
             }  # fmt: skip
             keeper = CheckpointFile(checkpoint, call, step, t1, recorders, comm)
             stack.callback(keeper.lock.unlock)
-        simulation = Simulation(
-            scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
-        )
-        solution = simulation.solution
+        kind: Any = ReferenceRun if by_reference else Simulation
+        simulation = kind(scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm)
+        solution: Solution = simulation.solution
         solution.every, solution.building = every, time.perf_counter() - begin
         stack.enter_context(running(simulation, recorders, outputs, begin))
         pace: EqualSteps | AdaptiveSteps | JudgedSteps  # `error`: see Solution.time_error
@@ -235,7 +222,7 @@ def take_steps(
         begin: ``time.perf_counter()`` at the beginning of the run, for checkpoints; s.
     """
     solution, ended = simulation.solution, False
-    tolerance = LEDGER_TOLERANCE * simulation.solver.c.rtol
+    tolerance = LEDGER_TOLERANCE * simulation.newton.rtol
     watch = LedgerWatch(simulation.numbering, simulation.scheme, tolerance)
 
     def after_step() -> None:
@@ -310,12 +297,12 @@ def check_ledger(simulation: Simulation) -> None:
         everyone = subdomain.comm.allgather(solution.warnings.splitlines(keepends=True))
         solution.warnings = "".join(dict.fromkeys(chain.from_iterable(everyone)))
     if getattr(simulation.scheme, "exact_ledger", False) and len(solution) > 1:
-        energy, tolerance = solution.energy, LEDGER_TOLERANCE * simulation.solver.c.rtol
+        energy, tolerance = solution.energy, LEDGER_TOLERANCE * simulation.newton.rtol
         if energy.describe_imbalance(tolerance, 0.0):
             # Round-off errors of steps are independent, so their squares add up.
             q = solution.q[:, subdomain.dofs]
             steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
-            round_off = simulation.solver.random_work(np.abs(q).max(axis=0), steps)
+            round_off = simulation.random_work(np.abs(q).max(axis=0), steps)
             solution.imbalance_message = energy.describe_imbalance(tolerance, round_off)
     if solution.imbalance_message and simulation.comm.rank == 0:
         warn(solution.imbalance_message)
@@ -382,82 +369,3 @@ def require_times(t: tuple[float, float], call: str = "simulate") -> tuple[float
 
 
 # -- the reference solver --------------------------------------------------------------------------
-
-
-def simulate_by_reference(
-    scene: Scene, scheme: Scheme, newton: Newton, times: tuple[float, float], number: int, *,
-    start: Solution | None, mesh: Mesh | None, every: int, max_states: int, comm: MPI.Intracomm,
-    progress: bool, until: Callable[[Any], bool] | None = None,
-) -> Solution:  # fmt: skip
-    """Simulate by the reference solver, in ``number`` equal steps between the two ``times`` (s).
-
-    Other arguments are as in :func:`simulate`.
-    """
-    if comm.size > 1:
-        require_plain(newton, f"mpirun, here with {comm.size} processes")
-    newton = checked_newton(newton, comm)
-    begin, (t0, t1) = time.perf_counter(), times
-    numbering, _ = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=start is None)
-    q, v, internal, _ = state = initial_state(numbering, start)
-    t0, same = continuation(start, scene, t0)
-    impacts, impact = impacts_of(numbering, scheme, t0, start, same, state)
-    v = v if impact is None else impact.v
-    options: dict[str, Any] = {"max_iterations": newton.max_iterations, "petsc": newton.petsc}
-    solver = Solver(numbering, scheme, t0, q, v, rtol=newton.rtol, **options)
-    between = float(scheme.average(0.0, 1.0))
-    solver.start(None if start is None else internal, same=same)
-    solver.impacts = impacts
-    if impacts is not None and impacts.moves:
-        solver.ledger.lost["impacts"] += 0.0
-    solver.meet(impact)
-    if (
-        start is not None
-        and start.equilibrium_fraction == between
-        and same_unknowns(start.numbering, numbering)
-    ):
-        goes_on = same and "reactions" in internal and not len(start.v)
-        if goes_on or has_inertia(scheme):
-            solver.on_nodes, solver.q_before = start.cell_resultants(-1), start.before(-1)
-    solution = Solution(scene, numbering)
-    solution.equilibrium_fraction, solution.needs_start = between, between < 1
-    solution.scheme = scheme
-    solution.every, solution.building = every, time.perf_counter() - begin
-
-    def keep() -> None:
-        columns, row = solver.now.row(0)
-        if solver.substeps == 0 and has_inertia(scheme):
-            columns.column_of("reactions", row).fill(math.nan)  # unknown before the first step
-        solution.append(columns, row)
-        solution.count(solver.substeps, solver.iterations)
-
-    keep()
-    try:
-        with progress_bar(progress, comm, total=1.0) as bar:
-            for k in range(1, number + 1):
-                end = t1 if k == number else t0 + (t1 - t0) * k / number
-                interrupt.get()()
-                solver.step_to(end)
-                if k % solution.every == 0 or k == number:
-                    keep()
-                    if len(solution) > max_states + 1 and k < number:
-                        solution.downsample()
-                        solution.every *= 2
-                bar.update(k / number - bar.n)
-                if until is not None and require_answer(until, solver):
-                    break
-    except StepFailed as failure:
-        raise ConvergenceError(
-            f"no equilibrium after t = {solver.t:.9g} s: {failure}. {scheme.advice}",
-            time=solver.t, dt=end - solver.t, solution=solution, residuals=failure.residuals,
-            forces={}, reason=failure.reason,
-        ) from failure  # fmt: skip
-    except BaseException as error:
-        stopped: Any = error
-        stopped.solution = solution
-        raise
-    finally:
-        if solution.times[-1] != solver.t:
-            keep()
-        solution.internal = solver.internal()
-        solution.seconds = time.perf_counter() - begin
-    return solution

@@ -9,7 +9,7 @@ a run grow during the first eighth of the first step, in substeps with small rot
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -21,7 +21,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
-from ufl_beam.errors import ModelError, StepFailed, warn
+from ufl_beam.errors import ModelError, StepFailed
 from ufl_beam.mechanics.time_scheme import Step, stages_of, with_half_tangents
 from ufl_beam.model.connector_laws import PrescribedMotion
 from ufl_beam.model.constraint_checks import INSTEAD, describe_motions
@@ -206,6 +206,7 @@ class Stepper(StateView):
             subdomain.numbering.scene,
         )
         self.equation, self.scheme, self.ledger, self.solution = equation, scheme, ledger, solution
+        self.newton = newton
         self.together, self._path, self._free_motion = together, path, free_motion
         self.comparison, self.parameter = ProcessComparison(comm, subdomain), solution.parameter
         self.fields, self.terms, self.supports = equation.fields, equation.terms, equation.supports
@@ -489,16 +490,9 @@ class Stepper(StateView):
             raise self._path.failure(failure == lib.LEAVES_MECHANISM)
         raise StepFailed("the step cannot be trusted")
 
-    def warn(self, warnings: Iterable[str], *, local: bool = False) -> None:
-        """Store warnings that the solution does not have yet, and issue them on rank 0.
-
-        With ``local``, each process issues its own warnings.
-        """
-        for said in warnings:
-            if said not in self.solution.warnings:
-                self.solution.warnings += f"{said}\n"
-                if local or self.comm.rank == 0:
-                    warn(said)
+    def random_work(self, q: Array, s: Array) -> float:
+        """Return the expected work of round-off forces in a step ``s``; J."""
+        return self.solver.random_work(q, s)
 
     # -- the state -----------------------------------------------------------------------------
 

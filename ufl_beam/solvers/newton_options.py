@@ -34,10 +34,10 @@ class Newton(Record):
             replaces an equivalent method in C, which is faster for few cells.  With
             ``snes_linesearch_type``, that line search is also used when full steps stall.
             A run raises :class:`ArgumentError` for options that PETSc does not use.
-        reference: True if the reference solver computes the run.  It solves the equations of the
-            paper by DOLFINx forms, a return map in NumPy and PETSc's SNES, and is ten to a
-            thousand times slower.  :func:`simulate` accepts it for equal steps on one process.
-            See docs/theory.md.
+        reference: True if the reference solver computes the run: plain DOLFINx forms on one mesh,
+            a return map in NumPy and PETSc's SNES, ten to a hundred times slower.
+            :func:`simulate` accepts it for equal steps and for the scenes that docs/theory.md
+            names.
 
     Example:
         >>> newton = ub.Newton(rtol=1e-12, petsc={"snes_linesearch_type": "bt"})
@@ -64,7 +64,7 @@ def require_plain(newton: Newton | None, what: str) -> None:
     if newton is not None and newton.reference:
         raise ArgumentError(
             f"Newton: reference=True cannot be combined with {what}: the reference solver computes "
-            "equal steps of simulate, on one process and without files; leave it out"
+            "equal steps of simulate, without checkpoints; leave it out"
         )
 
 

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 import scipy  # its subpackages are loaded when they are used
 
+from old_reference.cell_forms import Setting
+from old_reference.return_map import MaterialPoints, derivative
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, NoNumber
 from ufl_beam.mechanics.connector_equations import RigidPlasticStep, parameters, rigid_plastic_step
@@ -38,8 +40,6 @@ from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.material_law import State
 from ufl_beam.model.material_laws import ElastoPlastic
-from ufl_beam.reference.cell_forms import Setting
-from ufl_beam.reference.return_map import MaterialPoints, derivative
 
 CREEP = 1e-12
 """Creep in a step of a sticking connector at its limit; divided by the size of the scene, or rad.

@@ -10,6 +10,20 @@ from itertools import zip_longest
 import numpy as np
 import ufl
 
+from old_reference.cell_forms import (
+    Archive,
+    CellForce,
+    Cells,
+    Force,
+    Form,
+    Response,
+    Setting,
+    cell_dofs,
+    point_masses,
+    put,
+)
+from old_reference.imposed_strains import ImposedStrains
+from old_reference.return_map import MaterialPoints
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import mass_form
@@ -25,20 +39,6 @@ from ufl_beam.mechanics.time_scheme import (
 )
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
-from ufl_beam.reference.cell_forms import (
-    Archive,
-    CellForce,
-    Cells,
-    Force,
-    Form,
-    Response,
-    Setting,
-    cell_dofs,
-    point_masses,
-    put,
-)
-from ufl_beam.reference.imposed_strains import ImposedStrains
-from ufl_beam.reference.return_map import MaterialPoints
 
 
 class ElasticBeams(CellForce):

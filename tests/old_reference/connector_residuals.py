@@ -10,15 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
-from ufl_beam.errors import NoNumber
-from ufl_beam.mechanics.relative_motions import MOTIONS, connector_forms
-from ufl_beam.mechanics.time_scheme import Step, acting
-from ufl_beam.model.connector_law import ConnectorLaw
-from ufl_beam.model.connector_laws import Guide
-from ufl_beam.model.connectors import Connector
-from ufl_beam.model.functions import REACH, nearest, parameter_step, tangent
-from ufl_beam.reference.cell_forms import (
+from old_reference.cell_forms import (
     Archive,
     Force,
     Form,
@@ -29,7 +21,15 @@ from ufl_beam.reference.cell_forms import (
     put,
     separate_cells,
 )
-from ufl_beam.reference.connector_updates import law_in_step
+from old_reference.connector_updates import law_in_step
+from ufl_beam.arrays import Array, Index
+from ufl_beam.errors import NoNumber
+from ufl_beam.mechanics.relative_motions import MOTIONS, connector_forms
+from ufl_beam.mechanics.time_scheme import Step, acting
+from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_laws import Guide
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.functions import REACH, nearest, parameter_step, tangent
 
 GUIDE_INCREMENT = 1e-5
 """Increment of central differences of the forces of guides, divided by the size of the scene.

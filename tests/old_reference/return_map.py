@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from old_reference.cell_forms import Search, Setting
 from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.law_functions import Values
-from ufl_beam.reference.cell_forms import Search, Setting
 
 CLOSED, FLOWING = 0.0, 1.0
 """Values of the flag of a discontinuity that did not grow, or did grow, in the last step."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from old_reference.cell_forms import Cells, Setting, put
 from ufl_beam.arrays import Array
 from ufl_beam.mechanics.time_scheme import Step, has_inertia
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.reference.cell_forms import Cells, Setting, put
 
 
 class ImposedStrains:

@@ -13,6 +13,18 @@ import scipy  # its subpackages are loaded when they are used
 import ufl
 from scipy.sparse import csr_array
 
+from old_reference.beam_residuals import Inertia, Mass
+from old_reference.cell_forms import (
+    Archive,
+    CellForce,
+    Cells,
+    Force,
+    Response,
+    Setting,
+    coupled,
+    end_forces,
+    point_masses,
+)
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import perpendicular, split
@@ -31,18 +43,6 @@ from ufl_beam.model.loads import (
     RotatingFrame,
 )
 from ufl_beam.model.works import Potential, Work
-from ufl_beam.reference.beam_residuals import Inertia, Mass
-from ufl_beam.reference.cell_forms import (
-    Archive,
-    CellForce,
-    Cells,
-    Force,
-    Response,
-    Setting,
-    coupled,
-    end_forces,
-    point_masses,
-)
 
 AT_REST = 1e300  # largest step length in forms, so large that all rates vanish; s
 

@@ -1,0 +1,396 @@
+# SPDX-License-Identifier: MIT
+"""Runs by the reference solver: its scope, and results in the form of other runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+from mpi4py import MPI
+
+import numpy as np
+
+from ufl_beam.arrays import Array, State
+from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.discretization.state_transfer import same_unknowns
+from ufl_beam.dolfinx_compat import fem
+from ufl_beam.errors import ArgumentError, ConvergenceError, StepFailed
+from ufl_beam.mechanics.point_equations import curved, rows
+from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, has_inertia, nodal_step
+from ufl_beam.mechanics.time_schemes import EnergyMomentum, EnergyMomentumStatic, Static
+from ufl_beam.model.beams import Mesh
+from ufl_beam.model.connector_laws import RIGID, PrescribedMotion
+from ufl_beam.model.connectors import law_of
+from ufl_beam.model.loads import Gravity, LineLoad, PointLoad, Rayleigh
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.softening_laws import SofteningLaw
+from ufl_beam.output.recorder import StateView
+from ufl_beam.output.state_rows import (
+    BEFORE,
+    DISSIPATED,
+    FORCE,
+    FORCES,
+    WORK,
+    Block,
+    Columns,
+    Connection,
+)
+from ufl_beam.output.states import States
+from ufl_beam.parallel import Agreement, ProcessComparison
+from ufl_beam.reference.connectors import Connectors
+from ufl_beam.reference.solver import Solver
+from ufl_beam.simulation.impacts import Impact, impacts_of
+from ufl_beam.simulation.initial_state import (
+    StateOf,
+    checked_numbering,
+    chosen_state,
+    continuation,
+    initial_state,
+    mesh_of,
+)
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.solvers.newton_options import Newton, checked_newton
+
+SCHEMES = Static, EnergyMomentum, EnergyMomentumStatic
+DEAD_LOADS = PointLoad, LineLoad, Gravity
+RATE = Connection._fields.index("rate")
+
+
+def require_scope(numbering: DofNumbering, scheme: Scheme, comm: MPI.Intracomm) -> None:
+    """Raise :class:`ArgumentError` if the solver leaves out a part of the scene, or the scheme."""
+    scene = numbering.scene
+    kinds = {id(kind): kind for kind, _ in numbering.inelastic}.values()
+    sections = {beam.section for beam in scene.beams}
+    several = [s for s in sections if len(s.section_points(s.hinge)) > 1]
+    connectors = (c for c in scene.all_connectors if c not in scene.hinges)
+    known = isinstance(scheme, SCHEMES) and getattr(scheme, "order", 2) == 2
+    refused: dict[str, Sequence[object]] = {
+        "a scene without beams,": [scene] * (not scene.beams),
+        "the scheme": [scheme] * (not known),
+        "a mesh of degree above 1": [numbering.mesh] * (numbering.mesh.degree > 1),
+        "the law of": [c for c in connectors if not isinstance(c.law, PrescribedMotion)],
+        "the law of the hinge": [
+            hinge for hinge in scene.hinges if not isinstance(law_of(hinge), SofteningLaw)
+        ],
+        "the load": [x for x in scene.loads if not isinstance(x, DEAD_LOADS)],
+        "the damping": [x for x in scene.damping if not isinstance(x, Rayleigh) or x.tangent],
+        "the work": scene.works,
+        "the law": [
+            kind.kind.law for kind in kinds
+            if kind.kind.law.solves or rows(kind.kind.law, "strain") != ("strain",)
+        ],
+        "laws of several classes in": several,
+        f"{comm.size} processes for": [numbering] * (comm.size > len(numbering.cells)),
+    }  # fmt: skip
+    for kind, objects in refused.items():
+        for what in objects:
+            raise ArgumentError(
+                f"Newton: reference=True cannot be combined with {kind} {what}: the reference "
+                "solver computes beams with resultants or fibres, hinges, joints, bodies and dead "
+                "loads, see docs/theory.md; leave it out"
+            )
+
+
+class ReferenceRun(Solver):
+    """Simulation by the reference solver, with energy ledger, section forces and stored states.
+
+    The arguments are those of :class:`Simulation`.
+    """
+
+    _sums: Array
+    warn, may_break, damage = StateView.warn, StateView.may_break, StateView.damage
+
+    def __init__(
+        self, scene: Scene, scheme: Scheme, *, t0: float, start: StateOf | None,
+        newton: Newton | None, mesh: Mesh | None, comm: MPI.Intracomm,
+    ) -> None:  # fmt: skip
+        newton, start = checked_newton(newton, comm), chosen_state(start, "start")
+        mesh, fresh = mesh_of(start, mesh), start is None
+        numbering, _ = checked_numbering(scene, scheme, mesh, fresh=fresh)
+        require_scope(numbering, scheme, comm)
+        q, v, internal, _ = state = initial_state(numbering, start)
+        t, same = continuation(start, scene, t0)
+        impacts, impact = impacts_of(numbering, scheme, t, start, same, state)
+        super().__init__(numbering, scheme, t, newton=newton, comm=comm, impacts=impacts)
+        self.start(q, v, None if start is None else internal, same=same)
+        self.subdomain, self.together = Subdomain(numbering, MPI.COMM_SELF), Agreement(comm)
+        self.comparison = ProcessComparison(MPI.COMM_SELF, self.subdomain)
+        self.requested_forces: dict[Any, float] = {}
+        self.solution = solution = Solution(scene, numbering)
+        between = solution.equilibrium_fraction = float(scheme.average(0.0, 1.0))
+        solution.needs_start, solution.scheme = between < 1, scheme
+        self.parameter = solution.parameter
+        if (
+            start is not None
+            and start.equilibrium_fraction == between
+            and same_unknowns(start.numbering, numbering)
+        ):
+            self._forces = start.cell_resultants(-1)[:, self.frame.cells]
+            self.q_before = start.before(-1)
+        self._sum_energies()
+        self._lost_before = self._sums[2:].copy()
+        self.meet(impact)
+        self._sum_energies()
+
+    def start(self, q: Array, v: Array, internal: State | None, *, same: bool) -> None:
+        """See the base class; also begin the ledger, the reactions and the forces."""
+        super().start(q, v, internal, same=same)
+        numbering, size = self.numbering, len(self.frame.cells)
+        self.ledger, self._lost_before = self._make_ledger(), np.zeros(2)
+        self._forces, self._load_before = np.zeros((9, size)), self.load
+        self._history = np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
+        self._reactions: Array = np.zeros(numbering.size)
+        for group in self.connectors:
+            self._history[group.indices, 0] = group.e0
+            self._history[group.indices, FORCE] = q[group.forces_at]
+            for name in self._tables(group) if internal else ():
+                self._restore(group, internal.get(name, np.zeros((0, 5))))  # type: ignore[union-attr]
+        if not self.fresh and not self.dynamic:
+            self.q1, forces = q, self._total(self._assembled(self.fields.force))
+            self._reactions = self._held(forces + self._further_forces() - self.load)
+        if same and internal and "reactions" in internal:
+            self._reactions = internal["reactions"]
+
+    def _restore(self, group: Connectors, table: Array) -> None:
+        """Restore the rows of connectors in a table of :meth:`_tables`."""
+        for k, index in enumerate(group.indices):
+            for row in table[table[:, 0] == index]:
+                self._history[index, [WORK, RATE, FORCE, 0]] = row[1:5]
+                if k in group.hinges:
+                    group.hinges[k].restore(row[5:])
+                    self._history[index, DISSIPATED] = group.hinges[k].lost
+
+    def _held(self, forces: Array) -> Array:
+        """Return the forces on prescribed coordinates; (size,)."""
+        on_coordinates, reactions = self.frame.E.T @ forces, np.zeros(len(forces))
+        reactions[self.frame.held] = on_coordinates[self.frame.held]
+        return reactions
+
+    def steps_to(self, ends: Array, *, keep: bool = False) -> int:
+        """Go to some of the times ``ends``; return their number.
+
+        Raises:
+            ConvergenceError: Even the smallest substep failed.
+        """
+        ends = ends[:16]  # so that the run can be interrupted
+        for end in map(float, ends):
+            try:
+                self.step_to(end)
+            except StepFailed as failure:
+                raise ConvergenceError(
+                    f"no equilibrium after t = {self.t:.9g} s: {failure}. {self.scheme.advice}",
+                    time=self.t, dt=end - self.t, solution=self.solution, residuals={}, forces={},
+                    reason=failure.reason,
+                ) from failure  # fmt: skip
+            if keep:
+                self.keep()
+        return len(ends)
+
+    # -- energies --------------------------------------------------------------------------------
+
+    def _make_ledger(self) -> SimpleNamespace:
+        """Return the entries of the energy ledger with zeros; see :class:`Energy`."""
+        scene, scheme, points = self.scene, self.scheme, self.points
+        over_step, softens = scheme.average(0.0, 1.0) != 1.0, any(p.kind.softening for p in points)
+        yields = any(p.kind.yields for p in points)
+        releases = over_step and (softens or any(curved(p.kind.kind) for p in points))
+        defect = has_inertia(scheme) and scheme.coefficients(1.0, 1.0, 0).velocity_defect
+        laws = [connector.law for connector in scene.all_connectors]
+        motors = any(isinstance(law, PrescribedMotion) and law is not RIGID for law in laws)
+        occurs: dict[str, dict[str, object]] = {
+            "state": {"stored": True, "hardening": yields, "kinetic": self.dynamic},
+            "supplied": {
+                "supports": any(support.moving for support in scene.supports),
+                "loads": scene.loads, "motors": motors,
+            },
+            "lost": {
+                "plastic": yields, "hinges": softens or scene.hinges, "damping": scene.damping,
+                "numerical": scheme.alpha or defect or releases,
+                "impacts": self.impacts is not None and self.impacts.moves,
+            },
+        }  # fmt: skip
+        return SimpleNamespace(**{
+            account: {name: 0.0 for name, does in entries.items() if does}
+            for account, entries in occurs.items()
+        })  # fmt: skip
+
+    def accept(self, step: Step) -> None:
+        """Accept the end of a step, and enter works and losses in the ledger."""
+        scheme, supplied, lost, s = self.scheme, self.ledger.supplied, self.ledger.lost, self.s
+        self._forces = self._cell_forces()
+        forces = self._total(self.r.x.petsc_vec.array) + self._further_forces()
+        reactions = self._held(forces - self.load)
+        if "supports" in supplied:
+            along = nodal_step(scheme, self.y, self.y1, self.numbering.rotations)
+            supplied["supports"] += float(acting(scheme, self._reactions, reactions) @ along)
+        if "loads" in supplied:
+            supplied["loads"] += float(acting(scheme, self._load_before, self.load) @ s)
+        for group in self.connectors:
+            rows, force = self._history[group.indices], self.q1[group.forces_at]
+            growth = group.motions(self.q1) - group.e0
+            work = acting(scheme, rows[:, FORCE], force) * growth
+            rows[:, 0], rows[:, FORCE] = rows[:, 0] + growth, force
+            rows[:, WORK], rows[:, RATE] = rows[:, WORK] + work, growth / step.dt
+            self._history[group.indices] = rows
+            if "motors" in supplied:
+                drives = [isinstance(c.law, PrescribedMotion) and c.law is not RIGID
+                          for c in group.connectors]  # fmt: skip
+                supplied["motors"] -= float(work @ drives)
+        numerical = 2 * scheme.alpha * fem.assemble_scalar(self.fields.lost)
+        numerical -= sum(points.numerical for points in self.points)
+        v = self.v
+        super().accept(step)
+        numerical += sum(points.numerical for points in self.points)
+        if "numerical" in lost:
+            lost["numerical"] += self.comm.allreduce(float(numerical))
+        if self.dynamic:
+            defect = self.coefficients.velocity_defect
+            if defect is not None:
+                parts = defect[0] * (self.v - v) + defect[1] * v
+                lost["numerical"] += self._product(self.M, self.masses, parts, self.v - v)
+            if "damping" in lost:
+                product = self._product(self.damping, self.damping_of_masses, s, s)
+                lost["damping"] += product / step.dt
+        for group in self.connectors:
+            for k, hinge in group.hinges.items():
+                self._history[group.indices[k], DISSIPATED] = hinge.lost
+        self._reactions, self._load_before = reactions, self.load
+        self._sum_energies()
+
+    def _product(self, A: Any, diagonal: Array, a: Array, b: Array) -> float:
+        """Return a·(A + diagonal) b of two vectors of the scene."""
+        for function, x in ((self.rate, a), (self.r, b)):
+            function.x.array[:] = x[self.frame.dofs]
+        product = A.createVecLeft()
+        A.mult(self.r.x.petsc_vec, product)
+        return float(self.rate.x.petsc_vec.dot(product) + a @ (diagonal * b))
+
+    def _sum_energies(self) -> None:
+        """Sum the energies of the accepted state."""
+        state, lost = self.ledger.state, self.ledger.lost
+        sums = np.array([self.elastic, 0.0, 0.0, 0.0])
+        for points in self.points:
+            sums += np.r_[points.stored.sum(axis=0), points.recorded[:, 4:].sum(axis=0)]
+        self.comm.Allreduce(MPI.IN_PLACE, sums)
+        sums[3] += sum(hinge.lost for group in self.connectors for hinge in group.hinges.values())
+        self._sums = sums
+        values = dict(zip(("stored", "hardening"), sums, strict=False))
+        values |= dict(zip(("plastic", "hinges"), sums[2:] - self._lost_before, strict=True))
+        if self.dynamic:
+            values["kinetic"] = self._product(self.M, self.masses, self.v, self.v) / 2
+        for account in (state, lost):
+            account.update((name, float(values[name])) for name in account if name in values)
+        self.energies = sum(abs(x) for one in vars(self.ledger).values() for x in one.values())
+
+    def meet(self, impact: Impact | None) -> None:
+        """Change the velocities by an impact, and enter it in the ledger."""
+        super().meet(impact)
+        if impact is not None and self.impacts is not None:
+            works = np.zeros(len(self._history))
+            self.impacts.enter(impact, self.ledger, [(np.arange(len(works)), works)])
+            self._history[:, WORK] += works
+
+    # -- section forces --------------------------------------------------------------------------
+
+    def _cell_forces(self) -> Array:
+        """Return the forces of the nodes on cells in the step, as rows of FORCES; (9, cells)."""
+        fields = self.fields
+        along: Any = np.tensordot(self.factors, self.of_loads_on_cells, 1)
+        forces = _table(self.on_cells) - _table(along, density=True)
+        if self.dynamic:
+            c, (a0, a1), (_, mass, stiffness) = self.coefficients, self.rayleigh, fields.on_cells
+            a, v = (row[0] * self.s + row[1] * self.v for row in (c.inertia, c.velocity))
+            for form, rate, density in ((mass, a + a0 * v, True), (stiffness, a1 * v, False)):
+                fields.v.x.array[:] = rate[self.frame.dofs]
+                forces += _table(fields.forces_on_cells(form), density=density)
+        return forces
+
+    # -- states ----------------------------------------------------------------------------------
+
+    @property
+    def now(self) -> States:
+        """Present state as a solution; all processes call it together."""
+        numbering, scene = self.numbering, self.scene
+        reactions = np.zeros((len(scene.supports), 3))
+        for row, support in zip(reactions, scene.supports, strict=True):
+            row[[*support.held]] = self._reactions[numbering.node(support.place)[[*support.held]]]
+        material, forces = (
+            np.zeros((len(numbering.inelastic_cells), 6)),
+            np.zeros((9, len(numbering.cells))),
+        )
+        for points in self.points:
+            at = np.searchsorted(numbering.inelastic_cells, self.frame.cells[points.cells])
+            material[at] = points.recorded
+        forces[:, self.frame.cells] = self._forces
+        for table in (material, forces):
+            self.comm.Allreduce(MPI.IN_PLACE, table)
+        state = {"t": np.array(self.t), "q": self.q, "reactions": reactions}
+        if self.dynamic:
+            state["v"] = self.v
+        for account, energies in vars(self.ledger).items():
+            state |= {f"{account}: {name}": np.array(value) for name, value in energies.items()}
+        state |= {"connectors": self._history, "material": material, FORCES: forces}
+        between = self.solution.equilibrium_fraction
+        if between < 1:
+            state[BEFORE] = self.q_before
+        columns = Columns({name: np.shape(values) for name, values in state.items()})
+        row = np.concatenate([np.ravel(values) for values in state.values()])
+        now = States(numbering, None, Block(columns, row[None], 1))
+        now.equilibrium_fraction, now.needs_start = between, between < 1
+        return now
+
+    def keep(self) -> None:
+        """Append the state to :attr:`solution`; all processes call it."""
+        columns, row = self.now.row(0)
+        if self.substeps == 0 and self.dynamic:
+            columns.column_of("reactions", row).fill(math.nan)  # unknown before the first step
+        self.solution.append(columns, row)
+        self.solution.count(self.substeps, self.iterations)
+
+    def end(self) -> None:
+        """Store the last state, and the data for ``start=``, in the solution."""
+        if self.t not in self.solution.times[-1:]:
+            self.keep()
+        self.solution.substeps, self.solution.iterations = self.substeps, self.iterations
+        self.solution.internal = self.internal()
+
+    def internal(self) -> State:
+        """Return the variables that a later run needs, by name, on all processes."""
+        tables: dict[str, list[Array]] = {}
+        for part in self.comm.allgather([points.state() for points in self.points]):
+            for table in part:
+                tables.setdefault(f"cells, {table.shape[1] - 1}", []).append(table)
+        for group in self.connectors:
+            for name, table in self._tables(group).items():
+                tables.setdefault(name, []).append(table)
+        whole = {name: np.concatenate(parts) for name, parts in tables.items()}
+        whole = {name: x[np.argsort(x[:, 0], kind="stable")] for name, x in whole.items()}
+        return whole | {"reactions": self._reactions}
+
+    def _tables(self, group: Connectors) -> State:
+        """Return works, rates, forces, motions and variables of connectors, by kind of law."""
+        tables: dict[str, list[Array]] = {}
+        for k, index in enumerate(group.indices):
+            more = group.hinges[k].state() if k in group.hinges else ()
+            kind = "_Held" if group.connectors[k].law is RIGID else "_Driven"
+            row = np.r_[index, self._history[index, [WORK, RATE, FORCE, 0]], more]
+            name = "CompiledSlips, 11" if k in group.hinges else f"{kind}, 4"
+            tables.setdefault(name, []).append(row)
+        return {name: np.array(rows) for name, rows in tables.items()}
+
+    def velocities(self) -> list[Array]:
+        """Return a list with the velocities; empty in statics."""
+        return [self.v] if self.dynamic else []
+
+    def watch(self, fractions: Array) -> Any:
+        """Raise :class:`ArgumentError`: only C updates extremes after each substep."""
+        raise ArgumentError("Newton: reference=True cannot be combined with Extremes; leave it out")
+
+
+def _table(forces: Array, *, density: bool = False) -> Array:
+    """Return forces of both nodes on each cell, (cells, 2, 3), as rows of the column FORCES."""
+    start, end = forces.transpose(1, 2, 0)
+    return np.vstack([start, end, density * (start[2] + end[2]), density * (end - start)[:2] / 2])
