@@ -65,7 +65,7 @@ class Studies:
 class Checkpoints:
     """A checkpoint, from which the run goes on to a later end."""
 
-    format = "checkpoint of ufl_beam, 7"
+    format = "checkpoint of ufl_beam, 8"
     advice = "Delete the file to begin anew, or name another"
 
     def write(self, path):
@@ -281,7 +281,7 @@ WRONG = {
         content.update({name: x[:, :1]}) for name, x in [*content.items()] if "cells, " in name
     ], "of the state is of shape"),
     "history": ("checkpoint", changed("history/q", lambda q: q[1:]), "'q' is float64 of shape"),
-    "pace": ("checkpoint", changed("pace", lambda x: {}), "KeyError('steps')"),
+    "pace": ("checkpoint", lambda content: content.pop("pace/steps"), "KeyError('steps')"),
     "call": ("checkpoint", changed("call", lambda x: 3), "TypeError("),
     "stateful": ("checkpoint", changed("stateful", lambda x: {"a": 1}), "other objects have a"),
 }  # fmt: skip

@@ -58,6 +58,7 @@ class Connectors:
         self._at[_cell_dofs(forms.q1.function_space)] = dofs
         pairs = np.arange(dofs.size), self._at
         self._joins = csr_array((np.ones(dofs.size), pairs), (dofs.size, numbering.size))
+        self._joined, self._K = self._joins.T.tocsr(), fem.create_matrix(self._tangent)
         geometry = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in self.connectors]
         forms.geometry.x.array[_cell_dofs(forms.geometry.function_space)] = geometry
         self._row_dofs = _cell_dofs(forms.row.function_space)
@@ -78,13 +79,13 @@ class Connectors:
         for k, hinge in self.hinges.items():
             self._rows[k] = hinge.row(e[k], q1[self.forces_at[k]])
         self.forms.row.x.array[self._row_dofs] = self._rows
-        return np.asarray(self._joins.T @ fem.assemble_vector(self._work).array)
+        return np.asarray(self._joined @ fem.assemble_vector(self._work).array)
 
     def tangent(self, *, ones: bool = False) -> Any:
         """Return the derivative of the latest residual, or its pattern; (size, size), sparse."""
-        K = fem.assemble_matrix(self._tangent).to_scipy()
-        K.data[:] = 1.0 if ones else K.data
-        return self._joins.T @ K @ self._joins
+        self._K.set_value(float(ones))
+        K = self._K if ones else fem.assemble_matrix(self._K, self._tangent)
+        return self._joined @ K.to_scipy() @ self._joins
 
     def motions(self, q: Array) -> Array:
         """Return the relative motions at a configuration; (n,); m or rad."""

@@ -40,6 +40,8 @@ class Frame:
         C: PETSc matrix from the unknowns to the degrees of freedom of V.
         order: Coordinate of each unknown.
         mine: Coordinates of the unknowns of this process.
+        columns: Columns of E of all unknowns.
+        rows: Rows of E transposed of the unknowns of this process.
         held: Prescribed coordinates.
         motions: Function of time of each of them.
     """
@@ -62,11 +64,11 @@ class Frame:
         rows, owner = self.E[self.dofs], np.full(n.size, comm.size)
         owner[rows[:owned].indices] = comm.rank
         comm.Allreduce(MPI.IN_PLACE, owner, MPI.MIN)
-        further = np.append(n.dofs_of_bodies.ravel(), n.multipliers).astype(np.int64)
-        owner[further] = np.where(owner[further] == comm.size, 0, owner[further])
+        owner[owner == comm.size] = 0  # bodies, forces of connectors, ends of beams at hinges
         owner[self.held] = comm.size
         self.order: Index = np.argsort(owner, kind="stable")[: np.count_nonzero(owner < comm.size)]
         self.mine = np.flatnonzero(owner == comm.rank)
+        self.columns, self.rows = self.E[:, self.order], self.E[:, self.mine].T.tocsr()
         self._known = rows[:, self.held]
         C = rows[:owned][:, self.order].sorted_indices()
         csr = *(x.astype(PETSc.IntType) for x in (C.indptr, C.indices)), C.data

@@ -209,7 +209,8 @@ class Solver(PresentState):
         self.CKC = self.K.ptap(frame.C)
         self.x, f = (frame.C.createVecRight() for _ in range(2))
         A, sizes = self.CKC.copy(), (len(frame.mine), len(frame.order))
-        pattern = PETSc.Mat().createAIJ((sizes, sizes), csr=self._rows(self._pattern()), comm=comm)
+        further = self._further_tangent(ones=True)
+        pattern = PETSc.Mat().createAIJ((sizes, sizes), csr=further, comm=comm)
         A.axpy(1.0, pattern, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         A.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
         self.weights = self.numbering.scales[frame.mine]
@@ -260,7 +261,7 @@ class Solver(PresentState):
         frame.C.multTranspose(r, f)
         if self.connectors or self.masses.any():
             self.q1 = frame.E @ frame.coordinates(x, self.motions)
-        f.array_w[:] += (frame.E.T @ (self._further_forces() - self.load))[frame.mine]
+        f.array_w[:] += frame.rows @ (self._further_forces() - self.load)
 
     def _add(self, A: PETSc.Mat, row: Any) -> None:
         """Add the product of a matrix and a rate of the step to the residual."""
@@ -283,25 +284,18 @@ class Solver(PresentState):
             r += self.damping_of_masses * (c.velocity[0] * s + c.velocity[1] * self.v)
         return r
 
-    def _further_tangent(self) -> csr_array:
-        """Return the derivative of these forces by the coordinates; (size, size)."""
-        slope: Array = np.zeros(self.numbering.size)
-        if self.dynamic:
+    def _further_tangent(self, *, ones: bool = False) -> tuple[Any, Any, Array]:
+        """Return the derivative of these forces in rows of this process, or a matrix of ones."""
+        slope: Array = np.full(self.numbering.size, float(ones))
+        if self.dynamic and not ones:
             c, at = self.coefficients, self.numbering.rotations
             slope += c.inertia[0] * self.masses + c.velocity[0] * self.damping_of_masses
             if self.scheme.half_tangents:
                 slope[at] /= np.cos((self.q1 - self.q)[at] / 2) ** 2
-        K = sum((group.tangent() for group in self.connectors), diags_array(slope).tocsr())
-        return csr_array(self.frame.E.T @ K @ self.frame.E)
-
-    def _pattern(self) -> csr_array:
-        """Return a matrix without zeros where :meth:`_further_tangent` may have entries."""
-        E, K = abs(self.frame.E), diags_array(np.ones(self.numbering.size)).tocsr()
-        return csr_array(E.T @ sum((x.tangent(ones=True) for x in self.connectors), K) @ E)
-
-    def _rows(self, K: csr_array) -> tuple[Any, Any, Array]:
-        """Return the rows of the unknowns of this process, for PETSc."""
-        rows = csr_array(K[self.frame.mine][:, self.frame.order]).sorted_indices()
+        K = sum((group.tangent(ones=ones) for group in self.connectors), diags_array(slope).tocsr())
+        pair = self.frame.rows, self.frame.columns
+        left, right = (abs(x) for x in pair) if ones else pair
+        rows = csr_array(left @ K @ right).sorted_indices()
         return rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
@@ -323,7 +317,7 @@ class Solver(PresentState):
         P.zeroEntries()
         P.axpy(1.0, self.CKC, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         if self.connectors or self.masses.any():
-            P.setValuesCSR(*self._rows(self._further_tangent()), addv=ADD)
+            P.setValuesCSR(*self._further_tangent(), addv=ADD)
             P.assemble()
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, ...]) -> Any:
