@@ -17,9 +17,21 @@ ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
 
 
+def test_the_lines_of_ufl_are_those_of_the_demo():
+    """Beside comments, in the same order; the demo checks its results."""
+    lines, _ = blocks_of(README)
+    demo, code = (ROOT / "demos/demo_the_card.py").read_text("utf-8").splitlines(), []
+    for line in filter(None, (line.partition("  #")[0].strip() for line in lines.splitlines())):
+        found = [k for k, text in enumerate(demo) if text.partition("  #")[0].strip() == line]
+        assert len(found) == 1, line
+        code += found
+    assert len(code) > 10
+    assert code == sorted(code)
+
+
 @pytest.mark.serial
 def test_script_of_the_readme_runs(tmp_path, monkeypatch, capsys):
-    (script,) = blocks_of(README)
+    _, script = blocks_of(README)
     monkeypatch.chdir(tmp_path)
     names = {}
     exec(compile(script, "README.md", "exec"), names)
@@ -34,7 +46,7 @@ def test_script_of_the_readme_runs(tmp_path, monkeypatch, capsys):
 
 def test_the_demo_of_the_picture_computes_the_script():
     """The picture belongs to the script: all its lines but those of the output are in the demo."""
-    (script,) = blocks_of(README)
+    _, script = blocks_of(README)
     demo = (ROOT / "demos/demo_pushover.py").read_text("utf-8")
     assert "docs/pictures/pushover.png" in README.read_text("utf-8")
     assert 'savefig(output / "pushover.png")' in demo
