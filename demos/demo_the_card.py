@@ -81,7 +81,7 @@ D = fem.Function(Q)  # derivative of M by the curvature at the end of the step
 def in_cells(value):
     """Return a function that evaluates a UFL expression in the middle of each cell."""
     expression = fem.Expression(value, np.array([[0.5]]))
-    return lambda: expression.eval(domain, here)
+    return lambda: expression.eval(domain, here).reshape(len(here), -1)
 
 
 length, strains = in_cells(axis.h)()[:, 0], in_cells(strain(q1, axis))
@@ -270,11 +270,10 @@ def write(n):
         function.x.array[:] = np.ravel(value)
         file.write_function(function, n / steps)
     if n in (60, 150, 250, 380, 410, 500):
-        topology, kinds, x = dolfinx.plot.vtk_mesh(V)
-        grid = pyvista.UnstructuredGrid(topology, kinds, x + moved)
-        grid.cell_data["M (N m)"], grid.cell_data["jump"] = N_V_M[:, 2], jump1.x.array
-        grid.cell_data["hinge"] = has_hinge
-        shapes.append((f"{angle * n / steps:.1f} rad", comm.gather(grid)))
+        lines, _, x = dolfinx.plot.vtk_mesh(V)
+        shape = pyvista.PolyData(x + moved, lines=lines)
+        shape.cell_data["M (N m)"], shape.field_data["hinge"] = N_V_M[:, 2], has_hinge
+        shapes.append((f"{angle * n / steps:.1f} rad", comm.gather(shape)))
 
 
 def draw():
@@ -283,15 +282,16 @@ def draw():
     plotter.set_background("white")
     bar = {"title_font_size": 22, "label_font_size": 18, "n_labels": 2, "color": "black"}
     for turn, parts in shapes:
-        shape = pyvista.merge(parts)
-        x0, x1, *_ = shape.bounds
-        shape.translate((left - x0, 0, 0), inplace=True)
-        tubes = shape.extract_surface().tube(radius=0.009)
-        plotter.add_mesh(
-            tubes, scalars="M (N m)", clim=(0, 80), cmap="plasma_r", scalar_bar_args=bar
-        )
-        weak = shape.threshold(0.5, scalars="hinge").extract_surface().tube(radius=0.005)
-        plotter.add_mesh(weak.translate((0, 0, 0.01)), color="black")
+        x0, x1 = (f([part.bounds[k] for part in parts]) for k, f in enumerate((min, max)))
+        for part in parts:
+            part.translate((left - x0, 0, 0), inplace=True)
+            plotter.add_mesh(
+                part.tube(radius=0.009), scalars="M (N m)", clim=(0, 80), cmap="plasma_r",
+                scalar_bar_args=bar,
+            )  # fmt: skip
+            for k in np.flatnonzero(part.field_data["hinge"]):
+                a, b = part.points[part.lines[3 * k + 1 : 3 * k + 3]] + (0, 0, 0.01)
+                plotter.add_mesh(pyvista.Tube(pointa=a, pointb=b, radius=0.005), color="black")
         below = [(left + (x1 - x0) / 2, -0.09, 0)]
         plotter.add_point_labels(
             below, [turn], shape=None, show_points=False, text_color="black", font_size=20,

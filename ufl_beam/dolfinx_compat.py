@@ -142,7 +142,9 @@ def line_mesh(
         parts = (np.array_split(x, comm.size)[comm.rank] for x in (cells, points, ranks))
         mine: Any = [*parts]
         cells, points, to = mine[0], mine[1], graph.adjacencylist(mine[2][:, None])
-        more["partitioner"] = lambda *_: to
+        more["partitioner"] = lambda *_: getattr(
+            to, "_cpp_object", to
+        )  # of a class in DOLFINx 0.11
     return mesh.create_mesh(comm, cells=cells, x=points, e=line, **more)
 
 
