@@ -73,11 +73,11 @@ class Connectors:
                 self._rows[k, 2] = self.e0[k] + step.fraction * (end - self.e0[k])
         self.forms.q0.x.array[:] = step.q0[self._at]
 
-    def residual(self, q1: Array) -> Array:
+    def residual(self, q1: Array, *, steep: bool = False) -> Array:
         """Return forces on the nodes, and residuals of the equations; (size,)."""
         e = self.motions(q1)
         for k, hinge in self.hinges.items():
-            self._rows[k] = hinge.row(e[k], q1[self.forces_at[k]])
+            self._rows[k] = hinge.row(e[k], q1[self.forces_at[k]], steep=steep)
         self.forms.row.x.array[self._row_dofs] = self._rows
         return np.asarray(self._joined @ fem.assemble_vector(self._work).array)
 

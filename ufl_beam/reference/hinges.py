@@ -36,14 +36,18 @@ class Hinge:
         """Begin a step, in which the hinge moves on if it moved in the last one."""
         self.way, self.excess, self.grown, self.moment = self.flows, 0.0, 0.0, 0.0
 
-    def row(self, e: float, moment: float) -> tuple[float, float, float]:
-        """Return (α, β, γ) of the linear equation α e + β λ = γ of a Newton iteration."""
+    def row(self, e: float, moment: float, *, steep: bool) -> tuple[float, float, float]:
+        """Return (α, β, γ) of the linear equation α e + β λ = γ of a Newton iteration.
+
+        With ``steep``, the tangent has the opposite sign, so that nodes between hinges move with
+        the unbalanced moment.
+        """
         self.grown, self.moment = e - self.e0, moment
         if self.way == 0:
             return 1.0, 0.0, self.e0
         a = np.array([max(self.way * self.grown, 0.0) + 1e-200j])
         t: Any = self.scheme.resistance(self.law, np.array([self.opening]), a)[0]
-        falls = t.imag * 1e200
+        falls = abs(t.imag * 1e200) if steep else t.imag * 1e200
         return -falls, 1.0, self.way * t.real - falls * e
 
     def turns_back(self) -> bool:

@@ -44,6 +44,9 @@ SMALL_STEP, LAST_DIGITS = 1e-9, 1e-15
 """Newton's method ends after a correction of motions below these parts of the motions, or of the
 scene: the next error is of the size of the square of the correction."""
 
+PATIENCE = 10
+"""Newton's method stalls after this number of iterations that do not halve the least residual."""
+
 LARGEST_ROTATION = 0.75 * math.pi
 """Largest rotation of a node in a step, as 2 tan(Δψ/2) is infinite at π; rad."""
 
@@ -96,7 +99,7 @@ class Solver(PresentState):
         energies: Sum of all energies so far; J.
     """
 
-    energies = 0.0
+    energies, stiff = 0.0, 0
     on_cells_before: Array
     reached: Array
     v: Array
@@ -253,7 +256,7 @@ class Solver(PresentState):
         q1.array[:] += frame.g(self.motions)
         strains = fields.strains()
         for points in self.points:
-            points.return_map(strains, stiff=self.stiff)
+            points.return_map(strains, stiff=self.stiff > 0)
         self._assembled(fields.force)
         if self.dynamic:  # equation (78)
             self._add(self.M, self.coefficients.inertia)
@@ -274,7 +277,7 @@ class Solver(PresentState):
         """Return forces of connectors, bodies and point masses at ``q1``; (size,)."""
         r: Array = np.zeros(self.numbering.size)
         for group in self.connectors:
-            r += group.residual(self.q1)
+            r += group.residual(self.q1, steep=self.stiff == 2)
         if self.dynamic and self.masses.any():
             s, c = (
                 nodal_step(self.scheme, self.q, self.q1, self.numbering.rotations),
@@ -327,12 +330,18 @@ class Solver(PresentState):
         if norms[2] == 0.0:
             return REASONS.CONVERGED_FNORM_ABS
         if iteration == 0:
+            self._best, self._slow = math.inf, 0
             return REASONS.CONVERGED_ITERATING
         vectors = snes.getSolutionUpdate(), snes.getSolution()
         sizes = (np.max(np.abs(self.weights * x.array_r), initial=0.0) for x in vectors)
         correction, motion = self._largest(*sizes)
-        small = correction <= max(SMALL_STEP * motion, LAST_DIGITS)
-        return REASONS.CONVERGED_SNORM_RELATIVE if small else REASONS.CONVERGED_ITERATING
+        if correction <= max(SMALL_STEP * motion, LAST_DIGITS):
+            return REASONS.CONVERGED_SNORM_RELATIVE
+        forces = snes.getFunction()[0].array_r * (self.weights > 0)  # without other equations
+        size = math.sqrt(self.comm.allreduce(float(forces @ forces)))
+        self._slow = 0 if size <= self._best / 2 else self._slow + 1
+        self._best = self._best if self._slow else size
+        return REASONS.DIVERGED_DTOL if self._slow > PATIENCE else REASONS.CONVERGED_ITERATING
 
     def _largest(self, *values: float) -> Array:
         """Return the largest values on all processes; NaN counts as infinite."""
@@ -427,19 +436,22 @@ class Solver(PresentState):
         raise StepFailed("hinges open and close again and again")
 
     def _newton(self, guess: Array) -> None:
-        """Run SNES: full steps, a line search, elastic tangents of closed points, full steps again.
+        """Run SNES: full steps, a line search, stiffer tangents, full steps from where they end.
 
-        Points around an opening hinge unload, which their own tangents do not predict.
+        Points around an opening hinge unload, which their own tangents do not predict.  With
+        ``stiff`` 1, points that do not open have elastic tangents; with 2, hinges of zero length
+        have the opposite slope, too.
         """
         search = "snes_linesearch_type"
-        attempts = [("basic", False, True), ("bt", False, True)]
-        if self.points:
-            attempts += [("basic", True, True), ("basic", False, False)]
-        for kind, self.stiff, anew in attempts:
+        attempts = [("basic", 0), ("bt", 0)] + [("basic", 1), ("basic", 2)] * bool(self.opening)
+        for kind, self.stiff in attempts:
             self._set({search: self.newton.petsc.get(search, kind)})
-            if anew:
-                self.x.array_w[:] = guess
-            if (reason := self._iterate()) > 0:
+            self.x.array_w[:] = guess
+            reason = self._iterate()
+            if self.stiff and reason == REASONS.DIVERGED_MAX_IT:
+                self.stiff = 0
+                reason = self._iterate()
+            if reason > 0:
                 return
         names = {v: k for k, v in vars(REASONS).items() if isinstance(v, int)}
         failure = StepFailed(f"Newton's method did not converge ({names.get(reason, reason)})")
