@@ -13,7 +13,8 @@ import ufl_beam as ub
 from ufl_beam.dolfinx_compat import compile_form, fem, jit_directory
 from ufl_beam.mechanics import functional
 from ufl_beam.mechanics.kinematics import Axis, strain
-from ufl_beam.reference import connectors, forms, points, solver
+from ufl_beam.reference import connectors, forms, points
+from ufl_beam.reference.nonlinear_problem import NonlinearProblem
 from ufl_beam.simulation.reference_run import ReferenceRun
 
 pytestmark = [
@@ -199,7 +200,7 @@ def test_the_residual_is_the_derivative_of_the_functionals():
     q, α, w = fields.q1, fields.jump1, ufl.TestFunction(fields.q1.function_space)
 
     def W(e):
-        return functional.elastic_energy(e - fields.plastic, fields.C)
+        return functional.elastic_energy(e - fields.plastic, fields.stiffness)
 
     force = np.array(fem.assemble_vector(fields.force).array)
     size = np.abs(force).max()
@@ -224,7 +225,7 @@ def test_the_residual_is_the_derivative_of_the_functionals():
     assert np.abs(assembled(ufl.derivative(mixed, q, w)) - force).max() <= 1e-13 * size
     z = ufl.TestFunction(r.function_space)
     assert np.abs(assembled(ufl.derivative(mixed, r, z))).max(initial=0.0) <= 1e-15
-    stiffness = np.abs(fields.C.x.array).max() * np.abs(D.x.array).max()
+    stiffness = np.abs(fields.stiffness.x.array).max() * np.abs(D.x.array).max()
     assert np.abs(assembled(ufl.derivative(mixed, D, z))).max(initial=0.0) <= 1e-12 * stiffness
     state.close()
 
@@ -285,10 +286,8 @@ def sign_of_jump(patch):
 
 def mass_of_beams(patch):
     """Inertia is too large by a part in a million."""
-    add = solver.Solver._add
-    patch.setattr(
-        solver.Solver, "_add", lambda self, A, row: add(self, A, [(1 + 1e-6) * x for x in row])
-    )
+    problem, add = NonlinearProblem, NonlinearProblem._add
+    patch.setattr(problem, "_add", lambda self, A, c: add(self, A, [(1 + 1e-6) * x for x in c]))
 
 
 def motion_of_connectors(patch):
@@ -314,7 +313,7 @@ def stiffness(patch):
 
     def wrong(self, frame, scheme):
         begin(self, frame, scheme)
-        self.C.x.array[:] *= 1 + 1e-6
+        self.stiffness.x.array[:] *= 1 + 1e-6
         self.elastic.x.array[:] *= 1 + 1e-6
 
     patch.setattr(forms.Fields, "__init__", wrong)

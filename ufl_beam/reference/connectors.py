@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Joints, motors and hinges of zero length, whose forces are Lagrange multipliers.
 
-There are few of them, so every process computes all.
+Each is a cell of unit length on a second mesh, because the forms of relative motions need the
+configurations of two nodes.  There are few of them, so every process has all.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import point_masses
-from ufl_beam.dolfinx_compat import compile_form, fem, jit_directory, line_mesh
+from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.mechanics.relative_motions import connector_forms
 from ufl_beam.mechanics.time_scheme import Scheme, Step
 from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.functions import value_at
+from ufl_beam.reference.forms import compiled
 from ufl_beam.reference.hinges import Hinge
 
 
@@ -48,10 +50,7 @@ class Connectors:
         dofs = numbering.dofs_of_connectors[self.indices]
         self.forces_at = dofs[:, 6]
         self.forms = forms = connector_forms((motion,), scheme, mesh)
-        self._work, self._tangent, self._motion = (
-            compile_form(form, jit_directory())
-            for form in (forms.work, forms.tangent, forms.motion)
-        )
+        self._work, self._tangent, self._motion = map(compiled, forms[:3])
         by_cell = forms.motion.arguments()[0].ufl_function_space()
         self._cells = _cell_dofs(by_cell).ravel()
         self._at: Index = np.empty(dofs.size, dtype=np.int64)

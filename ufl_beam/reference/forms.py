@@ -30,83 +30,88 @@ class Fields:
         v: Velocity, or another vector of rates.
         jump0: Jumps α of the rotation in the middle of cells at the beginning; DG0; rad.
         jump1: Jumps at the end.
-        plastic: Plastic strains at t_n+θ; quadrature element.
+        plastic: Plastic strains at t_n+θ; quadrature element.  They are **e** - C⁻¹ **r** of the
+            return map, so that **r** is the derivative of W for every law.
         D: Derivatives of (N, V, M) at t_n+θ by the strains at the end; quadrature element.
-        C: Stiffness (EA, GA, EI) of cells; DG0.
+        stiffness: Stiffness C = (EA, GA, EI) of cells; DG0.
         elastic: The same, but zero in cells with material points.
-        rho: Inertia (A_ρ, J_ρ) of cells; DG0.
+        inertia: Inertia (A_ρ, J_ρ) of cells; DG0.
         h: Lengths of cells.
         force: Virtual work of the resultants, P(34), a linear form.
         tangent: Its derivative by q1, P(64) to P(66), P(76).
         mass: Inertia of the beams, P(67).
-        stiffness: Stiffness of the undeformed beams.
-        potential: Energy of elastic cells at the end of the step, P(49).
+        at_rest: Stiffness of the undeformed beams.
+        elastic_energy: Energy of the elastic cells at the end of the step, P(49).
         lost: Numerical loss of elastic cells in the step, divided by ``2 alpha`` of the scheme.
-        on_cells: ``force``, and products of ``mass`` and ``stiffness`` with ``v``, as forces of the
+        on_cells: ``force``, and products of ``mass`` and ``at_rest`` with ``v``, as forces of the
             nodes on each cell.
+        strains: Function that returns (Σ, Γ, K) of q1; (cells, 3).
+        resultants: Function that returns (N, V, M) at t_n+θ; (cells, 3).
     """
 
     def __init__(self, frame: Frame, scheme: Scheme) -> None:
-        V, numbering, θ = frame.V, frame.numbering, scheme.theta
-        self.mesh, self.cells = frame.mesh, frame.cells
+        self.mesh, self.cells, V, numbering = frame.mesh, frame.cells, frame.V, frame.numbering
         self.q0, self.q1, self.v = (fem.Function(V) for _ in range(3))
-        self.jump0, self.jump1, self.C, self.elastic, self.rho = map(
-            self.cellwise, ((), (), (3,), (3,), (2,))
-        )
-        self.plastic, self.D = self.at_points((3,)), self.at_points((3, 3))
-        self.h: Array = numbering.lengths(frame.cells)
+        self.jump0, self.jump1 = self.cellwise(()), self.cellwise(())
+        self.stiffness, self.elastic = self.cellwise((3,)), self.cellwise((3,))
+        self.inertia, self.plastic = self.cellwise((2,)), self.at_points((3,))
+        self.D, self.h = self.at_points((3, 3)), numbering.lengths(frame.cells)
         beams = numbering.beam_of_cell[frame.cells]
         sections = [numbering.scene.beams[beam].section for beam in beams]
-        self.C.x.array[:] = np.ravel([(s.EA, s.GA, s.EI) for s in sections])
-        self.rho.x.array[:] = np.ravel([(s.rhoA, s.rhoI) for s in sections])
-        self.D.x.array.reshape(-1, 9)[:, ::4] = θ * self.C.x.array.reshape(-1, 3)
-        self.elastic.x.array[:] = self.C.x.array
-        self.elastic.x.array.reshape(-1, 3)[np.isin(frame.cells, numbering.inelastic_cells)] = 0.0
+        C = np.array([(s.EA, s.GA, s.EI) for s in sections])
+        self.stiffness.x.array[:] = C.ravel()
+        self.inertia.x.array[:] = np.ravel([(s.rhoA, s.rhoI) for s in sections])
+        self.D.x.array.reshape(-1, 9)[:, ::4] = scheme.theta * C
+        inelastic = np.isin(frame.cells, numbering.inelastic_cells)
+        self.elastic.x.array[:] = np.where(inelastic[:, None], 0.0, C).ravel()
+        self._state_equilibrium(scheme)
+
+    def _state_equilibrium(self, scheme: Scheme) -> None:
+        """Derive all forms from the functional, with strains and variations of the scheme.
+
+        In statics ``force`` is the derivative of the potential of all cells by q1.  Other schemes
+        replace the strains in it by those at t_n+θ, and the variation by their own.
+        """
+        V, axis, dx, θ = self.q0.function_space, Axis(self.mesh), self.dx(1), scheme.theta
 
         def W(e: Expr) -> Expr:
-            return functional.elastic_energy(e - self.plastic, self.C)  # equation (35)
+            return functional.elastic_energy(e - self.plastic, self.stiffness)  # equation (35)
 
-        def elastic(e: Expr) -> Expr:
+        def W_elastic(e: Expr) -> Expr:
             return functional.elastic_energy(e, self.elastic)
 
-        dq, axis, dx = ufl.TrialFunction(V), Axis(self.mesh), self.dx(1)
         e0 = enhanced_strain(self.q0, self.jump0, axis)  # equation (30)
         e1 = enhanced_strain(self.q1, self.jump1, axis)
         e = ufl.variable((1 - θ) * e0 + θ * e1)  # equations (83), (89)
         r = ufl.diff(W(e), e)  # equation (29)
 
+        def variation(w: Expr) -> Expr:
+            return scheme.virtual_strain(self.q0, self.q1, w, axis)  # equation (21)
+
         def force(w: Expr) -> ufl.Form:
-            w_e = scheme.virtual_strain(self.q0, self.q1, w, axis)  # equation (21)
-            return virtual_work(r, w_e) * dx
+            return virtual_work(r, variation(w)) * dx
 
         def mass(w: Expr, a: Expr) -> ufl.Form:
-            kinetic = functional.kinetic_energy(self.v, self.rho) * self.dx(2)  # equation (18)
+            kinetic = functional.kinetic_energy(self.v, self.inertia) * self.dx(2)  # equation (18)
             return ufl.derivative(ufl.derivative(kinetic, self.v, w), self.v, a)
 
-        def stiffness(w: Expr, v: Expr) -> ufl.Form:
-            rest = fem.Function(V)
-            D_v = virtual_strain(rest, v, axis)
-            w_e = virtual_strain(rest, w, axis)
-            return virtual_work(functional.resultants(D_v, self.C), w_e) * dx  # equation (92)
+        def at_rest(w: Expr, v: Expr) -> ufl.Form:
+            D_v, D_w = (virtual_strain(fem.Function(V), x, axis) for x in (v, w))
+            return virtual_work(functional.resultants(D_v, self.stiffness), D_w) * dx
 
         # By the return map plastic strains and jumps are functions of q1; so D replaces θ C.
-        w = ufl.TestFunction(V)
-        w_e = scheme.virtual_strain(self.q0, self.q1, w, axis)
+        w, dq = ufl.TestFunction(V), ufl.TrialFunction(V)
         dr = ufl.dot(self.D, ufl.derivative(strain(self.q1, axis), self.q1, dq))
-        geometric = virtual_work(r, ufl.derivative(w_e, self.q1, dq))
-        self.force = self._compiled(force(w))
-        self.tangent = self._compiled((virtual_work(dr, w_e) + geometric) * dx)
-        self.mass, self.stiffness = (self._compiled(form(w, dq)) for form in (mass, stiffness))
-        ends = functional.potential(elastic, self.q1, self.jump1, ufl.as_ufl(0.0), axis)
-        self.potential = self._compiled(ends * dx)
-        self.lost = self._compiled(elastic(e1 - e0) * dx)
+        geometric = virtual_work(r, ufl.derivative(variation(w), self.q1, dq))
+        self.force = compiled(force(w))
+        self.tangent = compiled((virtual_work(dr, variation(w)) + geometric) * dx)
+        self.mass, self.at_rest = compiled(mass(w, dq)), compiled(at_rest(w, dq))
+        end = functional.potential(W_elastic, self.q1, self.jump1, ufl.as_ufl(0.0), axis)
+        self.elastic_energy, self.lost = compiled(end * dx), compiled(W_elastic(e1 - e0) * dx)
         # Test functions that are not continuous give the forces on each cell.
-        self.cell_forces = fem.functionspace(self.mesh, ("DG", 1, (3,)))
-        apart = ufl.TestFunction(self.cell_forces)
-        self.on_cells = [
-            self._compiled(form)
-            for form in (force(apart), mass(apart, self.v), stiffness(apart, self.v))
-        ]
+        self.apart = fem.functionspace(self.mesh, ("DG", 1, (3,)))
+        w = ufl.TestFunction(self.apart)
+        self.on_cells = [*map(compiled, (force(w), mass(w, self.v), at_rest(w, self.v)))]
         self.strains, self.resultants = map(self._evaluation, (strain(self.q1, axis), r))
 
     def dx(self, degree: int) -> ufl.Measure:
@@ -124,20 +129,22 @@ class Fields:
 
     def load(self, density: fem.Function) -> tuple[fem.Form, fem.Form]:
         """Return the work of forces along beams, as a form on V and as forces on each cell."""
-        spaces = self.q0.function_space, self.cell_forces
+        spaces = self.q0.function_space, self.apart
         forms = (ufl.dot(density, ufl.TestFunction(space)) * self.dx(9) for space in spaces)
-        one, other = map(self._compiled, forms)
+        one, other = map(compiled, forms)
         return one, other
 
     def forces_on_cells(self, form: fem.Form) -> Array:
         """Return the forces of both nodes on each cell; (cells, 2, 3)."""
         assembled = fem.assemble_vector(form).array.reshape(-1, 3)
-        return np.asarray(assembled[self.cell_forces.dofmap.list])
-
-    def _compiled(self, form: ufl.Form) -> fem.Form:
-        return compile_form(form, jit_directory())
+        return np.asarray(assembled[self.apart.dofmap.list])
 
     def _evaluation(self, value: Expr) -> Callable[[], Array]:
         expression: Any = fem.Expression(value, np.array([[0.5]]))
         cells = np.arange(len(self.h), dtype=np.int32)
         return lambda: expression.eval(self.mesh, cells).reshape(-1, 3)
+
+
+def compiled(form: ufl.Form) -> fem.Form:
+    """Compile a form with FFCx."""
+    return compile_form(form, jit_directory())

@@ -29,7 +29,10 @@ def slope(f: Callable[[At], Values], at: Mapping[str, Any], name: str) -> tuple[
 
 
 def by_cell(function: fem.Function) -> Array:
-    """Return the values of a function with one point in each cell; (cells, components)."""
+    """Return the values of a function with one point in each cell; (cells, components).
+
+    Such functions have the degree of freedom c in the cell c.
+    """
     return np.asarray(function.x.array).reshape(-1, function.function_space.dofmap.bs)
 
 
@@ -89,7 +92,10 @@ class Points:
     # -- a step ----------------------------------------------------------------------------------
 
     def begin(self, dt: float, *, hold: bool) -> None:
-        """Begin a step; with ``hold``, points that did not flow open only if released."""
+        """Begin a step; with ``hold``, points that did not flow open only if released.
+
+        docs/steps.md states the rule by which points open.
+        """
         old, at_points = self._old(), self.e0 @ self.B.T
         self.at: dict[str, Any] = {**self.given, **old, "before": at_points}
         self.at["dt"] = np.full_like(at_points, dt)
@@ -121,8 +127,7 @@ class Points:
         jump1 = jump0 + self.kind.hinges * (direction * growth)[:, -1:]
         e[:, 2:] += strain_by_jump((1 - θ) * jump0 + θ * jump1, at["length"][:, :1])
         D = np.einsum("cn,na,nb->cab", w * D, B, B) + θ * np.diag(rest)
-        # r = C (e - plastic) for any law, so that W(e - plastic) is its energy in the forms
-        plastic = e - r / by_cell(self.fields.C)[self.cells]
+        plastic = e - r / by_cell(self.fields.stiffness)[self.cells]
         new = {"jump0": jump0, "jump1": jump1, "plastic": plastic, "D": D.reshape(-1, 9)}
         self._set(vars(self.fields), new)
 
@@ -133,7 +138,11 @@ class Points:
         return self.equations.resistance(at, at["growth"])
 
     def _open(self, at: dict[str, Any], stress: Array) -> tuple[Array, Array]:
-        """Let jumps grow until bulk and hinge bear the same moment, P(32); NaN stops SNES."""
+        """Let jumps grow until bulk and hinge bear the same moment, P(32); NaN stops SNES.
+
+        The excess over the resistance is concave in the growth, so Newton's method approaches the
+        root from above; bisection takes over outside of the bounds.
+        """
         at["direction"] = np.where(stress < 0, -1.0, 1.0)
         a, low, high = np.zeros_like(stress), np.zeros_like(stress), np.full_like(stress, np.inf)
         bound = np.abs(stress) / at["stiffness"] * at["length"] / at["theta"]  # elastic bulk
@@ -145,7 +154,7 @@ class Points:
             change = at["direction"] * falls - softens
             low, high = np.where(over > 0, a, low), np.where(over > 0, high, a)
             newton = a - over / change
-            if k == 0:  # Newton's method approaches the root from above
+            if k == 0:
                 a = np.where(change < 0, np.fmin(bound, newton), bound)
                 continue
             if (met := np.abs(newton - a) <= 1e-9 * a + 1e-17).all():
