@@ -126,7 +126,7 @@ class NonlinearProblem(PresentState):
             s, i = numbering.parameters(load.beam), cells - numbering.cells_of(load.beam)[0]
             i = i[on := (i >= 0) & (i < len(s) - 1)]
             factors = load.factors((s[i, None] + np.diff(s)[i, None] * X.T).ravel())
-            values[on] = factors.reshape(len(i), -1, 1) * (*load.force, load.moment)
+            values[on] = factors.reshape(len(i), X.size, 1) * (*load.force, load.moment)
         elif isinstance(load, Gravity):
             g = np.array([*load.acceleration, 0.0])
             values[:] = self.fields.inertia.x.array[::2, None, None] * g
