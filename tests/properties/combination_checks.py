@@ -20,10 +20,12 @@ from combination_case import (
     results,
 )  # fmt: skip
 from helpers import stop_after
+from old_reference.run import simulation_by_either
 from old_reference.solver import Solver as OldSolver
 from user_classes import CONNECTOR_LAWS, LAWS, SOFTENING, LargestCurvature
 
 import ufl_beam as ub
+import ufl_beam.simulation.run
 from ufl_beam import parallel
 from ufl_beam.reference.solver import Solver
 
@@ -350,6 +352,12 @@ def reference(case):
     only(case.equal_steps, "its steps are equal")
     only(case.comm.size == 1, "it has one process")
     newton = ub.Newton(rtol=DIGITS, reference=True)
+    with mock.patch.object(ufl_beam.simulation.run, "ReferenceRun", simulation_by_either):
+        by_reference(case, newton)
+
+
+def by_reference(case, newton):
+    """Compare a run by the present or the old reference solver with the run of the case."""
     try:
         assert_agree(case, newton=newton)
     except StepsAreCut as flag:
