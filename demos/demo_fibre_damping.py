@@ -145,9 +145,9 @@ ub.print_once(f"\nτ = 0.01 MPa\n{smooth}\n\nτ = 1.06 MPa\n{scattered}")
 # An elastic bar with the same period has Rayleigh damping with the fitted damping ratio ζ, P(92).
 # The same coefficient and the same fibres are then used in longer bars with the same amplitude of
 # stress.  The damping ratio of the fibres does not depend on the length, except for the scatter of
-# the samples, since dissipation and energy both grow with the volume.  That of Rayleigh's damper
-# falls with the frequency.  In the paper a larger structure has a larger deviation τ: the size
-# effect is one of the material.
+# the samples, since dissipation and energy both grow with the volume.  The ratio of Rayleigh's
+# damper falls with the frequency.  In the paper a larger structure has a larger deviation τ: the
+# size effect is one of the material.
 
 # %%
 ζ, ω_d = scattered.fitted_ratio, 2 * np.pi / scattered.period

@@ -9,7 +9,7 @@
 # * a return map in NumPy updates them and the jump in each iteration,
 # * PETSc's SNES solves each step.
 #
-# The strains, the functional and the variations of the time schemes are those of the package.  The
+# The strains, the functional and the variations of the time schemes come from the package.  The
 # results are compared with both solvers of the package: the compiled one, and the reference solver
 # in `ufl_beam/reference/`, which solves the scenes of the paper in this way, also with inertia.
 #
@@ -176,8 +176,8 @@ def return_map(scheme, dt, K0):
 # ## Steps
 #
 # SNES finds the end of each step.  Its initial guess extrapolates the last step and satisfies the
-# boundary conditions.  Changes of internal variables from t_n to t_n+θ, divided by θ, are those of
-# the whole step.
+# boundary conditions.  Changes of internal variables from t_n to t_n+θ, divided by θ, are the
+# changes in the whole step.
 
 # %%
 clamp = fem.locate_dofs_geometrical(V, lambda x: np.isclose(x[0], 0))

@@ -153,6 +153,27 @@ def test_a_run_in_two_parts_by_different_solvers():
         assert np.abs(rest.q[-1] - whole.q[-1]).max() < 1e-8 * np.abs(whole.q).max()
 
 
+def test_a_new_link_stops_a_beam():
+    """A plastic impact at the beginning of a run, whose scene has no prescribed motions."""
+    section = ub.Section(EA=1e6, GA=4e5, EI=800.0, rhoA=10.0, rhoI=0.01)
+    arm = ub.Beam((0, 0), (1, 0), section, cells=4)
+    pin = [ub.Pinned(arm.start)]
+    spins = ub.Scene([arm], supports=pin, initial=[ub.Velocity((arm,), angular=1.0, about=(0, 0))])
+    held = ub.Scene([arm], supports=pin, joints=[ub.Link(ub.ground(1.0, -1.5), arm.end)])
+    begun = run(spins, ub.EnergyMomentum(), 1e-15, 1e-15)
+    both = [
+        ub.simulate(
+            held, ub.EnergyMomentum(), t=(1e-15, 0.01), dt=1e-3, start=begun,
+            newton=ub.Newton(rtol=1e-12, reference=by),
+        )
+        for by in (True, False)
+    ]  # fmt: skip
+    losses = [each.energy.lost["impacts"][-1] for each in both]
+    assert losses[0] == pytest.approx(losses[1], rel=1e-12)
+    assert 0.2 < losses[0] < spins.beams[0].section.rhoA / 6  # J, of the kinetic energy
+    assert apart(*both) < SAME
+
+
 def test_recorders(tmp_path):
     """A history and a file for ParaView of a run."""
     scene = machine()

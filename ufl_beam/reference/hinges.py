@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Plastic hinges of zero length: the jump is held, or its moment is that of a softening law."""
+"""Plastic hinges of zero length: the jump is held, or its moment follows a softening law."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Hinge:
         )
 
     def state(self) -> Array:
-        """Return the variables after those of a connector, as in ``solution.internal``."""
+        """Return the variables that follow the numbers of a connector in ``solution.internal``."""
         return np.array([self.opening, self.e0, self.limit, 0.0, self.lost, self.flows, 0.0])
 
     def restore(self, row: Array) -> None:

@@ -35,7 +35,7 @@ OPTIONS = {
     "snes_type": "newtonls", "ksp_type": "preonly", "pc_type": "lu",
     "pc_factor_mat_solver_type": "mumps",
 }  # fmt: skip
-"""Options of PETSc, which those of :class:`Newton` replace."""
+"""Options of PETSc; options of :class:`Newton` replace them."""
 
 SMALL_STEP, LAST_DIGITS = 1e-9, 1e-15
 """Newton's method ends after a correction of motions below these parts of the motions, or of the

@@ -494,7 +494,7 @@ class LedgerWatch:
 TURNED = 0.05
 """Rotation of beams beyond which Rayleigh damping of their stiffness is warned of; rad.
 
-A rigid rotation θ has the linear strain 1 - cos θ = 0.00125, which is that of steel that yields.
+A rigid rotation by this angle has the linear strain 1 - cos θ = 0.00125, at which steel yields.
 """
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -97,7 +98,7 @@ def require_scope(numbering: DofNumbering, scheme: Scheme, comm: MPI.Intracomm) 
 class ReferenceRun(Solver):
     """Simulation by the reference solver, with energy ledger, section forces and stored states.
 
-    The arguments are those of :class:`Simulation`.
+    It takes the arguments of :class:`Simulation`.
     """
 
     _sums: Array
@@ -213,7 +214,7 @@ class ReferenceRun(Solver):
             },
         }  # fmt: skip
         return SimpleNamespace(**{
-            account: {name: 0.0 for name, does in entries.items() if does}
+            account: defaultdict(float, {name: 0.0 for name, does in entries.items() if does})
             for account, entries in occurs.items()
         })  # fmt: skip
 
