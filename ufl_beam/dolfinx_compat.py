@@ -97,12 +97,21 @@ def _jit_options() -> dict[str, Any]:
     return options | {"cffi_extra_compile_args": flags}
 
 
-def compile_form(form: ufl.Form, directory: Path) -> fem.Form:
+def compile_form(form: ufl.Form, directory: Path | None = None) -> fem.Form:
     """Compile a form with FFCx, or load it from the cache in ``directory``."""
+    return _compiled(fem.form, form, directory=directory)
+
+
+def compile_expression(value: Any, points: Array) -> fem.Expression:
+    """Compile an expression for its values at points of the reference cell, (n, 1)."""
+    return _compiled(fem.Expression, value, points)
+
+
+def _compiled(create: Any, *arguments: Any, directory: Path | None = None) -> Any:
     logger = logging.getLogger()
-    handlers = logger.handlers[:]
+    handlers, where = logger.handlers[:], {"cache_dir": directory} if directory else {}
     try:
-        return fem.form(form, jit_options=_jit_options() | {"cache_dir": directory})
+        return create(*arguments, jit_options=_jit_options() | where)
     finally:
         logger.handlers = handlers  # FFCx does not restore them after an interrupt
 

@@ -4,16 +4,18 @@
 from itertools import pairwise
 
 from mpi4py import MPI
+from petsc4py import PETSc
 
 import numpy as np
 import pytest
 import ufl
 
 import ufl_beam as ub
-from ufl_beam.dolfinx_compat import compile_form, fem, jit_directory
+from ufl_beam import dolfinx_compat
+from ufl_beam.dolfinx_compat import compile_form, fem
 from ufl_beam.mechanics import functional
 from ufl_beam.mechanics.kinematics import Axis, strain
-from ufl_beam.reference import connectors, forms, points
+from ufl_beam.reference import connectors, forms, points, solver
 from ufl_beam.reference.nonlinear_problem import NonlinearProblem
 from ufl_beam.simulation.reference_run import ReferenceRun
 
@@ -206,8 +208,7 @@ def broken():
 
 
 def assembled(form):
-    form = compile_form(form, jit_directory())
-    return np.array(fem.assemble_vector(form).array)
+    return np.array(fem.assemble_vector(compile_form(form)).array)
 
 
 def test_the_residual_is_the_derivative_of_the_functionals():
@@ -249,6 +250,134 @@ def test_the_residual_is_the_derivative_of_the_functionals():
     stiffness = np.abs(fields.stiffness.x.array).max() * np.abs(D.x.array).max()
     assert np.abs(assembled(ufl.derivative(mixed, D, z))).max(initial=0.0) <= 1e-12 * stiffness
     state.close()
+
+
+# -- Newton's method -------------------------------------------------------------------------------
+
+
+def loaded(petsc=None, weight=1e9):
+    """A cantilever that a force bends far, and a post whose link bears a force of 1e9 N."""
+    plain, stiff = ub.Section(EA=1e6, GA=4e5, EI=800.0), ub.Section(EA=1e15, GA=1e15, EI=1e15)
+    arm = ub.Beam((0, 0), (1, 0), plain, cells=8)
+    post = ub.Beam((3, 0), (3, 1), stiff, cells=1)
+    scene = ub.Scene(
+        [arm, post],
+        joints=[ub.Link(ub.ground(3.0, 2.0), post.end)],
+        supports=[ub.Clamped(arm.start), ub.Clamped(post.start)],
+        loads=[ub.PointLoad(arm.end, force=(0, 2e3)), ub.PointLoad(post.end, force=(0, -weight))],
+    )
+    newton = ub.Newton(reference=True, petsc=petsc or {})
+    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, newton=newton)
+
+
+def test_a_line_search_leaves_no_point_behind(monkeypatch):
+    """Tangents, and accepted states, belong to the unknowns.
+
+    PETSc's line search does not move the unknowns if the full step does not help and is below a
+    tolerance of their norm.  The force of a link makes that norm, and so the tolerance, large.
+    """
+    Problem, at = NonlinearProblem, [np.zeros(0)]
+    residual, jacobian, accept = Problem._residual, Problem._jacobian, ReferenceRun.accept
+
+    def evaluated(self, snes, x, f):
+        at[0] = x.array_r.copy()
+        residual(self, snes, x, f)
+
+    def same(self, snes, x, A, P):
+        assert np.array_equal(at[0], x.array_r)
+        jacobian(self, snes, x, A, P)
+
+    def accepted(self, step):
+        assert np.array_equal(at[0], self.x.array_r)
+        accept(self, step)
+
+    monkeypatch.setattr(Problem, "_residual", evaluated)
+    monkeypatch.setattr(Problem, "_jacobian", same)
+    monkeypatch.setattr(ReferenceRun, "accept", accepted)
+    full, searched = loaded(), loaded(petsc={"snes_linesearch_type": "bt"})
+    assert searched.substeps == full.substeps == 2
+    assert apart(full, searched) < SAME
+
+
+def test_true_tangents_end_each_attempt(monkeypatch):
+    """With elastic tangents, a small correction does not prove a small error."""
+    solve, accept, tried = NonlinearProblem._solve_by_snes, ReferenceRun.accept, []
+
+    def solved(self, *attempt):
+        reason = solve(self, *attempt)
+        tried.append((self.stiff, reason > 0))
+        return reason
+
+    def accepted(self, step):
+        assert tried[-1] == (0, True)
+        accept(self, step)
+
+    monkeypatch.setattr(NonlinearProblem, "_solve_by_snes", solved)
+    monkeypatch.setattr(ReferenceRun, "accept", accepted)
+    run(weak_cell(2e7, np.pi), ub.Static(), 2.0, 0.1)
+    assert (1, True) in tried  # when the section begins to yield
+
+
+def test_no_attempt_is_repeated(monkeypatch):
+    """A load that the hinges cannot bear; a search from the same guess would fail again."""
+    section = ub.Section(EA=1e6, GA=4e5, EI=800.0)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2, hinges={0.5: ub.Softening(20.0, 5.0)})
+    push = ub.PointLoad(beam.end, force=(0.0, 60.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    guesses, solve = [], NonlinearProblem._newton
+    monkeypatch.setattr(solver, "MOST_SUBSTEPS", 1)
+    monkeypatch.setattr(
+        NonlinearProblem, "_newton", lambda self, x: (guesses.append(x), solve(self, x))[1]
+    )
+    with pytest.raises(ub.ConvergenceError):
+        run(scene, ub.Static(), 1.0, 1.0)
+    assert len(guesses) == len({x.tobytes() for x in guesses}) > 1
+
+
+@pytest.mark.serial  # a single process raises
+def test_errors_are_no_failed_steps(monkeypatch):
+    """Only a singular matrix is; the next attempts find the solution."""
+    jacobian, left = NonlinearProblem._jacobian, [2]
+
+    def singular(self, snes, x, A, P):
+        jacobian(self, snes, x, A, P)
+        if left[0]:
+            left[0] -= 1
+            P.zeroEntries()
+
+    def broken(*_):
+        raise PETSc.Error(55)  # out of memory
+
+    expected = loaded(weight=1.0)
+    monkeypatch.setattr(NonlinearProblem, "_jacobian", singular)
+    assert apart(loaded(weight=1.0), expected) < SAME
+    assert left == [0]
+    monkeypatch.setattr(NonlinearProblem, "_jacobian", broken)
+    with pytest.raises(PETSc.Error):
+        loaded()
+
+
+def test_all_objects_of_petsc_are_destroyed():
+    options = {"t0": 0.0, "start": None, "newton": ub.Newton(reference=True), "mesh": None}
+    state = ReferenceRun(machine(), ub.EnergyMomentum(), comm=MPI.COMM_WORLD, **options)
+    objects = [x for x in vars(state).values() if isinstance(x, PETSc.Object)]
+    state.close()
+    assert len(objects) > 5
+    assert not any(x.handle for x in objects)
+
+
+def test_expressions_have_the_options_of_forms(monkeypatch):
+    flags, create = ["-DEXPRESSION"], fem.Expression
+    monkeypatch.setattr(dolfinx_compat, "FLAGS", flags)
+
+    def expression(*arguments, **options):
+        assert options["jit_options"]["cffi_extra_compile_args"][-1:] == flags
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fem, "Expression", expression)
+    with pytest.raises(KeyboardInterrupt):
+        loaded()
+    assert create is not fem.Expression
 
 
 # -- refusals --------------------------------------------------------------------------------------

@@ -15,12 +15,11 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import point_masses
-from ufl_beam.dolfinx_compat import fem, line_mesh
+from ufl_beam.dolfinx_compat import compile_form, fem, line_mesh
 from ufl_beam.mechanics.relative_motions import connector_forms
 from ufl_beam.mechanics.time_scheme import Scheme, Step
 from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.functions import value_at
-from ufl_beam.reference.forms import compiled
 from ufl_beam.reference.hinges import Hinge
 
 
@@ -50,7 +49,7 @@ class Connectors:
         dofs = numbering.dofs_of_connectors[self.indices]
         self.forces_at = dofs[:, 6]
         self.forms = forms = connector_forms((motion,), scheme, mesh)
-        self._work, self._tangent, self._motion = map(compiled, forms[:3])
+        self._work, self._tangent, self._motion = map(compile_form, forms[:3])
         by_cell = forms.motion.arguments()[0].ufl_function_space()
         self._cells = _cell_dofs(by_cell).ravel()
         self._at: Index = np.empty(dofs.size, dtype=np.int64)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import basix.ufl
 import numpy as np
@@ -12,7 +11,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.dolfinx_compat import compile_form, fem, jit_directory
+from ufl_beam.dolfinx_compat import compile_expression, compile_form, fem
 from ufl_beam.mechanics import functional
 from ufl_beam.mechanics.functional import enhanced_strain, virtual_work
 from ufl_beam.mechanics.kinematics import Axis, strain, virtual_strain
@@ -103,15 +102,18 @@ class Fields:
         w, dq = ufl.TestFunction(V), ufl.TrialFunction(V)
         dr = ufl.dot(self.D, ufl.derivative(strain(self.q1, axis), self.q1, dq))
         geometric = virtual_work(r, ufl.derivative(variation(w), self.q1, dq))
-        self.force = compiled(force(w))
-        self.tangent = compiled((virtual_work(dr, variation(w)) + geometric) * dx)
-        self.mass, self.at_rest = compiled(mass(w, dq)), compiled(at_rest(w, dq))
+        self.force = compile_form(force(w))
+        self.tangent = compile_form((virtual_work(dr, variation(w)) + geometric) * dx)
+        self.mass, self.at_rest = compile_form(mass(w, dq)), compile_form(at_rest(w, dq))
         end = functional.potential(W_elastic, self.q1, self.jump1, ufl.as_ufl(0.0), axis)
-        self.elastic_energy, self.lost = compiled(end * dx), compiled(W_elastic(e1 - e0) * dx)
+        self.elastic_energy, self.lost = (
+            compile_form(end * dx),
+            compile_form(W_elastic(e1 - e0) * dx),
+        )
         # Test functions that are not continuous give the forces on each cell.
         self.apart = fem.functionspace(self.mesh, ("DG", 1, (3,)))
         w = ufl.TestFunction(self.apart)
-        self.on_cells = [*map(compiled, (force(w), mass(w, self.v), at_rest(w, self.v)))]
+        self.on_cells = [*map(compile_form, (force(w), mass(w, self.v), at_rest(w, self.v)))]
         self.strains, self.resultants = map(self._evaluation, (strain(self.q1, axis), r))
 
     def dx(self, degree: int) -> ufl.Measure:
@@ -131,7 +133,7 @@ class Fields:
         """Return the work of forces along beams, as a form on V and as forces on each cell."""
         spaces = self.q0.function_space, self.apart
         forms = (ufl.dot(density, ufl.TestFunction(space)) * self.dx(9) for space in spaces)
-        one, other = map(compiled, forms)
+        one, other = map(compile_form, forms)
         return one, other
 
     def forces_on_cells(self, form: fem.Form) -> Array:
@@ -140,11 +142,5 @@ class Fields:
         return np.asarray(assembled[self.apart.dofmap.list])
 
     def _evaluation(self, value: Expr) -> Callable[[], Array]:
-        expression: Any = fem.Expression(value, np.array([[0.5]]))
-        cells = np.arange(len(self.h), dtype=np.int32)
-        return lambda: expression.eval(self.mesh, cells).reshape(-1, 3)
-
-
-def compiled(form: ufl.Form) -> fem.Form:
-    """Compile a form with FFCx."""
-    return compile_form(form, jit_directory())
+        expression, cells = compile_expression(value, np.array([[0.5]])), np.arange(len(self.h))
+        return lambda: expression.eval(self.mesh, cells.astype(np.int32)).reshape(-1, 3)

@@ -18,6 +18,7 @@ from scipy.sparse import csr_array, diags_array
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.dolfinx_compat import fem
+from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia, nodal_step
 from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.functions import value_at
@@ -26,6 +27,7 @@ from ufl_beam.output.recorder import PresentState
 from ufl_beam.reference.connectors import connectors_of, masses
 from ufl_beam.reference.forms import Fields
 from ufl_beam.reference.frame import Frame
+from ufl_beam.reference.hinges import Hinge
 from ufl_beam.reference.points import Points
 
 ADD, SAME = PETSc.InsertMode.ADD_VALUES, PETSc.Mat.Structure.SAME_NONZERO_PATTERN
@@ -33,9 +35,14 @@ REASONS = PETSc.SNES.ConvergedReason
 
 OPTIONS = {
     "snes_type": "newtonls", "ksp_type": "preonly", "pc_type": "lu",
-    "pc_factor_mat_solver_type": "mumps",
+    "pc_factor_mat_solver_type": "mumps", "snes_stol": 0,
 }  # fmt: skip
-"""Options of PETSc; options of :class:`Newton` replace them."""
+"""Options of PETSc; options of :class:`Newton` replace them.  With a tolerance ``snes_stol``, the
+line search ``bt`` keeps the unknowns if the full step is shorter and does not help."""
+
+SEARCH = "snes_linesearch_type"
+NEARLY = REASONS.DIVERGED_MAX_IT, REASONS.DIVERGED_LINE_SEARCH
+"""Reasons to stop where full steps may converge: slow convergence, and round-off."""
 
 SMALL_STEP, LAST_DIGITS = 1e-9, 1e-15
 """Newton's method ends after a correction of motions below these parts of the motions, or of the
@@ -62,6 +69,8 @@ class NonlinearProblem(PresentState):
         fields: Functions and forms of a step.
         points: Material points of the cells of this process.
         connectors: Joints, motors and hinges of zero length of the scene.
+        parts: Hinges of zero length, and points.
+        opening: Those that may open.
         y: Coordinates of the scene before the step, see :class:`Frame`.
         q: Configuration of the scene before the step; q1 at its end.
         v: Velocities of the scene before the step.
@@ -95,6 +104,9 @@ class NonlinearProblem(PresentState):
             mine = np.flatnonzero(np.isin(frame.cells, cells))
             self.points.append(Points(kind, mine, numbering, self.fields, scheme))
         self.connectors, self.masses = connectors_of(numbering, scheme), masses(numbering)
+        hinges = [hinge for group in self.connectors for hinge in group.hinges.values()]
+        self.parts: list[Points | Hinge] = [*hinges, *self.points]
+        self.opening = [p for p in self.parts if isinstance(p, Hinge) or p.kind.softening]
         self.r, self.rate = fem.Function(frame.V), fem.Function(frame.V)
         self._add_loads()
         self._make_snes()
@@ -155,6 +167,7 @@ class NonlinearProblem(PresentState):
             self.damping.scale(a1)
             self.damping.axpy(a0, self.M, SAME)
             self.damping_of_masses, self.scaled = a0 * self.masses, self.M.copy()
+        self.matrices = [self.K, *([self.M, self.damping, self.scaled] if self.dynamic else [])]
         self.projected = self.K.ptap(frame.C)
         self.x, f = (frame.C.createVecRight() for _ in range(2))
         A, sizes = self.projected.copy(), (len(frame.mine), len(frame.order))
@@ -295,22 +308,47 @@ class NonlinearProblem(PresentState):
         self.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
         return largest
 
-    def _solve_by_snes(self) -> int:
-        """Iterate with SNES; return its reason to stop."""
+    def _newton(self, guess: Array) -> None:
+        """Run SNES: full steps, a line search, stiffer tangents, each from the guess.
+
+        Points around an opening hinge unload, which their own tangents do not predict.  With
+        ``stiff`` 1, points that do not open have elastic tangents; with 2, hinges of zero length
+        have the opposite slope, too.  Full steps with true tangents end each attempt: others
+        converge slowly, so that a small correction does not prove a small error, and a line search
+        leaves the state at the last point that it tried.
+        """
+        first, second = (self.newton.petsc.get(SEARCH, kind) for kind in ("basic", "bt"))
+        attempts = [(first, 0), (second, 0)] + [(first, 1), (first, 2)] * bool(self.opening)
+        for attempt in dict.fromkeys(attempts):
+            self.x.array_w[:] = guess
+            reason = self._solve_by_snes(*attempt)
+            if attempt != ("basic", 0) and (reason > 0 or reason in NEARLY):
+                reason = self._solve_by_snes("basic", 0)
+            if reason > 0:
+                return
+        names = {v: k for k, v in vars(REASONS).items() if isinstance(v, int)}
+        failure = StepFailed(f"Newton's method did not converge ({names.get(reason, reason)})")
+        failure.reason = str(names.get(reason, reason))
+        raise failure
+
+    def _solve_by_snes(self, search: str, stiff: int) -> int:
+        """Iterate from ``x`` with SNES; return its reason to stop."""
+        self.stiff = stiff
+        self._set({SEARCH: search})
         try:
             self.snes.solve(None, self.x)
         except PETSc.Error as error:  # also raised if a callback is interrupted
             cause: BaseException = error
             while cause.__cause__ is not None:
                 cause = cause.__cause__
-            if not isinstance(cause, PETSc.Error):
-                raise cause from None
-            self._make_snes()  # MUMPS has found no pivot
-            return int(REASONS.DIVERGED_LINEAR_SOLVE)
+            raise cause from None
         self.iterations += self.snes.getIterationNumber()
-        return int(self.snes.getConvergedReason())
+        reason = int(self.snes.getConvergedReason())
+        if reason == REASONS.DIVERGED_LINEAR_SOLVE:  # MUMPS has found no pivot, and would be stuck
+            self.snes.getKSP().getPC().reset()
+        return reason
 
     def close(self) -> None:
         """Destroy the PETSc objects."""
-        for thing in (self.snes, self.K, self.projected, self.x, self.frame.C):
+        for thing in (self.snes, self.x, self.frame.C, self.projected, *self.matrices):
             thing.destroy()

@@ -19,7 +19,7 @@ from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, nodal_step
 from ufl_beam.model.bodies import Body, Member
 from ufl_beam.model.functions import still, value_at
 from ufl_beam.reference.hinges import Hinge
-from ufl_beam.reference.nonlinear_problem import REASONS, NonlinearProblem
+from ufl_beam.reference.nonlinear_problem import NonlinearProblem
 from ufl_beam.reference.points import Points
 
 LARGEST_ROTATION = 0.75 * math.pi
@@ -55,7 +55,6 @@ class Solver(NonlinearProblem):
         impacts: Finds impacts where prescribed rates jump; None if no rate does.
 
     Attributes:
-        opening: Hinges of zero length, and points, that may open.
         y1: Coordinates at the end of the step.
         s: Steps of the nodes on which forces do work.
         energies: Sum of all energies so far; J.
@@ -73,9 +72,6 @@ class Solver(NonlinearProblem):
         super().__init__(numbering, scheme, t, newton=newton, comm=comm)
         self.impacts, self.substeps = impacts, 0
         self.last_dt, self._rejected = math.inf, 0.0
-        hinges = [hinge for group in self.connectors for hinge in group.hinges.values()]
-        self.parts: list[Points | Hinge] = [*hinges, *self.points]
-        self.opening = [p for p in self.parts if isinstance(p, Hinge) or p.kind.softening]
 
     def start(self, q: Array, v: Array, internal: State | None, *, same: bool) -> None:
         """Begin with a configuration, velocities, and the internal variables of another run.
@@ -166,8 +162,8 @@ class Solver(NonlinearProblem):
                 self._equilibrium(guess)
                 break
             except StepFailed:
-                if not hold or not self.opening:
-                    raise
+                if not hold or not any(isinstance(part, Points) for part in self.opening):
+                    raise  # a second search of hinges of zero length would repeat the first
         return self._check(step)
 
     def _equilibrium(self, guess: Array) -> None:
@@ -186,29 +182,6 @@ class Solver(NonlinearProblem):
                 part.release(EXCESS_DECAY**k * excess - EXCESS_TOLERANCE)
             guess = self.x.array.copy()
         raise StepFailed("hinges open and close again and again")
-
-    def _newton(self, guess: Array) -> None:
-        """Run SNES: full steps, a line search, stiffer tangents, full steps from where they end.
-
-        Points around an opening hinge unload, which their own tangents do not predict.  With
-        ``stiff`` 1, points that do not open have elastic tangents; with 2, hinges of zero length
-        have the opposite slope, too.
-        """
-        search = "snes_linesearch_type"
-        attempts = [("basic", 0), ("bt", 0)] + [("basic", 1), ("basic", 2)] * bool(self.opening)
-        for kind, self.stiff in attempts:
-            self._set({search: self.newton.petsc.get(search, kind)})
-            self.x.array_w[:] = guess
-            reason = self._solve_by_snes()
-            if self.stiff and reason == REASONS.DIVERGED_MAX_IT:
-                self.stiff = 0
-                reason = self._solve_by_snes()
-            if reason > 0:
-                return
-        names = {v: k for k, v in vars(REASONS).items() if isinstance(v, int)}
-        failure = StepFailed(f"Newton's method did not converge ({names.get(reason, reason)})")
-        failure.reason = str(names.get(reason, reason))
-        raise failure
 
     def _check(self, step: Step) -> float:
         """Raise :class:`StepFailed` if a step turns a part too far, or leaps to another branch."""
