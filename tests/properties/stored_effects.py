@@ -1,0 +1,940 @@
+# SPDX-License-Identifier: MIT
+"""Functions that write small scenes with one effect each; see :mod:`stored_scenes`.
+
+Sizes are of beams of about 1 m with EA = 1e4 N, GA = 4e3 N, EI = 100 N m2 and 1 kg/m, under forces
+of some tens of N, so that yielding moments are some N m and the lowest periods some 0.1 s.  Random
+numbers are drawn in the order of the calls: a changed function changes its stored numbers.
+"""
+
+import math
+
+from stored_scenes import ANY, DYNAMIC, OVER_ANY_STEP, OVER_STEP, Draft, effect  # noqa: F401
+from user_classes import (
+    Brake,
+    Cubic,
+    Cushion,
+    Dashpot,
+    Integral,
+    Maxwell,
+    Petersson,
+    PowerLaw,
+    Relaxing,
+    Rising,
+    Stiffening,
+    Weighted,
+    current,
+    dead,
+    drag,
+    field,
+    soil,
+    warming,
+)
+
+import ufl_beam as ub
+
+PLAIN = {"EA": 1e4, "GA": 4e3, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.01}
+
+
+# -- scenes in which effects act -----------------------------------------------------------------
+
+
+def arm(d, section=None, force=20.0, cells=3, hold=True, grows=None, **options):
+    """A beam that is clamped at its start, with a force at its end."""
+    section = section or ub.Section(**PLAIN)
+    beam = d.add(
+        "beams", ub.Beam((0, 0), (1, d.some(0, 0.4)), section, cells=cells, name="b0", **options)
+    )
+    if hold:
+        d.add("supports", ub.Clamped(beam.start))
+    if force:
+        x, y = d.some(-force, force), d.sign() * d.some(force / 2, force)
+        d.add("loads", ub.PointLoad(beam.end, force=(x, y), amplitude=grows or d.wave()))
+    return beam
+
+
+def forearm(d, beam, apart=0.0, force=15.0):
+    """A second beam from the end of the first one, with a force at its end."""
+    x, y = beam.end.point
+    start, section = (x + apart, y + apart / 2), ub.Section(**PLAIN)
+    other = ub.Beam(start, (x + 0.6, y - d.some(0.3, 0.6)), section, cells=2, name="b1")
+    d.add("beams", other)
+    if force:
+        load = (d.some(-force, force), d.sign() * d.some(force / 2, force))
+        d.add("loads", ub.PointLoad(other.end, force=load, amplitude=d.wave()))
+    return other
+
+
+def driven(d, section=None, size=0.06, grows=None, **options):
+    """An arm whose end is moved forth and back, so that it has no limit load."""
+    beam = arm(d, section, force=0.0, **options)
+    moved, size = grows or d.swell(), d.sign() * d.some(0.8 * size, 1.2 * size)
+    d.add("supports", ub.PrescribedDisplacement(beam.end, v=lambda t: size * moved(t)))
+    return beam
+
+
+def of_size(grows, size):
+    """A function of time, multiplied by a number."""
+    return lambda t: size * grows(t)
+
+
+def near(d, low=0.2, high=0.8):
+    """A point of the ground off the beams."""
+    return ub.ground(d.some(low, high), d.some(0.6, 1.0))
+
+
+def connected(d, law, kind=None, beam=None):
+    """A connector of one component between the ground and an inner vertex or end of a beam."""
+    beam = beam or arm(d)
+    place = d.one(beam.end, beam.at(1 / 3))
+    kind = kind or d.one("Stretch", "Slide")
+    if kind == "Turn":
+        return d.add("connectors", ub.Turn(ub.ground(0, 0), place, law))
+    if kind == "Stretch":
+        return d.add("connectors", ub.Stretch(near(d, 1.3, 1.8), place, law))
+    axis = (d.some(-0.4, 0.4), 1.0)
+    return d.add("connectors", ub.Slide(near(d), place, law, axis=axis))
+
+
+# -- loads -------------------------------------------------------------------------------------
+
+
+def force_of(d, size=15.0):
+    return d.either_sign(size / 3, size), d.either_sign(size / 3, size)
+
+
+def span_and_profile(d):
+    """A part of a beam, and how a load varies along it."""
+    top = d.acts(0.5, 2.0)
+    profile = d.one((top, -1.0), lambda s: top - 2 * (s - 0.5) ** 2)
+    return {"span": (0.1, d.acts(0.5, 0.8)), "profile": profile}
+
+
+@effect(ub.PointLoad)
+def point_load(d):
+    beam = arm(d, force=0.0)
+    d.add("loads", ub.PointLoad(beam.at(2 / 3), force_of(d), d.either_sign(1, 4), d.wave()))
+
+
+@effect(ub.FollowerLoad)
+def follower_load(d):
+    beam = arm(d)
+    d.add("loads", ub.FollowerLoad(beam.end, force_of(d), d.either_sign(1, 4), d.wave()))
+
+
+@effect(ub.LineLoad)
+def line_load(d):
+    beam = arm(d)
+    force, moment, amplitude = force_of(d, 30.0), d.either_sign(1, 4), d.wave()
+    d.add("loads", ub.LineLoad(beam, force, moment, amplitude, **span_and_profile(d)))
+
+
+@effect(ub.Pressure)
+def pressure(d):
+    beam = arm(d)
+    p, q, amplitude = d.either_sign(10, 30), d.either_sign(10, 30), d.wave()
+    d.add("loads", ub.Pressure(beam, p, q, amplitude, **span_and_profile(d)))
+
+
+@effect(ub.MovingLoad)
+def moving_load(d):
+    beam = arm(d)
+    d.add("supports", ub.Roller(beam.end))
+    other = forearm(d, beam)
+    d.add("joints", ub.Revolute(beam.end, other.start))
+    d.add("supports", ub.Roller(other.end))
+    speed, start = d.acts(4.0, 6.0), d.some(0.1, 0.2)
+    mass = 0.0 if d.static else d.acts(0.2, 0.6)
+    d.add("loads", ub.MovingLoad(
+        [beam, other], lambda t: start + speed * t, force_of(d), d.wave(), mass=mass
+    ))  # fmt: skip
+
+
+@effect(ub.Gravity)
+def gravity(d):
+    beam = arm(d)
+    d.add("masses", ub.PointMass(beam.at(2 / 3), 0.5))
+    d.add("loads", ub.Gravity((d.either_sign(2, 5), -d.acts(5, 15)), d.wave()))
+
+
+@effect(ub.RotatingFrame, schemes=OVER_ANY_STEP)
+def rotating_frame(d):
+    arm(d)
+    d.add("loads", ub.RotatingFrame(
+        d.either_sign(4, 8), about=(-d.acts(0.1, 0.3), d.acts(0.1, 0.3))
+    ))  # fmt: skip
+
+
+@effect(ub.ImposedStrain)
+def imposed_strain(d):
+    beam = arm(d)
+    d.add("supports", ub.Roller(beam.end))
+    a, b, k = d.either_sign(1e-3, 4e-3), d.either_sign(1e-3, 4e-3), d.either_sign(0.02, 0.06)
+    curvature = d.one((k, 0.0), lambda s: k * (1 - s**2))
+    shear, span = d.either_sign(1e-3, 3e-3), (0.0, d.acts(0.5, 0.8))
+    d.add("loads", ub.ImposedStrain(beam, (a, b), curvature, d.wave(), shear=shear, span=span))
+
+
+@effect(ub.Table)
+def table(d):
+    beam = arm(d, force=0.0)
+    times = [0.0, d.some(0.05, 0.09), d.acts(0.1, 0.15), d.end]
+    values = [0.0, d.acts(0.5, 1.0), -d.acts(0.5, 1.0), 0.5]
+    d.add("loads", ub.PointLoad(beam.end, (5.0, 12.0), amplitude=ub.Table(times, values)))
+
+
+@effect(ub.GroundMotion)
+def ground_motion(d):
+    beam = arm(d)
+    values = [d.either_sign(10.0, 40.0) for _ in range(6)]
+    quake = ub.GroundMotion(d.acts(0.02, 0.03), values)
+    if d.static or d.one(True, False):
+        d.add("loads", ub.Gravity((-1, 0.5), amplitude=quake.acceleration))
+    else:
+        d.parts["supports"] = [
+            ub.PrescribedDisplacement(beam.start, u=0.0, v=quake.displacement, psi=0.0)
+        ]
+
+
+# -- works and damping ---------------------------------------------------------------------------
+
+
+@effect(ub.VirtualWork)
+def virtual_work(d):
+    """A force across the deformed axis, or a dead force on one of two beams, and drag."""
+    beam = arm(d)
+    other = forearm(d, beam)
+    d.add("joints", ub.Rigid(beam.end, other.start))
+    grows, size = d.wave(), d.either_sign(5, 15)
+    d.add("works", d.one(
+        ub.VirtualWork("current", current, beams=[beam], numbers={"p": size}, degree=3),
+        ub.VirtualWork("dead", dead, numbers={"x": size, "y": lambda t: size * grows(t)}),
+    ))  # fmt: skip
+    if not d.static:
+        d.add("works", ub.VirtualWork("drag", drag, numbers={"c": d.acts(0.5, 3)}))
+
+
+@effect(ub.Potential)
+def potential(d):
+    beam = arm(d)
+    other = forearm(d, beam)
+    d.add("joints", ub.Rigid(beam.end, other.start))
+    grows, size = d.wave(), d.either_sign(2, 5)
+    d.add("works", ub.Potential("soil", soil, beams=[other], numbers={"k": d.acts(50, 300)}))
+    d.add("works", d.one(
+        ub.Potential("field", field, numbers={"size": lambda t: size * grows(t)}),
+        ub.Potential("warming", warming, numbers={"M": lambda t: size * grows(t)}, degree=3),
+    ))  # fmt: skip
+
+
+@effect(ub.Rayleigh, schemes=DYNAMIC)
+def rayleigh(d):
+    law = ub.ElastoPlastic(d.some(3, 6), kinematic=d.some(3, 10))
+    arm(d, ub.Section(**PLAIN, bending=law))
+    mass, stiffness = d.acts(0.5, 3), d.acts(5e-4, 3e-3)
+    d.add("damping", ub.Rayleigh(mass=mass, stiffness=stiffness, tangent=d.one(True, False)))
+
+
+@effect(ub.KelvinVoigt)
+def kelvin_voigt(d):
+    beam = arm(d)
+    other = forearm(d, beam)
+    d.add("joints", ub.Rigid(beam.end, other.start))
+    d.add("damping", ub.KelvinVoigt(d.acts(2e-3, 1e-2), beams=d.one(None, [other])))
+
+
+# -- supports ----------------------------------------------------------------------------------
+
+
+@effect(ub.Clamped)
+def clamped(d):
+    beam = arm(d, hold=False)
+    d.add("supports", d.instead(ub.Clamped, ub.Pinned)(beam.start))
+    d.add("connectors", ub.Turn(ub.ground(0, 0), beam.end, ub.Spring(d.some(20, 60))))
+
+
+@effect(ub.Pinned)
+def pinned(d):
+    beam = arm(d, hold=False)
+    d.add("supports", d.instead(ub.Pinned, ub.Clamped)(beam.start))
+    d.add("connectors", ub.Turn(ub.ground(0, 0), beam.end, ub.Spring(d.some(20, 60))))
+
+
+@effect(ub.Roller)
+def roller(d):
+    beam = arm(d)
+    other = forearm(d, beam)
+    d.add("joints", ub.Rigid(beam.end, other.start))
+    d.add("supports", ub.Roller(other.end, along=(d.acts(0.2, 0.6), 1.0)))
+
+
+@effect(ub.PrescribedDisplacement)
+def prescribed_displacement(d):
+    beam = arm(d, force=0.0, hold=False)
+    u, v, psi = (of_size(d.swell(), d.either_sign(0.02, 0.08)) for _ in range(3))
+    along = (1.0, d.acts(0.2, 0.6))
+    d.add("supports", ub.PrescribedDisplacement(beam.start, u=u, v=v, psi=0.0, along=along))
+    d.add("supports", ub.PrescribedDisplacement(beam.end, v=0.0, psi=psi))
+
+
+# -- joints ------------------------------------------------------------------------------------
+
+
+def joined(d, apart=0.0):
+    beam = arm(d)
+    return beam, forearm(d, beam, apart)
+
+
+@effect(ub.Rigid)
+def rigid(d):
+    beam, other = joined(d)
+    multipliers = d.one(True, False)
+    d.add("joints", d.instead(ub.Rigid, ub.Revolute)(
+        beam.end, other.start, multipliers=multipliers
+    ))  # fmt: skip
+    d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
+
+
+@effect(ub.Revolute)
+def revolute(d):
+    beam, other = joined(d)
+    multipliers = d.one(True, False)
+    d.add("joints", d.instead(ub.Revolute, ub.Rigid)(
+        beam.end, other.start, multipliers=multipliers
+    ))  # fmt: skip
+    d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
+
+
+@effect(ub.Prismatic)
+def prismatic(d):
+    beam, other = joined(d)
+    axis, turning = (d.acts(0.3, 0.8), 1.0), d.one(True, False)
+    d.add("joints", ub.Prismatic(beam.end, other.start, axis=axis, turning=turning))
+    d.add("connectors", ub.Slide(beam.end, other.start, ub.Spring(d.some(100, 500)), axis=axis))
+    if turning:
+        d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
+
+
+@effect(ub.RigidLink)
+def rigid_link(d):
+    beam, other = joined(d, apart=d.acts(0.1, 0.2))
+    d.add("joints", ub.RigidLink(beam.end, other.start))
+
+
+@effect(ub.Link)
+def link(d):
+    beam, other = joined(d)
+    d.add("joints", ub.Rigid(beam.end, other.start))
+    x, y = other.end.point
+    d.add("joints", ub.Link(ub.ground(x + d.acts(0.3, 0.6), y + d.acts(0.3, 0.9)), other.end))
+
+
+@effect(ub.Guided)
+def guided(d):
+    beam, other = joined(d)
+    d.add("joints", ub.Rigid(beam.end, other.start))
+    (x, y), slope, bend = other.end.point, d.acts(0.2, 0.6), d.acts(1.0, 3.0)
+    d.add("joints", ub.Guided(other.end, lambda s: (x + slope * s + bend * s**2, y + s)))
+
+
+@effect(ub.Release)
+def release(d):
+    beam, other = joined(d)
+    free, multipliers = d.one("N", "V", "M"), d.one(True, False)
+    free = d.instead(free, {"N": "V", "V": "M", "M": "N"}[free])
+    d.add("joints", ub.Release(beam.end, other.start, free=free, multipliers=multipliers))
+    for axis in ((1.0, 0.0), (0.0, 1.0)):
+        spring = ub.Spring(d.some(200, 600))
+        d.add("connectors", ub.Slide(beam.end, other.start, spring, axis=axis))
+    d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
+
+
+# -- connectors --------------------------------------------------------------------------------
+
+
+@effect(ub.Turn)
+def turn(d):
+    beam, other = joined(d)
+    d.add("joints", ub.Revolute(beam.end, other.start))
+    d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.acts(20, 60))))
+
+
+@effect(ub.Stretch)
+def stretch(d):
+    """Between the ground or a beam and a place of another beam."""
+    beam, other = joined(d)
+    d.add("joints", ub.Rigid(beam.end, other.start))
+    a = d.one(beam.at(1 / 3), ub.ground(d.some(0.1, 0.4), -0.5))
+    d.add("connectors", ub.Stretch(a, other.end, ub.Spring(d.acts(100, 400))))
+
+
+@effect(ub.Slide)
+def slide(d):
+    """Along an axis that turns with a beam, to a place at a distance."""
+    beam, other = joined(d)
+    d.add("joints", ub.Rigid(beam.end, other.start))
+    axis = (d.acts(0.3, 0.8), 1.0)
+    d.add("connectors", ub.Slide(beam.at(2 / 3), other.end, ub.Spring(d.acts(100, 400)), axis=axis))
+
+
+@effect(ub.Bushing, schemes=DYNAMIC)
+def bushing(d):
+    beam, other = joined(d)
+    law = Cushion(d.acts(100, 300), d.acts(0.05, 0.1), d.acts(1, 5))
+    axis = (d.acts(0.3, 0.8), 1.0)
+    d.add("connectors", ub.Bushing(beam.end, other.start, law, axis=axis))
+    d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
+
+
+@effect(ub.PrescribedMotion)
+def prescribed_motion(d):
+    grows, size = d.swell(), d.either_sign(0.03, 0.1)
+    connected(d, ub.PrescribedMotion(lambda t: size * grows(t)), d.one("Turn", "Stretch", "Slide"))
+
+
+@effect(ub.PrescribedForce)
+def prescribed_force(d):
+    grows, size = d.wave(), d.either_sign(3, 10)
+    connected(d, ub.PrescribedForce(lambda t: size * grows(t)), d.one("Turn", "Stretch", "Slide"))
+
+
+@effect(ub.Controller)
+def controller(d):
+    """Integral of a rotation, or a force from a displacement that is sampled."""
+    beam = arm(d)
+    if d.one(True, False):
+        law = ub.Controller(Integral(beam.end, d.acts(5, 20)))
+        d.add("connectors", ub.Turn(ub.ground(0, 0), beam.end, law))
+        return
+    gain, sample = d.acts(20, 60), d.one(None, 3 * d.dt)
+    law = ub.Controller(lambda now: -gain * now.displacement(beam.end)[1], sample)
+    connected(d, law, beam=beam)
+
+
+@effect(ub.Spring)
+def spring(d):
+    """Elastic with a free motion."""
+    connected(d, ub.Spring(d.acts(100, 400), free=d.either_sign(0.01, 0.03)))
+
+
+@effect(ub.Spring)
+def yielding_spring(d):
+    beam = driven(d, size=0.1)
+    law = ub.ElastoPlastic(d.acts(0.3, 0.8), isotropic=d.acts(5, 20), kinematic=d.acts(5, 20))
+    connected(d, ub.Spring(d.acts(150, 300), law=law), beam=beam)
+
+
+@effect(ub.Spring)
+def breaking_spring(d):
+    beam = driven(d, size=0.1)
+    kind = d.one(ub.Softening, ub.LinearSoftening)
+    softening = kind(d.acts(0.3, 0.8), d.acts(0.02, 0.05))
+    connected(d, ub.Spring(d.acts(150, 300), softening=softening), beam=beam)
+
+
+@effect(ub.Damper)
+def damper(d):
+    connected(d, ub.Damper(d.acts(2, 10)))
+
+
+@effect(ub.Stop)
+def stop(d):
+    """Both ends of the interval are reached."""
+    beam = arm(d, grows=d.swing())
+    low, high = -d.acts(5e-4, 2e-3), d.acts(5e-4, 2e-3)
+    damping = 0.0 if d.static else d.acts(0.2, 1)
+    connected(d, ub.Stop(d.acts(300, 900), low=low, high=high, damping=damping), beam=beam)
+
+
+@effect(ub.Clearance)
+def clearance(d):
+    beam = arm(d)
+    damping = 0.0 if d.static else d.acts(0.2, 1)
+    law = ub.Clearance(d.acts(300, 900), gap=d.acts(0.003, 0.01), damping=damping)
+    d.add("connectors", ub.Bushing(near(d), beam.end, law, axis=(0.3, 1.0)))
+
+
+@effect(ub.Clearance, schemes=DYNAMIC)
+def rough_clearance(d):
+    beam = arm(d)
+    law = ub.Clearance(
+        d.acts(300, 900), gap=d.acts(0.003, 0.01), damping=d.acts(0.2, 1),
+        friction=d.acts(0.03, 0.1), radius=d.acts(0.02, 0.05),
+    )  # fmt: skip
+    d.add("connectors", ub.Bushing(near(d), beam.end, law, axis=(0.3, 1.0)))
+
+
+@effect(ub.Coulomb, schemes=OVER_STEP)
+def coulomb(d):
+    connected(d, ub.Coulomb(d.acts(0.5, 3)), d.one("Turn", "Stretch", "Slide"))
+
+
+@effect(ub.Coulomb, schemes=OVER_STEP)
+def coulomb_in_a_joint(d):
+    beam, other = joined(d)
+    joint = d.add("joints", ub.Revolute(beam.end, other.start, multipliers=True))
+    law = ub.Coulomb(d.acts(0.1, 0.4), coefficient=d.acts(0.01, 0.03), joint=joint)
+    d.add("connectors", ub.Turn(beam.end, other.start, law))
+
+
+@effect(ub.RigidPlastic, schemes=OVER_ANY_STEP)
+def rigid_plastic(d):
+    beam = arm(d)
+    law = ub.ElastoPlastic(d.acts(1, 4), isotropic=d.acts(20, 60), kinematic=d.acts(20, 60))
+    connected(d, ub.RigidPlastic(law), beam=beam)
+
+
+@effect(ub.RigidPlastic, schemes=OVER_STEP)
+def rigid_then_softening(d):
+    kind = d.one(ub.Softening, ub.LinearSoftening, Petersson)
+    connected(d, ub.RigidPlastic(kind(d.acts(1, 4), d.acts(0.1, 0.3))), beam=arm(d))
+
+
+@effect(ub.ForceLaw)
+def force_law(d):
+    cubic = Cubic(d.acts(50, 200), d.acts(3e4, 9e4))
+    connected(d, ub.ForceLaw(cubic, stored=d.one(None, cubic.energy)))
+
+
+@effect(ub.ForceLaw, schemes=DYNAMIC)
+def force_law_with_state(d):
+    connected(d, ub.ForceLaw(Maxwell(d.acts(100, 300), d.acts(0.02, 0.1)), state=[0.0]))
+
+
+@effect(ub.ConnectorLaw)
+def own_connector_law(d):
+    connected(d, Stiffening(d.acts(50, 200), d.acts(3e4, 9e4)))
+
+
+@effect(ub.ConnectorLaw, schemes=DYNAMIC)
+def own_connector_law_with_state(d):
+    connected(d, Relaxing(d.acts(100, 300), d.acts(0.02, 0.1), d.acts(2, 10)))
+
+
+@effect(ub.ConnectorLaw, schemes=OVER_STEP)
+def own_connector_law_that_holds(d):
+    rest = d.acts(4, 8)
+    connected(d, Brake(rest, rest * d.acts(0.5, 0.8), d.acts(0.02, 0.1)))
+
+
+def backbone(d, M, k):
+    return ub.Backbone(
+        d.acts(0.8 * M, 1.2 * M), capping=d.acts(0.8, 1.5) * M / k,
+        post_capping=d.acts(4, 8) * M / k, overstrength=1 + d.acts(0.05, 0.15),
+        residual=d.acts(0.2, 0.4), ultimate=d.some(40, 60) * M / k,
+    )  # fmt: skip
+
+
+def deteriorating(d, kind, *more, **numbers):
+    """A hinge at the start of an arm, through some cycles."""
+    beam = driven(d, size=0.04, grows=d.surge(), hold=False)
+    d.add("supports", ub.Pinned(beam.start))
+    M, k = d.some(0.8, 1.5), d.acts(150, 250)
+    plus, minus = backbone(d, M, k), d.choose(lambda: None, lambda: backbone(d, M, k))
+    energies = {
+        name: d.acts(20, 60) * M / k for name in ("strength", "softening", "unloading", *more)
+    }
+    exponent = d.acts(1.0, 1.5)
+    law = kind(k, plus, minus, **energies, exponent=exponent, **numbers)
+    d.add("connectors", ub.Turn(ub.ground(0, 0), beam.start, law))
+
+
+@effect(ub.IbarraKrawinkler, ub.Backbone)
+def ibarra_krawinkler(d):
+    deteriorating(d, ub.IbarraKrawinkler)
+
+
+@effect(ub.PinchingHinge, ub.Backbone)
+def pinching_hinge(d):
+    deteriorating(
+        d, ub.PinchingHinge, "reloading", kappa_F=d.acts(0.3, 0.7), kappa_D=d.acts(0.2, 0.7)
+    )
+
+
+@effect(ub.AxialBendingHinge)
+def axial_bending_hinge(d):
+    beam, other = joined(d)
+    law = ub.AxialBendingHinge(
+        d.acts(3, 6), d.acts(0.5, 1.5), d.acts(500, 900), d.acts(500, 900), d.acts(100, 300)
+    )
+    d.add("connectors", ub.Bushing(beam.end, other.start, law, axis=(1.0, 0.3)))
+    for axis in ((1.0, 0.0), (0.0, 1.0)):
+        spring = ub.Spring(d.some(100, 200))
+        d.add("connectors", ub.Slide(beam.end, other.start, spring, axis=axis))
+    d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
+
+
+# -- laws of sections ----------------------------------------------------------------------------
+
+
+def bent(d, law):
+    driven(d, ub.Section(**PLAIN, bending=law))
+
+
+@effect(ub.ElastoPlastic)
+def elasto_plastic(d):
+    bent(d, ub.ElastoPlastic(d.acts(3, 6), isotropic=d.acts(3, 10), kinematic=d.acts(3, 10)))
+
+
+@effect(ub.ElastoPlastic, ub.Section)
+def axial_and_shear(d):
+    axial = ub.ElastoPlastic(d.acts(1, 2), isotropic=d.acts(500, 1000))
+    shear = ub.ElastoPlastic(d.acts(3, 6), kinematic=d.acts(200, 500))
+    arm(d, ub.Section(**PLAIN, axial=axial, shear=shear))
+
+
+@effect(ub.Perzyna)
+def perzyna(d):
+    viscosity = ub.Perzyna(d.acts(0.5, 3))
+    bent(d, ub.ElastoPlastic(d.acts(3, 6), kinematic=d.acts(3, 10), viscosity=viscosity))
+
+
+@effect(ub.DuvautLions)
+def duvaut_lions(d):
+    viscosity = ub.DuvautLions(d.acts(0.01, 0.05))
+    bent(d, ub.ElastoPlastic(d.acts(3, 6), isotropic=d.acts(3, 10), viscosity=viscosity))
+
+
+@effect(ub.RambergOsgood)
+def ramberg_osgood(d):
+    bent(d, ub.RambergOsgood(d.acts(4, 8), d.acts(0.02, 0.08), d.acts(2, 6)))
+
+
+@effect(ub.ArmstrongFrederick)
+def armstrong_frederick(d):
+    bent(d, ub.ArmstrongFrederick(d.acts(4, 8), d.acts(10, 30), d.acts(2, 8)))
+
+
+@effect(ub.BoucWen)
+def bouc_wen(d):
+    bent(d, ub.BoucWen(
+        d.acts(4, 8), d.acts(0.05, 0.2), d.acts(1, 3), d.acts(0.55, 0.8), d.acts(0.1, 0.3)
+    ))  # fmt: skip
+
+
+@effect(ub.AxialBending)
+def axial_bending(d):
+    law = ub.AxialBending(d.acts(15, 30), d.acts(4, 7), d.acts(0.01, 0.05))
+    beam = driven(d, ub.Section(**PLAIN, interaction=law))
+    pull = d.sign() * d.some(4, 8), 0.0
+    d.add("loads", ub.PointLoad(beam.end, force=pull, amplitude=d.wave()))
+
+
+@effect(ub.MaterialLaw)
+def own_material_law(d):
+    bent(d, d.choose(
+        lambda: Dashpot(d.acts(0.5, 2)), lambda: PowerLaw(d.acts(4, 8), 0.05, d.acts(2, 5))
+    ))  # fmt: skip
+
+
+def layered(d, fibres, **options):
+    """A rectangle of EI = 100 N m2 whose stress at 15 N m is 0.9 MPa while it is elastic."""
+    stiff = {"E": 1.2e8, "nu": 0.3, "rho": 1e3}
+    return ub.Section.rectangle(0.01, 0.1, **stiff, fibres=fibres, **options)
+
+
+@effect(ub.Fibres)
+def fibres(d):
+    """Cracks, a core of another law, and bars."""
+    law = ub.ElastoPlastic(d.acts(8e4, 1e5), isotropic=d.acts(4e6, 9e6))
+    crack = d.one(ub.Softening, ub.LinearSoftening)(d.acts(1.1e5, 1.3e5), d.acts(400, 800))
+    number = d.instead(4, 6)
+    cover = ub.Fibres(law, number=number, softening=crack)
+    core = ub.Fibres(ub.RambergOsgood(d.some(1e5, 2e5), 1e-4, 3.0))
+    bars = ub.Fibres(ub.ArmstrongFrederick(d.acts(3e5, 5e5), 1e8, 100.0))
+    section = d.one(layered(d, cover), layered(d, cover, cover=0.002, core=core))
+    driven(d, section.reinforced([-0.04, 0.04], [1e-5, 2e-5], E=8e8, fibres=bars))
+
+
+@effect(ub.Fibres, ub.Section)
+def placed_fibres(d):
+    law = ub.ElastoPlastic(d.acts(1e5, 2e5), kinematic=d.acts(3e6, 9e6))
+    y, A = [-0.05, 0.0, 0.03, d.acts(0.04, 0.05)], [2e-4, 3e-4, 3e-4, d.acts(1e-4, 2e-4)]
+    driven(d, ub.Section.of_fibres(y, A, E=1e8, nu=0.3, rho=1e3, fibres=ub.Fibres(law)))
+
+
+def scattered(d, limit):
+    driven(d, layered(d, ub.Fibres(ub.ElastoPlastic(limit, isotropic=6e6), number=4)))
+
+
+@effect(ub.Normal)
+def normal(d):
+    scattered(d, ub.Normal(d.acts(1e5, 2e5), d.acts(1e4, 2e4), seed=d.instead(1, 5)))
+
+
+@effect(ub.TruncatedNormal)
+def truncated_normal(d):
+    scattered(d, ub.TruncatedNormal(d.acts(1e5, 2e5), d.acts(2e4, 4e4), seed=d.instead(2, 6)))
+
+
+@effect(ub.Lognormal)
+def lognormal(d):
+    scattered(d, ub.Lognormal(d.acts(1e5, 2e5), d.acts(2e4, 4e4), seed=d.instead(3, 7)))
+
+
+@effect(ub.Weibull)
+def weibull(d):
+    scattered(d, ub.Weibull(d.acts(1e5, 2e5), d.acts(4, 8), seed=d.instead(4, 8)))
+
+
+@effect(ub.MenegottoPinto)
+def menegotto_pinto(d):
+    law = ub.MenegottoPinto(
+        d.acts(1e5, 2e5), d.acts(0.02, 0.1), R0=d.acts(10, 20), cR1=d.acts(0.6, 0.8),
+        cR2=d.acts(0.1, 0.3), a1=d.acts(0.05, 0.2), a2=d.acts(0.8, 1.5), a3=d.acts(0.05, 0.2),
+        a4=d.acts(0.8, 1.5),
+    )  # fmt: skip
+    driven(d, layered(d, ub.Fibres(law, number=4)))
+
+
+def concrete(d, law):
+    """With bars that yield: without them, cells crush one after the other, and which, is random."""
+    bars = ub.Fibres(ub.ElastoPlastic(2e6, kinematic=3e8))
+    section = layered(d, ub.Fibres(law, number=4))
+    driven(d, section.reinforced([-0.04, 0.04], [5e-5, 5e-5], E=8e8, fibres=bars), size=0.12)
+
+
+@effect(ub.KentPark)
+def kent_park(d):
+    strength, tension = d.acts(1e5, 2e5), ub.Softening(d.acts(6e4, 1e5), d.acts(400, 900))
+    ultimate = d.acts(1.4, 1.8) * 2.4e5 * 2 / 1.2e8
+    concrete(d, ub.KentPark(strength, d.acts(3e4, 6e4), ultimate, tension))
+
+
+@effect(ub.Mander)
+def mander(d):
+    strength, tension = d.acts(1e5, 2e5), ub.LinearSoftening(d.acts(6e4, 1e5), d.acts(400, 900))
+    strain = d.acts(1.2, 1.5) * 2.4e5 / 1.2e8
+    spalling = d.choose(lambda: math.inf, lambda: d.acts(2.1, 2.5) * strain)
+    concrete(d, ub.Mander(strength, strain, spalling, tension))
+
+
+# -- hinges ------------------------------------------------------------------------------------
+
+
+def hinge_in_cells(d, law):
+    bending = d.one(None, ub.ElastoPlastic(d.some(5, 6), isotropic=20.0))
+    driven(d, ub.Section(**PLAIN, hinge=law, bending=bending))
+
+
+def hinge_at_a_place(d, law):
+    driven(d, hinges={d.one(0.0, 1 / 3): law})
+
+
+def numbers_of_softening(d):
+    return d.acts(4, 7), d.acts(1.0, 3.0)
+
+
+@effect(ub.Softening, ub.Section)
+def softening_in_cells(d):
+    hinge_in_cells(d, ub.Softening(*numbers_of_softening(d)))
+
+
+@effect(ub.Softening, ub.Beam, schemes=OVER_ANY_STEP)
+def softening_at_a_place(d):
+    hinge_at_a_place(d, ub.Softening(*numbers_of_softening(d)))
+
+
+@effect(ub.LinearSoftening, ub.Section)
+def linear_softening_in_cells(d):
+    hinge_in_cells(d, ub.LinearSoftening(*numbers_of_softening(d)))
+
+
+@effect(ub.LinearSoftening, ub.Beam, schemes=OVER_ANY_STEP)
+def linear_softening_at_a_place(d):
+    hinge_at_a_place(d, ub.LinearSoftening(*numbers_of_softening(d)))
+
+
+@effect(ub.SofteningLaw, ub.Section)
+def own_softening_in_cells(d):
+    limit, energy = numbers_of_softening(d)
+    hinge_in_cells(d, d.one(Petersson(limit, energy), Rising(limit, energy / (1.5 * limit))))
+
+
+@effect(ub.SofteningLaw, ub.Beam, schemes=OVER_ANY_STEP)
+def own_softening_at_a_place(d):
+    limit, energy = numbers_of_softening(d)
+    hinge_at_a_place(d, d.one(Petersson(limit, energy), Rising(limit, energy / (1.5 * limit))))
+
+
+@effect(ub.ElastoPlastic, ub.Beam, schemes=OVER_ANY_STEP)
+def hardening_at_a_place(d):
+    viscosity = ub.Perzyna(d.choose(lambda: 0.0, lambda: d.acts(0.5, 2)))
+    hinge_at_a_place(d, ub.ElastoPlastic(
+        d.acts(3, 5), isotropic=d.acts(5, 20), kinematic=d.acts(5, 20), viscosity=viscosity
+    ))  # fmt: skip
+
+
+# -- sections, axes, bodies, motions ---------------------------------------------------------------
+
+
+@effect(ub.Section)
+def section(d):
+    """Elastic, also without rotary inertia."""
+    numbers = {"EA": d.acts(200, 900), "GA": d.acts(200, 900), "EI": d.acts(50, 150)}
+    arm(d, ub.Section(**numbers, rhoA=d.instead(d.some(0.5, 1.5), 2.0) if not d.static else 1.0))
+
+
+@effect(ub.Beam)
+def curved_axis(d):
+    """An arc, a polyline, or a curve of a user."""
+    plain, h = ub.Section(**PLAIN), d.acts(0.1, 0.3)
+    beam = d.add("beams", d.one(
+        ub.Beam.arc((0.5, -h), math.hypot(0.5, h), (math.pi - math.atan2(h, 0.5),
+                    math.atan2(h, 0.5)), plain, cells=3, name="b0"),
+        ub.Beam.polyline([(0, 0), (0.5, h), (1, 0)], plain, cells=2, name="b0"),
+        ub.Beam.along(lambda s: (s, 4 * h * s * (1 - s)), plain, cells=3, name="b0"),
+    ))  # fmt: skip
+    d.add("supports", ub.Clamped(beam.start))
+    d.add("loads", ub.PointLoad(beam.end, (d.some(-20, 20), 10.0), amplitude=d.wave()))
+
+
+@effect(ub.Body)
+def body(d):
+    beam = arm(d)
+    x, y = beam.end.point
+    body = ub.Body((x + d.acts(0.1, 0.2), y + 0.1), mass=d.instead(0.7, 0.9), inertia=0.02)
+    d.add("bodies", body)
+    if d.one(True, False):
+        d.add("joints", ub.Rigid(beam.end, body.at(x, y)))
+    else:
+        d.add("joints", ub.Revolute(beam.end, body.at(x, y), multipliers=True))
+        d.add("connectors", ub.Turn(beam.end, body.middle, ub.Spring(d.some(20, 90))))
+    d.add("loads", ub.PointLoad(body.at(x + 0.3, y), (3.0, -8.0), amplitude=d.wave()))
+    d.add("loads", ub.Gravity((0.0, -9.81), d.wave()))
+
+
+@effect(ub.PointMass)
+def point_mass(d):
+    beam = arm(d)
+    d.add("masses", ub.PointMass(beam.end, d.acts(0.3, 0.9)))
+    if not d.static:
+        d.add("masses", ub.PointMass(beam.at(1 / 3), d.some(0.3, 0.9), d.acts(0.02, 0.05)))
+    d.add("loads", ub.Gravity((3.0, -9.81), d.wave()))
+
+
+@effect(ub.Velocity, schemes=DYNAMIC)
+def velocity(d):
+    beam = arm(d, hold=False)
+    body = d.add("bodies", ub.Body((1.2, 0.5), mass=0.5, inertia=0.02))
+    d.add("joints", ub.RigidLink(beam.end, body.middle))
+    d.add("initial", ub.Velocity(
+        [beam, body], (d.either_sign(0.5, 2), d.either_sign(0.5, 2)), d.either_sign(2, 4),
+        about=(d.acts(0.2, 0.5), 0.0),
+    ))  # fmt: skip
+
+
+# -- discretization and schemes --------------------------------------------------------------------
+
+
+def varied(d):
+    """A frame with a load, a connector and, now and then, a law that yields."""
+    law = d.one(None, ub.ElastoPlastic(d.some(3, 6), kinematic=d.some(3, 10)))
+    beam = arm(d, ub.Section(**PLAIN, bending=law))
+    other = forearm(d, beam)
+    d.add("joints", ub.Rigid(beam.end, other.start))
+    spring = d.one(
+        ub.Stretch(near(d, 1.3, 1.8), other.end, ub.Spring(d.some(50, 200))),
+        ub.Slide(near(d), other.end, ub.Spring(d.some(50, 200)), axis=(0.3, 1.0)),
+    )
+    d.add("connectors", spring)
+    d.add("loads", d.one(
+        ub.Pressure(beam, d.some(5, 20), amplitude=d.wave()),
+        ub.LineLoad(beam, (0.0, d.some(5, 20)), amplitude=d.wave()),
+        ub.FollowerLoad(other.end, (0.0, d.some(5, 15)), amplitude=d.wave()),
+    ))  # fmt: skip
+
+
+@effect(ub.Mesh)
+def mesh_of_degree_2(d):
+    varied(d)
+    d.mesh = ub.Mesh(degree=d.instead(2, 1), lumped=d.one(True, False))
+
+
+@effect(ub.Mesh)
+def mesh_of_degree_3(d):
+    varied(d)
+    d.mesh = ub.Mesh(degree=d.instead(3, 2), lumped=d.one(True, False))
+
+
+@effect(ub.Mesh)
+def refined_mesh(d):
+    varied(d)
+    d.mesh = ub.Mesh(refine=d.instead(2, 1))
+
+
+@effect(ub.Mesh, schemes=DYNAMIC)
+def lumped_mass(d):
+    varied(d)
+    d.mesh = ub.Mesh(lumped=d.instead(True, False))
+
+
+def of_scheme(d, scheme, other):
+    d.scheme = d.instead(scheme, other)
+    varied(d)
+
+
+@effect(ub.Static)
+def static(d):
+    of_scheme(d, ub.Static(), ub.EnergyMomentum())
+
+
+@effect(ub.EnergyMomentumStatic)
+def energy_momentum_static(d):
+    theta = (1.0, 0.5, 0.7)[int(d.random.integers(3))]
+    of_scheme(d, ub.EnergyMomentumStatic(theta), ub.EnergyMomentum())
+    d.add("damping", ub.KelvinVoigt(5e-3))
+
+
+@effect(ub.EnergyMomentum)
+def energy_momentum(d):
+    alpha, beta = d.some(0.02, 0.1), d.some(0.05, 0.2)
+    of_scheme(d, ub.EnergyMomentum(alpha, beta), ub.EnergyMomentum())
+
+
+@effect(ub.EnergyMomentum)
+def fourth_order(d):
+    d.scheme = d.instead(ub.EnergyMomentum(order=4), ub.EnergyMomentum())
+    beam = arm(d)
+    other = forearm(d, beam)
+    d.add("joints", ub.Rigid(beam.end, other.start))
+    d.add("connectors", ub.Stretch(near(d, 1.3, 1.8), other.end, ub.Spring(d.some(50, 200))))
+
+
+@effect(ub.EnergyMomentumDecaying)
+def energy_momentum_decaying(d):
+    d.dt = d.one(0.008, 0.01)
+    of_scheme(d, ub.EnergyMomentumDecaying(d.some(0.4, 0.7)), ub.EnergyMomentumDecaying(1.0))
+
+
+@effect(ub.EnergyMomentumPrinted)
+def energy_momentum_printed(d):
+    of_scheme(d, ub.EnergyMomentumPrinted(), ub.EnergyMomentum())
+
+
+@effect(ub.Newmark)
+def newmark(d):
+    gamma, more = d.some(0.5, 0.6), d.some(0.0, 0.05)
+    scheme = ub.Newmark(gamma, (gamma + 0.5) ** 2 / 4 + more)
+    of_scheme(d, scheme, ub.Newmark(0.65, 0.4))
+
+
+@effect(ub.GeneralizedAlpha)
+def generalized_alpha(d):
+    rho = d.some(0.4, 0.9)
+    of_scheme(d, ub.GeneralizedAlpha(rho), ub.GeneralizedAlpha(1.0))
+
+
+@effect(ub.EnergyMomentumBase, ub.MidpointDynamics)
+def own_scheme(d):
+    weight = d.some(0.52, 0.58)
+    of_scheme(d, Weighted(weight), Weighted(0.5))
+
+
+@effect(ub.Adaptive)
+def adaptive(d):
+    """Motions after adaptive steps; in the scene that shows that they act, steps are equal."""
+    d.scheme = ub.EnergyMomentum()
+    steps = ub.Adaptive(d.some(1e-4, 3e-4), stops=[d.some(0.05, 0.1)])
+    d.dt = d.instead(steps, d.dt)
+    beam = arm(d)
+    connected(d, ub.Spring(d.some(50, 200)), beam=beam)

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: MIT
+"""Small random scenes whose numbers are stored in ``tests/data/effects``: runs and comparisons.
+
+:mod:`stored_effects` has a function for each effect.  As a script,
+``python3 tests/properties/stored_scenes.py [EFFECT ...]`` computes and writes their numbers.
+"""
+
+import json
+import math
+import sys
+import warnings
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mpi4py import MPI
+
+import numpy as np
+
+import ufl_beam as ub
+
+FOLDER = Path(__file__).parents[1] / "data" / "effects"
+
+SCENES = 3
+"""Number of scenes of each effect."""
+
+EXACT = ub.Newton(rtol=1e-13, max_iterations=60)
+"""Iterations go on to round-off, so that numbers do not depend on their way."""
+
+LARGER = 1.2
+"""Factor on a number of an effect in the scene that shows that this number acts."""
+
+STATIC = ub.Static, ub.EnergyMomentumStatic
+
+
+@dataclass
+class Draft:
+    """A scene while an effect writes into it, with its random numbers.
+
+    Attributes:
+        changed: Index of the number of the effect that is changed, or -1.
+        count: Number of numbers of the effect so far.
+        end: Time of the run; s.
+    """
+
+    random: np.random.Generator
+    scheme: ub.Scheme
+    changed: int = -1
+    count: int = 0
+    end: float = 0.2
+    dt: float | ub.Adaptive = 0.008
+    mesh: ub.Mesh = field(default_factory=ub.Mesh)
+    parts: dict = field(default_factory=dict)
+
+    @property
+    def static(self):
+        return isinstance(self.scheme, STATIC)
+
+    def some(self, low, high):
+        """A random number; it is rounded, so that it can be read."""
+        return float(f"{self.random.uniform(low, high):.4g}")
+
+    def sign(self):
+        return float(self.random.choice([-1.0, 1.0]))
+
+    def one(self, *choices):
+        return choices[int(self.random.integers(len(choices)))]
+
+    def choose(self, *functions):
+        """The value of one of some functions; numbers of the others are not drawn."""
+        return self.one(*functions)()
+
+    def acts(self, low, high):
+        """A random number of the effect; it is larger in the scene that shows that it acts."""
+        return self.some(low, high) * self.instead(1.0, LARGER)
+
+    def instead(self, effect, other):
+        """The effect, or something else in the scene that shows that it acts."""
+        self.count += 1
+        return other if self.count - 1 == self.changed else effect
+
+    def either_sign(self, low, high):
+        return self.sign() * self.acts(low, high)
+
+    def add(self, kind, *records):
+        """Add records to a field of the scene; the last one."""
+        self.parts.setdefault(kind, []).extend(records)
+        return records[-1]
+
+    def wave(self):
+        """A function of time that begins with zero and changes its sign or its slope."""
+        ω = self.some(3.0, 6.0) / self.end
+        return lambda t: math.sin(ω * t)
+
+    def swing(self):
+        """A function of time that begins with zero and has as large values of both signs."""
+        ω = self.some(6.0, 9.0) / self.end
+        return lambda t: math.sin(ω * t)
+
+    def surge(self):
+        """A function of time of both signs that begins with zero and with zero slope."""
+        ω = self.some(8.0, 11.0) / self.end
+        return lambda t: math.sin(ω * t) ** 3
+
+    def swell(self):
+        """A function of time that begins with zero and with zero slope, and comes back."""
+        ω = self.some(4.0, 7.0) / self.end
+        return lambda t: (1.0 - math.cos(ω * t)) / 2
+
+    def run(self):
+        """Scene and solution."""
+        scene = ub.Scene(**self.parts)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ub.ModelWarning)
+            return scene, ub.simulate(
+                scene, self.scheme, t=(0.0, self.end), dt=self.dt, mesh=self.mesh, newton=EXACT,
+                comm=MPI.COMM_SELF,
+            )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect of the package: classes that have it, a function that writes scenes with it."""
+
+    name: str
+    kinds: tuple[type, ...]
+    write: Callable[[Draft], None]
+    schemes: tuple[ub.Scheme, ...]
+
+    def draft(self, seed, changed=-1):
+        """The scene of a seed, in which one number of the effect may be changed."""
+        random = np.random.default_rng([zlib.crc32(self.name.encode()), seed])
+        draft = Draft(random, self.schemes[seed], changed)
+        self.write(draft)
+        return draft
+
+
+EFFECTS: dict[str, Effect] = {}
+
+ANY = ub.EnergyMomentum(), ub.Static(), ub.GeneralizedAlpha(0.8)
+DYNAMIC = ub.EnergyMomentum(), ub.EnergyMomentumDecaying(0.6), ub.GeneralizedAlpha(0.7)
+OVER_STEP = ub.EnergyMomentum(), ub.EnergyMomentumDecaying(0.6), ub.EnergyMomentum(0.05, 0.1)
+OVER_ANY_STEP = ub.EnergyMomentum(), ub.EnergyMomentumStatic(), ub.EnergyMomentumDecaying(0.6)
+"""Schemes of the three scenes; not all effects allow statics, or schemes with forces at the end."""
+
+
+def effect(*kinds, schemes=ANY):
+    """Add a function to the effects."""
+
+    def add(function):
+        name = function.__name__
+        EFFECTS[name] = Effect(name, kinds, function, schemes)
+        return function
+
+    return add
+
+
+# -- numbers -----------------------------------------------------------------------------------
+
+
+def numbers(scene, solution):
+    """Numbers of a run by name; the first word of a name is their kind."""
+    n = len(solution) - 1
+    rows = [n // 3, 2 * n // 3, n]
+    found = {"count steps": [n]}
+    places = {
+        f"{beam.name} {k}/{beam.cells}": beam.at(k / beam.cells)
+        for beam in scene.beams
+        for k in range(beam.cells + 1)
+    }
+    for name, place in (places | {body.name: body.middle for body in scene.bodies}).items():
+        found[f"motion {name}"] = solution.displacement(place)[rows]
+        if len(solution.v):
+            found[f"velocity {name}"] = solution.velocity(place)[-1]
+    for beam in scene.beams:
+        forces = [np.array(solution.diagram(beam, row, points=2)[1:])[:, [0, -1]] for row in rows]
+        found[f"force N V M at the ends of {beam.name}"] = forces
+    for i, support in enumerate(scene.supports):
+        found[f"force of support {i}"] = solution.reaction(support)[rows]
+    for i, joint in enumerate(scene.joints):
+        found[f"force of joint {i}"] = solution.joint(joint).force[rows] if joint.holders else []
+    for i, connector in enumerate((*scene.connectors, *scene.hinges)):
+        history = solution.connector(connector)
+        found[f"motion of connector {i}"] = history.motion[rows]
+        found[f"force of connector {i}"] = history.force[rows]
+    energy = solution.energy
+    for kind in ("state", "supplied", "lost"):
+        for name, values in getattr(energy, kind).items():
+            found[f"energy {kind}: {name}"] = values[rows]
+    return {name: np.ravel(values) for name, values in found.items() if np.size(values)}
+
+
+def differences(one, other):
+    """Largest difference of numbers of each kind, as a part of the largest number of the kind."""
+    assert list(one) == list(other)
+    sizes = {"count": 1.0}
+    for name, values in other.items():
+        kind = name.split()[0]
+        sizes[kind] = max(sizes.get(kind, 0.0), float(np.abs(values).max()))
+    return {
+        name: float(np.abs(np.subtract(one[name], values)).max()) / (sizes[name.split()[0]] or 1.0)
+        for name, values in other.items()
+    }
+
+
+def stored(name):
+    """What the file of an effect says about each scene."""
+    return json.loads((FOLDER / f"{name}.json").read_text("utf-8"))
+
+
+def compute(one):
+    """Numbers of the scenes of an effect, and how much each number of the effect changes them."""
+    scenes = []
+    for seed in range(SCENES):
+        draft = one.draft(seed)
+        found, acts = numbers(*draft.run()), []
+        for k in range(draft.count):
+            changed = numbers(*one.draft(seed, k).run())
+            same = {name: values for name, values in found.items() if name in changed}
+            other = {name: changed[name] for name in same}
+            same = {n: v for n, v in same.items() if len(v) == len(other[n])}
+            acts.append(max(differences(same, {n: other[n] for n in same}).values()))
+        scenes.append({"acts": acts, "numbers": found})
+    return scenes
+
+
+def write(name, scenes):
+    """Write a file with each list of numbers in one line."""
+    lines = []
+    for scene in scenes:
+        acts = ", ".join(f"{x:.1e}" for x in scene["acts"])
+        rows = [
+            f'  "{key}": [{", ".join(f"{x:.13g}" for x in values)}]'
+            for key, values in scene["numbers"].items()
+        ]
+        lines.append(f'{{"acts": [{acts}],\n "numbers": {{\n' + ",\n".join(rows) + "}}")
+    FOLDER.mkdir(exist_ok=True)
+    (FOLDER / f"{name}.json").write_text("[" + ",\n".join(lines) + "]\n", "utf-8")
+
+
+def main(names):
+    """Compute and write the numbers of some effects, by default of those that have none."""
+    import stored_effects  # noqa: F401 - adds the effects; it imports this module
+
+    missing = [name for name in EFFECTS if not (FOLDER / f"{name}.json").exists()]
+    for name in names or missing:
+        try:
+            scenes = compute(EFFECTS[name])
+        except Exception as error:
+            print(name, "FAILED", repr(error)[:400], flush=True)
+            continue
+        write(name, scenes)
+        print(
+            name, *(f"{min(scene['acts'], default=math.nan):.1e}" for scene in scenes), flush=True
+        )
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parent))
+    sys.modules["stored_scenes"] = sys.modules["__main__"]
+    main(sys.argv[1:])
