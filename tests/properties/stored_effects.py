@@ -8,7 +8,7 @@ numbers are drawn in the order of the calls: a changed function changes its stor
 
 import math
 
-from stored_scenes import ANY, DYNAMIC, OVER_ANY_STEP, OVER_STEP, Draft, effect  # noqa: F401
+from stored_scenes import DYNAMIC, OVER_ANY_STEP, OVER_STEP, effect
 from user_classes import (
     Brake,
     Cubic,
