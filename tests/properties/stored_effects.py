@@ -187,6 +187,7 @@ def ground_motion(d):
     beam = arm(d)
     values = [d.either_sign(10.0, 40.0) for _ in range(6)]
     quake = ub.GroundMotion(d.acts(0.02, 0.03), values)
+    d.further.append(quake)
     if d.static or d.one(True, False):
         d.add("loads", ub.Gravity((-1, 0.5), amplitude=quake.acceleration))
     else:
@@ -529,7 +530,7 @@ def deteriorating(d, kind, *more, **numbers):
     beam = driven(d, size=0.04, grows=d.surge(), hold=False)
     d.add("supports", ub.Pinned(beam.start))
     M, k = d.some(0.8, 1.5), d.acts(150, 250)
-    plus, minus = backbone(d, M, k), d.choose(lambda: None, lambda: backbone(d, M, k))
+    plus, minus = backbone(d, M, k), None if d.static else backbone(d, M, k)
     energies = {
         name: d.acts(20, 60) * M / k for name in ("strength", "softening", "unloading", *more)
     }
@@ -934,7 +935,53 @@ def own_scheme(d):
 def adaptive(d):
     """Motions after adaptive steps; in the scene that shows that they act, steps are equal."""
     d.scheme = ub.EnergyMomentum()
-    steps = ub.Adaptive(d.some(1e-4, 3e-4), stops=[d.some(0.05, 0.1)])
+    steps = ub.Adaptive(
+        d.some(1e-4, 3e-4), first=d.some(1e-3, 4e-3), longest=0.02, shortest=1e-9,
+        stops=[d.some(0.05, 0.1)],
+    )  # fmt: skip
     d.dt = d.instead(steps, d.dt)
     beam = arm(d)
     connected(d, ub.Spring(d.some(50, 200)), beam=beam)
+
+
+# -- paths -------------------------------------------------------------------------------------
+
+
+def along_path(d, beam, control, other):
+    """A load that grows with the load factor; of another control the path has other steps."""
+    load = d.some(-5, 5), -d.some(15, 25)
+    d.add("loads", ub.PointLoad(beam.end, force=load, amplitude=lambda t: t))
+    d.control = d.instead(control, other)
+
+
+@effect(ub.LoadControl)
+def load_control(d):
+    step = d.some(0.02, 0.05)
+    along_path(d, arm(d, force=0.0), ub.LoadControl(step), ub.LoadControl(1.1 * step))
+
+
+@effect(ub.DisplacementControl)
+def displacement_control(d):
+    beam, step = arm(d, force=0.0), -d.some(0.01, 0.02)
+    ends = (ub.DisplacementControl(beam.end, "v", step, end=20.5 * x * step) for x in (1, 1.1))
+    along_path(d, beam, *ends)
+
+
+@effect(ub.ArcLength)
+def arc_length(d):
+    """A shallow truss of two halves that snaps through."""
+    section, rise = ub.Section(**PLAIN), d.some(0.06, 0.1)
+    beam = d.add("beams", ub.Beam((0, 0), (1, rise), section, cells=3, name="b0"))
+    d.add("supports", ub.Pinned(beam.start), ub.Roller(beam.end, along=(0, 1)))
+    step, factor = d.some(0.01, 0.02), d.some(0.5, 2)
+    along_path(d, beam, ub.ArcLength(step, factor=factor), ub.ArcLength(1.1 * step, factor=factor))
+
+
+@effect(ub.DissipationControl)
+def dissipation_control(d):
+    """It hardens: where it softens, lengths of steps depend on numbers of iterations."""
+    law = ub.ElastoPlastic(d.some(2, 4), isotropic=d.some(10, 30))
+    beam = arm(d, ub.Section(**PLAIN, bending=law), force=0.0)
+    step, elastic = d.some(0.01, 0.02), ub.ArcLength(0.03)
+    controls = (ub.DissipationControl(x * step, otherwise=elastic) for x in (1, 1.1))
+    along_path(d, beam, *controls)

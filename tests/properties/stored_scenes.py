@@ -42,6 +42,8 @@ class Draft:
         changed: Index of the number of the effect that is changed, or -1.
         count: Number of numbers of the effect so far.
         end: Time of the run; s.
+        control: Control of a path, instead of a run in time.
+        further: Records of the effect that the scene has in functions only.
     """
 
     random: np.random.Generator
@@ -52,6 +54,8 @@ class Draft:
     dt: float | ub.Adaptive = 0.008
     mesh: ub.Mesh = field(default_factory=ub.Mesh)
     parts: dict = field(default_factory=dict)
+    control: object = None
+    further: list = field(default_factory=list)
 
     @property
     def static(self):
@@ -113,6 +117,11 @@ class Draft:
         scene = ub.Scene(**self.parts)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ub.ModelWarning)
+            if self.control is not None:
+                return scene, ub.follow(
+                    scene, self.control, steps=25, mesh=self.mesh, newton=EXACT, progress=False,
+                    comm=MPI.COMM_SELF,
+                )  # fmt: skip
             return scene, ub.simulate(
                 scene, self.scheme, t=(0.0, self.end), dt=self.dt, mesh=self.mesh, newton=EXACT,
                 comm=MPI.COMM_SELF,
@@ -163,7 +172,7 @@ def numbers(scene, solution):
     """Numbers of a run by name; the first word of a name is their kind."""
     n = len(solution) - 1
     rows = [n // 3, 2 * n // 3, n]
-    found = {"count steps": [n]}
+    found = {"count steps": [n], "time": solution.times[rows]}
     places = {
         f"{beam.name} {k}/{beam.cells}": beam.at(k / beam.cells)
         for beam in scene.beams
