@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Each effect of the package has stored numbers of scenes in which it acts."""
+"""Each effect of the package has stored numbers of scenes in which it acts, and a closed form."""
 
 import inspect
 import sys
@@ -32,6 +32,199 @@ OTHERS = {
 
 NAMES = {"name", "depth", "shape"}
 """Fields that are for messages, pictures and section tables."""
+
+
+INDEPENDENT = {
+    "unit/test_axial_bending_hinge.py": {
+        "axial_bending_hinge": "test_the_plastic_moment_depends_on_the_axial_force",
+    },
+    "unit/test_bushings.py": {
+        "bushing": "test_on_a_line_it_is_a_stop",
+        "clearance": "test_on_a_line_it_is_a_stop",
+        "rough_clearance": "test_a_turning_pin_climbs_to_the_friction_angle",
+    },
+    "unit/test_connector_laws.py": {
+        "stop": "test_a_damped_stop_takes_a_part_of_the_velocity",
+        "own_connector_law": "test_modes_about_a_state",
+        "own_connector_law_with_state": "test_a_maxwell_element_relaxes",
+    },
+    "unit/test_controllers.py": {
+        "controller": "test_a_sample_time_is_independent_of_the_step",
+    },
+    "unit/test_distributions.py": {
+        "normal": "test_samples_have_the_distribution",
+        "truncated_normal": "test_samples_have_the_distribution",
+        "lognormal": "test_samples_have_the_distribution",
+        "weibull": "test_scale_of_weibull",
+    },
+    "unit/test_fibre_laws.py": {
+        "menegotto_pinto": "test_menegotto_pinto_over_random_paths",
+        "kent_park": "test_concrete_over_random_paths",
+        "mander": "test_concrete_over_random_paths",
+    },
+    "unit/test_fibres.py": {
+        "fibres": "test_plastic_moment_of_a_rectangle",
+        "placed_fibres": "test_plastic_moment_of_few_fibres",
+    },
+    "unit/test_force_diagrams.py": {
+        "pinned": "test_simply_supported_beam",
+    },
+    "unit/test_force_laws.py": {
+        "force_law": "test_vibration_of_a_steep_law",
+        "force_law_with_state": "test_a_history_against_its_closed_form",
+    },
+    "unit/test_ground_motion.py": {
+        "ground_motion": "test_the_integrals_are_exact",
+    },
+    "unit/test_hinge_laws.py": {
+        "ibarra_krawinkler": "test_one_excursion_by_hand",
+        "pinching_hinge": "test_two_pinched_excursions_by_hand",
+    },
+    "unit/test_hysteresis_laws.py": {
+        "ramberg_osgood": "test_a_ramberg_osgood_law_follows_its_power",
+        "armstrong_frederick": "test_armstrong_frederick_hardens_exponentially",
+        "bouc_wen": "test_bouc_wen_against_integration",
+    },
+    "unit/test_imposed_strains.py": {
+        "imposed_strain": "test_heat_bends_a_free_beam_and_loads_a_clamped_one",
+    },
+    "unit/test_initial_state.py": {
+        "point_mass": "test_velocity_gives_kinetic_energy_and_momentum",
+        "velocity": "test_velocity_about_a_point",
+    },
+    "unit/test_interaction_laws.py": {
+        "axial_bending": "test_a_column_under_axial_force",
+    },
+    "unit/test_joints.py": {
+        "revolute": "test_bodies_pinned_to_each_other_away_from_their_centres",
+    },
+    "unit/test_laws_that_hold.py": {
+        "own_connector_law_that_holds": "test_a_slow_pull_slips_by_twice_the_drop",
+    },
+    "unit/test_loads.py": {
+        "point_load": "test_a_reaction_balances_a_point_load",
+        "table": "test_table_is_linear_between_and_constant_outside",
+    },
+    "unit/test_material_laws.py": {
+        "duvaut_lions": "test_overstress_relaxes_exponentially",
+    },
+    "unit/test_names_and_free_lengths.py": {
+        "spring": "test_a_spring_pulls_a_mass_to_its_free_length",
+    },
+    "unit/test_settlements.py": {
+        "clamped": "test_a_clamp_settles",
+        "prescribed_displacement": "test_an_inclined_roller_settles",
+    },
+    "unit/test_softening_laws.py": {
+        "rigid_then_softening": "test_moment_is_the_traction",
+        "own_softening_in_cells": "test_moment_is_the_traction",
+        "own_softening_at_a_place": "test_moment_is_the_traction",
+    },
+    "unit/test_user_laws.py": {
+        "own_material_law": "test_curvature_of_ramberg_and_osgood",
+    },
+    "verification/test_actions.py": {
+        "pressure": "test_ring_under_pressure",
+        "moving_load": "test_moving_mass",
+    },
+    "verification/test_adaptive.py": {
+        "adaptive": "test_the_estimate_is_the_error_of_a_step",
+    },
+    "verification/test_bifurcations.py": {
+        "load_control": "test_a_ring_under_pressure",
+        "arc_length": "test_a_ring_under_pressure",
+    },
+    "verification/test_damping.py": {
+        "kelvin_voigt": "test_kelvin_voigt_in_statics_is_retarded",
+    },
+    "verification/test_degree.py": {
+        "section": "test_one_cell_does_not_lock",
+        "mesh_of_degree_2": "test_one_cell_does_not_lock",
+        "mesh_of_degree_3": "test_one_cell_does_not_lock",
+        "refined_mesh": "test_half_circle",
+        "lumped_mass": "test_lumped_mass_of_a_rod",
+    },
+    "verification/test_effects_in_closed_form.py": {
+        "axial_and_shear": "test_a_beam_that_yields_in_shear",
+        "energy_momentum": "test_midpoint_rules_with_weights",
+        "fourth_order": "test_phase_of_the_scheme_of_fourth_order",
+        "own_scheme": "test_midpoint_rules_with_weights",
+    },
+    "verification/test_euler_column.py": {
+        "static": "test_end_position_and_angle",
+    },
+    "verification/test_frequencies.py": {
+        "rotating_frame": "test_foucaults_pendulum",
+        "rigid": "test_a_slender_portal_that_sways",
+        "prismatic": "test_mass_on_a_turning_rail",
+        "guided": "test_a_bead_in_a_bowl",
+    },
+    "verification/test_friction.py": {
+        "coulomb": "test_amplitudes_fall_by_4R_k_each_period",
+        "coulomb_in_a_joint": "test_bearing",
+    },
+    "verification/test_hinge.py": {
+        "softening_in_cells": "test_tip_load",
+        "linear_softening_in_cells": "test_tip_load",
+    },
+    "verification/test_linkages.py": {
+        "link": "test_a_trammel_does_not_leap",
+    },
+    "verification/test_machines.py": {
+        "release": "test_release_of_the_shear_force",
+        "turn": "test_spring_at_large_turns",
+        "stretch": "test_frequency_of_a_spring",
+        "slide": "test_frequency_of_a_spring",
+        "prescribed_motion": "test_motor_bears_the_inertia",
+        "prescribed_force": "test_given_moment",
+        "yielding_spring": "test_loop_of_a_bilinear_spring",
+        "breaking_spring": "test_breaking_spring",
+        "damper": "test_damper",
+        "body": "test_free_fall",
+    },
+    "verification/test_paths.py": {
+        "displacement_control": "test_branch_to_the_elastica",
+        "dissipation_control": "test_hinge_snap_back",
+    },
+    "verification/test_plastic_hinges.py": {
+        "rigid_plastic": "test_a_block_that_slips",
+        "softening_at_a_place": "test_moment_of_a_hinge",
+        "linear_softening_at_a_place": "test_moment_of_a_hinge",
+        "hardening_at_a_place": "test_kinematic_hardening_remembers_its_direction",
+    },
+    "verification/test_rigid_links.py": {
+        "rigid_link": "test_moment_is_force_times_offset",
+    },
+    "verification/test_schemes.py": {
+        "energy_momentum_decaying": "test_amplification_of_a_mode",
+        "energy_momentum_printed": "test_printed_midpoint_drifts_in_energy_and_keeps_momenta",
+        "newmark": "test_amplification_of_a_mode",
+        "generalized_alpha": "test_amplification_of_a_mode",
+    },
+    "verification/test_static_loads.py": {
+        "follower_load": "test_follower_force_at_the_end",
+        "line_load": "test_line_load_on_a_cantilever",
+        "gravity": "test_gravity_on_a_cantilever",
+        "roller": "test_small_reaction_of_the_roller",
+        "curved_axis": "test_quarter_circle",
+    },
+    "verification/test_table_1.py": {
+        "elasto_plastic": "test_rate_independent",
+        "perzyna": "test_viscous",
+        "energy_momentum_static": "test_exact_statics",
+    },
+    "verification/test_tangent_damping.py": {
+        "rayleigh": "test_a_yielding_oscillator_converges_with_first_order",
+    },
+    "verification/test_wind_soil_magnets.py": {
+        "virtual_work": "test_a_current_in_a_field",
+        "potential": "test_beam_on_an_elastic_foundation",
+    },
+}  # fmt: skip
+"""Tests of effects by closed forms or calculations that do not use the package, by file."""
+
+WITHOUT: set[str] = set()
+"""Effects without such a test; the set must not grow."""
 
 
 def public_effects():
@@ -169,3 +362,20 @@ def test_files_belong_to_effects_and_are_small():
     files = list(FOLDER.iterdir())
     assert {file.stem for file in files} == set(EFFECTS)
     assert sum(file.stat().st_size for file in files) < 2e6
+
+
+def test_each_effect_has_an_independent_test():
+    named = [name for tests in INDEPENDENT.values() for name in tests]
+    assert sorted([*named, *WITHOUT]) == sorted(EFFECTS)
+
+
+@pytest.mark.parametrize("file", INDEPENDENT)
+def test_independent_tests_exist(file):
+    """They are in the file, which uses a class of the effect, maybe by a scene of `scenes.py`."""
+    text = (TESTS / file).read_text("utf-8")
+    scenes = (TESTS / "scenes.py").read_text("utf-8") if "from scenes import" in text else ""
+    for name, test in INDEPENDENT[file].items():
+        assert f"def {test}(" in text
+        records = [one for scene in records_of(name) for one in scene]
+        own = {type(one) for one in records if isinstance(one, EFFECTS[name].kinds)}
+        assert any(kind.__name__ in text + scenes for kind in own.union(EFFECTS[name].kinds))
