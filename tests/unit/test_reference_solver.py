@@ -155,6 +155,30 @@ def test_a_run_in_two_parts_by_different_solvers():
         assert np.abs(rest.q[-1] - whole.q[-1]).max() < 1e-8 * np.abs(whole.q).max()
 
 
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
+def test_reactions_where_a_static_run_goes_on(scheme):
+    """At the first state of the second run, with a link and a hinge of zero length."""
+    section, hinges = ub.Section(EA=1e6, GA=4e5, EI=800.0), {0.0: ub.Softening(20.0, 5.0)}
+    upper = ub.Beam((0, 0), (1, 0), section, cells=3)
+    lower = ub.Beam((0, -1), (1, -1), section, cells=3, hinges=hinges)
+    push = ub.PointLoad(upper.end, force=(0, 100.0), amplitude=lambda t: t)
+    supports = [ub.Clamped(upper.start), ub.Clamped(lower.start)]
+    link = ub.Link(lower.end, upper.end)
+    scene = ub.Scene([upper, lower], joints=[link], supports=supports, loads=[push])
+    found, other = ([run(scene, scheme, 0.5, 0.1, reference=by)] for by in (True, False))
+    for runs, by in ((found, True), (other, False)):
+        newton = ub.Newton(rtol=1e-12, reference=by)
+        runs += [
+            ub.simulate(scene, scheme, t=(t, 1.0), dt=0.1, newton=newton, start=runs[0])
+            for t in (0.5, 0.7)
+        ]
+    for one, two in zip(found, other, strict=True):
+        assert apart(one, two) < SAME
+        for support in supports:
+            a, b = one.reaction(support), two.reaction(support)
+            assert np.abs(a - b).max() < 10 * SAME * np.abs(b).max()
+
+
 def test_a_new_link_stops_a_beam():
     """A plastic impact at the beginning of a run, whose scene has no prescribed motions."""
     section = ub.Section(EA=1e6, GA=4e5, EI=800.0, rhoA=10.0, rhoI=0.01)

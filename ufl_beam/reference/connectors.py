@@ -61,6 +61,12 @@ class Connectors:
         forms.geometry.x.array[_cell_dofs(forms.geometry.function_space)] = geometry
         self._row_dofs = _cell_dofs(forms.row.function_space)
         self.e0: Array = np.zeros(n)
+        self._rows: Array = np.zeros((n, 3))
+
+    def accept(self, q: Array) -> None:
+        """Accept a configuration, with which the next step begins."""
+        self.e0 = self.motions(q)
+        self.forms.q0.x.array[:] = q[self._at]
 
     def begin(self, step: Step) -> None:
         """Begin a step; a substep in statics applies a part of the rest of a motion."""
@@ -69,7 +75,6 @@ class Connectors:
             if connector.law is not RIGID and k not in self.hinges:
                 end = value_at(connector.law.motion, step.motion_time, connector)
                 self._rows[k, 2] = self.e0[k] + step.fraction * (end - self.e0[k])
-        self.forms.q0.x.array[:] = step.q0[self._at]
 
     def residual(self, q1: Array, *, steep: bool = False) -> Array:
         """Return forces on the nodes, and residuals of the equations; (size,)."""

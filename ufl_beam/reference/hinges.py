@@ -26,6 +26,7 @@ class Hinge:
     def __init__(self, hinge: Connector, scheme: Scheme) -> None:
         self.law: Any = law_of(hinge)
         self.scheme, self.opening, self.flows, self.lost, self.e0 = scheme, 0.0, 0, 0.0, 0.0
+        self.begin(0.0, hold=True)
 
     @property
     def limit(self) -> float:

@@ -91,7 +91,7 @@ class Solver(NonlinearProblem):
             points.begin(sys.float_info.min, hold=True)
             points.return_map(strains, stiff=False)
         for group in self.connectors:
-            group.e0 = group.motions(q)
+            group.accept(q)
         self.reached = self.factors = self._factors() * (not self.fresh)
         self.load = self.factors @ self.of_loads
         self.on_cells_before = fields.forces_on_cells(fields.on_cells[0])
@@ -245,7 +245,7 @@ class Solver(NonlinearProblem):
         for part in self.parts:
             part.accept()
         for group in self.connectors:
-            group.e0 = group.motions(self.q1)
+            group.accept(self.q1)
         self.reached, self.last_dt = self.reached + self.growths, step.dt
         self.y_before, self.q_before, self.y, self.q = self.y, self.q, self.y1, self.q1
         self.t, self.substeps = step.t1, self.substeps + 1
