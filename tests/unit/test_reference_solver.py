@@ -16,7 +16,7 @@ from ufl_beam.dolfinx_compat import compile_form, fem
 from ufl_beam.mechanics import functional
 from ufl_beam.mechanics.kinematics import Axis, strain
 from ufl_beam.reference import connectors, forms, points, solver
-from ufl_beam.reference.nonlinear_problem import NonlinearProblem
+from ufl_beam.reference.step_problem import StepProblem
 from ufl_beam.simulation.reference_run import ReferenceRun
 
 pytestmark = [
@@ -300,7 +300,7 @@ def test_a_line_search_leaves_no_point_behind(monkeypatch):
     PETSc's line search does not move the unknowns if the full step does not help and is below a
     tolerance of their norm.  The force of a link makes that norm, and so the tolerance, large.
     """
-    Problem, at = NonlinearProblem, [np.zeros(0)]
+    Problem, at = StepProblem, [np.zeros(0)]
     residual, jacobian, accept = Problem._residual, Problem._jacobian, ReferenceRun.accept
 
     def evaluated(self, snes, x, f):
@@ -325,7 +325,7 @@ def test_a_line_search_leaves_no_point_behind(monkeypatch):
 
 def test_true_tangents_end_each_attempt(monkeypatch):
     """With elastic tangents, a small correction does not prove a small error."""
-    solve, accept, tried = NonlinearProblem._solve_by_snes, ReferenceRun.accept, []
+    solve, accept, tried = StepProblem._solve_by_snes, ReferenceRun.accept, []
 
     def solved(self, *attempt):
         reason = solve(self, *attempt)
@@ -336,7 +336,7 @@ def test_true_tangents_end_each_attempt(monkeypatch):
         assert tried[-1] == (0, True)
         accept(self, step)
 
-    monkeypatch.setattr(NonlinearProblem, "_solve_by_snes", solved)
+    monkeypatch.setattr(StepProblem, "_solve_by_snes", solved)
     monkeypatch.setattr(ReferenceRun, "accept", accepted)
     run(weak_cell(2e7, np.pi), ub.Static(), 2.0, 0.1)
     assert (1, True) in tried  # when the section begins to yield
@@ -348,10 +348,10 @@ def test_no_attempt_is_repeated(monkeypatch):
     beam = ub.Beam((0, 0), (1, 0), section, cells=2, hinges={0.5: ub.Softening(20.0, 5.0)})
     push = ub.PointLoad(beam.end, force=(0.0, 60.0))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-    guesses, solve = [], NonlinearProblem._newton
+    guesses, solve = [], StepProblem.solve
     monkeypatch.setattr(solver, "MOST_SUBSTEPS", 1)
     monkeypatch.setattr(
-        NonlinearProblem, "_newton", lambda self, x: (guesses.append(x), solve(self, x))[1]
+        StepProblem, "solve", lambda self, x: (guesses.append(x), solve(self, x))[1]
     )
     with pytest.raises(ub.ConvergenceError):
         run(scene, ub.Static(), 1.0, 1.0)
@@ -361,7 +361,7 @@ def test_no_attempt_is_repeated(monkeypatch):
 @pytest.mark.serial  # a single process raises
 def test_errors_are_no_failed_steps(monkeypatch):
     """Only a singular matrix is; the next attempts find the solution."""
-    jacobian, left = NonlinearProblem._jacobian, [2]
+    jacobian, left = StepProblem._jacobian, [2]
 
     def singular(self, snes, x, A, P):
         jacobian(self, snes, x, A, P)
@@ -373,10 +373,10 @@ def test_errors_are_no_failed_steps(monkeypatch):
         raise PETSc.Error(55)  # out of memory
 
     expected = loaded(weight=1.0)
-    monkeypatch.setattr(NonlinearProblem, "_jacobian", singular)
+    monkeypatch.setattr(StepProblem, "_jacobian", singular)
     assert apart(loaded(weight=1.0), expected) < SAME
     assert left == [0]
-    monkeypatch.setattr(NonlinearProblem, "_jacobian", broken)
+    monkeypatch.setattr(StepProblem, "_jacobian", broken)
     with pytest.raises(PETSc.Error):
         loaded()
 
@@ -384,7 +384,7 @@ def test_errors_are_no_failed_steps(monkeypatch):
 def test_all_objects_of_petsc_are_destroyed():
     options = {"t0": 0.0, "start": None, "newton": ub.Newton(reference=True), "mesh": None}
     state = ReferenceRun(machine(), ub.EnergyMomentum(), comm=MPI.COMM_WORLD, **options)
-    objects = [x for x in vars(state).values() if isinstance(x, PETSc.Object)]
+    objects = [x for x in vars(state).values() if isinstance(x, PETSc.Object)] + state.matrices
     state.close()
     assert len(objects) > 5
     assert not any(x.handle for x in objects)
@@ -460,8 +460,13 @@ def sign_of_jump(patch):
 
 def mass_of_beams(patch):
     """Inertia is too large by a part in a million."""
-    problem, add = NonlinearProblem, NonlinearProblem._add
-    patch.setattr(problem, "_add", lambda self, A, c: add(self, A, [(1 + 1e-6) * x for x in c]))
+    make = StepProblem._make_matrices
+
+    def wrong(self):
+        make(self)
+        self.M.scale(1 + 1e-6)
+
+    patch.setattr(StepProblem, "_make_matrices", wrong)
 
 
 def motion_of_connectors(patch):

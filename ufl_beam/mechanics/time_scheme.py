@@ -226,6 +226,11 @@ def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
     return scheme.dynamic
 
 
+def acts_at_end(scheme: Scheme) -> bool:
+    """Return whether the equation of a step holds at its end, else between both ends."""
+    return bool(scheme.average(0.0, 1.0) == 1.0)
+
+
 def stages_of(scheme: Scheme) -> tuple[float, ...]:
     """Return the lengths of the stages of a step, as fractions of the step; their sum is 1.
 

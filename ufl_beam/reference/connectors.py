@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Joints, motors and hinges of zero length, whose forces are Lagrange multipliers.
 
-Each is a cell of unit length on a second mesh, because the forms of relative motions need the
-configurations of two nodes.  There are few of them, so every process has all.
+The forms of relative motions need the configurations of two nodes, so each connector is a cell of
+unit length on a further mesh, one for each kind of motion.  There are few connectors, so every
+process has all.
 """
 
 from __future__ import annotations
@@ -14,24 +15,23 @@ from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.discretization.function_spaces import point_masses
 from ufl_beam.dolfinx_compat import compile_form, fem, line_mesh
 from ufl_beam.mechanics.relative_motions import connector_forms
 from ufl_beam.mechanics.time_scheme import Scheme, Step
 from ufl_beam.model.connector_laws import RIGID
+from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.functions import value_at
-from ufl_beam.reference.hinges import Hinge
 
 
 class Connectors:
-    """Connectors with one kind of relative motion e and forces λ, with the equations α e + β λ = γ.
+    """Connectors with one kind of relative motion e and forces λ, with the equations a e + b λ = c.
 
-    Each is a cell of unit length between its nodes; its force is a further unknown of the cell.
+    Each is a cell between its nodes, and its force is a further unknown of the cell.
 
     Attributes:
         indices: Indices in :attr:`Scene.all_connectors`.
         forces_at: Numbers of the forces in the scene.
-        hinges: Hinges of zero length among them, by index in ``indices``.
+        hinges: Hinges of zero length among them, by position in ``indices``.
         e0: Relative motions at the beginning of the step; m or rad.
     """
 
@@ -43,9 +43,8 @@ class Connectors:
         mesh = line_mesh(ends, np.arange(2 * n).reshape(n, 2))
         self.indices: Index = indices[mesh.topology.original_cell_index]
         self.connectors = [scene.all_connectors[i] for i in self.indices]
-        self.hinges = {
-            k: Hinge(c, scheme) for k, c in enumerate(self.connectors) if c in scene.hinges
-        }
+        hinges = ((k, c) for k, c in enumerate(self.connectors) if c in scene.hinges)
+        self.hinges = {k: Hinge(c, scheme) for k, c in hinges}
         dofs = numbering.dofs_of_connectors[self.indices]
         self.forces_at = dofs[:, 6]
         self.forms = forms = connector_forms((motion,), scheme, mesh)
@@ -56,12 +55,9 @@ class Connectors:
         self._at[_cell_dofs(forms.q1.function_space)] = dofs
         pairs = np.arange(dofs.size), self._at
         self._joins = csr_array((np.ones(dofs.size), pairs), (dofs.size, numbering.size))
-        self._joined, self._K = self._joins.T.tocsr(), fem.create_matrix(self._tangent)
         geometry = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in self.connectors]
         forms.geometry.x.array[_cell_dofs(forms.geometry.function_space)] = geometry
-        self._row_dofs = _cell_dofs(forms.row.function_space)
-        self.e0: Array = np.zeros(n)
-        self._rows: Array = np.zeros((n, 3))
+        self._row_dofs, self._rows = _cell_dofs(forms.row.function_space), np.zeros((n, 3))
 
     def accept(self, q: Array) -> None:
         """Accept a configuration, with which the next step begins."""
@@ -70,30 +66,95 @@ class Connectors:
 
     def begin(self, step: Step) -> None:
         """Begin a step; a substep in statics applies a part of the rest of a motion."""
-        self._rows = np.column_stack([np.ones_like(self.e0), 0 * self.e0, 0 * self.e0])
+        self._rows[:] = (1.0, 0.0, 0.0)
         for k, connector in enumerate(self.connectors):
             if connector.law is not RIGID and k not in self.hinges:
                 end = value_at(connector.law.motion, step.motion_time, connector)
                 self._rows[k, 2] = self.e0[k] + step.fraction * (end - self.e0[k])
 
-    def residual(self, q1: Array, *, steep: bool = False) -> Array:
-        """Return forces on the nodes, and residuals of the equations; (size,)."""
+    def residual(self, q1: Array, *, steep: bool) -> Array:
+        """Return the work λ δe as forces on the nodes, and residuals of the equations; (size,)."""
         e = self.motions(q1)
         for k, hinge in self.hinges.items():
             self._rows[k] = hinge.row(e[k], q1[self.forces_at[k]], steep=steep)
         self.forms.row.x.array[self._row_dofs] = self._rows
-        return np.asarray(self._joined @ fem.assemble_vector(self._work).array)
+        return np.asarray(self._joins.T @ fem.assemble_vector(self._work).array)
 
-    def tangent(self, *, ones: bool = False) -> Any:
-        """Return the derivative of the latest residual, or its pattern; (size, size), sparse."""
-        self._K.set_value(float(ones))
-        K = self._K if ones else fem.assemble_matrix(self._K, self._tangent)
-        return self._joined @ K.to_scipy() @ self._joins
+    def tangent(self) -> Any:
+        """Return the derivative of the latest residual; (size, size), sparse."""
+        return self._joins.T @ fem.assemble_matrix(self._tangent).to_scipy() @ self._joins
 
     def motions(self, q: Array) -> Array:
         """Return the relative motions at a configuration; (n,); m or rad."""
         self.forms.q1.x.array[:] = q[self._at]
         return np.asarray(fem.assemble_vector(self._motion).array[self._cells])
+
+
+class Hinge:
+    """Law of a hinge of zero length in a step; jump e and moment λ are unknowns of the step.
+
+    Attributes:
+        opening: Sum of the absolute values of the growths of the jump; rad.
+        flows: Direction of the growth in the last step, or 0.
+        way: Direction in which the jump grows in this step, or 0 if the hinge is held.
+        excess: Relative excess of the moment over the limit of a held hinge.
+        dissipated: Energy; J.
+    """
+
+    def __init__(self, hinge: Connector, scheme: Scheme) -> None:
+        self.law: Any = law_of(hinge)
+        self.scheme, self.opening, self.flows, self.dissipated, self.e0 = scheme, 0.0, 0, 0.0, 0.0
+        self.begin(0.0, hold=True)
+
+    @property
+    def limit(self) -> float:
+        """Moment that the hinge bears at the beginning of the step; N m."""
+        return float(self.law.traction(np.array(self.opening)))
+
+    def begin(self, dt: float, *, hold: bool) -> None:
+        """Begin a step; the hinge moves on if it moved in the last one, otherwise it is held."""
+        self.way, self.excess, self.grown, self.moment = self.flows, 0.0, 0.0, 0.0
+
+    def row(self, e: float, moment: float, *, steep: bool) -> tuple[float, float, float]:
+        """Note an iterate; return (a, b, c) of the equation a e + b λ = c, linear around it.
+
+        With ``steep``, the slope of the resistance has the opposite sign, so that nodes between
+        hinges move with the unbalanced moment.
+        """
+        self.grown, self.moment = e - self.e0, moment
+        if self.way == 0:
+            return 1.0, 0.0, self.e0
+        growth = np.array([max(self.way * self.grown, 0.0) + 1e-200j])
+        t: Any = self.scheme.resistance(self.law, np.array([self.opening]), growth)[0]
+        falls = abs(t.imag * 1e200) if steep else t.imag * 1e200
+        return -falls, 1.0, self.way * t.real - falls * e
+
+    def turns_back(self) -> bool:
+        """Hold the hinge if its jump has turned back; return whether it has.
+
+        A hinge that has lost its strength is not held, but free in either direction.  A held
+        hinge measures its excess.
+        """
+        back, self.excess, limit = self.way * self.grown < 0, 0.0, self.limit
+        if limit == 0:
+            back, self.way = self.way == 0, -1 if self.grown < 0 else 1
+        elif back:
+            self.way = 0
+        elif self.way == 0:
+            self.excess = max(abs(self.moment) / limit - 1 - 1e-12, 0.0)
+        return back
+
+    def release(self, least: float) -> None:
+        """Let the hinge open if its excess is large enough."""
+        if self.excess > 0 and self.excess >= least:
+            self.way = -1 if self.moment < 0 else 1
+
+    def accept(self) -> None:
+        """Accept the jump at the end of a step."""
+        a = np.array([abs(self.way * self.grown)])
+        self.dissipated += float((a * self.law.mean_traction(np.array([self.opening]), a))[0])
+        self.opening, self.e0 = self.opening + float(a[0]), self.e0 + self.grown
+        self.flows = self.way * int(a[0] > 0)
 
 
 def connectors_of(numbering: DofNumbering, scheme: Scheme) -> list[Connectors]:
@@ -102,14 +163,6 @@ def connectors_of(numbering: DofNumbering, scheme: Scheme) -> list[Connectors]:
     for i, connector in enumerate(numbering.scene.all_connectors):
         kinds.setdefault(connector.motion, []).append(i)
     return [Connectors(kind, np.array(at), numbering, scheme) for kind, at in kinds.items()]
-
-
-def masses(numbering: DofNumbering) -> Array:
-    """Return masses and rotary inertias of bodies and point masses; (size,); kg, kg m²."""
-    diagonal: Array = np.zeros(numbering.size)
-    for place, mass, inertia in point_masses(numbering.scene):
-        np.add.at(diagonal, numbering.node(place), [mass, mass, inertia])
-    return diagonal
 
 
 def _cell_dofs(space: fem.FunctionSpace) -> Index:

@@ -16,60 +16,45 @@ from ufl_beam.mechanics import functional
 from ufl_beam.mechanics.functional import enhanced_strain, virtual_work
 from ufl_beam.mechanics.kinematics import Axis, strain, virtual_strain
 from ufl_beam.mechanics.time_scheme import Scheme
+from ufl_beam.model.loads import Gravity, LineLoad, Load
 from ufl_beam.reference.frame import Frame
 
 
 class Fields:
     """Functions of a time step, and its forms; laws hold at t_n+θ.
 
-    Attributes:
-        cells: Number in the scene of each cell of this process.
-        q0: Configuration (u_x, u_y, ψ) at the beginning of the step; P1.
-        q1: Configuration at its end.
-        v: Velocity, or another vector of rates.
-        jump0: Jumps α of the rotation in the middle of cells at the beginning; DG0; rad.
-        jump1: Jumps at the end.
-        plastic: Plastic strains at t_n+θ; quadrature element.  They are **e** - C⁻¹ **r** of the
-            return map, so that **r** is the derivative of W for every law.
-        D: Derivatives of (N, V, M) at t_n+θ by the strains at the end; quadrature element.
-        stiffness: Stiffness C = (EA, GA, EI) of cells; DG0.
-        elastic: The same, but zero in cells with material points.
-        inertia: Inertia (A_ρ, J_ρ) of cells; DG0.
-        h: Lengths of cells.
-        force: Virtual work of the resultants, P(34), a linear form.
-        tangent: Its derivative by q1, P(64) to P(66), P(76).
-        mass: Inertia of the beams, P(67).
-        at_rest: Stiffness of the undeformed beams.
-        elastic_energy: Energy of the elastic cells at the end of the step, P(49).
-        lost: Numerical loss of elastic cells in the step, divided by ``2 alpha`` of the scheme.
-        on_cells: ``force``, and products of ``mass`` and ``at_rest`` with ``v``, as forces of the
-            nodes on each cell.
-        strains: Function that returns (Σ, Γ, K) of q1; (cells, 3).
-        resultants: Function that returns (N, V, M) at t_n+θ; (cells, 3).
+    Cells have one Gauss point: with more, shear would lock, and the variations of the time schemes
+    would not be exact.  The value in cell c of a function with one point in each cell is number c.
     """
 
     def __init__(self, frame: Frame, scheme: Scheme) -> None:
-        self.mesh, self.cells, V, numbering = frame.mesh, frame.cells, frame.V, frame.numbering
-        self.q0, self.q1, self.v = (fem.Function(V) for _ in range(3))
+        self.mesh, self.cells = frame.mesh, frame.cells
+        self.numbering = numbering = frame.numbering
+        # Configuration (u_x, u_y, ψ) at both ends of the step, and its rate; P1
+        self.q0, self.q1, self.v = (fem.Function(frame.V) for _ in range(3))
+        # Jump of the rotation in the middle of each cell, at both ends; DG0; rad
         self.jump0, self.jump1 = self.cellwise(()), self.cellwise(())
+        # Plastic strains e - C⁻¹ r of the return map, so that r is the derivative of W for every
+        # law, and derivatives of r = (N, V, M) by the strains at the end; quadrature elements
+        self.plastic, self.moduli = self.at_points((3,)), self.at_points((3, 3))
+        # Stiffness C = (EA, GA, EI), and the same without cells that have material points; DG0
         self.stiffness, self.elastic = self.cellwise((3,)), self.cellwise((3,))
-        self.inertia, self.plastic = self.cellwise((2,)), self.at_points((3,))
-        self.D, self.h = self.at_points((3, 3)), numbering.lengths(frame.cells)
-        beams = numbering.beam_of_cell[frame.cells]
-        sections = [numbering.scene.beams[beam].section for beam in beams]
+        self.inertia = self.cellwise((2,))  # (A_ρ, J_ρ)
+        self.h = numbering.lengths(frame.cells)
+        sections = [numbering.scene.beams[i].section for i in numbering.beam_of_cell[frame.cells]]
         C = np.array([(s.EA, s.GA, s.EI) for s in sections])
         self.stiffness.x.array[:] = C.ravel()
         self.inertia.x.array[:] = np.ravel([(s.rhoA, s.rhoI) for s in sections])
-        self.D.x.array.reshape(-1, 9)[:, ::4] = scheme.theta * C
+        self.moduli.x.array.reshape(-1, 9)[:, ::4] = scheme.theta * C
         inelastic = np.isin(frame.cells, numbering.inelastic_cells)
         self.elastic.x.array[:] = np.where(inelastic[:, None], 0.0, C).ravel()
-        self._state_equilibrium(scheme)
+        self._make_forms(scheme)
 
-    def _state_equilibrium(self, scheme: Scheme) -> None:
+    def _make_forms(self, scheme: Scheme) -> None:
         """Derive all forms from the functional, with strains and variations of the scheme.
 
-        In statics ``force`` is the derivative of the potential of all cells by q1.  Other schemes
-        replace the strains in it by those at t_n+θ, and the variation by their own.
+        ``force`` is the virtual work of r = ∂W/∂e, P(34).  For :class:`Static` it is the derivative
+        of the potential by q1; other schemes take strains at t_n+θ, and variations of their own.
         """
         V, axis, dx, θ = self.q0.function_space, Axis(self.mesh), self.dx(1), scheme.theta
 
@@ -79,7 +64,7 @@ class Fields:
         def W_elastic(e: Expr) -> Expr:
             return functional.elastic_energy(e, self.elastic)
 
-        e0 = enhanced_strain(self.q0, self.jump0, axis)  # equation (30)
+        e0 = enhanced_strain(self.q0, self.jump0, axis)
         e1 = enhanced_strain(self.q1, self.jump1, axis)
         e = ufl.variable((1 - θ) * e0 + θ * e1)  # equations (83), (89)
         r = ufl.diff(W(e), e)  # equation (29)
@@ -92,28 +77,30 @@ class Fields:
 
         def mass(w: Expr, a: Expr) -> ufl.Form:
             kinetic = functional.kinetic_energy(self.v, self.inertia) * self.dx(2)  # equation (18)
-            return ufl.derivative(ufl.derivative(kinetic, self.v, w), self.v, a)
+            return ufl.derivative(ufl.derivative(kinetic, self.v, w), self.v, a)  # equation (67)
 
-        def at_rest(w: Expr, v: Expr) -> ufl.Form:
-            D_v, D_w = (virtual_strain(fem.Function(V), x, axis) for x in (v, w))
-            return virtual_work(functional.resultants(D_v, self.stiffness), D_w) * dx
+        def stiffness_at_rest(w: Expr, v: Expr) -> ufl.Form:
+            rest = fem.Function(V)
+            e_w, e_v = virtual_strain(rest, w, axis), virtual_strain(rest, v, axis)
+            return virtual_work(functional.resultants(e_v, self.stiffness), e_w) * dx
 
-        # By the return map plastic strains and jumps are functions of q1; so D replaces θ C.
+        # By the return map plastic strains and jumps are functions of q1, so moduli replace θ C.
         w, dq = ufl.TestFunction(V), ufl.TrialFunction(V)
-        dr = ufl.dot(self.D, ufl.derivative(strain(self.q1, axis), self.q1, dq))
+        dr = ufl.dot(self.moduli, ufl.derivative(strain(self.q1, axis), self.q1, dq))
         geometric = virtual_work(r, ufl.derivative(variation(w), self.q1, dq))
         self.force = compile_form(force(w))
         self.tangent = compile_form((virtual_work(dr, variation(w)) + geometric) * dx)
-        self.mass, self.at_rest = compile_form(mass(w, dq)), compile_form(at_rest(w, dq))
-        end = functional.potential(W_elastic, self.q1, self.jump1, ufl.as_ufl(0.0), axis)
-        self.elastic_energy, self.lost = (
-            compile_form(end * dx),
-            compile_form(W_elastic(e1 - e0) * dx),
+        self.mass, self.stiffness_at_rest = map(
+            compile_form, (mass(w, dq), stiffness_at_rest(w, dq))
         )
-        # Test functions that are not continuous give the forces on each cell.
+        # Energy of elastic cells at the end, P(49); their numerical loss, divided by 2 alpha
+        energy = functional.potential(W_elastic, self.q1, self.jump1, ufl.as_ufl(0.0), axis) * dx
+        self.elastic_energy, self.lost = map(compile_form, (energy, W_elastic(e1 - e0) * dx))
+        # Test functions that are not continuous give the forces of the nodes on each cell.
         self.apart = fem.functionspace(self.mesh, ("DG", 1, (3,)))
         w = ufl.TestFunction(self.apart)
-        self.on_cells = [*map(compile_form, (force(w), mass(w, self.v), at_rest(w, self.v)))]
+        on_cells = force(w), mass(w, self.v), stiffness_at_rest(w, self.v)
+        self.force_on_cells, self.mass_on_cells, self.damping_on_cells = map(compile_form, on_cells)
         self.strains, self.resultants = map(self._evaluation, (strain(self.q1, axis), r))
 
     def dx(self, degree: int) -> ufl.Measure:
@@ -129,12 +116,20 @@ class Fields:
         element = basix.ufl.quadrature_element("interval", value_shape=tuple(shape), degree=degree)
         return fem.Function(fem.functionspace(self.mesh, element))
 
-    def load(self, density: fem.Function) -> tuple[fem.Form, fem.Form]:
-        """Return the work of forces along beams, as a form on V and as forces on each cell."""
-        spaces = self.q0.function_space, self.apart
-        forms = (ufl.dot(density, ufl.TestFunction(space)) * self.dx(9) for space in spaces)
-        one, other = map(compile_form, forms)
-        return one, other
+    def load_on_cells(self, load: Load) -> Array:
+        """Return the forces of a load along beams for a factor of one; see forces_on_cells."""
+        density = self.at_points((3,), degree=9)
+        values, numbering = density.x.array.reshape(len(self.cells), -1, 3), self.numbering
+        if isinstance(load, LineLoad):
+            s, i = numbering.parameters(load.beam), self.cells - numbering.cells_of(load.beam)[0]
+            i = i[on := (i >= 0) & (i < len(s) - 1)]
+            points = basix.make_quadrature(basix.CellType.interval, 9)[0].ravel()
+            factors = load.factors((s[i, None] + np.diff(s)[i, None] * points).ravel())
+            values[on] = factors.reshape(len(i), -1, 1) * (*load.force, load.moment)
+        elif isinstance(load, Gravity):
+            values[:, :, :2] = self.inertia.x.array[::2, None, None] * load.acceleration
+        work = ufl.dot(density, ufl.TestFunction(self.apart)) * self.dx(9)
+        return self.forces_on_cells(compile_form(work))
 
     def forces_on_cells(self, form: fem.Form) -> Array:
         """Return the forces of both nodes on each cell; (cells, 2, 3)."""
@@ -142,5 +137,7 @@ class Fields:
         return np.asarray(assembled[self.apart.dofmap.list])
 
     def _evaluation(self, value: Expr) -> Callable[[], Array]:
-        expression, cells = compile_expression(value, np.array([[0.5]])), np.arange(len(self.h))
-        return lambda: expression.eval(self.mesh, cells.astype(np.int32)).reshape(-1, 3)
+        """Return a function that evaluates an expression in the middle of cells; (cells, 3)."""
+        expression = compile_expression(value, np.array([[0.5]]))
+        cells = np.arange(len(self.h), dtype=np.int32)
+        return lambda: expression.eval(self.mesh, cells).reshape(-1, 3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The beams of a scene as one distributed interval mesh; joints and supports as q = C x + g(t)."""
+"""The beams of a scene as one distributed interval mesh, with joints and supports as q = C x."""
 
 from __future__ import annotations
 
@@ -21,62 +21,47 @@ from ufl_beam.model.functions import TimeFunction, still
 class Frame:
     """Mesh of all beams, with a vertex for each part at a hinge or revolute joint.
 
-    Rigid joints are shared vertices.  Revolute joints make displacements equal, and supports
-    prescribe displacements along their axes and rotations.  So coordinates y of the scene determine
-    its configuration q = E y, both in the order of :class:`DofNumbering`.  The coordinates that no
-    support prescribes are the unknowns x, distributed over the processes; C has the rows of E of
-    the mesh and the columns of the unknowns.
+    Rigid joints are shared vertices.  The parts at a revolute joint have the same numbers of
+    displacements in ``dofs``, so C has equal rows.  The coordinates y of the scene are its
+    configuration q, but at inclined supports they are the displacements along the axes of the
+    support: q = E y, both in the order of :class:`DofNumbering`.  The unknowns x are the
+    coordinates in the order of the processes that own them, and C are the rows of E at the degrees
+    of freedom of the mesh.
 
     Args:
         numbering: Numbering of the scene, with cells of degree 1.
         comm: Processes that share the mesh.
-
-    Attributes:
-        mesh: Plane interval mesh.
-        cells: Number in the scene of each cell of this process.
-        V: Space of configurations (u_x, u_y, ψ), P1.
-        dofs: Number in the scene of each local degree of freedom of V.
-        E: Matrix of q = E y; (size, size).
-        C: PETSc matrix from the unknowns to the degrees of freedom of V.
-        order: Coordinate of each unknown.
-        mine: Coordinates of the unknowns of this process.
-        columns: Columns of E of all unknowns.
-        rows: Rows of E transposed of the unknowns of this process.
-        held: Prescribed coordinates.
-        motions: Function of time of each of them.
     """
 
     def __init__(self, numbering: DofNumbering, comm: MPI.Intracomm) -> None:
         self.numbering = n = numbering
         dofs, one, same = np.unique(n.dofs, axis=0, return_index=True, return_inverse=True)
-        cells, points = same.ravel()[n.cells], n.points[one]
+        cells = same.ravel()[n.cells]
         ranks = self._ranks(cells, comm)
-        self.mesh = line_mesh(points, cells.astype(np.int64), comm, ranks)
-        self.cells: Index = np.asarray(self.mesh.topology.original_cell_index)
+        self.mesh = line_mesh(n.points[one], cells.astype(np.int64), comm, ranks)
+        self.cells: Index = np.asarray(self.mesh.topology.original_cell_index)  # in the scene
         self.V = fem.functionspace(self.mesh, ("Lagrange", 1, (3,)))
         nodes = self.V.dofmap.index_map
         vertex = np.empty(nodes.size_local + nodes.num_ghosts, dtype=np.int64)
         vertex[self.V.dofmap.list] = cells[self.cells]
-        self.dofs: Index = dofs[vertex].ravel()
-        self.held, self.motions, self.E = self._coordinates()
+        self.dofs: Index = dofs[vertex].ravel()  # in the scene, of the local ones of V
+        self.held, self.motions, self.E = self._supports()
 
-        owned = 3 * nodes.size_local
-        rows, owner = self.E[self.dofs], np.full(n.size, comm.size)
-        owner[rows[:owned].indices] = comm.rank
+        rows, owner = self.E[self.dofs[: 3 * nodes.size_local]], np.full(n.size, comm.size)
+        owner[rows.indices] = comm.rank
         comm.Allreduce(MPI.IN_PLACE, owner, MPI.MIN)
         owner[owner == comm.size] = 0  # bodies, forces of connectors, ends of beams at hinges
-        owner[self.held] = comm.size
-        self.order: Index = np.argsort(owner, kind="stable")[: np.count_nonzero(owner < comm.size)]
-        self.mine = np.flatnonzero(owner == comm.rank)
+        self.order: Index = np.argsort(owner, kind="stable")  # coordinates of all unknowns
+        self.mine = np.flatnonzero(owner == comm.rank)  # and of those of this process
         self.columns, self.rows = self.E[:, self.order], self.E[:, self.mine].T.tocsr()
-        self._known = rows[:, self.held]
-        C = rows[:owned][:, self.order].sorted_indices()
+        C = rows[:, self.order].sorted_indices()
         csr = *(x.astype(PETSc.IntType) for x in (C.indptr, C.indices)), C.data
-        sizes = (owned, None), (len(self.mine), len(self.order))
+        sizes = (C.shape[0], None), (len(self.mine), n.size)
         self.C = PETSc.Mat().createAIJ(sizes, csr=csr, comm=comm)
+        self.fixed = np.flatnonzero(np.isin(self.mine, self.held))  # prescribed local unknowns
 
-    def _coordinates(self) -> tuple[Index, list[TimeFunction], csr_array]:
-        """Return prescribed coordinates and their functions of time, and the matrix E."""
+    def _supports(self) -> tuple[Index, list[TimeFunction], csr_array]:
+        """Return prescribed coordinates, their functions of time, and the matrix E."""
         numbering, scene, entries = self.numbering, self.numbering.scene, [(0, 0, 0.0)]
         held = dict[int, TimeFunction]()
         if GROUND in scene.rigid_bodies:
@@ -101,17 +86,12 @@ class Frame:
         pairs = many.nonzero()[0], cells[many]
         at = csr_array((many[many], pairs), (len(cells), cells.max() + 1))
         groups = connected_components(at @ at.T)[1]
-        _, first, group = np.unique(groups, return_index=True, return_inverse=True)
+        first = np.unique(groups, return_index=True)[1]
         middles = self.numbering.points[self.numbering.cells].mean(axis=1)
-        return np.asarray(bisect(middles, comm.size)[first[group]])
+        return np.asarray(bisect(middles, comm.size)[first[groups]])
 
-    def g(self, motions: Array) -> Array:
-        """Return the part of q that supports prescribe, at the local degrees of freedom of V."""
-        return np.asarray(self._known @ motions)
-
-    def coordinates(self, x: PETSc.Vec, motions: Array) -> Array:
-        """Return all coordinates y on all processes, from unknowns and prescribed motions."""
-        y: Array = np.zeros(self.numbering.size)
+    def coordinates(self, x: PETSc.Vec) -> Array:
+        """Return the coordinates of the scene, on all processes, from the unknowns."""
+        y: Array = np.empty(self.numbering.size)
         y[self.order] = np.concatenate(self.mesh.comm.allgather(x.array_r))
-        y[self.held] = motions
         return y

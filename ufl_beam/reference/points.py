@@ -29,10 +29,7 @@ def slope(f: Callable[[At], Values], at: Mapping[str, Any], name: str) -> tuple[
 
 
 def by_cell(function: fem.Function) -> Array:
-    """Return the values of a function with one point in each cell; (cells, components).
-
-    Such functions have the degree of freedom c in the cell c.
-    """
+    """Return the values of a function with one point in each cell; (cells, components)."""
     return np.asarray(function.x.array).reshape(-1, function.function_space.dofmap.bs)
 
 
@@ -40,11 +37,10 @@ class Points:
     """Material points of all cells with one kind of section; n points in each cell.
 
     Args:
-        kind: Points of a section, with laws of one class and one component.
+        section: Points of a section, with laws of one class and one component.
         cells: Cells of this process with these points.
 
     Attributes:
-        rows: Numbers of the cells in ``solution.internal``.
         variables: Internal variables: functions of the quadrature element with n components.
         excess: Relative excess over the limit of points that stay closed; (cells, n).
         recorded: (N, V, M) at the end of the last step, jump, energies dissipated by plastic
@@ -54,40 +50,43 @@ class Points:
     """
 
     def __init__(
-        self, kind: SectionPoints, cells: Index, numbering: DofNumbering, fields: Fields,
+        self, section: SectionPoints, cells: Index, numbering: DofNumbering, fields: Fields,
         scheme: Scheme,
     ) -> None:  # fmt: skip
-        self.kind, self.cells, self.fields = kind, cells, fields
-        in_scene = fields.cells[cells]
-        self.rows, keys = in_scene + kind.number * len(numbering.cells), numbering.keys(in_scene)
+        self.section, self.cells, self.fields = section, cells, fields
         self.scheme, self.θ = scheme, scheme.theta
-        self.equations = PointEquations(kind.kind, kind.softening, scheme)
-        n, law, softening = len(kind.weights), kind.kind.law, kind.softening
-        self.B = np.reshape(kind.strains, (n, 3))
-        numbers = kind.parameters(keys) if len(cells) else dict.fromkeys(kind.kind.parameters, 0.0)
-        given: dict[str, Any] = {
-            "stiffness": kind.stiffness, "length": fields.h[cells, None], "theta": self.θ,
-            **{f"number {name}": x for name, x in numbers.items()},
-            **{f"softening {name}": x for name, x in (softening.parameters() if softening else {})
-               .items()},
-        }  # fmt: skip
-        self.given = {name: np.broadcast_to(x, (len(cells), n)) for name, x in given.items()}
-        self.names = [f"state {name}" for name in law.variables]
-        start: dict[str, Any] = dict(zip(self.names, law.variables.values(), strict=True))
-        start |= {"jump": 0.0, "opening": 0.0, "limit": np.full(n, np.inf), "flows": 0.0}
+        self.equations = PointEquations(section.kind, section.softening, scheme)
+        n, law, softening = len(section.weights), section.kind.law, section.softening
+        self.B = np.reshape(section.strains, (n, 3))  # strains at points by those of the axis
+        in_scene, self.length = fields.cells[cells], fields.h[cells, None]
+        self.rows, keys = in_scene + section.number * len(numbering.cells), numbering.keys(in_scene)
+        numbers = (
+            section.parameters(keys) if len(cells) else dict.fromkeys(section.kind.parameters, 0.0)
+        )
+        of_hinge = softening.parameters() if softening else {}
+        given = {"stiffness": section.stiffness, "length": self.length, "theta": self.θ}
+        given |= {f"number {name}": x for name, x in numbers.items()}
+        given |= {f"softening {name}": x for name, x in of_hinge.items()}
+        self.shape = len(cells), n
+        self.given = {name: np.broadcast_to(x, self.shape) for name, x in given.items()}
+        limit = np.full(n, np.inf)
         if softening:
-            start["limit"][kind.breaking] = softening.limit
+            limit[section.breaking] = softening.limit
+        self.names = [f"state {name}" for name in law.variables]
+        self.columns = [*self.names, "jump", "opening", "strain", "limit", "flows"]
+        start: dict[str, Any] = dict(zip(self.names, law.variables.values(), strict=True))
+        start |= {"jump": 0.0, "opening": 0.0, "limit": limit, "flows": 0.0}
         self.variables = {name: fields.at_points((n,)) for name in start}
-        self._set(self.variables, start)
-        self.recorded: Array = np.zeros((len(cells), 6))
-        self.numerical = 0.0
+        self._set(start)
+        self.recorded, self.numerical = np.zeros((len(cells), 6)), 0.0
 
-    def _set(self, functions: Mapping[str, fem.Function], values: Mapping[str, Any]) -> None:
+    def _set(self, values: Mapping[str, Any]) -> None:
         for name, x in values.items():
-            by_cell(functions[name])[self.cells] = x
+            by_cell(self.variables[name])[self.cells] = x
 
     def _old(self) -> dict[str, Array]:
-        return {name: by_cell(f)[self.cells] for name, f in self.variables.items()}
+        old = {name: by_cell(f)[self.cells] for name, f in self.variables.items()}
+        return {**self.given, **old}
 
     # -- a step ----------------------------------------------------------------------------------
 
@@ -96,19 +95,17 @@ class Points:
 
         docs/steps.md states the rule by which points open.
         """
-        old, at_points = self._old(), self.e0 @ self.B.T
-        self.at: dict[str, Any] = {**self.given, **old, "before": at_points}
-        self.at["dt"] = np.full_like(at_points, dt)
-        self.may_open = (old["flows"] > 0) | (old["limit"] == 0) | (not hold)
-        self.excess = np.zeros_like(at_points)
+        self.at: dict[str, Any] = {**self._old(), "before": self.e0 @ self.B.T}
+        self.at["dt"] = np.full_like(self.at["before"], dt)
+        self.may_open = (self.at["flows"] > 0) | (self.at["limit"] == 0) | (not hold)
 
     @np.errstate(all="ignore")
     def return_map(self, strains: Array, *, stiff: bool) -> None:
-        """Set jumps, plastic strains and D of the cells, from the strains at the end of the step.
+        """Set jumps, plastic strains and moduli of cells, from the strains at the end of the step.
 
         With ``stiff``, points that do not open have their elastic tangent.
         """
-        at, θ, w, B, rest = self.at, self.θ, self.kind.weights, self.B, self.kind.rest
+        at, θ, w, B, fields = self.at, self.θ, self.section.weights, self.B, self.fields
         growth, direction = np.zeros((2, *self.may_open.shape))
         self.e1: Array = strains[self.cells]
         at |= {"strain": self.e1 @ B.T, "growth": growth, "direction": direction}
@@ -122,19 +119,21 @@ class Points:
             stress[opens], D[opens] = self._open(part, stress[opens])
             growth[opens], direction[opens] = part["growth"], part["direction"]
         e = (1 - θ) * self.e0 + θ * self.e1
-        r = rest * e + (w * stress) @ B
-        jump0 = self.kind.hinges * at["jump"][:, -1:]
-        jump1 = jump0 + self.kind.hinges * (direction * growth)[:, -1:]
-        e[:, 2:] += strain_by_jump((1 - θ) * jump0 + θ * jump1, at["length"][:, :1])
-        D = np.einsum("cn,na,nb->cab", w * D, B, B) + θ * np.diag(rest)
-        plastic = e - r / by_cell(self.fields.stiffness)[self.cells]
-        new = {"jump0": jump0, "jump1": jump1, "plastic": plastic, "D": D.reshape(-1, 9)}
-        self._set(vars(self.fields), new)
+        r = self.section.rest * e + (w * stress) @ B
+        jump0 = self.section.hinges * at["jump"][:, -1:]
+        jump1 = jump0 + self.section.hinges * (direction * growth)[:, -1:]
+        e[:, 2:] += strain_by_jump((1 - θ) * jump0 + θ * jump1, self.length)
+        moduli = np.einsum("cn,na,nb->cab", w * D, B, B) + θ * np.diag(self.section.rest)
+        by_cell(fields.jump0)[self.cells], by_cell(fields.jump1)[self.cells] = jump0, jump1
+        by_cell(fields.plastic)[self.cells] = e - r / by_cell(fields.stiffness)[self.cells]
+        by_cell(fields.moduli)[self.cells] = moduli.reshape(-1, 9)
 
     def _stress(self, at: At) -> Values:
+        """Return the stress of the bulk."""
         return self.equations.stress(at)[0]
 
     def _resistance(self, at: At) -> Values:
+        """Return the stress that the discontinuity bears."""
         return self.equations.resistance(at, at["growth"])
 
     def _open(self, at: dict[str, Any], stress: Array) -> tuple[Array, Array]:
@@ -170,75 +169,75 @@ class Points:
         """Let points open whose excess is large enough."""
         self.may_open |= (self.excess > 0) & (self.excess >= least)
 
-    # -- the end of a step -----------------------------------------------------------------------
+    # -- accepted states -------------------------------------------------------------------------
 
     @np.errstate(all="ignore")
     def change(self) -> float:
         """Return the energy stored and dissipated in the step; J."""
-        end, volume = self.equations.end(self.at), self.kind.weights * self.at["length"]
+        end = self.equations.end(self.at)
         bulk = end.worked + end.elastic + end.hardening + end.nonlinear_loss + end.relaxed
-        total = np.sum(volume * bulk) + np.sum(self.kind.weights * (end.broken + 0 * volume))
-        return float(total + self._rest(self.e1).sum() - self.stored.sum())
+        energies = self._sum(self.length * bulk) + self._sum(end.broken) + self._rest(self.e1)
+        return float(energies.sum() - self.stored.sum())
 
     @np.errstate(all="ignore")
     def accept(self) -> None:
         """Accept the internal variables of the latest return map."""
-        at, end, w, α = self.at, self.equations.end(self.at), self.kind.weights, self.scheme.alpha
-        volume = w * at["length"]
-        self.recorded[:, 4] += np.sum(volume * end.worked, axis=1)
-        self.recorded[:, 5] += np.sum(w * (end.broken + 0 * volume), axis=1)
-        self.numerical += 2 * α * self._rest(self.e1 - self.e0).sum()
-        self.numerical += np.sum(volume * (2 * α * end.lost + end.nonlinear_loss))
+        at, end, α, length = self.at, self.equations.end(self.at), self.scheme.alpha, self.length
+        self.recorded[:, 4] += self._sum(length * end.worked)
+        self.recorded[:, 5] += self._sum(end.broken)
+        lost = self._sum(length * (2 * α * end.lost + end.nonlinear_loss))
+        lost += 2 * α * self._rest(self.e1 - self.e0)
         limit = np.where(np.isfinite(at["limit"]), end.resistance, np.inf)
         # Broken points bear nothing; their elastic strain becomes a part of the jump.
         broken = limit == 0
-        relieved = np.where(broken, end.stress[0] / at["stiffness"] * at["length"], 0.0)
-        self.numerical += np.sum(np.where(broken, volume * (end.elastic - end.left), 0.0))
+        relieved = np.where(broken, end.stress[0] / at["stiffness"] * length, 0.0)
+        lost += self._sum(np.where(broken, length * (end.elastic - end.left), 0.0))
+        self.numerical += float(lost.sum())
         new = {"limit": limit, "flows": at["growth"] > 0, "opening": at["opening"] + at["growth"]}
         new["jump"] = at["jump"] + at["direction"] * at["growth"] + relieved
         new |= {n: at[n] + change for n, change in zip(self.names, end.changes, strict=True)}
-        self._set(self.variables, new)
+        self._set(new)
         self._store(self.e1)
 
     def _store(self, strains: Array) -> None:
         """Compute forces and energies of the accepted state at strains of these cells."""
-        self.e0 = strains
-        old, kind, at_points = self._old(), self.kind, self.e0 @ self.B.T
-        at = {**self.given, **old}
+        self.e0, at, section = strains, self._old(), self.section
         law, z = self.equations.law(at), self.equations.state(at)
-        e = at_points + strain_by_jump(old["jump"], at["length"])
-        stress = law.as_tuple(law.stress(law.as_argument((e,)), z))[0] * (old["limit"] != 0)
-        self.recorded[:, :3] = kind.rest * self.e0 + (kind.weights * stress) @ self.B
-        self.recorded[:, 3] = kind.hinges * old["jump"][:, -1]
-        volume, elastic = kind.weights * at["length"], law.elastic_energy(law.as_argument((e,)), z)
-        hardening = law.hardening_energy(z)
-        energies = (np.sum(volume * x, axis=1) for x in (elastic, hardening))
-        self.stored = np.column_stack([*energies])
-        self.stored[:, 0] += self._rest(self.e0)
+        e = law.as_argument((strains @ self.B.T + strain_by_jump(at["jump"], self.length),))
+        stress = law.as_tuple(law.stress(e, z))[0] * (at["limit"] != 0)
+        self.recorded[:, :3] = section.rest * strains + (section.weights * stress) @ self.B
+        self.recorded[:, 3] = section.hinges * at["jump"][:, -1]
+        elastic = self._sum(self.length * law.elastic_energy(e, z)) + self._rest(strains)
+        hardening = self._sum(self.length * law.hardening_energy(z))
+        self.stored = np.column_stack([elastic, hardening])
+
+    def _sum(self, values: Any) -> Array:
+        """Return the sum over the points of each cell, with their weights."""
+        return np.broadcast_to(values, self.shape) @ self.section.weights
 
     def _rest(self, strains: Array) -> Array:
         """Return the energy of resultants without points in each cell; J."""
-        return np.asarray(strains**2 @ self.kind.rest / 2 * self.fields.h[self.cells])
+        return np.asarray(strains**2 @ self.section.rest / 2 * self.fields.h[self.cells])
 
     # -- beginning and restart -------------------------------------------------------------------
 
     def start(self, strains: Array, internal: State) -> None:
         """Begin at strains of all cells, with a table of :meth:`state` if there is one."""
         self._store(strains[self.cells])
-        table, n = internal.get(f"cells, {self.state().shape[1] - 1}"), len(self.kind.weights)
+        table = internal.get(f"cells, {self.state().shape[1] - 1}")
         if table is not None and len(self.cells):
             values = table[np.searchsorted(table[:, 0], self.rows), 1:]
-            for i, name in enumerate((*self.names, "jump", "opening", "", "limit", "flows")):
-                self._set(self.variables, {name: values[:, i * n : (i + 1) * n]} if name else {})
+            blocks = np.split(values[:, :-11], len(self.columns), axis=1)
+            named = zip(self.columns, blocks, strict=True)
+            self._set({name: x for name, x in named if name in self.variables})
             self.recorded = values[:, -11:-5].copy()
             self._store(values[:, -5:-2].copy())
-        jumps = self.kind.hinges * self.recorded[:, 3]
+        jumps = self.section.hinges * self.recorded[:, 3:4]
         for function in (self.fields.jump0, self.fields.jump1):
-            function.x.array[self.cells] = jumps
+            by_cell(function)[self.cells] = jumps
 
     def state(self) -> Array:
         """Return the variables as a table with a row for each cell; see ``solution.internal``."""
-        old = self._old()
-        columns = [*(old[name] for name in self.names), old["jump"], old["opening"]]
-        columns += [self.e0 @ self.B.T, old["limit"], old["flows"], self.recorded, self.e0]
-        return np.column_stack([self.rows, *columns, self.stored])
+        at = {**self._old(), "strain": self.e0 @ self.B.T}
+        blocks = [at[name] for name in self.columns]
+        return np.column_stack([self.rows, *blocks, self.recorded, self.e0, self.stored])

@@ -20,7 +20,14 @@ from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ArgumentError, ConvergenceError, StepFailed
 from ufl_beam.mechanics.point_equations import curved, rows
-from ufl_beam.mechanics.time_scheme import Scheme, Step, acting, has_inertia, nodal_step
+from ufl_beam.mechanics.time_scheme import (
+    Scheme,
+    Step,
+    acting,
+    acts_at_end,
+    has_inertia,
+    nodal_step,
+)
 from ufl_beam.mechanics.time_schemes import EnergyMomentum, EnergyMomentumStatic, Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connector_laws import RIGID, PrescribedMotion
@@ -28,7 +35,7 @@ from ufl_beam.model.connectors import law_of
 from ufl_beam.model.loads import Gravity, LineLoad, PointLoad, Rayleigh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.softening_laws import SofteningLaw
-from ufl_beam.output.recorder import StateView
+from ufl_beam.output.recorder import PresentState, StateView
 from ufl_beam.output.state_rows import (
     BEFORE,
     DISSIPATED,
@@ -41,7 +48,7 @@ from ufl_beam.output.state_rows import (
 )
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, ProcessComparison
-from ufl_beam.reference.connectors import Connectors
+from ufl_beam.reference.connectors import Connectors, Hinge
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.impacts import Impact, impacts_of
 from ufl_beam.simulation.initial_state import (
@@ -95,7 +102,7 @@ def require_scope(numbering: DofNumbering, scheme: Scheme, comm: MPI.Intracomm) 
             )
 
 
-class ReferenceRun(Solver):
+class ReferenceRun(Solver, PresentState):
     """Simulation by the reference solver, with energy ledger, section forces and stored states.
 
     It takes the arguments of :class:`Simulation`.
@@ -115,8 +122,11 @@ class ReferenceRun(Solver):
         q, v, internal, _ = state = initial_state(numbering, start)
         t, same = continuation(start, scene, t0)
         impacts, impact = impacts_of(numbering, scheme, t, start, same, state)
-        super().__init__(numbering, scheme, t, newton=newton, comm=comm, impacts=impacts)
-        self.start(q, v, None if start is None else internal, same=same)
+        super().__init__(numbering, scheme, t, newton=newton, comm=comm)
+        self.impacts, self.q_before = impacts, q
+        self.start(q, v, None if start is None else internal)
+        if same and "reactions" in internal:
+            self._reactions = internal["reactions"]
         self.subdomain, self.together = Subdomain(numbering, MPI.COMM_SELF), Agreement(comm)
         self.comparison = ProcessComparison(MPI.COMM_SELF, self.subdomain)
         self.requested_forces: dict[Any, float] = {}
@@ -133,12 +143,12 @@ class ReferenceRun(Solver):
             self.q_before = start.before(-1)
         self._sum_energies()
         self._lost_before = self._sums[2:].copy()
-        self.meet(impact)
+        self._meet(impact)
         self._sum_energies()
 
-    def start(self, q: Array, v: Array, internal: State | None, *, same: bool) -> None:
+    def start(self, q: Array, v: Array, internal: State | None) -> None:
         """See the base class; also begin the ledger, the reactions and the forces."""
-        super().start(q, v, internal, same=same)
+        super().start(q, v, internal)
         numbering, size = self.numbering, len(self.frame.cells)
         self.ledger, self._lost_before = self._make_ledger(), np.zeros(2)
         self._forces, self._load_before = np.zeros((9, size)), self.load
@@ -150,10 +160,7 @@ class ReferenceRun(Solver):
             for name in self._tables(group) if internal else ():
                 self._restore(group, internal.get(name, np.zeros((0, 5))))  # type: ignore[union-attr]
         if not self.fresh and not self.dynamic:
-            self.q1, forces = q, self._total(self._assembled(self.fields.force))
-            self._reactions = self._held(forces + self._further_forces() - self.load)
-        if same and internal and "reactions" in internal:
-            self._reactions = internal["reactions"]
+            self._reactions = self._held(self.forces() - self.load)
 
     def _restore(self, group: Connectors, table: Array) -> None:
         """Restore the rows of connectors in a table of :meth:`_tables`."""
@@ -161,8 +168,9 @@ class ReferenceRun(Solver):
             for row in table[table[:, 0] == index]:
                 self._history[index, [WORK, RATE, FORCE, 0]] = row[1:5]
                 if k in group.hinges:
-                    group.hinges[k].restore(row[5:])
-                    self._history[index, DISSIPATED] = group.hinges[k].lost
+                    hinge = group.hinges[k]
+                    hinge.opening, hinge.e0, _, _, hinge.dissipated, flows, _ = map(float, row[5:])
+                    hinge.flows, self._history[index, DISSIPATED] = int(flows), hinge.dissipated
 
     def _held(self, forces: Array) -> Array:
         """Return the forces on prescribed coordinates; (size,)."""
@@ -195,9 +203,9 @@ class ReferenceRun(Solver):
     def _make_ledger(self) -> SimpleNamespace:
         """Return the entries of the energy ledger with zeros; see :class:`Energy`."""
         scene, scheme, points = self.scene, self.scheme, self.points
-        over_step, softens = scheme.average(0.0, 1.0) != 1.0, any(p.kind.softening for p in points)
-        yields = any(p.kind.yields for p in points)
-        releases = over_step and (softens or any(curved(p.kind.kind) for p in points))
+        over_step, softens = not acts_at_end(scheme), any(p.section.softening for p in points)
+        yields = any(p.section.yields for p in points)
+        releases = over_step and (softens or any(curved(p.section.kind) for p in points))
         defect = has_inertia(scheme) and scheme.coefficients(1.0, 1.0, 0).velocity_defect
         laws = [connector.law for connector in scene.all_connectors]
         motors = any(isinstance(law, PrescribedMotion) and law is not RIGID for law in laws)
@@ -222,8 +230,7 @@ class ReferenceRun(Solver):
         """Accept the end of a step, and enter works and losses in the ledger."""
         scheme, supplied, lost, s = self.scheme, self.ledger.supplied, self.ledger.lost, self.s
         self._forces = self._cell_forces()
-        forces = self._total(self.r.x.petsc_vec.array) + self._further_forces()
-        reactions = self._held(forces - self.load)
+        reactions = self._held(self.forces() - self.load)
         if "supports" in supplied:
             along = nodal_step(scheme, self.y, self.y1, self.numbering.rotations)
             supplied["supports"] += float(acting(scheme, self._reactions, reactions) @ along)
@@ -242,7 +249,7 @@ class ReferenceRun(Solver):
                 supplied["motors"] -= float(work @ drives)
         numerical = 2 * scheme.alpha * fem.assemble_scalar(self.fields.lost)
         numerical -= sum(points.numerical for points in self.points)
-        v = self.v
+        v, self.q_before = self.v, self.q
         super().accept(step)
         numerical += sum(points.numerical for points in self.points)
         if "numerical" in lost:
@@ -253,11 +260,11 @@ class ReferenceRun(Solver):
                 parts = defect[0] * (self.v - v) + defect[1] * v
                 lost["numerical"] += self._product(self.M, self.masses, parts, self.v - v)
             if "damping" in lost:
-                product = self._product(self.damping, self.damping_of_masses, s, s)
+                product = self._product(self.damping, self.rayleigh[0] * self.masses, s, s)
                 lost["damping"] += product / step.dt
         for group in self.connectors:
             for k, hinge in group.hinges.items():
-                self._history[group.indices[k], DISSIPATED] = hinge.lost
+                self._history[group.indices[k], DISSIPATED] = hinge.dissipated
         self._reactions, self._load_before = reactions, self.load
         self._sum_energies()
 
@@ -276,7 +283,7 @@ class ReferenceRun(Solver):
         for points in self.points:
             sums += np.r_[points.stored.sum(axis=0), points.recorded[:, 4:].sum(axis=0)]
         self.comm.Allreduce(MPI.IN_PLACE, sums)
-        sums[3] += sum(hinge.lost for group in self.connectors for hinge in group.hinges.values())
+        sums[3] += sum(part.dissipated for part in self.parts if isinstance(part, Hinge))
         self._sums = sums
         values = dict(zip(("stored", "hardening"), sums, strict=False))
         values |= dict(zip(("plastic", "hinges"), sums[2:] - self._lost_before, strict=True))
@@ -286,11 +293,17 @@ class ReferenceRun(Solver):
             account.update((name, float(values[name])) for name in account if name in values)
         self.energies = sum(abs(x) for one in vars(self.ledger).values() for x in one.values())
 
-    def meet(self, impact: Impact | None) -> None:
-        """Change the velocities by an impact, and enter it in the ledger."""
-        super().meet(impact)
+    def _solve(self, step: Step) -> None:
+        """See the base class; before, velocities meet rates of motions that have jumped."""
+        if self.impacts is not None:
+            counts = self.impacts.after(self.last_dt, self.t, step.t1)
+            self._meet(self.impacts.find(self.q, self.v, self.t, counts, {}, longest=step.dt / 4))
+        super()._solve(step)
+
+    def _meet(self, impact: Impact | None) -> None:
+        """Change the velocities by an impact, if there is one, and enter it in the ledger."""
         if impact is not None and self.impacts is not None:
-            works = np.zeros(len(self._history))
+            self.v, works = impact.v, np.zeros(len(self._history))
             self.impacts.enter(impact, self.ledger, [(np.arange(len(works)), works)])
             self._history[:, WORK] += works
 
@@ -300,11 +313,12 @@ class ReferenceRun(Solver):
         """Return the forces of the nodes on cells in the step, as rows of FORCES; (9, cells)."""
         fields = self.fields
         along: Any = np.tensordot(self.factors, self.of_loads_on_cells, 1)
-        forces = _table(self.on_cells) - _table(along, density=True)
+        forces = _table(fields.forces_on_cells(fields.force_on_cells)) - _table(along, density=True)
         if self.dynamic:
-            c, (a0, a1), (_, mass, stiffness) = self.coefficients, self.rayleigh, fields.on_cells
+            c, (a0, a1) = self.coefficients, self.rayleigh
             a, v = (row[0] * self.s + row[1] * self.v for row in (c.inertia, c.velocity))
-            for form, rate, density in ((mass, a + a0 * v, True), (stiffness, a1 * v, False)):
+            inertia, damping = (fields.mass_on_cells, a + a0 * v), (fields.damping_on_cells, a1 * v)
+            for (form, rate), density in ((inertia, True), (damping, False)):
                 fields.v.x.array[:] = rate[self.frame.dofs]
                 forces += _table(fields.forces_on_cells(form), density=density)
         return forces
@@ -373,12 +387,13 @@ class ReferenceRun(Solver):
 
     def _tables(self, group: Connectors) -> State:
         """Return works, rates, forces, motions and variables of connectors, by kind of law."""
-        tables: dict[str, list[Array]] = {}
+        tables: dict[str, list[list[float]]] = {}
         for k, index in enumerate(group.indices):
-            more = group.hinges[k].state() if k in group.hinges else ()
-            kind = "_Held" if group.connectors[k].law is RIGID else "_Driven"
-            row = np.r_[index, self._history[index, [WORK, RATE, FORCE, 0]], more]
-            name = "CompiledSlips, 11" if k in group.hinges else f"{kind}, 4"
+            name = "_Held, 4" if group.connectors[k].law is RIGID else "_Driven, 4"
+            row = [index, *self._history[index, [WORK, RATE, FORCE, 0]]]
+            if h := group.hinges.get(k):
+                name = "CompiledSlips, 11"
+                row += [h.opening, h.e0, h.limit, 0.0, h.dissipated, h.flows, 0.0]
             tables.setdefault(name, []).append(row)
         return {name: np.array(rows) for name, rows in tables.items()}
 
