@@ -9,8 +9,8 @@ The fields on a mesh of straight two-node cells, as in the paper, are
 * plastic strains and hardening variables, at the quadrature points.
 
 Energies are densities along the undeformed axis, J/m; a function W maps the strains (Σ, Γ, K) of
-the bulk to its free energy at given internal variables, P(35).  With :class:`Static`, weak forms are
-derivatives of these functionals; other time schemes replace the strains and variations in these
+the bulk to its free energy at given internal variables, P(35).  With :class:`Static`, weak forms
+are derivatives of these functionals.  Other schemes replace the strains and variations in these
 derivatives by their own, see :mod:`ufl_beam.mechanics.time_scheme`.
 """
 

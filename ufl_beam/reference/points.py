@@ -78,7 +78,8 @@ class Points:
         start |= {"jump": 0.0, "opening": 0.0, "limit": limit, "flows": 0.0}
         self.variables = {name: fields.at_points((n,)) for name in start}
         self._set(start)
-        self.recorded, self.numerical = np.zeros((len(cells), 6)), 0.0
+        self.recorded: Array = np.zeros((len(cells), 6))
+        self.numerical = 0.0
 
     def _set(self, values: Mapping[str, Any]) -> None:
         for name, x in values.items():
@@ -213,7 +214,7 @@ class Points:
 
     def _sum(self, values: Any) -> Array:
         """Return the sum over the points of each cell, with their weights."""
-        return np.broadcast_to(values, self.shape) @ self.section.weights
+        return np.asarray(np.broadcast_to(values, self.shape) @ self.section.weights)
 
     def _rest(self, strains: Array) -> Array:
         """Return the energy of resultants without points in each cell; J."""

@@ -109,6 +109,7 @@ class ReferenceRun(Solver, PresentState):
     """
 
     _sums: Array
+    _reactions: Array
     warn, may_break, damage = StateView.warn, StateView.may_break, StateView.damage
 
     def __init__(
@@ -153,7 +154,7 @@ class ReferenceRun(Solver, PresentState):
         self.ledger, self._lost_before = self._make_ledger(), np.zeros(2)
         self._forces, self._load_before = np.zeros((9, size)), self.load
         self._history = np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
-        self._reactions: Array = np.zeros(numbering.size)
+        self._reactions = np.zeros(numbering.size)
         for group in self.connectors:
             self._history[group.indices, 0] = group.e0
             self._history[group.indices, FORCE] = q[group.forces_at]
