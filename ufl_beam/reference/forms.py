@@ -90,10 +90,9 @@ class Fields:
         geometric = virtual_work(r, ufl.derivative(variation(w), self.q1, dq))
         self.force = compile_form(force(w))
         self.tangent = compile_form((virtual_work(dr, variation(w)) + geometric) * dx)
-        self.mass, self.stiffness_at_rest = map(
-            compile_form, (mass(w, dq), stiffness_at_rest(w, dq))
-        )
-        # Energy of elastic cells at the end, equation (49); their numerical loss, divided by 2 alpha
+        self.mass = compile_form(mass(w, dq))
+        self.stiffness_at_rest = compile_form(stiffness_at_rest(w, dq))
+        # Energy of elastic cells at the end, equation (49); their numerical loss / (2 alpha)
         energy = functional.potential(W_elastic, self.q1, self.jump1, ufl.as_ufl(0.0), axis) * dx
         self.elastic_energy, self.lost = map(compile_form, (energy, W_elastic(e1 - e0) * dx))
         # Test functions that are not continuous give the forces of the nodes on each cell.

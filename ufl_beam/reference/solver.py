@@ -47,18 +47,11 @@ KINK_WORK = 1e-6
 
 
 class Solver(StepProblem):
-    """State of a scene, and its steps.
+    """State of a scene, and its steps."""
 
-    Attributes:
-        fresh: True if the run does not begin with the state of another one.
-        substeps: Number of steps so far; substeps count as steps.
-        last_dt: Length of the last step; infinite before the first one; s.
-        y_before: Coordinates before the last step, for the guess.
-        factors: Factors of the loads in the step.
-        energies: Sum of all energies so far, which a run with a ledger updates; J.
-    """
-
-    energies, substeps, last_dt = 0.0, 0, math.inf
+    energies = 0.0  # sum of all energies so far, which a run with a ledger updates; J
+    substeps = 0  # number of steps so far; substeps count as steps
+    last_dt = math.inf  # length of the last step; s
 
     def start(self, q: Array, v: Array, internal: State | None) -> None:
         """Begin with a configuration, velocities, and the internal variables of another run."""

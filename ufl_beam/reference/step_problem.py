@@ -53,39 +53,16 @@ the least residual."""
 class StepProblem:
     """Equation Cᵀ r(C x) = F of a step, with its derivative, and the state before the step.
 
-    Vectors at the beginning of the step, and at its end for the latest iterate; the first three are
-    of the whole scene, on all processes:
-
-    * ``y`` and ``y1``: coordinates of the scene, see :class:`Frame`;
-    * ``q`` and ``q1``: its configuration, E y;
-    * ``v`` and ``s``: velocities; steps of the nodes on which forces do work;
-    * ``fields.q0`` and ``fields.q1``: configuration of the beams, a function on the mesh;
-    * ``x``: unknowns, y1 in another order, distributed.
-
-    Args:
-        numbering: Numbering of the scene, with cells of degree 1.
-        scheme: Static, EnergyMomentum or EnergyMomentumStatic.
-        t: Time of the initial state; s.
-        newton: Options of Newton's method.
-        comm: Processes that share the mesh.
-
-    Attributes:
-        parts: Hinges of zero length, and points.
-        opening: Those that may open.
-        load: Loads in the step; (size,).
-        further: Forces of connectors, bodies and point masses at the latest iterate; (size,).
-        coefficients: Numbers of the scheme in the step.
-        iterations: Number of Newton iterations so far.
-        stiff: 1 if points that do not open have elastic tangents, 2 if hinges of zero length have
-            the opposite slope, too.
+    ``fields`` has functions on the mesh; other vectors are of the whole scene, on all processes.
     """
 
-    y: Array
-    q: Array
-    v: Array
-    load: Array
-    coefficients: Any
-    stiff = iterations = 0
+    y: Array  # coordinates at the beginning of the step, see Frame; y1: at the latest iterate
+    q: Array  # configuration at the beginning of the step, E y; q1: at the latest iterate
+    v: Array  # velocities at the beginning of the step; s: steps on which forces do work
+    load: Array  # loads in the step
+    coefficients: Any  # numbers of the scheme in the step
+    stiff = 0  # 1: points that do not open have elastic tangents; 2: hinges are steep, too
+    iterations = 0  # of Newton's method so far
 
     def __init__(
         self, numbering: DofNumbering, scheme: Scheme, t: float, *, newton: Any,
@@ -102,6 +79,7 @@ class StepProblem:
         self.connectors = connectors_of(numbering, scheme)
         hinges = [hinge for group in self.connectors for hinge in group.hinges.values()]
         self.parts: list[Points | Hinge] = [*hinges, *self.points]
+        # Those that may open
         self.opening = [p for p in self.parts if isinstance(p, Hinge) or p.section.softening]
         self.r, self.rate = fem.Function(frame.V), fem.Function(frame.V)
         self._set_masses_and_loads()
@@ -114,10 +92,8 @@ class StepProblem:
         Loads have forces on the scene, of which those along beams are also forces on cells.
         """
         numbering, loads, cells = self.numbering, self.scene.loads, self.frame.cells
-        self.masses, self.of_loads = (
-            np.zeros(numbering.size),
-            np.zeros((len(loads), numbering.size)),
-        )
+        self.masses: Array = np.zeros(numbering.size)
+        self.of_loads = np.zeros((len(loads), numbering.size))
         for place, mass, inertia in point_masses(self.scene):
             np.add.at(self.masses, numbering.node(place), [mass, mass, inertia])
         on_cells = [self.fields.load_on_cells(load) for load in loads]
@@ -203,7 +179,7 @@ class StepProblem:
         f.array_w[frame.fixed] = 0.0  # the guess has the prescribed motions
 
     def _assemble_forces(self) -> PETSc.Vec:
-        """Compute ``further``, and return the forces of the mesh; both without inertia."""
+        """Compute the forces of connectors, and return those of the mesh, without inertia."""
         self.further: Array = np.zeros(self.numbering.size)
         for group in self.connectors:
             self.further += group.residual(self.q1, steep=self.stiff == 2)
