@@ -4,6 +4,7 @@
 Sizes are of beams of about 1 m with EA = 1e4 N, GA = 4e3 N, EI = 100 N m2 and 1 kg/m, under forces
 of some tens of N, so that yielding moments are some N m and the lowest periods some 0.1 s.  Random
 numbers are drawn in the order of the calls: a changed function changes its stored numbers.
+`seeds` are of scenes that replace others which have a limit load, or whose round-off grows.
 """
 
 import math
@@ -329,7 +330,7 @@ def link(d):
     d.add("joints", ub.Link(ub.ground(x + d.acts(0.3, 0.6), y + d.acts(0.3, 0.9)), other.end))
 
 
-@effect(ub.Guided)
+@effect(ub.Guided, seeds={4: 11})
 def guided(d):
     beam, other = joined(d)
     d.add("joints", ub.Rigid(beam.end, other.start))
@@ -694,14 +695,14 @@ def concrete(d, law):
     driven(d, section.reinforced([-0.04, 0.04], [5e-5, 5e-5], E=8e8, fibres=bars), size=0.12)
 
 
-@effect(ub.KentPark)
+@effect(ub.KentPark, seeds={4: 14})
 def kent_park(d):
     strength, tension = d.acts(1e5, 2e5), ub.Softening(d.acts(6e4, 1e5), d.acts(400, 900))
     ultimate = d.acts(1.4, 1.8) * 2.4e5 * 2 / 1.2e8
     concrete(d, ub.KentPark(strength, d.acts(3e4, 6e4), ultimate, tension))
 
 
-@effect(ub.Mander)
+@effect(ub.Mander, seeds={4: 11})
 def mander(d):
     strength, tension = d.acts(1e5, 2e5), ub.LinearSoftening(d.acts(6e4, 1e5), d.acts(400, 900))
     strain = d.acts(1.2, 1.5) * 2.4e5 / 1.2e8

@@ -22,11 +22,13 @@ import ufl_beam as ub
 
 FOLDER = Path(__file__).parents[1] / "data" / "effects"
 
-SCENES = 3
-"""Number of scenes of each effect."""
+MESHES = ub.Mesh(), ub.Mesh(), ub.Mesh(), ub.Mesh(degree=2), ub.Mesh(degree=3, lumped=True)
+"""Of the scenes of each effect."""
 
-EXACT = ub.Newton(rtol=1e-13, max_iterations=60)
-"""Iterations go on to round-off, so that numbers do not depend on their way."""
+SCENES = len(MESHES)
+
+EXACT = ub.Newton(rtol=1e-12, max_iterations=60)
+"""Iterations go on nearly to round-off, so that numbers do not depend on their way."""
 
 LARGER = 1.2
 """Factor on a number of an effect in the scene that shows that this number acts."""
@@ -52,7 +54,7 @@ class Draft:
     count: int = 0
     end: float = 0.2
     dt: float | ub.Adaptive = 0.008
-    mesh: ub.Mesh = field(default_factory=ub.Mesh)
+    mesh: ub.Mesh = MESHES[0]
     parts: dict = field(default_factory=dict)
     control: object = None
     further: list = field(default_factory=list)
@@ -130,17 +132,25 @@ class Draft:
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect of the package: classes that have it, a function that writes scenes with it."""
+    """An effect of the package: classes that have it, a function that writes scenes with it.
+
+    Attributes:
+        seeds: Other seeds of some scenes.
+    """
 
     name: str
     kinds: tuple[type, ...]
     write: Callable[[Draft], None]
     schemes: tuple[ub.Scheme, ...]
+    seeds: dict[int, int] = field(default_factory=dict)
 
-    def draft(self, seed, changed=-1):
-        """The scene of a seed, in which one number of the effect may be changed."""
-        random = np.random.default_rng([zlib.crc32(self.name.encode()), seed])
-        draft = Draft(random, self.schemes[seed], changed)
+    def draft(self, scene, changed=-1):
+        """The scene of this number, in which one number of the effect may be changed."""
+        random = np.random.default_rng(
+            [zlib.crc32(self.name.encode()), self.seeds.get(scene, scene)]
+        )
+        scheme = self.schemes[scene % len(self.schemes)]
+        draft = Draft(random, scheme, changed, mesh=MESHES[scene])
         self.write(draft)
         return draft
 
@@ -151,15 +161,15 @@ ANY = ub.EnergyMomentum(), ub.Static(), ub.GeneralizedAlpha(0.8)
 DYNAMIC = ub.EnergyMomentum(), ub.EnergyMomentumDecaying(0.6), ub.GeneralizedAlpha(0.7)
 OVER_STEP = ub.EnergyMomentum(), ub.EnergyMomentumDecaying(0.6), ub.EnergyMomentum(0.05, 0.1)
 OVER_ANY_STEP = ub.EnergyMomentum(), ub.EnergyMomentumStatic(), ub.EnergyMomentumDecaying(0.6)
-"""Schemes of the three scenes; not all effects allow statics, or schemes with forces at the end."""
+"""Schemes of scenes, in turn; not all effects allow statics, or schemes with forces at the end."""
 
 
-def effect(*kinds, schemes=ANY):
+def effect(*kinds, schemes=ANY, seeds=None):
     """Add a function to the effects."""
 
     def add(function):
         name = function.__name__
-        EFFECTS[name] = Effect(name, kinds, function, schemes)
+        EFFECTS[name] = Effect(name, kinds, function, schemes, seeds or {})
         return function
 
     return add

@@ -12,8 +12,9 @@ from stored_scenes import EFFECTS, SCENES, differences, numbers, stored
 TOLERANCE = 1e-9
 """Largest difference, as a part of the largest motion, velocity, force or energy of a scene.
 
-With the compiler flags -O1 and -march=x86-64 numbers differed by up to 1.2e-12, with changes of all
-random numbers by 1e-11 by up to 1.4e-9, and with Newton's method to 1e-11 by up to 4e-9.
+With the compiler flags -O1, -march=x86-64 and -ffp-contract numbers differed by up to 2.3e-12; with
+the tolerance of Newton's method, 1e-12, reduced to 1e-13 by up to 2.5e-10, which another order of
+iterations may do as well.
 """
 
 
