@@ -7,7 +7,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array, eye_array
+from scipy.sparse import csr_array, eye_array
 from scipy.sparse.csgraph import connected_components
 
 from ufl_beam.arrays import Array, Index
@@ -62,20 +62,17 @@ class Frame:
 
     def _supports(self) -> tuple[Index, list[TimeFunction], csr_array]:
         """Return prescribed coordinates, their functions of time, and the matrix E."""
-        numbering, scene, entries = self.numbering, self.numbering.scene, [(0, 0, 0.0)]
-        held = dict[int, TimeFunction]()
+        numbering, scene = self.numbering, self.numbering.scene
+        inclined, held = any(s.angle for s in scene.supports), dict[int, TimeFunction]()
+        E = eye_array(numbering.size, format="lil" if inclined else "csr")  # lil is slow
         if GROUND in scene.rigid_bodies:
             held = dict.fromkeys(map(int, numbering.node(GROUND.middle)), still)
         for support in scene.supports:
-            (i, j, _), angle = (y := numbering.node(support.place)), support.angle
-            c, s = np.cos(angle), np.sin(angle)
-            if angle:
-                entries += [(i, i, c - 1), (i, j, -s), (j, i, s), (j, j, c - 1)]
+            y, c, s = numbering.node(support.place), np.cos(support.angle), np.sin(support.angle)
+            if support.angle:
+                E[np.ix_(y[:2], y[:2])] = [[c, -s], [s, c]]
             held |= {int(y[k]): motion for k, motion in support.held.items()}
-        i, j, values = np.transpose(entries)
-        more = coo_array((values, (i.astype(int), j.astype(int))), (numbering.size,) * 2)
-        E = csr_array(eye_array(numbering.size, format="csr") + more.tocsr())
-        return np.array([*held], dtype=np.int64), [*held.values()], E
+        return np.array([*held], dtype=np.int64), [*held.values()], csr_array(E)
 
     def _ranks(self, cells: Index, comm: MPI.Intracomm) -> Index:
         """Return the process of each cell; all cells at a vertex of more than two are on one.

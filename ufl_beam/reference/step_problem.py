@@ -216,11 +216,12 @@ class StepProblem:
         self.K.ptap(frame.C, result=self.projected)
         P.zeroEntries()
         P.axpy(1.0, self.projected, SUBSET)
-        D = sum((group.tangent() for group in self.connectors), diags_array(slope).tocsr())
-        further = csr_array(frame.rows @ D @ frame.columns).sorted_indices()
-        rows = (x.astype(PETSc.IntType) for x in (further.indptr, further.indices))
-        P.setValuesCSR(*rows, further.data, addv=PETSc.InsertMode.ADD_VALUES)
-        P.assemble()
+        if self.connectors or self.masses.any():
+            D = sum((group.tangent() for group in self.connectors), diags_array(slope).tocsr())
+            further = csr_array(frame.rows @ D @ frame.columns).sorted_indices()
+            rows = (x.astype(PETSc.IntType) for x in (further.indptr, further.indices))
+            P.setValuesCSR(*rows, further.data, addv=PETSc.InsertMode.ADD_VALUES)
+            P.assemble()
         P.zeroRowsColumns((frame.fixed + P.getOwnershipRange()[0]).astype(PETSc.IntType))
 
     # -- Newton's method -------------------------------------------------------------------------
