@@ -85,6 +85,9 @@ INDEPENDENT = {
         "armstrong_frederick": "test_armstrong_frederick_hardens_exponentially",
         "bouc_wen": "test_bouc_wen_against_integration",
     },
+    "unit/test_impacts.py": {
+        "impact": "test_a_clutch_that_closes_loses_the_energy_of_the_relative_speed",
+    },
     "unit/test_imposed_strains.py": {
         "imposed_strain": "test_heat_bends_a_free_beam_and_loads_a_clamped_one",
     },

@@ -825,6 +825,18 @@ def velocity(d):
     ))  # fmt: skip
 
 
+@effect(ub.PrescribedMotion, ub.PrescribedDisplacement, schemes=DYNAMIC)
+def impact(d):
+    """A rate that jumps: at the beginning, and at a kink of the motion."""
+    beam = arm(d)
+    times, way = [0.0, d.some(0.04, 0.07), 1.0], d.either_sign(0.02, 0.05)
+    moved = ub.Table(times, [0.0, way, way])
+    if d.one(True, False):
+        d.add("supports", ub.PrescribedDisplacement(beam.end, v=moved))
+    else:
+        connected(d, ub.PrescribedMotion(moved), beam=beam)
+
+
 # -- discretization and schemes --------------------------------------------------------------------
 
 
