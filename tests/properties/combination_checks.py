@@ -391,7 +391,9 @@ def with_guesses(case, newton):
 
     def find_near(solver, guess):
         at, frame = at_end(*times), solver.frame
-        return find(solver, (frame.E.T @ q[at[0]])[frame.mine] if len(at) else guess)
+        near = (frame.E.T @ q[at[0]])[frame.mine] if len(at) else guess
+        near[frame.fixed] = guess[frame.fixed]  # prescribed motions
+        return find(solver, near)
 
     def find_near_by_old(solver, guess, step):
         at = at_end(step.t1, step.dt)
