@@ -191,6 +191,12 @@ def point_loop(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | 
     return _loop("points_simd.c", source, kernel, sizes, {}, SCHEDULED)
 
 
+@cache
+def element_loop(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | None:
+    """Return the address of the SIMD loop of a compiled function of elements, or None."""
+    return _loop("elements_simd.c", source, kernel, sizes, {}, FLAGS)
+
+
 def _loop(
     file: str, source: Path, kernel: int, sizes: tuple[int, int, int], numbers: dict[str, int],
     flags: list[str],

@@ -24,10 +24,16 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.caches import cached_by_structure
 from ufl_beam.caches import cached_forms as cached_forms
-from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib, view_pointer
+from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib, struct, view_pointer
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
-from ufl_beam.compiled.simd_kernels import BATCH, in_batches, interleaved, point_loop
+from ufl_beam.compiled.simd_kernels import (
+    BATCH,
+    element_loop,
+    in_batches,
+    interleaved,
+    point_loop,
+)
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
 
@@ -358,6 +364,14 @@ class Pointwise:
         sizes = len(outputs), len(self.at), 0
         address = point_loop(source, int(ffi.cast("intptr_t", function)), sizes)
         return ffi.cast("answer_loop *", address or 0)
+
+    def compile_elements(self, *outputs: Expr) -> Any:
+        """Compile a function of elements, ``element_function`` of loops.h."""
+        function, source = self._compiled(outputs)
+        sizes = len(outputs), len(self.at), 0
+        address = element_loop(source, int(ffi.cast("intptr_t", function)), sizes)
+        loop = ffi.cast("void (*)(int, const double *, double *)", address or 0)
+        return struct("element_function", several=loop, one=function, outputs=len(outputs))
 
     def _compiled(self, outputs: Sequence[Expr]) -> tuple[Any, Path]:
         """Return a C function that computes the outputs, and the C file that FFCx wrote for it."""

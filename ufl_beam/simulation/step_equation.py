@@ -14,6 +14,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.dof_numbering import DofNumbering
@@ -35,9 +36,9 @@ from ufl_beam.terms.connector_rows import Setting
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.imposed_strains import CellStrains, ImposedStrains
 from ufl_beam.terms.inertia_and_damping import BEFORE, Inertia, SecondDifferences, damping_forces
-from ufl_beam.terms.load_forces import DeadLoads, FrameForces, LoadTerm, load_terms
+from ufl_beam.terms.load_forces import DeadLoads, load_terms
 from ufl_beam.terms.material_points import create_entries
-from ufl_beam.terms.term import Callbacks, Term
+from ufl_beam.terms.term import Callbacks, LoadTerm, Term
 from ufl_beam.terms.user_forces import Works
 
 MOVING = "inertia", "damping"
@@ -122,6 +123,7 @@ class StepEquation:
         self.loads: list[LoadTerm] = load_terms(
             fields, scheme, ledger, A, None if inertia is None else inertia.c
         )
+        self.loads += load_blocks(subdomain, *setting)
         if imposed is not None:
             self.loads.append(imposed)
         if scene.works:
@@ -361,8 +363,6 @@ class StepEquation:
                 if term.kind != "inertia":
                     term.add_residual(q, r)
                     term.add_tangent(q)
-                if isinstance(term, FrameForces):  # for the forces of cells
-                    term.put_accelerations(self._begun[0], q)
             still = np.zeros(len(q))
             for term, phases in zip(self.terms, self.phases, strict=True):
                 # Some damping computes forces of cells when a step is accepted

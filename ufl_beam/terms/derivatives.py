@@ -279,7 +279,7 @@ LINEARIZE = {
     "connectors": "tabulate_connectors", "second_differences": "tabulate_second_differences",
     "differences": "begin_neighbours",
     "guides": "find_tangents_before", "imposed": "find_imposed_directions",
-    "damping": "tabulate_damping",
+    "damping": "tabulate_damping", "block": "tabulate_block",
 }  # fmt: skip
 ACCEPT = {
     name: f"accept_{name}_derivative"
@@ -291,6 +291,7 @@ ACCEPT = {
         "differences",
         "moving_loads",
         "imposed",
+        "block",
     )
 }
 
@@ -312,6 +313,7 @@ def functions(kind: str) -> list[Any]:
 # -- the adjoint -----------------------------------------------------------------------------------
 
 TRANSPOSES = {
+    "block": ("transpose_block_state", "transpose_block", "finish_block"),
     "form": ("", "transpose_form", "finish_form"),
     "points": ("transpose_points_state", "transpose_points", "finish_points"),
     "product": ("", "transpose_product", ""),
@@ -324,9 +326,6 @@ TRANSPOSES = {
     ),
     "shape": ("", "transpose_shape", ""),
     "differences": ("", "transpose_differences", ""),
-    "followers": ("", "transpose_followers", ""),
-    "pressures": ("", "transpose_pressures", ""),
-    "frame": ("", "transpose_frame", ""),
     "imposed": ("", "transpose_imposed", ""),
     "moving_loads": ("transpose_moving_state", "transpose_moving_loads", "finish_moving_loads"),
     "guides": ("", "transpose_guides", ""),
@@ -354,6 +353,9 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
     def rates(c: Any) -> list[tuple[Any, int]]:
         return [(ffi.addressof(c, "rate", j), 8 * c.size) for j in range(1, c.number)]
 
+    if kind == "block":
+        b = data.block
+        return [(b.w, 8 * b.batches * b.width * b.lanes)]
     if kind == "form":
         return [table(data)]
     if kind == "shape":

@@ -27,8 +27,7 @@ from ufl_beam.model.functions import value_at
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.terms.derivatives import Each, Neighbours, in_c
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.load_forces import LoadTerm
-from ufl_beam.terms.term import Callbacks, Phases
+from ufl_beam.terms.term import Callbacks, LoadTerm, Phases
 
 
 @cached_forms

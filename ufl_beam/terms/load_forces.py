@@ -1,50 +1,39 @@
 # SPDX-License-Identifier: MIT
-"""Loads: dead loads, follower loads, centrifugal and Coriolis forces."""
+"""Loads: dead loads, moving loads, centrifugal and Coriolis forces."""
 
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, number_view, struct
-from ufl_beam.compiled.csr import Csr, Product
-from ufl_beam.discretization.compiled_forms import cached_forms
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, struct
+from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import (
-    Element,
     Fields,
-    mass_kernel,
-    mass_matrix,
     point_masses,
 )
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ArgumentError
-from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import (
-    FollowerLoad,
     Gravity,
     LineLoad,
     Load,
     LoadAlongBeam,
     MovingLoad,
     PointLoad,
-    Pressure,
-    RotatingFrame,
 )
 from ufl_beam.terms.derivatives import Each, Neighbours, differences, in_c
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.term import Callbacks, InCells, Phases, Term
+from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, Phases
 
 
 def load_terms(
@@ -57,52 +46,14 @@ def load_terms(
     subdomain, loads = fields.subdomain, fields.subdomain.numbering.scene.loads
     if loads:
         ledger.supplied["loads"] += 0.0
-    followers = [load for load in loads if isinstance(load, FollowerLoad)]
-    frames = [load for load in loads if isinstance(load, RotatingFrame)]
-    pressures = [load for load in loads if isinstance(load, Pressure)]
     moving = [load for load in loads if isinstance(load, MovingLoad)]
     dead = [load for load in loads if load.dead and load not in moving]
-    terms: list[LoadTerm] = [FrameForces(x, fields, scheme, ledger, A) for x in frames]
+    terms = list[LoadTerm]()
     if dead:
         terms.append(DeadLoads(dead, subdomain, scheme, ledger))
-    if followers:
-        terms.append(FollowerLoads(followers, subdomain, scheme, ledger, A))
-    if pressures:
-        terms.append(Pressures(pressures, subdomain, scheme, ledger, A))
     if moving:
         terms.append(MovingLoads(moving, subdomain, scheme, ledger, A, rates))
     return terms
-
-
-class LoadTerm(Term):
-    """Forces that depend on time or on the configuration.
-
-    Attributes:
-        vector: ``vector`` of loops.h: forces of the term; their norm is added to the force with
-            which the convergence test compares the residual.
-    """
-
-    kind = "loads"
-    vector: Any
-    _scheme: Scheme
-    _ledger: Ledger
-
-    @abstractmethod
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Begin at the time ``t``: take its loads as the loads before the first step; return them.
-
-        The state ``q`` is assumed to be in equilibrium with these loads.  ``v`` are the velocities,
-        None in statics.  ``past`` is the end of an earlier run of the same scene, if there is one.
-        """
-
-    def pass_on(self, archive: Archive) -> None:
-        """Save the forces of the last step that :meth:`carry_on` cannot recompute."""
-
-    def begin_energy(self, t: float, q: Array, v: Array) -> None:
-        """Set the energies of the state that begins a dynamic run without :meth:`carry_on`."""
-
-    def prepare(self, q1: Array) -> None:
-        """Take rates besides velocities from a trial step that ends at ``q1``."""
 
 
 class _AtDofs(LoadTerm):
@@ -112,6 +63,8 @@ class _AtDofs(LoadTerm):
         dofs: Local degrees of freedom that are loaded on any process; the columns of ``_forces``.
     """
 
+    _scheme: Scheme
+    _ledger: Ledger
     _forces: Array  # (rows, dofs); the first row is in the step equation
 
     def _set_dofs(
@@ -227,7 +180,7 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Ind
     if isinstance(load, PointLoad):
         at_places = [(load.place, (*load.force, load.moment))]
     elif isinstance(load, LineLoad):
-        loaded, factors = _loaded_cells(load, subdomain)
+        loaded, factors = loaded_cells(load, subdomain)
         shares, density = factors @ mesh.gauss[1], [*load.force, load.moment]
     elif isinstance(load, Gravity):
         g_x, g_y = load.acceleration
@@ -253,152 +206,13 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Ind
     return loaded, np.hstack([component * along for component in density])
 
 
-def _loaded_cells(load: LoadAlongBeam, subdomain: Subdomain) -> tuple[Index, Array]:
+def loaded_cells(load: LoadAlongBeam, subdomain: Subdomain) -> tuple[Index, Array]:
     """Return the local cells of the loaded beam, and the profile at their Gauss points, (n, 4)."""
     numbering, cells = subdomain.numbering, subdomain.cells
     beam_cells = numbering.cells_of(load.beam)
     loaded = np.flatnonzero((cells >= beam_cells[0]) & (cells <= beam_cells[-1]))
     s = numbering.gauss_parameters(load.beam)[cells[loaded] - beam_cells[0]]
     return loaded, load.factors(s)
-
-
-class FollowerLoads(_AtDofs):
-    """Forces that rotate with the cross-section on which they act."""
-
-    def __init__(
-        self,
-        loads: Sequence[FollowerLoad],
-        subdomain: Subdomain,
-        scheme: Scheme,
-        ledger: Ledger,
-        A: Csr,
-    ) -> None:
-        self._ledger = ledger
-        indices = [i for i, load in enumerate(loads) if subdomain.computes(load.place)]
-        owners = [loads[i] for i in indices]
-        self._indices: Index = np.array(indices, dtype=np.int64)
-        places = [subdomain.local(subdomain.numbering.node(load.place)) for load in owners]
-        dofs = np.array(places, dtype=np.int32).reshape(-1, 3)
-        x, y, self._turning = np.ascontiguousarray(dofs.T)
-        loaded: Array = np.zeros(subdomain.size)
-        loaded[dofs] = 1.0
-        # Forces in the latest residual, and in the residual of the last step.
-        self._set_dofs(subdomain, loaded, owners, rows=2)
-        forces = [[*load.force, load.moment] for load in owners]
-        self._unit_forces = np.array(forces, dtype=np.float64).reshape(-1, 3)
-        # Sizes in the equation, at the end of the step, and at the end of the last step.
-        self._sizes = np.zeros((3, *self._unit_forces.shape))
-        self._rotations, self._A = np.zeros(len(indices)), A
-        self._c = struct(
-            "follower_loads", number=len(indices), size=len(self.dofs), dof=self.dofs,
-            at=np.searchsorted(self.dofs, dofs).astype(np.int32), given=self._unit_forces,
-            turning=self._turning, turn0=self._rotations, part=scheme.load_weight,
-            now=self._sizes[0], end=self._sizes[1], before=self._sizes[2],
-            x=A.positions(x, self._turning), y=A.positions(y, self._turning),
-            force=self._forces[0], force_before=self._forces[1],
-            weight_of_before=scheme.weight_of_before,
-        )  # fmt: skip
-        tangent = loop("add_tangent_of_follower_loads", self._c)
-        self.loops = loop("subtract_follower_loads", self._c), tangent
-
-    def phases(self, callbacks: Callbacks) -> Phases:
-        """Return the loops that begin and accept a step."""
-        c = fill(self._c, factor=callbacks.time_functions(self._in_time))
-        c.work = self._ledger.supplied.pointer("loads")
-        return Phases([loop("begin_follower_loads", c)], [loop("accept_follower_loads", c)])
-
-    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
-        """See the base class."""
-        found = differences(neighbours, lambda term: [term._sizes])
-        return [found, in_c("followers", self._c)]
-
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Set the loads before the next step to the loads at the time ``t``, and return them."""
-        self._sizes[:] = self._unit_forces * self._factors_at(t).reshape(-1, 1)
-        self._rotations[:] = q[self._turning]
-        self.add_residual(q, np.zeros(self._size))
-        self._forces[1] = self._forces[0]
-        return self._whole(self._forces[0])
-
-    def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore the forces in the equation of the last step, and sizes at its end."""
-        self._forces[:] = archive.added("follower loads", self._whole(self._forces[1]))[self.dofs]
-        self._sizes[:] = archive.rows("follower loads", self._indices, self._sizes[2])
-
-
-class Pressures(_AtDofs):
-    """Forces along beams that turn with the deformed axis, per deformed length.
-
-    A force along dx and its normal has nodal forces that are linear in the positions of the nodes.
-    """
-
-    def __init__(
-        self,
-        loads: Sequence[Pressure],
-        subdomain: Subdomain,
-        scheme: Scheme,
-        ledger: Ledger,
-        A: Csr,
-    ) -> None:
-        self._ledger, numbering, mesh = ledger, subdomain.numbering, subdomain.numbering.mesh
-        in_order = _in_order(mesh)
-        points, weights = mesh.gauss
-        at_points = weights[:, in_order, None] * mesh.slopes(points)[:, None, in_order]
-        pairs = [_loaded_cells(load, subdomain) for load in loads]
-        order: Index = np.concatenate([cells for cells, _ in pairs])
-        load_index = np.repeat(np.arange(len(loads)), [len(cells) for cells, _ in pairs])
-        shares = np.tensordot(np.concatenate([factors for _, factors in pairs]), at_points, 1)
-        nodes = numbering.nodes_of_cells[subdomain.cells[order]]
-        dofs = subdomain.cell_dofs[order, : 2 * nodes.shape[1]]
-        loaded: Array = np.zeros(subdomain.size)
-        loaded[dofs] = 1.0
-        self._set_dofs(subdomain, loaded, loads, rows=2)
-        rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None, :])
-        self._factors = np.zeros((3, len(loads)))  # in the equation, at its end, before the step
-        self._q0: Array = np.zeros(subdomain.size)
-        each, second = np.zeros((2, len(order), 3 * nodes.shape[1]))
-        self._each = ffi.new("double *[1]", [doubles(each)]), each
-        self._c = struct(
-            "pressures", loads=len(loads), cells=len(order), nodes=nodes.shape[1],
-            size=len(self.dofs), dof=self.dofs, load=load_index.astype(np.int32),
-            at=np.searchsorted(self.dofs, dofs).astype(np.int32), share=shares,
-            place=np.ascontiguousarray(numbering.points[nodes].transpose(0, 2, 1)), q0=self._q0,
-            part=scheme.load_weight, tangential=np.array([load.tangential for load in loads]),
-            normal=np.array([load.normal for load in loads]), now=self._factors[0],
-            end=self._factors[1], before=self._factors[2],
-            entry=A.positions(rows.ravel(), columns.ravel()), each=self._each[0],
-            force=self._forces[0], force_before=self._forces[1],
-            weight_of_before=scheme.weight_of_before,
-        )  # fmt: skip
-        tangent = loop("add_tangent_of_pressures", self._c)
-        self.loops, self._A = (loop("subtract_pressures", self._c), tangent), A
-        self.in_cells = [InCells(lambda: _NodeForces(self._each[0], second), lib.DENSITY, order)]
-
-    def phases(self, callbacks: Callbacks) -> Phases:
-        """Return the loops that begin and accept a step."""
-        c = fill(self._c, factor=callbacks.time_functions(self._in_time))
-        c.work = self._ledger.supplied.pointer("loads")
-        return Phases([loop("begin_pressures", c)], [loop("accept_pressures", c)])
-
-    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
-        """See the base class."""
-        found = differences(neighbours, lambda term: [term._factors])
-        return [found, in_c("pressures", self._c)]
-
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Set the loads before the next step to the loads at the time ``t``, and return them."""
-        self._factors[:] = self._factors_at(t)
-        self._q0[:] = q
-        self._c.q0 = doubles(self._q0)
-        self.add_residual(q, np.zeros(self._size))
-        self._forces[1] = self._forces[0]
-        return self._whole(self._forces[0])
-
-    def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore the forces in the equation of the last step, and factors at its end."""
-        self._forces[:] = archive.added("pressures", self._whole(self._forces[1]))[self.dofs]
-        for k, factor in enumerate(self._factors[2]):
-            self._factors[:, k] = archive.number(f"factor of pressure {k}", factor)
 
 
 class MovingLoads(_AtDofs):
@@ -445,7 +259,7 @@ class MovingLoads(_AtDofs):
             first=np.cumsum([0, *map(len, cells)]).astype(np.int32),
             cell=np.concatenate([number[x] for x in cells]),
             ends=ends,
-            polynomial=mesh.polynomials[:, _in_order(mesh)].T.copy(),
+            polynomial=mesh.polynomials[:, in_order(mesh)].T.copy(),
             given=forces, now=self._on_cells[0],
             end=self._on_cells[1], before=self._on_cells[2], each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
@@ -558,7 +372,7 @@ class MovingLoads(_AtDofs):
         self._masses_in(archive)
 
 
-def _in_order(mesh: Mesh) -> list[int]:
+def in_order(mesh: Mesh) -> list[int]:
     """Return the positions along a cell of its nodes: both vertices, then the nodes between."""
     first, *between, last = range(len(mesh.nodes))
     return [first, last, *between]
@@ -573,86 +387,3 @@ class _NodeForces(NamedTuple):
     def keep_entries(self) -> tuple[Any, int, Array]:
         """Return a pointer to the address of the array, one cell in a batch, a second array."""
         return self.each, 1, self.second
-
-
-@cached_forms
-def _turned_mass(element: Element) -> ufl.Form:
-    (u, _), (w_u, _) = split(ufl.TrialFunction(element.space)), split(element.w)
-    return element.inertia[0] * ufl.dot(perpendicular(u), w_u) * element.dx_of_mass()
-
-
-class FrameForces(LoadTerm):
-    """Centrifugal forces, which have a potential, and Coriolis forces, which do no work.
-
-    Rotary inertia causes no further moments, because a constant rate of the frame adds a constant
-    to the angular velocity of a cross-section.
-    """
-
-    def __init__(
-        self, frame: RotatingFrame, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr
-    ) -> None:
-        subdomain = fields.subdomain
-        self._ledger = ledger
-        # G v is the mass matrix times velocities turned by 90°; the Coriolis force is -2 Ω G v
-        S, G = mass_matrix(fields), fields.assembled(_turned_mass(fields.element))
-        for at, mass, _ in point_masses(subdomain.numbering.scene):
-            dofs = subdomain.numbering.node(at)[:2]
-            if subdomain.owns(dofs).all():
-                u, v = subdomain.local(dofs)
-                G.data[G.positions(np.array([u, v]), np.array([v, u]))] += (-mass, mass)
-        coriolis = 2 * frame.rate if has_inertia(scheme) else 0.0
-        S.data[np.isin(S.rows(), subdomain.rotations)] = 0.0
-        S.data *= frame.rate**2
-        G.data *= coriolis
-        self._matrices, self._A = (Product(S), Product(G)), A
-        x, y = (np.ascontiguousarray(axis, dtype=np.int32) for axis in subdomain.translations())
-        # Vectors from the centre of rotation to all nodes.  Nodes of beams are written last: if
-        # they are joined to the ground, they share its freedoms, but are not at its centre.
-        numbering, from_axis = subdomain.numbering, np.zeros(subdomain.numbering.size)
-        centers = np.array([body.center for body in numbering.scene.rigid_bodies]).reshape(-1, 2)
-        points = np.concatenate([centers, numbering.points]) - frame.about
-        from_axis[np.concatenate([numbering.dofs_of_bodies, numbering.dofs])[:, :2]] = points
-        change, place, space, self._force, self._before, rest = np.zeros((6, subdomain.size))
-        accelerations = ffi.new("double *[1]", [doubles(rest)])
-        self._rest = rest, accelerations
-        self.vector = struct("vector", size=subdomain.size, values=self._force)
-        c = self._c = struct(
-            "rotating_frame", size=subdomain.size, entries=len(A.data), places=len(x), x=x, y=y,
-            pull=self._matrices[0].c, turn=self._matrices[1].c, pulls=S.data, turns=G.data,
-            from_centre=from_axis[subdomain.dofs], rate=frame.rate, coriolis=coriolis,
-            part=scheme.load_weight, weight_of_before=scheme.weight_of_before, change=change,
-            place=place, space=space, force=self._force, before=self._before,
-            accelerations=accelerations,
-        )  # fmt: skip
-        self.loops = loop("subtract_frame_forces", c), loop("add_tangent_of_frame", c)
-        at_cells = fields.order, accelerations
-        self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at_cells)]
-
-    def phases(self, callbacks: Callbacks) -> Phases:
-        """Return the loops that begin and accept a step."""
-        self._c.work = self._ledger.supplied.pointer("loads")
-        return Phases([loop("begin_frame", self._c)], [loop("accept_frame", self._c)])
-
-    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
-        """See the base class."""
-        found = differences(neighbours, lambda term: [number_view(term._c, "grown")])
-        return [found, in_c("frame", self._c)]
-
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Set the forces before the next step to the forces at ``q``, and return them."""
-        self._c.grown = 1.0
-        still = np.zeros(len(q))
-        step = struct("time_step", q0=q, dt=math.inf, fraction=1.0, at=1.0)
-        lib.begin_frame(self._c, step, ffi.NULL, ffi.NULL)
-        self.add_residual(q, np.zeros(len(q)))
-        lib.accept_frame(self._c, step, doubles(q), doubles(still))
-        return self._force.copy()
-
-    def put_accelerations(self, step: Any, q: Array) -> None:
-        """Compute the accelerations of cells in the latest residual; ``step`` is of loops.h."""
-        lib.accept_frame(self._c, step, doubles(q), doubles(np.zeros(len(q))))
-
-    def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore the forces of the last step, and the load factor at its end."""
-        self._force[:] = self._before[:] = archive.added("rotating frame", self._before)
-        self._c.grown = archive.number("growth of the rotating frame", self._c.grown)

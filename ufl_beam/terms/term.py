@@ -143,6 +143,35 @@ class Term(ABC):
         """Save or restore the data on which later steps depend; ``q`` is the configuration."""
 
 
+class LoadTerm(Term):
+    """Forces that depend on time or on the configuration.
+
+    Attributes:
+        vector: ``vector`` of loops.h: forces of the term; their norm is added to the force with
+            which the convergence test compares the residual.
+    """
+
+    kind = "loads"
+    vector: Any
+
+    @abstractmethod
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
+        """Begin at the time ``t``: take its loads as the loads before the first step; return them.
+
+        The state ``q`` is assumed to be in equilibrium with these loads.  ``v`` are the velocities,
+        None in statics.  ``past`` is the end of an earlier run of the same scene, if there is one.
+        """
+
+    def pass_on(self, archive: Archive) -> None:
+        """Save the forces of the last step that :meth:`carry_on` cannot recompute."""
+
+    def begin_energy(self, t: float, q: Array, v: Array) -> None:
+        """Set the energies of the state that begins a dynamic run without :meth:`carry_on`."""
+
+    def prepare(self, q1: Array) -> None:
+        """Take rates besides velocities from a trial step that ends at ``q1``."""
+
+
 class Callbacks:
     """Python functions that C calls while it takes steps.
 

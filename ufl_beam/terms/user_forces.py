@@ -25,8 +25,7 @@ from ufl_beam.model.functions import Constant
 from ufl_beam.model.works import Potential, Work
 from ufl_beam.terms.derivatives import Each, Neighbours, differences, form_derivative, in_c
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.load_forces import LoadTerm
-from ufl_beam.terms.term import Callbacks, InCells, Phases, entering
+from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, Phases, entering
 
 
 class Acting:

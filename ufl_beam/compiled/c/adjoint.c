@@ -548,46 +548,6 @@ void transpose_differences(void *self, adjoint *a, const double *λ)
   }
 }
 
-void transpose_followers(void *self, adjoint *a, const double *λ)
-{
-  const follower_loads *f = self;
-  begin_follower_loads(self, a->step, 0, 0);
-  for (int k = 0; k < f->number; ++k) {
-    const int32_t *at = f->at + 3 * k;
-    double x, y;
-    turn_load(f, k, a->d->x, &x, &y);
-    a->q0[f->turning[k]] += (1 - f->part) * (y * λ[f->dof[at[0]]] - x * λ[f->dof[at[1]]]);
-  }
-}
-
-void transpose_pressures(void *self, adjoint *a, const double *λ)
-{
-  const pressures *of = self;
-  double e[8];
-  begin_pressures(self, a->step, 0, 0);
-  for (int k = 0; k < of->cells; ++k) {
-    const int32_t *at = of->at + 2 * of->nodes * k;
-    for (int j = 0; j < 2 * of->nodes; ++j) {
-      double x[8] = {0};
-      x[j] = 1 - of->part;
-      find_pressure(of, k, x, e);
-      for (int i = 0; i < 2 * of->nodes; ++i) a->q0[of->dof[at[j]]] += e[i] * λ[of->dof[at[i]]];
-    }
-  }
-}
-
-/* The matrix of the forces by positions is symmetric, that of the forces by velocities skew. */
-void transpose_frame(void *self, adjoint *a, const double *λ)
-{
-  const rotating_frame *f = self;
-  double *x = a->values;
-  begin_frame(self, a->step, 0, 0);
-  for (int i = 0; i < f->size; ++i) x[i] = -f->growth * (1 - f->part) * λ[i];
-  add_product(f->pull, x, a->q0);
-  for (int i = 0; i < f->size; ++i) x[i] = λ[i] / f->dt;
-  add_product(f->turn, x, a->q0);
-}
-
 /* Imposed strains, after all terms that use them. The run has whole steps, so that the strains at the
  * beginning are those at its time. */
 void transpose_imposed(void *self, adjoint *a, const double *λ)

@@ -667,41 +667,6 @@ void accept_differences_derivative(void *self, const derivatives *d, int p)
 
 /* -- loads that depend on the configuration before the step -------------------------------------------- */
 
-void add_followers_derivative(void *self, const derivatives *d, int p, double *r)
-{
-  const follower_loads *f = self;
-  for (int k = 0; k < f->number; ++k) {
-    const double turn = (1 - f->part) * d->q0[(size_t)p * d->size + f->turning[k]];
-    const int32_t *at = f->at + 3 * k;
-    double x, y;
-    turn_load(f, k, d->x, &x, &y);
-    r[f->dof[at[0]]] += y * turn, r[f->dof[at[1]]] -= x * turn;
-  }
-}
-
-void add_pressures_derivative(void *self, const derivatives *d, int p, double *r)
-{
-  const pressures *of = self;
-  const double *q0 = d->q0 + (size_t)p * d->size;
-  double x[8] = {0}, e[8];
-  for (int k = 0; k < of->cells; ++k) {
-    const int32_t *at = of->at + 2 * of->nodes * k;
-    for (int i = 0; i < 2 * of->nodes; ++i) x[i] = (1 - of->part) * q0[of->dof[at[i]]];
-    find_pressure(of, k, x, e);
-    for (int i = 0; i < 2 * of->nodes; ++i) r[of->dof[at[i]]] += e[i];
-  }
-}
-
-void add_frame_derivative(void *self, const derivatives *d, int p, double *r)
-{
-  const rotating_frame *f = self;
-  const double *q0 = d->q0 + (size_t)p * d->size;
-  for (int i = 0; i < f->size; ++i) d->space[i] = -f->growth * (1 - f->part) * q0[i];
-  add_product(f->pull, d->space, r);
-  for (int i = 0; i < f->size; ++i) d->space[i] = -q0[i] / f->dt;
-  add_product(f->turn, d->space, r);
-}
-
 /* -- moving loads --------------------------------------------------------------------------------------- */
 
 /* Differences between scenes give the derivatives by numbers and functions of time. Neighbouring scenes have the

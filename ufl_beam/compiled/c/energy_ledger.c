@@ -94,22 +94,6 @@ void accept_dead_loads(void *self, const time_step *step, const double *q1, cons
   sum_loads(l, l->factors_before, l->before);
 }
 
-void accept_follower_loads(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const follower_loads *f = self;
-  *f->work += work_in_step(f->size, f->dof, f->weight_of_before, f->force_before, f->force, s);
-  memcpy(f->force_before, f->force, f->size * sizeof *f->force);
-  memcpy(f->before, f->end, 3 * (size_t)f->number * sizeof *f->end);
-}
-
-void accept_pressures(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const pressures *p = self;
-  *p->work += work_in_step(p->size, p->dof, p->weight_of_before, p->force_before, p->force, s);
-  memcpy(p->force_before, p->force, p->size * sizeof *p->force);
-  memcpy(p->before, p->end, p->loads * sizeof *p->end);
-}
-
 /* The point of the axis at mass k at a time; returns whether this process has it. The speed is that of a
  * parabola through later places: some t begin at 0. */
 static int find_at(const moving_loads *m, int k, double t, on_axis *a)
@@ -213,21 +197,6 @@ void accept_moving_loads(void *self, const time_step *step, const double *q1, co
   }
   memcpy(m->force_before, m->force, m->size * sizeof *m->force);
   memcpy(m->before, m->end, 2 * (size_t)m->nodes * m->cells * sizeof *m->end);
-}
-
-void accept_frame(void *self, const time_step *step, const double *q1, const double *s)
-{
-  rotating_frame *f = self;
-  const double out = -f->growth * (f->rate * f->rate), across = f->coriolis / f->dt;
-  double *to = *f->accelerations;
-  *f->work += work_in_step(f->size, 0, f->weight_of_before, f->before, f->force, s);
-  memcpy(f->before, f->force, f->size * sizeof *f->force);
-  f->grown = f->grown_at_end;
-  for (int k = 0; k < f->places; ++k) {
-    const int x = f->x[k], y = f->y[k];
-    to[x] = out * f->place[x] - across * f->change[y];
-    to[y] = out * f->place[y] + across * f->change[x];
-  }
 }
 
 /* Enter the loss of a potential by the scheme, and the energy that its change in time supplied. */

@@ -79,88 +79,6 @@ void subtract_vector(void *self, const double *q, double *b)
   for (int i = 0; i < a->size; ++i) b[a->dof[i]] -= a->values[i];
 }
 
-/* Follower load k at q in the axes of the plane. */
-static void turn_load(const follower_loads *f, int k, const double *q, double *x, double *y)
-{
-  const double turn = f->turn0[k] + f->part * (q[f->turning[k]] - f->turn0[k]);
-  const double *size = f->now + 3 * k, c = cos(turn), s = sin(turn);
-  *x = c * size[0] - s * size[1], *y = s * size[0] + c * size[1];
-}
-
-void subtract_follower_loads(void *self, const double *q, double *r)
-{
-  const follower_loads *f = self;
-  memset(f->force, 0, f->size * sizeof *f->force);
-  for (int k = 0; k < f->number; ++k) {
-    double x, y;
-    turn_load(f, k, q, &x, &y);
-    const int32_t *at = f->at + 3 * k;
-    f->force[at[0]] += x, f->force[at[1]] += y, f->force[at[2]] += f->now[3 * k + 2];
-  }
-  for (int i = 0; i < f->size; ++i) r[f->dof[i]] -= f->force[i];
-}
-
-void add_tangent_of_follower_loads(void *self, const double *q, double *tangent)
-{
-  const follower_loads *f = self;
-  for (int k = 0; k < f->number; ++k) {
-    double x, y;
-    turn_load(f, k, q, &x, &y);
-    tangent[f->x[k]] += f->part * y, tangent[f->y[k]] -= f->part * x;
-  }
-}
-
-/* Minus the forces on the nodes of cell k at the positions x of its nodes. */
-static void find_pressure(const pressures *p, int k, const double *x, double *e)
-{
-  const int n = p->nodes;
-  const double factor = p->now[p->load[k]];
-  const double along = factor * p->tangential[p->load[k]], across = factor * p->normal[p->load[k]];
-  for (int i = 0; i < n; ++i) {
-    const double *share = p->share + (n * k + i) * n;
-    double a = 0, b = 0;
-    for (int j = 0; j < n; ++j) a += share[j] * x[j], b += share[j] * x[n + j];
-    e[i] = across * b - along * a, e[n + i] = -across * a - along * b;
-  }
-}
-
-void subtract_pressures(void *self, const double *q, double *r)
-{
-  const pressures *p = self;
-  const int n = p->nodes;
-  double *e = *p->each;
-  memset(p->force, 0, p->size * sizeof *p->force);
-  for (int k = 0; k < p->cells; ++k, e += 3 * n) {
-    const int32_t *at = p->at + 2 * n * k;
-    double x[8] = {0}; /* of the four nodes of degree 3 */
-    for (int i = 0; i < 2 * n; ++i) {
-      const int dof = p->dof[at[i]];
-      x[i] = p->place[2 * n * k + i] + p->q0[dof] + p->part * (q[dof] - p->q0[dof]);
-    }
-    find_pressure(p, k, x, e);
-    for (int i = 0; i < 2 * n; ++i) p->force[at[i]] -= e[i];
-  }
-  for (int i = 0; i < p->size; ++i) r[p->dof[i]] -= p->force[i];
-}
-
-void add_tangent_of_pressures(void *self, const double *q, double *tangent)
-{
-  const pressures *p = self;
-  const int n = p->nodes;
-  for (int k = 0; k < p->cells; ++k) {
-    const double factor = p->part * p->now[p->load[k]];
-    const double along = factor * p->tangential[p->load[k]], across = factor * p->normal[p->load[k]];
-    const int32_t *entry = p->entry + 4 * n * n * k;
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; j < n; ++j) {
-        const double share = p->share[(n * k + i) * n + j];
-        const int32_t *x = entry + i * 2 * n + j, *y = x + 2 * n * n;
-        tangent[x[0]] -= along * share, tangent[x[n]] += across * share;
-        tangent[y[0]] -= across * share, tangent[y[n]] -= along * share;
-      }
-  }
-}
-
 /* Index of the cell of load k at a time, OFF if it is not on the beam, or ELSEWHERE; and its place in the cell,
  * from 0 to 1. In a neighbouring scene the cell is that of the run. */
 static int find_loaded_cell(const moving_loads *m, int k, double t, double *s)
@@ -315,30 +233,6 @@ void add_product(const constant_matrix *A, const double *x, double *y)
     FOR_WIDTH(A->begin[g + 1] - A->begin[g], ADD)
 #undef ADD
   }
-}
-
-void subtract_frame_forces(void *self, const double *q, double *r)
-{
-  const rotating_frame *f = self;
-  for (int i = 0; i < f->size; ++i) {
-    f->change[i] = q[i] - f->q0[i];
-    f->place[i] = f->from_centre[i] + f->q0[i] + f->part * f->change[i];
-  }
-  memset(f->force, 0, f->size * sizeof *f->force);
-  memset(f->space, 0, f->size * sizeof *f->space);
-  add_product(f->pull, f->place, f->force);
-  add_product(f->turn, f->change, f->space);
-  for (int i = 0; i < f->size; ++i) {
-    f->force[i] *= f->growth;
-    r[i] = r[i] - f->force[i] + f->space[i] / f->dt;
-  }
-}
-
-void add_tangent_of_frame(void *self, const double *q, double *tangent)
-{
-  const rotating_frame *f = self;
-  const double pulled = f->growth * f->part;
-  for (int i = 0; i < f->entries; ++i) tangent[i] += f->turns[i] / f->dt - pulled * f->pulls[i];
 }
 
 /* tan(x/2) for the increment x of rotation k, stored because forces and their tangent use the same

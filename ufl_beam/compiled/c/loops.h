@@ -10,9 +10,9 @@ typedef struct { part *add; void *self; } call;
 
 /* Several contributions. */
 typedef struct { int number; const call *part; } calls;
-part add_calls, add_cells, add_static_tangent, subtract_vector, subtract_follower_loads,
-  add_tangent_of_follower_loads, subtract_pressures, add_tangent_of_pressures, subtract_moving_loads, add_tangent_of_moving_masses, subtract_frame_forces, add_tangent_of_frame, add_step_force,
-  add_step_tangent, add_inelastic_force, add_inelastic_tangent;
+part add_calls, add_cells, add_static_tangent, subtract_vector,
+  subtract_moving_loads, add_tangent_of_moving_masses, add_step_force,
+  add_step_tangent, add_inelastic_force, add_inelastic_tangent, add_block, add_block_tangent;
 
 /* -- forms and constant matrices --------------------------------------------------------------- */
 
@@ -721,20 +721,38 @@ typedef struct {
   double *entry, held;
 } form_value;
 
-/* Loads that rotate with cross-sections, see FollowerLoads; three numbers of each. */
+/* -- blocks: all elements with one statement, see blocks/statement.py ---------------------------------- */
+
+enum { MOST_INPUTS = 256 }; /* of a statement */
+
+/* A compiled function of elements. `several` computes all batches: the first input of each element of a
+ * batch, then the second ones, and so on; outputs alike. */
 typedef struct {
-  int number, size;
-  const int32_t *dof;      /* degrees of freedom that are loaded; size */
-  const int32_t *at;       /* indices in `dof` */
-  const int32_t *turning;  /* rotations that the loads follow; number */
-  double *turn0, part;     /* these at the beginning of the step; fraction of the increment for the loads */
-  const double *given;     /* forces along and across, and moments, for the factor 1 */
-  const time_function *factor;
-  double *now, *end, *before; /* in the equation, at the end of the step, at the end of the last step */
-  const int32_t *x, *y;    /* entries of the tangent: derivatives of forces in the plane by the rotations */
-  double *force, *force_before; /* in the plane: in the latest residual, in the last step; size */
-  double weight_of_before, *work;
-} follower_loads;
+  void (*several)(int batches, const double *w, double *out); /* or none */
+  kernel *one;
+  int outputs;
+} element_function;
+
+/* Inputs of an element are motions of its nodes at the end of the step and before it, `unknowns` each, its
+ * state, its numbers, and `steps` numbers of the step. */
+typedef struct {
+  const element_function *force_of, *tangent_of, *end_of; /* end_of: state, stored and lost energies; or none */
+  int lanes, elements, batches, unknowns, states, numbers, steps, width; /* lanes: elements of a batch */
+  int size;                 /* number of degrees of freedom on which elements act */
+  const int32_t *dof, *at;  /* these; index in `dof` of each motion of an element */
+  const int32_t *entry;     /* entry of the matrix of each output of tangent_of */
+  int functions;            /* of time */
+  const time_function *function;
+  double *now, *end, *before; /* their values in the equation, at the end of the step, at the end of the last
+                               * step; then the length of the step */
+  const int32_t *from;      /* index in `now` of each number of the step of an element */
+  double *w, *out, *space;  /* inputs; space for outputs of all elements, and of one */
+  double **each;            /* forces of elements in the latest residual */
+  double *force, *force_before; /* in the latest residual, in that of the last step; size */
+  double weight_of_before, *work; /* work: entry of the ledger of the work of minus the forces */
+  int stored, lost;
+  double *energy, *const *entries; /* stored energies; entries of stored, then of lost energies */
+} block;
 
 /* Imposed strains of the cells of a term, see CellStrains: elastic cells, whose forms have the strains
  * as a coefficient, or cells with material points. */
@@ -756,25 +774,6 @@ typedef struct {
   imposed_cells *const *group;
   double weight_of_before, *supplied;
 } imposed_strains;
-
-/* Forces along beams that turn with the deformed axis, see Pressures. Displacements of a cell are x
- * of all nodes, then y. */
-typedef struct {
-  int loads, cells, nodes, size; /* nodes: of a cell; size: of `dof` */
-  const int32_t *dof;      /* degrees of freedom that are loaded */
-  const int32_t *load, *at; /* load of each cell; index in `dof` of each displacement of a cell */
-  const double *share;     /* cells x nodes x nodes: force on a node by the position of a node */
-  const double *place;     /* positions of the nodes of the undeformed cells */
-  const double *q0;        /* configuration at the beginning of the step */
-  double part;             /* fraction of the increment at which the loads act */
-  const double *tangential, *normal; /* of each load, for the factor 1 */
-  const time_function *factor;
-  double *now, *end, *before; /* factors in the equation, at the end of the step, at the end of the last step */
-  const int32_t *entry;    /* entries of the tangent: 2 nodes x 2 nodes of each cell */
-  double **each;           /* minus the forces on the nodes of cells in the latest residual: x, y, moments */
-  double *force, *force_before; /* in the latest residual, in the last step; size */
-  double weight_of_before, *work;
-} pressures;
 
 /* Forces and masses that move along beams, see MovingLoads. Forces on a cell are x of its nodes, then
  * y. */
@@ -831,21 +830,6 @@ typedef struct {
   double weight_of_before;
   double *work; /* entry of the ledger */
 } dead_loads;
-
-/* Centrifugal and Coriolis forces, see FrameForces. */
-typedef struct {
-  int size, entries, places;
-  const int32_t *x, *y;             /* displacements of each point */
-  const constant_matrix *pull, *turn; /* matrices of the forces by positions and by velocities */
-  const double *pulls, *turns;      /* their entries in the tangent */
-  const double *from_centre;        /* positions at rest */
-  double rate, coriolis, part, weight_of_before; /* coriolis: twice the rate, or 0 in statics */
-  const double *q0;
-  double dt, growth, grown, grown_at_end; /* load factors: in the equation, before and after the step */
-  double *change, *place, *space;   /* change: of q; place: positions at which forces act */
-  double *force, *before;           /* in the latest residual, in the last step */
-  double *const *accelerations, *work;
-} rotating_frame;
 
 /* First parameters of a work: time, length of the step, load factor; the parameters of its user
  * follow. */
@@ -1128,14 +1112,15 @@ typedef struct {
 } time_loop;
 
 phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
-  accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_pressures,
-  accept_pressures, begin_moving_loads, accept_moving_loads,
-  add_energy_of_moving_masses, begin_frame, accept_frame, begin_works,
+  accept_dead_loads,
+  begin_moving_loads, accept_moving_loads,
+  add_energy_of_moving_masses, begin_works,
   accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
   accept_second_differences, begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
   begin_tangent_damping, accept_tangent_damping,
   begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,
-  begin_connectors_again, accept_connectors, add_energy_of_connectors, begin_guides, accept_guides;
+  begin_connectors_again, accept_connectors, add_energy_of_connectors, begin_guides, accept_guides,
+  begin_block, accept_block, add_energy_of_block;
 admission points_dissipate;
 change_of_energy change_of_form, change_of_points, change_of_connectors, change_of_imposed_strains;
 double value_at(const time_function *f, double t);
@@ -1291,6 +1276,19 @@ typedef struct {
   const constant_matrix *const *change;
 } product_derivative;
 
+/* Derivatives of a block by its inputs, with a row for each parameter. The table has the rows of forces and
+ * states. */
+typedef struct {
+  block *block;
+  int parameters, neighbours;
+  block *const *neighbour;  /* in scenes with other values of a parameter */
+  const double *weight;     /* see derivatives */
+  const element_function *table_of;
+  double *table, *direction; /* direction: space for the inputs of a batch */
+  double *by_state, *by_number, *by_step;
+  double *state_bar, *number_bar, *step_bar; /* of the adjoint */
+} block_derivatives;
+
 /* Derivatives of dead loads, from the loads of scenes with other values of a parameter. */
 typedef struct {
   int parameters, size, neighbours;
@@ -1403,14 +1401,14 @@ void transpose_product(void *self, adjoint *a, const double *lambda);
 void transpose_loads(void *self, adjoint *a, const double *lambda);
 void transpose_shape(void *self, adjoint *a, const double *lambda);
 void transpose_differences(void *self, adjoint *a, const double *lambda);
-void transpose_followers(void *self, adjoint *a, const double *lambda);
-void transpose_pressures(void *self, adjoint *a, const double *lambda);
-void transpose_frame(void *self, adjoint *a, const double *lambda);
 void transpose_moving_state(void *self, adjoint *a);
 void transpose_moving_loads(void *self, adjoint *a, const double *lambda);
 void finish_moving_loads(void *self, adjoint *a);
 void transpose_guides(void *self, adjoint *a, const double *lambda);
 void transpose_damping(void *self, adjoint *a, const double *lambda);
+void transpose_block_state(void *self, adjoint *a);
+void transpose_block(void *self, adjoint *a, const double *lambda);
+void finish_block(void *self, adjoint *a);
 void finish_form(void *self, adjoint *a);
 void finish_points(void *self, adjoint *a);
 int differentiate_step(derivatives *d, time_loop *m, int initial);
@@ -1420,9 +1418,6 @@ void tabulate_damping(void *self, const time_step *step, const double *q1);
 void add_damping_derivative(void *self, const derivatives *d, int p, double *r);
 void find_imposed_directions(void *self, const time_step *step, const double *q1);
 void add_differences_derivative(void *self, const derivatives *d, int p, double *r);
-void add_followers_derivative(void *self, const derivatives *d, int p, double *r);
-void add_pressures_derivative(void *self, const derivatives *d, int p, double *r);
-void add_frame_derivative(void *self, const derivatives *d, int p, double *r);
 void add_moving_loads_derivative(void *self, const derivatives *d, int p, double *r);
 void add_guides_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_imposed_derivative(void *self, const derivatives *d, int p);
@@ -1430,6 +1425,9 @@ void accept_differences_derivative(void *self, const derivatives *d, int p);
 void accept_moving_loads_derivative(void *self, const derivatives *d, int p);
 void keep_derivatives(derivatives *d, const time_loop *m);
 void keep_substep(derivatives *d, const time_loop *m, double end);
+void tabulate_block(void *self, const time_step *step, const double *q1);
+void add_block_derivative(void *self, const derivatives *d, int p, double *r);
+void accept_block_derivative(void *self, const derivatives *d, int p);
 void add_form_derivative(void *self, const derivatives *d, int p, double *r);
 void add_connectors_derivative(void *self, const derivatives *d, int p, double *r);
 void add_points_derivative(void *self, const derivatives *d, int p, double *r);

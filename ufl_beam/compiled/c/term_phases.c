@@ -116,29 +116,6 @@ void begin_dead_loads(void *self, const time_step *step, const double *q1, const
   if (!same) sum_loads(l, l->factors, l->force);
 }
 
-void begin_follower_loads(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const follower_loads *f = self;
-  for (int k = 0; k < f->number; ++k) {
-    const double factor = value_at(f->factor + k, step->load_time);
-    for (int i = 3 * k; i < 3 * k + 3; ++i) {
-      f->end[i] = f->before[i] + step->fraction * (f->given[i] * factor - f->before[i]);
-      f->now[i] = f->before[i] + step->at * (f->end[i] - f->before[i]);
-    }
-    f->turn0[k] = step->q0[f->turning[k]];
-  }
-}
-
-void begin_pressures(void *self, const time_step *step, const double *q1, const double *s)
-{
-  pressures *p = self;
-  for (int k = 0; k < p->loads; ++k) {
-    const double change = step->fraction * (value_at(p->factor + k, step->load_time) - p->before[k]);
-    p->end[k] = p->before[k] + change, p->now[k] = p->before[k] + step->at * change;
-  }
-  p->q0 = step->q0;
-}
-
 /* Forces on the nodes of cells at the time t. */
 static void find_moving_loads(const moving_loads *m, double t, double *out)
 {
@@ -173,15 +150,6 @@ void begin_moving_loads(void *self, const time_step *step, const double *q1, con
     if (step->fraction != 1) m->end[i] = before + step->fraction * (m->end[i] - before);
     m->now[i] = step->at == 1 ? m->end[i] : before + step->at * (m->end[i] - before);
   }
-}
-
-void begin_frame(void *self, const time_step *step, const double *q1, const double *s)
-{
-  rotating_frame *f = self;
-  const double growth = step->fraction * (1 - f->grown);
-  f->growth = f->grown + step->at * growth, f->grown_at_end = f->grown + growth;
-  f->q0 = step->q0, f->dt = step->dt;
-  memcpy(f->force, f->before, f->size * sizeof *f->force); /* iterates of a failed step may be far away */
 }
 
 /* Write a parameter into the forms of a work that depend on it, if it has changed. */

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Effects that are stated once, in UFL, and the loop that computes what follows."""

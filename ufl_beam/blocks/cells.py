@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""Elements of statements that are cells of beams: interpolation and virtual work in UFL."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from ufl.core.expr import Expr
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.blocks.statement import COMPONENTS, Inputs
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.model.beams import Mesh
+from ufl_beam.quadrature import gauss_rule
+
+
+def node_order(degree: int) -> list[int]:
+    """Return the positions along a cell of its nodes: both vertices, then the nodes between."""
+    return [0, *([degree] if degree else []), *range(1, degree)]
+
+
+def places(degree: int) -> list[str]:
+    """Return the names of the positions of the nodes of a cell: X of all nodes, then Y; m."""
+    return [f"{c}{k}" for c in "XY" for k in range(degree + 1)]
+
+
+def positions(subdomain: Subdomain, cells: Index) -> Array:
+    """Return the positions of the nodes of local cells, as :func:`places`; (2 * nodes, n); m."""
+    numbering = subdomain.numbering
+    at = numbering.points[numbering.nodes_of_cells[subdomain.cells[cells]]]
+    return np.asarray(at.transpose(2, 1, 0).reshape(-1, len(cells)))
+
+
+class Cell:
+    """Interpolation of nodal vectors along a cell; with degree 0, a single node.
+
+    Attributes:
+        virtual: Virtual motion (x, y, rotation) of each node.
+        place: Position of each node of the undeformed cell; m.
+    """
+
+    def __init__(self, degree: int, at: Inputs) -> None:
+        self.degree, self._order = degree, node_order(degree)
+        self._virtual = [[ufl.variable(ufl.as_ufl(0.0)) for _ in COMPONENTS] for _ in self._order]
+        self.virtual = [ufl.as_vector(v) for v in self._virtual]
+        nodes = range(degree + 1)
+        self.place = [ufl.as_vector([at[f"X{k}"], at[f"Y{k}"]]) for k in nodes if "X0" in at]
+
+    def value(self, s: float, nodal: Sequence[Expr]) -> Expr:
+        """Return the interpolation at a fraction ``s`` of the cell."""
+        return self._sum(Mesh(degree=self.degree).weights(s) if self.degree else [1.0], nodal)
+
+    def slope(self, s: float, nodal: Sequence[Expr]) -> Expr:
+        """Return the derivative of the interpolation by the fraction ``s``."""
+        return self._sum(Mesh(degree=self.degree).slopes(s), nodal)
+
+    def _sum(self, weights: npt.ArrayLike, nodal: Sequence[Expr]) -> Expr:
+        ordered = np.asarray(weights)[self._order]
+        terms = [float(a) * x for a, x in zip(ordered, nodal, strict=True)]
+        return sum(terms[1:], terms[0])
+
+    def points(self, number: int) -> list[tuple[float, float]]:
+        """Return Gauss points and weights as fractions of the cell."""
+        return [*zip(*gauss_rule(number), strict=True)]
+
+    def points_of_mass(self, *, lumped: bool) -> list[tuple[float, float]]:
+        """Return points and weights of inertia: exact, or at the nodes if it is lumped."""
+        if self.degree == 0:
+            return [(0.0, 1.0)]
+        mesh = Mesh(degree=self.degree)
+        return (
+            [*zip(mesh.nodes, mesh.fractions, strict=True)]
+            if lumped
+            else self.points(mesh.degree + 1)
+        )
+
+    def forces(self, work: Any) -> list[Expr]:
+        """Return the nodal forces whose work on the virtual motion is ``work``."""
+        return [ufl.diff(work, v[i]) for i in range(len(COMPONENTS)) for v in self._virtual]
