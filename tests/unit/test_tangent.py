@@ -10,7 +10,6 @@ from scipy.sparse import csr_array
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.terms.inertia_and_damping import SecondDifferences
 
 # Numbers of one magnitude, so that an error in any term shows in the largest entry.
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
@@ -105,9 +104,10 @@ class Probe:
         rates = simulation.inertia
         rates.commit(*random.uniform(-1, 1, (2, len(rates.v))), last_dt=0.2)
         rates.keep(*random.uniform(-1, 1, (len(simulation.scheme.further_rates), len(rates.v))))
-        numerical = (one for one in simulation.terms if isinstance(one, SecondDifferences))
-        for term in numerical:
-            term._change[:], term._last_dt[0] = random.uniform(-1, 1, term._change.shape), 0.2
+        for term in simulation.terms:
+            if term.effect == "SecondDifferences":
+                for name, values in term.state.items():
+                    values[:] = 0.2 if name == "last dt" else random.uniform(-1, 1, values.shape)
 
     @staticmethod
     def at_random(inelastic, random):

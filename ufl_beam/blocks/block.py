@@ -40,21 +40,31 @@ class Block(LoadTerm):
         functions: Functions of time, with the owners that messages name; equal on all processes.
         of_step: For each name of ``Statement.of_step`` but "dt", the index in ``functions`` of each
             element; (n,).
+        kind: Kind of the term, see :class:`Term`.
         supplies: Entry of the ledger of the work that the elements do on the scene.
         cells: Positions in ``subdomain.cells`` of the elements, if they are cells.
+        force_kind: Value of ``force_kind`` in loops.h, for section forces of cells.
+
+    Attributes:
+        statement: The statement.
+        state: Views of the states by name, in batches, with copies of the last element; initially
+            zero.
     """
 
     def __init__(
         self, statement: Statement, name: str, indices: Index, dofs: Index,
         numbers: Sequence[Array], subdomain: Subdomain, scheme: Scheme, ledger: Ledger,
         A: Csr, *, functions: Sequence[tuple[TimeFunction, object]] = (),
-        of_step: Mapping[str, npt.ArrayLike] | None = None, supplies: str,
-        cells: Index | None = None,
+        of_step: Mapping[str, npt.ArrayLike] | None = None, kind: str = "loads",
+        supplies: str | None = None, cells: Index | None = None, force_kind: int = lib.DENSITY,
     ) -> None:  # fmt: skip
-        self._statement, self._name, self._indices = statement, name, indices
+        self.statement, self._name, self._indices = statement, name, indices
         self._functions, self._supplies, self._ledger = functions, supplies, ledger
+        self.kind = kind
         self._size, self._subdomain, self._A = subdomain.size, subdomain, A
         self._kernels = made = kernels(statement)
+        for name in made.lost:
+            ledger.lost[name] += 0.0
         n, width, motions = len(indices), len(statement.inputs), len(statement.unknowns)
         dofs = np.asarray(dofs, dtype=np.int32).reshape(n, motions)
         loaded: Array = np.zeros(subdomain.size)
@@ -70,6 +80,7 @@ class Block(LoadTerm):
         w[:, first : first + len(statement.numbers)] = np.array(numbers).reshape(-1, n).T
         self._w = in_batches(w, BATCH)
         self._states = self._w[:, 2 * motions : first]
+        self.state = {z: self._states[:, k] for k, z in enumerate(statement.state)}
         self._numbers = self._w[:, first : first + len(statement.numbers)]
         batches, most = len(self._w), made.tangent.outputs
         most = max(most, made.end.outputs) if made.end else most
@@ -96,12 +107,12 @@ class Block(LoadTerm):
         )  # fmt: skip
         self.loops = loop("add_block", self._c), loop("add_block_tangent", self._c)
         if cells is not None:
-            self.in_cells = [InCells(lambda: self, lib.DENSITY, cells)]
+            self.in_cells = [InCells(lambda: self, force_kind, cells)]
 
     @property
     def effect(self) -> str:
         """Name of the statement."""
-        return type(self._statement).__name__
+        return type(self.statement).__name__
 
     def keep_entries(self) -> tuple[Any, int, Array]:
         """Return the forces of elements, as :meth:`Kernel.keep_entries` does those of cells."""
@@ -114,7 +125,8 @@ class Block(LoadTerm):
         entries += [ledger.lost.pointer(name) for name in made.lost]
         c = fill(
             self._c, function=callbacks.time_functions(self._functions),
-            entries=ffi.new("double *[]", entries), work=ledger.supplied.pointer(self._supplies),
+            entries=ffi.new("double *[]", entries),
+            work=ledger.supplied.pointer(self._supplies) if self._supplies else ffi.NULL,
         )  # fmt: skip
         energies = [loop("add_energy_of_block", c)] if made.stored else []
         return Phases([loop("begin_block", c)], [loop("accept_block", c)], energies)
@@ -137,14 +149,15 @@ class Block(LoadTerm):
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore states, functions of time and forces at the end of the last step."""
         name, n = self._name, len(self._indices)
-        forces = archive.added(name, self._whole(self._forces[1]))
-        self._forces[:] = forces[self.dofs]
+        if self._supplies:
+            forces = archive.added(name, self._whole(self._forces[1]))
+            self._forces[:] = forces[self.dofs]
         times = self._times[2, :-1, None]
         self._times[2, :-1] = archive.rows(
             f"functions of {name}", np.arange(len(times)), times, known=True
         )[:, 0]
-        if self._statement.state:
-            rows = self._states.transpose(0, 2, 1).reshape(-1, len(self._statement.state))[:n]
+        if self.statement.state:
+            rows = self._states.transpose(0, 2, 1).reshape(-1, len(self.statement.state))[:n]
             rows = archive.rows(f"states of {name}", self._indices, rows)
             self._states[:] = in_batches(rows, BATCH)
 

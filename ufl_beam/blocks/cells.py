@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.statement import COMPONENTS, Inputs
 from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.mechanics.kinematics import Axis, perpendicular
 from ufl_beam.model.beams import Mesh
 from ufl_beam.quadrature import gauss_rule
 
@@ -81,3 +83,31 @@ class Cell:
     def forces(self, work: Any) -> list[Expr]:
         """Return the nodal forces whose work on the virtual motion is ``work``."""
         return [ufl.diff(work, v[i]) for i in range(len(COMPONENTS)) for v in self._virtual]
+
+
+class AxisOfCell(Axis):
+    """Undeformed axis of a cell at the fraction ``s``, for fields that are interpolated by it."""
+
+    def __init__(self, cell: Cell, s: float) -> None:
+        mesh, order = Mesh(degree=cell.degree), node_order(cell.degree)
+        self.nodes, self.X = [float(a) for a in mesh.nodes], ufl.variable(ufl.as_ufl(s))
+        between = [self.nodes[k] for k in order]
+        self._weights = [
+            math.prod((self.X - b) / (a - b) for b in between if b != a) for a in between
+        ]
+        start, end = cell.place[:2]
+        self.h = ufl.sqrt(ufl.dot(end - start, end - start))
+        self.t0 = (end - start) / self.h
+        self.n0 = perpendicular(self.t0)
+
+    def field(self, nodal: Sequence[Expr]) -> Expr:
+        """Return the interpolation of nodal vectors."""
+        n = range(len(COMPONENTS))
+        pairs = [*zip(self._weights, nodal, strict=True)]
+        return ufl.as_vector([sum((a * x[i] for a, x in pairs), 0) for i in n])
+
+    def d(self, f: Expr) -> Expr:
+        """See the base class."""
+        if f.ufl_shape:
+            return ufl.as_vector([self.d(f[i]) for i in range(f.ufl_shape[0])])
+        return ufl.diff(f, self.X) / self.h

@@ -146,8 +146,8 @@ def _followers(
     statement = FollowerForce(scheme.load_weight)
     return [Block(
         statement, "follower loads", mine, np.array(nodes), [*forces.T],
-        subdomain, scheme, ledger, A, functions=[(load.amplitude, load) for load in loads], of_step={"factor": mine},
-        supplies="loads",
+        subdomain, scheme, ledger, A, functions=[(load.amplitude, load) for load in loads],
+        of_step={"factor": mine}, supplies="loads",
     )]  # fmt: skip
 
 

@@ -59,18 +59,21 @@ class Statement(ABC):
     """Effect on an element.  Equal statements, such as equal frozen dataclasses, share kernels.
 
     Attributes:
-        state: Names of the numbers that an element remembers.
         of_step: Names of the numbers of a step; "dt" is its length (s), others are values of
             functions of time.
     """
 
-    state: Sequence[str] = ()
     of_step: Sequence[str] = ()
 
     @property
     @abstractmethod
     def nodes(self) -> int:
         """Number of nodes of an element."""
+
+    @property
+    def state(self) -> Sequence[str]:
+        """Names of the numbers that an element remembers."""
+        return ()
 
     @property
     @abstractmethod

@@ -14,6 +14,8 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.blocks.block import Block
+from ufl_beam.blocks.damping import second_differences, viscosity
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
@@ -26,6 +28,7 @@ from ufl_beam.mechanics.time_scheme import Scheme, Step, has_inertia
 from ufl_beam.model.connector_laws import has_friction
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.imposed_strains import ImposedStrain
+from ufl_beam.model.loads import Rayleigh
 from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.terms.beam_forces import Cells, ElasticBeams, InelasticBeams
@@ -35,7 +38,7 @@ from ufl_beam.terms.connector_forces import connector_terms
 from ufl_beam.terms.connector_rows import Setting
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.imposed_strains import CellStrains, ImposedStrains
-from ufl_beam.terms.inertia_and_damping import BEFORE, Inertia, SecondDifferences, damping_forces
+from ufl_beam.terms.inertia_and_damping import BEFORE, Inertia, rayleigh_forces
 from ufl_beam.terms.load_forces import DeadLoads, load_terms
 from ufl_beam.terms.material_points import create_entries
 from ufl_beam.terms.term import Callbacks, LoadTerm, Term
@@ -109,7 +112,7 @@ class StepEquation:
             subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
             self.beams.append(ElasticBeams(subset, *setting, imposed_on(subset)))
             if scheme.lost_fraction:
-                others.append(SecondDifferences(scheme, subset, A, ledger))
+                others.append(second_differences(scheme, subset, A, ledger))
 
         self.controllers = Controllers(subdomain)
         inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
@@ -136,7 +139,11 @@ class StepEquation:
                 ledger.lost["numerical"] += 0.0
             others.append(inertia)
         for damping in scene.damping:
-            others += damping_forces(damping, fields, *setting, inertia, self.inelastic)
+            if isinstance(damping, Rayleigh):
+                others.append(rayleigh_forces(damping, fields, *setting, inertia, self.inelastic))
+            else:
+                ledger.lost["damping"] += 0.0
+                others += viscosity(damping, fields, *setting)
         if scene.beams:
             ledger.state["stored"] += 0.0
         self.inner: list[Term] = [*self.beams, *self.connector_terms]
@@ -247,7 +254,7 @@ class StepEquation:
         if self.inertia is not None and self.inertia.scheme.uses_last_step:
             self.inertia.pass_on_step(archive)
             for term in self.terms:
-                if isinstance(term, SecondDifferences):
+                if isinstance(term, Block) and term.statement.state:
                     term.save_or_restore(archive, q)
 
     # -- forces and tangent --------------------------------------------------------------------

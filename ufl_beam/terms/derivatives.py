@@ -276,7 +276,7 @@ def differences(
 
 LINEARIZE = {
     "form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads",
-    "connectors": "tabulate_connectors", "second_differences": "tabulate_second_differences",
+    "connectors": "tabulate_connectors",
     "differences": "begin_neighbours",
     "guides": "find_tangents_before", "imposed": "find_imposed_directions",
     "damping": "tabulate_damping", "block": "tabulate_block",
@@ -287,7 +287,6 @@ ACCEPT = {
         "points",
         "load",
         "connectors",
-        "second_differences",
         "differences",
         "moving_loads",
         "imposed",
@@ -319,11 +318,6 @@ TRANSPOSES = {
     "product": ("", "transpose_product", ""),
     "connectors": ("transpose_connectors_state", "transpose_connectors", "finish_connectors"),
     "load": ("", "transpose_loads", ""),
-    "second_differences": (
-        "transpose_second_differences_state",
-        "transpose_second_differences",
-        "",
-    ),
     "shape": ("", "transpose_shape", ""),
     "differences": ("", "transpose_differences", ""),
     "imposed": ("", "transpose_imposed", ""),
@@ -364,10 +358,6 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         if not stored:
             return []
         return [(form.w, 8 * form.batch_size * ((batches - 1) * form.width + stored))]
-    if kind == "second_differences":
-        shape = recorded("shape", data.shape) if data.shape else []
-        ratio = (ffi.addressof(data, "ratio"), 8)
-        return [table(data.strains), table(data.force), ratio, *shape]
     if kind == "product":
         product = data.matrix.product
         rate = ffi.addressof(product, "rate")  # C exchanges the vectors at this address

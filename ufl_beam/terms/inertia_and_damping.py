@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import ufl
-from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, struct
@@ -22,7 +21,6 @@ from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.function_spaces import (
     Element,
     Fields,
-    Strains,
     applied,
     mass_kernel,
     mass_matrix,
@@ -31,7 +29,7 @@ from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ModelError
 from ufl_beam.mechanics.functional import resultants, virtual_work
-from ufl_beam.mechanics.kinematics import strain, virtual_strain
+from ufl_beam.mechanics.kinematics import virtual_strain
 from ufl_beam.mechanics.time_scheme import (
     FURTHER,
     V_BEFORE,
@@ -42,16 +40,14 @@ from ufl_beam.mechanics.time_scheme import (
     combined,
     with_half_tangents,
 )
-from ufl_beam.model.loads import KelvinVoigt, Rayleigh
-from ufl_beam.terms.beam_forces import FormForces, InelasticBeams
+from ufl_beam.model.loads import Rayleigh
+from ufl_beam.terms.beam_forces import InelasticBeams
 from ufl_beam.terms.derivatives import (
     Each,
     Neighbours,
     differences,
     form_derivative,
-    form_derivatives,
     in_c,
-    shape_derivative,
 )
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, fields_of_forms
@@ -260,54 +256,6 @@ def product_derivative(
 # -- damping ---------------------------------------------------------------------------------------
 
 
-def _work_and_loss(
-    element: Element, scheme: Scheme, factor: Expr, before: Expr
-) -> tuple[ufl.Form, ufl.Form]:
-    """Return forms of virtual work and lost energy of resultants ``factor C (Δe - before)``.
-
-    Δe is the change of the strains in the step.
-    """
-    change = strain(element.q1, element.axis) - strain(element.q0, element.axis)
-    r = factor * resultants(change - before, element.stiffness)
-    w_e = scheme.virtual_strain(element.q0, element.q1, element.w, element.axis)
-    return virtual_work(r, w_e) * element.dx(1), virtual_work(r, change) * element.dx(1)
-
-
-@cached_forms
-def _viscous_forms(element: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Return forms of virtual work and lost energy, and the coefficient that is their factor."""
-    rate = element.at_points()
-    return *_work_and_loss(element, scheme, rate, ufl.zero(3)), rate
-
-
-class KelvinVoigtForces(FormForces):
-    """Resultants in proportion to strain rates, P(89) with the factor retardation time / dt."""
-
-    kind = _entry = "damping"
-
-    def __init__(
-        self, damping: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
-    ) -> None:
-        work, lost, self._rate = _viscous_forms(fields.element, scheme)
-        super().__init__(work, [lost], fields, A, ledger)
-        self._time, self._dt = damping.retardation_time, np.zeros(1)
-
-    def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the cells, which also put the factor of the step into the forms."""
-        begin, accept, *_ = super().phases(callbacks)
-        c = struct(
-            "viscous_forms", **fields_of_forms(self._step_kernels, self._rate),
-            of_cell=len(self._rate.x.array), time=self._time, dt=self._dt,
-        )  # fmt: skip
-        return Phases([*begin, loop("begin_viscous_forms", c)], accept)
-
-    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
-        """See the base class."""
-        kernel = partial(self._fields.kernel, unknown=self._q1)
-        by_q0 = form_derivative(self._work_form, self._force, kernel, self._q0)
-        return [differences(neighbours), in_c("form", by_q0)]
-
-
 @cached_forms
 def _reference_stiffness(element: Element) -> ufl.Form:
     rest = element.configuration()
@@ -452,98 +400,18 @@ class TangentRayleighForces(Term):
         return [differences(neighbours), *found]
 
 
-def damping_forces(
-    damping: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
+def rayleigh_forces(
+    damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
     rates: Inertia | None, inelastic: Sequence[InelasticBeams],
-) -> list[Term]:  # fmt: skip
-    """Return the terms of a damping; empty if the process has no damped cells."""
+) -> Term:  # fmt: skip
+    """Return the term of Rayleigh damping."""
     ledger.lost["damping"] += 0.0
-    if isinstance(damping, Rayleigh):
-        if rates is None:
-            raise ModelError(
-                "Rayleigh: it damps vibrations, and statics has no inertia. Leave it out, by "
-                "dataclasses.replace(scene, damping=())"
-            )
-        setting = (damping, fields, scheme, A, ledger, rates)
-        if damping.tangent:
-            return [TangentRayleighForces(*setting, inelastic)]
-        return [RayleighForces(*setting)]
-    numbering = fields.subdomain.numbering
-    beams = numbering.scene.beams if damping.beams is None else damping.beams
-    pairs = (zip(numbering.cells_of(beam), numbering.hinges(beam), strict=True) for beam in beams)
-    cells = [cell for beam_cells in pairs for cell, hinge in beam_cells if hinge is None]
-    positions = np.flatnonzero(np.isin(fields.subdomain.cells, cells))
-    if not len(positions):
-        return []
-    return [KelvinVoigtForces(damping, Fields(fields.subdomain, positions), scheme, A, ledger)]
-
-
-# -- numerical damping -----------------------------------------------------------------------------
-
-
-@cached_forms
-def _change_forms(element: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Return forms of virtual work and lost energy, and their coefficient r Δe'.
-
-    Δe' is the change of strain in the last step, r the ratio of the step lengths.
-    """
-    before = element.at_points(3)
-    return *_work_and_loss(element, scheme, element.constant(scheme.lost_fraction), before), before
-
-
-class SecondDifferences(FormForces):
-    """Resultants c C (Δe - r Δe') of cells, see :class:`EnergyMomentumDecaying`."""
-
-    kind, _entry = "beams", "numerical"
-
-    def __init__(self, scheme: Scheme, fields: Fields, A: Csr, ledger: Ledger) -> None:
-        work, lost, self._before = _change_forms(fields.element, scheme)
-        super().__init__(work, [lost], fields, A, ledger)
-        self._strains = Strains(fields)
-        self._cells = fields.subdomain.cells[fields.order]
-        self._e, self._change = np.zeros((2, *self._strains.shape))
-        self._last_dt = np.full(1, math.inf)
-
-    def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the cells and their strains."""
-        begin, accept, *_ = super().phases(callbacks)
-        c = self._in_steps = struct(
-            "second_differences", strains=self._strains.kernel.cells, weight=self._strains.weights,
-            of_cell=len(self._strains.weights), **fields_of_forms(self._step_kernels, self._before),
-            e=self._e, change=self._change, space=np.zeros(self._e.shape), last_dt=self._last_dt,
-        )  # fmt: skip
-        before, after = (loop(f"{name}_second_differences", c) for name in ("begin", "accept"))
-        return Phases([*begin, before], [*accept, after])
-
-    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
-        """See the base class."""
-        kernel, strains = partial(self._fields.kernel, unknown=self._q1), self._strains
-        force = form_derivative(
-            self._work_form, self._force, kernel, self._before, direction=np.zeros(1), stride=0
+    if rates is None:
+        raise ModelError(
+            "Rayleigh: it damps vibrations, and statics has no inertia. Leave it out, by "
+            "dataclasses.replace(scene, damping=())"
         )
-        by_q1 = form_derivative(strains.form, strains.kernel, kernel, self._q1)
-        e1, direction = np.zeros((2, *self._e.shape))
-        e0 = neighbours.state(lambda term: term._e)
-        change = neighbours.state(lambda term: term._change)
-        c = struct(
-            "second_difference_derivatives", differences=self._in_steps, strains=by_q1,
-            force=force, e0=e0, change=change, e1=e1, direction=direction,
-            e0_bar=np.zeros(e1.shape), change_bar=np.zeros(e1.shape),
-            shape=shape_derivative(lambda x: x._strains.kernel, neighbours, e1.size),
-        )  # fmt: skip
-        others = form_derivatives(
-            self._work_form, lambda term: term._force, kernel, self._q0, neighbours, [self._before]
-        )
-        return [in_c("second_differences", c), *others]
-
-    def start(self, q: Array) -> None:
-        """Set the strains at the beginning of the step to the strains at ``q``."""
-        self._e[:] = self._strains(q)
-
-    def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore changes of the strains in the last step, and its length."""
-        # The length is in the rows, because process 0, which saves numbers, may have no such cells.
-        rows = np.column_stack([self._change, np.full(len(self._change), self._last_dt)])
-        rows = archive.rows("changes of strains", self._cells, rows)
-        self._change[:], self._last_dt[0] = rows[:, :-1], rows[0, -1]
-        self.start(q)
+    setting = (damping, fields, scheme, A, ledger, rates)
+    return (
+        TangentRayleighForces(*setting, inelastic) if damping.tangent else RayleighForces(*setting)
+    )

@@ -74,27 +74,6 @@ void transpose_shape(void *self, adjoint *a, const double *λ) { transpose_shape
 
 /* -- second differences of strains ----------------------------------------------------------------------- */
 
-void transpose_second_differences_state(void *self, adjoint *a)
-{
-  const second_difference_derivatives *m = self;
-  const int n = m->differences->of_cell, all = m->differences->strains->number * n;
-  for (int i = 0; i < all; ++i) {
-    m->e1[i] = (m->e0_bar[i] + m->change_bar[i]) / m->differences->weight[i % n];
-    m->e0_bar[i] = -m->change_bar[i], m->change_bar[i] = 0;
-  }
-  transpose_tables(m->strains, m->e1, 0, 0, a->q1);
-  if (m->shape) transpose_shape_of(m->shape, a, m->e1);
-}
-
-void transpose_second_differences(void *self, adjoint *a, const double *λ)
-{
-  const second_difference_derivatives *m = self;
-  const int all = m->differences->strains->number * m->differences->of_cell;
-  memset(m->direction, 0, all * sizeof *m->direction);
-  transpose_tables(m->force, 0, λ, m->direction, 0);
-  for (int i = 0; i < all; ++i) m->change_bar[i] += m->ratio * m->direction[i];
-}
-
 /* -- material points ----------------------------------------------------------------------------------- */
 
 /* Remove the unknowns of a point from x_bar, the derivatives by all its inputs; the transpose of

@@ -112,7 +112,7 @@ static void end_step(const block *b, int enter)
 void accept_block(void *self, const time_step *step, const double *q1, const double *s)
 {
   const block *b = self;
-  *b->work -= work_in_step(b->size, b->dof, b->weight_of_before, b->force_before, b->force, s);
+  if (b->work) *b->work -= work_in_step(b->size, b->dof, b->weight_of_before, b->force_before, b->force, s);
   memcpy(b->force_before, b->force, b->size * sizeof *b->force);
   memcpy(b->before, b->end, b->functions * sizeof *b->before);
   if (!b->end_of) return;

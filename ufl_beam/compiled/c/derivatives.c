@@ -96,36 +96,6 @@ void add_shape_derivative(void *self, const derivatives *d, int p, double *r) { 
 
 /* -- second differences of strains --------------------------------------------------------------------- */
 
-void tabulate_second_differences(void *self, const time_step *step, const double *q1)
-{
-  second_difference_derivatives *m = self;
-  tabulate_derivative(m->strains, step, q1);
-  tabulate_derivative(m->force, step, q1);
-  m->ratio = fmin(1, step->dt / *m->differences->last_dt);
-}
-
-void add_second_differences_derivative(void *self, const derivatives *d, int p, double *r)
-{
-  const second_difference_derivatives *m = self;
-  const int all = m->differences->strains->number * m->differences->of_cell;
-  for (int i = 0; i < all; ++i) m->direction[i] = m->ratio * m->change[(size_t)p * all + i];
-  multiply_tables(m->force, m->direction, 0, 0, r);
-}
-
-void accept_second_differences_derivative(void *self, const derivatives *d, int p)
-{
-  const second_difference_derivatives *m = self;
-  const int n = m->differences->of_cell, all = m->differences->strains->number * n;
-  double *e0 = m->e0 + (size_t)p * all, *change = m->change + (size_t)p * all;
-  memset(m->e1, 0, all * sizeof *e0);
-  multiply_tables(m->strains, 0, d->q1 + (size_t)p * d->size, 1, m->e1);
-  if (m->shape) add_shape(m->shape, d->x, p, m->e1);
-  for (int i = 0; i < all; ++i) {
-    const double e1 = m->e1[i] / m->differences->weight[i % n];
-    change[i] = e1 - e0[i], e0[i] = e1;
-  }
-}
-
 /* -- material points --------------------------------------------------------------------------------- */
 
 /* Compute a table, whose last outputs are margins. Derivatives by infinite numbers, such as the limit of an

@@ -37,20 +37,6 @@ static double product_with(const matrix_of_rates *m, const double *x, const doub
   return sum;
 }
 
-void accept_second_differences(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const second_differences *d = self;
-  const int n = d->of_cell, all = d->strains->number * n;
-  memset(d->space, 0, all * sizeof *d->space);
-  add_cells((void *)d->strains, q1, d->space);
-  for (int i = 0; i < all; ++i) {
-    const double now = d->space[i] / d->weight[i % n];
-    d->change[i] = now - d->e[i];
-    d->e[i] = now;
-  }
-  *d->last_dt = step->dt;
-}
-
 /* Work of the resultants in a step to q1 on the change of imposed strains; points have their response
  * to q1. */
 static double work_on_imposed_strains(const imposed_strains *all, const double *q1)

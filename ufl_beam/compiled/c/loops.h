@@ -697,24 +697,6 @@ typedef struct {
  * q0 at the beginning of the step. */
 typedef struct { const cells *form; int at; } form_of_step;
 
-/* Forms whose coefficients have a time constant divided by the time step, for each of the `of_cell`
- * points of a cell. */
-typedef struct {
-  int forms, of_cell;
-  const form_of_step *form;
-  double time, *dt; /* dt: of the latest step */
-} viscous_forms;
-
-/* Forms with the changes of the strains in the previous step, see SecondDifferences. */
-typedef struct {
-  const cells *strains; /* form of the weighted strains */
-  int of_cell, forms;
-  const double *weight; /* of_cell */
-  const form_of_step *form;
-  double *e, *change; /* strains at the beginning of the step, changes in the last one; cells * of_cell */
-  double *space, *last_dt;
-} second_differences;
-
 /* A form whose value is added to an entry of the ledger; `held` is the value added last. */
 typedef struct {
   const cells *form;
@@ -749,7 +731,8 @@ typedef struct {
   double *w, *out, *space;  /* inputs; space for outputs of all elements, and of one */
   double **each;            /* forces of elements in the latest residual */
   double *force, *force_before; /* in the latest residual, in that of the last step; size */
-  double weight_of_before, *work; /* work: entry of the ledger of the work of minus the forces */
+  double weight_of_before, *work; /* work: entry of the ledger of the work of minus the
+                                   * forces; or none */
   int stored, lost;
   double *energy, *const *entries; /* stored energies; entries of stored, then of lost energies */
 } block;
@@ -1115,8 +1098,8 @@ phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, be
   accept_dead_loads,
   begin_moving_loads, accept_moving_loads,
   add_energy_of_moving_masses, begin_works,
-  accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
-  accept_second_differences, begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
+  accept_works, add_energy_of_works,
+  begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
   begin_tangent_damping, accept_tangent_damping,
   begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,
   begin_connectors_again, accept_connectors, add_energy_of_connectors, begin_guides, accept_guides,
@@ -1198,17 +1181,6 @@ typedef struct {
   int size;             /* number of values of the form */
   double *space;
 } shape_derivative;
-
-/* Derivatives of second differences of strains, see SecondDifferences. */
-typedef struct {
-  const second_differences *differences;
-  form_derivative *strains, *force; /* strains by q1; force by the change of the strains in the last step */
-  const shape_derivative *shape;    /* of the strains; or none */
-  double *e0, *change;              /* derivatives of strains and of their changes in the last step */
-  double *e1, *direction;           /* of one parameter */
-  double *e0_bar, *change_bar;      /* of the adjoint */
-  double ratio;
-} second_difference_derivatives;
 
 /* Derivatives of material points by all their inputs. The columns of a table are the growth, the
  * variables that a law solves for, then the other inputs; its rows are the stresses, the changes of the
@@ -1388,9 +1360,7 @@ struct adjoint {
 int record_step(adjoint *a, time_loop *m, int initial);
 int go_back(adjoint *a, time_loop *m);
 void finish_adjoint(adjoint *a, time_loop *m);
-void transpose_second_differences_state(void *self, adjoint *a);
 void transpose_imposed(void *self, adjoint *a, const double *lambda);
-void transpose_second_differences(void *self, adjoint *a, const double *lambda);
 void transpose_points_state(void *self, adjoint *a);
 void transpose_connectors_state(void *self, adjoint *a);
 void transpose_connectors(void *self, adjoint *a, const double *lambda);
@@ -1433,15 +1403,12 @@ void add_connectors_derivative(void *self, const derivatives *d, int p, double *
 void add_points_derivative(void *self, const derivatives *d, int p, double *r);
 void add_product_derivative(void *self, const derivatives *d, int p, double *r);
 void add_shape_derivative(void *self, const derivatives *d, int p, double *r);
-void add_second_differences_derivative(void *self, const derivatives *d, int p, double *r);
 void add_load_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_connectors_derivative(void *self, const derivatives *d, int p);
 void accept_points_derivative(void *self, const derivatives *d, int p);
-void accept_second_differences_derivative(void *self, const derivatives *d, int p);
 void accept_load_derivative(void *self, const derivatives *d, int p);
 void tabulate_derivative(void *self, const time_step *step, const double *q1);
 void tabulate_connectors(void *self, const time_step *step, const double *q1);
-void tabulate_second_differences(void *self, const time_step *step, const double *q1);
 void tabulate_points(void *self, const time_step *step, const double *q1);
 void differentiate_loads(void *self, const time_step *step, const double *q1);
 

@@ -24,28 +24,6 @@ void begin_forms(void *self, const time_step *step, const double *q1, const doub
   set_cells(f->form, step->q0, f->at);
 }
 
-void begin_viscous_forms(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const viscous_forms *v = self;
-  const double rate = v->time / step->dt;
-  if (step->dt == *v->dt) return;
-  *v->dt = step->dt;
-  for (int k = 0; k < v->forms; ++k)
-    for (int c = 0; c < v->form[k].form->number; ++c)
-      for (int i = 0; i < v->of_cell; ++i) put_in_cell(v->form[k].form, c, v->form[k].at + i, 1, &rate);
-}
-
-void begin_second_differences(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const second_differences *d = self;
-  const double ratio = fmin(1, step->dt / *d->last_dt);
-  const int n = d->of_cell;
-  for (int i = 0; i < d->strains->number * n; ++i) d->space[i] = ratio * d->change[i];
-  for (int k = 0; k < d->forms; ++k)
-    for (int c = 0; c < d->strains->number; ++c)
-      put_in_cell(d->form[k].form, c, d->form[k].at, n, d->space + (size_t)c * n);
-}
-
 void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s)
 {
   predicted_strains *p = self;
