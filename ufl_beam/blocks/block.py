@@ -95,7 +95,7 @@ class Block(LoadTerm):
             lanes=BATCH, elements=n, batches=batches, unknowns=motions,
             states=len(statement.state), numbers=len(statement.numbers),
             steps=len(statement.of_step), width=width, size=len(self.dofs), dof=self.dofs,
-            at=in_batches(np.searchsorted(self.dofs, dofs).astype(np.int32), BATCH),
+            dofs=in_batches(dofs, BATCH), at=in_batches(np.searchsorted(self.dofs, dofs).astype(np.int32), BATCH),
             entry=in_batches(entries, BATCH), functions=len(functions), now=self._times[0],
             end=self._times[1], before=self._times[2],
             **{"from": in_batches(np.array(from_, dtype=np.int32).T.reshape(n, -1), BATCH)},

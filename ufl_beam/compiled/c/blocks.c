@@ -34,10 +34,10 @@ static inline double *input(const block *b, int c, int i) { return b->w + ((size
 static void gather(const block *b, const double *q, int first)
 {
   const int all = b->unknowns * b->lanes;
-  for (int c = 0; c < b->batches; ++c) {
-    const int32_t *at = b->at + (size_t)c * all;
+  const int32_t *dofs = b->dofs;
+  for (int c = 0; c < b->batches; ++c, dofs += all) {
     double *w = input(b, c, first);
-    for (int i = 0; i < all; ++i) w[i] = q[b->dof[at[i]]];
+    for (int i = 0; i < all; ++i) w[i] = q[dofs[i]];
   }
 }
 
@@ -64,33 +64,32 @@ void begin_block(void *self, const time_step *step, const double *q1, const doub
     for (int i = 0; i < all; ++i) input(b, c, of_step)[i] = b->now[b->from[(size_t)c * all + i]];
 }
 
+/* Add numbers of elements, `each` of them, to `out` at indices. */
+static void scatter(const block *b, int each, const double *values, const int32_t *index, double *out)
+{
+  const int n = b->lanes;
+  for (int c = 0; c < b->batches; ++c)
+    for (int i = 0, some = elements_in(b, c); i < each; ++i, values += n, index += n)
+      for (int l = 0; l < some; ++l) out[index[l]] += values[l];
+}
+
 void add_block(void *self, const double *q, double *r)
 {
   const block *b = self;
-  const int n = b->lanes;
-  const double *f = *b->each;
   gather(b, q, 0);
   evaluate(b, b->force_of, *b->each);
+  scatter(b, b->unknowns, *b->each, b->dofs, r);
+  if (!b->work) return;
   memset(b->force, 0, b->size * sizeof *r);
-  for (int c = 0; c < b->batches; ++c)
-    for (int i = 0; i < b->unknowns; ++i, f += n) {
-      const int32_t *at = b->at + ((size_t)c * b->unknowns + i) * n;
-      for (int l = 0; l < elements_in(b, c); ++l) b->force[at[l]] += f[l];
-    }
-  for (int i = 0; i < b->size; ++i) r[b->dof[i]] += b->force[i];
+  scatter(b, b->unknowns, *b->each, b->at, b->force);
 }
 
 void add_block_tangent(void *self, const double *q, double *tangent)
 {
   const block *b = self;
-  const int n = b->lanes, entries = b->tangent_of->outputs;
-  const double *slope = b->out;
-  const int32_t *entry = b->entry;
   gather(b, q, 0);
   evaluate(b, b->tangent_of, b->out);
-  for (int c = 0; c < b->batches; ++c)
-    for (int i = 0; i < entries; ++i, slope += n, entry += n)
-      for (int l = 0; l < elements_in(b, c); ++l) tangent[entry[l]] += slope[l];
+  scatter(b, b->tangent_of->outputs, b->out, b->entry, tangent);
 }
 
 /* New states, and energies: stored ones are kept for add_energy_of_block, lost ones are entered. */
@@ -112,8 +111,10 @@ static void end_step(const block *b, int enter)
 void accept_block(void *self, const time_step *step, const double *q1, const double *s)
 {
   const block *b = self;
-  if (b->work) *b->work -= work_in_step(b->size, b->dof, b->weight_of_before, b->force_before, b->force, s);
-  memcpy(b->force_before, b->force, b->size * sizeof *b->force);
+  if (b->work) {
+    *b->work -= work_in_step(b->size, b->dof, b->weight_of_before, b->force_before, b->force, s);
+    memcpy(b->force_before, b->force, b->size * sizeof *b->force);
+  }
   memcpy(b->before, b->end, b->functions * sizeof *b->before);
   if (!b->end_of) return;
   gather(b, q1, 0);
@@ -157,9 +158,9 @@ static void find_direction(const block_derivatives *m, const derivatives *d, int
   const int n = b->lanes, motions = b->unknowns * n, steps = b->steps * n;
   const size_t states = b->states * n, numbers = b->numbers * n, at = (size_t)p * b->batches + c;
   const double *q0 = d->q0 + (size_t)p * d->size, *now = m->by_step + p * (b->functions + 1);
-  const int32_t *dof = b->at + (size_t)c * motions, *from = b->from + (size_t)c * steps;
+  const int32_t *dofs = b->dofs + (size_t)c * motions, *from = b->from + (size_t)c * steps;
   double *x = m->direction;
-  for (int i = 0; i < motions; ++i) x[i] = q1 ? q1[b->dof[dof[i]]] : 0, x[motions + i] = q0[b->dof[dof[i]]];
+  for (int i = 0; i < motions; ++i) x[i] = q1 ? q1[dofs[i]] : 0, x[motions + i] = q0[dofs[i]];
   x += 2 * motions;
   memcpy(x, m->by_state + at * states, states * sizeof *x), x += states;
   memcpy(x, m->by_number + at * numbers, numbers * sizeof *x), x += numbers;
@@ -185,9 +186,9 @@ void add_block_derivative(void *self, const derivatives *d, int p, double *r)
   for (int c = 0; c < b->batches; ++c) {
     find_direction(m, d, c, p, 0);
     for (int i = 0; i < b->unknowns; ++i) {
-      const int32_t *at = b->at + ((size_t)c * b->unknowns + i) * b->lanes;
+      const int32_t *dofs = b->dofs + ((size_t)c * b->unknowns + i) * b->lanes;
       multiply_row(m, c, i, sum);
-      for (int l = 0; l < elements_in(b, c); ++l) r[b->dof[at[l]]] += sum[l];
+      for (int l = 0; l < elements_in(b, c); ++l) r[dofs[l]] += sum[l];
     }
   }
 }
@@ -213,14 +214,14 @@ static void transpose_rows(const block_derivatives *m, adjoint *a, int c, int fi
 {
   const block *b = m->block;
   const int n = b->lanes, motions = b->unknowns, end = 2 * motions + b->states;
-  const int32_t *at = b->at + (size_t)c * motions * n, *from = b->from + (size_t)c * b->steps * n;
+  const int32_t *dofs = b->dofs + (size_t)c * motions * n, *from = b->from + (size_t)c * b->steps * n;
   for (int i = 0; i < rows; ++i) {
     const double *slope = m->table + ((size_t)c * (motions + b->states) + first + i) * b->width * n;
     for (int j = 0; j < b->width; ++j, slope += n)
       for (int l = 0; l < elements_in(b, c); ++l) {
         const double x = slope[l] * bar[i * n + l];
-        if (j < motions) { if (first) a->q1[b->dof[at[j * n + l]]] += x; }
-        else if (j < 2 * motions) a->q0[b->dof[at[(j - motions) * n + l]]] += x;
+        if (j < motions) { if (first) a->q1[dofs[j * n + l]] += x; }
+        else if (j < 2 * motions) a->q0[dofs[(j - motions) * n + l]] += x;
         else if (j < end) z_bar[(j - 2 * motions) * n + l] += x;
         else if (j < end + b->numbers) m->number_bar[((size_t)c * b->numbers + j - end) * n + l] += x;
         else m->step_bar[from[(j - end - b->numbers) * n + l]] += x;
@@ -257,8 +258,8 @@ void transpose_block(void *self, adjoint *a, const double *λ)
   const int n = b->lanes, motions = b->unknowns * n;
   if (a->d->initial) tabulate_again(m, a); /* such a step has no new state */
   for (int c = 0; c < b->batches; ++c) {
-    const int32_t *at = b->at + (size_t)c * motions;
-    for (int i = 0; i < motions; ++i) m->direction[i] = λ[b->dof[at[i]]];
+    const int32_t *dofs = b->dofs + (size_t)c * motions;
+    for (int i = 0; i < motions; ++i) m->direction[i] = λ[dofs[i]];
     transpose_rows(m, a, c, 0, b->unknowns, m->direction, m->state_bar + (size_t)c * b->states * n);
   }
   add_products(a, b->functions + 1, m->step_bar, m->by_step);

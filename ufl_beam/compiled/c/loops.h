@@ -720,8 +720,9 @@ typedef struct {
 typedef struct {
   const element_function *force_of, *tangent_of, *end_of; /* end_of: state, stored and lost energies; or none */
   int lanes, elements, batches, unknowns, states, numbers, steps, width; /* lanes: elements of a batch */
-  int size;                 /* number of degrees of freedom on which elements act */
-  const int32_t *dof, *at;  /* these; index in `dof` of each motion of an element */
+  const int32_t *dofs;      /* degree of freedom of each motion of an element */
+  int size;                 /* of loads: number of degrees of freedom on which they act */
+  const int32_t *dof, *at;  /* of loads: these; index in `dof` of each motion of an element */
   const int32_t *entry;     /* entry of the matrix of each output of tangent_of */
   int functions;            /* of time */
   const time_function *function;
@@ -730,9 +731,8 @@ typedef struct {
   const int32_t *from;      /* index in `now` of each number of the step of an element */
   double *w, *out, *space;  /* inputs; space for outputs of all elements, and of one */
   double **each;            /* forces of elements in the latest residual */
-  double *force, *force_before; /* in the latest residual, in that of the last step; size */
-  double weight_of_before, *work; /* work: entry of the ledger of the work of minus the
-                                   * forces; or none */
+  double *force, *force_before; /* of loads: in the latest residual, in that of the last step; size */
+  double weight_of_before, *work; /* work: entry of the ledger of the work of loads, minus the forces; or none */
   int stored, lost;
   double *energy, *const *entries; /* stored energies; entries of stored, then of lost energies */
 } block;
