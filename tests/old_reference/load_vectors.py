@@ -25,8 +25,8 @@ from old_reference.cell_forms import (
     end_forces,
     point_masses,
 )
+from old_reference.work_forms import GROWTH, statement
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import Step, acting, combined, has_inertia, nodal_step
 from ufl_beam.model.bodies import GROUND, moves_with_node

@@ -27,6 +27,9 @@ from ufl_beam.terms.derivatives import Each, Neighbours, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, Phases
 
+AT = {"now": lib.AT_NOW, "before": lib.AT_START, "between": lib.AT_MIDDLE, "end": lib.AT_END}
+"""Values of ``time_of_number`` in loops.h by the time of a number."""
+
 
 class Block(LoadTerm):
     """Elements of one statement on a process.
@@ -37,13 +40,17 @@ class Block(LoadTerm):
         indices: Index of each element in the scene.
         dofs: Local degrees of freedom of the elements; (n, 3 * nodes), see ``Statement.unknowns``.
         numbers: Numbers of the elements, in the order of ``Statement.numbers``; (n,) each.
-        functions: Functions of time, with the owners that messages name; equal on all processes.
+        functions: Functions of time, with the owners that messages name, equal on all processes;
+            None: the time itself.
+        when: For each function, a value of ``time_of_number`` in loops.h; by default GROWS.
         of_step: For each name of ``Statement.of_step`` but "dt", the index in ``functions`` of each
             element; (n,).
         kind: Kind of the term, see :class:`Term`.
         supplies: Entry of the ledger of the work that the elements do on the scene.
         cells: Positions in ``subdomain.cells`` of the elements, if they are cells.
         force_kind: Value of ``force_kind`` in loops.h, for section forces of cells.
+        t0: Time at which the run begins; s.
+        rates: Whether forces depend on velocities of the step.
 
     Attributes:
         statement: The statement.
@@ -54,25 +61,32 @@ class Block(LoadTerm):
     def __init__(
         self, statement: Statement, name: str, indices: Index, dofs: Index,
         numbers: Sequence[Array], subdomain: Subdomain, scheme: Scheme, ledger: Ledger,
-        A: Csr, *, functions: Sequence[tuple[TimeFunction, object]] = (),
+        A: Csr, *, functions: Sequence[tuple[TimeFunction | None, object]] = (),
+        when: Sequence[int] = (),
         of_step: Mapping[str, npt.ArrayLike] | None = None, kind: str = "loads",
         supplies: str | None = None, cells: Index | None = None, force_kind: int = lib.DENSITY,
+        t0: float = 0.0, rates: bool = False,
     ) -> None:  # fmt: skip
         self.statement, self._name, self._indices = statement, name, indices
         self._functions, self._supplies, self._ledger = functions, supplies, ledger
-        self.kind = kind
+        self.kind, self._rates = kind, rates
+        self._passes_on = rates and bool(scheme.weight_of_before)
+        when = when or [lib.GROWS] * len(functions)
+        self._t = np.full(2, t0)
         self._size, self._subdomain, self._A = subdomain.size, subdomain, A
         self._kernels = made = kernels(statement)
-        for name in made.lost:
-            ledger.lost[name] += 0.0
+        for account, energies in made.energies.items():
+            for entry in energies:
+                getattr(ledger, account)[entry] += 0.0
         n, width, motions = len(indices), len(statement.inputs), len(statement.unknowns)
         dofs = np.asarray(dofs, dtype=np.int32).reshape(n, motions)
         loaded: Array = np.zeros(subdomain.size)
         loaded[dofs] = 1.0
         # Other processes may load degrees of freedom that this process owns.
         self.dofs: Index = np.flatnonzero(subdomain.added(loaded)).astype(np.int32)
-        rows, columns = (dofs[:, list(x)] for x in zip(*made.entries, strict=True))
-        entries = A.positions(rows.ravel(), columns.ravel()).reshape(n, -1)
+        self.dofs = self.dofs if kind == "loads" else self.dofs[:0]
+        i, j = np.array(made.entries, dtype=int).reshape(-1, 2).T
+        entries = A.positions(dofs[:, i].ravel(), dofs[:, j].ravel()).reshape(n, len(i))
         time_index = {"dt": np.full(n, len(functions))} | dict(of_step or {})
         from_ = [np.broadcast_to(time_index[x], n) for x in statement.of_step]
         w = np.zeros((n, width))
@@ -82,30 +96,34 @@ class Block(LoadTerm):
         self._states = self._w[:, 2 * motions : first]
         self.state = {z: self._states[:, k] for k, z in enumerate(statement.state)}
         self._numbers = self._w[:, first : first + len(statement.numbers)]
-        batches, most = len(self._w), made.tangent.outputs
-        most = max(most, made.end.outputs) if made.end else most
+        batches = len(self._w)
+        most = max(f.outputs for f in (made.force, made.tangent, made.end) if f is not None)
         each, self._second = np.zeros((2, batches, motions, BATCH))
         self._each = ffi.new("double *[1]", [doubles(each)]), each
         self._times = np.zeros((3, len(functions) + 1))
         self._forces = np.zeros((2, len(self.dofs)))
-        self._energy = np.zeros(len(made.stored))
+        self._energy, stored = np.zeros(len(made.energies["state"])), len(made.energies["state"])
+        others = sum(map(len, made.energies.values())) - stored
         self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
         self._c = struct(
-            "block", force_of=made.force, tangent_of=made.tangent, end_of=made.end or ffi.NULL,
+            "block", force_of=made.force, tangent_of=made.tangent or ffi.NULL,
+            end_of=made.end or ffi.NULL,
             lanes=BATCH, elements=n, batches=batches, unknowns=motions,
             states=len(statement.state), numbers=len(statement.numbers),
             steps=len(statement.of_step), width=width, size=len(self.dofs), dof=self.dofs,
-            dofs=in_batches(dofs, BATCH), at=in_batches(np.searchsorted(self.dofs, dofs).astype(np.int32), BATCH),
+            dofs=in_batches(dofs, BATCH),
+            at=in_batches(np.searchsorted(self.dofs, dofs).astype(np.int32), BATCH),
             entry=in_batches(entries, BATCH), functions=len(functions), now=self._times[0],
             end=self._times[1], before=self._times[2],
             **{"from": in_batches(np.array(from_, dtype=np.int32).T.reshape(n, -1), BATCH)},
             w=self._w, out=np.zeros(batches * BATCH * most),
             space=np.zeros(max(motions * (motions + 1), most)), each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
-            weight_of_before=scheme.weight_of_before, stored=len(made.stored),
-            lost=len(made.lost), energy=self._energy,
+            weight_of_before=scheme.weight_of_before, stored=stored,
+            entered=others, energy=self._energy, t=self._t, when=np.array(when, dtype=np.int32),
         )  # fmt: skip
-        self.loops = loop("add_block", self._c), loop("add_block_tangent", self._c)
+        tangent = loop("add_block_tangent", self._c) if made.tangent else None
+        self.loops = loop("add_block", self._c), tangent
         if cells is not None:
             self.in_cells = [InCells(lambda: self, force_kind, cells)]
 
@@ -121,24 +139,53 @@ class Block(LoadTerm):
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return the loops that begin and accept a step, and enter energies."""
         self._callbacks, ledger, made = callbacks, self._ledger, self._kernels
-        entries = [ledger.state.pointer(name) for name in made.stored]
-        entries += [ledger.lost.pointer(name) for name in made.lost]
+        entries = [
+            getattr(ledger, account).pointer(entry)
+            for account, energies in made.energies.items() for entry in energies
+        ]  # fmt: skip
         c = fill(
             self._c, function=callbacks.time_functions(self._functions),
             entries=ffi.new("double *[]", entries),
             work=ledger.supplied.pointer(self._supplies) if self._supplies else ffi.NULL,
         )  # fmt: skip
-        energies = [loop("add_energy_of_block", c)] if made.stored else []
+        energies = [loop("add_energy_of_block", c)] if len(self._energy) else []
         return Phases([loop("begin_block", c)], [loop("accept_block", c)], energies)
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Set the forces before the next step to the forces at the time ``t``, and return them."""
-        step = struct("time_step", load_time=t, fraction=1.0, at=1.0, dt=math.inf, q0=q)
-        lib.begin_block(self._c, step, ffi.NULL, ffi.NULL)
-        self._callbacks.synchronize()
+        """Set the forces before the next step to the forces at the time ``t``, and return them.
+
+        If they depend on velocities, the last step is assumed to take 1 s at constant velocities.
+        """
+        self._t[:] = t
+        before, dt = (q - v, 1.0) if self._rates and v is not None else (q, math.inf)
+        self._begin(before, t, dt=dt, fraction=1.0)
         self.add_residual(q, np.zeros(self._size))
         self._forces[1], self._times[2] = self._forces[0], self._times[1]
-        return -self._whole(self._forces[0])
+        if self._passes_on and past is not None and past.has(self._name):
+            self._keep_forces(past)
+        return -self._whole(self._forces[1])
+
+    def _begin(self, q0: Array, t: float, *, dt: float, fraction: float) -> None:
+        times = {"load_time": t, "motion_time": t, "fraction": fraction, "at": 1.0}
+        step = struct("time_step", q0=q0, dt=dt, **times)
+        lib.begin_block(self._c, step, ffi.NULL, ffi.NULL)
+        self._callbacks.synchronize()
+
+    def pass_on(self, archive: Archive) -> None:
+        """Save the forces of the last step, if they depend on its velocities."""
+        if self._passes_on:
+            self._keep_forces(archive)
+
+    def _keep_forces(self, archive: Archive) -> None:
+        """Save or restore the forces in the equation of the last step."""
+        forces = archive.added(self._name, self._whole(self._forces[1]))
+        self._forces[:] = forces[self.dofs]
+
+    def start(self, q: Array) -> None:
+        """See the base class: compute the stored energies."""
+        if len(self._energy):
+            self._begin(q, float(self._t[0]), dt=math.inf, fraction=0.0)
+            lib.find_energies_of_block(self._c, doubles(q))
 
     def _whole(self, forces: Array) -> Array:
         """Return forces at all local degrees of freedom from forces at the loaded ones."""
@@ -149,9 +196,9 @@ class Block(LoadTerm):
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore states, functions of time and forces at the end of the last step."""
         name, n = self._name, len(self._indices)
-        if self._supplies:
-            forces = archive.added(name, self._whole(self._forces[1]))
-            self._forces[:] = forces[self.dofs]
+        self._t[0] = archive.number(f"time of {name}", float(self._t[0]))
+        if self._c.size:
+            self._keep_forces(archive)
         times = self._times[2, :-1, None]
         self._times[2, :-1] = archive.rows(
             f"functions of {name}", np.arange(len(times)), times, known=True
@@ -161,6 +208,15 @@ class Block(LoadTerm):
             rows = archive.rows(f"states of {name}", self._indices, rows)
             self._states[:] = in_batches(rows, BATCH)
 
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """See the base class."""
+        if (change := self._kernels.change) is not None:
+            batches, width, lanes = self._w.shape
+            w = np.zeros((batches, width + self._c.unknowns, lanes))
+            lib.add_change_of_tangent(
+                self._c, change, *map(doubles, (q1, u, w)), doubles(self._A.data)
+            )
+
     # -- derivatives of runs ---------------------------------------------------------------------
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
@@ -169,7 +225,7 @@ class Block(LoadTerm):
         by_number = neighbours.differences(lambda term: term._numbers)
         by_state = neighbours.state(lambda term: term._states)
         terms = [term for some in neighbours.terms for term in some]
-        neighbours.states += [term._times[2] for term in terms]
+        neighbours.states += [x for term in terms for x in (term._times[2], term._t)]
         b, numbers = self._c, len(self._functions) + 1
         rows = b.unknowns + b.states
         c = struct(

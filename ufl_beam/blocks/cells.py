@@ -85,10 +85,21 @@ class Cell:
         return [ufl.diff(work, v[i]) for i in range(len(COMPONENTS)) for v in self._virtual]
 
 
+POINT = "s", "weight"
+"""Names of a quadrature point as a fraction of the cell, and of its weight."""
+
+
+def at_points(cells: Index, number: int) -> tuple[Index, Index, list[Array]]:
+    """Return elements for the Gauss points of cells: their cells, indices, and :data:`POINT`."""
+    s, weight = (np.tile(x, len(cells)) for x in gauss_rule(number))
+    indices = np.repeat(cells * number, number) + np.tile(np.arange(number), len(cells))
+    return np.repeat(cells, number), indices, [s, weight]
+
+
 class AxisOfCell(Axis):
     """Undeformed axis of a cell at the fraction ``s``, for fields that are interpolated by it."""
 
-    def __init__(self, cell: Cell, s: float) -> None:
+    def __init__(self, cell: Cell, s: float | Expr) -> None:
         mesh, order = Mesh(degree=cell.degree), node_order(cell.degree)
         self.nodes, self.X = [float(a) for a in mesh.nodes], ufl.variable(ufl.as_ufl(s))
         between = [self.nodes[k] for k in order]
@@ -99,6 +110,7 @@ class AxisOfCell(Axis):
         self.h = ufl.sqrt(ufl.dot(end - start, end - start))
         self.t0 = (end - start) / self.h
         self.n0 = perpendicular(self.t0)
+        self.x = start + self.X * (end - start)
 
     def field(self, nodal: Sequence[Expr]) -> Expr:
         """Return the interpolation of nodal vectors."""

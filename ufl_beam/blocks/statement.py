@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
+import numpy as np
 import ufl
 from ufl.algorithms import expand_derivatives
 from ufl.classes import ListTensor, Zero
@@ -33,16 +34,28 @@ class Equations(NamedTuple):
         state: New state at the end of the step, by name.
         stored: Energies that the element stores at the end of the step, by entry of the ledger; J.
         lost: Energies that it loses in the step, by entry of the ledger; J.
+        supplied: Energies that it supplies in the step besides the work of loads; J.
     """
 
     forces: Sequence[Expr]
     state: Mapping[str, Expr] = {}
     stored: Mapping[str, Expr] = {}
     lost: Mapping[str, Expr] = {}
+    supplied: Mapping[str, Expr] = {}
 
 
 class Inputs(dict[str, Expr]):
-    """Inputs of a statement by name; motions are "q0 x0", "q1 rotation1" and so on."""
+    """Inputs of a statement by name; motions are "q0 x0", "q1 rotation1" and so on.
+
+    Attributes:
+        domain: Mesh of the inputs in UFL.
+        space: Function that returns a space of n values on it.
+    """
+
+    def __init__(self, compiler: Pointwise, at: Mapping[str, Expr]) -> None:
+        super().__init__(at)
+        self.space = compiler.values
+        self.domain = compiler.values(1).mesh.ufl_domain()
 
     def motions(self, group: str) -> list[Expr]:
         """Return the motion (x, y, rotation) of each node: "q0" before the step, "q1" after it."""
@@ -56,14 +69,7 @@ class Inputs(dict[str, Expr]):
 
 
 class Statement(ABC):
-    """Effect on an element.  Equal statements, such as equal frozen dataclasses, share kernels.
-
-    Attributes:
-        of_step: Names of the numbers of a step; "dt" is its length (s), others are values of
-            functions of time.
-    """
-
-    of_step: Sequence[str] = ()
+    """Effect on an element.  Equal statements, such as equal frozen dataclasses, share kernels."""
 
     @property
     @abstractmethod
@@ -73,6 +79,11 @@ class Statement(ABC):
     @property
     def state(self) -> Sequence[str]:
         """Names of the numbers that an element remembers."""
+        return ()
+
+    @property
+    def of_step(self) -> Sequence[str]:
+        """Names of the numbers of a step: "dt", its length (s), and values of functions of time."""
         return ()
 
     @property
@@ -103,36 +114,57 @@ class Kernels:
         force: Forces of an element.
         tangent: Their derivatives by the motions at the end of the step, without zeros.
         entries: Row and column of each entry of ``tangent``.
-        end: New state, stored and lost energies; None if there are none.
-        stored, lost: Names of the energies in the ledger.
+        end: New state, stored, lost and supplied energies; None if there are none.
+        energies: Names of these energies in the ledger, by account.
     """
 
     def __init__(self, statement: Statement) -> None:
-        self._statement = statement
-        self._compiler = Pointwise(statement.inputs)
-        at = Inputs({name: ufl.variable(x) for name, x in self._compiler.at.items()})
-        made, self._at = statement.equations(at), at
-        self.stored, self.lost = tuple(made.stored), tuple(made.lost)
-        self._forces, self._state = list(made.forces), [made.state[z] for z in statement.state]
-        self.force = self._compiled(_expanded(self._forces))
+        self._statement, self._compilers = statement, list[Pointwise]()
+        made, at = self._stated(statement.inputs)
         names = [f"q1 {name}" for name in statement.unknowns]
-        slopes = _expanded([ufl.diff(ufl.as_ufl(f), at[q]) for f in self._forces for q in names])
+        forces = _expanded(made.forces)
+        slopes = _slopes(forces, [at[q] for q in names])
         nonzero = [i for i, slope in enumerate(slopes) if not isinstance(slope, Zero)]
         self.entries = [divmod(i, len(names)) for i in nonzero]
+        self.energies = {"state": made.stored, "lost": made.lost, "supplied": made.supplied}
+        energies = [value for account in self.energies.values() for value in account.values()]
+        self.force = self._compiled(forces)
         self.tangent = self._compiled([slopes[i] for i in nonzero])
-        self.end = self._compiled(
-            _expanded([*self._state, *made.stored.values(), *made.lost.values()])
-        )
+        self.end = self._compiled(_expanded([*self._states(made), *energies]))
+
+    def _stated(self, names: Sequence[str]) -> tuple[Equations, Inputs]:
+        self._compilers.append(compiler := Pointwise(names))
+        at = Inputs(compiler, {name: ufl.variable(x) for name, x in compiler.at.items()})
+        return self._statement.equations(at), at
+
+    def _states(self, made: Equations) -> list[Expr]:
+        return [made.state[name] for name in self._statement.state]
 
     def _compiled(self, outputs: Sequence[Expr]) -> Any:
-        return self._compiler.compile_elements(*outputs) if outputs else None
+        return self._compilers[-1].compile_elements(*outputs) if outputs else None
 
     @cached_property
     def derivative(self) -> Any:
         """Derivatives of forces and new state, row after row, by all inputs."""
-        rows, columns = [*self._forces, *self._state], self._statement.inputs
-        slopes = [ufl.diff(ufl.as_ufl(f), self._at[name]) for f in rows for name in columns]
-        return self._compiled(_expanded(slopes))
+        names = self._statement.inputs
+        made, at = self._stated(names)
+        rows = [*made.forces, *self._states(made)]
+        return self._compiled(_slopes(_expanded(rows), [at[name] for name in names]))
+
+    @cached_property
+    def change(self) -> Any:
+        """Derivatives of ``tangent`` along motions, which are further inputs; None if zero."""
+        names = [f"q1 {name}" for name in self._statement.unknowns]
+        made, at = self._stated([*self._statement.inputs, *(f"along {x}" for x in names)])
+        motions = [at[name] for name in names]
+        slopes = _slopes(_expanded(made.forces), motions)
+        slopes = [slopes[i * len(names) + j] for i, j in self.entries]
+        rows = np.reshape(np.array(_slopes(slopes, motions), dtype=object), (-1, len(names)))
+        changes = _expanded([
+            sum((x * at[f"along {name}"] for x, name in zip(row, names, strict=True)), 0)
+            for row in rows
+        ])  # fmt: skip
+        return None if all(isinstance(x, Zero) for x in changes) else self._compiled(changes)
 
 
 @lru_cache(maxsize=128)
@@ -145,11 +177,22 @@ def _expanded(outputs: Sequence[Expr]) -> list[Expr]:
     """Return expressions with all derivatives expanded together."""
     if not outputs:
         return []
-    whole = expand_derivatives(ufl.as_vector([ufl.as_ufl(x) for x in outputs]))
+    return _components(expand_derivatives(ufl.as_vector([*map(ufl.as_ufl, outputs)])), len(outputs))
+
+
+def _slopes(outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:
+    """Return the derivatives of expanded expressions: of the first one by all variables, ..."""
+    if not outputs:
+        return []
+    every = ufl.as_vector(outputs)  # UFL differentiates a vector at once
+    whole = expand_derivatives(ufl.as_tensor([ufl.diff(every, x) for x in by]))
+    columns = [_components(x, len(outputs)) for x in _components(whole, len(by))]
+    return [column[i] for i in range(len(outputs)) for column in columns]
+
+
+def _components(whole: Expr, number: int) -> list[Expr]:
     if isinstance(whole, ListTensor):
         return list(whole.ufl_operands)
-    return (
-        [Zero()] * len(outputs)
-        if isinstance(whole, Zero)
-        else [whole[i] for i in range(len(outputs))]
-    )
+    if isinstance(whole, Zero):
+        return [Zero(whole.ufl_shape[1:])] * number
+    return [whole[i] for i in range(number)]

@@ -348,7 +348,7 @@ class Pointwise:
     def __init__(self, inputs: Sequence[str]) -> None:
         self._cell = line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
         self._alive: list[fem.Form] = []
-        x = fem.Function(self._values(len(inputs)))
+        x = fem.Function(self.values(len(inputs)))
         self.at: dict[str, Expr] = {name: x[i] for i, name in enumerate(inputs)}
 
     def compile(self, *outputs: Expr) -> Any:
@@ -376,12 +376,13 @@ class Pointwise:
     def _compiled(self, outputs: Sequence[Expr]) -> tuple[Any, Path]:
         """Return a C function that computes the outputs, and the C file that FFCx wrote for it."""
         outputs = with_shared_nodes(outputs)
-        z = ufl.TestFunction(self._values(len(outputs)))
+        z = ufl.TestFunction(self.values(len(outputs)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
         form, source = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)
         self._alive.append(form)
         return tabulator(form), source
 
-    def _values(self, n: int) -> fem.FunctionSpace:
+    def values(self, n: int) -> fem.FunctionSpace:
+        """Return a space of n values at the point."""
         element = basix.ufl.quadrature_element("interval", value_shape=(n,), degree=1)
         return fem.functionspace(self._cell, element)

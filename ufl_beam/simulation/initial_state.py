@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.blocks.works import require_work
 from ufl_beam.caches import no_garbage_collection
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.discretization.function_spaces import element_of
 from ufl_beam.discretization.model_warnings import (
     warn_of_far_points,
     warn_of_free_hinges,
@@ -21,7 +21,6 @@ from ufl_beam.discretization.model_warnings import (
 )
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Excess, Transfer, same_unknowns
-from ufl_beam.discretization.work_forms import statement
 from ufl_beam.errors import ArgumentError, require_kind, shorten, warn
 from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import DEFAULT_MESH, Mesh
@@ -71,7 +70,7 @@ def checked_numbering(
             instead = "begin with a run by Static() or EnergyMomentumStatic(theta=1), as start="
             require_no_prestress(scene, repr(scheme), instead)
     for work in scene.works:
-        statement(work, element_of(mesh), scheme)
+        require_work(work, mesh.degree, scheme)
     require_independent(scene)
     warn_of_far_points(scene)
     warn_of_free_hinges(scene)

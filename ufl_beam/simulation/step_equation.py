@@ -17,6 +17,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import Block
 from ufl_beam.blocks.damping import second_differences, viscosity
 from ufl_beam.blocks.loads import load_blocks
+from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.dof_numbering import DofNumbering
@@ -42,7 +43,6 @@ from ufl_beam.terms.inertia_and_damping import BEFORE, Inertia, rayleigh_forces
 from ufl_beam.terms.load_forces import DeadLoads, load_terms
 from ufl_beam.terms.material_points import create_entries
 from ufl_beam.terms.term import Callbacks, LoadTerm, Term
-from ufl_beam.terms.user_forces import Works
 
 MOVING = "inertia", "damping"
 """Kinds of terms that depend on velocities."""
@@ -130,7 +130,7 @@ class StepEquation:
         if imposed is not None:
             self.loads.append(imposed)
         if scene.works:
-            self.loads.append(together(Works, fields, scheme, ledger, A, t0))
+            self.loads += together(work_blocks, subdomain, scheme, ledger, A, t0)
         self.supports = Supports(subdomain, scheme, ledger, A)
         if inertia is not None:
             self.supports.stop(v)

@@ -206,10 +206,11 @@ class Callbacks:
 
     # -- functions, with their data ---------------------------------------------------------------
 
-    def time_functions(self, functions: Sequence[tuple[TimeFunction, object]]) -> Any:
+    def time_functions(self, functions: Sequence[tuple[TimeFunction | None, object]]) -> Any:
         """Return an array of ``time_function`` of loops.h for pairs of a function and its owner.
 
-        Error messages mention the owner of the function, see :func:`value_at`.
+        None is the time itself.  Error messages mention the owner of the function, see
+        :func:`value_at`.
         """
         functions_in_c = ffi.new("time_function[]", len(functions))
         for place, (function, owner) in zip(functions_in_c, functions, strict=True):
@@ -219,7 +220,7 @@ class Callbacks:
                 points = [np.array(x, dtype=np.float64) for x in (function.times, function.values)]
                 place.points, (place.t, place.y) = len(points[0]), map(doubles, points)
                 self._alive += points
-            else:
+            elif function is not None:
                 place.value = lib.time_in_python
                 place.handle = self.handle(partial(value_at, function, owner=owner))
         return functions_in_c

@@ -41,15 +41,21 @@ static void gather(const block *b, const double *q, int first)
   }
 }
 
-/* Numbers of a step: functions of time, which grow from their values at the end of the last step, and the
- * length of the step. */
+/* Numbers of a step: functions of time, and the length of the step. */
 static void find_numbers_of_step(const block *b, const time_step *step)
 {
   static const double at_rest = 1e300; /* instead of an infinite step; all rates are practically zero */
-  for (int k = 0; k < b->functions; ++k) {
-    const double change = step->fraction * (value_at(b->function + k, step->load_time) - b->before[k]);
-    b->end[k] = b->before[k] + change, b->now[k] = b->before[k] + step->at * change;
-  }
+  const double t = b->t[0], a = b->weight_of_before, reached = step->at * step->fraction;
+  double time[TIMES_OF_NUMBERS];
+  time[AT_START] = t, time[AT_NOW] = t + reached * (step->load_time - t);
+  time[AT_END] = b->t[1] = t + step->fraction * (step->motion_time - t);
+  time[AT_MIDDLE] = a * t + (1 - a) * time[AT_NOW];
+  for (int k = 0; k < b->functions; ++k)
+    if (b->when[k] == GROWS) {
+      const double change = step->fraction * (value_at(b->function + k, step->load_time) - b->before[k]);
+      b->end[k] = b->before[k] + change, b->now[k] = b->before[k] + step->at * change;
+    } else
+      b->now[k] = value_at(b->function + k, time[b->when[k]]);
   b->now[b->functions] = fmin(step->dt, at_rest);
 }
 
@@ -79,7 +85,7 @@ void add_block(void *self, const double *q, double *r)
   gather(b, q, 0);
   evaluate(b, b->force_of, *b->each);
   scatter(b, b->unknowns, *b->each, b->dofs, r);
-  if (!b->work) return;
+  if (!b->size) return;
   memset(b->force, 0, b->size * sizeof *r);
   scatter(b, b->unknowns, *b->each, b->at, b->force);
 }
@@ -92,30 +98,36 @@ void add_block_tangent(void *self, const double *q, double *tangent)
   scatter(b, b->tangent_of->outputs, b->out, b->entry, tangent);
 }
 
-/* New states, and energies: stored ones are kept for add_energy_of_block, lost ones are entered. */
+/* New states, and energies: those of the state are kept for add_energy_of_block, those of the step are entered. */
 static void end_step(const block *b, int enter)
 {
-  const int n = b->lanes, outputs = b->end_of->outputs;
+  const int n = b->lanes, outputs = b->end_of->outputs, energies = b->stored + b->entered;
   evaluate(b, b->end_of, b->out);
   memset(b->energy, 0, b->stored * sizeof(double));
   for (int c = 0; c < b->batches; ++c) {
     const double *out = b->out + (size_t)c * outputs * n, *energy = out + b->states * n;
     if (enter) memcpy(input(b, c, 2 * b->unknowns), out, b->states * n * sizeof *out);
-    for (int i = 0; i < b->stored + b->lost; ++i)
-      for (int l = 0; l < elements_in(b, c); ++l)
+    for (int i = 0, some = elements_in(b, c); i < energies; ++i)
+      for (int l = 0; l < some; ++l)
         if (i < b->stored) b->energy[i] += energy[i * n + l];
         else if (enter) *b->entries[i] += energy[i * n + l];
   }
 }
 
+/* Energies of the state with the configuration q, from which a step begins. */
+void find_energies_of_block(const block *b, const double *q)
+{
+  gather(b, q, 0);
+  end_step(b, 0);
+}
+
 void accept_block(void *self, const time_step *step, const double *q1, const double *s)
 {
   const block *b = self;
-  if (b->work) {
-    *b->work -= work_in_step(b->size, b->dof, b->weight_of_before, b->force_before, b->force, s);
-    memcpy(b->force_before, b->force, b->size * sizeof *b->force);
-  }
+  if (b->work) *b->work -= work_in_step(b->size, b->dof, b->weight_of_before, b->force_before, b->force, s);
+  memcpy(b->force_before, b->force, b->size * sizeof *b->force);
   memcpy(b->before, b->end, b->functions * sizeof *b->before);
+  b->t[0] = b->t[1];
   if (!b->end_of) return;
   gather(b, q1, 0);
   end_step(b, 1);
@@ -125,6 +137,20 @@ void add_energy_of_block(void *self, const time_step *step, const double *q1, co
 {
   const block *b = self;
   for (int i = 0; i < b->stored; ++i) *b->entries[i] += b->energy[i];
+}
+
+/* Add the derivative of the tangent at q along u; w is space for the inputs and as many motions along u. */
+void add_change_of_tangent(const block *b, const element_function *f, const double *q, const double *u, double *w,
+                           double *tangent)
+{
+  block more = *b;
+  more.w = w, more.width = b->width + b->unknowns;
+  for (int c = 0; c < b->batches; ++c)
+    memcpy(input(&more, c, 0), input(b, c, 0), (size_t)b->width * b->lanes * sizeof *w);
+  gather(&more, q, 0);
+  gather(&more, u, b->width);
+  evaluate(&more, f, b->out);
+  scatter(b, f->outputs, b->out, b->entry, tangent);
 }
 
 /* -- derivatives ----------------------------------------------------------------------------------------- */
@@ -203,8 +229,11 @@ void accept_block_derivative(void *self, const derivatives *d, int p)
     find_direction(m, d, c, p, d->q1 + (size_t)p * d->size);
     for (int i = 0; i < b->states; ++i) multiply_row(m, c, b->unknowns + i, z + i * b->lanes);
   }
-  for (int k = p * m->neighbours; k < (p + 1) * m->neighbours; ++k)
-    memcpy(m->neighbour[k]->before, m->neighbour[k]->end, b->functions * sizeof(double));
+  for (int k = p * m->neighbours; k < (p + 1) * m->neighbours; ++k) {
+    const block *one = m->neighbour[k];
+    memcpy(one->before, one->end, b->functions * sizeof(double));
+    one->t[0] = one->t[1];
+  }
 }
 
 /* Add the products of the rows from `first` on, weighted by `bar` in lanes, to the derivatives by all inputs but

@@ -185,50 +185,6 @@ void accept_moving_loads(void *self, const time_step *step, const double *q1, co
   memcpy(m->before, m->end, 2 * (size_t)m->nodes * m->cells * sizeof *m->end);
 }
 
-/* Enter the loss of a potential by the scheme, and the energy that its change in time supplied. */
-static void account_for(const user_work *w, const user_works *all, const double *q0, const double *q1)
-{
-  const double a = all->weight_of_before;
-  if (w->lost) add_values(w->lost, 0, q1, 0);
-  if (!w->supplied) return;
-  put_time(w, a * all->t + (1 - a) * w->number[WORK_TIME]);
-  const cells *energy = w->energy->form;
-  const double moved = value_of_cells(energy, q1) - value_of_cells(energy, q0);
-  put_time(w, all->t_at_end);
-  *w->supplied += value_of_cells(energy, q1) - w->energy->held - moved;
-}
-
-void accept_works(void *self, const time_step *step, const double *q1, const double *s)
-{
-  user_works *all = self;
-  const double a = all->weight_of_before;
-  double *r = all->space;
-  memset(all->force, 0, all->size * sizeof *r);
-  for (int k = 0; k < all->works; ++k) {
-    const user_work *w = all->work[k];
-    memset(r, 0, all->size * sizeof *r);
-    add_cells((void *)w->residual, q1, r);
-    for (int i = 0; i < all->size; ++i) r[i] = -r[i], all->force[i] += r[i];
-    if (w->energy) account_for(w, all, step->q0, q1);
-    else {
-      *w->supplied += work_in_step(all->size, 0, a, w->before, r, s);
-      memcpy(w->before, r, all->size * sizeof *r);
-    }
-  }
-  all->t = all->t_at_end, all->grown = all->grown_at_end;
-}
-
-void add_energy_of_works(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const user_works *all = self;
-  for (int k = 0; k < all->works; ++k) {
-    const user_work *w = all->work[k];
-    if (!w->energy) continue;
-    put_time(w, all->t);
-    add_values(w->energy, step, q1, s);
-  }
-}
-
 void accept_inertia(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;

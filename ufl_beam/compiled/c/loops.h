@@ -715,6 +715,11 @@ typedef struct {
   int outputs;
 } element_function;
 
+/* Time of a number of a step. GROWS: a value that grows from that at the end of the last step, by the applied
+ * fraction of a step. Others are values at the time of the loads, at the beginning and at the end of the step,
+ * and at the time between for which the trapezoidal rule takes loads. */
+enum time_of_number { GROWS, AT_NOW, AT_START, AT_MIDDLE, AT_END, TIMES_OF_NUMBERS };
+
 /* Inputs of an element are motions of its nodes at the end of the step and before it, `unknowns` each, its
  * state, its numbers, and `steps` numbers of the step. */
 typedef struct {
@@ -726,6 +731,8 @@ typedef struct {
   const int32_t *entry;     /* entry of the matrix of each output of tangent_of */
   int functions;            /* of time */
   const time_function *function;
+  const int32_t *when;      /* time_of_number of each */
+  double *t;                /* time of the state, and at the end of the step */
   double *now, *end, *before; /* their values in the equation, at the end of the step, at the end of the last
                                * step; then the length of the step */
   const int32_t *from;      /* index in `now` of each number of the step of an element */
@@ -733,8 +740,8 @@ typedef struct {
   double **each;            /* forces of elements in the latest residual */
   double *force, *force_before; /* of loads: in the latest residual, in that of the last step; size */
   double weight_of_before, *work; /* work: entry of the ledger of the work of loads, minus the forces; or none */
-  int stored, lost;
-  double *energy, *const *entries; /* stored energies; entries of stored, then of lost energies */
+  int stored, entered;      /* numbers of energies: of a state, and of a step */
+  double *energy, *const *entries; /* energies of the state; entries of all in the ledger */
 } block;
 
 /* Imposed strains of the cells of a term, see CellStrains: elastic cells, whose forms have the strains
@@ -796,6 +803,9 @@ struct moving_loads {
   double part;              /* fraction of the increment at which loads act */
 };
 
+void find_energies_of_block(const block *b, const double *q);
+void add_change_of_tangent(const block *b, const element_function *f, const double *q, const double *u, double *w,
+                           double *tangent);
 void start_moving_masses(moving_loads *m, double t, const double *q);
 void take_rates_of_masses(moving_loads *m, const double *q1);
 
@@ -813,32 +823,6 @@ typedef struct {
   double weight_of_before;
   double *work; /* entry of the ledger */
 } dead_loads;
-
-/* First parameters of a work: time, length of the step, load factor; the parameters of its user
- * follow. */
-enum work_number { WORK_TIME, WORK_STEP, WORK_PART, WORK_NUMBERS };
-
-/* A work of a user on cells, see user_forces.py. */
-typedef struct {
-  const cells *residual;
-  int forms, numbers;           /* numbers: of the parameters */
-  const form_of_step *form;     /* all forms of the work, and the position of q0 in each, or -1 */
-  const int32_t *at;            /* forms x numbers: positions of the parameters, or -1 */
-  double *number;               /* current values in the forms */
-  const time_function *of_time; /* parameters of the user */
-  double *before;               /* of a virtual work: forces in the equation of the last step */
-  form_value *energy, *lost;    /* of a potential; or none */
-  double *supplied;             /* ledger entry of the energy supplied by the work or by a potential that
-                                 * depends on time; or none */
-} user_work;
-
-typedef struct {
-  int size, works;
-  user_work *const *work;
-  double weight_of_before;
-  double t, grown, t_at_end, grown_at_end; /* time and load factor, of the state and after the step */
-  double *force, *space; /* force: of all works in the equation of the last step */
-} user_works;
 
 /* Coefficients of a step, see Coefficients of time_scheme.py. Their rows multiply the rates: the
  * step or a change of velocities, the velocities, the previous velocities, and further rates of the
@@ -1097,8 +1081,8 @@ typedef struct {
 phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
   accept_dead_loads,
   begin_moving_loads, accept_moving_loads,
-  add_energy_of_moving_masses, begin_works,
-  accept_works, add_energy_of_works,
+  add_energy_of_moving_masses,
+  
   begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
   begin_tangent_damping, accept_tangent_damping,
   begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,

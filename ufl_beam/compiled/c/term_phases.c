@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Beginning of a step: each term computes its loads, rows and coefficients of the step; see term.py. */
 
-/* Interpolate as numpy.interp does. */
+/* Interpolate as numpy.interp does; without points and function, the value is the time. */
 double value_at(const time_function *f, double t)
 {
   const int last = f->points - 1;
-  if (last < 0) return f->value(f->handle, t);
+  if (last < 0) return f->value ? f->value(f->handle, t) : t;
   if (t <= f->t[0] || last == 0) return f->y[0];
   if (t >= f->t[last]) return f->y[last];
   int low = 0, high = last;
@@ -127,44 +127,6 @@ void begin_moving_loads(void *self, const time_step *step, const double *q1, con
     const double before = m->before[i];
     if (step->fraction != 1) m->end[i] = before + step->fraction * (m->end[i] - before);
     m->now[i] = step->at == 1 ? m->end[i] : before + step->at * (m->end[i] - before);
-  }
-}
-
-/* Write a parameter into the forms of a work that depend on it, if it has changed. */
-static void put_number(const user_work *w, int k, double value)
-{
-  if (value == w->number[k]) return;
-  w->number[k] = value;
-  for (int j = 0; j < w->forms; ++j) {
-    const cells *form = w->form[j].form;
-    const int at = w->at[j * w->numbers + k];
-    if (at < 0) continue;
-    for (int c = 0; c < form->number; c += form->batch_size)
-      for (int l = 0; l < form->batch_size; ++l) in_cell(form, c, at)[l] = value;
-  }
-}
-
-static void put_time(const user_work *w, double t)
-{
-  put_number(w, WORK_TIME, t);
-  for (int k = WORK_NUMBERS; k < w->numbers; ++k) put_number(w, k, value_at(w->of_time + k - WORK_NUMBERS, t));
-}
-
-/* Longest time step that works get, instead of an infinite one; all rates are practically zero. */
-static const double AT_REST = 1e300;
-
-void begin_works(void *self, const time_step *step, const double *q1, const double *s)
-{
-  user_works *all = self;
-  const double growth = step->fraction * (1 - all->grown), t = all->t;
-  all->t_at_end = t + step->fraction * (step->motion_time - t), all->grown_at_end = all->grown + growth;
-  for (int k = 0; k < all->works; ++k) {
-    const user_work *w = all->work[k];
-    for (int j = 0; j < w->forms; ++j)
-      if (w->form[j].at >= 0) set_cells(w->form[j].form, step->q0, w->form[j].at);
-    put_time(w, t + step->at * step->fraction * (step->load_time - t));
-    put_number(w, WORK_STEP, fmin(step->dt, AT_REST));
-    put_number(w, WORK_PART, all->grown + step->at * growth);
   }
 }
 
