@@ -18,8 +18,8 @@ FILES = {
 """Files of the modules of the package, by names such as ``model.beams``."""
 
 SUBPACKAGES = [
-    *("", "model", "compiled", "mechanics", "discretization", "terms", "solvers"),
-    *("output", "reference", "simulation", "analysis", "plotting"),
+    *("", "model", "compiled", "mechanics", "discretization", "terms", "blocks"),
+    *("solvers", "output", "reference", "simulation", "analysis", "plotting"),
 ]
 """From the lowest to the highest; the first one is the package itself.
 

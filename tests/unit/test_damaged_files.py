@@ -65,7 +65,7 @@ class Studies:
 class Checkpoints:
     """A checkpoint, from which the run goes on to a later end."""
 
-    format = "checkpoint of ufl_beam, 8"
+    format = "checkpoint of ufl_beam, 9"
     advice = "Delete the file to begin anew, or name another"
 
     def write(self, path):
@@ -194,7 +194,7 @@ def test_files_of_other_kinds_and_versions(kind, other, path, monkeypatch):
         refused(kind, path, f"is a {other.format}, written by version {version()}")
         return
     monkeypatch.setattr(output_files, "version", lambda: "9.8.7")
-    later = f"{kind.format[:-1]}9"
+    later = f"{kind.format[:-1]}99"
     output_files.write(path, later, {})
     monkeypatch.undo()
     refused(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -31,67 +31,99 @@ AT = {"now": lib.AT_NOW, "before": lib.AT_START, "between": lib.AT_MIDDLE, "end"
 """Values of ``time_of_number`` in loops.h by the time of a number."""
 
 
+class BlockSetting(NamedTuple):
+    """Equation of a step to which blocks belong: process, scheme, matrix, ledger, initial time."""
+
+    subdomain: Subdomain
+    scheme: Scheme
+    A: Csr
+    ledger: Ledger
+    t0: float
+
+
+class InTime(NamedTuple):
+    """Number of a step that is a function of time; None is the time itself.
+
+    Attributes:
+        function: The function.
+        owner: Object that error messages name.
+        when: Value of ``time_of_number`` in loops.h.
+    """
+
+    function: TimeFunction | None
+    owner: object
+    when: int = lib.GROWS
+
+
+class Elements(NamedTuple):
+    """Elements of a statement on a process.
+
+    Attributes:
+        name: Name in saved states.
+        indices: Index of each element in the scene.
+        dofs: Local degrees of freedom in the order of ``Statement.unknowns``; (n, unknowns).
+        numbers: Numbers in the order of ``Statement.numbers``; (n,) each.
+        in_time: Functions of time, equal on all processes.
+        of_step: For each name of ``Statement.of_step`` but "dt", an index in ``in_time``, or (n,).
+        cells: Positions in ``subdomain.cells`` of elements that are cells.
+        force_kind: Value of ``force_kind`` in loops.h, for section forces of cells.
+    """
+
+    name: str
+    indices: Index
+    dofs: Index
+    numbers: Sequence[Array]
+    in_time: Sequence[InTime] = ()
+    of_step: Mapping[str, npt.ArrayLike] = {}
+    cells: Index | None = None
+    force_kind: int = lib.DENSITY
+
+
 class Block(LoadTerm):
     """Elements of one statement on a process.
 
     Args:
         statement: Effect on an element.
-        name: Name of the elements in saved states.
-        indices: Index of each element in the scene.
-        dofs: Local degrees of freedom of the elements; (n, 3 * nodes), see ``Statement.unknowns``.
-        numbers: Numbers of the elements, in the order of ``Statement.numbers``; (n,) each.
-        functions: Functions of time, with the owners that messages name, equal on all processes;
-            None: the time itself.
-        when: For each function, a value of ``time_of_number`` in loops.h; by default GROWS.
-        of_step: For each name of ``Statement.of_step`` but "dt", the index in ``functions`` of each
-            element; (n,).
+        elements: The elements.
+        setting: Equation of a step.
         kind: Kind of the term, see :class:`Term`.
         supplies: Entry of the ledger of the work that the elements do on the scene.
-        cells: Positions in ``subdomain.cells`` of the elements, if they are cells.
-        force_kind: Value of ``force_kind`` in loops.h, for section forces of cells.
-        t0: Time at which the run begins; s.
         rates: Whether forces depend on velocities of the step.
 
     Attributes:
         statement: The statement.
         state: Views of the states by name, in batches, with copies of the last element; initially
             zero.
+        dofs: Degrees of freedom on which loads act, on any process.
     """
 
     def __init__(
-        self, statement: Statement, name: str, indices: Index, dofs: Index,
-        numbers: Sequence[Array], subdomain: Subdomain, scheme: Scheme, ledger: Ledger,
-        A: Csr, *, functions: Sequence[tuple[TimeFunction | None, object]] = (),
-        when: Sequence[int] = (),
-        of_step: Mapping[str, npt.ArrayLike] | None = None, kind: str = "loads",
-        supplies: str | None = None, cells: Index | None = None, force_kind: int = lib.DENSITY,
-        t0: float = 0.0, rates: bool = False,
+        self, statement: Statement, elements: Elements, setting: BlockSetting, *,
+        kind: str = "loads", supplies: str | None = None, rates: bool = False,
     ) -> None:  # fmt: skip
-        self.statement, self._name, self._indices = statement, name, indices
-        self._functions, self._supplies, self._ledger = functions, supplies, ledger
-        self.kind, self._rates = kind, rates
+        subdomain, scheme, self._A, self._ledger, t0 = setting
+        self.statement, self._elements, self._supplies = statement, elements, supplies
+        self.kind, self._rates, self._size = kind, rates, subdomain.size
         self._passes_on = rates and bool(scheme.weight_of_before)
-        when = when or [lib.GROWS] * len(functions)
-        self._t = np.full(2, t0)
-        self._size, self._subdomain, self._A = subdomain.size, subdomain, A
         self._kernels = made = kernels(statement)
         for account, energies in made.energies.items():
             for entry in energies:
-                getattr(ledger, account)[entry] += 0.0
-        n, width, motions = len(indices), len(statement.inputs), len(statement.unknowns)
-        dofs = np.asarray(dofs, dtype=np.int32).reshape(n, motions)
+                getattr(self._ledger, account)[entry] += 0.0
+        if supplies:
+            self._ledger.supplied[supplies] += 0.0
+        n, motions, states = len(elements.indices), len(statement.unknowns), len(statement.state)
+        dofs = np.asarray(elements.dofs, dtype=np.int32).reshape(n, motions)
         loaded: Array = np.zeros(subdomain.size)
-        loaded[dofs] = 1.0
+        loaded[dofs] = kind == "loads"
         # Other processes may load degrees of freedom that this process owns.
         self.dofs: Index = np.flatnonzero(subdomain.added(loaded)).astype(np.int32)
-        self.dofs = self.dofs if kind == "loads" else self.dofs[:0]
         i, j = np.array(made.entries, dtype=int).reshape(-1, 2).T
-        entries = A.positions(dofs[:, i].ravel(), dofs[:, j].ravel()).reshape(n, len(i))
-        time_index = {"dt": np.full(n, len(functions))} | dict(of_step or {})
-        from_ = [np.broadcast_to(time_index[x], n) for x in statement.of_step]
-        w = np.zeros((n, width))
-        first = 2 * motions + len(statement.state)
-        w[:, first : first + len(statement.numbers)] = np.array(numbers).reshape(-1, n).T
+        entries = self._A.positions(dofs[:, i].ravel(), dofs[:, j].ravel()).reshape(n, len(i))
+        in_time = {"dt": len(elements.in_time), **elements.of_step}
+        from_ = [np.broadcast_to(in_time[x], n) for x in statement.of_step]
+        w = np.zeros((n, len(statement.inputs)))
+        first = 2 * motions + states
+        w[:, first : first + len(statement.numbers)] = np.array(elements.numbers).reshape(-1, n).T
         self._w = in_batches(w, BATCH)
         self._states = self._w[:, 2 * motions : first]
         self.state = {z: self._states[:, k] for k, z in enumerate(statement.state)}
@@ -100,32 +132,34 @@ class Block(LoadTerm):
         most = max(f.outputs for f in (made.force, made.tangent, made.end) if f is not None)
         each, self._second = np.zeros((2, batches, motions, BATCH))
         self._each = ffi.new("double *[1]", [doubles(each)]), each
-        self._times = np.zeros((3, len(functions) + 1))
+        self._times, self._t = np.zeros((3, len(elements.in_time) + 1)), np.full(2, t0)
+        self._begun = np.zeros(1, dtype=np.int32)
         self._forces = np.zeros((2, len(self.dofs)))
-        self._energy, stored = np.zeros(len(made.energies["state"])), len(made.energies["state"])
-        others = sum(map(len, made.energies.values())) - stored
+        stored, *entered = map(len, made.energies.values())
+        self._energy = np.zeros(stored)
         self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
         self._c = struct(
             "block", force_of=made.force, tangent_of=made.tangent or ffi.NULL,
-            end_of=made.end or ffi.NULL,
-            lanes=BATCH, elements=n, batches=batches, unknowns=motions,
-            states=len(statement.state), numbers=len(statement.numbers),
-            steps=len(statement.of_step), width=width, size=len(self.dofs), dof=self.dofs,
-            dofs=in_batches(dofs, BATCH),
+            end_of=made.end or ffi.NULL, lanes=BATCH, elements=n, batches=batches,
+            unknowns=motions, states=states, numbers=len(statement.numbers),
+            steps=len(from_), width=w.shape[1], dofs=in_batches(dofs, BATCH),
+            size=len(self.dofs), dof=self.dofs,
             at=in_batches(np.searchsorted(self.dofs, dofs).astype(np.int32), BATCH),
-            entry=in_batches(entries, BATCH), functions=len(functions), now=self._times[0],
-            end=self._times[1], before=self._times[2],
-            **{"from": in_batches(np.array(from_, dtype=np.int32).T.reshape(n, -1), BATCH)},
+            entry=in_batches(entries, BATCH), functions=len(elements.in_time),
+            when=np.array([x.when for x in elements.in_time], dtype=np.int32), t=self._t,
+            begun=self._begun,
+            now=self._times[0], end=self._times[1], before=self._times[2],
+            **{"from": in_batches(np.array(from_, dtype=np.int32).reshape(-1, n).T, BATCH)},
             w=self._w, out=np.zeros(batches * BATCH * most),
             space=np.zeros(max(motions * (motions + 1), most)), each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
-            weight_of_before=scheme.weight_of_before, stored=stored,
-            entered=others, energy=self._energy, t=self._t, when=np.array(when, dtype=np.int32),
+            weight_of_before=scheme.weight_of_before, stored=stored, entered=sum(entered),
+            energy=self._energy,
         )  # fmt: skip
         tangent = loop("add_block_tangent", self._c) if made.tangent else None
         self.loops = loop("add_block", self._c), tangent
-        if cells is not None:
-            self.in_cells = [InCells(lambda: self, force_kind, cells)]
+        if elements.cells is not None:
+            self.in_cells = [InCells(lambda: self, elements.force_kind, elements.cells)]
 
     @property
     def effect(self) -> str:
@@ -144,7 +178,7 @@ class Block(LoadTerm):
             for account, energies in made.energies.items() for entry in energies
         ]  # fmt: skip
         c = fill(
-            self._c, function=callbacks.time_functions(self._functions),
+            self._c, function=callbacks.time_functions([x[:2] for x in self._elements.in_time]),
             entries=ffi.new("double *[]", entries),
             work=ledger.supplied.pointer(self._supplies) if self._supplies else ffi.NULL,
         )  # fmt: skip
@@ -161,7 +195,8 @@ class Block(LoadTerm):
         self._begin(before, t, dt=dt, fraction=1.0)
         self.add_residual(q, np.zeros(self._size))
         self._forces[1], self._times[2] = self._forces[0], self._times[1]
-        if self._passes_on and past is not None and past.has(self._name):
+        self._begun[:] = 1
+        if self._passes_on and past is not None and past.has(f"forces of {self._elements.name}"):
             self._keep_forces(past)
         return -self._whole(self._forces[1])
 
@@ -178,8 +213,9 @@ class Block(LoadTerm):
 
     def _keep_forces(self, archive: Archive) -> None:
         """Save or restore the forces in the equation of the last step."""
-        forces = archive.added(self._name, self._whole(self._forces[1]))
+        forces = archive.added(f"forces of {self._elements.name}", self._whole(self._forces[1]))
         self._forces[:] = forces[self.dofs]
+        self._begun[:] = 1
 
     def start(self, q: Array) -> None:
         """See the base class: compute the stored energies."""
@@ -195,7 +231,7 @@ class Block(LoadTerm):
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore states, functions of time and forces at the end of the last step."""
-        name, n = self._name, len(self._indices)
+        name = self._elements.name
         self._t[0] = archive.number(f"time of {name}", float(self._t[0]))
         if self._c.size:
             self._keep_forces(archive)
@@ -203,10 +239,14 @@ class Block(LoadTerm):
         self._times[2, :-1] = archive.rows(
             f"functions of {name}", np.arange(len(times)), times, known=True
         )[:, 0]
-        if self.statement.state:
-            rows = self._states.transpose(0, 2, 1).reshape(-1, len(self.statement.state))[:n]
-            rows = archive.rows(f"states of {name}", self._indices, rows)
-            self._states[:] = in_batches(rows, BATCH)
+        self.keep_states(archive)
+
+    def keep_states(self, archive: Archive) -> None:
+        """Save or restore the states of the elements."""
+        if number := len(self.statement.state):
+            indices = self._elements.indices
+            rows = self._states.transpose(0, 2, 1).reshape(-1, number)[: len(indices)]
+            self._states[:] = in_batches(archive.rows(self._elements.name, indices, rows), BATCH)
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """See the base class."""
@@ -226,7 +266,7 @@ class Block(LoadTerm):
         by_state = neighbours.state(lambda term: term._states)
         terms = [term for some in neighbours.terms for term in some]
         neighbours.states += [x for term in terms for x in (term._times[2], term._t)]
-        b, numbers = self._c, len(self._functions) + 1
+        b, numbers = self._c, len(self._elements.in_time) + 1
         rows = b.unknowns + b.states
         c = struct(
             "block_derivatives", block=b, parameters=P, neighbours=others,

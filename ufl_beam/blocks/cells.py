@@ -90,10 +90,9 @@ POINT = "s", "weight"
 
 
 def at_points(cells: Index, number: int) -> tuple[Index, Index, list[Array]]:
-    """Return elements for the Gauss points of cells: their cells, indices, and :data:`POINT`."""
+    """Return elements for the Gauss points of cells: cell and point of each, and :data:`POINT`."""
     s, weight = (np.tile(x, len(cells)) for x in gauss_rule(number))
-    indices = np.repeat(cells * number, number) + np.tile(np.arange(number), len(cells))
-    return np.repeat(cells, number), indices, [s, weight]
+    return np.repeat(cells, number), np.tile(np.arange(number), len(cells)), [s, weight]
 
 
 class AxisOfCell(Axis):

@@ -11,19 +11,17 @@ import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
-from ufl_beam.arrays import Index
-from ufl_beam.blocks.block import Block
+from ufl_beam.arrays import Array
+from ufl_beam.blocks.block import Block, BlockSetting, Elements
 from ufl_beam.blocks.cells import AxisOfCell, Cell, places, positions
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.loads import KelvinVoigt
-from ufl_beam.terms.energy_ledger import Ledger
 
 STIFFNESS = "EA", "GA", "EI"
 """Names of the stiffnesses of a cell; N, N, N m²."""
@@ -115,39 +113,33 @@ class SecondDifferences(_Damping):
         return made._replace(state=dict(zip(self.state, values, strict=True)))
 
 
-def viscosity(
-    damping: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
-) -> list[Block]:
-    """Return the block of a viscosity; none if the process has no damped cells."""
-    subdomain = fields.subdomain
-    numbering = subdomain.numbering
+def viscosity(damping: KelvinVoigt, fields: Fields, setting: BlockSetting) -> Block:
+    """Return the block of a viscosity."""
+    setting.ledger.lost["damping"] += 0.0
+    subdomain, numbering = fields.subdomain, fields.subdomain.numbering
     beams = numbering.scene.beams if damping.beams is None else damping.beams
     pairs = (zip(numbering.cells_of(beam), numbering.hinges(beam), strict=True) for beam in beams)
     cells = [cell for beam_cells in pairs for cell, hinge in beam_cells if hinge is None]
-    positions = np.flatnonzero(np.isin(subdomain.cells, cells))
-    statement = Viscosity(scheme, numbering.mesh.degree)
-    times = np.full(len(positions), damping.retardation_time)
-    some = Fields(subdomain, positions)
-    return [_on_cells(statement, "damping", [times], some, scheme, A, ledger)] * bool(
-        len(positions)
+    some = Fields(subdomain, np.flatnonzero(np.isin(subdomain.cells, cells)))
+    times = np.full(len(some.order), damping.retardation_time)
+    elements = _on_cells("viscosity", [times], some)
+    return Block(
+        Viscosity(setting.scheme, numbering.mesh.degree), elements, setting, kind="damping"
     )
 
 
-def second_differences(scheme: Scheme, fields: Fields, A: Csr, ledger: Ledger) -> Block:
+def second_differences(fields: Fields, setting: BlockSetting) -> Block:
     """Return the block of the numerical damping of elastic cells."""
-    statement = SecondDifferences(scheme, fields.element.degree)
-    block = _on_cells(statement, "beams", [], fields, scheme, A, ledger)
+    statement = SecondDifferences(setting.scheme, fields.element.degree)
+    block = Block(statement, _on_cells("changes of strains", [], fields), setting, kind="beams")
     block.state["last dt"][:] = math.inf
     return block
 
 
-def _on_cells(
-    statement: _Damping, kind: str, numbers: list[Index], fields: Fields, scheme: Scheme, A: Csr,
-    ledger: Ledger,
-) -> Block:  # fmt: skip
+def _on_cells(name: str, numbers: list[Array], fields: Fields) -> Elements:
     subdomain, stiffness = fields.subdomain, fields.section_values(fields.element.stiffness)
-    return Block(
-        statement, type(statement).__name__, subdomain.cells[fields.order], fields.cell_dofs,
-        [*numbers, *stiffness.T, *positions(subdomain, fields.order)], subdomain, scheme, ledger,
-        A, kind=kind, cells=fields.order, force_kind=lib.STRESS,
+    return Elements(
+        name, subdomain.cells[fields.order], fields.cell_dofs,
+        [*numbers, *stiffness.T, *positions(subdomain, fields.order)], cells=fields.order,
+        force_kind=lib.STRESS,
     )  # fmt: skip

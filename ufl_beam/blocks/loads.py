@@ -3,23 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import ufl
 
-from ufl_beam.blocks.block import Block
+from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import Cell, places, positions
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
-from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import point_masses
-from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.mechanics.kinematics import perpendicular, split
-from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
+from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.functions import steady
 from ufl_beam.model.loads import FollowerLoad, Pressure, RotatingFrame
-from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.load_forces import loaded_cells
 
 
@@ -125,75 +122,69 @@ class ForceOfRotation(Statement):
         return Equations(cell.forces(-work))
 
 
-def load_blocks(subdomain: Subdomain, scheme: Scheme, A: Csr, ledger: Ledger) -> list[Block]:
-    """Return the blocks of the loads of a scene."""
-    loads, setting = subdomain.numbering.scene.loads, (subdomain, scheme, ledger, A)
-    blocks = list[Block]()
-    for kind, make in (
+def load_blocks(setting: BlockSetting) -> list[Block]:
+    """Return the blocks of the loads of a scene; every process has them."""
+    loads, blocks = setting.subdomain.numbering.scene.loads, list[Block]()
+    for kind, made in (
         (FollowerLoad, _followers), (Pressure, _pressures), (RotatingFrame, _rotations)
     ):  # fmt: skip
         some = [load for load in loads if isinstance(load, kind)]
-        blocks += make(some, *setting) if some else []
+        pairs = made(some, setting) if some else []
+        blocks += [Block(*pair, setting, supplies="loads") for pair in pairs]
     return blocks
 
 
 def _followers(
-    loads: Sequence[FollowerLoad], subdomain: Subdomain, scheme: Scheme, ledger: Ledger, A: Csr
-) -> list[Block]:
+    loads: Sequence[FollowerLoad], setting: BlockSetting
+) -> Iterator[tuple[Statement, Elements]]:
+    subdomain = setting.subdomain
     mine = np.array([i for i, x in enumerate(loads) if subdomain.computes(x.place)], dtype=int)
     nodes = [subdomain.local(subdomain.numbering.node(loads[i].place)) for i in mine]
     forces = np.array([[*loads[i].force, loads[i].moment] for i in mine]).reshape(-1, 3)
-    statement = FollowerForce(scheme.load_weight)
-    return [Block(
-        statement, "follower loads", mine, np.array(nodes), [*forces.T],
-        subdomain, scheme, ledger, A, functions=[(load.amplitude, load) for load in loads],
-        of_step={"factor": mine}, supplies="loads",
-    )]  # fmt: skip
+    in_time = [InTime(load.amplitude, load) for load in loads]
+    yield (
+        FollowerForce(setting.scheme.load_weight),
+        Elements("follower loads", mine, np.array(nodes), [*forces.T], in_time, {"factor": mine}),
+    )
 
 
 def _pressures(
-    loads: Sequence[Pressure], subdomain: Subdomain, scheme: Scheme, ledger: Ledger, A: Csr
-) -> list[Block]:
+    loads: Sequence[Pressure], setting: BlockSetting
+) -> Iterator[tuple[Statement, Elements]]:
+    subdomain, numbering = setting.subdomain, setting.subdomain.numbering
     pairs = [loaded_cells(load, subdomain) for load in loads]
     cells = np.concatenate([cells for cells, _ in pairs])
     of_load = np.repeat(np.arange(len(loads)), [len(cells) for cells, _ in pairs])
     forces = np.array([[load.normal, load.tangential] for load in loads])[of_load]
     shares = np.concatenate([shares for _, shares in pairs])
-    return [Block(
-        PressureOnCell(scheme.load_weight, subdomain.numbering.mesh.degree), "pressures",
-        subdomain.cells[cells] + len(subdomain.numbering.cells) * of_load,
-        subdomain.cell_dofs[cells], [*forces.T, *positions(subdomain, cells), *shares.T],
-        subdomain, scheme, ledger, A, functions=[(load.amplitude, load) for load in loads],
-        of_step={"factor": of_load}, supplies="loads", cells=cells,
-    )]  # fmt: skip
+    indices = subdomain.cells[cells] + len(numbering.cells) * of_load
+    in_time = [InTime(load.amplitude, load) for load in loads]
+    yield PressureOnCell(setting.scheme.load_weight, numbering.mesh.degree), Elements(
+        "pressures", indices, subdomain.cell_dofs[cells],
+        [*forces.T, *positions(subdomain, cells), *shares.T], in_time, {"factor": of_load}, cells,
+    )  # fmt: skip
 
 
 def _rotations(
-    frames: Sequence[RotatingFrame], subdomain: Subdomain, scheme: Scheme, ledger: Ledger, A: Csr
-) -> list[Block]:
-    (frame,), numbering = frames, subdomain.numbering  # a scene has one at most
-    mesh, cells, about = numbering.mesh, np.arange(len(subdomain.cells)), np.array(frame.about)
+    frames: Sequence[RotatingFrame], setting: BlockSetting
+) -> Iterator[tuple[Statement, Elements]]:
+    (frame,), subdomain, scheme = frames, setting.subdomain, setting.scheme  # one at most
+    numbering, about, in_motion = subdomain.numbering, np.array(frame.about), has_inertia(scheme)
+    mesh, cells, in_time = numbering.mesh, np.arange(len(subdomain.cells)), [InTime(steady, frame)]
     rhoA = np.array([beam.section.rhoA for beam in numbering.scene.beams])
     masses = rhoA[numbering.beam_of_cell[subdomain.cells]] * numbering.lengths(subdomain.cells)
-    on_cells = positions(subdomain, cells) - np.repeat(about, mesh.degree + 1)[:, None]
-    points = [
-        (subdomain.local(numbering.node(at)), mass, frame.rate, *(np.array(at.point) - about))
-        for at, mass, _ in point_masses(numbering.scene) if subdomain.computes(at)
-    ]  # fmt: skip
-    nodes, *numbers = zip(*points, strict=True) if points else ([],) * 5
-    elements = [
-        ("cells", mesh.degree, subdomain.cells, subdomain.cell_dofs,
-         [masses, np.full(len(cells), frame.rate), *on_cells], cells),
-        ("masses", 0, np.arange(len(points)), np.array(nodes), numbers, None),
-    ]  # fmt: skip
-    setting = subdomain, scheme, ledger, A
-    return [
-        Block(
-            ForceOfRotation(scheme.load_weight, degree, mesh.lumped, has_inertia(scheme)),
-            f"rotation of {kind}", indices, dofs, of_element, *setting,
-            functions=[(steady, frame)], of_step={"growth": np.zeros(len(indices))},
-            supplies="loads", cells=cells_of_block,
-        )
-        for kind, degree, indices, dofs, of_element, cells_of_block in elements
-        if kind == "cells" or point_masses(numbering.scene)
-    ]  # fmt: skip
+    from_centre = positions(subdomain, cells) - np.repeat(about, mesh.degree + 1)[:, None]
+    rates = np.full(len(cells), frame.rate)
+    yield ForceOfRotation(scheme.load_weight, mesh.degree, mesh.lumped, in_motion), Elements(
+        "rotation of cells", subdomain.cells, subdomain.cell_dofs, [masses, rates, *from_centre],
+        in_time, {"growth": 0}, cells,
+    )  # fmt: skip
+    if all_masses := point_masses(numbering.scene):
+        mine = [
+            (subdomain.local(numbering.node(at)), mass, frame.rate, *(np.array(at.point) - about))
+            for at, mass, _ in all_masses if subdomain.computes(at)
+        ]  # fmt: skip
+        nodes, *numbers = map(np.array, zip(*mine, strict=True)) if mine else (np.zeros(0),) * 5
+        yield ForceOfRotation(scheme.load_weight, 0, mesh.lumped, in_motion), Elements(
+            "rotation of masses", np.arange(len(mine)), nodes, numbers, in_time, {"growth": 0},
+        )  # fmt: skip

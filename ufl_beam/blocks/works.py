@@ -16,17 +16,14 @@ from ufl.classes import Zero
 from ufl.core.expr import Expr
 from ufl.domain import extract_domains
 
-from ufl_beam.blocks.block import AT, Block
+from ufl_beam.blocks.block import AT, Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import POINT, AxisOfCell, Cell, at_points, places, positions
 from ufl_beam.blocks.statement import Equations, Inputs, Statement, kernels
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.mechanics.time_scheme import Scheme
-from ufl_beam.model.functions import Constant, TimeFunction, steady
+from ufl_beam.model.functions import Constant, steady
 from ufl_beam.model.works import Potential, VirtualWork, Work
-from ufl_beam.terms.energy_ledger import Ledger
 
 
 class _Same:
@@ -228,40 +225,33 @@ def require_work(work: Work, degree: int, scheme: Scheme) -> None:
         raise ModelError(f"{work}: its form cannot be compiled: {shorten(error)}") from error
 
 
-def work_blocks(
-    subdomain: Subdomain, scheme: Scheme, ledger: Ledger, A: Csr, t0: float
-) -> list[Block]:
+def work_blocks(setting: BlockSetting) -> list[Block]:
     """Return the blocks of the works of a scene; every process has them.
 
     The ledger has virtual works in ``supplied``, and energies of potentials in ``state``.  Virtual
     works grow in the substeps of the first step, as loads do; potentials act fully from the start.
     """
-    numbering, blocks = subdomain.numbering, list[Block]()
-    for work in numbering.scene.works:
-        statement = work_statement(work, numbering.mesh.degree, scheme)
-        functions: list[tuple[TimeFunction | None, object]] = [(steady, work)]
-        when, of_step = [lib.GROWS], dict[str, int]()
+    subdomain, blocks = setting.subdomain, list[Block]()
+    numbering, scene = subdomain.numbering, subdomain.numbering.scene
+    for work in scene.works:
+        statement = work_statement(work, numbering.mesh.degree, setting.scheme)
+        in_time, of_step = [InTime(steady, work)], {"growth": 0}
         values = {f"number {k}": x if callable(x) else Constant(x) for k, x in work.numbers.items()}
         for name in statement.of_step:
             plain, time = name.rsplit(" ", 1) if isinstance(work, Potential) else (name, "now")
             if plain in ("t", *values):
-                of_step[name] = len(functions)
-                functions.append((values.get(plain), work))
-                when.append(AT[time])
-        of_step["growth"] = 0
-        of_work = np.concatenate(
-            [numbering.cells_of(beam) for beam in work.on(numbering.scene.beams)]
+                of_step[name] = len(in_time)
+                in_time.append(InTime(values.get(plain), work, AT[time]))
+        of_work = np.concatenate([numbering.cells_of(beam) for beam in work.on(scene.beams)])
+        points = (work.degree + 2 * (numbering.mesh.degree - 1)) // 2 + 1
+        cells, point, at = at_points(np.flatnonzero(np.isin(subdomain.cells, of_work)), points)
+        elements = Elements(
+            f"work of {work.name}", subdomain.cells[cells] * points + point,
+            subdomain.cell_dofs[cells],
+            [*at, *positions(subdomain, cells)], in_time, of_step, cells, lib.WORK,
+        )  # fmt: skip
+        supplies = work.name if isinstance(work, VirtualWork) else None
+        blocks.append(
+            Block(statement, elements, setting, supplies=supplies, rates=work.takes_rates)
         )
-        cells, indices, points = at_points(
-            np.flatnonzero(np.isin(subdomain.cells, of_work)),
-            (work.degree + 2 * (numbering.mesh.degree - 1)) // 2 + 1,
-        )
-        blocks.append(Block(
-            statement, f"work of {work.name}", indices, subdomain.cell_dofs[cells],
-            [*points, *positions(subdomain, cells)], subdomain, scheme, ledger, A,
-            functions=functions, when=when,
-            of_step={x: k for x, k in of_step.items() if x in statement.of_step},
-            supplies=work.name if isinstance(work, VirtualWork) else None, cells=cells,
-            force_kind=lib.WORK, t0=t0, rates=work.takes_rates,
-        ))  # fmt: skip
     return blocks

@@ -36,7 +36,7 @@ from ufl_beam.parallel import on_first
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 
-FORMAT = "checkpoint of ufl_beam, 8"
+FORMAT = "checkpoint of ufl_beam, 9"
 """Format of the file; its number is increased by each incompatible change of the format."""
 
 

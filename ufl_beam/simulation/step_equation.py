@@ -14,7 +14,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.blocks.block import Block
+from ufl_beam.blocks.block import Block, BlockSetting
 from ufl_beam.blocks.damping import second_differences, viscosity
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.works import work_blocks
@@ -84,6 +84,7 @@ class StepEquation:
         self.ledger, self.fields = ledger, fields = Ledger(), Fields(subdomain)
         self.A = A = fields.matrix()
         setting = (scheme, A, ledger)
+        in_blocks = BlockSetting(subdomain, scheme, A, ledger, t0)
         strains = [load for load in scene.loads if isinstance(load, ImposedStrain)]
         imposed = ImposedStrains(strains, subdomain, scheme, ledger, t0) if strains else None
 
@@ -112,7 +113,7 @@ class StepEquation:
             subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
             self.beams.append(ElasticBeams(subset, *setting, imposed_on(subset)))
             if scheme.lost_fraction:
-                others.append(second_differences(scheme, subset, A, ledger))
+                others.append(second_differences(subset, in_blocks))
 
         self.controllers = Controllers(subdomain)
         inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
@@ -126,11 +127,11 @@ class StepEquation:
         self.loads: list[LoadTerm] = load_terms(
             fields, scheme, ledger, A, None if inertia is None else inertia.c
         )
-        self.loads += load_blocks(subdomain, *setting)
+        self.loads += load_blocks(in_blocks)
         if imposed is not None:
             self.loads.append(imposed)
         if scene.works:
-            self.loads += together(work_blocks, subdomain, scheme, ledger, A, t0)
+            self.loads += together(work_blocks, in_blocks)
         self.supports = Supports(subdomain, scheme, ledger, A)
         if inertia is not None:
             self.supports.stop(v)
@@ -142,8 +143,7 @@ class StepEquation:
             if isinstance(damping, Rayleigh):
                 others.append(rayleigh_forces(damping, fields, *setting, inertia, self.inelastic))
             else:
-                ledger.lost["damping"] += 0.0
-                others += viscosity(damping, fields, *setting)
+                others.append(viscosity(damping, fields, in_blocks))
         if scene.beams:
             ledger.state["stored"] += 0.0
         self.inner: list[Term] = [*self.beams, *self.connector_terms]
@@ -254,8 +254,8 @@ class StepEquation:
         if self.inertia is not None and self.inertia.scheme.uses_last_step:
             self.inertia.pass_on_step(archive)
             for term in self.terms:
-                if isinstance(term, Block) and term.statement.state:
-                    term.save_or_restore(archive, q)
+                if isinstance(term, Block):
+                    term.keep_states(archive)
 
     # -- forces and tangent --------------------------------------------------------------------
 

@@ -41,6 +41,15 @@ static void gather(const block *b, const double *q, int first)
   }
 }
 
+/* Add numbers of elements, `each` of them, to `out` at indices. */
+static void scatter(const block *b, int each, const double *values, const int32_t *index, double *out)
+{
+  const int n = b->lanes;
+  for (int c = 0; c < b->batches; ++c)
+    for (int i = 0, some = elements_in(b, c); i < each; ++i, values += n, index += n)
+      for (int l = 0; l < some; ++l) out[index[l]] += values[l];
+}
+
 /* Numbers of a step: functions of time, and the length of the step. */
 static void find_numbers_of_step(const block *b, const time_step *step)
 {
@@ -63,20 +72,18 @@ void begin_block(void *self, const time_step *step, const double *q1, const doub
 {
   const block *b = self;
   const int of_step = b->width - b->steps, all = b->steps * b->lanes;
-  memcpy(b->force, b->force_before, b->size * sizeof *b->force); /* iterates of a failed step may be far away */
   find_numbers_of_step(b, step);
   gather(b, step->q0, b->unknowns);
   for (int c = 0; c < b->batches; ++c)
     for (int i = 0; i < all; ++i) input(b, c, of_step)[i] = b->now[b->from[(size_t)c * all + i]];
-}
-
-/* Add numbers of elements, `each` of them, to `out` at indices. */
-static void scatter(const block *b, int each, const double *values, const int32_t *index, double *out)
-{
-  const int n = b->lanes;
-  for (int c = 0; c < b->batches; ++c)
-    for (int i = 0, some = elements_in(b, c); i < each; ++i, values += n, index += n)
-      for (int l = 0; l < some; ++l) out[index[l]] += values[l];
+  /* For the size of loads: iterates of a failed step may be far away, and a first step has no forces before it. */
+  if (*b->begun) memcpy(b->force, b->force_before, b->size * sizeof *b->force);
+  else if (b->size) {
+    gather(b, step->q0, 0);
+    evaluate(b, b->force_of, *b->each);
+    memset(b->force, 0, b->size * sizeof *b->force);
+    scatter(b, b->unknowns, *b->each, b->at, b->force);
+  }
 }
 
 void add_block(void *self, const double *q, double *r)
@@ -127,7 +134,7 @@ void accept_block(void *self, const time_step *step, const double *q1, const dou
   if (b->work) *b->work -= work_in_step(b->size, b->dof, b->weight_of_before, b->force_before, b->force, s);
   memcpy(b->force_before, b->force, b->size * sizeof *b->force);
   memcpy(b->before, b->end, b->functions * sizeof *b->before);
-  b->t[0] = b->t[1];
+  b->t[0] = b->t[1], *b->begun = 1;
   if (!b->end_of) return;
   gather(b, q1, 0);
   end_step(b, 1);

@@ -733,6 +733,7 @@ typedef struct {
   const time_function *function;
   const int32_t *when;      /* time_of_number of each */
   double *t;                /* time of the state, and at the end of the step */
+  int32_t *begun;           /* whether forces of a last step are known */
   double *now, *end, *before; /* their values in the equation, at the end of the step, at the end of the last
                                * step; then the length of the step */
   const int32_t *from;      /* index in `now` of each number of the step of an element */

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: MIT
+"""Size of the package: lines of Python and C, which grow only with a reason.
+
+Effects move from the terms of the old core to statements in ``blocks/``.  A commit that moves an
+effect lowers the limit of the other subpackages.  A commit that raises a limit has the reason in
+its message.
+"""
+
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[2] / "ufl_beam"
+BLOCKS = {"blocks.c", "elements_simd.c"}
+LIMITS = {
+    "Python of blocks": 1_190,
+    "C of blocks": 320,
+    "Python beside blocks": 47_770,
+    "C beside blocks": 8_000,
+}
+
+
+def is_block(path):
+    return path.parent.name == "blocks" or path.name in BLOCKS
+
+
+@pytest.mark.parametrize("of_blocks", [True, False])
+@pytest.mark.parametrize("language", ["Python", "C"])
+def test_lines(language, of_blocks):
+    suffixes = {".py"} if language == "Python" else {".c", ".h"}
+    files = [x for x in PACKAGE.rglob("*") if x.suffix in suffixes and is_block(x) == of_blocks]
+    lines = sum(len(path.read_text("utf-8").splitlines()) for path in files)
+    limit = LIMITS[f"{language} {'of' if of_blocks else 'beside'} blocks"]
+    assert 0 < lines <= limit, "see the docstring of this file"
