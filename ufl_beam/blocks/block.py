@@ -123,7 +123,9 @@ class Block(LoadTerm):
         from_ = [np.broadcast_to(in_time[x], n) for x in statement.of_step]
         w = np.zeros((n, len(statement.inputs)))
         first = 2 * motions + states
-        w[:, first : first + len(statement.numbers)] = np.array(elements.numbers).reshape(-1, n).T
+        w[:, first : first + len(statement.numbers)] = (
+            np.array(elements.numbers).reshape(len(statement.numbers), n).T
+        )
         self._w = in_batches(w, BATCH)
         self._states = self._w[:, 2 * motions : first]
         self.state = {z: self._states[:, k] for k, z in enumerate(statement.state)}
@@ -149,7 +151,7 @@ class Block(LoadTerm):
             when=np.array([x.when for x in elements.in_time], dtype=np.int32), t=self._t,
             begun=self._begun,
             now=self._times[0], end=self._times[1], before=self._times[2],
-            **{"from": in_batches(np.array(from_, dtype=np.int32).reshape(-1, n).T, BATCH)},
+            **{"from": in_batches(np.array(from_, dtype=np.int32).reshape(len(from_), n).T, BATCH)},
             w=self._w, out=np.zeros(batches * BATCH * most),
             space=np.zeros(max(motions * (motions + 1), most)), each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
@@ -245,7 +247,8 @@ class Block(LoadTerm):
         """Save or restore the states of the elements."""
         if number := len(self.statement.state):
             indices = self._elements.indices
-            rows = self._states.transpose(0, 2, 1).reshape(-1, number)[: len(indices)]
+            batches, _, lanes = self._states.shape
+            rows = self._states.transpose(0, 2, 1).reshape(batches * lanes, number)[: len(indices)]
             self._states[:] = in_batches(archive.rows(self._elements.name, indices, rows), BATCH)
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
