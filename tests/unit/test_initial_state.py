@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from helpers import raises
 from scenes import SECTION, clamped
 
 import ufl_beam as ub
@@ -296,3 +297,19 @@ def test_a_rotating_bar_keeps_turning_through_many_turns():
     # The bar stretches by its centrifugal force, 50 N / 1e7 N, and breathes by as much
     assert solution.displacement(beam.at(0.5))[-1, 2] == pytest.approx(expected, rel=1e-4)
     assert solution.energy.worst < 1e-9
+
+
+@pytest.mark.parametrize("reference", [False, True])
+def test_a_new_link_must_fit_the_state(reference):
+    """A link of the undeformed length would pull the sagging tip up by 1 mm in one step."""
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
+    supports, load = [ub.Clamped(beam.start)], ub.PointLoad(beam.end, force=(0.0, -0.5))
+    free = ub.Scene([beam], supports=supports, loads=[load])
+    sagging = ub.simulate(free, ub.Static(), t=(0, 1), dt=1.0)
+    link = ub.Link(ub.ground(1.0, 1.0), beam.end)
+    held = ub.Scene([beam], supports=supports, loads=[load], joints=[link])
+    with raises("start: ", "does not fit the end", "Connect the places", kind=ub.ModelError):
+        ub.simulate(
+            held, ub.Static(), t=(1, 2), dt=1.0, start=sagging,
+            newton=ub.Newton(reference=reference),
+        )  # fmt: skip

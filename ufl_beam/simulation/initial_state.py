@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,11 +21,12 @@ from ufl_beam.discretization.model_warnings import (
     warn_of_touching,
 )
 from ufl_beam.discretization.state_io import State
-from ufl_beam.discretization.state_transfer import Excess, Transfer, same_unknowns
-from ufl_beam.errors import ArgumentError, require_kind, shorten, warn
+from ufl_beam.discretization.state_transfer import APART, Excess, Transfer, same_unknowns
+from ufl_beam.errors import ArgumentError, ModelError, require_kind, shorten, warn
 from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import DEFAULT_MESH, Mesh
 from ufl_beam.model.connector_laws import RIGID, Coulomb, Guide
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import (
     require_independent,
     require_inertia,
@@ -183,6 +185,20 @@ def initial_state(
     transfer = Transfer(start.numbering, numbering)
     after, excess = (v, None) if v0 is None else transfer.velocity(v0)
     return transfer.state(q0), after, transfer.internal(start.internal), excess
+
+
+def require_held(connectors: Sequence[Connector], motions: Array, size: float) -> None:
+    """Raise :class:`ModelError` if a joint or link of a continued run does not fit its state.
+
+    ``motions`` (m or rad) are zero in a state that fits; ``size`` is that of the scene (m).
+    """
+    for connector, e in zip(connectors, motions, strict=True):
+        if connector.law is RIGID and abs(e) > APART * (1.0 if connector.is_rotation else size):
+            raise ModelError(
+                f"start: {connector} does not fit the end of the solution: the motion that it "
+                f"holds at zero is {e:.3g} {'rad' if connector.is_rotation else 'm'} there. "
+                "Connect the places by a spring, or start from a solution that fits"
+            )
 
 
 def _initial_velocity(numbering: DofNumbering) -> Array:

@@ -58,6 +58,7 @@ from ufl_beam.simulation.initial_state import (
     continuation,
     initial_state,
     mesh_of,
+    require_held,
 )
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton, checked_newton
@@ -156,6 +157,8 @@ class ReferenceRun(Solver, PresentState):
         self._history = np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
         self._reactions = np.zeros(numbering.size)
         for group in self.connectors:
+            if not self.fresh:
+                require_held(group.connectors, group.e0, self.scene.size)
             self._history[group.indices, 0] = group.e0
             self._history[group.indices, FORCE] = q[group.forces_at]
             for name in self._tables(group) if internal else ():

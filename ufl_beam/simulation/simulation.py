@@ -21,6 +21,7 @@ from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import ArgumentError, ModelError, StepFailed, require_number, shorten
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
+from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
@@ -37,6 +38,7 @@ from ufl_beam.simulation.initial_state import (
     continuation,
     initial_state,
     mesh_of,
+    require_held,
 )
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StaticPath, StepEquation, forces_of_scene
@@ -140,6 +142,7 @@ class Simulation(Stepper):
             together(equation.begin_energies, t0, q_local, inertia.v)
         if start is not None:
             equation.set_internal_variables(q_local, t0, internal, same=same)
+            together(self._require_held, equation, q_local)
         for term in equation.terms:
             term.start(q_local)
         equation.add_state(q_local)
@@ -202,6 +205,14 @@ class Simulation(Stepper):
             self._meet(self.equation, impact)
             self._moved(t)
         return float(impacts.next_check(t + 1e-9 * (t1 - t)))
+
+    @staticmethod
+    def _require_held(equation: StepEquation, q: Array) -> None:
+        """Raise if a joint or link does not fit the state with which a continued run begins."""
+        for group in equation.connector_terms:
+            if group.connectors[0].law is RIGID:
+                size = equation.subdomain.numbering.scene.size
+                require_held(group.connectors, group.motion(q), size)
 
     def _meet(self, equation: StepEquation, impact: Impact | None) -> None:
         """Change the velocities of this process by an impact, if there is one."""
