@@ -218,10 +218,14 @@ def from_data(data: Data) -> Any:
         for record in data["records"]:
             fields = {name: make(value) for name, value in record.items() if name != "is"}
             kind = RECORDS[record["is"]]
-            known = {field.name for field in dataclasses.fields(kind) if field.init}
-            if fields.keys() != known:
-                others = ", ".join(sorted(fields.keys() ^ known))
-                raise TypeError(f"{kind.__name__}: fields {others} are missing or unknown")
+            known = {field.name: field for field in dataclasses.fields(kind) if field.init}
+            if others := fields.keys() - known.keys():
+                raise TypeError(f"{kind.__name__}: fields {', '.join(sorted(others))} are unknown")
+            for name in known.keys() - fields.keys():  # a field that is newer than the file
+                default, factory = known[name].default, known[name].default_factory
+                if default is factory is dataclasses.MISSING:
+                    raise TypeError(f"{kind.__name__}: field {name} is missing")
+                fields[name] = default if factory is dataclasses.MISSING else factory()
             # Arguments of constructors may differ from the fields.
             made.append(object.__new__(kind))
             for name, value in fields.items():

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""Scene and runs whose files are stored in tests/data/files, written by an earlier commit.
+
+As a script it writes the files with the package that is imported.
+"""
+
+import sys
+from pathlib import Path
+
+import ufl_beam as ub
+
+SECTION = ub.Section(EA=2e6, GA=8e5, EI=900.0, rhoA=8.0, rhoI=0.01)
+END, DT = 0.2, 0.01
+
+
+def crane():
+    """Two arms with a yielding hinge, a link, and loads that follow the motion."""
+    mast = ub.Beam((0, 0), (0, 2), SECTION, cells=4, name="mast")
+    arm = ub.Beam((0, 2), (1.5, 2), SECTION, cells=3, name="arm")
+    yields = ub.ElastoPlastic(400.0, isotropic=2e3)
+    hinge = ub.Turn(mast.end, arm.start, ub.Spring(2e4, law=yields))
+    return ub.Scene(
+        [mast, arm],
+        joints=[ub.Revolute(mast.end, arm.start), ub.Link(ub.ground(-1.0, 1.0), mast.at(0.5))],
+        supports=[ub.Clamped(mast.start)],
+        connectors=[hinge],
+        loads=[ub.FollowerLoad(arm.end, force=(0, -500.0)), ub.Pressure(mast, normal=200.0)],
+        masses=[ub.PointMass(arm.end, 5.0)],
+        damping=[ub.KelvinVoigt(1e-3)],
+    )
+
+
+def simulated(scheme, until=END, **options):
+    """The run of the crane."""
+    return ub.simulate(crane(), scheme, t=(0, until), dt=DT, progress=False, **options)
+
+
+def member(x):
+    """A member of the study."""
+    return {"square": x**2}
+
+
+def write(folder):
+    """Write a file of each kind."""
+    for name, scheme in (("decaying", ub.EnergyMomentumDecaying()), ("static", ub.Static())):
+        simulated(scheme).save(folder / f"{name}.solution")
+    simulated(ub.EnergyMomentum(), checkpoint=ub.Checkpoint(folder / "crane.checkpoint", every=10))
+    ub.study(member, [{"x": float(x)} for x in range(3)], path=folder / "squares.study")
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]))
