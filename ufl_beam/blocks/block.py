@@ -23,7 +23,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.functions import TimeFunction
-from ufl_beam.terms.derivatives import Each, Neighbours, in_c
+from ufl_beam.terms.derivatives import Each, Neighbours, differences, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, Phases
 
@@ -242,6 +242,8 @@ class Block(LoadTerm):
             f"functions of {name}", np.arange(len(times)), times, known=True
         )[:, 0]
         self.keep_states(archive)
+        if archive.has(f"time of {name}"):
+            self.start(q)
 
     def keep_states(self, archive: Archive) -> None:
         """Save or restore the states of the elements."""
@@ -267,7 +269,11 @@ class Block(LoadTerm):
         P, others = neighbours.weights.shape
         by_number = neighbours.differences(lambda term: term._numbers)
         by_state = neighbours.state(lambda term: term._states)
-        terms = [term for some in neighbours.terms for term in some]
+        terms, found = [term for some in neighbours.terms for term in some], list[Each]()
+        if any(term.statement != self.statement for term in terms):
+            # Numbers in the functions of a user are in kernels, not in arrays
+            found.append(differences(neighbours, lambda term: [term._times[2], term._t]))
+            terms, others, by_number = [], 0, np.zeros_like(by_number)
         neighbours.states += [x for term in terms for x in (term._times[2], term._t)]
         b, numbers = self._c, len(self._elements.in_time) + 1
         rows = b.unknowns + b.states
@@ -280,4 +286,4 @@ class Block(LoadTerm):
             by_step=np.zeros((P, numbers)), state_bar=np.zeros(self._states.shape),
             number_bar=np.zeros(self._numbers.shape), step_bar=np.zeros(numbers),
         )  # fmt: skip
-        return [in_c("block", c)]
+        return [*found, in_c("block", c)]
