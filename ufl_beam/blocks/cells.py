@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.blocks.statement import COMPONENTS, Inputs
+from ufl_beam.blocks.statement import COMPONENTS, Inputs, Statement
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.mechanics.kinematics import Axis, perpendicular
 from ufl_beam.model.beams import Mesh
@@ -35,6 +36,22 @@ def positions(subdomain: Subdomain, cells: Index) -> Array:
     numbering = subdomain.numbering
     at = numbering.points[numbering.nodes_of_cells[subdomain.cells[cells]]]
     return np.asarray(at.transpose(2, 1, 0).reshape(2 * at.shape[1], len(cells)))
+
+
+@dataclass(frozen=True)
+class StatementOnCell(Statement):
+    """Statement whose elements are cells, or single nodes with the degree 0.
+
+    Attributes:
+        degree: Degree of the cell.
+    """
+
+    degree: int
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes of a cell."""
+        return self.degree + 1
 
 
 class Cell:

@@ -13,8 +13,8 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import Block, BlockSetting, Elements
-from ufl_beam.blocks.cells import AxisOfCell, Cell, places, positions
-from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.blocks.cells import AxisOfCell, Cell, StatementOnCell, places, positions
+from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.functional import resultants, virtual_work
@@ -28,21 +28,14 @@ STIFFNESS = "EA", "GA", "EI"
 
 
 @dataclass(frozen=True)
-class _Damping(Statement):
+class _Damping(StatementOnCell):
     """Resultants ``factor C (Δe - before)``; Δe is the change of the strains in the step.
 
     Attributes:
         scheme: Scheme of the virtual strains.
-        degree: Degree of the cell.
     """
 
     scheme: Scheme
-    degree: int
-
-    @property
-    def nodes(self) -> int:
-        """Number of nodes of a cell."""
-        return self.degree + 1
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -124,13 +117,13 @@ def viscosity(damping: KelvinVoigt, fields: Fields, setting: BlockSetting) -> Bl
     times = np.full(len(some.order), damping.retardation_time)
     elements = _on_cells("viscosity", [times], some)
     return Block(
-        Viscosity(setting.scheme, numbering.mesh.degree), elements, setting, kind="damping"
+        Viscosity(numbering.mesh.degree, setting.scheme), elements, setting, kind="damping"
     )
 
 
 def second_differences(fields: Fields, setting: BlockSetting) -> Block:
     """Return the block of the numerical damping of elastic cells."""
-    statement = SecondDifferences(setting.scheme, fields.element.degree)
+    statement = SecondDifferences(fields.element.degree, setting.scheme)
     block = Block(statement, _on_cells("changes of strains", [], fields), setting, kind="beams")
     block.state["last dt"][:] = math.inf
     return block

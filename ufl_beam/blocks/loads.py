@@ -10,7 +10,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
-from ufl_beam.blocks.cells import Cell, places, positions
+from ufl_beam.blocks.cells import Cell, StatementOnCell, places, positions
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.discretization.function_spaces import point_masses
 from ufl_beam.mechanics.kinematics import perpendicular, split
@@ -43,22 +43,15 @@ class FollowerForce(Statement):
 
 
 @dataclass(frozen=True)
-class PressureOnCell(Statement):
+class PressureOnCell(StatementOnCell):
     """Forces along a cell, normal and tangential to the deformed axis, per deformed length.
 
     Attributes:
         at: Fraction of the step at which loads act.
-        degree: Degree of the cell.
     """
 
     at: float
-    degree: int
     of_step = ("factor",)
-
-    @property
-    def nodes(self) -> int:
-        """Number of nodes of a cell."""
-        return self.degree + 1
 
     @property
     def numbers(self) -> list[str]:
@@ -78,7 +71,7 @@ class PressureOnCell(Statement):
 
 
 @dataclass(frozen=True)
-class ForceOfRotation(Statement):
+class ForceOfRotation(StatementOnCell):
     """Centrifugal and Coriolis force on the mass of a cell, or of a node (degree 0).
 
     The centrifugal force has a potential, and the Coriolis force does no work.  Rotary inertia
@@ -87,20 +80,14 @@ class ForceOfRotation(Statement):
 
     Attributes:
         at: Fraction of the step at which loads act.
-        degree, lumped: Degree and mass of the cell, see :class:`Mesh`.
+        lumped: Whether the mass is lumped at the nodes.
         in_motion: Whether there is a Coriolis force.
     """
 
     at: float
-    degree: int
     lumped: bool
     in_motion: bool
     of_step = "growth", "dt"
-
-    @property
-    def nodes(self) -> int:
-        """Number of nodes of a cell."""
-        return self.degree + 1
 
     @property
     def numbers(self) -> list[str]:
@@ -159,7 +146,7 @@ def _pressures(
     shares = np.concatenate([shares for _, shares in pairs])
     indices = subdomain.cells[cells] + len(numbering.cells) * of_load
     in_time = [InTime(load.amplitude, load) for load in loads]
-    yield PressureOnCell(setting.scheme.load_weight, numbering.mesh.degree), Elements(
+    yield PressureOnCell(numbering.mesh.degree, setting.scheme.load_weight), Elements(
         "pressures", indices, subdomain.cell_dofs[cells],
         [*forces.T, *positions(subdomain, cells), *shares.T], in_time, {"factor": of_load}, cells,
     )  # fmt: skip
@@ -175,7 +162,7 @@ def _rotations(
     masses = rhoA[numbering.beam_of_cell[subdomain.cells]] * numbering.lengths(subdomain.cells)
     from_centre = positions(subdomain, cells) - np.repeat(about, mesh.degree + 1)[:, None]
     rates = np.full(len(cells), frame.rate)
-    yield ForceOfRotation(scheme.load_weight, mesh.degree, mesh.lumped, in_motion), Elements(
+    yield ForceOfRotation(mesh.degree, scheme.load_weight, mesh.lumped, in_motion), Elements(
         "rotation of cells", subdomain.cells, subdomain.cell_dofs, [masses, rates, *from_centre],
         in_time, {"growth": 0}, cells,
     )  # fmt: skip
@@ -185,6 +172,6 @@ def _rotations(
             for at, mass, _ in all_masses if subdomain.computes(at)
         ]  # fmt: skip
         nodes, *numbers = map(np.array, zip(*mine, strict=True)) if mine else (np.zeros(0),) * 5
-        yield ForceOfRotation(scheme.load_weight, 0, mesh.lumped, in_motion), Elements(
+        yield ForceOfRotation(0, scheme.load_weight, mesh.lumped, in_motion), Elements(
             "rotation of masses", np.arange(len(mine)), nodes, numbers, in_time, {"growth": 0},
         )  # fmt: skip

@@ -17,8 +17,16 @@ from ufl.core.expr import Expr
 from ufl.domain import extract_domains
 
 from ufl_beam.blocks.block import AT, Block, BlockSetting, Elements, InTime
-from ufl_beam.blocks.cells import POINT, AxisOfCell, Cell, at_points, places, positions
-from ufl_beam.blocks.statement import Equations, Inputs, Statement, kernels
+from ufl_beam.blocks.cells import (
+    POINT,
+    AxisOfCell,
+    Cell,
+    StatementOnCell,
+    at_points,
+    places,
+    positions,
+)
+from ufl_beam.blocks.statement import Equations, Inputs, kernels
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.mechanics.time_scheme import Scheme
@@ -40,27 +48,20 @@ class _Same:
 
 
 @dataclass(frozen=True)
-class _WorkOnCell(Statement):
+class _WorkOnCell(StatementOnCell):
     """Effect of a user at a quadrature point of a cell.
 
     Attributes:
         name: Name of the work.
         density: The user's function.
         names: Names of its numbers.
-        degree: Degree of the cell.
         scheme: Time scheme.
     """
 
     name: str
     density: _Same
     names: tuple[str, ...]
-    degree: int
     scheme: Scheme
-
-    @property
-    def nodes(self) -> int:
-        """Number of nodes of a cell."""
-        return self.degree + 1
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -208,7 +209,7 @@ class PotentialOfCell(_WorkOnCell):
 
 def work_statement(work: Work, degree: int, scheme: Scheme) -> _WorkOnCell:
     """Return the statement of a work; it serves all beams and values of numbers."""
-    fields = (work.name, _Same(work.density), tuple(work.numbers), degree, scheme)
+    fields = (degree, work.name, _Same(work.density), tuple(work.numbers), scheme)
     if isinstance(work, VirtualWork):
         return WorkOnCell(*fields)
     varying = {"t", *(name for name, x in work.numbers.items() if callable(x))}
