@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+import ufl
 from helpers import raises
 
 import ufl_beam as ub
@@ -232,6 +233,21 @@ def test_derivatives_by_curves_hardly_depend_on_the_step_of_differences(monkeypa
 def test_derivatives_are_those_of_runs_in_curved_cells(model, degree):
     scheme, mesh = ub.EnergyMomentum(0.02), ub.Mesh(degree=degree)
     assert disagreement(model, scheme, 0.6, 0.05, mesh=mesh)[0] < SAME
+
+
+def saturated(c=0.8):
+    """Drag by a function for which there are no vectors, so that elements are computed singly."""
+
+    def drag(v, w, c):
+        return -c * ufl.tanh(v[1]) * w[1]
+
+    return scene_of(100.0, works=lambda b: [ub.VirtualWork("air", drag, numbers={"c": c})])
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("model", [saturated])
+def test_derivatives_of_elements_that_are_computed_singly(model):
+    assert disagreement(model, ub.EnergyMomentum(), 0.6, 0.05)[0] < SAME
 
 
 @pytest.mark.serial

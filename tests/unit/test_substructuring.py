@@ -305,3 +305,20 @@ def test_beams_that_share_nothing(number, scheme):
     )
     # Residuals of 1e-10 of the forces, 1 N, on stiffnesses of some 10 N/m
     assert np.abs(alone - together).max() < 1e-9
+
+
+def test_processes_may_have_no_elastic_cells_that_are_damped_numerically():
+    """Of two processes, one has the elastic cells and one the cells that yield."""
+    elastic = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7800.0)
+    fibres = ub.Fibres(ub.ElastoPlastic(355e6, isotropic=2e9), number=4)
+    yields = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7800.0, fibres=fibres)
+    a, b = ub.Beam((0, 0), (2, 0), elastic, cells=4), ub.Beam((2, 0), (4, 0), yields, cells=4)
+    scene = ub.Scene(
+        [a, b], joints=[ub.Rigid(a.end, b.start)], supports=[ub.Clamped(a.start)],
+        loads=[ub.PointLoad(b.end, force=(0, -1e3))],
+    )  # fmt: skip
+    one, all_of_us = (
+        ub.simulate(scene, ub.EnergyMomentumDecaying(0.5), t=(0, 0.01), dt=2e-3, comm=comm)
+        for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)
+    )
+    np.testing.assert_allclose(all_of_us.q, one.q, atol=1e-10 * np.abs(one.q).max(), rtol=0.0)

@@ -490,3 +490,12 @@ def test_a_work_that_is_no_number_ends_the_run():
     scene = clamped(BEAM, loads=[push], works=[still])
     with pytest.raises(ub.ConvergenceError, match="girder"):
         run(scene, t=(0, 1))
+
+
+def test_section_forces_before_the_first_static_step_are_zero():
+    """The potential acts from the first step on, as its reactions do."""
+    weight = ub.Potential("weight", lambda q, g: g * q[1], numbers={"g": 6.0})
+    run_ = run(clamped(BEAM, works=[weight]), ub.Static(), t=(0, 1), dt=0.5)
+    shear = run_.cell_resultants(-1)[[1, 4]]
+    assert np.abs(shear).max() > 1.0  # N
+    assert run_.cell_resultants(0)[[1, 4]] == pytest.approx(0.0, abs=1e-9)

@@ -114,9 +114,11 @@ class Block(LoadTerm):
         n, motions, states = len(elements.indices), len(statement.unknowns), len(statement.state)
         dofs = np.asarray(elements.dofs, dtype=np.int32).reshape(n, motions)
         loaded: Array = np.zeros(subdomain.size)
-        loaded[dofs] = kind == "loads"
-        # Other processes may load degrees of freedom that this process owns.
-        self.dofs: Index = np.flatnonzero(subdomain.added(loaded)).astype(np.int32)
+        if kind == "loads":  # all processes have blocks of loads
+            loaded[dofs] = 1.0
+            # Other processes may load degrees of freedom that this process owns.
+            loaded = subdomain.added(loaded)
+        self.dofs: Index = np.flatnonzero(loaded).astype(np.int32)
         i, j = np.array(made.entries, dtype=int).reshape(-1, 2).T
         entries = self._A.positions(dofs[:, i].ravel(), dofs[:, j].ravel()).reshape(n, len(i))
         in_time = {"dt": len(elements.in_time), **elements.of_step}
@@ -153,7 +155,8 @@ class Block(LoadTerm):
             now=self._times[0], end=self._times[1], before=self._times[2],
             **{"from": in_batches(np.array(from_, dtype=np.int32).reshape(len(from_), n).T, BATCH)},
             w=self._w, out=np.zeros(batches * BATCH * most),
-            space=np.zeros(max(motions * (motions + 1), most)), each=self._each[0],
+            space=np.zeros(w.shape[1] + motions + max((motions + states) * w.shape[1], most)),
+            each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
             weight_of_before=scheme.weight_of_before, stored=stored, entered=sum(entered),
             energy=self._energy,
@@ -215,9 +218,11 @@ class Block(LoadTerm):
 
     def _keep_forces(self, archive: Archive) -> None:
         """Save or restore the forces in the equation of the last step."""
-        forces = archive.added(f"forces of {self._elements.name}", self._whole(self._forces[1]))
-        self._forces[:] = forces[self.dofs]
-        self._begun[:] = 1
+        name = f"forces of {self._elements.name}"
+        restores, forces = archive.has(name), archive.added(name, self._whole(self._forces[1]))
+        if restores:
+            self._forces[:] = forces[self.dofs]
+            self._begun[:] = 1
 
     def start(self, q: Array) -> None:
         """See the base class: compute the stored energies."""

@@ -25,17 +25,17 @@ class FollowerForce(Statement):
     """Force and moment that turn with the cross-section on which they act.
 
     Attributes:
-        at: Fraction of the step at which loads act.
+        load_weight: Fraction of the step at which loads act.
     """
 
-    at: float
+    load_weight: float
     nodes = 1
     numbers = "along", "across", "moment"
     of_step = ("factor",)
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class; "along" and "across" are the force in the undeformed scene."""
-        ((_, _, turn),) = at.between(self.at)
+        ((_, _, turn),) = at.between(self.load_weight)
         c, s, factor = ufl.cos(turn), ufl.sin(turn), at["factor"]
         x = factor * (c * at["along"] - s * at["across"])
         y = factor * (s * at["along"] + c * at["across"])
@@ -47,10 +47,10 @@ class PressureOnCell(StatementOnCell):
     """Forces along a cell, normal and tangential to the deformed axis, per deformed length.
 
     Attributes:
-        at: Fraction of the step at which loads act.
+        load_weight: Fraction of the step at which loads act.
     """
 
-    at: float
+    load_weight: float
     of_step = ("factor",)
 
     @property
@@ -61,7 +61,9 @@ class PressureOnCell(StatementOnCell):
     def equations(self, at: Inputs) -> Equations:
         """See the base class; the derivative of the axis has the length of its part of the cell."""
         cell, work = Cell(self.degree, at), 0.0
-        moved = [X + split(q)[0] for X, q in zip(cell.place, at.between(self.at), strict=True)]
+        moved = [
+            X + split(q)[0] for X, q in zip(cell.place, at.between(self.load_weight), strict=True)
+        ]
         for g, (s, weight) in enumerate(cell.points(4)):
             along = cell.slope(s, moved)
             force = at["tangential"] * along + at["normal"] * perpendicular(along)
@@ -79,12 +81,12 @@ class ForceOfRotation(StatementOnCell):
     velocity of a cross-section.
 
     Attributes:
-        at: Fraction of the step at which loads act.
+        load_weight: Fraction of the step at which loads act.
         lumped: Whether the mass is lumped at the nodes.
         in_motion: Whether there is a Coriolis force.
     """
 
-    at: float
+    load_weight: float
     lumped: bool
     in_motion: bool
     of_step = "growth", "dt"
@@ -97,7 +99,9 @@ class ForceOfRotation(StatementOnCell):
     def equations(self, at: Inputs) -> Equations:
         """See the base class; velocities are means over the step."""
         cell, work, rate = Cell(self.degree, at), 0.0, at["rate"]
-        moved = [X + split(q)[0] for X, q in zip(cell.place, at.between(self.at), strict=True)]
+        moved = [
+            X + split(q)[0] for X, q in zip(cell.place, at.between(self.load_weight), strict=True)
+        ]
         change = [q1 - q0 for q0, q1 in zip(at.motions("q0"), at.motions("q1"), strict=True)]
         for s, weight in cell.points_of_mass(lumped=self.lumped):
             force = at["growth"] * rate**2 * cell.value(s, moved)

@@ -134,12 +134,6 @@ def view_pointer(array: Array) -> Any:
     return ffi.gc(ffi.cast("double *", array.ctypes.data), lambda _, alive=array: None)
 
 
-def number_view(struct: Any, field: str) -> Array:
-    """Return a view, (1,), of a number in a struct of loops.h; the view keeps it alive."""
-    offset = ffi.offsetof(ffi.typeof(struct).item, field)
-    return np.frombuffer(ffi.buffer(struct), count=1, offset=offset)
-
-
 _FLOAT64, _INT32 = np.dtype(np.float64), np.dtype(np.int32)
 _INT32_ARRAY = ffi.typeof("int32_t[]")
 

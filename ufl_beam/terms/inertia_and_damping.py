@@ -50,7 +50,7 @@ from ufl_beam.terms.derivatives import (
     in_c,
 )
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, fields_of_forms
+from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, forms_of_step
 
 BEFORE = "velocity before"
 """Name of the velocities at the beginning of the last step in saved data."""
@@ -340,7 +340,7 @@ class TangentRayleighForces(Term):
         kernels = stiffness, force
         for kernel in kernels:
             kernel.put(D, at_points.reshape(len(elastic), -1))
-        forms = fields_of_forms(kernels, D)["form"]
+        forms = forms_of_step(kernels, D)
         self._inelastic = inelastic
         cells = [beams.keep_tangents() for beams in inelastic]
         groups = [(*tangents.shape, integers(cell), doubles(tangents)) for cell, tangents in cells]

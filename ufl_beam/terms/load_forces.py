@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Loads: dead loads, moving loads, centrifugal and Coriolis forces."""
+"""Loads: dead loads, moving loads."""
 
 from __future__ import annotations
 

@@ -311,10 +311,10 @@ def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:
     ]  # fmt: skip
 
 
-def fields_of_forms(kernels: Sequence[Any], function: fem.Function) -> dict[str, Any]:
-    """Return the fields ``forms`` and ``form`` for a phase that sets a function in kernels."""
+def forms_of_step(kernels: Sequence[Any], function: fem.Function) -> Any:
+    """Return ``form_of_step`` of loops.h of kernels in which a phase sets a function."""
     forms = [(kernel.cells, kernel.position(function)) for kernel in kernels]
-    return {"forms": len(forms), "form": ffi.new("form_of_step[]", forms)}
+    return ffi.new("form_of_step[]", forms)
 
 
 def entering(kernel: Any, entry: Any) -> Loop:

@@ -72,8 +72,6 @@ static void transpose_shape_of(const shape_derivative *s, adjoint *a, const doub
 
 void transpose_shape(void *self, adjoint *a, const double *λ) { transpose_shape_of(self, a, λ); }
 
-/* -- second differences of strains ----------------------------------------------------------------------- */
-
 /* -- material points ----------------------------------------------------------------------------------- */
 
 /* Remove the unknowns of a point from x_bar, the derivatives by all its inputs; the transpose of

@@ -6,7 +6,7 @@
 static void evaluate(const block *b, const element_function *f, double *out)
 {
   const int n = b->lanes;
-  double one[MOST_INPUTS], *e = b->space;
+  double *one = b->space, *e = one + b->width;
   if (f->several) {
     f->several(b->batches, b->w, out);
     return;
@@ -80,9 +80,9 @@ void begin_block(void *self, const time_step *step, const double *q1, const doub
   if (*b->begun) memcpy(b->force, b->force_before, b->size * sizeof *b->force);
   else if (b->size) {
     gather(b, step->q0, 0);
-    evaluate(b, b->force_of, *b->each);
+    evaluate(b, b->force_of, b->out);
     memset(b->force, 0, b->size * sizeof *b->force);
-    scatter(b, b->unknowns, *b->each, b->at, b->force);
+    scatter(b, b->unknowns, b->out, b->at, b->force);
   }
 }
 

@@ -94,8 +94,6 @@ static void add_shape(const shape_derivative *s, const double *q, int p, double 
 
 void add_shape_derivative(void *self, const derivatives *d, int p, double *r) { add_shape(self, d->x, p, r); }
 
-/* -- second differences of strains --------------------------------------------------------------------- */
-
 /* -- material points --------------------------------------------------------------------------------- */
 
 /* Compute a table, whose last outputs are margins. Derivatives by infinite numbers, such as the limit of an

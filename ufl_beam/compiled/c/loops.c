@@ -65,13 +65,6 @@ double value_of_cells(const cells *c, const double *q)
   return value;
 }
 
-/* Add all contributions. */
-void add_calls(void *self, const double *q, double *out)
-{
-  const calls *c = self;
-  for (int i = 0; i < c->number; ++i) c->part[i].add(c->part[i].self, q, out);
-}
-
 /* b -= a at its degrees of freedom */
 void subtract_vector(void *self, const double *q, double *b)
 {

@@ -8,9 +8,7 @@
 typedef void (part)(void *self, const double *q, double *out);
 typedef struct { part *add; void *self; } call;
 
-/* Several contributions. */
-typedef struct { int number; const call *part; } calls;
-part add_calls, add_cells, add_static_tangent, subtract_vector,
+part add_cells, add_static_tangent, subtract_vector,
   subtract_moving_loads, add_tangent_of_moving_masses, add_step_force,
   add_step_tangent, add_inelastic_force, add_inelastic_tangent, add_block, add_block_tangent;
 
@@ -701,8 +699,6 @@ typedef struct {
 
 /* -- blocks: all elements with one statement, see blocks/statement.py ---------------------------------- */
 
-enum { MOST_INPUTS = 256 }; /* of a statement */
-
 /* A compiled function of elements. `several` computes all batches: the first input of each element of a
  * batch, then the second ones, and so on; outputs alike. */
 typedef struct {
@@ -719,7 +715,7 @@ enum time_of_number { GROWS, AT_NOW, AT_START, AT_MIDDLE, AT_END, TIMES_OF_NUMBE
 /* Inputs of an element are motions of its nodes at the end of the step and before it, `unknowns` each, its
  * state, its numbers, and `steps` numbers of the step. */
 typedef struct {
-  const element_function *force_of, *tangent_of, *end_of; /* end_of: state, stored and lost energies; or none */
+  const element_function *force_of, *tangent_of, *end_of; /* end_of: state and energies; or none */
   int lanes, elements, batches, unknowns, states, numbers, steps, width; /* lanes: elements of a batch */
   const int32_t *dofs;      /* degree of freedom of each motion of an element */
   int size;                 /* of loads: number of degrees of freedom on which they act */
@@ -733,7 +729,7 @@ typedef struct {
   double *now, *end, *before; /* their values in the equation, at the end of the step, at the end of the last
                                * step; then the length of the step */
   const int32_t *from;      /* index in `now` of each number of the step of an element */
-  double *w, *out, *space;  /* inputs; space for outputs of all elements, and of one */
+  double *w, *out, *space;  /* inputs; space for outputs of all elements, and for inputs and outputs of one */
   double **each;            /* forces of elements in the latest residual */
   double *force, *force_before; /* of loads: in the latest residual, in that of the last step; size */
   double weight_of_before, *work; /* work: entry of the ledger of the work of loads, minus the forces; or none */
@@ -1174,7 +1170,6 @@ typedef struct {
   form_derivative *strains;       /* strains of the sections, or motions of the springs, by q1 */
   const shape_derivative *shape;  /* strains of the sections by coordinates; or none */
   form_derivative *by_geometry;   /* motions of the springs by their geometry; or none */
-  double *fixed;                  /* derivatives of the strains at constant unknowns */
   kernel *table;
   int outputs, columns, equations, margin, margins; /* equations, margin: their first rows; margins: number */
   int unknown;                    /* index in w of the first variable at the end of the step */
