@@ -143,7 +143,7 @@ class Block(LoadTerm):
         self._energy = np.zeros(stored)
         self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
         self._c = struct(
-            "block", force_of=made.force, tangent_of=made.tangent or ffi.NULL,
+            "element_block", force_of=made.force, tangent_of=made.tangent or ffi.NULL,
             end_of=made.end or ffi.NULL, lanes=BATCH, elements=n, batches=batches,
             unknowns=motions, states=states, numbers=len(statement.numbers),
             steps=len(from_), width=w.shape[1], dofs=in_batches(dofs, BATCH),
@@ -284,7 +284,7 @@ class Block(LoadTerm):
         rows = b.unknowns + b.states
         c = struct(
             "block_derivatives", block=b, parameters=P, neighbours=others,
-            neighbour=ffi.new("block *[]", [term._c for term in terms]),
+            neighbour=ffi.new("element_block *[]", [term._c for term in terms]),
             weight=neighbours.weights, table_of=self._kernels.derivative,
             table=np.zeros(b.batches * rows * b.width * b.lanes),
             direction=np.zeros(b.width * b.lanes), by_state=by_state, by_number=by_number,

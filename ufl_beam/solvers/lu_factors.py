@@ -64,6 +64,7 @@ class Klu:
         self.c = fill(
             ffi.gc(ffi.new("lu_factors *"), lib.free_factors),
             size=A.size, begin=A.indptr, index=A.indices, data=A.data,
+            refines=int(forces.any()), space=np.zeros(2 * A.size),
         )  # fmt: skip
         order = np.zeros(A.size, dtype=np.int32)
         found = lib.find_order(self.c, integers(order))

@@ -3,7 +3,7 @@
  * the statement; no function knows an effect. */
 
 /* The outputs of a function for all elements; element by element if it has no loop in lanes. */
-static void evaluate(const block *b, const element_function *f, double *out)
+static void evaluate(const element_block *b, const element_function *f, double *out)
 {
   const int n = b->lanes;
   double *one = b->space, *e = one + b->width;
@@ -21,17 +21,17 @@ static void evaluate(const block *b, const element_function *f, double *out)
 }
 
 /* Number of elements in batch c; copies of the last one fill up its lanes. */
-static inline int elements_in(const block *b, int c)
+static inline int elements_in(const element_block *b, int c)
 {
   const int rest = b->elements - c * b->lanes;
   return rest < b->lanes ? rest : b->lanes;
 }
 
 /* Input i of batch c; inputs are motions after and before the step, state, numbers, numbers of the step. */
-static inline double *input(const block *b, int c, int i) { return b->w + ((size_t)c * b->width + i) * b->lanes; }
+static inline double *input(const element_block *b, int c, int i) { return b->w + ((size_t)c * b->width + i) * b->lanes; }
 
 /* Write the configuration q into the motions of elements, from the input `first` on. */
-static void gather(const block *b, const double *q, int first)
+static void gather(const element_block *b, const double *q, int first)
 {
   const int all = b->unknowns * b->lanes;
   const int32_t *dofs = b->dofs;
@@ -42,7 +42,7 @@ static void gather(const block *b, const double *q, int first)
 }
 
 /* Add numbers of elements, `each` of them, to `out` at indices. */
-static void scatter(const block *b, int each, const double *values, const int32_t *index, double *out)
+static void scatter(const element_block *b, int each, const double *values, const int32_t *index, double *out)
 {
   const int n = b->lanes;
   for (int c = 0; c < b->batches; ++c)
@@ -51,7 +51,7 @@ static void scatter(const block *b, int each, const double *values, const int32_
 }
 
 /* Numbers of a step: functions of time, and the length of the step. */
-static void find_numbers_of_step(const block *b, const time_step *step)
+static void find_numbers_of_step(const element_block *b, const time_step *step)
 {
   static const double at_rest = 1e300; /* instead of an infinite step; all rates are practically zero */
   const double t = b->t[0], a = b->weight_of_before, reached = step->at * step->fraction;
@@ -70,7 +70,7 @@ static void find_numbers_of_step(const block *b, const time_step *step)
 
 void begin_block(void *self, const time_step *step, const double *q1, const double *s)
 {
-  const block *b = self;
+  const element_block *b = self;
   const int of_step = b->width - b->steps, all = b->steps * b->lanes;
   find_numbers_of_step(b, step);
   gather(b, step->q0, b->unknowns);
@@ -88,7 +88,7 @@ void begin_block(void *self, const time_step *step, const double *q1, const doub
 
 void add_block(void *self, const double *q, double *r)
 {
-  const block *b = self;
+  const element_block *b = self;
   gather(b, q, 0);
   evaluate(b, b->force_of, *b->each);
   scatter(b, b->unknowns, *b->each, b->dofs, r);
@@ -99,14 +99,14 @@ void add_block(void *self, const double *q, double *r)
 
 void add_block_tangent(void *self, const double *q, double *tangent)
 {
-  const block *b = self;
+  const element_block *b = self;
   gather(b, q, 0);
   evaluate(b, b->tangent_of, b->out);
   scatter(b, b->tangent_of->outputs, b->out, b->entry, tangent);
 }
 
 /* New states, and energies: those of the state are kept for add_energy_of_block, those of the step are entered. */
-static void end_step(const block *b, int enter)
+static void end_step(const element_block *b, int enter)
 {
   const int n = b->lanes, outputs = b->end_of->outputs, energies = b->stored + b->entered;
   evaluate(b, b->end_of, b->out);
@@ -122,7 +122,7 @@ static void end_step(const block *b, int enter)
 }
 
 /* Energies of the state with the configuration q, from which a step begins. */
-void find_energies_of_block(const block *b, const double *q)
+void find_energies_of_block(const element_block *b, const double *q)
 {
   gather(b, q, 0);
   end_step(b, 0);
@@ -130,7 +130,7 @@ void find_energies_of_block(const block *b, const double *q)
 
 void accept_block(void *self, const time_step *step, const double *q1, const double *s)
 {
-  const block *b = self;
+  const element_block *b = self;
   if (b->work) *b->work -= work_in_step(b->size, b->dof, b->weight_of_before, b->force_before, b->force, s);
   memcpy(b->force_before, b->force, b->size * sizeof *b->force);
   memcpy(b->before, b->end, b->functions * sizeof *b->before);
@@ -142,15 +142,15 @@ void accept_block(void *self, const time_step *step, const double *q1, const dou
 
 void add_energy_of_block(void *self, const time_step *step, const double *q1, const double *s)
 {
-  const block *b = self;
+  const element_block *b = self;
   for (int i = 0; i < b->stored; ++i) *b->entries[i] += b->energy[i];
 }
 
 /* Add the derivative of the tangent at q along u; w is space for the inputs and as many motions along u. */
-void add_change_of_tangent(const block *b, const element_function *f, const double *q, const double *u, double *w,
+void add_change_of_tangent(const element_block *b, const element_function *f, const double *q, const double *u, double *w,
                            double *tangent)
 {
-  block more = *b;
+  element_block more = *b;
   more.w = w, more.width = b->width + b->unknowns;
   for (int c = 0; c < b->batches; ++c)
     memcpy(input(&more, c, 0), input(b, c, 0), (size_t)b->width * b->lanes * sizeof *w);
@@ -168,7 +168,7 @@ static void find_directions_of_step(const block_derivatives *m, const time_step 
   const int numbers = m->block->functions;
   memset(m->by_step, 0, (size_t)m->parameters * (numbers + 1) * sizeof *m->by_step);
   for (int k = 0; k < m->parameters * m->neighbours; ++k) {
-    const block *one = m->neighbour[k];
+    const element_block *one = m->neighbour[k];
     find_numbers_of_step(one, step);
     double *direction = m->by_step + k / m->neighbours * (numbers + 1);
     for (int i = 0; i < numbers; ++i) direction[i] += m->weight[k] * (one->now[i] - m->block->now[i]);
@@ -187,7 +187,7 @@ void tabulate_block(void *self, const time_step *step, const double *q1)
  * step are q1, or zero. */
 static void find_direction(const block_derivatives *m, const derivatives *d, int c, int p, const double *q1)
 {
-  const block *b = m->block;
+  const element_block *b = m->block;
   const int n = b->lanes, motions = b->unknowns * n, steps = b->steps * n;
   const size_t states = b->states * n, numbers = b->numbers * n, at = (size_t)p * b->batches + c;
   const double *q0 = d->q0 + (size_t)p * d->size, *now = m->by_step + p * (b->functions + 1);
@@ -203,7 +203,7 @@ static void find_direction(const block_derivatives *m, const derivatives *d, int
 /* Product of a row of the table of batch c with the directions, in lanes. */
 static inline void multiply_row(const block_derivatives *m, int c, int row, double *sum)
 {
-  const block *b = m->block;
+  const element_block *b = m->block;
   const int n = b->lanes;
   const double *slope = m->table + ((size_t)c * (b->unknowns + b->states) + row) * b->width * n;
   memset(sum, 0, n * sizeof *sum);
@@ -214,7 +214,7 @@ static inline void multiply_row(const block_derivatives *m, int c, int row, doub
 void add_block_derivative(void *self, const derivatives *d, int p, double *r)
 {
   const block_derivatives *m = self;
-  const block *b = m->block;
+  const element_block *b = m->block;
   double sum[MOST_LANES];
   for (int c = 0; c < b->batches; ++c) {
     find_direction(m, d, c, p, 0);
@@ -229,7 +229,7 @@ void add_block_derivative(void *self, const derivatives *d, int p, double *r)
 void accept_block_derivative(void *self, const derivatives *d, int p)
 {
   const block_derivatives *m = self;
-  const block *b = m->block;
+  const element_block *b = m->block;
   const size_t of_batch = b->states * b->lanes;
   for (int c = 0; c < b->batches && b->states; ++c) {
     double *z = m->by_state + ((size_t)p * b->batches + c) * of_batch;
@@ -237,7 +237,7 @@ void accept_block_derivative(void *self, const derivatives *d, int p)
     for (int i = 0; i < b->states; ++i) multiply_row(m, c, b->unknowns + i, z + i * b->lanes);
   }
   for (int k = p * m->neighbours; k < (p + 1) * m->neighbours; ++k) {
-    const block *one = m->neighbour[k];
+    const element_block *one = m->neighbour[k];
     memcpy(one->before, one->end, b->functions * sizeof(double));
     one->t[0] = one->t[1];
   }
@@ -248,7 +248,7 @@ void accept_block_derivative(void *self, const derivatives *d, int p)
 static void transpose_rows(const block_derivatives *m, adjoint *a, int c, int first, int rows, const double *bar,
                            double *z_bar)
 {
-  const block *b = m->block;
+  const element_block *b = m->block;
   const int n = b->lanes, motions = b->unknowns, end = 2 * motions + b->states;
   const int32_t *dofs = b->dofs + (size_t)c * motions * n, *from = b->from + (size_t)c * b->steps * n;
   for (int i = 0; i < rows; ++i) {
@@ -276,7 +276,7 @@ static void tabulate_again(const block_derivatives *m, const adjoint *a)
 void transpose_block_state(void *self, adjoint *a)
 {
   const block_derivatives *m = self;
-  const block *b = m->block;
+  const element_block *b = m->block;
   const int of_batch = b->states * b->lanes;
   tabulate_again(m, a);
   for (int c = 0; c < b->batches && b->states; ++c) {
@@ -290,7 +290,7 @@ void transpose_block_state(void *self, adjoint *a)
 void transpose_block(void *self, adjoint *a, const double *λ)
 {
   const block_derivatives *m = self;
-  const block *b = m->block;
+  const element_block *b = m->block;
   const int n = b->lanes, motions = b->unknowns * n;
   if (a->d->initial) tabulate_again(m, a); /* such a step has no new state */
   for (int c = 0; c < b->batches; ++c) {
@@ -305,7 +305,7 @@ void transpose_block(void *self, adjoint *a, const double *λ)
 void finish_block(void *self, adjoint *a)
 {
   const block_derivatives *m = self;
-  const block *b = m->block;
+  const element_block *b = m->block;
   const size_t all = (size_t)b->batches * b->lanes;
   add_products(a, all * b->states, m->state_bar, m->by_state);
   add_products(a, all * b->numbers, m->number_bar, m->by_number);

@@ -464,7 +464,8 @@ extern klu_functions klu;
 typedef struct {
   int size;
   int32_t *begin, *index; /* compressed rows of the matrix */
-  double *data;
+  double *data, *space;   /* space: of twice the size */
+  int refines;            /* whether solutions are refined */
   void *common, *symbolic; /* of KLU: settings, order of elimination */
   void *in_order, *exchanged, *latest; /* factors: without row exchanges, with; the latest of both */
 } lu_factors;
@@ -735,7 +736,7 @@ typedef struct {
   double weight_of_before, *work; /* work: entry of the ledger of the work of loads, minus the forces; or none */
   int stored, entered;      /* numbers of energies: of a state, and of a step */
   double *energy, *const *entries; /* energies of the state; entries of all in the ledger */
-} block;
+} element_block;
 
 /* Imposed strains of the cells of a term, see CellStrains: elastic cells, whose forms have the strains
  * as a coefficient, or cells with material points. */
@@ -796,8 +797,8 @@ struct moving_loads {
   double part;              /* fraction of the increment at which loads act */
 };
 
-void find_energies_of_block(const block *b, const double *q);
-void add_change_of_tangent(const block *b, const element_function *f, const double *q, const double *u, double *w,
+void find_energies_of_block(const element_block *b, const double *q);
+void add_change_of_tangent(const element_block *b, const element_function *f, const double *q, const double *u, double *w,
                            double *tangent);
 void start_moving_masses(moving_loads *m, double t, const double *q);
 void take_rates_of_masses(moving_loads *m, const double *q1);
@@ -1227,9 +1228,9 @@ typedef struct {
 /* Derivatives of a block by its inputs, with a row for each parameter. The table has the rows of forces and
  * states. */
 typedef struct {
-  block *block;
+  element_block *block;
   int parameters, neighbours;
-  block *const *neighbour;  /* in scenes with other values of a parameter */
+  element_block *const *neighbour;  /* in scenes with other values of a parameter */
   const double *weight;     /* see derivatives */
   const element_function *table_of;
   double *table, *direction; /* direction: space for the inputs of a batch */

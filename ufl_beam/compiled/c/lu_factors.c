@@ -7,6 +7,8 @@
 
 klu_functions klu;
 
+enum { SMALL_SYSTEM = 12 }; /* largest number of unknowns that are eliminated with row exchanges in any case */
+
 /* Least pivot, relative to the largest number beside it, where rows are exchanged; least reciprocal
  * growth of entries without exchanges. */
 static const double LEAST_PIVOT = 0.1, LEAST_GROWTH = 0.01;
@@ -39,12 +41,30 @@ double analyze(lu_factors *lu, int32_t *order)
   return factors ? (double)factors->lnz + factors->unz : INFINITY;
 }
 
+/* The solution of a small system by dense elimination with row exchanges; x has `columns` right-hand sides, 0 or 1.
+ * Returns whether the matrix is regular. */
+static int solve_small(const lu_factors *lu, int columns, double *x)
+{
+  const int n = lu->size;
+  double A[SMALL_SYSTEM * SMALL_SYSTEM] = {0};
+  for (int i = 0; i < n; ++i) {
+    double largest = 0;
+    for (int k = lu->begin[i]; k < lu->begin[i + 1]; ++k) largest = fmax(largest, fabs(lu->data[k]));
+    /* Rows have different units; a power of two changes no digit. */
+    const double unit = ldexp(1, largest > 0 && isfinite(largest) ? -ilogb(largest) : 0);
+    for (int k = lu->begin[i]; k < lu->begin[i + 1]; ++k) A[n * i + lu->index[k]] = unit * lu->data[k];
+    if (columns) x[i] *= unit;
+  }
+  return solve_dense(n, A, columns, x);
+}
+
 /* Factorize the matrix without row exchanges, or with exchanges if entries would grow. The factors do
  * not depend on earlier matrices, so that a restarted run has the same numbers. Returns whether the
  * matrix is regular. */
 int factorize(lu_factors *lu)
 {
   klu_common *common = lu->common;
+  if (lu->size <= SMALL_SYSTEM) return solve_small(lu, 0, 0);
   lu->latest = lu->in_order;
   if (klu.klu_refactor(lu->begin, lu->index, lu->data, lu->symbolic, lu->in_order, common)
       && klu.klu_rgrowth(lu->begin, lu->index, lu->data, lu->symbolic, lu->in_order, common)
@@ -55,10 +75,24 @@ int factorize(lu_factors *lu)
   return lu->latest != 0;
 }
 
-/* Replace a right-hand side by the solution. */
+/* Replace a right-hand side by the solution. Without row exchanges, solutions with forces of connectors lose
+ * digits, which a refinement restores. */
 void solve_factored(const lu_factors *lu, double *x)
 {
-  klu.klu_tsolve(lu->symbolic, lu->latest, lu->size, 1, x, lu->common);
+  const int n = lu->size;
+  if (n <= SMALL_SYSTEM) {
+    solve_small(lu, 1, x);
+    return;
+  }
+  double *left = lu->space, *first = left + n;
+  if (lu->refines) memcpy(left, x, n * sizeof *x);
+  klu.klu_tsolve(lu->symbolic, lu->latest, n, 1, x, lu->common);
+  if (!lu->refines) return;
+  memcpy(first, x, n * sizeof *x);
+  for (int i = 0; i < n; ++i)
+    for (int k = lu->begin[i]; k < lu->begin[i + 1]; ++k) left[i] -= lu->data[k] * x[lu->index[k]];
+  klu.klu_tsolve(lu->symbolic, lu->latest, n, 1, left, lu->common);
+  for (int i = 0; i < n; ++i) x[i] = first[i] + left[i];
 }
 
 void free_factors(lu_factors *lu)
