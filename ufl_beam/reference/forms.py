@@ -124,7 +124,7 @@ class Fields:
             i = i[on := (i >= 0) & (i < len(s) - 1)]
             points = basix.make_quadrature(basix.CellType.interval, 9)[0].ravel()
             factors = load.factors((s[i, None] + np.diff(s)[i, None] * points).ravel())
-            values[on] = factors.reshape(len(i), -1, 1) * (*load.force, load.moment)
+            values[on] = factors.reshape(len(i), points.size, 1) * (*load.force, load.moment)
         elif isinstance(load, Gravity):
             values[:, :, :2] = self.inertia.x.array[::2, None, None] * load.acceleration
         work = ufl.dot(density, ufl.TestFunction(self.apart)) * self.dx(9)
