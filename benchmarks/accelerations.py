@@ -40,7 +40,9 @@ ACCELERATIONS = {
         (
             "compiled/c/newton.c:factor_tangent", "compiled/c/newton.c:solve_tangent",
             "compiled/c/newton.c:find_change", "compiled/c/newton.c:newton",
-            "compiled/c/newton.c:snes_newton", "solvers/beam_elimination.py:CondensedSolver.drive",
+            "compiled/c/newton.c:snes_newton", "solvers/multifrontal.py:Multifrontal.drive",
+            "solvers/beam_elimination.py:CondensedSolver.drive",
+            "solvers/substructuring.py:Klu.drive",
         ),
     ),
     "SIMD kernels": Acceleration(
@@ -57,10 +59,12 @@ ACCELERATIONS = {
         ),
     ),
     "elimination along beams": Acceleration(
-        "The interior vertices of beams are eliminated first, in blocks of three unknowns. KLU "
-        "factors the remaining matrix. Without it, KLU factors the whole tangent. On several "
-        "processes, each process eliminates the unknowns along its beams, and then factors the sum "
-        "of the remaining matrices.",
+        "The interior vertices of beams are eliminated first, in blocks of three unknowns. Dense "
+        "fronts factor the remaining matrix; KLU factors it if more than 24 unknowns remain and "
+        "forces of connectors are among them. Without it, the same solver factors the whole "
+        "tangent. On several processes, each process eliminates its own unknowns, or in scenes "
+        "with forces of connectors only the unknowns along its beams. Each process then factors "
+        "the remaining matrix.",
         by.SHIPPED, by.WHOLE,
         (
             "compiled/c/beam_elimination.c", "solvers/beam_elimination.py:_interior_vertices",
@@ -68,13 +72,14 @@ ACCELERATIONS = {
             "solvers/beam_elimination.py:Elimination",
         ),
     ),
-    "kept structure of factors": Acceleration(
-        "C calls KLU directly for the unknowns that remain after the elimination along beams, "
-        "mostly of joints. The structure of the factors is found once, and rows are exchanged only "
-        "if pivots are small. Without it, Python calls PETSc, whose KLU finds row exchanges and "
-        "structure for each tangent.",
+    "dense fronts": Acceleration(
+        "The unknowns that remain after the elimination along beams, mostly of joints, are "
+        "eliminated in small dense matrices (fronts), with partial sums in registers. Without it, "
+        "KLU, called by PETSc, factors the remaining matrix. Both variants use KLU if more than 24 "
+        "unknowns remain and forces of connectors are among them. The gain grows with the number "
+        "of joints: see docs/ranks.md.",
         by.SHIPPED, by.LEFT,
-        ("compiled/c/lu_factors.c", "solvers/lu_factors.py:Klu"),
+        ("compiled/c/fronts.c", "solvers/multifrontal.py"),
     ),
     "guess with the acceleration": Acceleration(
         "The initial guess extrapolates with the velocity of the last step and adds a fraction of "

@@ -154,7 +154,7 @@ def main():
             keep("bench_scaling", case)
         print(*map(line, cases), sep="\n", flush=True)
         rows.append((cases, half))
-    write_page(rows)
+    write_page(rows, lattice)
 
 
 def line(case):

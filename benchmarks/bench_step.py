@@ -64,6 +64,7 @@ def parts(simulation):
     x, equation = solver.unknowns.copy(), simulation.equation.c
     r = np.zeros_like(x)
     at_x, at_r = doubles(x), doubles(r)
+    failed = ffi.new("int *")
 
     def assemble():
         lib.fill_tangent(equation, at_x)
@@ -75,7 +76,7 @@ def parts(simulation):
         "of it beams": microseconds(lambda: simulation.beams[0].add_residual(x, r)),
         "tangent": microseconds(assemble),
         "of it beams ": microseconds(lambda: simulation.beams[0].add_tangent(x)),
-        "factor": microseconds(lambda: lib.factor_tangent(equation)),
+        "factor": microseconds(lambda: lib.factor_tangent(equation, failed)),
         "solve": microseconds(lambda: lib.solve_tangent(equation, 0)),
         "sizes of forces": microseconds(lambda: lib.norm(len(r), ffi.NULL, equation.weight, at_r)),
     }

@@ -7,7 +7,8 @@ from collections import Counter
 
 import numpy as np
 
-from ufl_beam.compiled.c_library import ffi, lib
+from ufl_beam.compiled.c_library import doubles, ffi, lib
+from ufl_beam.discretization.partition import bisect
 
 COLLECTIVE = (
     "allreduce", "Allreduce", "Iallreduce", "allgather", "Allgather", "Allgatherv", "bcast",
@@ -44,7 +45,7 @@ def count_traffic(simulation):
         return count
     simulation.subdomain.comm = Counted(simulation.subdomain.comm, count)
     simulation.together._comm = Counted(simulation.together._comm, count)
-    summed = solver._factors._factors._inner
+    summed = solver._factors._solved._inner
     summed._comm = Counted(summed._comm, count)
     ghosts, update = 8 * len(simulation.subdomain.ghosts), lib.petsc.VecGhostUpdateBegin
 
@@ -57,23 +58,46 @@ def count_traffic(simulation):
     return count
 
 
+def front_flops(pivots, others):
+    """Operations of the elimination of pivots in dense fronts with other unknowns."""
+    left = [np.arange(m, p + m, dtype=float) for p, m in zip(pivots, others, strict=True)]
+    return float(sum(np.sum(n + 2 * n**2) for n in left))
+
+
 def work(simulation):
-    """Sizes of the part of this process, of the sum of all parts, and the time of its factors."""
+    """Sizes of the part of this process: cells, unknowns of joints, operations, entries."""
     factors = simulation.solver._factors
-    reduced = factors._factors._inner.left
-    begin = time.perf_counter()
-    for _ in range(3):
-        lib.factorize(factors._factors.c)
-    return {
+    fronts, entries = factors._solved, factors._elimination.left
+    found = {
         "cells_here": len(simulation.subdomain.cells),
-        "joints_here": factors._elimination.left.size, "joints": reduced.size,
-        "entries": len(reduced.data), "s_of_joints": (time.perf_counter() - begin) / 3,
+        "joints_here": entries.size,
         "ghosts": len(simulation.subdomain.ghosts),
-    }  # fmt: skip
+    }
+    if not simulation.subdomain.alone:
+        summed, fronts = fronts._inner.left, fronts._inner._inner
+        sizes = {"border": summed.size, "border_entries": len(summed.data)}
+        found |= {"border_here": fronts.left.size, **sizes}
+    c, begin = fronts.c, time.perf_counter()
+    for _ in range(3):
+        lib.factor_fronts(c, doubles(entries.data))
+    found["s_of_flops"] = (time.perf_counter() - begin) / 3
+    found["flops"] = front_flops(*(np.diff(list(x[0 : c.fronts])) for x in (c.first, c.begin)))
+    return found
+
+
+def borders(numbering, ranks):
+    """Unknowns that several of so many processes have, in all and of one process at most."""
+    part = bisect(numbering.points[numbering.cells].mean(axis=1), ranks)
+    of_cell = numbering.dofs[numbering.cells].reshape(len(part), 6)
+    pairs = np.unique(of_cell.astype(np.int64) * ranks + part[:, None])
+    dofs, ranks_of = pairs // ranks, pairs % ranks
+    shared = np.bincount(dofs, minlength=numbering.size)[dofs] > 1
+    return len(np.unique(dofs[shared])), int(np.bincount(ranks_of[shared]).max(initial=0))
 
 
 def fitted(whole, half, shared):
     """Numbers of the model, from one process with all cells and with half, and from two."""
+    flops, rate = whole["flops"], whole["flops"] / whole["s_of_flops"]
     cells, fewer = whole["cells"], half["cells"]
     bytes_whole, bytes_half, bytes_shared = (
         1e6 * max(one["memory_mb"]) for one in (whole, half, shared)
@@ -82,25 +106,30 @@ def fitted(whole, half, shared):
     both = (bytes_whole - bytes_half) / (cells - fewer)
     own = 2 * (bytes_whole - bytes_shared) / cells
     return {
-        "cells": cells, "entries": whole["entries"], "s_of_joints": whole["s_of_joints"],
-        "s_per_cell": (1e-3 * whole["ms_per_iteration"] - whole["s_of_joints"]) / cells,
+        "cells": cells, "flops": flops, "flops_per_s": rate,
+        "s_per_cell": (1e-3 * whole["ms_per_iteration"] - flops / rate) / cells,
         "messages": shared["messages_per_iteration"],
         "memory": (bytes_whole - both * cells, both - own, own),
     }  # fmt: skip
 
 
-def extrapolated(cells, ranks, model, growth):
+def extrapolated(cells, ranks, model, border, part, growth):
     """Seconds of an iteration by parts, and bytes of a process.
 
+    ``border`` unknowns belong to several processes, ``part`` of them to one process at most.
     ``growth`` is the exponent with which operations for joints grow with cells: 1 in a tower, 1.5
     in a square lattice.
     """
-    larger = cells / model["cells"]
-    bytes_sent = 16 * model["entries"] * larger * (ranks > 1)
+    here, rate = cells / ranks, model["flops_per_s"]
+    # The last separator of the borders couples to itself only: in a tower a border, in a square
+    # the borders between its halves.
+    separator = max(part / 2, border / 4 if growth > 1 else 0)
+    entries = border * min(border, 2 * part)
     seconds = {
-        "cells": model["s_per_cell"] * cells / ranks,
-        "joints": model["s_of_joints"] * larger**growth,
-        "messages": model["messages"] * LATENCY * np.log2(ranks) + bytes_sent / BANDWIDTH,
+        "cells": model["s_per_cell"] * here,
+        "joints": model["flops"] * (here / model["cells"]) ** growth / rate,
+        "borders": 2 / 3 * separator**2 * border / rate,
+        "messages": model["messages"] * LATENCY * np.log2(ranks) + 16 * entries / BANDWIDTH,
     }
     fixed, whole_scene, own = model["memory"]
-    return seconds, fixed + whole_scene * cells + own * cells / ranks
+    return seconds, fixed + whole_scene * cells + own * here + 8 * part**2 + 16 * entries

@@ -20,7 +20,7 @@ from ufl_beam.discretization import compiled_forms
 from ufl_beam.simulation import stepper
 from ufl_beam.simulation.stepper import Prediction
 from ufl_beam.solvers import beam_elimination, newton
-from ufl_beam.solvers.lu_factors import FactorsOfPetsc
+from ufl_beam.solvers.substructuring import Klu
 from ufl_beam.terms import material_points
 
 plan = beam_elimination._plan
@@ -31,13 +31,13 @@ def nothing(*_):
 
 
 def without_chains(cell_dofs, indptr, indices, alone, *more):
-    """Chains of no vertices: the whole tangent remains for KLU."""
+    """Chains of no vertices: the whole tangent remains for the fronts."""
     return plan(cell_dofs, indptr, indices, np.zeros_like(alone), *more)
 
 
-def by_petsc(inner, forces):
-    """Factors by PETSc, which calls KLU."""
-    return FactorsOfPetsc(inner)
+def klu(inner, _):
+    """Factor with KLU, called by PETSc, instead of fronts."""
+    return Klu(inner)
 
 
 class AtVelocity(Prediction):
@@ -65,11 +65,9 @@ def without_kept_tangents():
         depends_on=[source],
         flags=c_library.FLAGS,
     )
-    for library in ("petsc", "klu"):
-        known, new = (getattr(lib, library) for lib in (c_library.lib, other.lib))
-        for name, field in other.ffi.typeof(f"{library}_functions").fields:
-            address = int(c_library.ffi.cast("intptr_t", getattr(known, name)))
-            setattr(new, name, other.ffi.cast(field.type, address))
+    for name, field in other.ffi.typeof("petsc_functions").fields:
+        address = int(c_library.ffi.cast("intptr_t", getattr(c_library.lib.petsc, name)))
+        setattr(other.lib.petsc, name, other.ffi.cast(field.type, address))
     return int(other.ffi.cast("intptr_t", other.ffi.addressof(other.lib, "snes_newton")))
 
 
@@ -105,13 +103,13 @@ class Variant(NamedTuple):
 CELL_BY_CELL = (compiled_forms, "interleaved", nothing)
 POINT_BY_POINT = (material_points, "BATCH", math.inf)
 NO_CHAINS = (beam_elimination, "_plan", without_chains)
-BY_PETSC = (beam_elimination, "lu_factors", by_petsc)
+NO_FRONTS = (beam_elimination, "Multifrontal", klu)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
 AT_VELOCITY = (stepper, "Prediction", AtVelocity)
 
 SHIPPED, PETSC = "as shipped", "PETSc's `newtonls`"
-SCALAR, WHOLE = "cell by cell", "KLU for the whole tangent"
-LEFT = "KLU called by PETSc"
+SCALAR, WHOLE = "cell by cell", "fronts of the whole tangent"
+LEFT = "KLU instead of fronts"
 TANGENTS, VELOCITY = "a tangent in each iteration", "guess at the last velocity"
 
 VARIANTS = {
@@ -119,7 +117,7 @@ VARIANTS = {
     PETSC: Variant(newton={"petsc": {"snes_type": "newtonls"}}),
     SCALAR: Variant((CELL_BY_CELL, POINT_BY_POINT)),
     WHOLE: Variant((NO_CHAINS,)),
-    LEFT: Variant((BY_PETSC,)),
+    LEFT: Variant((NO_FRONTS,)),
     TANGENTS: Variant((ALL_TANGENTS,)),
     VELOCITY: Variant((AT_VELOCITY,)),
 }

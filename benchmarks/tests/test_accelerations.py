@@ -60,14 +60,14 @@ def test_a_variant_with_another_result_is_refused(monkeypatch):
 
 
 def state_of(simulation):
-    """Type of Newton's method, and whether SIMD, chains, KLU and prediction are in use."""
+    """Type of Newton's method, and whether SIMD, chains, fronts and prediction are in use."""
     elimination = simulation.solver._factors._elimination.c
     return {
         "newton": simulation.solver._snes.getType(),
         "SIMD": simulation.beams[0]._force.cells.batch_size > 1,
         "two ends": elimination.count == 2,
         "no chains": elimination.left_size == len(simulation.q),
-        "KLU": bool(simulation.equation.c.lu),
+        "fronts": bool(simulation.equation.c.fronts),
         "second order": bool(simulation.prediction.c.second),
     }
 
@@ -75,14 +75,14 @@ def state_of(simulation):
 def test_variants_switch_off_one_acceleration_and_leave_the_package_as_it_was(advanced):
     shipped = state_of(advanced(switches.SHIPPED))
     assert shipped == {
-        "newton": "shell", "SIMD": True, "two ends": True, "no chains": False, "KLU": True,
+        "newton": "shell", "SIMD": True, "two ends": True, "no chains": False, "fronts": True,
         "second order": True,
     }  # fmt: skip
     for variant, change in {
         switches.PETSC: {"newton": "newtonls"},
         switches.SCALAR: {"SIMD": False},
         switches.WHOLE: {"no chains": True},
-        switches.LEFT: {"KLU": False},
+        switches.LEFT: {"fronts": False},
         switches.VELOCITY: {"second order": False},
     }.items():
         found = state_of(advanced(variant))
@@ -131,7 +131,7 @@ def cases(factors):
 def test_gains_are_ratios_within_a_round():
     found = bench.gains(cases({"as shipped": 1.0, "cell by cell": 1.5}))
     assert found["SIMD kernels"]["elastic", 64] == pytest.approx(1.5)
-    assert found["kept structure of factors"]["hinged", 8] == pytest.approx(2.0)
+    assert found["dense fronts"]["hinged", 8] == pytest.approx(2.0)
     assert {scene for scene, _ in found["SIMD kernels"]} == {"elastic", "hinged", "jointed"}
 
 
@@ -140,7 +140,7 @@ def test_accelerations_of_little_gain_are_marked():
     rows = {row.split(" | ")[0][2:]: row for row in bench.summary(found).splitlines()}
     assert "to be deleted" in rows["SIMD kernels"]
     assert "| 1.09 | 1.09 |" in rows["SIMD kernels"]
-    assert "to be deleted" not in rows["kept structure of factors"]
+    assert "to be deleted" not in rows["dense fronts"]
 
 
 def test_lines_of_code_are_counted_once():
@@ -149,7 +149,7 @@ def test_lines_of_code_are_counted_once():
             assert accelerations.lines_of(place)
     text = (ROOT / "ufl_beam/compiled/c/beam_elimination.c").read_text(encoding="utf-8")
     assert accelerations.count(["compiled/c/beam_elimination.c"]) == len(text.splitlines())
-    nested = ["solvers/lu_factors.py:Klu", "solvers/lu_factors.py"]
+    nested = ["solvers/substructuring.py:Klu", "solvers/substructuring.py"]
     assert accelerations.count(nested) == accelerations.count(nested[1:])
     start = min(accelerations.lines_of("compiled/c/newton.c:snes_newton"))[1]
     lines = (ROOT / "ufl_beam/compiled/c/newton.c").read_text(encoding="utf-8").splitlines()

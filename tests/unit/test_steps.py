@@ -400,7 +400,7 @@ def test_slender_beams_yield_in_a_few_iterations():
 
 
 def test_singular_tangent_is_a_failed_step():
-    """KLU finds no pivot; a shorter step has one.
+    """KLU stops PETSc where it finds no pivot; a shorter step has one.
 
     A force that grows by 4 m/dt² takes from a step of dt what inertia gives it.
     """

@@ -1,10 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Factors of reduced systems against dense solutions, also without KLU; the parts of processes."""
-
-from contextlib import nullcontext
-from functools import cache
-from itertools import pairwise
-from pathlib import Path
+"""Dense fronts and their Schur complements against dense solutions; the parts of processes."""
 
 from mpi4py import MPI
 
@@ -14,13 +9,10 @@ from scipy.sparse import csr_array, eye_array, kron, random_array
 
 import ufl_beam as ub
 from ufl_beam.arrays import Array
-from ufl_beam.compiled import c_library
-from ufl_beam.compiled.c_library import ffi
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.compiled.jit import compiled
 from ufl_beam.discretization.partition import bisect
-from ufl_beam.solvers import lu_factors
-from ufl_beam.solvers.lu_factors import FactorsOfPetsc, Klu
+from ufl_beam.solvers import multifrontal
+from ufl_beam.solvers.multifrontal import Multifrontal
 from ufl_beam.solvers.substructuring import Summed
 
 
@@ -45,10 +37,18 @@ class Whole:
         x[:] = small
 
 
-def solve(factors, b, again=False) -> Array:
+def dense(A):
+    return csr_array((A.data, A.indices, A.indptr), shape=[A.size] * 2).toarray()
+
+
+def solve(condensed, b, again=False) -> Array:
+    """Solution by a dense one of what is left."""
     x = np.empty(len(b))
-    assert factors.reduce(b) if again else factors.factor(b)
-    factors.expand(x)
+    if again:
+        condensed.reduce(b)
+    else:
+        assert condensed.factor(b)
+    condensed.expand(np.linalg.solve(dense(condensed.left), condensed.f), x)
     return x
 
 
@@ -69,63 +69,59 @@ def matrix_of(name, n, seed=0):
     pattern = csr_array(pattern + eye_array(n))
     blocks = csr_array(kron(pattern, np.ones((2, 2))))
     blocks.data[:] = random.uniform(-1, 1, blocks.nnz)
-    # Large pairs off the diagonal: rows must be exchanged.
+    # Large pairs off the diagonal: rows must be exchanged in the fronts.
     pivots = kron(eye_array(pattern.shape[0]), [[1e-6, 9.0 + n], [-9.0 - n, 1e-6]])
     return csr_array(blocks + pivots)
-
-
-def without_forces(whole):
-    return Klu(whole, np.zeros(len(whole.dofs), dtype=bool))
-
-
-@pytest.fixture(params=["KLU", "PETSc with KLU", "PETSc with MUMPS"])
-def kind(request, monkeypatch):
-    """Factors by KLU, and by PETSc without a header or without KLU."""
-    if request.param == "KLU":
-        return without_forces
-    monkeypatch.setattr(c_library, "HAS_KLU", request.param == "PETSc with KLU")
-    return FactorsOfPetsc
 
 
 @pytest.mark.parametrize("n", [1, 4, 49, 225])
 @pytest.mark.parametrize(
     "name", ["nothing coupled", "a chain", "a square", "at random", "all coupled"]
 )
-def test_solutions_are_those_of_the_whole(kind, name, n):
+@pytest.mark.parametrize("part", [0.0, 0.1, 1.0])
+def test_solutions_are_those_of_the_whole(name, n, part):
     """Also of a second matrix with the same pattern, and a second right-hand side."""
     if name == "all coupled" and n > 49:
         n = 49
     matrix = matrix_of(name, n)
     size = matrix.shape[0]
     random = np.random.default_rng(1)
+    stays = np.repeat(random.uniform(size=size // 2) < part, 2)
     whole = Whole(matrix, np.arange(size))
-    factors = kind(whole)
+    condensed = Multifrontal(whole, stays)
+    assert condensed.left.size == np.count_nonzero(stays)
     for factor in (1.0, -3.0):
         whole.left.data[:] = factor * csr_array(matrix).data
         for again, b in enumerate(random.uniform(-1, 1, (2, size))):
-            expected = np.linalg.solve(whole.left.sparse().toarray(), b)
+            expected = np.linalg.solve(dense(whole.left), b)
             # Pivots of some 10 and less than n entries of 1: few digits of sixteen are lost.
-            assert np.allclose(solve(factors, b, again), expected, rtol=0, atol=1e-13)
+            assert np.allclose(solve(condensed, b, again), expected, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("small", [0.0, 1e-9])
-def test_rows_are_exchanged_if_a_matrix_needs_it(small):
-    """The second matrix has small or zero diagonal entries; it is as regular as the first."""
-    n = 25
-    coupled = np.random.default_rng(2).uniform(-0.1, 0.1, (2 * n, 2 * n))
-    here = np.kron(np.eye(n), np.ones((2, 2))) == 1
-    one, other = (
-        np.where(here, np.kron(np.eye(n), block), coupled)
-        for block in ([[4.0, 1.0], [1.0, small]], [[small, 1.0], [1.0, 4.0]])
-    )
-    whole, b = Whole(np.ones((2 * n, 2 * n)), np.arange(2 * n)), np.ones(2 * n)
-    factors, found = without_forces(whole), []
-    for matrix in (one, other, one, other):
-        whole.left.data[:] = matrix.ravel()
-        found.append(solve(factors, b))
-        # Solutions of some tens: 1e-13.  Pivots of 1e-9 lose half of the digits.
-        assert np.abs(matrix @ found[-1] - b).max() < 1e-12
-    assert np.array_equal(found[:2], found[2:])  # matrices before have no effect, as for restarts
+def test_the_schur_complement():
+    """Of the unknowns that stay, in their order."""
+    matrix, stays = matrix_of("a square", 49), np.zeros(98, dtype=bool)
+    stays[[2, 3, 50, 51]] = True
+    condensed = Multifrontal(Whole(matrix, np.arange(98)), stays)
+    assert condensed.factor(np.zeros(98))
+    K = matrix.toarray()
+    cut = (K[np.ix_(a, b)] for a in (stays, ~stays) for b in (stays, ~stays))
+    kk, ki, ik, ii = cut
+    expected = kk - ki @ np.linalg.solve(ii, ik)
+    assert np.allclose(dense(condensed.left), expected, rtol=0, atol=1e-12 * np.abs(kk).max())
+    assert condensed.dofs.tolist() == [2, 3, 50, 51]
+
+
+@pytest.mark.parametrize(("stays", "best"), [(0, "amd"), (20, "nd")])
+def test_the_order_of_fewest_operations(monkeypatch, stays, best):
+    """Of a square of 20 nodes a side, one side of which may stay."""
+    matrix, operations = matrix_of("a square", 400), {}
+    structure = multifrontal._structure.__wrapped__  # what it finds is kept otherwise
+    for kinds in [("amd",), ("nd",), multifrontal.ORDERINGS]:
+        monkeypatch.setattr(multifrontal, "ORDERINGS", kinds)
+        _, first, begin, *_ = structure(matrix.indptr, matrix.indices, np.arange(800) < 2 * stays)
+        operations[kinds] = multifrontal._operations(first, begin)
+    assert operations[("amd", "nd")] == operations[(best,)] == min(operations.values())
 
 
 @pytest.mark.parametrize("units", [1.0, 1e-20, 1e20])
@@ -139,50 +135,23 @@ def test_a_small_system_with_forces_of_joints(units):
         K = units * np.kron(np.eye(2), lengthen.T @ np.diag(springs) @ lengthen)
         matrix = np.block([[K, held.T], [held, np.zeros((2, 2))]])
         b = np.append(units * np.linspace(-1.0, 2.0, 2 * nodes), np.zeros(2))
-        whole = Whole(np.ones_like(matrix), np.arange(len(b)))
-        whole.left.data[:] = matrix.ravel()
-        x = solve(Klu(whole, np.arange(len(b)) >= 2 * nodes), b)
+        nothing_stays = np.zeros(len(b), dtype=bool)
+        x = solve(Multifrontal(Whole(matrix, np.arange(len(b))), nothing_stays), b)
         # Motions of some tens, with 22 unknowns: 1e-14.  Rows compared by numbers of different
         # dimensions take last digits of the stiffness for pivots, and lose two digits more.
         residual = (matrix @ x - b) / np.array([units] * (2 * nodes) + [1.0] * 2)
         assert np.abs(residual).max() < 1e-13
 
 
-def test_forces_of_joints_need_no_exchanges_of_rows():
-    """Springs from node to node and to the ground, and forces that hold some motions."""
-    n, random = 40, np.random.default_rng(3)
-    lengthen = np.diff(np.eye(n + 1), axis=0)[:, :n]
-    K = lengthen.T @ np.diag(random.uniform(0.1, 1.0, n)) @ lengthen
-    held = np.eye(n)[::4] - np.eye(n)[1::4]
-    matrix = np.block([[K, held.T], [held, np.zeros((10, 10))]])
-    matrix[np.diag_indices(n + 10)] += 1e-300  # PETSc and KLU need the diagonal in the pattern
-    for forces, same in ((np.arange(n + 10) >= n, True), (np.zeros(n + 10, dtype=bool), False)):
-        factors, b = Klu(Whole(matrix, np.arange(n + 10)), forces), random.uniform(-1, 1, n + 10)
-        # Stiffnesses of some 0.1 / 40: solutions of some 1e2
-        assert np.abs(matrix @ solve(factors, b) - b).max() < 1e-12
-        assert (factors.c.latest == factors.c.in_order) == same
-
-
-@pytest.mark.parametrize("row", [slice(2), slice(-2, None)])
-def test_a_singular_part_is_said(kind, row):
-    """Also after a regular matrix, and before one."""
-    matrix, b = matrix_of("nothing coupled", 9), np.ones(18)
-    whole = Whole(matrix, np.arange(18))
-    factors, data = kind(whole), whole.left.data.reshape(18, 2)
-    x, kept = solve(factors, b), data[row].copy()
-    data[row] = 0.0
-    assert not factors.factor(b)
-    assert not factors.factor(b)
-    data[row] = kept
-    assert np.array_equal(solve(factors, b), x)
-
-
-def test_factors_with_more_entries_than_indices_of_32_bits_are_refused(monkeypatch):
-    monkeypatch.setattr(lu_factors, "LARGEST_INDEX", 9999)
-    whole = Whole(matrix_of("all coupled", 50), np.arange(100))
-    says = "the 100 unknowns of joints have more entries than .* indices of 32 bits can number"
-    with pytest.raises(ub.ArgumentError, match=says):
-        without_forces(whole)
+@pytest.mark.parametrize("value", [0.0, np.nan])
+def test_a_singular_part_is_said(value):
+    """Even where nothing that stays couples to it."""
+    matrix = matrix_of("nothing coupled", 9)
+    whole, stays = Whole(matrix, np.arange(18)), np.arange(18) < 4
+    condensed = Multifrontal(whole, stays)
+    assert condensed.factor(np.zeros(18))
+    whole.left.data[-4:] = value
+    assert not condensed.factor(np.zeros(18))
 
 
 def test_sums_over_processes():
@@ -191,81 +160,17 @@ def test_sums_over_processes():
     size, here = 2 * comm.size + 1, 2 * comm.rank + np.arange(3)
     part = np.array([[2.0, -1.0, 0.0], [-1.0, 3.0, -1.0], [0.0, -1.0, 2.0]])
     whole = Whole(part, here)
-    factors = without_forces(summed := Summed(whole, comm))
+    stays = np.array([comm.rank > 0, False, comm.rank < comm.size - 1])
+    summed = Summed(Multifrontal(whole, stays), comm)
     K, b = np.zeros((size, size)), np.arange(1.0, size + 1)
     for rank in range(comm.size):
         K[2 * rank :, 2 * rank :][:3, :3] += part
     owned = b[here] * np.array([comm.rank == 0, 1, 1])  # the end before is another's
     for again in (False, True):
-        assert np.allclose(solve(factors, owned, again), np.linalg.solve(K, b)[here], rtol=1e-13)
-    assert summed.dofs.tolist() == list(range(size))
+        assert np.allclose(solve(summed, owned, again), np.linalg.solve(K, b)[here], rtol=1e-13)
+    assert summed.dofs.tolist() == list(range(2, size - 1, 2))
     whole.good = comm.rank < comm.size - 1
-    assert not factors.factor(owned)
-
-
-# -- a missing KLU -------------------------------------------------------------------------------
-
-
-def frame():
-    """Frame of two storeys, with a joint that is held by forces."""
-    section = ub.Section(EA=1e4, GA=4e3, EI=10.0, rhoA=1.0, rhoI=0.01)
-    line = [(0, 0), (0, 1), (0, 2), (1, 2), (1, 1), (1, 0)]
-    *legs, bar = (
-        ub.Beam(*ends, section, cells=2) for ends in [*pairwise(line), (line[1], line[4])]
-    )
-    joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(legs)]
-    joints += [
-        ub.Revolute(legs[k].end, end, multipliers=k == 3)
-        for k, end in ((0, bar.start), (3, bar.end))
-    ]
-    feet = [ub.Clamped(legs[0].start), ub.Clamped(legs[-1].end)]
-    push = ub.PointLoad(legs[1].end, force=(3.0, 1.0))
-    return ub.Scene([*legs, bar], joints=joints, supports=feet, loads=[push])
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "says"),
-    [("KLU_HEADER", None, r"klu\.h is missing"), ("HAS_KLU", False, "PETSc was built without KLU")],
-)
-def test_runs_without_klu(monkeypatch, name, value, says):
-    """PETSc factors the tangents; one warning names the package to install."""
-    expected = ub.simulate(frame(), ub.EnergyMomentum(), t=(0, 1), dt=0.1).q
-    monkeypatch.setattr(c_library, name, value)
-    monkeypatch.setattr(
-        lu_factors, "_warn_of_missing_klu", cache(lu_factors._warn_of_missing_klu.__wrapped__)
-    )
-    context = pytest.warns(RuntimeWarning, match=f"{says}: .* Install libsuitesparse-dev")
-    with context if MPI.COMM_WORLD.rank == 0 else nullcontext():
-        simulation = ub.Simulation(frame(), ub.EnergyMomentum())
-    assert simulation.equation.c.lu == ffi.NULL
-    found = ub.simulate(frame(), ub.EnergyMomentum(), t=(0, 1), dt=0.1).q  # no second warning
-    # Residuals of 1e-10 of the forces, some 10 N, on stiffnesses of some 10 N/m
-    assert np.abs(found - expected).max() < 1e-9
-
-
-def test_c_is_compiled_without_the_header_of_klu():
-    declarations = c_library.DECLARATIONS + c_library._CALLBACKS
-    code = c_library.source(None)
-    options = {"depends_on": [code], "flags": ["-O0"]}
-    without = compiled("ufl_beam_without_klu", declarations, lambda: code, **options)
-    assert without.lib.klu.klu_factor == without.ffi.NULL
-
-
-def test_the_header_of_klu_is_looked_for_in_the_flags_of_petsc_first(tmp_path, monkeypatch):
-    variables, prefix = tmp_path / "lib/petsc/conf/petscvariables", tmp_path / "prefix"
-    flag, general = tmp_path / "flag/klu.h", prefix / "include/suitesparse/klu.h"
-    for path in (variables, flag, general):
-        path.parent.mkdir(parents=True)
-        path.touch()
-    monkeypatch.setattr("sys.prefix", str(prefix))
-    assert c_library.klu_header(tmp_path) == general
-    variables.write_text(f"CC = gcc\nPETSC_CC_INCLUDES = -I/none -I{flag.parent} -I/other\n")
-    assert c_library.klu_header(tmp_path) == flag
-    monkeypatch.setattr(Path, "is_file", lambda path: path == variables)
-    assert c_library.klu_header(tmp_path) is None
-
-
-# -- parts of processes --------------------------------------------------------------------------
+    assert not summed.factor(owned)
 
 
 @pytest.mark.parametrize("number", [1, 2, 3, 8, 64])

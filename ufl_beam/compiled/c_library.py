@@ -9,15 +9,11 @@ into the coefficients of each cell, and add the entries of the cell at stored in
 from __future__ import annotations
 
 import ctypes
-import re
-import sys
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
-import petsc4py
 from petsc4py import PETSc
 
 import numpy as np
@@ -30,7 +26,7 @@ T = TypeVar("T")
 
 SOURCES = (
     "assembly", "loops", "material_laws", "embedded_hinges", "material_points", "rigid_plastic",
-    "connectors", "guide_curves", "beam_elimination", "lu_factors", "newton", "cell_forces",
+    "connectors", "guide_curves", "beam_elimination", "fronts", "newton", "cell_forces",
     "term_phases", "energy_ledger", "derivatives", "adjoint", "blocks", "steps", "oscillators",
 )  # fmt: skip
 """C files in the folder c; they form one translation unit."""
@@ -57,49 +53,17 @@ extern "Python" void begin_in_python(void *handle, double t, double dt);
 """
 
 
-WITHOUT_KLU = """
-typedef struct { double tol, rgrowth; int btf, scale; } klu_common;
-typedef struct { int *Q; } klu_symbolic;
-typedef struct { int lnz, unz; } klu_numeric;"""
-"""Declarations that replace the header of KLU if it is missing; KLU is not called then."""
-
-
-def klu_header(petsc_directory: Path) -> Path | None:
-    """Return the path of klu.h, or None; the include flags of PETSc are searched first."""
-    variables = petsc_directory / "lib/petsc/conf/petscvariables"
-    flags = variables.read_text() if variables.is_file() else ""
-    folders = re.findall(r"-I(\S+)", "".join(re.findall("^PETSC_CC_INCLUDES.*", flags, re.M)))
-    folders += [f"{prefix}/include" for prefix in (sys.prefix, "/usr/local", "/usr")]
-    paths = (Path(folder, name) for folder in folders for name in ("suitesparse/klu.h", "klu.h"))
-    return next((path for path in paths if path.is_file()), None)
-
-
-def source(header: Path | None) -> str:
-    """Return the C code, with the header of KLU."""
-    begin = WITHOUT_KLU if header is None else f'#include "{header}"'
-    return "\n".join([HEADERS, begin, DECLARATIONS, *(text(f"{name}.c") for name in SOURCES)])
-
-
-_CONFIGURATION = petsc4py.get_config()
-KLU_HEADER = klu_header(Path(_CONFIGURATION["PETSC_DIR"], _CONFIGURATION["PETSC_ARCH"]))
-
-_SOURCE = source(KLU_HEADER)
+_SOURCE = "\n".join([HEADERS, DECLARATIONS, *(text(f"{name}.c") for name in SOURCES)])
 module = compiled(
-    "ufl_beam_loops",
-    DECLARATIONS + _CALLBACKS,
-    lambda: _SOURCE,
-    depends_on=[_SOURCE, KLU_HEADER.read_text() if KLU_HEADER else ""],
-    flags=FLAGS,
+    "ufl_beam_loops", DECLARATIONS + _CALLBACKS, lambda: _SOURCE, depends_on=[_SOURCE], flags=FLAGS
 )
 ffi: Any = module.ffi
 lib: Any = module.lib
 
-_PETSC = ctypes.CDLL(PETSc.__file__)  # petsc4py has loaded PETSc, and PETSc has loaded KLU
-HAS_KLU = hasattr(_PETSC, "klu_refactor")
-for _library in ("petsc", *["klu"] * HAS_KLU):
-    for _name, _field in ffi.typeof(f"{_library}_functions").fields:
-        _address = ctypes.cast(getattr(_PETSC, _name), ctypes.c_void_p).value
-        setattr(getattr(lib, _library), _name, ffi.cast(_field.type, _address))
+_PETSC = ctypes.CDLL(PETSc.__file__)  # petsc4py has loaded PETSc
+for _name, _field in ffi.typeof("petsc_functions").fields:
+    _address = ctypes.cast(getattr(_PETSC, _name), ctypes.c_void_p).value
+    setattr(lib.petsc, _name, ffi.cast(_field.type, _address))
 
 
 def opaque(thing: Any) -> Any:

@@ -20,8 +20,8 @@ from ufl_beam.caches import cached_by_structure
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Subdomain
-from ufl_beam.solvers.lu_factors import BAD_PIVOT, GOOD, Klu, lu_factors
-from ufl_beam.solvers.substructuring import Summed
+from ufl_beam.solvers.multifrontal import ONE_FRONT, Multifrontal
+from ufl_beam.solvers.substructuring import BAD_PIVOT, GOOD, Klu, Summed, succeeds
 
 
 def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any, ...]:
@@ -162,6 +162,7 @@ class Elimination:
     :meth:`expand` after it.  On one process, C uses :attr:`c` directly, see newton.c.
 
     Attributes:
+        shared: True for remaining unknowns that other processes have, too.
         c: ``chains`` of loops.h.
     """
 
@@ -170,7 +171,7 @@ class Elimination:
         alone = ~np.isin(subdomain.dofs, ghosts)
         pattern = subdomain.cell_dofs, A.indptr, A.indices, alone, subdomain.dofs
         remaining, at, indptr, columns, *arrays = _plan(*pattern, subdomain.num_owned)
-        self.dofs = subdomain.dofs[remaining]
+        self.dofs, self.shared = subdomain.dofs[remaining], ~alone[remaining]
         self.left = Csr(np.zeros(len(columns)), columns, indptr)
         self.f: Array = np.zeros(len(remaining))
         indices = dict(zip(INDICES, arrays, strict=True))
@@ -201,30 +202,32 @@ class Elimination:
 class CondensedSolver:
     """Direct solver: condensation along the beams, then factorization of the rest.
 
-    If processes share a scene, each process factors the sum of the reduced systems of all
-    processes, so that no process sends a solution.
+    If processes share a scene, each process also eliminates all other unknowns that no other
+    process has, except in scenes with forces of connectors.  The remaining system is small.  Each
+    process factors its sum over all processes, so that no process sends a solution.
     """
 
     def __init__(self, subdomain: Subdomain, A: Csr) -> None:
-        self._is_new = self._good = False
-        self._elimination: Any = Elimination(subdomain, A)
-        self._alone, rest = subdomain.alone, self._elimination
-        if not self._alone:
+        self._elimination, self._is_new, self._good = Elimination(subdomain, A), False, False
+        # If only connectors hold a beam, elimination may leave zeros or round-off on the diagonal.
+        # Several fronts then exchange too few rows; KLU exchanges enough.
+        few_exchanges = not len(subdomain.numbering.multipliers)
+        rest: Any = self._elimination
+        if not subdomain.alone:
+            if few_exchanges:
+                rest = Multifrontal(rest, self._elimination.shared)
             rest = Summed(rest, subdomain.comm)
-        forces = np.isin(rest.dofs, subdomain.numbering.multipliers)
-        self._factors = lu_factors(rest, forces)
-        self.factor = self._factors.factor
+        none = np.zeros(len(rest.dofs), dtype=bool)
+        fronts = few_exchanges or len(none) <= ONE_FRONT
+        self._solved = Multifrontal(rest, none) if fronts else Klu(rest)
+        self.factor = self._solved.factor
+        if fronts:
+            del self._elimination.left.indices  # fronts need positions only
 
-    def drive(self, c: Any) -> bool:
-        """Let Newton's method in C solve without Python, if it can; return whether it can.
-
-        ``c`` is its ``equation`` of loops.h.
-        """
-        if not (self._alone and isinstance(self._factors, Klu)):
-            return False
-        self._elimination.c.f = c.change
-        fill(c, elimination=self._elimination.c, lu=self._factors.c)
-        return True
+    def drive(self, c: Any) -> None:
+        """Let Newton's method in C use this solver; ``c`` is its ``equation`` of loops.h."""
+        c.elimination, self._elimination.c.f = self._elimination.c, c.change
+        self._solved.drive(c)
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factor with the next right-hand side; PETSc calls this if the matrix has changed."""
@@ -245,7 +248,7 @@ class CondensedSolver:
 
         If ``reduced``, :meth:`factor` has already reduced the right-hand side.
         """
-        good = reduced or self._factors.reduce(b)
+        good = reduced or succeeds(self._solved.reduce, b)
         if good:
-            self._factors.expand(x)
+            self._solved.expand(self._solved.f, x)
         return good

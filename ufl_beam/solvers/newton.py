@@ -117,10 +117,10 @@ class Solver:
         )  # fmt: skip
         self._set_stiffness()
         c.handle = equation.callbacks.handle(self)  # `fill` would keep this object alive
-        if not subdomain.alone:
-            fill(c, agree=lib.agree_in_python)
-        if not self._factors.drive(c):
-            fill(c, solve=lib.solve_in_python)
+        if subdomain.alone:
+            self._factors.drive(c)
+        else:
+            fill(c, agree=lib.agree_in_python, solve=lib.solve_in_python)
         self._make_snes()
 
     # -- PETSc ---------------------------------------------------------------------------------

@@ -704,7 +704,7 @@ int go_back(adjoint *a, time_loop *m)
   const char *from = a->record + (size_t)--a->recorded * a->bytes;
   scheme_numbers numbers;
   const rates *of = m->rates;
-  int initial;
+  int failed = 0, initial;
   memcpy(&initial, from, sizeof initial), from += sizeof initial;
   memcpy(&m->step, from, sizeof m->step), from += sizeof m->step;
   memcpy(&numbers, from, sizeof numbers), from += sizeof numbers;
@@ -727,7 +727,7 @@ int go_back(adjoint *a, time_loop *m)
   turn_axes(e->turned, e->axes, r, 1);
   memcpy(d->v, r, a->size * sizeof *r);
   for (int k = 0; k < e->held; ++k) r[e->hold[k]] = 0;
-  if (!factor_tangent(e) || !solve_tangent(e, 1)) return 0;
+  if (factor_tangent(e, &failed) || failed || solve_tangent(e, 1)) return 0;
   for (int i = 0; i < a->size; ++i) λ[i] = -e->change[i];
   for (int k = 0; k < e->held; ++k) λ[e->hold[k]] = 0;
   turn_axes(e->turned, e->axes, λ, -1);

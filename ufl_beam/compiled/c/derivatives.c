@@ -859,7 +859,7 @@ int differentiate_step(derivatives *d, time_loop *m, int initial)
   hold_tangent(e);
   for (int k = 0; k < d->terms; ++k)
     if (d->term[k].linearize) d->term[k].linearize(d->term[k].self, &m->step, m->x);
-  for (int p = 0; p < d->parameters; ++p) {
+  for (int p = 0; p < d->parameters && !failed; ++p) {
     double *r = e->residual, *q1 = d->q1 + (size_t)p * n, *reactions = d->reactions + (size_t)p * e->held;
     memset(d->r, 0, n * sizeof *r);
     for (int k = 0; k < d->terms; ++k)
@@ -873,7 +873,8 @@ int differentiate_step(derivatives *d, time_loop *m, int initial)
     }
     turn_axes(e->turned, e->axes, r, 1);
     for (int k = 0; k < e->held; ++k) r[e->hold[k]] = 0;
-    if ((failed = (p == 0 && !factor_tangent(e)) || !solve_tangent(e, p == 0))) break;
+    if (p == 0 && (factor_tangent(e, &failed) || failed)) break;
+    if (solve_tangent(e, p == 0)) failed = 1;
     for (int i = 0; i < n; ++i) q1[i] = d->v[i] - e->change[i];
     for (int k = 0; k < e->held; ++k) q1[e->hold[k]] = d->v[e->hold[k]];
     turn_axes(e->turned, e->axes, q1, -1);

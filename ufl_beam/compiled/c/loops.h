@@ -440,41 +440,38 @@ void reduce(const chains *c, const double *b);
 void expand(const chains *c, const double *left, double *x);
 int all_finite(int size, const double *values);
 
-/* -- factors of the reduced system, see lu_factors.c ---------------------------------------------- */
+/* -- multifrontal elimination, see fronts.c ------------------------------------------------------ */
 
-/* Functions of KLU, which Python looks up under these names; its objects are opaque here. */
-typedef struct {
-  int (*klu_defaults)(void *common);
-  void *(*klu_analyze)(int32_t size, int32_t *begin, int32_t *index, void *common);
-  void *(*klu_analyze_given)(int32_t size, int32_t *begin, int32_t *index, int32_t *rows,
-                             int32_t *columns, void *common);
-  void *(*klu_factor)(int32_t *begin, int32_t *index, double *data, void *symbolic, void *common);
-  int (*klu_refactor)(int32_t *begin, int32_t *index, double *data, void *symbolic, void *numeric,
-                      void *common);
-  int (*klu_rgrowth)(int32_t *begin, int32_t *index, double *data, void *symbolic, void *numeric,
-                     void *common);
-  int (*klu_tsolve)(void *symbolic, void *numeric, int32_t size, int32_t columns, double *x,
-                    void *common);
-  int (*klu_free_symbolic)(void **symbolic, void *common);
-  int (*klu_free_numeric)(void **numeric, void *common);
-} klu_functions;
-
-extern klu_functions klu;
+enum {
+  WIDE = 8,      /* columns of a product that are computed at once */
+  ONE_FRONT = 24 /* largest number of unknowns of a system that is one front */
+};
 
 typedef struct {
-  int size;
-  int32_t *begin, *index; /* compressed rows of the matrix */
-  double *data, *space;   /* space: of twice the size */
-  int refines;            /* whether solutions are refined */
-  void *common, *symbolic; /* of KLU: settings, order of elimination */
-  void *in_order, *exchanged, *latest; /* factors: without row exchanges, with; the latest of both */
-} lu_factors;
+  int size, fronts;
+  const int32_t *unknown;       /* unknowns of the system in the order of elimination */
+  const int32_t *first, *begin; /* of each front, and one more: first pivot, where its `rest` begins */
+  const int32_t *rest;          /* unknowns of a front that are not its pivots */
+  const int32_t *parent, *up;   /* front that receives the Schur complement; rows there */
+  const int32_t *order, *before, *children; /* see order_fronts */
+  const int32_t *entries, *entry, *place;   /* of each front: indices in the data, indices in the front */
+  const int64_t *at;            /* where the factors of each front begin in values */
+  double *values;               /* rows of the pivots, then columns of the rest */
+  double *schur, *stack, *space; /* space: for the largest front and 2 WIDE numbers more */
+  int32_t *swap;                /* for each pivot: the row with which it is exchanged */
+  double *x;                    /* right-hand side and solution, in the order of elimination */
+  double *unit;                 /* space for a number for each pivot of a front */
+} fronts;
 
-int find_order(lu_factors *lu, int32_t *order);
-double analyze(lu_factors *lu, int32_t *order);
-int factorize(lu_factors *lu);
-void solve_factored(const lu_factors *lu, double *x);
-void free_factors(lu_factors *lu);
+int find_fronts(int unknowns, int eliminated, const int32_t *indptr, const int32_t *indices,
+                int room, int32_t *first, int32_t *begin, int32_t *rest, int32_t *mark,
+                int32_t *next);
+void place_in_fronts(const fronts *c, int entries, const int32_t *row, const int32_t *column,
+                     const int32_t *front_of, int32_t *place, int32_t *parent, int32_t *up);
+int64_t order_fronts(const fronts *c, int32_t *order, int32_t *before, int32_t *children);
+int factor_fronts(const fronts *c, const double *data);
+void reduce_fronts(const fronts *c, const double *b);
+void expand_fronts(const fronts *c, double *found);
 
 /* -- Newton's method, see newton.c ------------------------------------------------------------- */
 
@@ -495,6 +492,9 @@ typedef struct {
   int (*VecLockReadPop)(void *vec);
   int (*PetscObjectStateGet)(void *object, int64_t *state);
   int (*PetscObjectStateSet)(void *object, int64_t state);
+  int (*PCSetUp)(void *pc);
+  int (*PCGetFailedReason)(void *pc, int *reason);
+  int (*PCApply)(void *pc, void *b, void *x);
   int (*SNESSetFunction)(void *snes, void *f, int (*function)(void *, void *, void *, void *),
                          void *context);
   int (*SNESSetJacobian)(void *snes, void *A, void *P,
@@ -515,6 +515,8 @@ typedef struct {
 extern petsc_functions petsc;
 
 enum { INSERT_VALUES = 1, ADD_VALUES = 2, FORWARD = 0, REVERSE = 1 }; /* of InsertMode, ScatterMode */
+
+enum { OF_LIBRARY = 76 }; /* PETSC_ERR_LIB: KLU reports a singular matrix by this error */
 
 /* Relative violation of a law at an iterate q with the residual r. scale is the size of the forces;
  * moved is the largest motion, see find_motion. */
@@ -589,9 +591,11 @@ typedef struct {
 
   double rtol, loads; /* tolerance; size of the loads */
   const chains *elimination;
-  lu_factors *lu;        /* factors of the reduced system */
+  const fronts *fronts;  /* factors of the reduced system; or none: then PETSc factorizes it */
+  void *left, *factors, *left_f, *left_x; /* in PETSc: reduced system, its factors, two vectors */
   void *snes, *x, *f, *y;                 /* in PETSc: solver; unknowns, residual, change */
   double *unknowns, *residual, *change;   /* local values of these; others use `change` between solutions */
+  double *found;         /* solution of the reduced system; in PETSc the entries of left_x */
   const double *weight;  /* see Solver */
   int least, most;                             /* numbers of iterations */
   const int32_t *diagonal;
@@ -619,8 +623,7 @@ typedef struct {
   double *conjugate, *start, *aside; /* space: of a line search; of a solution with stiffer tangents */
   void *handle;
   void (*agree)(void *handle, int number, const int *how, double *values); /* none on one process */
-  int (*solve)(void *handle, int anew);                /* computes the change on several processes, or
-                                                        * by PETSc; returns whether this fails */
+  int (*solve)(void *handle, int anew);                /* on several processes: computes the change */
   void (*find_conjugates)(void *handle, const double *q);
   int (*find_zero_modes)(void *handle);
   int (*forget_zero_modes)(void *handle);
@@ -637,7 +640,7 @@ void turn_axes(int number, const turned_axes *axes, double *x, int way);
 int residual(equation *e, const double *x, double *r, void *f);
 void fill_tangent(const equation *e, const double *q);
 void hold_tangent(const equation *e);
-int factor_tangent(const equation *e);
+int factor_tangent(const equation *e, int *failed);
 int solve_tangent(const equation *e, int reduced);
 void find_motion(equation *e, const double *x);
 void find_round_off(const equation *e, const double *q, double *forces);

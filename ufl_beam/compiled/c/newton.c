@@ -265,34 +265,51 @@ static int note_change(void *matrix)
   return petsc.PetscObjectStateSet(matrix, state + 1);
 }
 
-/* Factorize the tangent and eliminate the residual; returns whether the tangent is regular. */
-int factor_tangent(const equation *e)
+/* Factorize the tangent and eliminate the residual in the chains; *failed if the tangent is
+ * singular. */
+int factor_tangent(const equation *e, int *failed)
 {
-  if (e->solve) return !e->solve(e->handle, 1);
-  const chains *c = e->elimination;
-  eliminate(c, e->residual);
-  return all_finite(c->left, c->left_data) && factorize(e->lu);
+  eliminate(e->elimination, e->residual);
+  if ((*failed = !all_finite(e->elimination->left, e->elimination->left_data))) return 0;
+  if (e->fronts) {
+    *failed = !factor_fronts(e->fronts, e->elimination->left_data);
+    return 0;
+  }
+  TRY(note_change(e->left));
+  const int error = petsc.PCSetUp(e->factors);
+  if (!error) return petsc.PCGetFailedReason(e->factors, failed);
+  *failed = 1;
+  return error == OF_LIBRARY ? 0 : error;
 }
 
-/* Compute the change that Newton's method subtracts from the iterate; `reduced` says that
- * factor_tangent has eliminated the residual. Returns whether this succeeds. */
+/* Compute the change that Newton's method subtracts from the iterate; `reduced` says that the
+ * residual is already eliminated in the chains. */
 int solve_tangent(const equation *e, int reduced)
 {
-  if (e->solve) return reduced || !e->solve(e->handle, 0);
-  const chains *c = e->elimination;
-  if (!reduced) reduce(c, e->residual);
-  solve_factored(e->lu, c->left_f);
-  expand(c, c->left_f, e->change);
-  return 1;
+  if (!reduced) reduce(e->elimination, e->residual);
+  if (e->fronts) {
+    reduce_fronts(e->fronts, e->elimination->left_f);
+    expand_fronts(e->fronts, e->found);
+  } else TRY(petsc.PCApply(e->factors, e->left_f, e->left_x));
+  expand(e->elimination, e->found, e->change);
+  return 0;
 }
 
-/* Compute the change of an iteration, with a new tangent if `anew`; returns whether this
- * succeeds. */
-static int find_change(equation *e, const double *x, int anew)
+/* Compute the change of an iteration, with a new tangent if `anew`; *failed if that is singular. */
+static int find_change(equation *e, const double *x, int anew, int *failed)
 {
-  if (e->border) return !e->border->change(e->border->handle, x);
+  *failed = 0;
+  if (e->border) {
+    *failed = e->border->change(e->border->handle, x);
+    return 0;
+  }
   if (anew) assemble(e, x);
-  return (!anew || factor_tangent(e)) && solve_tangent(e, anew);
+  if (e->agree) {
+    *failed = e->solve(e->handle, anew);
+    return 0;
+  }
+  if (anew) TRY(factor_tangent(e, failed));
+  return *failed ? 0 : solve_tangent(e, anew);
 }
 
 /* -- Newton's method --------------------------------------------------------------------------- */
@@ -359,7 +376,9 @@ static int newton(equation *e, double *x)
       e->reason = TOO_MANY;
       return 0;
     }
-    if (!find_change(e, x, !e->near)) {
+    int failed;
+    TRY(find_change(e, x, !e->near, &failed));
+    if (failed) {
       e->reason = SINGULAR;
       return 0;
     }
@@ -475,7 +494,7 @@ static int iterate(equation *e, int patience, int careful)
   const int error = by_petsc || !e->monitored ? petsc.SNESSolve(e->snes, 0, e->x) : newton(e, e->unknowns);
   e->total += e->iterations;
   if (error) {
-    e->error = error;
+    if (error != OF_LIBRARY) e->error = error; /* KLU raises an error if it finds no pivot */
     e->reason = SINGULAR;
   } else if (by_petsc) {
     petsc.SNESGetConvergedReason(e->snes, &e->reason);
