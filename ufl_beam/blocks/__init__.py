@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Effects that are stated once, in UFL, and the loop that computes what follows."""
+"""Statements of effects in UFL, and their evaluation for all elements of a scene."""

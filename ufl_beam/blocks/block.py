@@ -42,12 +42,14 @@ class BlockSetting(NamedTuple):
 
 
 class InTime(NamedTuple):
-    """Number of a step that is a function of time; None is the time itself.
+    """Number of a step that is a function of time.
 
     Attributes:
-        function: The function.
+        function: The function; None is the time itself.
         owner: Object that error messages name.
-        when: Value of ``time_of_number`` in loops.h.
+        when: Time at which the function is taken, a value of ``time_of_number`` in loops.h.  By
+            default the number grows from its last value by the applied fraction of the step, as
+            load factors do.
     """
 
     function: TimeFunction | None
@@ -59,7 +61,7 @@ class Elements(NamedTuple):
     """Elements of a statement on a process.
 
     Attributes:
-        name: Name in saved states.
+        name: Name in saved states; no other block of the scene has it.
         indices: Index of each element in the scene.
         dofs: Local degrees of freedom in the order of ``Statement.unknowns``; (n, unknowns).
         numbers: Numbers in the order of ``Statement.numbers``; (n,) each.
@@ -88,7 +90,7 @@ class Block(LoadTerm):
         setting: Equation of a step.
         kind: Kind of the term, see :class:`Term`.
         supplies: Entry of the ledger of the work that the elements do on the scene.
-        rates: Whether forces depend on velocities of the step.
+        rates: Whether the forces before the first step are computed with the initial velocities.
 
     Attributes:
         statement: The statement.
@@ -172,7 +174,7 @@ class Block(LoadTerm):
         return type(self.statement).__name__
 
     def keep_entries(self) -> tuple[Any, int, Array]:
-        """Return the forces of elements, as :meth:`Kernel.keep_entries` does those of cells."""
+        """Return the forces of elements in the form of :meth:`Kernel.keep_entries`."""
         return self._each[0], BATCH, self._second
 
     def phases(self, callbacks: Callbacks) -> Phases:

@@ -16,14 +16,9 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.statement import COMPONENTS, Inputs, Statement
 from ufl_beam.discretization.partition import Subdomain
-from ufl_beam.mechanics.kinematics import Axis, perpendicular
+from ufl_beam.mechanics.kinematics import Axis, perpendicular, split
 from ufl_beam.model.beams import Mesh
 from ufl_beam.quadrature import gauss_rule
-
-
-def node_order(degree: int) -> list[int]:
-    """Return the positions along a cell of its nodes: both vertices, then the nodes between."""
-    return [0, *([degree] if degree else []), *range(1, degree)]
 
 
 def places(degree: int) -> list[str]:
@@ -63,11 +58,15 @@ class Cell:
     """
 
     def __init__(self, degree: int, at: Inputs) -> None:
-        self.degree, self._order = degree, node_order(degree)
+        self.degree, self._order = degree, Mesh(degree=degree).order if degree else [0]
         self._virtual = [[ufl.variable(ufl.as_ufl(0.0)) for _ in COMPONENTS] for _ in self._order]
         self.virtual = [ufl.as_vector(v) for v in self._virtual]
         nodes = range(degree + 1)
         self.place = [ufl.as_vector([at[f"X{k}"], at[f"Y{k}"]]) for k in nodes if "X0" in at]
+
+    def moved(self, motions: Sequence[Expr]) -> list[Expr]:
+        """Return the positions of the nodes after motions (x, y, rotation); m."""
+        return [X + split(q)[0] for X, q in zip(self.place, motions, strict=True)]
 
     def value(self, s: float, nodal: Sequence[Expr]) -> Expr:
         """Return the interpolation at a fraction ``s`` of the cell."""
@@ -116,12 +115,10 @@ class AxisOfCell(Axis):
     """Undeformed axis of a cell at the fraction ``s``, for fields that are interpolated by it."""
 
     def __init__(self, cell: Cell, s: float | Expr) -> None:
-        mesh, order = Mesh(degree=cell.degree), node_order(cell.degree)
+        mesh = Mesh(degree=cell.degree)
         self.nodes, self.X = [float(a) for a in mesh.nodes], ufl.variable(ufl.as_ufl(s))
-        between = [self.nodes[k] for k in order]
-        self._weights = [
-            math.prod((self.X - b) / (a - b) for b in between if b != a) for a in between
-        ]
+        nodes = [self.nodes[k] for k in mesh.order]
+        self._weights = [math.prod((self.X - b) / (a - b) for b in nodes if b != a) for a in nodes]
         start, end = cell.place[:2]
         self.h = ufl.sqrt(ufl.dot(end - start, end - start))
         self.t0 = (end - start) / self.h

@@ -61,9 +61,7 @@ class PressureOnCell(StatementOnCell):
     def equations(self, at: Inputs) -> Equations:
         """See the base class; the derivative of the axis has the length of its part of the cell."""
         cell, work = Cell(self.degree, at), 0.0
-        moved = [
-            X + split(q)[0] for X, q in zip(cell.place, at.between(self.load_weight), strict=True)
-        ]
+        moved = cell.moved(at.between(self.load_weight))
         for g, (s, weight) in enumerate(cell.points(4)):
             along = cell.slope(s, moved)
             force = at["tangential"] * along + at["normal"] * perpendicular(along)
@@ -89,7 +87,7 @@ class ForceOfRotation(StatementOnCell):
     load_weight: float
     lumped: bool
     in_motion: bool
-    of_step = "growth", "dt"
+    of_step = "growth", "dt"  # growth: part of the centrifugal force, from 0 to 1 in substeps
 
     @property
     def numbers(self) -> list[str]:
@@ -99,9 +97,7 @@ class ForceOfRotation(StatementOnCell):
     def equations(self, at: Inputs) -> Equations:
         """See the base class; velocities are means over the step."""
         cell, work, rate = Cell(self.degree, at), 0.0, at["rate"]
-        moved = [
-            X + split(q)[0] for X, q in zip(cell.place, at.between(self.load_weight), strict=True)
-        ]
+        moved = cell.moved(at.between(self.load_weight))
         change = [q1 - q0 for q0, q1 in zip(at.motions("q0"), at.motions("q1"), strict=True)]
         for s, weight in cell.points_of_mass(lumped=self.lumped):
             force = at["growth"] * rate**2 * cell.value(s, moved)

@@ -242,6 +242,11 @@ class Mesh:
         return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
 
     @property
+    def order(self) -> list[int]:
+        """Positions along a cell of its nodes: both vertices, then the nodes between."""
+        return [0, self.degree, *range(1, self.degree)]
+
+    @property
     def points(self) -> Array:
         """Gauss points of a cell, ascending from 0 to 1; (p,)."""
         return gauss_rule(self.degree)[0]

@@ -52,7 +52,7 @@ class Frame:
         comm.Allreduce(MPI.IN_PLACE, owner, MPI.MIN)
         owner[owner == comm.size] = 0  # bodies, forces of connectors, ends of beams at hinges
         self.order: Index = np.argsort(owner, kind="stable")  # coordinates of all unknowns
-        self.mine = np.flatnonzero(owner == comm.rank)  # and of those of this process
+        self.mine = np.flatnonzero(owner == comm.rank)  # unknowns of this process
         self.columns, self.rows = self.E[:, self.order], self.E[:, self.mine].T.tocsr()
         C = rows[:, self.order].sorted_indices()
         csr = *(x.astype(PETSc.IntType) for x in (C.indptr, C.indices)), C.data

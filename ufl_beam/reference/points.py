@@ -57,7 +57,9 @@ class Points:
         self.scheme, self.θ = scheme, scheme.theta
         self.equations = PointEquations(section.kind, section.softening, scheme)
         n, law, softening = len(section.weights), section.kind.law, section.softening
-        self.B = np.reshape(section.strains, (n, 3))  # strains at points by those of the axis
+        self.B = np.reshape(
+            section.strains, (n, 3)
+        )  # from strains of the axis to strains at points
         in_scene, self.length = fields.cells[cells], fields.h[cells, None]
         self.rows, keys = in_scene + section.number * len(numbering.cells), numbering.keys(in_scene)
         numbers = (

@@ -179,7 +179,7 @@ class StepProblem:
         f.array_w[frame.fixed] = 0.0  # the guess has the prescribed motions
 
     def _assemble_forces(self) -> PETSc.Vec:
-        """Compute the forces of connectors, and return those of the mesh, without inertia."""
+        """Return the forces of the mesh without inertia; also compute the forces of connectors."""
         self.further: Array = np.zeros(self.numbering.size)
         for group in self.connectors:
             self.further += group.residual(self.q1, steep=self.stiff == 2)

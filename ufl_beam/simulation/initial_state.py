@@ -190,7 +190,7 @@ def initial_state(
 def require_held(connectors: Sequence[Connector], motions: Array, size: float) -> None:
     """Raise :class:`ModelError` if a joint or link of a continued run does not fit its state.
 
-    ``motions`` (m or rad) are zero in a state that fits; ``size`` is that of the scene (m).
+    ``motions`` (m or rad) are zero in a state that fits; ``size`` is the size of the scene (m).
     """
     for connector, e in zip(connectors, motions, strict=True):
         if connector.law is RIGID and abs(e) > APART * (1.0 if connector.is_rotation else size):

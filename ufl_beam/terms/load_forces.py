@@ -20,7 +20,6 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
-from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import (
@@ -259,7 +258,7 @@ class MovingLoads(_AtDofs):
             first=np.cumsum([0, *map(len, cells)]).astype(np.int32),
             cell=np.concatenate([number[x] for x in cells]),
             ends=ends,
-            polynomial=mesh.polynomials[:, in_order(mesh)].T.copy(),
+            polynomial=mesh.polynomials[:, mesh.order].T.copy(),
             given=forces, now=self._on_cells[0],
             end=self._on_cells[1], before=self._on_cells[2], each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
@@ -370,12 +369,6 @@ class MovingLoads(_AtDofs):
         self._forces[:] = archive.added("moving loads", self._whole(self._forces[1]))[self.dofs]
         self._on_cells[:] = archive.rows("moving loads", self._cells, self._on_cells[2])
         self._masses_in(archive)
-
-
-def in_order(mesh: Mesh) -> list[int]:
-    """Return the positions along a cell of its nodes: both vertices, then the nodes between."""
-    first, *between, last = range(len(mesh.nodes))
-    return [first, last, *between]
 
 
 class _NodeForces(NamedTuple):

@@ -91,10 +91,13 @@ void add_block(void *self, const double *q, double *r)
   const element_block *b = self;
   gather(b, q, 0);
   evaluate(b, b->force_of, *b->each);
-  scatter(b, b->unknowns, *b->each, b->dofs, r);
-  if (!b->size) return;
+  if (!b->size) {
+    scatter(b, b->unknowns, *b->each, b->dofs, r);
+    return;
+  }
   memset(b->force, 0, b->size * sizeof *r);
   scatter(b, b->unknowns, *b->each, b->at, b->force);
+  for (int i = 0; i < b->size; ++i) r[b->dof[i]] += b->force[i];
 }
 
 void add_block_tangent(void *self, const double *q, double *tangent)
@@ -105,7 +108,8 @@ void add_block_tangent(void *self, const double *q, double *tangent)
   scatter(b, b->tangent_of->outputs, b->out, b->entry, tangent);
 }
 
-/* New states, and energies: those of the state are kept for add_energy_of_block, those of the step are entered. */
+/* Compute new states and energies. Stored energies are kept for add_energy_of_block; with `enter`, the new states
+ * are accepted, and energies of the step are added to the ledger. */
 static void end_step(const element_block *b, int enter)
 {
   const int n = b->lanes, outputs = b->end_of->outputs, energies = b->stored + b->entered;
@@ -146,7 +150,7 @@ void add_energy_of_block(void *self, const time_step *step, const double *q1, co
   for (int i = 0; i < b->stored; ++i) *b->entries[i] += b->energy[i];
 }
 
-/* Add the derivative of the tangent at q along u; w is space for the inputs and as many motions along u. */
+/* Add the derivative of the tangent at q in the direction u; w is space for all inputs and for the motions in u. */
 void add_change_of_tangent(const element_block *b, const element_function *f, const double *q, const double *u, double *w,
                            double *tangent)
 {
@@ -183,8 +187,8 @@ void tabulate_block(void *self, const time_step *step, const double *q1)
   find_directions_of_step(m, step);
 }
 
-/* Directions of all inputs of the elements in batch c by parameter p; those of the motions at the end of the
- * step are q1, or zero. */
+/* Derivatives of all inputs of the elements in batch c by parameter p. The derivatives of the motions at the end of
+ * the step are in q1; without q1 they are zero. */
 static void find_direction(const block_derivatives *m, const derivatives *d, int c, int p, const double *q1)
 {
   const element_block *b = m->block;

@@ -735,7 +735,7 @@ typedef struct {
   const int32_t *from;      /* index in `now` of each number of the step of an element */
   double *w, *out, *space;  /* inputs; space for outputs of all elements, and for inputs and outputs of one */
   double **each;            /* forces of elements in the latest residual */
-  double *force, *force_before; /* of loads: in the latest residual, in that of the last step; size */
+  double *force, *force_before; /* of loads: forces in the latest residual and in the last step; size */
   double weight_of_before, *work; /* work: entry of the ledger of the work of loads, minus the forces; or none */
   int stored, entered;      /* numbers of energies: of a state, and of a step */
   double *energy, *const *entries; /* energies of the state; entries of all in the ledger */
