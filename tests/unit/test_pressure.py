@@ -129,3 +129,31 @@ def test_buckling_refuses_pressure():
     scene, _ = blown()
     with pytest.raises(ub.ArgumentError, match="the Pressure has a stiffness of its own"):
         ub.buckling(scene, 1)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_change_of_the_tangent_of_loads_is_its_derivative(degree):
+    """Differences of fourth order of the tangent itself leave 1e-9 of its change."""
+    beam = ub.Beam((0, 0), (1, 2), ub.Section(EA=60.0, GA=40.0, EI=30.0), cells=2)
+    loads = [
+        ub.Pressure(beam, 20.0, -30.0, profile=(0.5, 2.0)),
+        ub.FollowerLoad(beam.end, force=(20, -30), moment=7),
+        ub.RotatingFrame(rate=3.0),
+    ]
+    scene, scheme = clamped(beam, loads=loads), ub.Static()
+    equation = ub.Simulation(scene, scheme, mesh=ub.Mesh(degree=degree)).equation
+    q, u = np.random.default_rng(degree).uniform(-0.3, 0.3, (2, equation.A.size))
+    equation.begin(ub.Step.create(scheme, 0.0, 1.0, 1.0, np.zeros(len(q))))
+
+    def tangent(q):
+        equation.A.data.fill(0.0)
+        for term in (*equation.inner, *equation.loads):
+            term.add_tangent(q)
+        return equation.A.data.copy()
+
+    h = 1e-2
+    stencil = ((-2, 1), (-1, -8), (1, 8), (2, -1))
+    difference = sum(weight * tangent(q + k * h * u) for k, weight in stencil) / (12 * h)
+    change = equation.tangent_change(q, u)
+    assert np.abs(change - difference).max() < 1e-8 * np.abs(change).max()
