@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,7 @@ from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.functions import TimeFunction
 from ufl_beam.terms.derivatives import Each, Neighbours, differences, in_c
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, Phases
+from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, NodeForces, Phases
 
 AT = {"now": lib.AT_NOW, "before": lib.AT_START, "between": lib.AT_MIDDLE, "end": lib.AT_END}
 """Values of ``time_of_number`` in loops.h by the time of a number."""
@@ -136,7 +136,7 @@ class Block(LoadTerm):
         self._numbers = self._w[:, first : first + len(statement.numbers)]
         batches = len(self._w)
         most = max(f.outputs for f in (made.force, made.tangent, made.end) if f is not None)
-        each, self._second = np.zeros((2, batches, motions, BATCH))
+        each, second = np.zeros((2, batches, motions, BATCH))
         self._each = ffi.new("double *[1]", [doubles(each)]), each
         self._times, self._t = np.zeros((3, len(elements.in_time) + 1)), np.full(2, t0)
         self._begun = np.zeros(1, dtype=np.int32)
@@ -166,16 +166,13 @@ class Block(LoadTerm):
         tangent = loop("add_block_tangent", self._c) if made.tangent else None
         self.loops = loop("add_block", self._c), tangent
         if elements.cells is not None:
-            self.in_cells = [InCells(lambda: self, elements.force_kind, elements.cells)]
+            forces = NodeForces(self._each[0], BATCH, second)
+            self.in_cells = [InCells(lambda: forces, elements.force_kind, elements.cells)]
 
     @property
     def effect(self) -> str:
         """Name of the statement."""
         return type(self.statement).__name__
-
-    def keep_entries(self) -> tuple[Any, int, Array]:
-        """Return the forces of elements in the form of :meth:`Kernel.keep_entries`."""
-        return self._each[0], BATCH, self._second
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return the loops that begin and accept a step, and enter energies."""

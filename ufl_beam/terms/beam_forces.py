@@ -9,7 +9,7 @@ works of the tangent and of its derivative.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -47,53 +47,6 @@ from ufl_beam.terms.imposed_strains import (
 )
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, beginning, entering
-
-
-class FormForces(Term):
-    """Forces of a virtual work on cells, with forms of the energy lost in a step."""
-
-    _entry: str  # name of the ledger entry of the losses
-    _step_coefficients: Sequence[fem.Function] = ()  # coefficients that phases of a step set
-
-    def __init__(
-        self, work: ufl.Form, losses: Sequence[ufl.Form], fields: Fields, A: Csr, ledger: Ledger,
-        tangent: Kernel | None = None,
-    ) -> None:  # fmt: skip
-        self._q0, self._q1 = fields.element.q0, fields.element.q1
-        self._fields, self._A, self._ledger, self._work_form = fields, A, ledger, work
-        if tangent is None:
-            self._force, tangent = fields.force_and_tangent(work, self._q1, A)
-        else:
-            self._force = fields.kernel(work, self._q1)
-        force = self._force
-        self.loops = loop("add_cells", force.cells), loop("add_cells", tangent.cells)
-        self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order)]
-        self._losses = [fields.kernel(form, self._q1) for form in losses]
-        self._step_kernels = [
-            force,
-            *(loss for loss in self._losses if not loss.reuse_values(force)),
-        ]
-        if losses:
-            ledger.lost[self._entry] += 0.0
-
-    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
-        """See the base class."""
-        kernel = partial(self._fields.kernel, unknown=self._q1)
-        return form_derivatives(
-            self._work_form,
-            lambda term: term._force,
-            kernel,
-            self._q0,
-            neighbours,
-            self._step_coefficients,
-        )
-
-    def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the cells that begin and accept a step."""
-        lost = self._ledger.lost
-        accept = [entering(loss, lost.pointer(self._entry)) for loss in self._losses]
-        return Phases(beginning(self._step_kernels, self._q0), accept)
-
 
 # -- static steps ----------------------------------------------------------------------------------
 
@@ -267,13 +220,13 @@ def _static_tangent(
     return (geometric + material) * element.dx(1), e
 
 
-class ElasticBeams(FormForces, Cells):
+class ElasticBeams(Cells):
     """Virtual work of the resultants of elastic cells, P(12).
 
     In statics the tangent uses the forces of the :func:`predicted_strains`.
     """
 
-    kind, _entry = "beams", "numerical"
+    kind = "beams"
 
     def __init__(
         self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
@@ -290,15 +243,26 @@ class ElasticBeams(FormForces, Cells):
                 "static_tangent", predicted=self.predicted, tangent=tangent.cells,
                 at_e=tangent.position(e),
             )  # fmt: skip
-        super().__init__(forms.work, forms.losses, fields, A, ledger, tangent)
+        self._q0, self._q1, self._work_form = element.q0, q1, forms.work
+        self._fields, self._A, self._ledger = fields, A, ledger
+        if tangent is None:
+            force, in_motion = fields.force_and_tangent(forms.work, q1, A)
+            slope = loop("add_cells", in_motion.cells)
+        else:
+            force, slope = fields.kernel(forms.work, q1), loop("add_static_tangent", self._static)
+        self._force, self.loops = force, (loop("add_cells", force.cells), slope)
+        self._losses = [fields.kernel(form, q1) for form in forms.losses]
+        self._step_kernels = [force, *(x for x in self._losses if not x.reuse_values(force))]
+        if self._losses:
+            ledger.lost["numerical"] += 0.0
         self._stored = fields.kernel(forms.stored, q1)
         self._stored.reuse_values(self._force)
         if tangent is not None:
             self._step_kernels.append(tangent)
-            self.loops = self.loops[0], loop("add_static_tangent", self._static)
+        # Without imposed strains, the configurations at both ends of a step determine the forces.
+        q0 = self._q0 if imposed is None else None
+        self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order, q0=q0)]
         if imposed is None:
-            # The configurations at both ends of a step determine the forces.
-            self.in_cells = [forces._replace(q0=self._q0) for forces in self.in_cells]
             return
         work = fields.kernel(work_on_imposed_strains(element, scheme), q1)
         self._step_kernels.append(work)
@@ -309,17 +273,18 @@ class ElasticBeams(FormForces, Cells):
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
-        own = imposed_directions(neighbours)
+        own, function = imposed_directions(neighbours), imposed_at_points(self._fields.element)
+        kernel, without = partial(self._fields.kernel, unknown=self._q1), [function]
+        found = form_derivatives(
+            self._work_form, lambda term: term._force, kernel, self._q0, neighbours, without
+        )
         if own is None:
-            return super().derivatives(neighbours)
-        function = imposed_at_points(self._fields.element)
-        self._step_coefficients = [function]
-        kernel = partial(self._fields.kernel, unknown=self._q1)
+            return found
         f = form_derivative(
             self._work_form, self._force, kernel, function, direction=own.ravel(),
             stride=own[0].size, bar=neighbours.term.imposed.bars,
         )  # fmt: skip
-        return [*(super().derivatives(neighbours) or []), in_c("form", f)]
+        return [*found, in_c("form", f)]
 
     def about_state(self) -> tuple[Index, Array, Array]:
         """See the base class."""
@@ -339,7 +304,8 @@ class ElasticBeams(FormForces, Cells):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the cells that begin and accept a step, and enter the stored energy."""
-        begin, accept, *_ = super().phases(callbacks)
+        begin, lost = beginning(self._step_kernels, self._q0), self._ledger.lost
+        accept = [entering(loss, lost.pointer("numerical")) for loss in self._losses]
         if self.predicted is not None:
             begin = [*begin, loop("begin_static_tangent", self._static)]
         state = entering(self._stored, self._ledger.state.pointer("stored"))

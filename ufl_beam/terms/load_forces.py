@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -32,11 +32,11 @@ from ufl_beam.model.loads import (
 )
 from ufl_beam.terms.derivatives import Each, Neighbours, differences, in_c
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, Phases
+from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, NodeForces, Phases
 
 
 def load_terms(
-    fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr, rates: Any = None
+    fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr, rates: Any
 ) -> list[LoadTerm]:
     """Create the terms of the loads of a scene, one for all loads with the same kind of force.
 
@@ -64,20 +64,15 @@ class _AtDofs(LoadTerm):
 
     _scheme: Scheme
     _ledger: Ledger
-    _forces: Array  # (rows, dofs); the first row is in the step equation
+    _forces: Array  # (2, dofs): in the step equation, and at the end of the last step
 
-    def _set_dofs(
-        self, subdomain: Subdomain, loaded: Array, owners: Sequence[Load], rows: int
-    ) -> None:
+    def _set_dofs(self, subdomain: Subdomain, loaded: Array, owners: Sequence[Load]) -> None:
         """Set ``dofs`` to the nonzero entries of ``loaded`` on any process; create the forces."""
         # Other processes may load degrees of freedom that this process owns.
         self.dofs: Index = np.flatnonzero(subdomain.added(loaded)).astype(np.int32)
         self._size, self._in_time = subdomain.size, [(load.amplitude, load) for load in owners]
-        self._forces = np.zeros((rows, len(self.dofs)))
+        self._forces = np.zeros((2, len(self.dofs)))
         self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
-
-    def _factors_at(self, t: float) -> Array:
-        return np.array([value_at(function, t, load) for function, load in self._in_time])
 
     def _whole(self, forces: Array) -> Array:
         """Return forces at all local degrees of freedom from forces at the loaded ones."""
@@ -106,8 +101,7 @@ class DeadLoads(_AtDofs):
         for key, along in in_cells.items():
             np.add.at(vectors[key][1], subdomain.cell_dofs, along)
         owners, whole = zip(*vectors.values(), strict=True)
-        # Forces in the equation, and at the end of the last step.
-        self._set_dofs(subdomain, np.any(whole, axis=0) * 1.0, owners, rows=2)
+        self._set_dofs(subdomain, np.any(whole, axis=0) * 1.0, owners)
         self._vectors = [vector[self.dofs] for vector in whole]
         # Rows: factors in the equation of this step, at its end, at its beginning, and in the
         # equation of the previous step.
@@ -155,7 +149,8 @@ class DeadLoads(_AtDofs):
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the loads before the next step to the loads at the time ``t``, and return them."""
-        self._factors[:3] = factors = self._factors_at(t)
+        factors = np.array([value_at(function, t, load) for function, load in self._in_time])
+        self._factors[:3] = factors
         self._forces[:] = sum(f * vector for f, vector in zip(factors, self._vectors, strict=True))
         return self._whole(self._forces[0])
 
@@ -244,7 +239,7 @@ class MovingLoads(_AtDofs):
         dofs = subdomain.cell_dofs[order, : 2 * len(mesh.nodes)]
         loaded: Array = np.zeros(subdomain.size)
         loaded[dofs] = 1.0
-        self._set_dofs(subdomain, loaded, loads, rows=2)
+        self._set_dofs(subdomain, loaded, loads)
         # On cells: in the equation, at the end of the step, before the step
         self._on_cells = np.zeros((3, *dofs.shape))
         each, second = np.zeros((2, len(order), 3 * len(mesh.nodes)))
@@ -282,7 +277,8 @@ class MovingLoads(_AtDofs):
             )  # fmt: skip
             tangent = loop("add_tangent_of_moving_masses", self._c)
         self.loops = loop("subtract_moving_loads", self._c), tangent
-        self.in_cells = [InCells(lambda: _NodeForces(self._each[0], second), lib.DENSITY, order)]
+        entries = NodeForces(self._each[0], 1, second)
+        self.in_cells = [InCells(lambda: entries, lib.DENSITY, order)]
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return the loops that begin and accept a step."""
@@ -369,14 +365,3 @@ class MovingLoads(_AtDofs):
         self._forces[:] = archive.added("moving loads", self._whole(self._forces[1]))[self.dofs]
         self._on_cells[:] = archive.rows("moving loads", self._cells, self._on_cells[2])
         self._masses_in(archive)
-
-
-class _NodeForces(NamedTuple):
-    """Forces on the nodes of cells that C stores in each residual, as a compiled form does."""
-
-    each: Any
-    second: Array
-
-    def keep_entries(self) -> tuple[Any, int, Array]:
-        """Return a pointer to the address of the array, one cell in a batch, a second array."""
-        return self.each, 1, self.second

@@ -54,6 +54,24 @@ class InCells(NamedTuple):
     q0: Any = None
 
 
+class NodeForces(NamedTuple):
+    """Forces on the nodes of cells that C stores in each residual, as a compiled form does.
+
+    Attributes:
+        each: Pointer to the address of the array of forces, in batches.
+        batch_size: Number of cells in a batch.
+        second: Array by which C may replace the first.
+    """
+
+    each: Any
+    batch_size: int
+    second: Array
+
+    def keep_entries(self) -> tuple[Any, int, Array]:
+        """Return the forces in the form of :meth:`Kernel.keep_entries`."""
+        return self.each, self.batch_size, self.second
+
+
 class Phases(NamedTuple):
     """C functions of a term in a step, each with its data; loops.h declares their types.
 
