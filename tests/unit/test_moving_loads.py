@@ -132,12 +132,19 @@ def test_a_run_with_moving_loads_is_resumed_and_saved(scheme, tmp_path):
     np.testing.assert_allclose(continued.q[-1], whole.q[-1], atol=1e-9 * np.abs(whole.q).max())
 
 
-def test_processes_share_moving_loads():
+@pytest.mark.parametrize("place", [None, lambda t: 0.99 + 5 * t])
+def test_processes_share_moving_loads(place):
+    """The second mass goes from a process to another in the first step."""
     scene, beam = crossed(cells=7, mass=2.0)
+    if place is not None:
+        beam = ub.Beam((0, 0), (2, 0), SECTION, cells=6)
+        scene = clamped(beam, loads=[ub.MovingLoad(beam, place, (0, 15), mass=2.0)])
     together, alone = (
         run(scene, t=(0, 0.3), dt=0.02, comm=comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
     )
     np.testing.assert_allclose(together.q, alone.q, rtol=0, atol=1e-9)
+    kinetic = (x.energy.state["kinetic"] for x in (together, alone))
+    np.testing.assert_allclose(*kinetic, rtol=1e-9)
     np.testing.assert_allclose(together.diagram(beam).M, alone.diagram(beam).M, atol=1e-7)
 
 

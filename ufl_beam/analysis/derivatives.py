@@ -323,11 +323,11 @@ class Case:
 
 
 def _alike(run: Simulation, other: Simulation) -> bool:
-    """Return whether two simulations have the same unknowns and the same kinds of terms."""
+    """Return whether two simulations have the same unknowns and the same parts of terms."""
     a, b = run.numbering, other.numbering
     names = "cells", "dofs", "dofs_of_bodies", "multipliers"
     same = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
-    terms = [[type(term) for term in x.equation.terms] for x in (run, other)]
+    terms = [[term.parts for term in x.equation.terms] for x in (run, other)]
     angles = [[support.angle for support in x.scene.supports] for x in (run, other)]
     constrained = np.array_equal(run.supports.dofs, other.supports.dofs)
     return same and terms[0] == terms[1] and angles[0] == angles[1] and constrained

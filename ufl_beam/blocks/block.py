@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.blocks.statement import Statement, kernels
+from ufl_beam.blocks.statement import OF_STEP, Statement, kernels
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
@@ -27,18 +27,26 @@ from ufl_beam.terms.derivatives import Each, Neighbours, differences, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, NodeForces, Phases
 
-AT = {"now": lib.AT_NOW, "before": lib.AT_START, "between": lib.AT_MIDDLE, "end": lib.AT_END}
+AT = {
+    "now": lib.AT_NOW, "whole": lib.AT_LOADS, "before": lib.AT_START, "between": lib.AT_MIDDLE,
+    "end": lib.AT_END, "half before": lib.HALF_BEFORE, "half after": lib.HALF_AFTER,
+    "later": lib.LATER, "twice later": lib.TWICE_LATER,
+}  # fmt: skip
 """Values of ``time_of_number`` in loops.h by the time of a number."""
 
 
 class BlockSetting(NamedTuple):
-    """Equation of a step to which blocks belong: process, scheme, matrix, ledger, initial time."""
+    """Equation of a step to which blocks belong: process, scheme, matrix, ledger, initial time.
+
+    ``rates`` of loops.h are the rates of the scene; None in statics.
+    """
 
     subdomain: Subdomain
     scheme: Scheme
     A: Csr
     ledger: Ledger
     t0: float
+    rates: Any
 
 
 class InTime(NamedTuple):
@@ -66,9 +74,11 @@ class Elements(NamedTuple):
         dofs: Local degrees of freedom in the order of ``Statement.unknowns``; (n, unknowns).
         numbers: Numbers in the order of ``Statement.numbers``; (n,) each.
         in_time: Functions of time, equal on all processes.
-        of_step: For each name of ``Statement.of_step`` but "dt", an index in ``in_time``, or (n,).
+        of_step: Indices in ``in_time`` of functions in ``Statement.of_step``, one each or (n,).
         cells: Positions in ``subdomain.cells`` of elements that are cells.
         force_kind: Value of ``force_kind`` in loops.h, for section forces of cells.
+        groups: Group of each element, if it shares numbers, (n,).  All processes have all groups.
+        number_of_groups: Number of groups.
     """
 
     name: str
@@ -79,6 +89,8 @@ class Elements(NamedTuple):
     of_step: Mapping[str, npt.ArrayLike] = {}
     cells: Index | None = None
     force_kind: int = lib.DENSITY
+    groups: npt.ArrayLike = 0
+    number_of_groups: int = 0
 
 
 class Block(LoadTerm):
@@ -103,10 +115,10 @@ class Block(LoadTerm):
         self, statement: Statement, elements: Elements, setting: BlockSetting, *,
         kind: str = "loads", supplies: str | None = None, rates: bool = False,
     ) -> None:  # fmt: skip
-        subdomain, scheme, self._A, self._ledger, t0 = setting
+        subdomain, scheme, self._A, self._ledger, t0, nodal = setting
         self.statement, self._elements, self._supplies = statement, elements, supplies
-        self.kind, self._rates, self._size = kind, rates, subdomain.size
-        self._passes_on = rates and bool(scheme.weight_of_before)
+        self.kind, self._rates, self._subdomain = kind, rates, subdomain
+        self._passes_on = bool(statement.shared or (rates and scheme.weight_of_before))
         self._kernels = made = kernels(statement)
         for account, energies in made.energies.items():
             for entry in energies:
@@ -114,6 +126,8 @@ class Block(LoadTerm):
         if supplies:
             self._ledger.supplied[supplies] += 0.0
         n, motions, states = len(elements.indices), len(statement.unknowns), len(statement.state)
+        shares, groups = len(statement.shared), elements.number_of_groups
+        functions = len(elements.in_time)
         dofs = np.asarray(elements.dofs, dtype=np.int32).reshape(n, motions)
         loaded: Array = np.zeros(subdomain.size)
         if kind == "loads":  # all processes have blocks of loads
@@ -123,45 +137,57 @@ class Block(LoadTerm):
         self.dofs: Index = np.flatnonzero(loaded).astype(np.int32)
         i, j = np.array(made.entries, dtype=int).reshape(-1, 2).T
         entries = self._A.positions(dofs[:, i].ravel(), dofs[:, j].ravel()).reshape(n, len(i))
-        in_time = {"dt": len(elements.in_time), **elements.of_step}
-        from_ = [np.broadcast_to(in_time[x], n) for x in statement.of_step]
+        # Numbers of a step, then those of the groups
+        more = {name: functions + i for i, name in enumerate(OF_STEP)}
+        first = functions + len(more if statement.rates else OF_STEP[: lib.NUMBERS_OF_STEP])
+        of_group = [first + shares * np.asarray(elements.groups) + i for i in range(shares)]
+        in_time = more | {**elements.of_step} | dict(zip(statement.shared, of_group, strict=True))
+        from_ = [np.broadcast_to(in_time[x], n) for x in (*statement.of_step, *statement.shared)]
+        self._of_step = first + shares * groups
+        numbers = np.array(elements.numbers, dtype=np.float64).reshape(len(statement.numbers), n).T
         w = np.zeros((n, len(statement.inputs)))
-        first = 2 * motions + states
-        w[:, first : first + len(statement.numbers)] = (
-            np.array(elements.numbers).reshape(len(statement.numbers), n).T
-        )
+        after = w.shape[1] - len(from_)
+        w[:, after - len(statement.numbers) : after] = numbers
         self._w = in_batches(w, BATCH)
-        self._states = self._w[:, 2 * motions : first]
+        self._numbers = self._w[:, after - len(statement.numbers) : after]
+        self._states = np.zeros((len(self._w), states, BATCH))
         self.state = {z: self._states[:, k] for k, z in enumerate(statement.state)}
-        self._numbers = self._w[:, first : first + len(statement.numbers)]
-        batches = len(self._w)
+        batches, rows = len(self._w), motions + states + shares
         most = max(f.outputs for f in (made.force, made.tangent, made.end) if f is not None)
         each, second = np.zeros((2, batches, motions, BATCH))
         self._each = ffi.new("double *[1]", [doubles(each)]), each
-        self._times, self._t = np.zeros((3, len(elements.in_time) + 1)), np.full(2, t0)
+        self._times, self._t = np.zeros((3, self._of_step)), np.full(2, t0)
         self._begun = np.zeros(1, dtype=np.int32)
         self._forces = np.zeros((2, len(self.dofs)))
         stored, *entered = map(len, made.energies.values())
         self._energy = np.zeros(stored)
         self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
+        self._shared = np.zeros((groups, shares))
+        ranged = [statement.numbers.index(x) for x in ("low", "high") if statement.acts_at]
+        self._nodal = nodal if statement.rates else ffi.NULL
         self._c = struct(
             "element_block", force_of=made.force, tangent_of=made.tangent or ffi.NULL,
             end_of=made.end or ffi.NULL, lanes=BATCH, elements=n, batches=batches,
-            unknowns=motions, states=states, numbers=len(statement.numbers),
+            unknowns=motions, rates=statement.rates, states=states, numbers=len(statement.numbers),
             steps=len(from_), width=w.shape[1], dofs=in_batches(dofs, BATCH),
+            acting=np.full(1, batches, dtype=np.int32), batch=np.arange(batches, dtype=np.int32),
+            ranges=len(statement.acts_at), range=in_batches(numbers[:, ranged], BATCH),
             size=len(self.dofs), dof=self.dofs,
             at=in_batches(np.searchsorted(self.dofs, dofs).astype(np.int32), BATCH),
-            entry=in_batches(entries, BATCH), functions=len(elements.in_time),
+            entry=in_batches(entries, BATCH), functions=functions,
             when=np.array([x.when for x in elements.in_time], dtype=np.int32), t=self._t,
             begun=self._begun,
             now=self._times[0], end=self._times[1], before=self._times[2],
             **{"from": in_batches(np.array(from_, dtype=np.int32).reshape(len(from_), n).T, BATCH)},
-            w=self._w, out=np.zeros(batches * BATCH * most),
-            space=np.zeros(w.shape[1] + motions + max((motions + states) * w.shape[1], most)),
+            state=self._states, w=self._w, out=np.zeros(batches * BATCH * most),
+            space=np.zeros(motions + w.shape[1] + max(most, rows * w.shape[1])),
             each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
             weight_of_before=scheme.weight_of_before, stored=stored, entered=sum(entered),
-            energy=self._energy,
+            energy=self._energy, nodal=self._nodal, groups=groups, shares=shares,
+            kept=shares - len(statement.trial), shared=self._shared,
+            new_shared=np.zeros(self._shared.shape), totals=ffi.new("int[]", self._shared.size),
+            group=in_batches(np.broadcast_to(elements.groups, n).astype(np.int32)[:, None], BATCH),
         )  # fmt: skip
         tangent = loop("add_block_tangent", self._c) if made.tangent else None
         self.loops = loop("add_block", self._c), tangent
@@ -174,6 +200,11 @@ class Block(LoadTerm):
         """Name of the statement."""
         return type(self.statement).__name__
 
+    @property
+    def parts(self) -> object:
+        """See the base class: the kind of statement, and the elements."""
+        return self.effect, *self._elements.indices
+
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return the loops that begin and accept a step, and enter energies."""
         self._callbacks, ledger, made = callbacks, self._ledger, self._kernels
@@ -185,6 +216,7 @@ class Block(LoadTerm):
             self._c, function=callbacks.time_functions([x[:2] for x in self._elements.in_time]),
             entries=ffi.new("double *[]", entries),
             work=ledger.supplied.pointer(self._supplies) if self._supplies else ffi.NULL,
+            equation=callbacks.c,
         )  # fmt: skip
         energies = [loop("add_energy_of_block", c)] if len(self._energy) else []
         return Phases([loop("begin_block", c)], [loop("accept_block", c)], energies)
@@ -197,23 +229,57 @@ class Block(LoadTerm):
         self._t[:] = t
         before, dt = (q - v, 1.0) if self._rates and v is not None else (q, math.inf)
         self._begin(before, t, dt=dt, fraction=1.0)
-        self.add_residual(q, np.zeros(self._size))
+        self.add_residual(q, np.zeros(self._subdomain.size))
+        self._begin_state(q)
         self._forces[1], self._times[2] = self._forces[0], self._times[1]
         self._begun[:] = 1
         if self._passes_on and past is not None and past.has(f"forces of {self._elements.name}"):
             self._keep_forces(past)
+            self._keep_shared(past)
         return -self._whole(self._forces[1])
 
     def _begin(self, q0: Array, t: float, *, dt: float, fraction: float) -> None:
         times = {"load_time": t, "motion_time": t, "fraction": fraction, "at": 1.0}
-        step = struct("time_step", q0=q0, dt=dt, **times)
+        step, nodal = struct("time_step", q0=q0, dt=dt, **times), self._nodal
+        if nodal:  # without a step, the scheme has no coefficients
+            now, nodal.now = nodal.now, ffi.NULL
         lib.begin_block(self._c, step, ffi.NULL, ffi.NULL)
+        if nodal:
+            nodal.now = now
         self._callbacks.synchronize()
+
+    def begin_energy(self, t: float, q: Array, v: Array) -> None:
+        """Set the shared numbers, and the energies of the state."""
+        if self.statement.shared:
+            self._t[:] = t
+            self._begin(q, t, dt=math.inf, fraction=1.0)
+            self._begin_state(q)
+
+    def _begin_state(self, q: Array) -> None:
+        """Set the state at ``q``, the shared numbers, and the energies; a collective call."""
+        lib.end_step_of_block(self._c, doubles(q), lib.BEGIN)
+        if self.statement.shared and not self._subdomain.alone:
+            self._shared[:] = self._subdomain.comm.allreduce(self._shared)
+
+    def prepare(self, q1: Array) -> None:
+        """Take shared numbers from a trial step."""
+        if self.statement.trial:
+            lib.end_step_of_block(self._c, doubles(q1), lib.TRIAL)
 
     def pass_on(self, archive: Archive) -> None:
         """Save the forces of the last step, if they depend on its velocities."""
         if self._passes_on:
             self._keep_forces(archive)
+            self._keep_shared(archive)
+
+    def _keep_shared(self, archive: Archive) -> None:
+        """Save or restore shared numbers, and the energies of the state, which follow from them."""
+        name, groups = self._elements.name, np.arange(len(self._shared))
+        if not self.statement.shared:
+            return
+        self._shared[:] = archive.rows(f"shared by {name}", groups, self._shared, known=True)
+        for i, energy in enumerate(self._energy):
+            self._energy[i] = archive.total(f"energy {i} of {name}", energy)
 
     def _keep_forces(self, archive: Archive) -> None:
         """Save or restore the forces in the equation of the last step."""
@@ -225,13 +291,13 @@ class Block(LoadTerm):
 
     def start(self, q: Array) -> None:
         """See the base class: compute the stored energies."""
-        if len(self._energy):
+        if len(self._energy) and not self.statement.shared:
             self._begin(q, float(self._t[0]), dt=math.inf, fraction=0.0)
-            lib.find_energies_of_block(self._c, doubles(q))
+            lib.end_step_of_block(self._c, doubles(q), lib.ENERGIES)
 
     def _whole(self, forces: Array) -> Array:
         """Return forces at all local degrees of freedom from forces at the loaded ones."""
-        whole: Array = np.zeros(self._size)
+        whole: Array = np.zeros(self._subdomain.size)
         whole[self.dofs] = forces
         return whole
 
@@ -241,11 +307,11 @@ class Block(LoadTerm):
         self._t[0] = archive.number(f"time of {name}", float(self._t[0]))
         if self._c.size:
             self._keep_forces(archive)
-        times = self._times[2, :-1, None]
-        self._times[2, :-1] = archive.rows(
-            f"functions of {name}", np.arange(len(times)), times, known=True
-        )[:, 0]
+        times = self._times[2, : len(self._elements.in_time), None]
+        indices = np.arange(len(times))
+        times[:] = archive.rows(f"functions of {name}", indices, times, known=True)
         self.keep_states(archive)
+        self._keep_shared(archive)
         if archive.has(f"time of {name}"):
             self.start(q)
 
@@ -279,15 +345,16 @@ class Block(LoadTerm):
             found.append(differences(neighbours, lambda term: [term._times[2], term._t]))
             terms, others, by_number = [], 0, np.zeros_like(by_number)
         neighbours.states += [x for term in terms for x in (term._times[2], term._t)]
-        b, numbers = self._c, len(self._elements.in_time) + 1
-        rows = b.unknowns + b.states
+        b, by_shared = self._c, neighbours.state(lambda term: term._shared)
+        rows = b.unknowns + b.states + b.shares
         c = struct(
             "block_derivatives", block=b, parameters=P, neighbours=others,
             neighbour=ffi.new("element_block *[]", [term._c for term in terms]),
             weight=neighbours.weights, table_of=self._kernels.derivative,
             table=np.zeros(b.batches * rows * b.width * b.lanes),
             direction=np.zeros(b.width * b.lanes), by_state=by_state, by_number=by_number,
-            by_step=np.zeros((P, numbers)), state_bar=np.zeros(self._states.shape),
-            number_bar=np.zeros(self._numbers.shape), step_bar=np.zeros(numbers),
+            of_step=self._of_step, by_step=np.zeros((P, self._of_step)), by_shared=by_shared,
+            state_bar=np.zeros(self._states.shape), number_bar=np.zeros(self._numbers.shape),
+            step_bar=np.zeros(self._of_step), shared_bar=np.zeros(self._shared.shape),
         )  # fmt: skip
         return [*found, in_c("block", c)]

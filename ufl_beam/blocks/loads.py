@@ -5,18 +5,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import ufl
 
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import Cell, StatementOnCell, places, positions
+from ufl_beam.blocks.moving_loads import moving_loads
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.discretization.function_spaces import point_masses
 from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.functions import steady
-from ufl_beam.model.loads import FollowerLoad, Pressure, RotatingFrame
+from ufl_beam.model.loads import FollowerLoad, MovingLoad, Pressure, RotatingFrame
 from ufl_beam.terms.load_forces import loaded_cells
 
 
@@ -112,12 +114,14 @@ class ForceOfRotation(StatementOnCell):
 def load_blocks(setting: BlockSetting) -> list[Block]:
     """Return the blocks of the loads of a scene; every process has them."""
     loads, blocks = setting.subdomain.numbering.scene.loads, list[Block]()
+    made: Any
     for kind, made in (
-        (FollowerLoad, _followers), (Pressure, _pressures), (RotatingFrame, _rotations)
+        (FollowerLoad, _followers), (Pressure, _pressures), (RotatingFrame, _rotations),
+        (MovingLoad, moving_loads),
     ):  # fmt: skip
         some = [load for load in loads if isinstance(load, kind)]
-        pairs = made(some, setting) if some else []
-        blocks += [Block(*pair, setting, supplies="loads") for pair in pairs]
+        for statement, elements in made(some, setting) if some else ():
+            blocks.append(Block(statement, elements, setting, supplies="loads"))
     return blocks
 
 

@@ -19,10 +19,21 @@ from ufl.algorithms import expand_derivatives
 from ufl.classes import ListTensor, Zero
 from ufl.core.expr import Expr
 
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.compiled_forms import Pointwise
 
 COMPONENTS = "x", "y", "rotation"
 """Components of the motion of a node: displacements (m) and rotation (rad)."""
+
+COEFFICIENTS = [
+    *(f"{row} {j}" for row in ("inertia", "velocity") for j in range(lib.MOST_RATES)),
+    *(f"rates {i} {j}" for i in range(lib.MOST_RATES) for j in range(lib.MOST_RATES)),
+]
+"""Names of the coefficients of a scheme in a step, see :class:`~ufl_beam.Coefficients`."""
+
+OF_STEP = ["dt", "fraction", "reached", *COEFFICIENTS]
+"""Numbers of all steps: length (s); part of the changes of loads that is applied at the end of the
+step, and in its equation; and, for statements with rates, coefficients of the scheme."""
 
 
 class Equations(NamedTuple):
@@ -31,7 +42,7 @@ class Equations(NamedTuple):
     Attributes:
         forces: Forces of the element in the equilibrium of its nodes, in the order of
             :attr:`Statement.unknowns`; positive if they resist a positive motion.
-        state: New state at the end of the step, by name.
+        state: New state and shared numbers at the end of the step, by name.
         stored: Energies that the element stores at the end of the step, by entry of the ledger; J.
         lost: Energies that it loses in the step, by entry of the ledger; J.
         supplied: Energies that it supplies in the step besides the work of loads; J.
@@ -45,7 +56,7 @@ class Equations(NamedTuple):
 
 
 class Inputs(dict[str, Expr]):
-    """Inputs of a statement by name; motions are "q0 x0", "q1 rotation1" and so on.
+    """Inputs of a statement by name; motions are "q0 x0", "q1 rotation1", rates "rate1 x0".
 
     Attributes:
         domain: Mesh of the inputs in UFL.
@@ -58,7 +69,10 @@ class Inputs(dict[str, Expr]):
         self.domain = compiler.values(1).mesh.ufl_domain()
 
     def motions(self, group: str) -> list[Expr]:
-        """Return the motion (x, y, rotation) of each node: "q0" before the step, "q1" after it."""
+        """Return the motion (x, y, rotation) of each node: "q0" before the step, "q1" after it.
+
+        "rate1" are the velocities before the step, "rate2" and so on further rates of the scheme.
+        """
         nodes = sum(name.startswith(f"{group} x") for name in self)
         return [ufl.as_vector([self[f"{group} {c}{k}"] for c in COMPONENTS]) for k in range(nodes)]
 
@@ -77,13 +91,40 @@ class Statement(ABC):
         """Number of nodes of an element."""
 
     @property
+    def rates(self) -> int:
+        """Number of rates of each motion among the inputs, in dynamics."""
+        return 0
+
+    @property
     def state(self) -> Sequence[str]:
         """Names of the numbers that an element remembers."""
         return ()
 
     @property
     def of_step(self) -> Sequence[str]:
-        """Names of the numbers of a step: "dt", its length (s), and values of functions of time."""
+        """Names of the numbers of a step: values of functions of time, or :data:`OF_STEP`."""
+        return ()
+
+    @property
+    def acts_at(self) -> Sequence[str]:
+        """Names of the first numbers of the step, if elements act in some steps only.
+
+        An element acts while one of these numbers is above its number "low" and not above its
+        number "high", or its state is not zero.
+        """
+        return ()
+
+    @property
+    def shared(self) -> Sequence[str]:
+        """Names of numbers that a group of elements remembers, which are inputs.
+
+        The new numbers are the sums of the outputs of the elements that act.
+        """
+        return ()
+
+    @property
+    def trial(self) -> Sequence[str]:
+        """Last names of ``shared``: numbers that a trial step for initial rates changes."""
         return ()
 
     @property
@@ -103,8 +144,9 @@ class Statement(ABC):
     @property
     def inputs(self) -> list[str]:
         """Names of all inputs, in the order of the columns of an element."""
-        motions = (f"{group} {name}" for group in ("q1", "q0") for name in self.unknowns)
-        return [*motions, *self.state, *self.numbers, *self.of_step]
+        groups = "q1", "q0", *(f"rate{j + 1}" for j in range(self.rates))
+        motions = (f"{group} {name}" for group in groups for name in self.unknowns)
+        return [*motions, *self.state, *self.numbers, *self.of_step, *self.shared]
 
 
 class Kernels:
@@ -138,14 +180,14 @@ class Kernels:
         return self._statement.equations(at), at
 
     def _states(self, made: Equations) -> list[Expr]:
-        return [made.state[name] for name in self._statement.state]
+        return [made.state[name] for name in (*self._statement.state, *self._statement.shared)]
 
     def _compiled(self, outputs: Sequence[Expr]) -> Any:
         return self._compilers[-1].compile_elements(*outputs) if outputs else None
 
     @cached_property
     def derivative(self) -> Any:
-        """Derivatives of forces and new state, row after row, by all inputs."""
+        """Derivatives of forces, new state and shared numbers, row after row, by all inputs."""
         names = self._statement.inputs
         made, at = self._stated(names)
         rows = [*made.forces, *self._states(made)]

@@ -90,7 +90,7 @@ def in_vectors(kernel: str) -> str:
     missing = sorted(set(called) - FUNCTIONS)
     if missing:
         raise Refused(f"assembly_simd.h has no {', '.join(missing)}")
-    divisors = Counter(re.findall(r"/ (sp_\w+);", body))
+    divisors = Counter(re.findall(r"= [a-zA-Z]\w* / (sp_\w+);", body))
     repeated = "|".join(name for name, number in divisors.items() if number > 1) or "(?!)"
     lines = []
     for line in body.splitlines():

@@ -40,7 +40,7 @@ from ufl_beam.terms.connector_rows import Setting
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.imposed_strains import CellStrains, ImposedStrains
 from ufl_beam.terms.inertia_and_damping import BEFORE, Inertia, rayleigh_forces
-from ufl_beam.terms.load_forces import DeadLoads, load_terms
+from ufl_beam.terms.load_forces import DeadLoads, dead_loads
 from ufl_beam.terms.material_points import create_entries
 from ufl_beam.terms.term import Callbacks, LoadTerm, Term
 
@@ -84,7 +84,9 @@ class StepEquation:
         self.ledger, self.fields = ledger, fields = Ledger(), Fields(subdomain)
         self.A = A = fields.matrix()
         setting = (scheme, A, ledger)
-        in_blocks = BlockSetting(subdomain, scheme, A, ledger, t0)
+        inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
+        self.inertia = inertia
+        in_blocks = BlockSetting(subdomain, *setting, t0, inertia.c if inertia else None)
         strains = [load for load in scene.loads if isinstance(load, ImposedStrain)]
         imposed = ImposedStrains(strains, subdomain, scheme, ledger, t0) if strains else None
 
@@ -116,22 +118,20 @@ class StepEquation:
                 others.append(second_differences(subset, in_blocks))
 
         self.controllers = Controllers(subdomain)
-        inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
-        self.inertia = inertia
         connectors = Setting(
             self.controllers.place, None if inertia is None else inertia.c, scene, scheme,
             ledger, friction_repeats(scene), search, switched,
         )  # fmt: skip
         self.connector_terms = together(connector_terms, subdomain, connectors, A)
 
-        self.loads: list[LoadTerm] = load_terms(
-            fields, scheme, ledger, A, None if inertia is None else inertia.c
-        )
+        self.loads: list[LoadTerm] = dead_loads(subdomain, scheme, ledger)
+        if scene.works:
+            self.loads += together(work_blocks, in_blocks)
+        if scene.beams:
+            ledger.state["stored"] += 0.0
         self.loads += load_blocks(in_blocks)
         if imposed is not None:
             self.loads.append(imposed)
-        if scene.works:
-            self.loads += together(work_blocks, in_blocks)
         self.supports = Supports(subdomain, scheme, ledger, A)
         if inertia is not None:
             self.supports.stop(v)
@@ -144,8 +144,6 @@ class StepEquation:
                 others.append(rayleigh_forces(damping, fields, *setting, inertia, self.inelastic))
             else:
                 others.append(viscosity(damping, fields, in_blocks))
-        if scene.beams:
-            ledger.state["stored"] += 0.0
         self.inner: list[Term] = [*self.beams, *self.connector_terms]
         self.others: list[Term] = [*self.loads, *others]
         self.terms: list[Term] = [*self.inner, *self.others]

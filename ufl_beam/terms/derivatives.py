@@ -288,7 +288,6 @@ ACCEPT = {
         "load",
         "connectors",
         "differences",
-        "moving_loads",
         "imposed",
         "block",
     )
@@ -303,7 +302,7 @@ def in_c(kind: str, data: Any) -> Each:
 def functions(kind: str) -> list[Any]:
     """Return the functions of ``term_derivative`` of loops.h for a kind; null if there is none."""
     accept = ACCEPT.get(kind)
-    trial = accept if kind == "moving_loads" else None
+    trial = accept if kind == "block" else None
     found = LINEARIZE.get(kind), f"add_{kind}_derivative", accept, trial
     has = (name if name and hasattr(lib, name) else None for name in found)
     return [ffi.addressof(lib, name) if name else ffi.NULL for name in has]
@@ -321,7 +320,6 @@ TRANSPOSES = {
     "shape": ("", "transpose_shape", ""),
     "differences": ("", "transpose_differences", ""),
     "imposed": ("", "transpose_imposed", ""),
-    "moving_loads": ("transpose_moving_state", "transpose_moving_loads", "finish_moving_loads"),
     "guides": ("", "transpose_guides", ""),
     "damping": ("", "transpose_damping", ""),
 }
@@ -349,7 +347,11 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
 
     if kind == "block":
         b = data.block
-        return [(b.w, 8 * b.batches * b.width * b.lanes)]
+        states = [
+            (b.state, 8 * b.batches * b.states * b.lanes),
+            (b.shared, 8 * b.groups * b.shares),
+        ]
+        return [*states, *(rates(b.nodal) if b.rates else ())]
     if kind == "form":
         return [table(data)]
     if kind == "shape":
@@ -362,15 +364,6 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         product = data.matrix.product
         rate = ffi.addressof(product, "rate")  # C exchanges the vectors at this address
         return [(rate, 8 * product.size), (product.half, 8 * product.rotations)]
-    if kind == "moving_loads":
-        loads = data.loads
-        if not loads.rates:
-            return []
-        return [
-            *rates(loads.rates),
-            (loads.state, 16 * lib.MOST_RATES * loads.loads),
-            (loads.on, 4 * loads.loads),
-        ]
     if kind == "damping":
         damping = data.damping
         groups = [damping.group[g] for g in range(damping.groups)]

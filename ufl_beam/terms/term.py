@@ -142,6 +142,11 @@ class Term(ABC):
         """Description of the effect in messages."""
         return type(self).__name__
 
+    @property
+    def parts(self) -> object:
+        """Kind of the term; a run has derivatives only if it is equal in neighbouring scenes."""
+        return type(self)
+
     def describe(self, place: int) -> str:
         """Return the name of a material point or connector of the term, by its index."""
         return self.effect

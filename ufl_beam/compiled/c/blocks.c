@@ -2,22 +2,28 @@
 /* Blocks: all elements with one statement; see blocks/block.py. Everything here follows from the functions of
  * the statement; no function knows an effect. */
 
-/* The outputs of a function for all elements; element by element if it has no loop in lanes. */
+/* For each batch c with elements that act in the step. */
+#define FOR_ACTING(b, c) for (int k_ = 0, c; k_ < *(b)->acting && (c = (b)->batch[k_], 1); ++k_)
+
+/* The outputs of a function for all acting elements; element by element if it has no loop in lanes. */
 static void evaluate(const element_block *b, const element_function *f, double *out)
 {
   const int n = b->lanes;
   double *one = b->space, *e = one + b->width;
-  if (f->several) {
+  if (f->several && *b->acting == b->batches) {
     f->several(b->batches, b->w, out);
     return;
   }
-  for (int c = 0; c < b->batches; ++c)
-    for (int l = 0; l < n; ++l) {
-      const double *w = b->w + (size_t)c * b->width * n + l;
-      for (int i = 0; i < b->width; ++i) one[i] = w[i * n];
+  FOR_ACTING(b, c) {
+    const double *w = b->w + (size_t)c * b->width * n;
+    double *to = out + (size_t)c * f->outputs * n;
+    if (f->several) f->several(1, w, to);
+    for (int l = 0; l < n && !f->several; ++l) {
+      for (int i = 0; i < b->width; ++i) one[i] = w[i * n + l];
       ask(f->one, one, f->outputs, e);
-      for (int i = 0; i < f->outputs; ++i) out[((size_t)c * f->outputs + i) * n + l] = e[i];
+      for (int i = 0; i < f->outputs; ++i) to[i * n + l] = e[i];
     }
+  }
 }
 
 /* Number of elements in batch c; copies of the last one fill up its lanes. */
@@ -27,15 +33,20 @@ static inline int elements_in(const element_block *b, int c)
   return rest < b->lanes ? rest : b->lanes;
 }
 
-/* Input i of batch c; inputs are motions after and before the step, state, numbers, numbers of the step. */
+/* Input i of batch c; inputs are motions after and before the step, their rates, state, numbers, numbers of the
+ * step. */
 static inline double *input(const element_block *b, int c, int i) { return b->w + ((size_t)c * b->width + i) * b->lanes; }
+
+/* Indices of the first number of the state, and of the first number of the step. */
+static inline int first_state(const element_block *b) { return (2 + b->rates) * b->unknowns; }
+static inline int first_of_step(const element_block *b) { return b->width - b->steps; }
 
 /* Write the configuration q into the motions of elements, from the input `first` on. */
 static void gather(const element_block *b, const double *q, int first)
 {
   const int all = b->unknowns * b->lanes;
-  const int32_t *dofs = b->dofs;
-  for (int c = 0; c < b->batches; ++c, dofs += all) {
+  FOR_ACTING(b, c) {
+    const int32_t *dofs = b->dofs + (size_t)c * all;
     double *w = input(b, c, first);
     for (int i = 0; i < all; ++i) w[i] = q[dofs[i]];
   }
@@ -45,37 +56,80 @@ static void gather(const element_block *b, const double *q, int first)
 static void scatter(const element_block *b, int each, const double *values, const int32_t *index, double *out)
 {
   const int n = b->lanes;
-  for (int c = 0; c < b->batches; ++c)
-    for (int i = 0, some = elements_in(b, c); i < each; ++i, values += n, index += n)
-      for (int l = 0; l < some; ++l) out[index[l]] += values[l];
+  FOR_ACTING(b, c)
+    for (int i = 0, some = elements_in(b, c); i < each; ++i) {
+      const size_t at = ((size_t)c * each + i) * n;
+      for (int l = 0; l < some; ++l) out[index[at + l]] += values[at + l];
+    }
 }
 
-/* Numbers of a step: functions of time, and the length of the step. */
+/* Numbers of a step: functions of time, then numbers_of_step, coefficients of the scheme, and shared numbers. */
 static void find_numbers_of_step(const element_block *b, const time_step *step)
 {
   static const double at_rest = 1e300; /* instead of an infinite step; all rates are practically zero */
+  static const double later = 1e-4; /* s */
   const double t = b->t[0], a = b->weight_of_before, reached = step->at * step->fraction;
-  double time[TIMES_OF_NUMBERS];
-  time[AT_START] = t, time[AT_NOW] = t + reached * (step->load_time - t);
-  time[AT_END] = b->t[1] = t + step->fraction * (step->motion_time - t);
+  const double half = isfinite(step->dt) ? step->dt / 2 : 0;
+  double time[TIMES_OF_NUMBERS], *more = b->now + b->functions;
+  time[AT_LOADS] = step->load_time, time[AT_START] = t, time[AT_NOW] = reached == 1 ? step->load_time : t + reached * (step->load_time - t);
+  time[AT_END] = b->t[1] = step->fraction == 1 ? step->motion_time : t + step->fraction * (step->motion_time - t);
   time[AT_MIDDLE] = a * t + (1 - a) * time[AT_NOW];
+  time[HALF_BEFORE] = time[AT_NOW] - half, time[HALF_AFTER] = time[AT_NOW] + half;
+  time[LATER] = time[AT_END] + later, time[TWICE_LATER] = time[AT_END] + 2 * later;
   for (int k = 0; k < b->functions; ++k)
     if (b->when[k] == GROWS) {
       const double change = step->fraction * (value_at(b->function + k, step->load_time) - b->before[k]);
       b->end[k] = b->before[k] + change, b->now[k] = b->before[k] + step->at * change;
     } else
       b->now[k] = value_at(b->function + k, time[b->when[k]]);
-  b->now[b->functions] = fmin(step->dt, at_rest);
+  more[LENGTH_OF_STEP] = fmin(step->dt, at_rest), more[FRACTION] = step->fraction, more[REACHED] = reached;
+  more += NUMBERS_OF_STEP;
+  if (!b->rates) return;
+  static const scheme_numbers at_begin = {.velocity = {1}, .rates = {{0, 1}}}; /* velocities are known, all else is zero */
+  memcpy(more, (b->nodal->now ? b->nodal->now : &at_begin)->inertia, OF_SCHEME * sizeof *more);
+  memcpy(more + OF_SCHEME, b->shared, b->groups * b->shares * sizeof *more);
+}
+
+/* Find the batches with elements that act: a number of the step is within the range of an element, or its state is
+ * not zero. All elements act if they have no ranges. */
+static void find_acting(const element_block *b)
+{
+  const int n = b->lanes;
+  if (!b->ranges) return;
+  *b->acting = 0;
+  for (int c = 0; c < b->batches; ++c) {
+    const int32_t *from = b->from + (size_t)c * b->steps * n;
+    const double *low = b->range + 2 * (size_t)c * n, *z = b->state + (size_t)c * b->states * n;
+    int acts = 0;
+    for (int k = 0; k < b->ranges; ++k)
+      for (int l = 0; l < n; ++l) {
+        const double x = b->now[from[k * n + l]];
+        acts |= low[l] < x && x <= low[n + l];
+      }
+    for (int i = 0; i < b->states * n; ++i) acts |= z[i] != 0;
+    if (acts) b->batch[(*b->acting)++] = c;
+  }
+  memset(*b->each, 0, (size_t)b->batches * b->unknowns * n * sizeof **b->each);
+}
+
+/* Set the inputs of a step, except the motions at its end. */
+static void take_inputs(const element_block *b, const time_step *step)
+{
+  const int steps = b->steps * b->lanes, states = b->states * b->lanes;
+  find_numbers_of_step(b, step);
+  find_acting(b);
+  gather(b, step->q0, b->unknowns);
+  for (int j = 1; j <= b->rates; ++j) gather(b, b->nodal->rate[j], (1 + j) * b->unknowns);
+  FOR_ACTING(b, c) {
+    memcpy(input(b, c, first_state(b)), b->state + (size_t)c * states, states * sizeof *b->w);
+    for (int i = 0; i < steps; ++i) input(b, c, first_of_step(b))[i] = b->now[b->from[(size_t)c * steps + i]];
+  }
 }
 
 void begin_block(void *self, const time_step *step, const double *q1, const double *s)
 {
   const element_block *b = self;
-  const int of_step = b->width - b->steps, all = b->steps * b->lanes;
-  find_numbers_of_step(b, step);
-  gather(b, step->q0, b->unknowns);
-  for (int c = 0; c < b->batches; ++c)
-    for (int i = 0; i < all; ++i) input(b, c, of_step)[i] = b->now[b->from[(size_t)c * all + i]];
+  take_inputs(b, step);
   /* For the size of loads: iterates of a failed step may be far away, and a first step has no forces before it. */
   if (*b->begun) memcpy(b->force, b->force_before, b->size * sizeof *b->force);
   else if (b->size) {
@@ -108,28 +162,31 @@ void add_block_tangent(void *self, const double *q, double *tangent)
   scatter(b, b->tangent_of->outputs, b->out, b->entry, tangent);
 }
 
-/* Compute new states and energies. Stored energies are kept for add_energy_of_block; with `enter`, the new states
- * are accepted, and energies of the step are added to the ledger. */
-static void end_step(const element_block *b, int enter)
+/* Compute new states and energies. Stored energies are kept for add_energy_of_block. */
+void end_step_of_block(const element_block *b, const double *q, enum end_of_step what)
 {
-  const int n = b->lanes, outputs = b->end_of->outputs, energies = b->stored + b->entered;
+  const int n = b->lanes, states = b->states * n, energies = b->stored + b->entered;
+  double *sum = b->new_shared;
+  if (!b->end_of) return;
+  gather(b, q, 0);
   evaluate(b, b->end_of, b->out);
-  memset(b->energy, 0, b->stored * sizeof(double));
-  for (int c = 0; c < b->batches; ++c) {
-    const double *out = b->out + (size_t)c * outputs * n, *energy = out + b->states * n;
-    if (enter) memcpy(input(b, c, 2 * b->unknowns), out, b->states * n * sizeof *out);
-    for (int i = 0, some = elements_in(b, c); i < energies; ++i)
+  if (what != TRIAL) memset(b->energy, 0, b->stored * sizeof(double));
+  memset(sum, 0, b->groups * b->shares * sizeof *sum);
+  FOR_ACTING(b, c) {
+    const double *out = b->out + (size_t)c * b->end_of->outputs * n, *shared = out + states, *energy = shared + b->shares * n;
+    const int some = elements_in(b, c);
+    if (what >= BEGIN) memcpy(b->state + (size_t)c * states, out, states * sizeof *out);
+    for (int i = 0; i < b->shares; ++i)
+      for (int l = 0; l < some; ++l) sum[b->group[c * n + l] * b->shares + i] += shared[i * n + l];
+    for (int i = 0; i < energies && what != TRIAL; ++i)
       for (int l = 0; l < some; ++l)
         if (i < b->stored) b->energy[i] += energy[i * n + l];
-        else if (enter) *b->entries[i] += energy[i * n + l];
+        else if (what == ACCEPT) *b->entries[i] += energy[i * n + l];
   }
-}
-
-/* Energies of the state with the configuration q, from which a step begins. */
-void find_energies_of_block(const element_block *b, const double *q)
-{
-  gather(b, q, 0);
-  end_step(b, 0);
+  if (!b->shares || what == ENERGIES) return;
+  if (what != BEGIN && b->equation->agree) b->equation->agree(b->equation->handle, b->groups * b->shares, b->totals, sum);
+  for (int i = 0; i < b->groups * b->shares; ++i)
+    if (what != TRIAL || i % b->shares >= b->kept) b->shared[i] = sum[i];
 }
 
 void accept_block(void *self, const time_step *step, const double *q1, const double *s)
@@ -139,9 +196,7 @@ void accept_block(void *self, const time_step *step, const double *q1, const dou
   memcpy(b->force_before, b->force, b->size * sizeof *b->force);
   memcpy(b->before, b->end, b->functions * sizeof *b->before);
   b->t[0] = b->t[1], *b->begun = 1;
-  if (!b->end_of) return;
-  gather(b, q1, 0);
-  end_step(b, 1);
+  end_step_of_block(b, q1, ACCEPT);
 }
 
 void add_energy_of_block(void *self, const time_step *step, const double *q1, const double *s)
@@ -156,7 +211,7 @@ void add_change_of_tangent(const element_block *b, const element_function *f, co
 {
   element_block more = *b;
   more.w = w, more.width = b->width + b->unknowns;
-  for (int c = 0; c < b->batches; ++c)
+  FOR_ACTING(b, c)
     memcpy(input(&more, c, 0), input(b, c, 0), (size_t)b->width * b->lanes * sizeof *w);
   gather(&more, q, 0);
   gather(&more, u, b->width);
@@ -169,14 +224,17 @@ void add_change_of_tangent(const element_block *b, const element_function *f, co
 /* Derivatives by the numbers of a step, from blocks in neighbouring scenes that take the same step. */
 static void find_directions_of_step(const block_derivatives *m, const time_step *step)
 {
-  const int numbers = m->block->functions;
-  memset(m->by_step, 0, (size_t)m->parameters * (numbers + 1) * sizeof *m->by_step);
+  const element_block *b = m->block;
+  const int shared = b->groups * b->shares;
+  memset(m->by_step, 0, (size_t)m->parameters * m->of_step * sizeof *m->by_step);
   for (int k = 0; k < m->parameters * m->neighbours; ++k) {
     const element_block *one = m->neighbour[k];
     find_numbers_of_step(one, step);
-    double *direction = m->by_step + k / m->neighbours * (numbers + 1);
-    for (int i = 0; i < numbers; ++i) direction[i] += m->weight[k] * (one->now[i] - m->block->now[i]);
+    double *direction = m->by_step + k / m->neighbours * m->of_step;
+    for (int i = 0; i < b->functions; ++i) direction[i] += m->weight[k] * (one->now[i] - b->now[i]);
   }
+  for (int p = 0; p < m->parameters; ++p)
+    memcpy(m->by_step + (p + 1) * m->of_step - shared, m->by_shared + (size_t)p * shared, shared * sizeof(double));
 }
 
 void tabulate_block(void *self, const time_step *step, const double *q1)
@@ -194,22 +252,27 @@ static void find_direction(const block_derivatives *m, const derivatives *d, int
   const element_block *b = m->block;
   const int n = b->lanes, motions = b->unknowns * n, steps = b->steps * n;
   const size_t states = b->states * n, numbers = b->numbers * n, at = (size_t)p * b->batches + c;
-  const double *q0 = d->q0 + (size_t)p * d->size, *now = m->by_step + p * (b->functions + 1);
+  const double *now = m->by_step + p * m->of_step;
   const int32_t *dofs = b->dofs + (size_t)c * motions, *from = b->from + (size_t)c * steps;
   double *x = m->direction;
-  for (int i = 0; i < motions; ++i) x[i] = q1 ? q1[dofs[i]] : 0, x[motions + i] = q0[dofs[i]];
-  x += 2 * motions;
+  for (int j = -1; j <= b->rates; ++j, x += motions) {
+    const double *q = j < 0 ? q1 : (j ? d->rates[j] : d->q0) + (size_t)p * d->size;
+    for (int i = 0; i < motions; ++i) x[i] = q ? q[dofs[i]] : 0;
+  }
   memcpy(x, m->by_state + at * states, states * sizeof *x), x += states;
   memcpy(x, m->by_number + at * numbers, numbers * sizeof *x), x += numbers;
   for (int i = 0; i < steps; ++i) x[i] = now[from[i]];
 }
+
+/* Number of rows of the table: forces, state, shared numbers. */
+static inline int rows_of(const element_block *b) { return b->unknowns + b->states + b->shares; }
 
 /* Product of a row of the table of batch c with the directions, in lanes. */
 static inline void multiply_row(const block_derivatives *m, int c, int row, double *sum)
 {
   const element_block *b = m->block;
   const int n = b->lanes;
-  const double *slope = m->table + ((size_t)c * (b->unknowns + b->states) + row) * b->width * n;
+  const double *slope = m->table + ((size_t)c * rows_of(b) + row) * b->width * n;
   memset(sum, 0, n * sizeof *sum);
   for (int j = 0; j < b->width; ++j, slope += n)
     for (int l = 0; l < n; ++l) sum[l] += slope[l] * m->direction[j * n + l];
@@ -220,7 +283,7 @@ void add_block_derivative(void *self, const derivatives *d, int p, double *r)
   const block_derivatives *m = self;
   const element_block *b = m->block;
   double sum[MOST_LANES];
-  for (int c = 0; c < b->batches; ++c) {
+  FOR_ACTING(b, c) {
     find_direction(m, d, c, p, 0);
     for (int i = 0; i < b->unknowns; ++i) {
       const int32_t *dofs = b->dofs + ((size_t)c * b->unknowns + i) * b->lanes;
@@ -234,76 +297,96 @@ void accept_block_derivative(void *self, const derivatives *d, int p)
 {
   const block_derivatives *m = self;
   const element_block *b = m->block;
-  const size_t of_batch = b->states * b->lanes;
-  for (int c = 0; c < b->batches && b->states; ++c) {
-    double *z = m->by_state + ((size_t)p * b->batches + c) * of_batch;
+  const int n = b->lanes, shared = b->groups * b->shares;
+  double sum[MOST_LANES], *new_shared = b->new_shared;
+  memset(new_shared, 0, shared * sizeof *new_shared);
+  FOR_ACTING(b, c) {
+    double *z = m->by_state + ((size_t)p * b->batches + c) * b->states * n;
+    if (!b->states && !b->shares) break;
     find_direction(m, d, c, p, d->q1 + (size_t)p * d->size);
-    for (int i = 0; i < b->states; ++i) multiply_row(m, c, b->unknowns + i, z + i * b->lanes);
+    for (int i = 0; i < b->states && !d->initial; ++i) multiply_row(m, c, b->unknowns + i, z + i * n);
+    for (int i = 0; i < b->shares; ++i) {
+      multiply_row(m, c, b->unknowns + b->states + i, sum);
+      for (int l = 0; l < elements_in(b, c); ++l) new_shared[b->group[c * n + l] * b->shares + i] += sum[l];
+    }
   }
-  for (int k = p * m->neighbours; k < (p + 1) * m->neighbours; ++k) {
+  for (int i = 0; i < shared; ++i)
+    if (!d->initial || i % b->shares >= b->kept) m->by_shared[(size_t)p * shared + i] = new_shared[i];
+  for (int k = p * m->neighbours; k < (p + 1) * m->neighbours && !d->initial; ++k) {
     const element_block *one = m->neighbour[k];
     memcpy(one->before, one->end, b->functions * sizeof(double));
     one->t[0] = one->t[1];
   }
 }
 
-/* Add the products of the rows from `first` on, weighted by `bar` in lanes, to the derivatives by all inputs but
- * the state, and return those by the state in `z_bar`. */
-static void transpose_rows(const block_derivatives *m, adjoint *a, int c, int first, int rows, const double *bar,
-                           double *z_bar)
+/* Derivatives of batch c by the rows of the table, in lanes: of forces by λ, of new states and shared numbers by
+ * the derivatives after the step, which a trial step has of some shared numbers only. */
+static void find_bars(const block_derivatives *m, const adjoint *a, int c, const double *λ, double *bar)
 {
   const element_block *b = m->block;
-  const int n = b->lanes, motions = b->unknowns, end = 2 * motions + b->states;
-  const int32_t *dofs = b->dofs + (size_t)c * motions * n, *from = b->from + (size_t)c * b->steps * n;
-  for (int i = 0; i < rows; ++i) {
-    const double *slope = m->table + ((size_t)c * (motions + b->states) + first + i) * b->width * n;
-    for (int j = 0; j < b->width; ++j, slope += n)
-      for (int l = 0; l < elements_in(b, c); ++l) {
-        const double x = slope[l] * bar[i * n + l];
-        if (j < motions) { if (first) a->q1[dofs[j * n + l]] += x; }
-        else if (j < 2 * motions) a->q0[dofs[(j - motions) * n + l]] += x;
-        else if (j < end) z_bar[(j - 2 * motions) * n + l] += x;
-        else if (j < end + b->numbers) m->number_bar[((size_t)c * b->numbers + j - end) * n + l] += x;
-        else m->step_bar[from[(j - end - b->numbers) * n + l]] += x;
-      }
-  }
+  const int n = b->lanes, motions = b->unknowns * n, states = b->states * n;
+  const int32_t *dofs = b->dofs + (size_t)c * motions;
+  for (int i = 0; i < motions; ++i) bar[i] = λ ? λ[dofs[i]] : 0;
+  for (int i = 0; i < states; ++i) bar[motions + i] = a->d->initial ? 0 : m->state_bar[(size_t)c * states + i];
+  for (int i = 0; i < b->shares; ++i)
+    for (int l = 0; l < n; ++l)
+      bar[motions + states + i * n + l] =
+        a->d->initial && i < b->kept ? 0 : m->shared_bar[b->group[c * n + l] * b->shares + i];
 }
 
-/* The table of a recorded step, whose inputs are restored. */
-static void tabulate_again(const block_derivatives *m, const adjoint *a)
-{
-  find_numbers_of_step(m->block, a->step);
-  find_directions_of_step(m, a->step);
-  evaluate(m->block, m->table_of, m->table);
-}
-
+/* The table of a recorded step, whose state is restored. Forces and new states depend on the motions after the
+ * step: the solution for λ needs the derivatives of new states by these. */
 void transpose_block_state(void *self, adjoint *a)
 {
   const block_derivatives *m = self;
   const element_block *b = m->block;
-  const int of_batch = b->states * b->lanes;
-  tabulate_again(m, a);
-  for (int c = 0; c < b->batches && b->states; ++c) {
-    double *bar = m->state_bar + (size_t)c * of_batch;
-    memcpy(m->direction, bar, of_batch * sizeof *bar);
-    memset(bar, 0, of_batch * sizeof *bar);
-    transpose_rows(m, a, c, b->unknowns, b->states, m->direction, bar);
+  const int n = b->lanes, rows = rows_of(b);
+  take_inputs(b, a->step);
+  tabulate_block(self, a->step, a->d->x);
+  FOR_ACTING(b, c) {
+    const int32_t *dofs = b->dofs + (size_t)c * b->unknowns * n;
+    if (rows == b->unknowns) break;
+    find_bars(m, a, c, 0, m->direction);
+    for (int i = b->unknowns; i < rows; ++i) {
+      const double *slope = m->table + ((size_t)c * rows + i) * b->width * n, *bar = m->direction + i * n;
+      for (int j = 0; j < b->unknowns; ++j)
+        for (int l = 0; l < elements_in(b, c); ++l) a->q1[dofs[j * n + l]] += slope[j * n + l] * bar[l];
+    }
   }
 }
 
+/* Derivatives by all inputs but the motions after the step. */
 void transpose_block(void *self, adjoint *a, const double *λ)
 {
   const block_derivatives *m = self;
   const element_block *b = m->block;
-  const int n = b->lanes, motions = b->unknowns * n;
-  if (a->d->initial) tabulate_again(m, a); /* such a step has no new state */
-  for (int c = 0; c < b->batches; ++c) {
-    const int32_t *dofs = b->dofs + (size_t)c * motions;
-    for (int i = 0; i < motions; ++i) m->direction[i] = λ[dofs[i]];
-    transpose_rows(m, a, c, 0, b->unknowns, m->direction, m->state_bar + (size_t)c * b->states * n);
+  const int n = b->lanes, motions = b->unknowns, z = first_state(b), end = z + b->states, rows = rows_of(b);
+  const int shared = b->groups * b->shares;
+  FOR_ACTING(b, c) {
+    const int32_t *dofs = b->dofs + (size_t)c * motions * n, *from = b->from + (size_t)c * b->steps * n;
+    double *z_bar = m->state_bar + (size_t)c * b->states * n;
+    find_bars(m, a, c, λ, m->direction);
+    if (!a->d->initial) memset(z_bar, 0, b->states * n * sizeof *z_bar);
+    for (int i = 0; i < rows; ++i) {
+      const double *slope = m->table + ((size_t)c * rows + i) * b->width * n + motions * n;
+      for (int j = motions; j < b->width; ++j, slope += n)
+        for (int l = 0; l < elements_in(b, c); ++l) {
+          const double x = slope[l] * m->direction[i * n + l];
+          const int rate = j / motions - 1;
+          if (j < z) (rate ? a->rates[rate] : a->q0)[dofs[j % motions * n + l]] += x;
+          else if (j < end) z_bar[(j - z) * n + l] += x;
+          else if (j < end + b->numbers) m->number_bar[((size_t)c * b->numbers + j - end) * n + l] += x;
+          else m->step_bar[from[(j - end - b->numbers) * n + l]] += x;
+        }
+    }
   }
-  add_products(a, b->functions + 1, m->step_bar, m->by_step);
-  memset(m->step_bar, 0, (b->functions + 1) * sizeof *m->step_bar);
+  double *before = m->step_bar + m->of_step - shared;
+  for (int i = 0; i < shared; ++i) {
+    m->shared_bar[i] = before[i] + (a->d->initial && i % b->shares < b->kept ? m->shared_bar[i] : 0);
+    before[i] = 0;
+  }
+  add_products(a, m->of_step, m->step_bar, m->by_step);
+  memset(m->step_bar, 0, m->of_step * sizeof *m->step_bar);
 }
 
 void finish_block(void *self, adjoint *a)
@@ -313,4 +396,5 @@ void finish_block(void *self, adjoint *a)
   const size_t all = (size_t)b->batches * b->lanes;
   add_products(a, all * b->states, m->state_bar, m->by_state);
   add_products(a, all * b->numbers, m->number_bar, m->by_number);
+  add_products(a, b->groups * b->shares, m->shared_bar, m->by_shared);
 }

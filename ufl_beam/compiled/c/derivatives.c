@@ -633,65 +633,6 @@ void accept_differences_derivative(void *self, const derivatives *d, int p)
     run(&t->term[1 + k].accept, d->step, d->x, d->s);
 }
 
-/* -- loads that depend on the configuration before the step -------------------------------------------- */
-
-/* -- moving loads --------------------------------------------------------------------------------------- */
-
-/* Differences between scenes give the derivatives by numbers and functions of time. Neighbouring scenes have the
- * cells and the rates of masses of the run: forces have kinks where loads pass from cell to cell. */
-
-/* Masses with derivatives as motions and rates, in which their steps are linear at constant cells. */
-static moving_loads in_direction(const moving_derivatives *m, const derivatives *d, int p, rates *along)
-{
-  moving_loads of = *m->loads;
-  *along = *of.rates;
-  for (int j = 1; j < along->number; ++j) along->rate[j] = d->rates[j] + (size_t)p * d->size;
-  of.rates = along, of.place = m->nowhere, of.q0 = d->q0 + (size_t)p * d->size;
-  of.state = m->state + 2 * MOST_RATES * (size_t)p * of.loads;
-  return of;
-}
-
-void add_moving_loads_derivative(void *self, const derivatives *d, int p, double *r)
-{
-  const moving_derivatives *m = self;
-  rates along;
-  on_axis a;
-  if (!m->loads->rates) return;
-  const moving_loads of = in_direction(m, d, p, &along);
-  memset(d->space, 0, d->size * sizeof *r);
-  for (int k = 0; k < of.loads; ++k)
-    for (int i = 0; find_mass(&of, k, d->space, &a) && i < 2 * of.nodes; ++i)
-      r[a.dof[i]] += of.mass[k] * a.shape[i % of.nodes] * a.acceleration[i / of.nodes];
-}
-
-/* Derivatives of the rates of masses after the step by a parameter, at constant motions and rates before it. */
-static void find_changes_of_rates(const moving_derivatives *m, int p, double t, const double *q1, int initial,
-                                  double *out)
-{
-  const int all = 2 * MOST_RATES * m->loads->loads;
-  double *own = m->loads->space, *one = own + all;
-  find_new_rates(m->loads, t, q1, initial, own);
-  memset(out, 0, all * sizeof *out);
-  for (int j = p * m->neighbours; j < (p + 1) * m->neighbours; ++j) {
-    find_new_rates(m->neighbour[j], t, q1, initial, one);
-    for (int i = 0; i < all; ++i) out[i] += m->weight[j] * (one[i] - own[i]);
-  }
-}
-
-void accept_moving_loads_derivative(void *self, const derivatives *d, int p)
-{
-  const moving_derivatives *m = self;
-  const int all = 2 * MOST_RATES * m->loads->loads;
-  double *by_motion = m->loads->space + 2 * all, *by_numbers = by_motion + all;
-  rates along;
-  if (!m->loads->rates) return;
-  const moving_loads of = in_direction(m, d, p, &along);
-  find_new_rates(&of, d->step->t1, d->q1 + (size_t)p * d->size, d->initial, by_motion);
-  find_changes_of_rates(m, p, d->step->t1, d->x, d->initial, by_numbers);
-  for (int i = 0; i < all; ++i)
-    if (!d->initial || i % (2 * MOST_RATES) >= 6) of.state[i] = by_motion[i] + by_numbers[i];
-}
-
 /* -- guides ---------------------------------------------------------------------------------------------- */
 
 /* Largest parameter step of polynomials for differences between scenes, relative to that of the guides,

@@ -9,7 +9,7 @@ typedef void (part)(void *self, const double *q, double *out);
 typedef struct { part *add; void *self; } call;
 
 part add_cells, add_static_tangent, subtract_vector,
-  subtract_moving_loads, add_tangent_of_moving_masses, add_step_force,
+  add_step_force,
   add_step_tangent, add_inelastic_force, add_inelastic_tangent, add_block, add_block_tangent;
 
 /* -- forms and constant matrices --------------------------------------------------------------- */
@@ -712,15 +712,30 @@ typedef struct {
 } element_function;
 
 /* Time of a number of a step. GROWS: a value that grows from that at the end of the last step, by the applied
- * fraction of a step. Others are values at the time of the loads, at the beginning and at the end of the step,
- * and at the time between for which the trapezoidal rule takes loads. */
-enum time_of_number { GROWS, AT_NOW, AT_START, AT_MIDDLE, AT_END, TIMES_OF_NUMBERS };
+ * fraction of a step. Others are values at the time of the applied fraction of the loads, of all loads, at the
+ * beginning and at the end of the step, at the time between for which the trapezoidal rule takes loads, half a
+ * step before and after the loads, and 1e-4 s and twice that after the step. */
+enum time_of_number {
+  GROWS, AT_NOW, AT_LOADS, AT_START, AT_MIDDLE, AT_END, HALF_BEFORE, HALF_AFTER, LATER, TWICE_LATER, TIMES_OF_NUMBERS
+};
 
-/* Inputs of an element are motions of its nodes at the end of the step and before it, `unknowns` each, its
- * state, its numbers, and `steps` numbers of the step. */
+/* Numbers of all steps: length (s), and the fraction of changes of loads at its end and in its equation. */
+enum number_of_step { LENGTH_OF_STEP, FRACTION, REACHED, NUMBERS_OF_STEP };
+
+/* Purpose of the computation of energies and of new numbers: energies of a state; rates after a trial step; state
+ * that begins a run; step that is accepted. */
+enum end_of_step { ENERGIES, TRIAL, BEGIN, ACCEPT };
+
+typedef struct rates rates;
+
+/* Inputs of an element are motions of its nodes at the end of the step and before it, `unknowns` each, `rates` of
+ * them, its state, its numbers, and `steps` numbers of the step. */
 typedef struct {
-  const element_function *force_of, *tangent_of, *end_of; /* end_of: state and energies; or none */
-  int lanes, elements, batches, unknowns, states, numbers, steps, width; /* lanes: elements of a batch */
+  const element_function *force_of, *tangent_of, *end_of; /* end_of: state, shared numbers, energies; or none */
+  int lanes, elements, batches, unknowns, rates, states, numbers, steps, width; /* lanes: elements of a batch */
+  int32_t *acting, *batch;  /* number of batches with elements that act in this step; their indices */
+  int ranges;               /* the first numbers of the step, of which one is within the range of an acting element */
+  const double *range;      /* lower ends, then upper ends, of a batch; or none */
   const int32_t *dofs;      /* degree of freedom of each motion of an element */
   int size;                 /* of loads: number of degrees of freedom on which they act */
   const int32_t *dof, *at;  /* of loads: these; index in `dof` of each motion of an element */
@@ -733,12 +748,20 @@ typedef struct {
   double *now, *end, *before; /* their values in the equation, at the end of the step, at the end of the last
                                * step; then the length of the step */
   const int32_t *from;      /* index in `now` of each number of the step of an element */
+  double *state;            /* of the elements in batches */
   double *w, *out, *space;  /* inputs; space for outputs of all elements, and for inputs and outputs of one */
   double **each;            /* forces of elements in the latest residual */
   double *force, *force_before; /* of loads: forces in the latest residual and in the last step; size */
   double weight_of_before, *work; /* work: entry of the ledger of the work of loads, minus the forces; or none */
   int stored, entered;      /* numbers of energies: of a state, and of a step */
   double *energy, *const *entries; /* energies of the state; entries of all in the ledger */
+  /* Of elements with rates; otherwise none: */
+  const rates *nodal;
+  const equation *equation;
+  int groups, shares, kept; /* numbers that the elements of a group share; kept: by a trial step */
+  const int32_t *group;     /* of each element */
+  double *shared, *new_shared;
+  const int *totals;        /* TOTAL for each shared number */
 } element_block;
 
 /* Imposed strains of the cells of a term, see CellStrains: elastic cells, whose forms have the strains
@@ -762,49 +785,9 @@ typedef struct {
   double weight_of_before, *supplied;
 } imposed_strains;
 
-/* Forces and masses that move along beams, see MovingLoads. Forces on a cell are x of its nodes, then
- * y. */
-/* Of a mass: on the cell of another process; without effect in this step. */
-enum { ELSEWHERE = -1, OFF = -2 };
-typedef struct rates rates;
-typedef struct moving_loads moving_loads;
-struct moving_loads {
-  int loads, cells, nodes, size; /* nodes: of a cell; size: of `dof` */
-  const moving_loads *run;  /* these loads, or those of the run in a neighbouring scene, see derivatives.c */
-  const int32_t *dof;       /* degrees of freedom that may be loaded */
-  const int32_t *at;        /* index in `dof` of each displacement of a cell */
-  const int32_t *first;     /* first cell of each load, in the next two arrays; and their number */
-  const int32_t *cell;      /* index of the cell on this process, or -1 */
-  const double *ends;       /* distances of both ends from the start of the beam */
-  const double *polynomial; /* coefficients of the shape functions: nodes x powers */
-  const double *given;      /* force for the factor 1, two numbers of each load */
-  const time_function *factor, *position;
-  double *now, *end, *before; /* on cells: in the equation, at the end of the step, at the end of the last step */
-  double **each;            /* minus the forces on the nodes of cells in the latest residual: x, y, moments */
-  double *force, *force_before; /* in the latest residual, in the last step; size */
-  double weight_of_before, *work;
-  /* If a load has a mass in dynamics; otherwise none: */
-  const rates *rates;
-  const equation *equation;
-  const int *totals;        /* TOTAL for each number in `state` */
-  const double *mass;
-  double *kinetic, *stored; /* energy of each mass in the accepted state; entry of the ledger */
-  double *state, *space;    /* rates of each mass, MOST_RATES x 2; the first ones are not used; 4 times this space */
-  int32_t *on;              /* whether each mass is on its beams in the accepted state */
-  int32_t *here;            /* index of the cell of each mass in the arrays of `first`; ELSEWHERE or OFF */
-  double *motion;           /* of each mass: fraction of the cell, speed along the beam */
-  const int32_t *freedom;   /* displacements of each cell: x, y */
-  const int32_t *entry;     /* entries of the tangent: for x, then y, nodes x nodes of each cell */
-  const double *place;      /* positions of the nodes of the undeformed cells from the first one: x, y */
-  const double *q0;         /* configuration at the beginning of the step */
-  double part;              /* fraction of the increment at which loads act */
-};
-
-void find_energies_of_block(const element_block *b, const double *q);
+void end_step_of_block(const element_block *b, const double *q, enum end_of_step what);
 void add_change_of_tangent(const element_block *b, const element_function *f, const double *q, const double *u, double *w,
                            double *tangent);
-void start_moving_masses(moving_loads *m, double t, const double *q);
-void take_rates_of_masses(moving_loads *m, const double *q1);
 
 /* Vectors of loads at some degrees of freedom times functions of time, see DeadLoads. */
 typedef struct {
@@ -824,7 +807,7 @@ typedef struct {
 /* Coefficients of a step, see Coefficients of time_scheme.py. Their rows multiply the rates: the
  * step or a change of velocities, the velocities, the previous velocities, and further rates of the
  * scheme. */
-enum { MOST_RATES = 6, MOST_KNOWN = 16 };
+enum { MOST_RATES = 6, MOST_KNOWN = 16, OF_SCHEME = 2 * MOST_RATES + MOST_RATES * MOST_RATES };
 typedef struct {
   double dt, last_dt;
   int more, gives; /* number of further rates that are known before the step, and after it */
@@ -1077,8 +1060,6 @@ typedef struct {
 
 phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
   accept_dead_loads,
-  begin_moving_loads, accept_moving_loads,
-  add_energy_of_moving_masses,
   
   begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
   begin_tangent_damping, accept_tangent_damping,
@@ -1237,8 +1218,9 @@ typedef struct {
   const double *weight;     /* see derivatives */
   const element_function *table_of;
   double *table, *direction; /* direction: space for the inputs of a batch */
-  double *by_state, *by_number, *by_step;
-  double *state_bar, *number_bar, *step_bar; /* of the adjoint */
+  int of_step;              /* number of all numbers of the step */
+  double *by_state, *by_number, *by_step, *by_shared;
+  double *state_bar, *number_bar, *step_bar, *shared_bar; /* of the adjoint */
 } block_derivatives;
 
 /* Derivatives of dead loads, from the loads of scenes with other values of a parameter. */
@@ -1261,17 +1243,6 @@ typedef struct {
   const double *weight;      /* see derivatives */
   double *here;              /* forces of the scene */
 } term_differences;
-
-/* Derivatives of moving loads by the motion. Arrays have a row for each parameter. */
-typedef struct {
-  int parameters, neighbours;
-  const moving_loads *loads;
-  const moving_loads *const *neighbour;
-  const double *weight;          /* see derivatives */
-  const double *nowhere;         /* zeros, for `place` of the loads */
-  double *state;                 /* derivatives of the rates of masses */
-  double *state_bar, *moved_bar; /* of the adjoint: by these rates, and by the steps of masses */
-} moving_derivatives;
 
 /* Guides of the run, the same with other polynomials, and in neighbouring scenes; and the unit tangents of
  * their curves at the points before the step. */
@@ -1351,9 +1322,6 @@ void transpose_product(void *self, adjoint *a, const double *lambda);
 void transpose_loads(void *self, adjoint *a, const double *lambda);
 void transpose_shape(void *self, adjoint *a, const double *lambda);
 void transpose_differences(void *self, adjoint *a, const double *lambda);
-void transpose_moving_state(void *self, adjoint *a);
-void transpose_moving_loads(void *self, adjoint *a, const double *lambda);
-void finish_moving_loads(void *self, adjoint *a);
 void transpose_guides(void *self, adjoint *a, const double *lambda);
 void transpose_damping(void *self, adjoint *a, const double *lambda);
 void transpose_block_state(void *self, adjoint *a);
@@ -1368,11 +1336,9 @@ void tabulate_damping(void *self, const time_step *step, const double *q1);
 void add_damping_derivative(void *self, const derivatives *d, int p, double *r);
 void find_imposed_directions(void *self, const time_step *step, const double *q1);
 void add_differences_derivative(void *self, const derivatives *d, int p, double *r);
-void add_moving_loads_derivative(void *self, const derivatives *d, int p, double *r);
 void add_guides_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_imposed_derivative(void *self, const derivatives *d, int p);
 void accept_differences_derivative(void *self, const derivatives *d, int p);
-void accept_moving_loads_derivative(void *self, const derivatives *d, int p);
 void keep_derivatives(derivatives *d, const time_loop *m);
 void keep_substep(derivatives *d, const time_loop *m, double end);
 void tabulate_block(void *self, const time_step *step, const double *q1);

@@ -94,42 +94,6 @@ void begin_dead_loads(void *self, const time_step *step, const double *q1, const
   if (!same) sum_loads(l, l->factors, l->force);
 }
 
-/* Forces on the nodes of cells at the time t. */
-static void find_moving_loads(const moving_loads *m, double t, double *out)
-{
-  const int n = m->nodes;
-  memset(out, 0, 2 * (size_t)n * m->cells * sizeof *out);
-  for (int k = 0; k < m->loads; ++k) {
-    const double factor = value_at(m->factor + k, t);
-    double s, shape[4];
-    const int i = find_loaded_cell(m, k, t, &s);
-    if (i < 0) continue;
-    double *on = out + 2 * n * m->cell[i];
-    find_shapes(m, s, shape, 0);
-    for (int j = 0; j < n; ++j) {
-      on[j] += factor * shape[j] * m->given[2 * k];
-      on[n + j] += factor * shape[j] * m->given[2 * k + 1];
-    }
-  }
-}
-
-void begin_moving_loads(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const moving_loads *m = self;
-  for (int k = 0; m->rates && k < m->loads; ++k) { /* speed by a difference */
-    const double t = step->load_time, half = step->dt / 2;
-    m->here[k] = m->on[k] ? find_loaded_cell(m, k, t, m->motion + 2 * k) : OFF;
-    m->motion[2 * k + 1] = (value_at(m->position + k, t + half) - value_at(m->position + k, t - half)) / step->dt;
-  }
-  if (m->rates) ((moving_loads *)self)->q0 = step->q0;
-  find_moving_loads(m, step->load_time, m->end);
-  for (int i = 0; i < 2 * m->nodes * m->cells; ++i) {
-    const double before = m->before[i];
-    if (step->fraction != 1) m->end[i] = before + step->fraction * (m->end[i] - before);
-    m->now[i] = step->at == 1 ? m->end[i] : before + step->at * (m->end[i] - before);
-  }
-}
-
 /* out = sum of coefficients times rates, from the index `first` on */
 static void combine_rates(const rates *r, const double *numbers, int first, double *out)
 {
