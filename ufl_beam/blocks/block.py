@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.statement import OF_STEP, Statement, kernels
-from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, names, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.partition import Subdomain
@@ -27,12 +27,8 @@ from ufl_beam.terms.derivatives import Each, Neighbours, differences, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, NodeForces, Phases
 
-AT = {
-    "now": lib.AT_NOW, "whole": lib.AT_LOADS, "before": lib.AT_START, "between": lib.AT_MIDDLE,
-    "end": lib.AT_END, "half before": lib.HALF_BEFORE, "half after": lib.HALF_AFTER,
-    "later": lib.LATER, "twice later": lib.TWICE_LATER,
-}  # fmt: skip
-"""Values of ``time_of_number`` in loops.h by the time of a number."""
+TIMES = names("time_of_number", "time_")
+"""Times of the numbers of a step, see loops.h."""
 
 
 class BlockSetting(NamedTuple):
@@ -55,14 +51,13 @@ class InTime(NamedTuple):
     Attributes:
         function: The function; None is the time itself.
         owner: Object that error messages name.
-        when: Time at which the function is taken, a value of ``time_of_number`` in loops.h.  By
-            default the number grows from its last value by the applied fraction of the step, as
-            load factors do.
+        when: Time at which the function is taken, one of :data:`TIMES`.  By default the number
+            grows from its last value by the applied fraction of the step, as load factors do.
     """
 
     function: TimeFunction | None
     owner: object
-    when: int = lib.GROWS
+    when: str = "growing"
 
 
 class Elements(NamedTuple):
@@ -127,7 +122,7 @@ class Block(LoadTerm):
             self._ledger.supplied[supplies] += 0.0
         n, motions, states = len(elements.indices), len(statement.unknowns), len(statement.state)
         shares, groups = len(statement.shared), elements.number_of_groups
-        functions = len(elements.in_time)
+        in_time, functions = elements.in_time, len(elements.in_time)
         dofs = np.asarray(elements.dofs, dtype=np.int32).reshape(n, motions)
         loaded: Array = np.zeros(subdomain.size)
         if kind == "loads":  # all processes have blocks of loads
@@ -141,8 +136,8 @@ class Block(LoadTerm):
         more = {name: functions + i for i, name in enumerate(OF_STEP)}
         first = functions + len(more if statement.rates else OF_STEP[: lib.NUMBERS_OF_STEP])
         of_group = [first + shares * np.asarray(elements.groups) + i for i in range(shares)]
-        in_time = more | {**elements.of_step} | dict(zip(statement.shared, of_group, strict=True))
-        from_ = [np.broadcast_to(in_time[x], n) for x in (*statement.of_step, *statement.shared)]
+        index = more | {**elements.of_step} | dict(zip(statement.shared, of_group, strict=True))
+        from_ = [np.broadcast_to(index[x], n) for x in (*statement.of_step, *statement.shared)]
         self._of_step = first + shares * groups
         numbers = np.array(elements.numbers, dtype=np.float64).reshape(len(statement.numbers), n).T
         w = np.zeros((n, len(statement.inputs)))
@@ -175,7 +170,7 @@ class Block(LoadTerm):
             size=len(self.dofs), dof=self.dofs,
             at=in_batches(np.searchsorted(self.dofs, dofs).astype(np.int32), BATCH),
             entry=in_batches(entries, BATCH), functions=functions,
-            when=np.array([x.when for x in elements.in_time], dtype=np.int32), t=self._t,
+            when=np.array([TIMES.index(x.when) for x in in_time], dtype=np.int32), t=self._t,
             begun=self._begun,
             now=self._times[0], end=self._times[1], before=self._times[2],
             **{"from": in_batches(np.array(from_, dtype=np.int32).reshape(len(from_), n).T, BATCH)},

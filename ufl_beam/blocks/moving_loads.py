@@ -11,9 +11,10 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.blocks.block import AT, BlockSetting, Elements, InTime
+from ufl_beam.blocks.block import BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import AxisOfCell, Cell, StatementOnCell, places, positions
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.mechanics.kinematics import split
 from ufl_beam.mechanics.time_scheme import DynamicScheme, has_inertia
 from ufl_beam.model.loads import MovingLoad
@@ -21,11 +22,8 @@ from ufl_beam.model.loads import MovingLoad
 ON_ROUTE = "low", "high", "first", "last"
 """Distances along the route between which a cell acts, and at the ends of the cell; m."""
 
-TIMES = "now", "end", "half before", "half after", "later", "twice later"
-"""Times of the distances of a mass, see :data:`AT`."""
-
-LATER = 1e-4
-"""Time between the end of a step and the time "later"; s."""
+NEAR = "now", "end", "half_before", "half_after", "later", "twice_later"
+"""Times of the distances of a mass, see :data:`~ufl_beam.blocks.block.TIMES`."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ class MovingMass(_OnRoute):
         """Distances at the time of the loads, at the end of the step, and near both times; m."""
         rows = "inertia", "velocity", *(f"rates {i}" for i in range(self.rates - 1))
         coefficients = [f"{row} {j}" for row in rows for j in range(self.rates + 1)]
-        return [*(f"place {time}" for time in TIMES), "dt", *coefficients]
+        return [*(f"place {time}" for time in NEAR), "dt", *coefficients]
 
     @property
     def shared(self) -> list[str]:
@@ -123,7 +121,7 @@ class MovingMass(_OnRoute):
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
         cell, u0, u1 = Cell(self.degree, at), at.motions("q0"), at.motions("q1")
-        number, place = range(1, self.rates + 1), {time: at[f"place {time}"] for time in TIMES}
+        number, place = range(1, self.rates + 1), {time: at[f"place {time}"] for time in NEAR}
         of_nodes = [at.motions(f"rate{j}") for j in number]
         own = [ufl.as_vector([at[f"own rate{j} {c}"] for c in "xy"]) for j in number]
 
@@ -143,14 +141,16 @@ class MovingMass(_OnRoute):
         here, axis = self.at_distance(cell, at, place["now"])
         there, axis_at_end = self.at_distance(cell, at, place["end"])
         carried, remains = at["on"] * on_route(place["now"]), on_route(place["end"])
-        speed = (place["half after"] - place["half before"]) / at["dt"]
+        speed = (place["half_after"] - place["half_before"]) / at["dt"]
         v = of_axis(axis, "velocity", speed, self.scheme.load_weight)
         step = (v - row("velocity", ufl.zero(2), own)) / at["velocity 0"]
         w, _ = split(axis.field(cell.virtual))
         work = here * carried * at["mass"] * ufl.dot(row("inertia", step, own), w)
 
         # Parabola through later places: some functions of time begin with the run
-        speed = (4.0 * place["later"] - 3.0 * place["end"] - place["twice later"]) / (2.0 * LATER)
+        speed = (4.0 * place["later"] - 3.0 * place["end"] - place["twice_later"]) / (
+            2e-6 * lib.LATER
+        )
         stays, comes = here * carried * remains, there * (1.0 - carried) * remains
         new = list[Expr]()
         for i in (0, None, *range(1, self.rates - 1)):  # None: the velocity before the step
@@ -197,11 +197,11 @@ def _elements(
     cells, of_load = table[:2].astype(np.int32)
     wanted = {"place": ("position", "whole"), "factor": ("amplitude", "whole")}
     if heavy:
-        wanted = {f"place {time}": ("position", time) for time in TIMES}
+        wanted = {f"place {time}": ("position", time) for time in NEAR}
     return Elements(
         name, subdomain.cells[cells] + len(numbering.cells) * of_load, subdomain.cell_dofs[cells],
         [*table[2:], *positions(subdomain, cells)],
-        [InTime(getattr(x, name), x, AT[time]) for name, time in wanted.values() for x in loads],
+        [InTime(getattr(x, name), x, time) for name, time in wanted.values() for x in loads],
         {name: k * len(loads) + of_load for k, name in enumerate(wanted)}, cells,
         groups=of_load, number_of_groups=len(loads) * heavy,
     )  # fmt: skip

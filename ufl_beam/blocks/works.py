@@ -16,7 +16,7 @@ from ufl.classes import Zero
 from ufl.core.expr import Expr
 from ufl.domain import extract_domains
 
-from ufl_beam.blocks.block import AT, Block, BlockSetting, Elements, InTime
+from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import (
     POINT,
     AxisOfCell,
@@ -242,7 +242,7 @@ def work_blocks(setting: BlockSetting) -> list[Block]:
             plain, time = name.rsplit(" ", 1) if isinstance(work, Potential) else (name, "now")
             if plain in ("t", *values):
                 of_step[name] = len(in_time)
-                in_time.append(InTime(values.get(plain), work, AT[time]))
+                in_time.append(InTime(values.get(plain), work, time))
         of_work = np.concatenate([numbering.cells_of(beam) for beam in work.on(scene.beams)])
         points = (work.degree + 2 * (numbering.mesh.degree - 1)) // 2 + 1
         cells, point, at = at_points(np.flatnonzero(np.isin(subdomain.cells, of_work)), points)

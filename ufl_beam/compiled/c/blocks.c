@@ -67,18 +67,20 @@ static void scatter(const element_block *b, int each, const double *values, cons
 static void find_numbers_of_step(const element_block *b, const time_step *step)
 {
   static const double at_rest = 1e300; /* instead of an infinite step; all rates are practically zero */
-  static const double later = 1e-4; /* s */
-  const double t = b->t[0], a = b->weight_of_before, reached = step->at * step->fraction;
-  const double half = isfinite(step->dt) ? step->dt / 2 : 0;
-  double time[TIMES_OF_NUMBERS], *more = b->now + b->functions;
-  time[AT_LOADS] = step->load_time, time[AT_START] = t, time[AT_NOW] = reached == 1 ? step->load_time : t + reached * (step->load_time - t);
-  time[AT_END] = b->t[1] = step->fraction == 1 ? step->motion_time : t + step->fraction * (step->motion_time - t);
-  time[AT_MIDDLE] = a * t + (1 - a) * time[AT_NOW];
-  time[HALF_BEFORE] = time[AT_NOW] - half, time[HALF_AFTER] = time[AT_NOW] + half;
-  time[LATER] = time[AT_END] + later, time[TWICE_LATER] = time[AT_END] + 2 * later;
+  const double t = b->t[0], t1 = step->load_time, a = b->weight_of_before, reached = step->at * step->fraction;
+  const double half = isfinite(step->dt) ? step->dt / 2 : 0, later = 1e-6 * LATER;
+  const double now = reached == 1 ? t1 : t + reached * (t1 - t);
+  const double end = step->fraction == 1 ? step->motion_time : t + step->fraction * (step->motion_time - t);
+  const double time[TIMES_OF_NUMBERS] = {
+    [TIME_NOW] = now, [TIME_WHOLE] = t1, [TIME_BEFORE] = t, [TIME_BETWEEN] = a * t + (1 - a) * now, [TIME_END] = end,
+    [TIME_HALF_BEFORE] = now - half, [TIME_HALF_AFTER] = now + half, [TIME_LATER] = end + later,
+    [TIME_TWICE_LATER] = end + 2 * later,
+  };
+  double *more = b->now + b->functions;
+  b->t[1] = end;
   for (int k = 0; k < b->functions; ++k)
-    if (b->when[k] == GROWS) {
-      const double change = step->fraction * (value_at(b->function + k, step->load_time) - b->before[k]);
+    if (b->when[k] == TIME_GROWING) {
+      const double change = step->fraction * (value_at(b->function + k, t1) - b->before[k]);
       b->end[k] = b->before[k] + change, b->now[k] = b->before[k] + step->at * change;
     } else
       b->now[k] = value_at(b->function + k, time[b->when[k]]);

@@ -711,13 +711,15 @@ typedef struct {
   int outputs;
 } element_function;
 
-/* Time of a number of a step. GROWS: a value that grows from that at the end of the last step, by the applied
- * fraction of a step. Others are values at the time of the applied fraction of the loads, of all loads, at the
- * beginning and at the end of the step, at the time between for which the trapezoidal rule takes loads, half a
- * step before and after the loads, and 1e-4 s and twice that after the step. */
+/* Time of a number of a step. Growing: a value that grows from that at the end of the last step, by the applied
+ * fraction of a step. Others are values at the time of the applied fraction of the loads, and of all loads; before
+ * and at the end of the step, and at the time between for which the trapezoidal rule takes loads; half a step
+ * before and after the loads; LATER and twice as much after the step. */
 enum time_of_number {
-  GROWS, AT_NOW, AT_LOADS, AT_START, AT_MIDDLE, AT_END, HALF_BEFORE, HALF_AFTER, LATER, TWICE_LATER, TIMES_OF_NUMBERS
+  TIME_GROWING, TIME_NOW, TIME_WHOLE, TIME_BEFORE, TIME_BETWEEN, TIME_END, TIME_HALF_BEFORE, TIME_HALF_AFTER,
+  TIME_LATER, TIME_TWICE_LATER, TIMES_OF_NUMBERS
 };
+enum { LATER = 100 }; /* microseconds */
 
 /* Numbers of all steps: length (s), and the fraction of changes of loads at its end and in its equation. */
 enum number_of_step { LENGTH_OF_STEP, FRACTION, REACHED, NUMBERS_OF_STEP };
