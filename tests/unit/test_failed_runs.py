@@ -55,6 +55,22 @@ def test_a_step_with_a_large_turn_is_subdivided():
     assert solution.displacement(scene.beams[0].start)[-1, 2] == pytest.approx(4.0, rel=1e-12)
 
 
+@pytest.mark.parametrize("scheme", [ub.GeneralizedAlpha(0.8), ub.Newmark()], ids=repr)
+def test_a_turn_far_from_the_velocity_is_subdivided(scheme):
+    """A step of 0.1 s turns the tip by 5 rad beyond its velocity, and its halves by 1.25 rad."""
+    soft = ub.Section(EA=1e-6, GA=1e-6, EI=1e-6, rhoA=1.0, rhoI=1.0)
+    one = ub.Beam((0, 0), (1, 0), soft, cells=1)
+    moment = 1000.0 / 3.0  # of a third of rhoI, P(18)
+    load = ub.PointLoad(one.end, moment=moment)
+    scene = ub.Scene([one], supports=[ub.Clamped(one.start)], loads=[load])
+    solution = run(scene, scheme, t=(0, 0.3), dt=0.1)
+    turns = solution.displacement(one.end)[:, 2]
+    np.testing.assert_allclose(turns, 500.0 * solution.times**2, rtol=1e-6)
+    assert solution.substeps == 2 * (len(solution) - 1)
+    halves = run(scene, scheme, t=(0, 0.3), dt=0.05)
+    assert halves.substeps == len(halves) - 1
+
+
 def test_nothing_is_lost_when_a_step_fails(shared_path, on_first_rank):
     """The solution ends with the last accepted state, the table with the last whole step."""
     path = shared_path / "run.csv"

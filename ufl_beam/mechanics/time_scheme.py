@@ -103,7 +103,10 @@ class Scheme(Protocol):
 
     @property
     def limits_rotation(self) -> bool:
-        """Whether a step that turns a node by more than 0.75 π is subdivided."""
+        """Whether a step that turns a node by more than 0.75 π is subdivided.
+
+        Otherwise this holds in motion for the difference from the rotation at the velocity before.
+        """
 
     @property
     def theta(self) -> float:

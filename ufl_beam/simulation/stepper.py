@@ -98,7 +98,11 @@ class Prediction:
 # -- check of static steps -------------------------------------------------------------------------
 
 LARGEST_ROTATION = 0.75 * math.pi
-"""Largest rotation of a node in a step; rad.  Algorithmic strains are valid up to π."""
+"""Largest rotation of a node in a step; rad.  Algorithmic strains are valid up to π.
+
+In motion, schemes without such strains limit the difference from the rotation at the velocity
+before the step: Newton's method may find a solution to which no motion leads.
+"""
 
 LARGEST_RIGID_ROTATION = 0.5
 """Largest rotation of a part that a step turns without strain, in statics and if forces work on Δψ.
@@ -242,7 +246,8 @@ class Stepper(StateView):
             prediction=self.prediction.c,
             guess=np.zeros(subdomain.size), proportional=not in_motion,
             load_weight=scheme.load_weight, at=1.0 if in_motion else scheme.load_weight,
-            largest_turn=LARGEST_ROTATION if scheme.limits_rotation else math.inf,
+            largest_turn=LARGEST_ROTATION if scheme.limits_rotation or in_motion else math.inf,
+            turns_from_velocities=in_motion and not scheme.limits_rotation,
             rotations=len(rotations), rotation=rotations,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
@@ -463,8 +468,9 @@ class Stepper(StateView):
             raise self.solver.failure()
         if failure == lib.TURNS_TOO_FAR:
             raise StepFailed(
-                f"a node turns by {c.turn:.3g} rad in the step, more than the limit of 0.75 π; "
-                "reduce dt"
+                f"a node turns by {c.turn:.3g} rad in the step"
+                f"{' beyond its velocity' * c.turns_from_velocities}, more than the limit of "
+                "0.75 π; reduce dt"
             )
         if failure == lib.PART_TURNS_TOO_FAR:
             raise StepFailed(

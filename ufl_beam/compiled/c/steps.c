@@ -258,13 +258,17 @@ static double largest_rigid_turn(const rigid_parts *p, const double *q0, const d
 static int measure(time_loop *m)
 {
   equation *e = m->equation;
+  const double *v = m->turns_from_velocities ? m->rates->rate[1] : 0;
   double turn = 0;
   if (e->turned) {
     memcpy(m->x, e->unknowns, m->size * sizeof *m->x);
     turn_axes(e->turned, e->axes, m->x, -1);
   }
   for (int i = 0; i < m->size; ++i) m->s[i] = m->x[i] - m->q[i];
-  for (int k = 0; k < m->rotations; ++k) turn = fmax(turn, fabs(m->s[m->rotation[k]]));
+  for (int k = 0; k < m->rotations; ++k) {
+    const int i = m->rotation[k];
+    turn = fmax(turn, fabs(v ? m->s[i] - m->step.dt * v[i] : m->s[i]));
+  }
   m->turn = over_processes(e, LARGEST, turn);
   if (m->applies && m->turn > m->applying_turn && m->short_part * m->step.dt > m->applied_by - m->begin_of_run)
     return fails(m, APPLIED_TOO_FAST);
