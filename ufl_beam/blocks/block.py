@@ -97,7 +97,7 @@ class Block(LoadTerm):
         setting: Equation of a step.
         kind: Kind of the term, see :class:`Term`.
         supplies: Entry of the ledger of the work that the elements do on the scene.
-        rates: Whether the forces before the first step are computed with the initial velocities.
+        moves: Whether the forces before the first step are computed with the initial velocities.
 
     Attributes:
         statement: The statement.
@@ -108,12 +108,12 @@ class Block(LoadTerm):
 
     def __init__(
         self, statement: Statement, elements: Elements, setting: BlockSetting, *,
-        kind: str = "loads", supplies: str | None = None, rates: bool = False,
+        kind: str = "loads", supplies: str | None = None, moves: bool = False,
     ) -> None:  # fmt: skip
         subdomain, scheme, self._A, self._ledger, t0, nodal = setting
         self.statement, self._elements, self._supplies = statement, elements, supplies
-        self.kind, self._rates, self._subdomain = kind, rates, subdomain
-        self._passes_on = bool(statement.shared or (rates and scheme.weight_of_before))
+        self.kind, self._moves, self._subdomain = kind, moves, subdomain
+        self._passes_on = bool(statement.shared or (moves and scheme.weight_of_before))
         self._kernels = made = kernels(statement)
         for account, energies in made.energies.items():
             for entry in energies:
@@ -132,7 +132,7 @@ class Block(LoadTerm):
         self.dofs: Index = np.flatnonzero(loaded).astype(np.int32)
         i, j = np.array(made.entries, dtype=int).reshape(-1, 2).T
         entries = self._A.positions(dofs[:, i].ravel(), dofs[:, j].ravel()).reshape(n, len(i))
-        # Numbers of a step, then those of the groups
+        # Positions in the array of a step: functions of time, OF_STEP, shared numbers of each group
         more = {name: functions + i for i, name in enumerate(OF_STEP)}
         first = functions + len(more if statement.rates else OF_STEP[: lib.NUMBERS_OF_STEP])
         of_group = [first + shares * np.asarray(elements.groups) + i for i in range(shares)]
@@ -222,7 +222,7 @@ class Block(LoadTerm):
         If they depend on velocities, the last step is assumed to take 1 s at constant velocities.
         """
         self._t[:] = t
-        before, dt = (q - v, 1.0) if self._rates and v is not None else (q, math.inf)
+        before, dt = (q - v, 1.0) if self._moves and v is not None else (q, math.inf)
         self._begin(before, t, dt=dt, fraction=1.0)
         self.add_residual(q, np.zeros(self._subdomain.size))
         self._begin_state(q)
@@ -251,13 +251,13 @@ class Block(LoadTerm):
             self._begin_state(q)
 
     def _begin_state(self, q: Array) -> None:
-        """Set the state at ``q``, the shared numbers, and the energies; a collective call."""
+        """Compute state, shared numbers and energies at ``q``; a collective call."""
         lib.end_step_of_block(self._c, doubles(q), lib.BEGIN)
         if self.statement.shared and not self._subdomain.alone:
             self._shared[:] = self._subdomain.comm.allreduce(self._shared)
 
     def prepare(self, q1: Array) -> None:
-        """Take shared numbers from a trial step."""
+        """Take further rates of the scheme, which are shared numbers, from a trial step."""
         if self.statement.trial:
             lib.end_step_of_block(self._c, doubles(q1), lib.TRIAL)
 

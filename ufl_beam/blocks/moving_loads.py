@@ -20,7 +20,7 @@ from ufl_beam.mechanics.time_scheme import DynamicScheme, has_inertia
 from ufl_beam.model.loads import MovingLoad
 
 ON_ROUTE = "low", "high", "first", "last"
-"""Distances along the route between which a cell acts, and at the ends of the cell; m."""
+"""Distances along the route: bounds between which the cell acts, and ends of the cell; m."""
 
 NEAR = "now", "end", "half_before", "half_after", "later", "twice_later"
 """Times of the distances of a mass, see :data:`~ufl_beam.blocks.block.TIMES`."""
@@ -28,7 +28,7 @@ NEAR = "now", "end", "half_before", "half_after", "later", "twice_later"
 
 @dataclass(frozen=True)
 class _OnRoute(StatementOnCell):
-    """Effect at a place that moves along a route of cells."""
+    """Effect at a place that moves along a route, on one cell of the route."""
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -79,10 +79,10 @@ class MovingForce(_OnRoute):
 class MovingMass(_OnRoute):
     """Mass with the velocity of the point of the axis that it is at: v = ṙ + ṡ r'.
 
-    The velocity contains displacements only.  The momentum is a number of its own, so that the mass
-    gains at a kink of the axis, between two cells, what the axis loses, and r'' is not needed.  The
-    scheme gives it the acceleration that fits the velocities.  A mass that comes has the rates of
-    its point of the axis, without its speed in rates other than the velocity.
+    Rotations of the axis do not enter the velocity.  The mass has a momentum of its own: at a kink
+    of the axis, between two cells, it gains the momentum that the axis loses, so that r'' is not
+    needed.  The scheme gives the mass the acceleration that fits its velocities.  A mass that comes
+    to the route takes the rates of its point of the axis; ṡ enters the velocity only.
 
     Attributes:
         scheme: Time scheme.
@@ -148,9 +148,8 @@ class MovingMass(_OnRoute):
         work = here * carried * at["mass"] * ufl.dot(row("inertia", step, own), w)
 
         # Parabola through later places: some functions of time begin with the run
-        speed = (4.0 * place["later"] - 3.0 * place["end"] - place["twice_later"]) / (
-            2e-6 * lib.LATER
-        )
+        ways = place["later"] - place["end"], place["twice_later"] - place["end"]
+        speed = (4.0 * ways[0] - ways[1]) / (2e-6 * lib.LATER)
         stays, comes = here * carried * remains, there * (1.0 - carried) * remains
         new = list[Expr]()
         for i in (0, None, *range(1, self.rates - 1)):  # None: the velocity before the step

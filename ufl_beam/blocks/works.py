@@ -253,6 +253,6 @@ def work_blocks(setting: BlockSetting) -> list[Block]:
         )  # fmt: skip
         supplies = work.name if isinstance(work, VirtualWork) else None
         blocks.append(
-            Block(statement, elements, setting, supplies=supplies, rates=work.takes_rates)
+            Block(statement, elements, setting, supplies=supplies, moves=work.takes_rates)
         )
     return blocks

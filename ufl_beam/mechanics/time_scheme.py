@@ -105,7 +105,8 @@ class Scheme(Protocol):
     def limits_rotation(self) -> bool:
         """Whether a step that turns a node by more than 0.75 π is subdivided.
 
-        Otherwise this holds in motion for the difference from the rotation at the velocity before.
+        Otherwise, in motion, a step is subdivided if this rotation differs by more than 0.75 π from
+        the rotation with the velocity before the step.
         """
 
     @property

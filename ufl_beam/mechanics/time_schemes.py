@@ -56,7 +56,7 @@ class _ForcesAtEnd(PlainStep):
 
     load_weight = 1.0
     weight_of_before = 0.5  # trapezoidal rule, exact for forces that are linear in the motion
-    limits_rotation = False  # rotations of nodes in a step have no limit
+    limits_rotation = False  # strains are valid for all rotations of a step
     theta = 1.0
     alpha = lost_fraction = 0.0
 

@@ -100,7 +100,7 @@ class Prediction:
 LARGEST_ROTATION = 0.75 * math.pi
 """Largest rotation of a node in a step; rad.  Algorithmic strains are valid up to π.
 
-In motion, schemes without such strains limit the difference from the rotation at the velocity
+In motion, schemes without such strains limit the difference from the rotation with the velocity
 before the step: Newton's method may find a solution to which no motion leads.
 """
 

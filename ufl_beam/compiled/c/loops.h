@@ -1014,7 +1014,7 @@ typedef struct {
   int rotations, half_tangents, multipliers;
   const int32_t *rotation, *half_tangent, *multiplier;
   double turn, largest_turn; /* largest rotation in the step; limit of it, infinite if there is none */
-  int turns_from_velocities; /* whether this is the difference from the rotation at the velocity before the step */
+  int turns_from_velocities; /* whether these are differences from rotations with the velocities before the step */
   rigid_parts *parts; /* whose rotation is limited; or none */
   rates *rates;       /* in dynamics */
   int admissions, checks_laws; /* checks of laws; whether any process has checks */
