@@ -54,7 +54,8 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     """
     require_independent(scene)
     subject = Subject(scene)
-    notes = [*subject.hinge_notes, *model_notes(scene)]
+    alike = [f"{number} connectors: {words}" for words, number in subject.alike.items()]
+    notes = [*subject.hinge_notes, *alike, *model_notes(scene)]
     cells = (subject.cells, "cell", "cells")
     beams, bodies = (len(scene.beams), "beam", "beams"), (len(scene.bodies), "body", "bodies")
     title = f"model: {counted(beams, cells, bodies)}"

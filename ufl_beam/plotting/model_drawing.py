@@ -35,7 +35,7 @@ LOAD_LABELS, MOTIONS, CAPTIONS, NAMES = range(
 )  # ranks of labels: labels of loads are placed first
 MOST_LABELS = 80  # number of labels beyond which names, and then captions, are left out
 MOST_CELLS = 300  # number of cells beyond which neither cells nor possible hinges are marked
-FEW_HINGES = 4  # number of equal hinges beyond which a note has their limit, instead of labels
+FEW_HINGES = 4  # number of equal hinges or connectors beyond which they have a note, not labels
 
 HINGE = "#B0508A"  # colour of hinges
 HINGES = HINGE, "#4B2E83", "#1B7F79", "#777777"  # colours of groups of equal hinges; last: others
@@ -82,6 +82,8 @@ class Subject:
             for vectors in (forces, lines, speeds)
         )
         self.hinge_notes, self.hinge_colors = self._groups()
+        words = Counter(map(connector_words, scene.connectors))
+        self.alike = {text: number for text, number in words.items() if number > FEW_HINGES}
         ends = [(x[0], x[1], x[-1], x[-2]) for x in self.axes.values()]
         self._ends: Array = np.reshape(ends, (-1, 2, 2))
 
@@ -271,10 +273,15 @@ def _name_bodies_and_connectors(drawing: Drawing) -> None:
                 for fraction in (0.5, 0.3, 0.7)
                 for side in (outwards, -outwards)
             ]
-        units = ("N m", "rad") if connector.is_rotation else ("N", "m")
-        words = symbols.law_symbol(connector.law).words(connector.law, *units)
-        name = f"{connector.name}, " * bool(connector.name)
-        drawing.write(name + words, TEXT, CAPTIONS, spots)
+        if (words := connector_words(connector)) not in drawing.subject.alike:
+            drawing.write(words, TEXT, CAPTIONS, spots)
+
+
+def connector_words(connector: Connector) -> str:
+    """Return the name and the parameters of a connector."""
+    units = ("N m", "rad") if connector.is_rotation else ("N", "m")
+    words = symbols.law_symbol(connector.law).words(connector.law, *units)
+    return f"{connector.name}, " * bool(connector.name) + words
 
 
 # -- arrows ------------------------------------------------------------------------------------
