@@ -478,6 +478,28 @@ def test_what_was_not_used_for_a_month_is_removed_once_a_day(place):
     assert not (place / "new_3").exists()
 
 
+def test_a_module_of_an_earlier_version_is_ignored_and_removed(place):
+    def answer(number):
+        source = f"int answer(void) {{ return {number}; }}"
+        module = jit.compiled(
+            *("ufl_beam_test", "int answer(void);", lambda: source),
+            **{"depends_on": [source], "flags": []},
+        )
+        return module.lib.answer()
+
+    assert answer(1) == 1
+    (earlier,) = (name for name in entries(place) if not name.endswith(".lock"))
+    assert answer(2) == 2
+    assert len(entries(place)) == 4
+    aged(place / earlier / CHECKSUMS, 31)
+    for lock in place.glob("*.lock"):
+        aged(lock, 31)
+    code_cache.clean_up(place)
+    assert len(entries(place)) == 2
+    assert not (place / earlier).exists()
+    assert answer(2) == 2
+
+
 def test_a_use_is_noted_once_a_day(place):
     build = Builds()
     build()

@@ -37,7 +37,6 @@ from ufl_beam.output.output_files import (
     beside,
     decoding,
     plain,
-    read,
     remove_prefix,
     require_apart,
     require_arrays,
@@ -51,7 +50,8 @@ Member = Callable[..., dict[str, Any]]
 Outcome = dict[str, Array] | str  # result of a member, or the reason of its failure
 Record = tuple[Outcome, float]  # outcome of a member, and its wall time; s
 
-FORMAT = "study of ufl_beam, 2"
+FORMAT, EARLIER = "study of ufl_beam, 3", "study of ufl_beam, 2"
+"""Formats of files: of this version, and of versions whose results a study does not continue."""
 
 _MEMBER: ContextVar[Member] = ContextVar("member of the study that this process serves")
 
@@ -132,8 +132,7 @@ class Study(Rich):
             ArgumentError: The file does not exist, is no study, or is damaged.
         """
         file = require_path(path, "study")
-        with decoding(file, FORMAT):
-            content = read(file, FORMAT)
+        with decoding(file, FORMAT, EARLIER) as content:
             cases, results = content["cases"], remove_prefix("results/", content)
             failed = {i: str(error) for i, error in enumerate(content["errors"]) if error}
             require_arrays(content, {"seconds": (len(cases),)})
@@ -219,6 +218,8 @@ def study(
         if path is not None and path.exists():
             old = Study.load(path)
             if not anew:
+                with decoding(path, FORMAT):
+                    pass  # refuses earlier formats
                 if old.member != name:
                     raise ArgumentError(f"study {path} has results of {old.member}, not of {name}")
                 for i, key in enumerate(map(_case_text, old.cases)):

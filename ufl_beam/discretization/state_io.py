@@ -21,15 +21,23 @@ NOWHERE: Array = np.empty(0)
 strains and energies do not belong to the present configuration of the scene."""
 
 
+class OtherVersion(ModelError):
+    """Error of saved arrays that are not those of this version of the package."""
+
+
 class Archive:
     """Storage of the state of a process, for restart and ``start=``.
 
     Without ``state``, methods save their arguments and return them.  With ``state``, methods return
     the saved values instead.
+
+    Attributes:
+        unknown: Table and index of each row that was to be restored and is not in the state.
     """
 
     def __init__(self, subdomain: Subdomain, state: State | None = None) -> None:
         self._subdomain, self._restored = subdomain, state
+        self.unknown: set[tuple[str, int]] = set()
         self._sums: dict[str, tuple[int, Index, Array]] = {}
         self._rows: defaultdict[str, list[Array]] = defaultdict(list)
         self._scalar = (1, np.zeros(1, dtype=int), int(subdomain.comm.rank == 0))
@@ -80,10 +88,12 @@ class Archive:
                 self._rows[key].append(np.column_stack([indices, rows]))
             return rows
         if not self.has(key):
+            self.unknown |= {(name, int(index)) for index in indices}
             return rows
         table = self._array(key, (-1, columns + 1))
         positions = np.minimum(np.searchsorted(table[:, 0], indices), len(table) - 1)
         present = table[positions, 0] == indices
+        self.unknown |= {(name, int(index)) for index in indices[~present]}
         return np.where(present[:, None], table[positions, 1:], rows)
 
     def has(self, name: str) -> bool:
@@ -95,7 +105,7 @@ class Archive:
         values = (self._restored or {}).get(name)
         if values is None or len(values.shape) != len(shape) or shape[-1] != values.shape[-1]:
             problem = "missing" if values is None else f"of shape {values.shape}"
-            raise ModelError(f"the array {name!r} of the state is {problem}, and must be {shape}")
+            raise OtherVersion(f"the array {name!r} of the state is {problem}, and must be {shape}")
         return values
 
     def state(self) -> State:

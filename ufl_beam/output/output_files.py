@@ -29,6 +29,7 @@ from typing import Any
 
 import numpy as np
 
+from ufl_beam.discretization.state_io import OtherVersion
 from ufl_beam.errors import ArgumentError
 from ufl_beam.file_system import is_at, sync
 
@@ -213,7 +214,7 @@ class OutputFile:
 
 def changed(what: str) -> ArgumentError:
     """Return the error of an output that differs from its state at the checkpoint."""
-    return ArgumentError(
+    return WrongReader(
         f"{what}: it differs from the file at the checkpoint: it is missing, or was changed "
         "while the run was down; restore it, or delete the checkpoint to begin anew"
     )
@@ -225,7 +226,7 @@ Content = dict[str, Any]
 """Arrays and JSON data by name."""
 
 ADVICE = {
-    "solution": "Take another copy of the file, or save the solution again",
+    "solution": "Take another copy of the file, or run and save the solution again",
     "study": "Delete the file to compute all members, or name another",
     "checkpoint": "Delete the file to begin anew, or name another",
 }
@@ -322,30 +323,38 @@ def plain(value: Any) -> Any:
 
 
 @contextmanager
-def decoding(path: Path, format: str) -> Iterator[None]:
-    """Turn every error of reading a file into :class:`ArgumentError` with its path and a remedy."""
-    what = format.partition(" ")[0]
+def decoding(path: Path, *formats: str, content: Content | None = None) -> Iterator[Content]:
+    """Yield the content of a file, and raise :class:`ArgumentError` at every error in using it.
+
+    The message has the path, a remedy, and the version that wrote a content that this version does
+    not understand.  The file is read unless its ``content`` is given.
+    """
+    what = formats[0].partition(" ")[0]
     try:
-        yield
+        content = read(path, *formats) if content is None else content
+        yield content
     except WrongReader as error:
         raise ArgumentError(f"{what} {path}: {error}") from None
-    except ArgumentError as error:
-        raise ArgumentError(f"{what} {path}: {error}. {ADVICE[what]}") from None
     except Exception as error:  # of any library, as a file may have any content
-        raise ArgumentError(
-            f"{what} {path}: the file is damaged: {error!r}. {ADVICE[what]}"
-        ) from error
+        why, told = str(error), isinstance(error, ArgumentError)
+        if not told or isinstance(error, OtherVersion):
+            by = "the file is damaged"
+            if content is not None:
+                by = f"version {content['version']} of ufl_beam wrote it, and this version, "
+                by += f"{version()}, cannot use it"
+            why = f"{by}: {why if told else repr(error)}"
+        raise ArgumentError(f"{what} {path}: {why}. {ADVICE[what]}") from None if told else error
 
 
-def read(path: Path, format: str) -> Content:
-    """Read a file of :func:`write`; to be called in :func:`decoding`, which names the file."""
+def read(path: Path, *formats: str) -> Content:
+    """Read a file in one of some formats; its content has the "version" that wrote it."""
     try:
         data = path.read_bytes()
     except FileNotFoundError:
         raise ArgumentError("there is no such file") from None
     except OSError as error:
         raise ArgumentError(f"the file cannot be read: {error.strerror}") from None
-    kind = format.rpartition(", ")[0]
+    kind = formats[0].rpartition(", ")[0]
     end = END.fullmatch(data[-256:])
     if end is None:
         why = "its last line is wrong" if data else "it is empty"
@@ -353,15 +362,15 @@ def read(path: Path, format: str) -> Content:
     if hashlib.sha256(data[:-DIGEST]).hexdigest().encode() != data[-DIGEST:]:
         raise ArgumentError("the file is damaged: its checksum does not match its content")
     actual, by = end[1].decode(), end[2].decode()
-    if actual != format:
+    if actual not in formats:
         raise ArgumentError(
             f"the file is a {actual}, written by version {by} of ufl_beam; this version, "
-            f"{version()}, reads a {format}"
+            f"{version()}, needs a {formats[0]}"
         )
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         if sum(member.file_size for member in archive.infolist()) > len(data):
             raise ArgumentError("the file is damaged: its content is larger than the file")
-        content: Content = json.loads(archive.read("text.json"))
+        content: Content = {"version": by} | json.loads(archive.read("text.json"))
         for member in archive.namelist():
             name, _, ending = member.rpartition(".")
             if ending == "npy":
@@ -371,7 +380,7 @@ def read(path: Path, format: str) -> Content:
 
 
 def require_arrays(content: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> None:
-    """Raise :class:`ArgumentError` unless arrays of 64-bit numbers have shapes; -1: any length."""
+    """Raise :class:`OtherVersion` unless arrays of 64-bit numbers have shapes; -1: any length."""
     for name, shape in shapes.items():
         values = np.asarray(content.get(name))
         same = len(values.shape) == len(shape) and all(
@@ -379,7 +388,6 @@ def require_arrays(content: Mapping[str, Any], shapes: Mapping[str, tuple[int, .
         )
         if not same or values.dtype.kind not in "fi" or values.dtype.itemsize != 8:
             is_ = f"{values.dtype} of shape {values.shape}" if name in content else "missing"
-            raise ArgumentError(
-                f"the file is damaged: the array {name!r} is {is_}, and must be numbers of 64 bits "
-                f"of shape {shape}"
+            raise OtherVersion(
+                f"the array {name!r} is {is_}, and must be numbers of 64 bits of shape {shape}"
             )

@@ -196,6 +196,19 @@ def require_no_code(data: Data) -> None:
             )
 
 
+def add_new_fields(data: Data) -> Data:
+    """Add the fields of the package's classes that are newer than the data, with their defaults."""
+    for record in data["records"]:
+        kind = None if "from" in record else RECORDS.get(record["is"])
+        for field in dataclasses.fields(kind) if kind else ():
+            made, missing = field.default_factory, dataclasses.MISSING
+            value = field.default if made is missing else made()
+            default = {} if value is missing else to_data(value)
+            if field.init and not default.get("records", True):  # a number, a text or the like
+                record.setdefault(field.name, default["root"])
+    return data
+
+
 def from_data(data: Data) -> Any:
     """Rebuild the scene or object that :func:`to_data` described, without its warnings."""
     require_no_code(data)
@@ -215,17 +228,13 @@ def from_data(data: Data) -> Any:
     }  # fmt: skip
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        for record in data["records"]:
+        for record in add_new_fields(data)["records"]:
             fields = {name: make(value) for name, value in record.items() if name != "is"}
             kind = RECORDS[record["is"]]
-            known = {field.name: field for field in dataclasses.fields(kind) if field.init}
-            if others := fields.keys() - known.keys():
-                raise TypeError(f"{kind.__name__}: fields {', '.join(sorted(others))} are unknown")
-            for name in known.keys() - fields.keys():  # a field that is newer than the file
-                default, factory = known[name].default, known[name].default_factory
-                if default is factory is dataclasses.MISSING:
-                    raise TypeError(f"{kind.__name__}: field {name} is missing")
-                fields[name] = default if factory is dataclasses.MISSING else factory()
+            known = {field.name for field in dataclasses.fields(kind) if field.init}
+            if others := fields.keys() ^ known:
+                unlike = ", ".join(sorted(others))
+                raise TypeError(f"{kind.__name__}: fields {unlike} are missing or unknown")
             # Arguments of constructors may differ from the fields.
             made.append(object.__new__(kind))
             for name, value in fields.items():

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -16,17 +15,16 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.discretization.state_io import Archive
+from ufl_beam.discretization.state_io import Archive, OtherVersion, State
 from ufl_beam.errors import ArgumentError, require_count, require_number, require_sequence, shorten
 from ufl_beam.file_system import Lock, require_path
 from ufl_beam.output.output_files import (
-    ADVICE,
     Content,
     add_prefix,
     beside,
     decoding,
-    read,
     remove_prefix,
+    require_arrays,
     require_writable,
     write,
 )
@@ -37,7 +35,8 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 
 FORMAT = "checkpoint of ufl_beam, 9"
-"""Format of the file; its number is increased by each incompatible change of the format."""
+"""Format of the file; its number grows if arrays of the same names and shapes get another meaning.
+Other arrays are found when a state is restored."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,11 +138,8 @@ class CheckpointFile:
 
     def _find(self) -> None:
         """Lock the file; if it exists, read it, and check that it belongs to this run."""
-        folder = self.path.parent
-        if not folder.is_dir():
+        if not (folder := self.path.parent).is_dir():
             raise ArgumentError(f"checkpoint {self.path}: there is no directory {folder}; make it")
-        if not os.access(folder, os.W_OK):
-            raise ArgumentError(f"checkpoint {self.path}: the directory cannot be written to")
         try:
             owner = self.lock.acquire()
             exists = self.path.exists()
@@ -157,8 +153,7 @@ class CheckpointFile:
                 "it, or name another file"
             )
         if exists:
-            with decoding(self.path, FORMAT):
-                self.content = read(self.path, FORMAT)
+            with decoding(self.path, FORMAT) as self.content:
                 now, then = self._described.texts, self.content["call"]
                 if self.content["python"] != PYTHON:
                     now, then = (
@@ -182,10 +177,8 @@ class CheckpointFile:
     def resume(self, simulation: Simulation, pace: Any) -> None:
         """Restore simulation, step control ``pace``, objects with a state, and recorders."""
         content, solution = self.content, simulation.solution
-        with decoding(self.path, FORMAT):
-            simulation.save_or_restore(
-                Archive(simulation.subdomain, remove_prefix("state/", content))
-            )
+        with decoding(self.path, FORMAT, content=content):
+            _restore(simulation, remove_prefix("state/", content))
             solution.resume(remove_prefix("history/", content))
             pace.restore(remove_prefix("pace/", content))
             solution.seconds = float(content["seconds"])
@@ -203,11 +196,11 @@ class CheckpointFile:
         for i, recorder in enumerate(self._recorders):
             try:
                 recorder.resume(simulation, remove_prefix(f"recorder {i}/", content))
-            except ArgumentError as error:
-                raise ArgumentError(f"checkpoint {self.path}: {error}") from None
             except (LookupError, TypeError, ValueError) as error:
-                why = f"checkpoint {self.path}: {recorder} cannot continue from it: {error!r}"
-                raise ArgumentError(f"{why}. {ADVICE['checkpoint']}") from error
+                with decoding(self.path, FORMAT, content=content):
+                    if isinstance(error, ArgumentError):
+                        raise
+                    raise OtherVersion(f"{recorder} cannot continue from it: {error!r}") from error
         self._last_step, self.content = pace.steps, {}
 
     # -- writing -------------------------------------------------------------------------------
@@ -267,6 +260,16 @@ class CheckpointFile:
                 f"contains: {changed.replace(', in the file', ', at the beginning')}. Make it an "
                 "object with methods state() and restore(state), see docs/restart.md"
             )
+
+
+def _restore(simulation: Simulation, state: State) -> None:
+    """Restore a simulation; raise unless its state then consists of the same arrays."""
+    simulation.together(simulation.save_or_restore, Archive(simulation.subdomain, state))
+    simulation.save_or_restore(restored := Archive(simulation.subdomain))
+    arrays = restored.state()
+    require_arrays(state, {name: values.shape for name, values in arrays.items()})
+    if unknown := sorted(state.keys() - arrays.keys()):
+        raise OtherVersion(f"the array {unknown[0]!r} is unknown")
 
 
 PYTHON = ".".join(map(str, sys.version_info[:2]))

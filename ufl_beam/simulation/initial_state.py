@@ -20,8 +20,15 @@ from ufl_beam.discretization.model_warnings import (
     warn_of_rates,
     warn_of_touching,
 )
-from ufl_beam.discretization.state_io import State
-from ufl_beam.discretization.state_transfer import APART, Excess, Transfer, same_unknowns
+from ufl_beam.discretization.state_io import OtherVersion, State
+from ufl_beam.discretization.state_transfer import (
+    APART,
+    CELL_TABLES,
+    Excess,
+    Transfer,
+    geometry,
+    same_unknowns,
+)
 from ufl_beam.errors import ArgumentError, ModelError, require_kind, shorten, warn
 from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import DEFAULT_MESH, Mesh
@@ -39,6 +46,7 @@ from ufl_beam.model.constraint_checks import (
 from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
+from ufl_beam.output.output_files import version
 from ufl_beam.simulation.solution import Solution
 
 StateOf = Solution | tuple[Solution, int]
@@ -185,6 +193,25 @@ def initial_state(
     transfer = Transfer(start.numbering, numbering)
     after, excess = (v, None) if v0 is None else transfer.velocity(v0)
     return transfer.state(q0), after, transfer.internal(start.internal), excess
+
+
+def require_known(numbering: DofNumbering, start: Solution, unknown: set[tuple[str, int]]) -> None:
+    """Raise :class:`OtherVersion` if ``start`` lacks internal variables of a law that it had.
+
+    ``unknown`` has a table and an index of each cell and connector without stored variables.
+    """
+    laws = {geometry(c): c.law for c in start.scene.all_connectors} if unknown else {}
+    cells = [index % len(numbering.cells) for table, index in unknown if table == CELL_TABLES[0]]
+    at = [index for table, index in unknown if table not in CELL_TABLES]
+    connectors = (numbering.scene.all_connectors[index] for index in sorted(at))
+    owners = [numbering.middle(cell).beam.name for cell in sorted(cells)]
+    owners += [str(c) for c in connectors if remembers(c.law) and laws.get(geometry(c)) == c.law]
+    if owners:
+        raise OtherVersion(
+            f"start: version {start.version} of ufl_beam computed the solution and stored other "
+            f"internal variables of {owners[0]} than this version, {version()}. Run again from the "
+            "beginning"
+        )
 
 
 def require_held(connectors: Sequence[Connector], motions: Array, size: float) -> None:

@@ -39,6 +39,7 @@ from ufl_beam.simulation.initial_state import (
     initial_state,
     mesh_of,
     require_held,
+    require_known,
 )
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StaticPath, StepEquation, forces_of_scene
@@ -141,7 +142,8 @@ class Simulation(Stepper):
         elif inertia is not None:
             together(equation.begin_energies, t0, q_local, inertia.v)
         if start is not None:
-            equation.set_internal_variables(q_local, t0, internal, same=same)
+            unknown = equation.set_internal_variables(q_local, t0, internal, same=same)
+            together(require_known, numbering, start, unknown)
             together(self._require_held, equation, q_local)
         for term in equation.terms:
             term.start(q_local)

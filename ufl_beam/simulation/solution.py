@@ -14,7 +14,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.discretization.state_io import State
+from ufl_beam.discretization.state_io import OtherVersion, State
 from ufl_beam.display import TIME, Rich
 from ufl_beam.errors import ArgumentError, require_kind, warn
 from ufl_beam.file_system import require_path
@@ -35,7 +35,6 @@ from ufl_beam.output.output_files import (
     WrongReader,
     add_prefix,
     decoding,
-    read,
     remove_prefix,
     require_arrays,
     version,
@@ -46,6 +45,7 @@ from ufl_beam.output.serialization import (
     Description,
     SavedCurve,
     SavedFunction,
+    add_new_fields,
     difference,
     from_data,
     require_no_code,
@@ -79,6 +79,7 @@ class Solution(States, Rich):
         imbalance_message: Message if the imbalance of the energy ledger exceeds the tolerance of
             the scheme; empty otherwise.
         warnings: Warnings of the run, one in each line; see docs/warnings.md.
+        version: Version of the package that computed the solution.
         internal: Data for a run that continues at the end of this run: internal variables of cells
             and connectors, reactions, rates and forces.
         scheme: Time scheme of the run; None if the solution was loaded or unpickled.
@@ -102,6 +103,7 @@ class Solution(States, Rich):
         self.substeps = self.iterations = 0
         self.time_error, self.seconds, self.building = math.nan, 0.0, 0.0
         self.every, self.imbalance_message, self.warnings = 1, "", ""
+        self.version = version()
         self.internal: State = {}
         self.scheme: Scheme | None = like.scheme if isinstance(like, Solution) else None
         self.substeps_of_last = UNKNOWN
@@ -167,8 +169,8 @@ class Solution(States, Rich):
         file = require_path(path, "Solution.load")
         if scene is not None:
             require_kind(scene, Scene, "Solution.load: scene")
-        with decoding(file, FORMAT):
-            return restored(read(file, FORMAT), scene)
+        with decoding(file, FORMAT) as content:
+            return restored(content, scene)
 
     def _content(self) -> Content:
         numbering = self.numbering
@@ -190,10 +192,9 @@ class Solution(States, Rich):
             return None
 
         return {
-            "kind": type(self).__name__, "version": version(),
-            "scene": to_data(numbering.scene, record), "mesh": to_data(numbering.mesh),
-            "numbering": numbering.checksum(), **{name: getattr(self, name) for name in NAMED},
-            **self._arrays(),
+            "kind": type(self).__name__, "scene": to_data(numbering.scene, record),
+            "mesh": to_data(numbering.mesh), "numbering": numbering.checksum(),
+            **{name: getattr(self, name) for name in NAMED}, **self._arrays(),
         }  # fmt: skip
 
     def _arrays(self) -> State:
@@ -347,15 +348,12 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
                 "it is a solution of another scene: its beams, cells, bodies or joints differ; "
                 "give the scene of that run, or load the file without scene="
             )
-        raise ArgumentError(
-            f"it was written by version {content['version']} of ufl_beam, which numbers degrees of "
-            f"freedom differently from this version, {version()}; load it with the former version"
-        )
+        raise OtherVersion("it numbers degrees of freedom differently")
     kinds = {kind.__name__: kind for kind in (Solution, *Solution.__subclasses__())}
     solution = kinds[content["kind"]](numbering.scene, numbering)
     solution._set_content(content)
     if scene is not None:
-        scenes = solution._content()["scene"], content["scene"]
+        scenes = solution._content()["scene"], add_new_fields(content["scene"])
         now, then = (Description({"scene": json.loads(json.dumps(d))}).texts for d in scenes)
         if differs := difference(now, then):
             raise WrongReader(
@@ -526,7 +524,7 @@ FORMAT = "solution of ufl_beam, 6"
 
 NAMED = {
     "seconds": float, "time_error": float, "equilibrium_fraction": float, "needs_start": bool,
-    "imbalance_message": str, "warnings": str,
+    "imbalance_message": str, "warnings": str, "version": str,
 }  # fmt: skip
 """Attributes that a file contains unchanged, and their types."""
 

@@ -229,16 +229,19 @@ class StepEquation:
         for load in self.loads:
             load.begin_energy(t, q, v)
 
-    def set_internal_variables(self, q: Array, t: float, internal: State, *, same: bool) -> None:
+    def set_internal_variables(
+        self, q: Array, t: float, internal: State, *, same: bool
+    ) -> set[tuple[str, int]]:
         """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
 
         ``same`` means that the other run ended at this time with this scene, so that accelerations
-        are unchanged.
+        are unchanged.  The result is :attr:`Archive.unknown` of cells and connectors.
         """
         archive = Archive(self.subdomain, internal)
         self.controllers.save_or_restore(archive, t)
         for term in (*self.inelastic, *self.connector_terms):
             term.save_or_restore(archive, NOWHERE)
+        unknown = archive.unknown.copy()
         if "reactions" in internal:
             self.supports.carry_on(archive, q)
         if self.inertia is not None and same:
@@ -246,6 +249,7 @@ class StepEquation:
             self.inertia.carry_on(archive, known)
             if BEFORE in internal:
                 self._pass_on_step(archive, q)
+        return unknown
 
     def _pass_on_step(self, archive: Archive, q: Array) -> None:
         """Save or restore the increments of the last step, if the next step depends on them."""
