@@ -56,8 +56,11 @@ def lanes_source(loop):
     defined = ["#define LANES 4", "#define AT 0", *(f"#define {name} 1" for name in names)]
     head = [jit.HEADERS, jit.DECLARATIONS, *defined, jit.text("assembly_simd.h")]
     # The functions that Python calls are declared in no header: cffi reads them as text.
-    texts = jit.text("check_simd.c"), jit.text(loop)
-    return "\n".join([*head, KERNEL, simd_kernels.INTERFACE, *texts])
+    interface, texts = (
+        simd_kernels.INTERFACE.replace("_{0}", ""),
+        (jit.text("check_simd.c"), jit.text(loop)),
+    )
+    return "\n".join([*head, KERNEL, interface, *texts])
 
 
 @pytest.mark.parametrize(
@@ -66,8 +69,9 @@ def lanes_source(loop):
         (lambda: c_library._SOURCE, ["-O3"]),
         (lambda: lanes_source("assembly_simd.c"), ["-O2", "-march=native"]),
         (lambda: lanes_source("points_simd.c"), ["-O2", "-march=native"]),
+        (lambda: lanes_source("elements_simd.c"), ["-O2", "-march=native"]),
     ],
-    ids=["loops", "cells", "points"],
+    ids=["loops", "cells", "points", "elements"],
 )
 def test_the_compiler_warns_of_nothing(tmp_path, source, flags):
     """The compiler finds nothing to warn of, at the level of optimisation of each library."""

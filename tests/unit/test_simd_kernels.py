@@ -12,7 +12,7 @@ import ufl_beam as ub
 from ufl_beam.compiled import code_cache, jit, simd_kernels
 from ufl_beam.compiled.c_library import doubles, ffi, lib
 from ufl_beam.compiled.simd_kernels import in_batches
-from ufl_beam.discretization.compiled_forms import Kernel
+from ufl_beam.discretization.compiled_forms import Kernel, Pointwise
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 
 
@@ -245,6 +245,41 @@ def test_the_compiler_says_nothing(fresh, capfd, condition):
     kernel, _ = pointwise(lambda x: ufl.conditional(condition(x), x, -1.0), values, several=True)
     assert kernel.cells.batch_size > 1
     assert "error" not in capfd.readouterr().err
+
+
+def of_elements():
+    """Four functions of elements, and their outputs for a batch of inputs."""
+    pointwise = Pointwise(["a", "b"])
+    a, b = pointwise.at.values()
+    x, y = inputs = np.random.default_rng(3).uniform(-2.0, 2.0, (2, simd_kernels.BATCH))
+    stated = [a * b, ufl.sin(a)], [], [a * b, ufl.sin(a)], [ufl.cos(b)]
+    meant = [[x * y, np.sin(x)], None, [x * y, np.sin(x)], [np.cos(y)]]
+    return pointwise, pointwise.compile_elements(*stated), inputs, meant
+
+
+@pytest.mark.serial
+def test_functions_of_elements_are_compiled_together(fresh, tmp_path):
+    """Equal functions and none at all do not confuse them."""
+    _alive, functions, inputs, meant = of_elements()
+    assert len([path for path in tmp_path.iterdir() if path.is_dir()]) == 2  # FFCx's code, vectors
+    for function, values in zip(functions, meant, strict=True):
+        if values is None:
+            assert function is None
+            continue
+        assert function.outputs == len(values)
+        out = np.full_like(values, np.nan)
+        function.several(1, doubles(inputs), doubles(out))
+        assert np.allclose(out, values, rtol=1e-14)  # products, and sines to two last digits
+
+
+@pytest.mark.serial
+def test_a_wrong_function_of_elements_refuses_those_beside_it(fresh, monkeypatch):
+    right = simd_kernels.in_vectors
+    monkeypatch.setattr(
+        simd_kernels, "in_vectors", lambda kernel: right(kernel).replace("lanes_cos(", "lanes_sin(")
+    )
+    _alive, functions, *_ = of_elements()
+    assert [bool(function.several) for function in functions if function] == [False] * 3
 
 
 @pytest.mark.serial

@@ -15,12 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
-from ufl.algorithms import expand_derivatives
-from ufl.classes import ListTensor, Zero
+from ufl.classes import Zero
 from ufl.core.expr import Expr
 
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.discretization.compiled_forms import Pointwise
+from ufl_beam.discretization.compiled_forms import Pointwise, components
 
 COMPONENTS = "x", "y", "rotation"
 """Components of the motion of a node: displacements (m) and rotation (rad)."""
@@ -170,9 +169,8 @@ class Kernels:
         self.entries = [divmod(i, len(names)) for i in nonzero]
         self.energies = {"state": made.stored, "lost": made.lost, "supplied": made.supplied}
         energies = [value for account in self.energies.values() for value in account.values()]
-        self.force = self._compiled(forces)
-        self.tangent = self._compiled([slopes[i] for i in nonzero])
-        self.end = self._compiled(_expanded([*self._states(made), *energies]))
+        tangent, end = [slopes[i] for i in nonzero], _expanded([*self._states(made), *energies])
+        self.force, self.tangent, self.end = self._compiled(forces, tangent, end)
 
     def _stated(self, names: Sequence[str]) -> tuple[Equations, Inputs]:
         self._compilers.append(compiler := Pointwise(names))
@@ -182,8 +180,8 @@ class Kernels:
     def _states(self, made: Equations) -> list[Expr]:
         return [made.state[name] for name in (*self._statement.state, *self._statement.shared)]
 
-    def _compiled(self, outputs: Sequence[Expr]) -> Any:
-        return self._compilers[-1].compile_elements(*outputs) if outputs else None
+    def _compiled(self, *functions: Sequence[Expr]) -> list[Any]:
+        return self._compilers[-1].compile_elements(*functions)
 
     @cached_property
     def derivative(self) -> Any:
@@ -191,7 +189,7 @@ class Kernels:
         names = self._statement.inputs
         made, at = self._stated(names)
         rows = [*made.forces, *self._states(made)]
-        return self._compiled(_slopes(_expanded(rows), [at[name] for name in names]))
+        return self._compiled(_slopes(_expanded(rows), [at[name] for name in names]))[0]
 
     @cached_property
     def change(self) -> Any:
@@ -206,7 +204,7 @@ class Kernels:
             sum((x * at[f"along {name}"] for x, name in zip(row, names, strict=True)), 0)
             for row in rows
         ])  # fmt: skip
-        return None if all(isinstance(x, Zero) for x in changes) else self._compiled(changes)
+        return None if all(isinstance(x, Zero) for x in changes) else self._compiled(changes)[0]
 
 
 @lru_cache(maxsize=128)
@@ -217,9 +215,7 @@ def kernels(statement: Statement) -> Kernels:
 
 def _expanded(outputs: Sequence[Expr]) -> list[Expr]:
     """Return expressions with all derivatives expanded together."""
-    if not outputs:
-        return []
-    return _components(expand_derivatives(ufl.as_vector([*map(ufl.as_ufl, outputs)])), len(outputs))
+    return components(ufl.as_vector([*map(ufl.as_ufl, outputs)])) if outputs else []
 
 
 def _slopes(outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:
@@ -227,14 +223,5 @@ def _slopes(outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:
     if not outputs:
         return []
     every = ufl.as_vector(outputs)  # UFL differentiates a vector at once
-    whole = expand_derivatives(ufl.as_tensor([ufl.diff(every, x) for x in by]))
-    columns = [_components(x, len(outputs)) for x in _components(whole, len(by))]
-    return [column[i] for i in range(len(outputs)) for column in columns]
-
-
-def _components(whole: Expr, number: int) -> list[Expr]:
-    if isinstance(whole, ListTensor):
-        return list(whole.ufl_operands)
-    if isinstance(whole, Zero):
-        return [Zero(whole.ufl_shape[1:])] * number
-    return [whole[i] for i in range(number)]
+    whole = components(ufl.as_tensor([ufl.diff(every, x) for x in by]))
+    return [x for i in range(len(outputs)) for x in whole[i :: len(outputs)]]

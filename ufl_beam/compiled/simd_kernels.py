@@ -11,6 +11,7 @@ import logging
 import math
 import re
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
@@ -62,11 +63,17 @@ FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "exp", "log", "pow"}
 lanes_power others."""
 
 INTERFACE = """
-void *address(void);
-void compute_both(void *of_ffcx, const double *w, const double *constants, const double *x,
-                  double *one, double *several);
+void *address_{0}(void);
+void compute_both_{0}(void *of_ffcx, const double *w, const double *constants, const double *x,
+                      double *one, double *several);
 """
-"""Functions of assembly_simd.c, points_simd.c and check_simd.c that Python calls."""
+"""Functions of each kernel that Python calls, in check_simd.c and the file of the loop."""
+
+Sizes = tuple[int, int, int]
+"""Numbers of entries, of coefficient values and of constants of a kernel."""
+
+OWN = "tabulate", "compute_both", "address", "evaluate_in_lanes"
+"""Functions of each kernel in C, whose names get the number of the kernel."""
 
 _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 _POWER = r"\bpow\(([^(),]+), (?!-?\d+\))([^(),]+)\)"
@@ -116,12 +123,15 @@ def in_vectors(kernel: str) -> str:
     return "\n".join([f"static inline void tabulate(lanes *restrict A, {inputs})", *lines])
 
 
-def written(source: Path) -> str:
-    """Return the text of the kernel that FFCx wrote into the file ``source`` for a form."""
-    pattern = r"^void tabulate_tensor_.*?^}(?=\s*^(?:bool|ufcx_integral) )"
-    if source.exists() and (match := re.search(pattern, source.read_text(), re.M | re.S)):
-        return match[0]
-    raise Refused(f"{source} has no kernel")
+def written(source: Path) -> list[str]:
+    """Return the kernels that FFCx wrote into the file ``source`` for the integrals of a form."""
+    code = source.read_text() if source.exists() else ""
+    pattern = r"^void tabulate_tensor_(\w+).*?^}(?=\s*^(?:bool|ufcx_integral) )"
+    kernels = {match[1]: match[0] for match in re.finditer(pattern, code, re.M | re.S)}
+    names = re.findall(r"&(integral_\w+)", code)
+    if not names or not kernels.keys() >= {*names}:
+        raise Refused(f"{source} has no kernel")
+    return [kernels[name] for name in names]
 
 
 def in_batches(rows: npt.NDArray[Any], batch_size: int) -> npt.NDArray[Any]:
@@ -142,19 +152,18 @@ errors than the tolerance.
 """
 
 
-def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, int]) -> None:
-    """Raise :class:`Refused` if a vector kernel differs from FFCx's kernel on random cells.
-
-    ``sizes`` are the numbers of entries, of coefficient values and of constants of the kernel.
-    """
+def require_agreement(module: ModuleType, number: int, kernel: int, sizes: Sizes) -> None:
+    """Raise :class:`Refused` if a vector kernel differs from FFCx's kernel on random cells."""
     random, (entries, width, constants) = np.random.default_rng(0), sizes
     at, wrong = partial(module.ffi.from_buffer, "double[]"), 0
+    compute_both = partial(
+        getattr(module.lib, f"compute_both_{number}"), module.ffi.cast("void *", kernel)
+    )
     for signs in ([1.0], [1.0], [-1.0, 1.0], [-1.0, 1.0]):
         w = random.uniform(0.1, 1.0, (width, BATCH)) * random.choice(signs, (width, BATCH))
         x = np.array([[0.0, 0.0, 0.0, 1.0, 0.5, 0.0]]).T + random.uniform(-0.1, 0.1, (6, BATCH))
         c, (single, several) = random.uniform(0.1, 0.9, constants), np.zeros((2, entries, BATCH))
-        address = module.ffi.cast("void *", kernel)
-        module.lib.compute_both(address, *map(at, (w, c, x, single, several)))
+        compute_both(*map(at, (w, c, x, single, several)))
         scale = np.abs(single).max(axis=0, where=np.isfinite(single), initial=0.0)
         scale = np.maximum(scale, np.median(scale))
         with np.errstate(invalid="ignore"):
@@ -167,20 +176,18 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
 
 
 @cache
-def interleaved(
-    source: Path, kernel: int, sizes: tuple[int, int, int], unknowns: tuple[int, int]
-) -> int | None:
+def interleaved(source: Path, kernel: int, sizes: Sizes, unknowns: tuple[int, int]) -> int | None:
     """Return the address of the SIMD loop of a compiled form, or None if the form has none.
 
-    ``sizes`` are as in :func:`require_agreement`.  ``unknowns`` are the position of the first
-    unknown among the coefficients, and the number of unknowns.
+    ``unknowns`` are the position of the first unknown among the coefficients, and the number of
+    unknowns.
     """
     numbers = {"SIDE": math.isqrt(sizes[0]), "AT": unknowns[0], "UNKNOWNS": unknowns[1]}
-    return _loop("assembly_simd.c", source, kernel, sizes, numbers, FLAGS)
+    return _loops("assembly_simd.c", source, [(kernel, sizes)], FLAGS, numbers)[0]
 
 
 @cache
-def point_loop(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | None:
+def point_loop(source: Path, kernel: int, sizes: Sizes) -> int | None:
     """Return the address of the SIMD loop of a compiled function of points, see points_simd.c.
 
     None means that SIMD is not faster: loading the inputs takes as long as their evaluation, unless
@@ -188,35 +195,44 @@ def point_loop(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | 
     """
     if source.exists() and not re.search(_SLOW, source.read_text()):
         return None
-    return _loop("points_simd.c", source, kernel, sizes, {}, SCHEDULED)
+    return _loops("points_simd.c", source, [(kernel, sizes)], SCHEDULED)[0]
 
 
 @cache
-def element_loop(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | None:
-    """Return the address of the SIMD loop of a compiled function of elements, or None."""
-    return _loop("elements_simd.c", source, kernel, sizes, {}, FLAGS)
+def element_loops(source: Path, kernels: tuple[tuple[int, Sizes], ...]) -> list[int | None]:
+    """Return the addresses of the SIMD loops of functions of elements, compiled as one form."""
+    return _loops("elements_simd.c", source, kernels, FLAGS)
 
 
-def _loop(
-    file: str, source: Path, kernel: int, sizes: tuple[int, int, int], numbers: dict[str, int],
-    flags: list[str],
-) -> int | None:  # fmt: skip
-    """Compile the loop in ``file`` over a kernel of FFCx, with ``numbers`` as macros."""
-    numbers |= dict(zip(("ENTRIES", "WIDTH", "CONSTANTS"), sizes, strict=True)) | {"LANES": BATCH}
-    defined = [f"#define {x} {n}" for x, n in numbers.items()]
-    head = "\n".join([HEADERS, DECLARATIONS, *defined, text("assembly_simd.h")])
-    loop = text("check_simd.c") + text(file)
+def _loops(
+    file: str, source: Path, kernels: Sequence[tuple[int, Sizes]], flags: list[str],
+    numbers: Mapping[str, int] = {},
+) -> list[int | None]:  # fmt: skip
+    """Compile the loop in ``file`` over each kernel of FFCx, with ``numbers`` as macros."""
+    head = "\n".join([HEADERS, DECLARATIONS, f"#define LANES {BATCH}", text("assembly_simd.h")])
+    loop, which, macros = text("check_simd.c") + text(file), range(len(kernels)), []
+    for k in which:
+        values = zip(("ENTRIES", "WIDTH", "CONSTANTS"), kernels[k][1], strict=True)
+        defined = [*numbers.items(), *values, *((name, f"{name}_{k}") for name in OWN)]
+        macros.append("".join(f"\n#undef {x}\n#define {x} {value}" for x, value in defined))
+
+    def code() -> str:
+        bodies = zip(macros, map(in_vectors, written(source)), strict=True)
+        return head + "".join(f"{defined}\n{body}\n{loop}" for defined, body in bodies)
+
+    def check(module: ModuleType) -> None:
+        for k in which:
+            require_agreement(module, k, *kernels[k])
+
+    # The name of the file is a hash of the form, options and versions of FFCx.
+    depends_on = [source.name, head, *macros, loop, Path(__file__).read_text()]
+    declared = "".join(map(INTERFACE.format, which))
     try:
-        module = compiled(
-            "ufl_beam_lanes",
-            INTERFACE,
-            lambda: "\n".join([head, in_vectors(written(source)), loop]),
-            # The name of the file is a hash of the form, options and versions of FFCx.
-            depends_on=[source.name, head, loop, Path(__file__).read_text()],
-            flags=flags,
-            check=lambda module: require_agreement(module, kernel, sizes),
+        lanes = compiled(
+            "ufl_beam_lanes", declared, code, depends_on=depends_on, flags=flags, check=check
         )
     except (Refused, CompilerError) as why:
         LOGGER.info("%s is computed cell by cell, which is slower: %s", source.stem, why)
-        return None
-    return int(module.ffi.cast("intptr_t", module.lib.address()))
+        return [None] * len(kernels)
+    addresses = (getattr(lanes.lib, f"address_{k}")() for k in which)
+    return [int(lanes.ffi.cast("intptr_t", address)) for address in addresses]

@@ -12,14 +12,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from itertools import accumulate
+from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import basix.ufl
 import numpy as np
 import ufl
+from ufl.algorithms import expand_derivatives
+from ufl.algorithms.expand_indices import IndexExpander
+from ufl.classes import Indexed, MultiIndex, Operator
 from ufl.core.expr import Expr
+from ufl.corealg.traversal import unique_post_traversal
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.caches import cached_by_structure
@@ -29,7 +33,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import (
     BATCH,
-    element_loop,
+    element_loops,
     in_batches,
     interleaved,
     point_loop,
@@ -37,10 +41,11 @@ from ufl_beam.compiled.simd_kernels import (
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 
 
-def tabulator(compiled: fem.Form) -> Any:
-    """Return the C function of a compiled cell form, valid as long as the form exists."""
-    integral = compiled.ufcx_form.form_integrals[0]
-    return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
+def tabulators(compiled: fem.Form) -> list[Any]:
+    """Return the C functions of the cell integrals of a form, valid as long as the form exists."""
+    form = compiled.ufcx_form
+    integrals = [form.form_integrals[i] for i in range(form.form_integral_offsets[1])]
+    return [kernel(x.tabulate_tensor_float64, compiled.module.ffi) for x in integrals]
 
 
 class Prepared(NamedTuple):
@@ -85,7 +90,7 @@ def prepared(form: ufl.Form) -> Prepared:
             f"a form on cells of {' x '.join(map(str, sizes))} degrees of freedom has {entries} "
             f"entries; loops.h allows {lib.MOST_ENTRIES}"
         )
-    tabulate = tabulator(compiled)
+    (tabulate,) = tabulators(compiled)
     return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
 
 
@@ -336,6 +341,45 @@ def with_shared_nodes(expressions: Sequence[Expr]) -> tuple[Expr, ...]:
     return tuple(shared[id(expression)] for expression in expressions)
 
 
+class _Components(IndexExpander):  # type: ignore[misc]
+    """Replacement of tensors by their components, each of which is found once."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._found: dict[Any, Expr] = {}
+
+    def visit(self, o: Expr) -> Expr:
+        if isinstance(o, MultiIndex):
+            return super().visit(o)
+        indices = (self._index2value[ufl.Index(i)] for i in o.ufl_free_indices)
+        if (key := (id(o), self.component(), *indices)) not in self._found:
+            self._found[key] = super().visit(o)
+        return self._found[key]
+
+    def variable(self, o: Expr) -> Expr:
+        """Keep the variables of inputs, by which functions may be differentiated."""
+        return o if isinstance(o.ufl_operands[0], Indexed) else self.visit(o.ufl_operands[0])
+
+    def of(self, tensor: Expr, at: tuple[int, ...]) -> Expr:
+        self._components.push(at)
+        component = self.visit(tensor)
+        self._components.pop()
+        return component
+
+
+def components(tensor: Expr) -> list[Expr]:
+    """Expand the derivatives in a tensor, and return its components without inner tensors.
+
+    FFCx 0.9 to 0.11 searches all nodes of an expression for each inner tensor.
+    """
+    found, whole = _Components(), expand_derivatives(tensor)
+    for node in unique_post_traversal(whole):  # operands first, which limits the recursion
+        if isinstance(node, Operator) and not node.ufl_free_indices:
+            for at in np.ndindex(node.ufl_shape):
+                found.of(node, at)
+    return [found.of(whole, at) for at in np.ndindex(whole.ufl_shape)]
+
+
 class Pointwise:
     """Compiler of functions of values at a point; ``inputs`` are the names of these values.
 
@@ -353,34 +397,45 @@ class Pointwise:
 
     def compile(self, *outputs: Expr) -> Any:
         """Compile a C function that computes the outputs, valid as long as this object exists."""
-        return self._compiled(outputs)[0]
+        return self._compiled(outputs)[0][0]
 
     def compile_loop(self, *outputs: Expr) -> Any:
         """Compile a loop over points that computes the outputs, an ``answer_loop`` of loops.h.
 
         The loop is null if it would not be faster than calls of the function.
         """
-        function, source = self._compiled(outputs)
-        sizes = len(outputs), len(self.at), 0
-        address = point_loop(source, int(ffi.cast("intptr_t", function)), sizes)
-        return ffi.cast("answer_loop *", address or 0)
+        _, source, ((address, sizes),) = self._compiled(outputs)
+        return ffi.cast("answer_loop *", point_loop(source, address, sizes) or 0)
 
-    def compile_elements(self, *outputs: Expr) -> Any:
-        """Compile a function of elements, ``element_function`` of loops.h."""
-        function, source = self._compiled(outputs)
-        sizes = len(outputs), len(self.at), 0
-        address = element_loop(source, int(ffi.cast("intptr_t", function)), sizes)
-        loop = ffi.cast("void (*)(int, const double *, double *)", address or 0)
-        return struct("element_function", several=loop, one=function, outputs=len(outputs))
+    def compile_elements(self, *functions: Sequence[Expr]) -> list[Any]:
+        """Compile functions of elements together, each an ``element_function`` of loops.h.
 
-    def _compiled(self, outputs: Sequence[Expr]) -> tuple[Any, Path]:
-        """Return a C function that computes the outputs, and the C file that FFCx wrote for it."""
-        outputs = with_shared_nodes(outputs)
-        z = ufl.TestFunction(self.values(len(outputs)))
+        A function without outputs is None.
+        """
+        compiled, source, kernels = self._compiled(*filter(None, functions))
+        loops, kind = element_loops(source, kernels), "void (*)(int, const double *, double *)"
+        made = [
+            struct("element_function", several=ffi.cast(kind, loop or 0), one=one, outputs=sizes[0])
+            for one, loop, (_, sizes) in zip(compiled, loops, kernels, strict=True)
+        ]
+        return [made.pop(0) if outputs else None for outputs in functions]
+
+    def _compiled(self, *functions: Sequence[Expr]) -> tuple[list[Any], Path, Any]:
+        """Compile functions as integrals of one form.
+
+        Returns:
+            C functions, the C file that FFCx wrote, and addresses and sizes of the functions.
+        """
+        shared = iter(with_shared_nodes([x for outputs in functions for x in outputs]))
+        sizes = [(len(outputs), len(self.at), 0) for outputs in functions]
+        z = ufl.TestFunction(self.values(most := max(sizes)[0]))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
-        form, source = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)
+        values = ([*islice(shared, n), *[0] * (most - n)] for n, *_ in sizes)
+        parts = (ufl.dot(ufl.as_vector(x), z) * dx(k) for k, x in enumerate(values))
+        form, source = compiled_form(sum(parts))
         self._alive.append(form)
-        return tabulator(form), source
+        addresses = [int(ffi.cast("intptr_t", x)) for x in tabulators(form)]
+        return tabulators(form), source, tuple(zip(addresses, sizes, strict=True))
 
     def values(self, n: int) -> fem.FunctionSpace:
         """Return a space of n values at the point."""

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Comparison of a vector kernel with the kernel of FFCx, and sizes of the kernel. */
 
-enum { NUMBERS = CONSTANTS + (CONSTANTS == 0), COEFFICIENTS = WIDTH + (WIDTH == 0) };
+#define NUMBERS (CONSTANTS + (CONSTANTS == 0))
+#define COEFFICIENTS (WIDTH + (WIDTH == 0))
 
 /* Entries of a batch, computed cell by cell with FFCx's kernel, and at once with the kernel of this
  * file. */
