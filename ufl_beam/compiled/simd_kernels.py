@@ -152,27 +152,26 @@ errors than the tolerance.
 """
 
 
-def require_agreement(module: ModuleType, number: int, kernel: int, sizes: Sizes) -> None:
+def require_agreement(module: ModuleType, kernels: Sequence[tuple[int, Sizes]]) -> None:
     """Raise :class:`Refused` if a vector kernel differs from FFCx's kernel on random cells."""
-    random, (entries, width, constants) = np.random.default_rng(0), sizes
-    at, wrong = partial(module.ffi.from_buffer, "double[]"), 0
-    compute_both = partial(
-        getattr(module.lib, f"compute_both_{number}"), module.ffi.cast("void *", kernel)
-    )
-    for signs in ([1.0], [1.0], [-1.0, 1.0], [-1.0, 1.0]):
-        w = random.uniform(0.1, 1.0, (width, BATCH)) * random.choice(signs, (width, BATCH))
-        x = np.array([[0.0, 0.0, 0.0, 1.0, 0.5, 0.0]]).T + random.uniform(-0.1, 0.1, (6, BATCH))
-        c, (single, several) = random.uniform(0.1, 0.9, constants), np.zeros((2, entries, BATCH))
-        compute_both(*map(at, (w, c, x, single, several)))
-        scale = np.abs(single).max(axis=0, where=np.isfinite(single), initial=0.0)
-        scale = np.maximum(scale, np.median(scale))
-        with np.errstate(invalid="ignore"):
-            good = (np.abs(several - single) <= AGREEMENT * scale) | (several == single)
-        wrong += np.sum(~good & ~(np.isnan(single) & np.isnan(several)))
-    if wrong:
-        why = f"{wrong} of {4 * BATCH * entries} entries differ from FFCx's kernel"
-        LOGGER.warning("a vector kernel, from code of %s, is wrong: %s", VERSIONS, why)
-        raise Refused(why)
+    at = partial(module.ffi.from_buffer, "double[]")
+    for number, (kernel, (entries, width, constants)) in enumerate(kernels):
+        random, wrong, of_ffcx = np.random.default_rng(0), 0, module.ffi.cast("void *", kernel)
+        for signs in ([1.0], [1.0], [-1.0, 1.0], [-1.0, 1.0]):
+            w = random.uniform(0.1, 1.0, (width, BATCH)) * random.choice(signs, (width, BATCH))
+            x = np.array([[0, 0, 0, 1, 0.5, 0]]).T + random.uniform(-0.1, 0.1, (6, BATCH))
+            c, (one, several) = random.uniform(0.1, 0.9, constants), np.zeros((2, entries, BATCH))
+            compute_both = getattr(module.lib, f"compute_both_{number}")
+            compute_both(of_ffcx, *map(at, (w, c, x, one, several)))
+            scale = np.abs(one).max(axis=0, where=np.isfinite(one), initial=0.0)
+            scale = np.maximum(scale, np.median(scale))
+            with np.errstate(invalid="ignore"):
+                good = (np.abs(several - one) <= AGREEMENT * scale) | (several == one)
+            wrong += np.sum(~good & ~(np.isnan(one) & np.isnan(several)))
+        if wrong:
+            why = f"{wrong} of {4 * BATCH * entries} entries differ from FFCx's kernel"
+            LOGGER.warning("a vector kernel, from code of %s, is wrong: %s", VERSIONS, why)
+            raise Refused(why)
 
 
 @cache
@@ -220,16 +219,15 @@ def _loops(
         bodies = zip(macros, map(in_vectors, written(source)), strict=True)
         return head + "".join(f"{defined}\n{body}\n{loop}" for defined, body in bodies)
 
-    def check(module: ModuleType) -> None:
-        for k in which:
-            require_agreement(module, k, *kernels[k])
-
-    # The name of the file is a hash of the form, options and versions of FFCx.
-    depends_on = [source.name, head, *macros, loop, Path(__file__).read_text()]
-    declared = "".join(map(INTERFACE.format, which))
     try:
         lanes = compiled(
-            "ufl_beam_lanes", declared, code, depends_on=depends_on, flags=flags, check=check
+            "ufl_beam_lanes",
+            "".join(map(INTERFACE.format, which)),
+            code,
+            # The name of the file is a hash of the form, options and versions of FFCx.
+            depends_on=[source.name, head, *macros, loop, Path(__file__).read_text()],
+            flags=flags,
+            check=lambda module: require_agreement(module, kernels),
         )
     except (Refused, CompilerError) as why:
         LOGGER.info("%s is computed cell by cell, which is slower: %s", source.stem, why)
