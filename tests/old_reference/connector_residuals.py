@@ -6,9 +6,12 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
+import basix.ufl
 import numpy as np
+import ufl
+from ufl.core.expr import Expr
 
 from old_reference.cell_forms import (
     Archive,
@@ -23,9 +26,12 @@ from old_reference.cell_forms import (
 )
 from old_reference.connector_updates import law_in_step
 from ufl_beam.arrays import Array, Index
+from ufl_beam.caches import cached_forms
+from ufl_beam.dolfinx_compat import fem
+from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import NoNumber
-from ufl_beam.mechanics.relative_motions import MOTIONS, connector_forms
-from ufl_beam.mechanics.time_scheme import Step, acting
+from ufl_beam.mechanics.relative_motions import MOTIONS, Geometry, Pair
+from ufl_beam.mechanics.time_scheme import Scheme, Step, acting
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
@@ -36,6 +42,64 @@ GUIDE_INCREMENT = 1e-5
 
 The error of the differences is of second order; round-off of the curve adds less than 1e-10.
 """
+
+
+class ConnectorForms(NamedTuple):
+    """Forms of connectors, and their coefficients."""
+
+    work: ufl.Form  # virtual work, and ``row[:n]·e + row[n] λ - row[n + 1]`` of each motion
+    tangent: ufl.Form  # derivative of ``work`` by ``q1``
+    motion: ufl.Form  # the n relative motions e of each cell
+    rate: ufl.Form  # derivatives of the motions along ``u``
+    geometry: fem.Function  # :class:`Geometry` of each motion
+    row: fem.Function
+    q0: fem.Function  # configurations and forces λ at the beginning of the step
+    q1: fem.Function  # configurations and forces λ at its end
+    u: fem.Function
+
+
+@cached_forms
+def connector_forms(motions: Sequence[str], scheme: Scheme, cell: meshes.Mesh) -> ConnectorForms:
+    """Return forms on cells of unit length between the two nodes of a connector."""
+    n = len(motions)
+    line = basix.ufl.element("Lagrange", "interval", 1)
+    point = basix.ufl.element("DG", "interval", 0)
+    space = fem.functionspace(cell, basix.ufl.mixed_element([line, line, line, *n * [point]]))
+    geometry, row, motions_by_cell = (
+        fem.Function(fem.functionspace(cell, ("DG", 0, (size,))))
+        for size in (8 * n, n * (n + 2), n)
+    )
+    q0, q1, u = (fem.Function(space) for _ in range(3))
+    (before, _), (now, λ), (w, w_λ) = map(_split, (q0, q1, ufl.TestFunction(space)))
+    dx = ufl.Measure("dx", domain=cell, metadata={"quadrature_degree": 1})
+    z = ufl.TestFunction(motions_by_cell.function_space)
+    e, e_w = [], []
+    for k, motion in enumerate(motions):
+        at = range(8 * k, 8 * k + 8, 2)
+        mine = Geometry(*(ufl.as_vector([geometry[i], geometry[i + 1]]) for i in at))
+        value, variation = MOTIONS[motion](before, now, w, mine, scheme)
+        e.append(value)
+        e_w.append(variation)
+    density, motion_sum = 0, 0
+    for i in range(n):
+        first = i * (n + 2)
+        law = sum(row[first + j] * e[j] for j in range(n))
+        density += λ[i] * e_w[i] + w_λ[i] * (law + row[first + n] * λ[i] - row[first + n + 1])
+        motion_sum += e[i] * z[i]
+    work, by_cell = density * dx, motion_sum * dx
+    tangent = ufl.derivative(work, q1)
+    rate = ufl.derivative(by_cell, q1, u)
+    return ConnectorForms(work, tangent, by_cell, rate, geometry, row, q0, q1, u)
+
+
+def _split(q: Expr) -> tuple[Pair, Sequence[Expr]]:
+    """Split a function into the configurations at both ends of a cell, and the forces."""
+    fields = ufl.split(q)
+
+    def at(end: float) -> Expr:
+        return ufl.as_vector([x + end / 2 * ufl.grad(x)[0] for x in fields[:3]])
+
+    return Pair(at(-1.0), at(1.0)), fields[3:]
 
 
 class ConnectorGroup(Force):

@@ -201,26 +201,6 @@ def dense(A):
 # -- start and refusals ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("scheme", "first"),
-    [
-        (ub.EnergyMomentum(0.1), True), (ub.EnergyMomentumDecaying(), False),
-        (ub.GeneralizedAlpha(0.6), True), (ub.GeneralizedAlpha(0.6), False),
-    ],
-)  # fmt: skip
-def test_a_run_begins_where_another_one_ends(scheme, first):
-    """Of either kind; internal variables and what the scheme keeps go on."""
-    options = {"dt": 5e-3}
-    newton = {one: ub.Newton(rtol=1e-12, reference=one) for one in (False, True)}
-    scene = yielding()
-    begun = ub.simulate(scene, scheme, t=(0, 0.1), newton=newton[first], **options)
-    one, other = (
-        ub.simulate(scene, scheme, t=(0.1, 0.125), newton=newton[by], start=begun, **options)
-        for by in (False, True)
-    )
-    assert max(differences(one, other).values()) < SAME
-
-
 @pytest.mark.parametrize("first", [False, True])
 def test_a_guided_run_begins_where_another_one_ends(first):
     """The point on the curve and its parameter go on, from a run of either kind."""

@@ -9,12 +9,12 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from compiled_law import compiled_law
 from helpers import AfterEachStep, in_turn, law_of, require_reference, require_restart
 from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.compiled.c_library import doubles, lib
-from ufl_beam.terms.compiled_connector_laws import LawForms, inputs
+from ufl_beam.compiled.c_library import lib
 
 f = ub.law_functions
 SECTION = ub.Section(EA=1e5, GA=1e5, EI=3.0, rhoA=1.0, rhoI=1e-2)
@@ -115,15 +115,14 @@ run = partial(ub.simulate, t=(0, 0.6), dt=0.02)
 def test_tangent_is_the_derivative(name, scheme):
     """Against central differences, in small steps, in large ones, over edges and in none."""
     law, n = LAWS[name], LAWS[name].components
-    forms = LawForms(law, scheme)
+    compiled = compiled_law(law, scheme)
     known = {f"number {x}": value for x, value in law.parameters().items()}
     known |= {"dt": 0.01, "theta": scheme.theta} | {f"state {x}": 1e-4 for x in law.variables}
 
     def ask(e0, e1):
         given = known | {f"before {i}": x for i, x in enumerate(e0)}
         given |= {f"motion {i}": x for i, x in enumerate(e1)}
-        w, answers = np.array([given[x] for x in inputs(law)]), np.zeros(n + n * n)
-        lib.ask_law(forms.force, doubles(w), n + n * n, doubles(answers))
+        answers = compiled(given)
         return answers[:n], answers[n:].reshape(n, n)
 
     starts = np.array([[3e-3, 1e-3, 0.01], [5e-3, -4e-3, 0.02], [0.0, 0.0, 0.0]])

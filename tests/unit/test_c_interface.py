@@ -21,7 +21,6 @@ from ufl_beam.discretization import compiled_forms
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.mechanics.point_equations import inputs as inputs_of_points
-from ufl_beam.terms import connector_rows
 
 pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
 
@@ -33,7 +32,6 @@ def test_inputs_of_points_are_where_c_has_them():
     """Python takes their order from loops.h."""
     for inputs, enum, prefix in (
         (inputs_of_points(SECTION.section_points(None)[0]), "point_input", ""),
-        (connector_rows.INPUTS, "slip_input", "slip_"),
     ):
         of_c = names(enum, prefix)
         assert inputs[: len(of_c)] == of_c

@@ -346,7 +346,7 @@ def test_forms_are_compiled_once_in_a_process(compiled):
         ub.Simulation(scene, ub.EnergyMomentum())
         if n == 3:
             before = len(compiled)
-    assert before == len(compiled) > 10
+    assert before == len(compiled) > 8
 
 
 def test_components_have_no_tensors_inside():

@@ -28,8 +28,8 @@ SAME = 1e-9
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_a_stored_solution_is_read_and_continued(name):
-    """States, ledger and section forces are those of a run today, and so is a run that goes on."""
+def test_a_stored_solution_is_read_and_not_continued(name):
+    """States, ledger and section forces are those of a run today; states of connectors are not."""
     scheme, scene = RUNS[name]
     old = ub.Solution.load(FILES / f"{name}.solution", scene=scene())
     new = simulated(scheme, scene=scene)
@@ -46,18 +46,18 @@ def test_a_stored_solution_is_read_and_continued(name):
     forces = new.cell_resultants(-1)
     scale = np.abs(forces).max()
     np.testing.assert_allclose(old.cell_resultants(-1), forces, atol=1e-7 * scale, rtol=0.0)
-    ends = [continued(run, scheme).q[-1] for run in (old, new)]
-    np.testing.assert_allclose(*ends, atol=1e2 * SAME * size, rtol=0.0)
+    with raises("start: version 0.1.0 of ufl_beam", "Run again from the beginning"):
+        continued(old, scheme)
 
 
 def continued(run, scheme):
     return ub.simulate(run.scene, scheme, t=(END, 2 * END), dt=DT, start=run, progress=False)
 
 
-@pytest.mark.parametrize(("table", "owner"), [("cells", "deck"), ("_Rubbing", "Slide")])
+@pytest.mark.parametrize(("table", "owner"), [("cells", "deck"), ("Coulomb", "Slide")])
 def test_internal_variables_in_another_form_are_refused(table, owner):
     """Without the check, the run would begin with a bridge that has never yielded or slipped."""
-    old = ub.Solution.load(FILES / "bridge.solution", scene=bridge())
+    old = simulated(ub.EnergyMomentum(), scene=bridge)
     (name,) = (name for name in old.internal if name.startswith(f"{table}, "))
     old.internal[f"other {name}"] = old.internal.pop(name)
     other = f"stored other internal variables of {owner}"

@@ -214,13 +214,13 @@ def test_internal_variables_change_with_accepted_steps_only():
     law = ub.ForceLaw(counting, state=[0.0, 0.0])
     _, scene, _ = floating(law, lambda t: 2.0 * t)
     simulation = ub.Simulation(scene, ub.Static())
-    response = simulation.connector_terms[0].response
+    state = simulation.connector_terms[0].state
     simulation.attempt(0.5)
-    assert response.state()[0, 0] == 0.0
+    assert state["state 0"][0, 0] == 0.0
     for n, t in enumerate((0.25, 0.5, 1.0)):
         simulation.step_to(t)
-        assert response.state()[0, 0] == n + 1
-    assert response.state()[0, 1] == pytest.approx(1e-3 * (0.25 + 0.5 + 1.0))
+        assert state["state 0"][0, 0] == n + 1
+    assert state["state 1"][0, 0] == pytest.approx(1e-3 * (0.25 + 0.5 + 1.0))
     simulation.close()
 
 

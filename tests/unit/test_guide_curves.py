@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.terms.connector_forces import Guides
+from ufl_beam.terms.guides import Guides
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=10.0, rhoA=1.0, rhoI=0.01)
 

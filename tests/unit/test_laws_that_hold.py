@@ -184,6 +184,22 @@ def test_a_slow_pull_slips_by_twice_the_drop():
     assert after == pytest.approx(2 * 2.0 - 3.0, rel=5e-3)
 
 
+def test_a_run_that_goes_on_takes_the_limit_of_its_scene():
+    """A sliding body whose rail becomes rougher."""
+    body = ub.Body((1, 0), mass=2.0, inertia=1.0)
+
+    def slider(limit, **more):
+        rail = ub.Slide(ub.ground(0, 0), body.middle, ub.Coulomb(limit))
+        joint = ub.Prismatic(ub.ground(0, 0), body.middle)
+        return rail, ub.Scene(bodies=[body], joints=[joint], connectors=[rail], **more)
+
+    _, scene = slider(5.0, initial=[ub.Velocity([body], (3.0, 0.0))])
+    start = run(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.01)
+    rail, scene = slider(10.0)
+    solution = run(scene, ub.EnergyMomentum(), t=(0.1, 0.2), dt=0.01, start=start)
+    assert solution.connector(rail).force[1:] == pytest.approx(np.full(10, 10.0), rel=1e-12)
+
+
 @pytest.mark.parametrize("dt", [5e-3, 1.875e-3, pytest.param(4.7e-4, marks=pytest.mark.slow)])
 def test_iterations_do_not_decide_what_breaks_loose(dt):
     """To stick and to slide can both solve a step.

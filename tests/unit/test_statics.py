@@ -161,7 +161,8 @@ def test_a_broken_spring_stores_nothing(scheme, dt):
     scene = ub.Scene([], bodies=[body], supports=[pulled], connectors=[stretch])
     found = run(scene, scheme, dt=dt)
     assert found.energy["stored"][-1] == 0.0
-    assert found.connector(stretch).force[-1] == 0.0
+    # The law and the unknown force err by a digit of the motion, which was 2 m
+    assert abs(found.connector(stretch).force[-1]) <= 1e4 * np.spacing(2.0)
     assert found.energy["hinges"][-1] == pytest.approx(energy, rel=1e-9)
     if not isinstance(scheme, ub.Static):
         assert found.energy.worst < 1e-9

@@ -106,8 +106,8 @@ def warn_of_omissions(small: Linearization, inputs: Sequence[Any]) -> None:
     warn_of_relaxation("linearize", small)
     warn_of_limits("linearize", small)
     for group in small._simulation.equation.connector_terms:
-        if isinstance(group.connectors[0].law, Coulomb) and group.response.sticks is not None:
-            for connector, sticks in zip(group.connectors, group.response.sticks, strict=True):
+        if isinstance(group.law, Coulomb) and group.sticks is not None:
+            for connector, sticks in zip(group.connectors, group.sticks, strict=True):
                 if not sticks:
                     warn(f"linearize: {connector}: sliding friction is left out")
 

@@ -40,7 +40,6 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.beam_forces import inelastic_forms, section_law
 from ufl_beam.terms.cell_forces import CellForces
-from ufl_beam.terms.connector_forces import ConnectorForces
 from ufl_beam.terms.term import InCells
 
 BALANCED = 1e-13  # forces below this fraction of the stiffness times the scene's size are round-off
@@ -103,7 +102,7 @@ class Linearization:
         for cells in simulation.inelastic:
             cells.points.freeze()
         for group in simulation.connector_terms:
-            group.response.freeze()
+            group.freeze()
         Q = eye_array(self.numbering.size, format="lil")
         for support in (support for support in scene.supports if support.angle):
             i, j = self.numbering.node(support.place)[:2]
@@ -203,8 +202,7 @@ class Linearization:
     def touching(self) -> list[Connector]:
         """Return connectors whose stiffness differs on both sides of their motion in the state."""
         T, multipliers, found = self.tangent.tocsc(), self.numbering.multipliers, list[Connector]()
-        groups = (x for x in self._simulation.connector_terms if isinstance(x, ConnectorForces))
-        for group in groups:
+        for group in self._simulation.connector_terms:
             for i, connector in enumerate(group.connectors):
                 if not isinstance(connector.law, ConnectorLaw | ForceLaw):
                     break
@@ -213,7 +211,7 @@ class Linearization:
                 step = CHANGE * self.lengths[self._motion_of(connector)]
                 apart = step * along * self.lengths / max(along @ along, 1e-300)
                 around = [self.q + part * apart for part in (0.0, -1.0, 1.0, -0.5, 0.5)]
-                slopes = np.array([group.rows(q)[i, :-2].copy() for q in around])
+                slopes = np.array([group.slopes(q)[i] for q in around])
                 jumps, inner = np.abs(slopes[1:] - slopes[0]).max(axis=-1).reshape(2, 2)
                 # A slope that varies smoothly changes by half as much in half the distance.
                 if ((jumps > KINK * np.abs(slopes).max()) & (inner > 0.6 * jumps)).any():

@@ -117,9 +117,7 @@ class PathCorrector:
         """Return how much more a motion along ``direction`` dissipates than one against it; J."""
         motion = direction[:-1]
         now, size = self.dissipation(q), self.size(motion)
-        active = any(
-            group.response.flow_direction.any() for group in self.simulation.connector_terms
-        )
+        active = any(group.flow_direction.any() for group in self.simulation.connector_terms)
         flows = self.subdomain.total(float(active))
         for doubled in range(MOST_DOUBLINGS if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size

@@ -8,22 +8,23 @@ of the ledger, section forces, derivatives of runs, and restart.  The loops are 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.blocks.statement import OF_STEP, Statement, kernels
-from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, names, struct
+from ufl_beam.blocks.statement import OF_STEP, Kernels, Statement, kernels
+from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, names, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.functions import TimeFunction
-from ufl_beam.terms.derivatives import Each, Neighbours, differences, in_c
+from ufl_beam.model.scene import Scene
+from ufl_beam.terms.derivatives import MOST_MARGINS, Each, Neighbours, differences, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, NodeForces, Phases
 
@@ -32,9 +33,17 @@ TIMES = names("time_of_number", "time_")
 
 
 class BlockSetting(NamedTuple):
-    """Equation of a step to which blocks belong: process, scheme, matrix, ledger, initial time.
+    """Equation of a step to which blocks belong.
 
-    ``rates`` of loops.h are the rates of the scene; None in statics.
+    Attributes:
+        subdomain, scheme, A, ledger: Cells of the process, scheme, matrix, ledger.
+        t0: Initial time; s.
+        rates: ``rates`` of loops.h; None in statics.
+        search: Flags that all points and connectors share, see loops.h.
+        switched: Whether a law began or ceased to hold since the last tangent; (1,).
+        requested_forces: Function that returns the address of the force of a controller, or of the
+            limit of friction.
+        friction_repeats: True if constraints of sticking connectors may be redundant.
     """
 
     subdomain: Subdomain
@@ -43,6 +52,16 @@ class BlockSetting(NamedTuple):
     ledger: Ledger
     t0: float
     rates: Any
+    search: Index
+    switched: Index
+    requested_forces: Callable[[Any], Any]
+    friction_repeats: bool
+
+    @property
+    def scene(self) -> Scene:
+        """Scene of the equation of a step."""
+        scene: Scene = self.subdomain.numbering.scene
+        return scene
 
 
 class InTime(NamedTuple):
@@ -79,7 +98,7 @@ class Elements(NamedTuple):
     name: str
     indices: Index
     dofs: Index
-    numbers: Sequence[Array]
+    numbers: Sequence[Array] | Array
     in_time: Sequence[InTime] = ()
     of_step: Mapping[str, npt.ArrayLike] = {}
     cells: Index | None = None
@@ -110,7 +129,7 @@ class Block(LoadTerm):
         self, statement: Statement, elements: Elements, setting: BlockSetting, *,
         kind: str = "loads", supplies: str | None = None, moves: bool = False,
     ) -> None:  # fmt: skip
-        subdomain, scheme, self._A, self._ledger, t0, nodal = setting
+        subdomain, scheme, self._A, self._ledger, t0, nodal, *_ = setting
         self.statement, self._elements, self._supplies = statement, elements, supplies
         self.kind, self._moves, self._subdomain = kind, moves, subdomain
         self._passes_on = bool(statement.shared or (moves and scheme.weight_of_before))
@@ -130,8 +149,6 @@ class Block(LoadTerm):
             # Other processes may load degrees of freedom that this process owns.
             loaded = subdomain.added(loaded)
         self.dofs: Index = np.flatnonzero(loaded).astype(np.int32)
-        i, j = np.array(made.entries, dtype=int).reshape(-1, 2).T
-        entries = self._A.positions(dofs[:, i].ravel(), dofs[:, j].ravel()).reshape(n, len(i))
         # Positions in the array of a step: functions of time, OF_STEP, shared numbers of each group
         more = {name: functions + i for i, name in enumerate(OF_STEP)}
         first = functions + len(more if statement.rates else OF_STEP[: lib.NUMBERS_OF_STEP])
@@ -141,17 +158,27 @@ class Block(LoadTerm):
         self._of_step = first + shares * groups
         numbers = np.array(elements.numbers, dtype=np.float64).reshape(len(statement.numbers), n).T
         w = np.zeros((n, len(statement.inputs)))
-        after = w.shape[1] - len(from_)
+        modes = len(statement.all_modes)
+        after = w.shape[1] - modes - len(from_)
         w[:, after - len(statement.numbers) : after] = numbers
         self._w = in_batches(w, BATCH)
         self._numbers = self._w[:, after - len(statement.numbers) : after]
         self._states = np.zeros((len(self._w), states, BATCH))
         self.state = {z: self._states[:, k] for k, z in enumerate(statement.state)}
         batches, rows = len(self._w), motions + states + shares
-        most = max(f.outputs for f in (made.force, made.tangent, made.end) if f is not None)
-        each, second = np.zeros((2, batches, motions, BATCH))
+        known = {f"last {name}": k for k, name in enumerate(statement.modes)}
+        begins = np.full(len(known), -1, dtype=np.int32)
+        for k, z in enumerate(statement.state):
+            if z in known:
+                begins[known[z]] = k
+        functions_of = made.force, made.tangent, made.end, made.mode
+        most = max(f.outputs for f in functions_of if f is not None)
+        each, second = np.zeros((2, batches, made.force.outputs, BATCH))
+        self.recorded: Array = np.zeros((n, len(statement.recorded)))
+        table = (rows + MOST_MARGINS) * (w.shape[1] + 1)
+        self._out: Array = np.zeros(batches * BATCH * most)
         self._each = ffi.new("double *[1]", [doubles(each)]), each
-        self._times, self._t = np.zeros((3, self._of_step)), np.full(2, t0)
+        self._times, self._t = np.zeros((3, self._of_step)), np.full(2, float(t0))
         self._begun = np.zeros(1, dtype=np.int32)
         self._forces = np.zeros((2, len(self.dofs)))
         stored, *entered = map(len, made.energies.values())
@@ -164,31 +191,50 @@ class Block(LoadTerm):
             "element_block", force_of=made.force, tangent_of=made.tangent or ffi.NULL,
             end_of=made.end or ffi.NULL, lanes=BATCH, elements=n, batches=batches,
             unknowns=motions, rates=statement.rates, states=states, numbers=len(statement.numbers),
-            steps=len(from_), width=w.shape[1], dofs=in_batches(dofs, BATCH),
+            steps=len(from_), modes=modes, width=w.shape[1], dofs=in_batches(dofs, BATCH),
             acting=np.full(1, batches, dtype=np.int32), batch=np.arange(batches, dtype=np.int32),
             ranges=len(statement.acts_at), range=in_batches(numbers[:, ranged], BATCH),
             size=len(self.dofs), dof=self.dofs,
             at=in_batches(np.searchsorted(self.dofs, dofs).astype(np.int32), BATCH),
-            entry=in_batches(entries, BATCH), functions=functions,
+            entry=self._entries(made), functions=functions,
             when=np.array([TIMES.index(x.when) for x in in_time], dtype=np.int32), t=self._t,
             begun=self._begun,
             now=self._times[0], end=self._times[1], before=self._times[2],
             **{"from": in_batches(np.array(from_, dtype=np.int32).reshape(len(from_), n).T, BATCH)},
-            state=self._states, w=self._w, out=np.zeros(batches * BATCH * most),
-            space=np.zeros(motions + w.shape[1] + max(most, rows * w.shape[1])),
+            state=self._states, w=self._w, out=self._out,
+            space=np.zeros(motions + w.shape[1] + max(most, table)),
             each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
-            weight_of_before=scheme.weight_of_before, stored=stored, entered=sum(entered),
+            weight_of_before=scheme.weight_of_before, stored=stored, lost=entered[0],
+            entered=sum(entered), power_of=made.power or ffi.NULL,
+            mode_of=made.mode or ffi.NULL, begins=begins,
+            holds=np.zeros(n * statement.laws, dtype=np.int32),
             energy=self._energy, nodal=self._nodal, groups=groups, shares=shares,
             kept=shares - len(statement.trial), shared=self._shared,
             new_shared=np.zeros(self._shared.shape), totals=ffi.new("int[]", self._shared.size),
             group=in_batches(np.broadcast_to(elements.groups, n).astype(np.int32)[:, None], BATCH),
+            laws=statement.laws, scene=subdomain.numbering.scene.size, record=self.recorded,
+            recorded=len(statement.recorded),
+            recorded_kind=ffi.new("int[]", [*statement.recorded.values()]),
         )  # fmt: skip
         tangent = loop("add_block_tangent", self._c) if made.tangent else None
         self.loops = loop("add_block", self._c), tangent
         if elements.cells is not None:
             forces = NodeForces(self._each[0], BATCH, second)
             self.in_cells = [InCells(lambda: forces, elements.force_kind, elements.cells)]
+
+    def _entries(self, made: Kernels) -> Any:
+        """Return the entries of the matrix of the outputs of a tangent, in batches."""
+        i, j = np.array(made.entries, dtype=int).reshape(-1, 2).T
+        dofs = np.reshape(self._elements.dofs, (-1, len(self.statement.unknowns))).astype(np.int32)
+        entries = self._A.positions(dofs[:, i].ravel(), dofs[:, j].ravel()).astype(np.int32)
+        return integers(in_batches(entries.reshape(len(dofs), len(i)), BATCH))
+
+    def freeze(self) -> None:
+        """Keep the internal variables constant from now on."""
+        made = kernels(self.statement.frozen)
+        tangent, entries = made.tangent or ffi.NULL, self._entries(made)
+        fill(self._c, force_of=made.force, tangent_of=tangent, entry=entries)
 
     @property
     def effect(self) -> str:
@@ -214,7 +260,8 @@ class Block(LoadTerm):
             equation=callbacks.c,
         )  # fmt: skip
         energies = [loop("add_energy_of_block", c)] if len(self._energy) else []
-        return Phases([loop("begin_block", c)], [loop("accept_block", c)], energies)
+        change = loop("change_of_block", c) if self.kind == "connectors" else None
+        return Phases([loop("begin_block", c)], [loop("accept_block", c)], energies, change)
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Set the forces before the next step to the forces at the time ``t``, and return them.
@@ -285,10 +332,13 @@ class Block(LoadTerm):
             self._begun[:] = 1
 
     def start(self, q: Array) -> None:
-        """See the base class: compute the stored energies."""
-        if len(self._energy) and not self.statement.shared:
+        """See the base class: compute stored energies, and recorded numbers of the state."""
+        if (len(self._energy) or self.recorded.size) and not self.statement.shared:
             self._begin(q, float(self._t[0]), dt=math.inf, fraction=0.0)
+            if len(self._energy):  # internal variables are those of the state
+                self._c.end_of = kernels(self.statement.frozen).end
             lib.end_step_of_block(self._c, doubles(q), lib.ENERGIES)
+            self._c.end_of = self._kernels.end
 
     def _whole(self, forces: Array) -> Array:
         """Return forces at all local degrees of freedom from forces at the loaded ones."""
@@ -310,22 +360,33 @@ class Block(LoadTerm):
         if archive.has(f"time of {name}"):
             self.start(q)
 
-    def keep_states(self, archive: Archive) -> None:
-        """Save or restore the states of the elements."""
-        if number := len(self.statement.state):
-            indices = self._elements.indices
-            batches, _, lanes = self._states.shape
-            rows = self._states.transpose(0, 2, 1).reshape(batches * lanes, number)[: len(indices)]
-            self._states[:] = in_batches(archive.rows(self._elements.name, indices, rows), BATCH)
+    def keep_states(self, archive: Archive, first: int = 0) -> None:
+        """Save or restore the states of the elements, without the first ones."""
+        if number := len(self.statement.state) - first:
+            indices, states = self._elements.indices, self._states[:, first:]
+            rows = states.transpose(0, 2, 1).reshape(-1, number)[: len(indices)]
+            states[:] = in_batches(archive.rows(self._elements.name, indices, rows), BATCH)
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """See the base class."""
-        if (change := self._kernels.change) is not None:
-            batches, width, lanes = self._w.shape
-            w = np.zeros((batches, width + self._c.unknowns, lanes))
-            lib.add_change_of_tangent(
-                self._c, change, *map(doubles, (q1, u, w)), doubles(self._A.data)
-            )
+        made = kernels(self.statement.frozen)
+        if (change := made.change) is not None:
+            self._along(change, q1, u, self._entries(made), doubles(self._A.data))
+
+    def _along(
+        self, function: Any, q: Array, u: Array, entries: Any = ffi.NULL, tangent: Any = ffi.NULL
+    ) -> Array:
+        """Return outputs at ``q`` of a function of motions ``u``, or add them to the tangent."""
+        batches, width, lanes = self._w.shape
+        w = np.zeros((batches, width + self._c.unknowns, lanes))
+        lib.evaluate_along(self._c, function, *map(doubles, (q, u, w)), entries, tangent)
+        return self.outputs(function)
+
+    def outputs(self, function: Any) -> Array:
+        """Return the latest outputs of a function for each element; (elements, outputs)."""
+        outputs = self._out[: len(self._w) * function.outputs * BATCH]
+        by_element = outputs.reshape(-1, function.outputs, BATCH).transpose(0, 2, 1)
+        return np.array(by_element.reshape(-1, function.outputs)[: self._c.elements])
 
     # -- derivatives of runs ---------------------------------------------------------------------
 
@@ -341,15 +402,21 @@ class Block(LoadTerm):
             terms, others, by_number = [], 0, np.zeros_like(by_number)
         neighbours.states += [x for term in terms for x in (term._times[2], term._t)]
         b, by_shared = self._c, neighbours.state(lambda term: term._shared)
-        rows = b.unknowns + b.states + b.shares
+        by_before = neighbours.state(lambda term: term._times[2, : b.functions])
+        table, conditions = self._kernels.derivative
         c = struct(
             "block_derivatives", block=b, parameters=P, neighbours=others,
             neighbour=ffi.new("element_block *[]", [term._c for term in terms]),
-            weight=neighbours.weights, table_of=self._kernels.derivative,
-            table=np.zeros(b.batches * rows * b.width * b.lanes),
+            weight=neighbours.weights, table_of=table, margins=conditions,
+            table=np.zeros(b.batches * table.outputs * b.lanes),
             direction=np.zeros(b.width * b.lanes), by_state=by_state, by_number=by_number,
             of_step=self._of_step, by_step=np.zeros((P, self._of_step)), by_shared=by_shared,
+            by_before=by_before,
             state_bar=np.zeros(self._states.shape), number_bar=np.zeros(self._numbers.shape),
             step_bar=np.zeros(self._of_step), shared_bar=np.zeros(self._shared.shape),
         )  # fmt: skip
+        self.complete_derivatives(c, neighbours, by_number)
         return [*found, in_c("block", c)]
+
+    def complete_derivatives(self, c: Any, neighbours: Neighbours, by_number: Array) -> None:
+        """Set further fields of ``block_derivatives`` of loops.h."""

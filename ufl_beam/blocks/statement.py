@@ -18,8 +18,9 @@ import ufl
 from ufl.classes import Zero
 from ufl.core.expr import Expr
 
-from ufl_beam.compiled.c_library import lib
-from ufl_beam.discretization.compiled_forms import Pointwise, components
+from ufl_beam.compiled.c_library import lib, names
+from ufl_beam.discretization.compiled_forms import Pointwise, components, with_shared_nodes
+from ufl_beam.terms.derivatives import margins
 
 COMPONENTS = "x", "y", "rotation"
 """Components of the motion of a node: displacements (m) and rotation (rad)."""
@@ -35,6 +36,10 @@ OF_STEP = ["dt", "fraction", "reached", *COEFFICIENTS]
 step, and in its equation; and, for statements with rates, coefficients of the scheme."""
 
 
+FIRST_MODES = names("mode_of_block", "mode_")
+"""Modes that C sets: "held", "fresh" and "stiffened", see loops.h."""
+
+
 class Equations(NamedTuple):
     """Functions of the inputs of a statement.
 
@@ -45,6 +50,16 @@ class Equations(NamedTuple):
         stored: Energies that the element stores at the end of the step, by entry of the ledger; J.
         lost: Energies that it loses in the step, by entry of the ledger; J.
         supplied: Energies that it supplies in the step besides the work of loads; J.
+        modes: Modes in an iterate, by name.
+        excess: Violation of the modes of an element that is held in the search; 0 without.
+        opened: 1 if the element has opened in the iterate, else 0.
+        holds: 1 for each law that holds its motion, 0 for a law of its force; by default, laws hold
+            that do not depend on their force.
+        margins: Numbers that vanish where the element changes its modes, for ranges of derivatives.
+        power: Power at a part of the step (J per step), if the work on the path of a step is an
+            input, see :attr:`Statement.integrates`.
+        motions: Variables of UFL on which the laws depend, one for each law; m or rad.
+        recorded: Numbers that solutions record, by name; changes of numbers that are sums.
     """
 
     forces: Sequence[Expr]
@@ -52,6 +67,14 @@ class Equations(NamedTuple):
     stored: Mapping[str, Expr] = {}
     lost: Mapping[str, Expr] = {}
     supplied: Mapping[str, Expr] = {}
+    modes: Mapping[str, Expr] = {}
+    excess: Expr | float = 0.0
+    opened: Expr | float = 0.0
+    holds: Sequence[Expr] = ()
+    margins: Sequence[Expr] = ()
+    power: Expr | None = None
+    motions: Sequence[Expr] = ()
+    recorded: Mapping[str, Expr] = {}
 
 
 class Inputs(dict[str, Expr]):
@@ -60,12 +83,27 @@ class Inputs(dict[str, Expr]):
     Attributes:
         domain: Mesh of the inputs in UFL.
         space: Function that returns a space of n values on it.
+        stages: Intermediate numbers: a variable, its value, a number with the same derivatives, and
+            the symbol in the variable.
     """
 
     def __init__(self, compiler: Pointwise, at: Mapping[str, Expr]) -> None:
         super().__init__(at)
         self.space = compiler.values
         self.domain = compiler.values(1).mesh.ufl_domain()
+        self.stages: list[tuple[Expr, Expr, Expr, Expr]] = []
+        self._known: dict[tuple[Any, ...], list[Expr]] = {}
+
+    def stage(self, value: Any, slope_of: Any = None) -> Expr:
+        """Return a variable for an intermediate number, which is differentiated apart.
+
+        Derivatives by inputs are products of derivatives by the number and of the number.  With
+        ``slope_of``, the derivatives of the number are those of another one.
+        """
+        symbol = ufl.Coefficient(self.space(1))[0]
+        alike = value if slope_of is None else slope_of
+        self.stages.append((ufl.variable(symbol), *_expanded([value, alike]), symbol))
+        return self.stages[-1][0]
 
     def motions(self, group: str) -> list[Expr]:
         """Return the motion (x, y, rotation) of each node: "q0" before the step, "q1" after it.
@@ -79,6 +117,38 @@ class Inputs(dict[str, Expr]):
         """Return the motions of the nodes at a fraction of the step."""
         pairs = zip(self.motions("q0"), self.motions("q1"), strict=True)
         return [(1.0 - fraction) * q0 + fraction * q1 for q0, q1 in pairs]
+
+    def slopes(self, outputs: Sequence[Expr], names: Sequence[str]) -> list[Expr]:
+        """Return the derivatives of expanded expressions by inputs: of the first one, ..."""
+        return self.slopes_by(outputs, [self[name] for name in names])
+
+    def slopes_by(self, outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:
+        """Return the derivatives of expanded expressions by variables: of the first one, ..."""
+        total, n = _slopes(outputs, by), len(by)
+        for k, (stage, *_) in enumerate(self.stages):
+            outer = _slopes(outputs, [stage])
+            if all(isinstance(x, Zero) for x in outer):
+                continue
+            inner = self._slopes_of_stage(k, by)
+            for i, x in enumerate(outer):
+                row = slice(i * n, (i + 1) * n)
+                total[row] = [y + x * dx for y, dx in zip(total[row], inner, strict=True)]
+        return total
+
+    def _slopes_of_stage(self, k: int, by: Sequence[Expr]) -> list[Expr]:
+        """Return the derivatives of an intermediate number, which may depend on earlier ones."""
+        key = k, *map(id, by)
+        if key not in self._known:
+            self._known[key] = self.slopes_by(_expanded([self.stages[k][2]]), by)
+        return self._known[key]
+
+    def along(
+        self, outputs: Sequence[Expr], names: Sequence[str], directions: Sequence[Expr]
+    ) -> list[Expr]:
+        """Return the derivatives of expanded expressions along directions of inputs."""
+        slopes = np.array(self.slopes(outputs, names), dtype=object).reshape(-1, len(names))
+        pairs = (zip(row, directions, strict=True) for row in slopes)
+        return _expanded([sum((slope * u for slope, u in some), 0) for some in pairs])
 
 
 class Statement(ABC):
@@ -127,6 +197,45 @@ class Statement(ABC):
         return ()
 
     @property
+    def laws(self) -> int:
+        """Number of laws of an element, each with a force among the unknowns.
+
+        The last outputs of ``forces`` are the residuals of the laws, which are motions or forces.
+        """
+        return 0
+
+    @property
+    def recorded(self) -> Mapping[str, int]:
+        """Numbers that solutions record: their names, and ``recorded_number`` of loops.h."""
+        return {}
+
+    @property
+    def modes(self) -> Sequence[str]:
+        """Names of numbers that select the branch of an iterate, besides :data:`FIRST_MODES`.
+
+        In the first iterate, a mode "x" has the value of the state "last x", or is zero.
+        """
+        return ()
+
+    @property
+    def all_modes(self) -> list[str]:
+        """Names of all modes among the inputs."""
+        return [*FIRST_MODES, *self.modes] if self.modes else []
+
+    @property
+    def integrates(self) -> bool:
+        """True if the first number of an element is the work of its power on the path of a step.
+
+        In the power this number is the part of the path, from 0 to 1.
+        """
+        return False
+
+    @property
+    def frozen(self) -> Statement:
+        """The statement with constant internal variables."""
+        return self
+
+    @property
     @abstractmethod
     def numbers(self) -> Sequence[str]:
         """Names of the constant numbers of an element."""
@@ -137,25 +246,30 @@ class Statement(ABC):
 
     @property
     def unknowns(self) -> list[str]:
-        """Names of the motions of an element: x of all nodes, then y, then rotations."""
-        return [f"{c}{k}" for c in COMPONENTS for k in range(self.nodes)]
+        """Names of the motions of an element: x of all nodes, then y, then rotations; forces."""
+        motions = [f"{c}{k}" for c in COMPONENTS for k in range(self.nodes)]
+        return [*motions, *(f"force{k}" for k in range(self.laws))]
 
     @property
     def inputs(self) -> list[str]:
         """Names of all inputs, in the order of the columns of an element."""
         groups = "q1", "q0", *(f"rate{j + 1}" for j in range(self.rates))
         motions = (f"{group} {name}" for group in groups for name in self.unknowns)
-        return [*motions, *self.state, *self.numbers, *self.of_step, *self.shared]
+        numbers = *self.state, *self.numbers, *self.of_step, *self.shared
+        return [*motions, *numbers, *self.all_modes]
 
 
 class Kernels:
     """Compiled functions of a statement, each as ``element_function`` of loops.h.
 
     Attributes:
-        force: Forces of an element.
+        force: Forces of an element; derivatives of its laws, see loops.h.
         tangent: Their derivatives by the motions at the end of the step, without zeros.
         entries: Row and column of each entry of ``tangent``.
-        end: New state, stored, lost and supplied energies; None if there are none.
+        power: See :attr:`Equations.power`; None if there is none.
+        mode: Modes in an iterate, excess, and whether the element has opened; None if C sets modes.
+        end: New state, recorded numbers, and stored, lost and supplied energies; None if there
+            are none.
         energies: Names of these energies in the ledger, by account.
     """
 
@@ -164,47 +278,79 @@ class Kernels:
         made, at = self._stated(statement.inputs)
         names = [f"q1 {name}" for name in statement.unknowns]
         forces = _expanded(made.forces)
-        slopes = _slopes(forces, [at[q] for q in names])
+        slopes = at.slopes(forces, names)
         nonzero = [i for i, slope in enumerate(slopes) if not isinstance(slope, Zero)]
         self.entries = [divmod(i, len(names)) for i in nonzero]
         self.energies = {"state": made.stored, "lost": made.lost, "supplied": made.supplied}
         energies = [value for account in self.energies.values() for value in account.values()]
-        tangent, end = [slopes[i] for i in nonzero], _expanded([*self._states(made), *energies])
-        self.force, self.tangent, self.end = self._compiled(forces, tangent, end)
+        recorded = [made.recorded[name] for name in statement.recorded]
+        modes = [made.modes[name] for name in statement.modes] if made.modes else []
+        self.force, self.tangent, self.end, self.power, self.mode = self._compiled(
+            at,
+            [*forces, *_expanded(self._slopes_of_laws(made, at))],
+            [slopes[i] for i in nonzero],
+            _expanded([*self._states(made), *recorded, *energies]),
+            _expanded([made.power] if made.power else []),
+            _expanded([*modes, made.excess, made.opened] if modes else []),
+        )
 
     def _stated(self, names: Sequence[str]) -> tuple[Equations, Inputs]:
         self._compilers.append(compiler := Pointwise(names))
         at = Inputs(compiler, {name: ufl.variable(x) for name, x in compiler.at.items()})
         return self._statement.equations(at), at
 
+    def _slopes_of_laws(self, made: Equations, at: Inputs) -> list[Expr]:
+        """Return whether each law holds, and its derivatives by its force and by all motions."""
+        laws, found = made.forces[len(made.forces) - self._statement.laws :], list[Expr]()
+        for k, law in enumerate(laws):
+            by = [at[f"q1 force{k}"], *made.motions]
+            slopes = at.slopes_by(_expanded([law]), by)
+            holds = made.holds[k] if made.holds else float(isinstance(slopes[0], Zero))
+            found += [ufl.as_ufl(holds), *slopes]
+        return found
+
     def _states(self, made: Equations) -> list[Expr]:
         return [made.state[name] for name in (*self._statement.state, *self._statement.shared)]
 
-    def _compiled(self, *functions: Sequence[Expr]) -> list[Any]:
-        return self._compilers[-1].compile_elements(*functions)
+    def _compiled(self, at: Inputs, *functions: Sequence[Expr]) -> list[Any]:
+        instead = {symbol: value for _, value, _, symbol in at.stages}
+        return self._compilers[-1].compile_elements(*functions, instead=instead)
 
     @cached_property
-    def derivative(self) -> Any:
-        """Derivatives of forces, new state and shared numbers, row after row, by all inputs."""
-        names = self._statement.inputs
-        made, at = self._stated(names)
-        rows = [*made.forces, *self._states(made)]
-        return self._compiled(_slopes(_expanded(rows), [at[name] for name in names]))[0]
+    def derivative(self) -> tuple[Any, int]:
+        """Derivatives of forces, new state, shared numbers and margins by all inputs; margins.
+
+        The rows of a function are the derivatives of one number; the margins follow.  The second
+        item is the number of margins.
+        """
+        statement = self._statement
+        names = statement.inputs[: len(statement.inputs) - len(statement.all_modes)]
+        made, at = self._stated(statement.inputs)
+        rows = with_shared_nodes(_expanded([*made.forces, *self._states(made)]))
+        conditions = [*margins(rows), *_expanded(made.margins)]
+        every = [*rows, *conditions]
+        table = [*at.slopes(every, names), *conditions]
+        return self._compiled(at, table)[0], len(conditions)
 
     @cached_property
     def change(self) -> Any:
         """Derivatives of ``tangent`` along motions, which are further inputs; None if zero."""
+        made, at, names, along = self._stated_along()
+        slopes = at.slopes(_expanded(made.forces), names)
+        changes = at.along([slopes[i * len(names) + j] for i, j in self.entries], names, along)
+        return None if all(isinstance(x, Zero) for x in changes) else self._compiled(at, changes)[0]
+
+    @cached_property
+    def motion_rates(self) -> Any:
+        """Derivatives of the motions of laws along motions, which are further inputs."""
+        made, at, names, along = self._stated_along()
+        return self._compiled(at, at.along(made.motions, names, along))[0]
+
+    def _stated_along(self) -> tuple[Equations, Inputs, list[str], list[Expr]]:
+        """Return the equations, and the names and directions of the motions after the step."""
         names = [f"q1 {name}" for name in self._statement.unknowns]
         made, at = self._stated([*self._statement.inputs, *(f"along {x}" for x in names)])
-        motions = [at[name] for name in names]
-        slopes = _slopes(_expanded(made.forces), motions)
-        slopes = [slopes[i * len(names) + j] for i, j in self.entries]
-        rows = np.reshape(np.array(_slopes(slopes, motions), dtype=object), (-1, len(names)))
-        changes = _expanded([
-            sum((x * at[f"along {name}"] for x, name in zip(row, names, strict=True)), 0)
-            for row in rows
-        ])  # fmt: skip
-        return None if all(isinstance(x, Zero) for x in changes) else self._compiled(changes)[0]
+        return made, at, names, [at[f"along {name}"] for name in names]
 
 
 @lru_cache(maxsize=128)
@@ -215,7 +361,8 @@ def kernels(statement: Statement) -> Kernels:
 
 def _expanded(outputs: Sequence[Expr]) -> list[Expr]:
     """Return expressions with all derivatives expanded together."""
-    return components(ufl.as_vector([*map(ufl.as_ufl, outputs)])) if outputs else []
+    shared = with_shared_nodes([*map(ufl.as_ufl, outputs)])
+    return components(ufl.as_vector(shared)) if outputs else []
 
 
 def _slopes(outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:

@@ -25,8 +25,8 @@ from ufl_beam.dolfinx_compat import VERSIONS
 T = TypeVar("T")
 
 SOURCES = (
-    "assembly", "loops", "material_laws", "embedded_hinges", "material_points", "rigid_plastic",
-    "connectors", "guide_curves", "beam_elimination", "fronts", "newton", "cell_forces",
+    "assembly", "loops", "material_laws", "embedded_hinges", "material_points",
+    "guide_curves", "beam_elimination", "fronts", "newton", "cell_forces",
     "term_phases", "energy_ledger", "derivatives", "adjoint", "blocks", "steps", "oscillators",
 )  # fmt: skip
 """C files in the folder c; they form one translation unit."""

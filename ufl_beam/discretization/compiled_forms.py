@@ -10,10 +10,11 @@ forms that mix a one-point rule with another rule.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
 from itertools import accumulate, islice
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import basix.ufl
@@ -316,10 +317,13 @@ class Kernel:
         return value
 
 
-def with_shared_nodes(expressions: Sequence[Expr]) -> tuple[Expr, ...]:
+def with_shared_nodes(
+    expressions: Sequence[Expr], instead: Mapping[Expr, Expr] = MappingProxyType({})
+) -> tuple[Expr, ...]:
     """Return expressions in which equal nodes are the same object.
 
-    The time in which UFL compares two equal nodes grows exponentially with their depth.
+    The time in which UFL compares two equal nodes grows exponentially with their depth.  Nodes that
+    are keys of ``instead`` are replaced by its values.
     """
     shared: dict[int, Expr] = {}  # the node to use, by the identity of a node
     known: dict[Any, Expr] = {}
@@ -327,6 +331,13 @@ def with_shared_nodes(expressions: Sequence[Expr]) -> tuple[Expr, ...]:
         waiting = [expression]
         while waiting:
             node = waiting[-1]
+            if isinstance(node, Indexed) and node in instead:
+                if id(other := instead[node]) not in shared:
+                    waiting.append(other)
+                else:
+                    shared[id(node)] = shared[id(other)]
+                    waiting.pop()
+                continue
             if missing := [x for x in node.ufl_operands if id(x) not in shared]:
                 waiting += missing
                 continue
@@ -407,12 +418,14 @@ class Pointwise:
         _, source, ((address, sizes),) = self._compiled(outputs)
         return ffi.cast("answer_loop *", point_loop(source, address, sizes) or 0)
 
-    def compile_elements(self, *functions: Sequence[Expr]) -> list[Any]:
+    def compile_elements(
+        self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = MappingProxyType({})
+    ) -> list[Any]:
         """Compile functions of elements together, each an ``element_function`` of loops.h.
 
-        A function without outputs is None.
+        A function without outputs is None.  Nodes that are keys of ``instead`` are replaced.
         """
-        compiled, source, kernels = self._compiled(*filter(None, functions))
+        compiled, source, kernels = self._compiled(*filter(None, functions), instead=instead)
         loops, kind = element_loops(source, kernels), "void (*)(int, const double *, double *)"
         made = [
             struct("element_function", several=ffi.cast(kind, loop or 0), one=one, outputs=sizes[0])
@@ -420,13 +433,16 @@ class Pointwise:
         ]
         return [made.pop(0) if outputs else None for outputs in functions]
 
-    def _compiled(self, *functions: Sequence[Expr]) -> tuple[list[Any], Path, Any]:
+    def _compiled(
+        self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = MappingProxyType({})
+    ) -> tuple[list[Any], Path, Any]:
         """Compile functions as integrals of one form.
 
         Returns:
             C functions, the C file that FFCx wrote, and addresses and sizes of the functions.
         """
-        shared = iter(with_shared_nodes([x for outputs in functions for x in outputs]))
+        every = [x for outputs in functions for x in outputs]
+        shared = iter(with_shared_nodes(every, instead))
         sizes = [(len(outputs), len(self.at), 0) for outputs in functions]
         z = ufl.TestFunction(self.values(most := max(sizes)[0]))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})

@@ -29,7 +29,7 @@ Excess = tuple[Array, float]
 """Momentum and kinetic energy (J) before an impact in addition to those of the velocities: of parts
 with different velocities that begin to share an unknown."""
 
-CELL_TABLES = ("cells", "changes of strains")
+CELL_TABLES = ("cells", "changes of strains", "committed tangents")
 """Tables of internal variables of cells; the other tables are of connectors."""
 
 

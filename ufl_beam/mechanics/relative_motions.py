@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Relative motions of two frames, their variation over a step, and forms of connectors, in UFL.
+"""Relative motions of two frames, and their variation over a step, in UFL.
 
 A frame is a configuration (u_x, u_y, ψ).  Each motion has a function of the frames at both ends of
 a step and of virtual motions of the frames.  The function returns the motion at the end, which is
@@ -12,17 +12,11 @@ the points coincide.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import product
 from typing import NamedTuple
 
-import basix.ufl
 import ufl
 from ufl.core.expr import Expr
 
-from ufl_beam.caches import cached_forms
-from ufl_beam.dolfinx_compat import fem
-from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.kinematics import frame, perpendicular, split
 from ufl_beam.mechanics.time_scheme import Scheme
 
@@ -112,70 +106,3 @@ def sliding(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[E
 
 MOTIONS = {motion.__name__: motion for motion in (turning, stretching, parting, sliding)}
 """Relative motions by name."""
-
-
-# -- forms of connectors ---------------------------------------------------------------------------
-
-
-class ConnectorForms(NamedTuple):
-    """Forms of connectors, and their coefficients."""
-
-    work: ufl.Form  # virtual work, and ``row[:n]·e + row[n] λ - row[n + 1]`` of each motion
-    tangent: ufl.Form  # derivative of ``work`` by ``q1``
-    motion: ufl.Form  # the n relative motions e of each cell
-    rate: ufl.Form  # derivatives of the motions along ``u``
-    change: ufl.Form  # derivative of the tangent along ``u``, with ``bend`` = d row[:n] / de
-    geometry: fem.Function  # :class:`Geometry` of each motion
-    row: fem.Function
-    q0: fem.Function  # configurations and forces λ at the beginning of the step
-    q1: fem.Function  # configurations and forces λ at its end
-    bend: fem.Function
-    u: fem.Function
-
-
-@cached_forms
-def connector_forms(motions: Sequence[str], scheme: Scheme, cell: meshes.Mesh) -> ConnectorForms:
-    """Return forms on cells of unit length between the two nodes of a connector."""
-    n = len(motions)
-    line = basix.ufl.element("Lagrange", "interval", 1)
-    point = basix.ufl.element("DG", "interval", 0)
-    space = fem.functionspace(cell, basix.ufl.mixed_element([line, line, line, *n * [point]]))
-    geometry, row, bend, motions_by_cell = (
-        fem.Function(fem.functionspace(cell, ("DG", 0, (size,))))
-        for size in (8 * n, n * (n + 2), n**3, n)
-    )
-    q0, q1, u = (fem.Function(space) for _ in range(3))
-    (before, _), (now, λ), (w, w_λ) = map(_split, (q0, q1, ufl.TestFunction(space)))
-    dx = ufl.Measure("dx", domain=cell, metadata={"quadrature_degree": 1})
-    dq, z = ufl.TrialFunction(space), ufl.TestFunction(motions_by_cell.function_space)
-    e, e_w = [], []
-    for k, motion in enumerate(motions):
-        at = range(8 * k, 8 * k + 8, 2)
-        mine = Geometry(*(ufl.as_vector([geometry[i], geometry[i + 1]]) for i in at))
-        value, variation = MOTIONS[motion](before, now, w, mine, scheme)
-        e.append(value)
-        e_w.append(variation)
-    de, du = ([ufl.derivative(f, q1, along) for f in e] for along in (dq, u))
-    density, row_sum, motion_sum = 0, 0, 0
-    for i in range(n):
-        first = i * (n + 2)
-        law = sum(row[first + j] * e[j] for j in range(n))
-        density += λ[i] * e_w[i] + w_λ[i] * (law + row[first + n] * λ[i] - row[first + n + 1])
-        motion_sum += e[i] * z[i]
-        for j, k in product(range(n), repeat=2):
-            row_sum += w_λ[i] * bend[n * (n * i + j) + k] * du[k] * de[j]
-    work, by_cell = density * dx, motion_sum * dx
-    tangent = ufl.derivative(work, q1, dq)
-    change = ufl.derivative(tangent, q1, u) + row_sum * dx
-    rate = ufl.derivative(by_cell, q1, u)
-    return ConnectorForms(work, tangent, by_cell, rate, change, geometry, row, q0, q1, bend, u)
-
-
-def _split(q: Expr) -> tuple[Pair, Sequence[Expr]]:
-    """Split a function into the configurations at both ends of a cell, and the forces."""
-    fields = ufl.split(q)
-
-    def at(end: float) -> Expr:
-        return ufl.as_vector([x + end / 2 * ufl.grad(x)[0] for x in fields[:3]])
-
-    return Pair(at(-1.0), at(1.0)), fields[3:]

@@ -270,7 +270,7 @@ class StateWriter:
         for connector in connector_terms:
             rows = at["connectors"].start + columns.shapes["connectors"][1] * connector.indices
             self._add(now, connector.forces_at, rows + FORCE)
-            for field, values in connector.recorded:
+            for field, values in connector.fields:
                 apart = values.strides[0] // values.itemsize * np.arange(len(rows))
                 self._add(self._place(values), apart, rows + Connection._fields.index(field))
         groups = ffi.new("group_columns[]", self._groups)

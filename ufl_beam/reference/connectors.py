@@ -8,19 +8,57 @@ process has all.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
+import basix.ufl
 import numpy as np
+import ufl
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.dolfinx_compat import compile_form, fem, line_mesh
-from ufl_beam.mechanics.relative_motions import connector_forms
+from ufl_beam.dolfinx_compat import mesh as meshes
+from ufl_beam.mechanics.relative_motions import MOTIONS, Geometry, Pair
 from ufl_beam.mechanics.time_scheme import Scheme, Step
 from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.functions import value_at
+
+
+class ConnectorForms(NamedTuple):
+    """Forms of connectors, and their coefficients."""
+
+    work: ufl.Form  # virtual work, and ``a e + b λ - c``
+    tangent: ufl.Form  # derivative of ``work`` by ``q1``
+    motion: ufl.Form  # relative motion e of each cell
+    geometry: fem.Function  # :class:`Geometry`
+    row: fem.Function  # a, b, c
+    q0: fem.Function  # configuration and force λ at the beginning of the step
+    q1: fem.Function  # configuration and force λ at its end
+
+
+def connector_forms(motion: str, scheme: Scheme, cells: meshes.Mesh) -> ConnectorForms:
+    """Return forms on cells of unit length between the two nodes of a connector."""
+    line = basix.ufl.element("Lagrange", "interval", 1)
+    point = basix.ufl.element("DG", "interval", 0)
+    space = fem.functionspace(cells, basix.ufl.mixed_element([line, line, line, point]))
+    geometry, row = (fem.Function(fem.functionspace(cells, ("DG", 0, (n,)))) for n in (8, 3))
+    q0, q1, by_cell = fem.Function(space), fem.Function(space), fem.functionspace(cells, ("DG", 0))
+
+    def split(q: Any) -> tuple[Pair, Any]:
+        """Split a function into the configurations at both ends of a cell, and the force."""
+        *fields, force = ufl.split(q)
+        at = (ufl.as_vector([x + s * ufl.grad(x)[0] for x in fields]) for s in (-0.5, 0.5))
+        return Pair(*at), force
+
+    (before, _), (now, λ), (w, w_λ) = map(split, (q0, q1, ufl.TestFunction(space)))
+    dx = ufl.Measure("dx", domain=cells, metadata={"quadrature_degree": 1})
+    vectors = (ufl.as_vector([geometry[i], geometry[i + 1]]) for i in range(0, 8, 2))
+    e, variation = MOTIONS[motion](before, now, w, Geometry(*vectors), scheme)
+    work = (λ * variation + w_λ * (row[0] * e + row[1] * λ - row[2])) * dx
+    tangent, shown = ufl.derivative(work, q1), e * ufl.TestFunction(by_cell) * dx
+    return ConnectorForms(work, tangent, shown, geometry, row, q0, q1)
 
 
 class Connectors:
@@ -47,7 +85,7 @@ class Connectors:
         self.hinges = {k: Hinge(c, scheme) for k, c in hinges}
         dofs = numbering.dofs_of_connectors[self.indices]
         self.forces_at = dofs[:, 6]
-        self.forms = forms = connector_forms((motion,), scheme, mesh)
+        self.forms = forms = connector_forms(motion, scheme, mesh)
         self._work, self._tangent, self._motion = map(compile_form, forms[:3])
         by_cell = forms.motion.arguments()[0].ufl_function_space()
         self._cells = _cell_dofs(by_cell).ravel()

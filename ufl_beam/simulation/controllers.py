@@ -99,7 +99,8 @@ class Controllers:
             return
         values = np.column_stack([self.values, self._samples, np.full(len(self.values), t)])
         rows = archive.rows("asked", self._indices, values, known=True)
-        self.values[:] = rows[:, 0]
+        changing = [i for i, _ in self._changing]  # other limits are those of the scene
+        self.values[changing] = rows[changing, 0]
         if np.all(rows[:, 3] == t):
             self._samples[:] = rows[:, 1:3]
 
@@ -171,7 +172,9 @@ class ForceWatch:
             "force_watch", number=n, most=ALTERNATIONS, large=LEAST_CHANGE, moved=LEAST_MOTION,
             dof=np.array([group.forces_at[k] for _, group, k in watched], dtype=np.int32),
             value=ffi.new("double *[]", values), fresh=ffi.new("int32_t *[]", fresh),
-            rate=ffi.new("double *[]", [doubles(group.rate) + k for _, group, k in watched]),
+            rate=ffi.new("double *[]", [
+                ffi.cast("double *", group.rate[k:].ctypes.data) for _, group, k in watched
+            ]),
             length=np.array([1.0 if c.is_rotation else size for c in self._connectors]),
             force=none[0], change=none[1], largest=none[2], told=self._told,
             count=np.zeros(n, dtype=np.int32),

@@ -25,7 +25,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
-from ufl_beam.model.connector_laws import Coulomb, Damper, ForceLaw, Spring, Stop
+from ufl_beam.model.connector_laws import Coulomb, Damper, ForceLaw, RigidPlastic, Spring, Stop
 from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.model.loads import Rayleigh
 from ufl_beam.model.material_law import MaterialLaw, dissipation_must_grow, has_quadratic_energies
@@ -37,7 +37,6 @@ from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.factorization import Factorization
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vectors
-from ufl_beam.terms.connector_rows import RigidPlasticLaws
 from ufl_beam.terms.term import KINDS
 
 LEAST_NAMED = 0.1
@@ -239,8 +238,8 @@ def _deformations(equation: StepEquation, q: Array, x: Array, most: float = SOFT
         except StepFailed:
             continue  # beyond the end of a guide, which the failure of the step reports
         connectors[group.indices] = np.abs(change)
-        left[group.indices] = group.response.remaining()
-        if isinstance(group.response, RigidPlasticLaws):
+        left[group.indices] = group.remaining()
+        if isinstance(group.law, RigidPlastic):
             # A held connector cannot move, so one that moves slips in the latest tangent.
             left[group.indices[np.abs(change) >= LEAST_NAMED]] = 0.0
     connectors /= np.where(

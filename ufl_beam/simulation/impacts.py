@@ -112,7 +112,7 @@ class Impacts:
     def __init__(self, equation: StepEquation) -> None:
         self._equation, self._held = equation, equation.supports.dofs
         terms = equation.connector_terms
-        self._terms = [term for term in terms if isinstance(term.connectors[0].law, HOLDING)]
+        self._terms = [term for term in terms if isinstance(term.law, HOLDING)]
         motions = {dof: motion for dof, motion, _ in equation.supports.motions}
         connectors = [c for term in self._terms for c in term.connectors]
         self._functions = [motions.get(int(dof)) for dof in self._held]

@@ -162,19 +162,24 @@ class ReferenceRun(Solver, PresentState):
             self._history[group.indices, 0] = group.e0
             self._history[group.indices, FORCE] = q[group.forces_at]
             for name in self._tables(group) if internal else ():
-                self._restore(group, internal.get(name, np.zeros((0, 5))))  # type: ignore[union-attr]
+                self._restore(group, name, internal.get(name, np.zeros((0, 0))))  # type: ignore[union-attr]
         if not self.fresh and not self.dynamic:
             self._reactions = self._held(self.forces() - self.load)
 
-    def _restore(self, group: Connectors, table: Array) -> None:
+    def _restore(self, group: Connectors, name: str, table: Array) -> None:
         """Restore the rows of connectors in a table of :meth:`_tables`."""
+        recorded, forces = (name.startswith(x) for x in ("recorded", "forces"))
         for k, index in enumerate(group.indices):
-            for row in table[table[:, 0] == index]:
-                self._history[index, [WORK, RATE, FORCE, 0]] = row[1:5]
-                if k in group.hinges:
-                    hinge = group.hinges[k]
-                    hinge.opening, hinge.e0, _, _, hinge.dissipated, flows, _ = map(float, row[5:])
-                    hinge.flows, self._history[index, DISSIPATED] = int(flows), hinge.dissipated
+            for row in table[table[:, :1].ravel() == index, 1:]:
+                if recorded:
+                    self._history[index, [0, WORK, RATE]] = row[:3]
+                elif forces:
+                    self._history[index, FORCE] = row[0]
+                if (hinge := group.hinges.get(k)) and recorded:
+                    self._history[index, DISSIPATED] = hinge.dissipated = float(row[3])
+                elif hinge and not forces:
+                    hinge.opening, hinge.e0, _, _, flows = map(float, row)
+                    hinge.flows = int(flows)
 
     def _held(self, forces: Array) -> Array:
         """Return the forces on prescribed coordinates; (size,)."""
@@ -390,16 +395,20 @@ class ReferenceRun(Solver, PresentState):
         return whole | {"reactions": self._reactions}
 
     def _tables(self, group: Connectors) -> State:
-        """Return works, rates, forces, motions and variables of connectors, by kind of law."""
+        """Return recorded numbers and states of connectors, as :class:`ConnectorBlock` does."""
         tables: dict[str, list[list[float]]] = {}
         for k, index in enumerate(group.indices):
-            name = "_Held, 4" if group.connectors[k].law is RIGID else "_Driven, 4"
-            row = [index, *self._history[index, [WORK, RATE, FORCE, 0]]]
+            name = "Held" if group.connectors[k].law is RIGID else "Driven"
+            motion, work, rate, force = self._history[index, [0, WORK, RATE, FORCE]]
+            recorded, state = [motion, work, rate], list[float]()
             if h := group.hinges.get(k):
-                name = "CompiledSlips, 11"
-                row += [h.opening, h.e0, h.limit, 0.0, h.dissipated, h.flows, 0.0]
-            tables.setdefault(name, []).append(row)
-        return {name: np.array(rows) for name, rows in tables.items()}
+                name = "Hinged"
+                recorded += [h.dissipated, group.e0[k]]
+                state += [h.opening, h.e0, h.limit, 0.0, h.flows]
+            rows = {f"recorded of {name}": recorded, f"forces of {name}": [force], name: state}
+            for kind, row in rows.items():
+                tables.setdefault(f"{kind}, {len(row)}", []).append([index, *row])
+        return {name: np.array(rows) for name, rows in tables.items() if rows[0][1:]}
 
     def velocities(self) -> list[Array]:
         """Return a list with the velocities; empty in statics."""

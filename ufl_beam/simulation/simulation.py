@@ -212,7 +212,7 @@ class Simulation(Stepper):
     def _require_held(equation: StepEquation, q: Array) -> None:
         """Raise if a joint or link does not fit the state with which a continued run begins."""
         for group in equation.connector_terms:
-            if group.connectors[0].law is RIGID:
+            if group.law is RIGID:
                 size = equation.subdomain.numbering.scene.size
                 require_held(group.connectors, group.motion(q), size)
 
@@ -224,7 +224,7 @@ class Simulation(Stepper):
         assert inertia is not None
         inertia.commit(v, v, inertia.c.last_dt)
         inertia.keep()  # accelerations are unknown
-        groups = [(term.indices, dict(term.recorded)["work"]) for term in equation.connector_terms]
+        groups = [(term.indices, dict(term.fields)["work"]) for term in equation.connector_terms]
         share = float(equation.subdomain.comm.rank == 0)
         self._impacts.enter(impact, equation.ledger, groups, share)
 

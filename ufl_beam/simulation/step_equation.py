@@ -15,6 +15,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import Block, BlockSetting
+from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, viscosity
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.works import work_blocks
@@ -35,8 +36,6 @@ from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.terms.beam_forces import Cells, ElasticBeams, InelasticBeams
 from ufl_beam.terms.boundary_conditions import Supports
 from ufl_beam.terms.cell_forces import CellForces
-from ufl_beam.terms.connector_forces import connector_terms
-from ufl_beam.terms.connector_rows import Setting
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.imposed_strains import CellStrains, ImposedStrains
 from ufl_beam.terms.inertia_and_damping import BEFORE, Inertia, rayleigh_forces
@@ -86,7 +85,11 @@ class StepEquation:
         setting = (scheme, A, ledger)
         inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
         self.inertia = inertia
-        in_blocks = BlockSetting(subdomain, *setting, t0, inertia.c if inertia else None)
+        self.controllers = Controllers(subdomain)
+        in_blocks = BlockSetting(
+            subdomain, *setting, t0, inertia.c if inertia else None, search, switched,
+            self.controllers.place, friction_repeats(scene),
+        )  # fmt: skip
         strains = [load for load in scene.loads if isinstance(load, ImposedStrain)]
         imposed = ImposedStrains(strains, subdomain, scheme, ledger, t0) if strains else None
 
@@ -117,12 +120,7 @@ class StepEquation:
             if scheme.lost_fraction:
                 others.append(second_differences(subset, in_blocks))
 
-        self.controllers = Controllers(subdomain)
-        connectors = Setting(
-            self.controllers.place, None if inertia is None else inertia.c, scene, scheme,
-            ledger, friction_repeats(scene), search, switched,
-        )  # fmt: skip
-        self.connector_terms = together(connector_terms, subdomain, connectors, A)
+        self.connector_terms = together(connector_terms, in_blocks)
 
         self.loads: list[LoadTerm] = dead_loads(subdomain, scheme, ledger)
         if scene.works:

@@ -276,7 +276,6 @@ def differences(
 
 LINEARIZE = {
     "form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads",
-    "connectors": "tabulate_connectors",
     "differences": "begin_neighbours",
     "guides": "find_tangents_before", "imposed": "find_imposed_directions",
     "damping": "tabulate_damping", "block": "tabulate_block",
@@ -286,7 +285,6 @@ ACCEPT = {
     for name in (
         "points",
         "load",
-        "connectors",
         "differences",
         "imposed",
         "block",
@@ -315,7 +313,6 @@ TRANSPOSES = {
     "form": ("", "transpose_form", "finish_form"),
     "points": ("transpose_points_state", "transpose_points", "finish_points"),
     "product": ("", "transpose_product", ""),
-    "connectors": ("transpose_connectors_state", "transpose_connectors", "finish_connectors"),
     "load": ("", "transpose_loads", ""),
     "shape": ("", "transpose_shape", ""),
     "differences": ("", "transpose_differences", ""),
@@ -351,7 +348,15 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
             (b.state, 8 * b.batches * b.states * b.lanes),
             (b.shared, 8 * b.groups * b.shares),
         ]
-        return [*states, *(rates(b.nodal) if b.rates else ())]
+        alike = [b, *(data.neighbour[i] for i in range(data.parameters * data.neighbours))]
+        times = [pair for x in alike for pair in ((x.t, 16), (x.before, 8 * b.functions))]
+        at = b.width - b.modes
+        modes = [
+            (b.w + (c * b.width + at) * b.lanes, 8 * b.modes * b.lanes)
+            for c in range(b.batches if b.modes else 0)
+        ]
+        inner = recorded("points", data.inner) if data.inner else []
+        return [*states, *times, *modes, *inner, *(rates(b.nodal) if b.rates else ())]
     if kind == "form":
         return [table(data)]
     if kind == "shape":
@@ -372,30 +377,9 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
     if kind == "guides":
         g = data.guides
         return [(x, 8 * g.number) for x in (g.s0, g.step)]
-    if kind == "connectors":
-        c, blocks = data.term.connectors, [table(data.motions), (data.dt, 8)]
-        if data.by_geometry:
-            blocks.append(table(data.by_geometry))
-        laws = c.laws or c.rigid_plastic
-        if data.J:
-            blocks.append((data.J, 8 * c.number * data.outputs))
-        if laws:
-            blocks.append((laws.w, 8 * c.number * laws.width))
-        if data.by_parameter:
-            blocks.append((data.by_parameter, 8 * data.parameters * c.number * data.rows))
-        if c.rigid_plastic:
-            blocks.append((c.rigid_plastic.direction, 4 * c.number))
-        if f := c.friction:
-            blocks += [table(rate) for rate in (data.rate_by_v, data.rate_by_q0) if rate]
-            blocks += [(x, 8 * c.number) for x in (f.slip, f.creep)]
-            blocks += [(x, 4 * c.number) for x in (f.sticks, f.against)]
-            blocks += [(f.limit[i], 8) for i in range(c.number)]
-        return [*blocks, *((x, 8 * c.number * c.components) for x in (c.e0, c.e1))]
     if kind == "points":
-        points, blocks = data.points, [table(data.strains)]
+        points, blocks = data.points, [table(data.strains)] if data.strains else []
         number = points.cells * points.of_cell
-        if data.by_geometry:
-            blocks.append(table(data.by_geometry))
         if data.shape:
             blocks += recorded("shape", data.shape)
         return [

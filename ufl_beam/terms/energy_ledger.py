@@ -15,29 +15,12 @@ from ufl_beam.compiled.c_library import doubles
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.display import Rich
 from ufl_beam.model.connector_law import CONTRIBUTIONS
-from ufl_beam.model.connector_laws import (
-    Controller,
-    Coulomb,
-    Damper,
-    PrescribedForce,
-    PrescribedMotion,
-)
 
 EXPLAINED = 0.1
 """Least ratio of estimated round-off to imbalance at which round-off explains the imbalance."""
 
 ROUND_OFF_ENERGY = 1e-3
 """Largest ratio of stored and lost energy to transferred energy at which works are round-off."""
-
-LEDGER_ENTRIES = {
-    PrescribedMotion: ("_Driven", "supplied", "motors", -1.0),
-    PrescribedForce: ("_Pushed", "supplied", "loads", -1.0),
-    Controller: ("_Controlled", "supplied", "controllers", -1.0),
-    Damper: ("_Damped", "lost", "damping", 1.0),
-    Coulomb: ("_Rubbing", "lost", "friction", 1.0),
-}
-"""For each law of connectors with an entry of its own: name in files; part of the ledger, entry,
-and sign of the work of its forces."""
 
 
 class Account(Mapping[str, float]):

@@ -243,6 +243,8 @@ class Callbacks:
                 points = [np.array(x, dtype=np.float64) for x in (function.times, function.values)]
                 place.points, (place.t, place.y) = len(points[0]), map(doubles, points)
                 self._alive += points
+            elif isinstance(function, ffi.CData):  # the address of a number
+                place.points, place.t, place.y = 1, function, function
             elif function is not None:
                 place.value = lib.time_in_python
                 place.handle = self.handle(partial(value_at, function, owner=owner))

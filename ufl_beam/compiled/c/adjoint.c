@@ -275,14 +275,10 @@ void transpose_points_state(void *self, adjoint *a)
     for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
     transpose_tables(m->strains, m->e1, 0, 0, a->q1);
     if (m->shape) transpose_shape_of(m->shape, a, m->e1);
-  } else {
-    for (int i = 0; i < p->cells; ++i) m->r[i] = m->e1[3 * i];
-    transpose_tables(m->strains, m->r, 0, 0, a->q1);
-    if (m->by_geometry) transpose_tables(m->by_geometry, m->r, 0, m->by_geometry->bar, 0);
   }
 }
 
-/* Derivatives by the resultants, or by the rows of springs, to those by the state before the step. */
+/* Derivatives by the resultants to those by the state before the step. */
 void transpose_points(void *self, adjoint *a, const double *λ)
 {
   const point_derivatives *m = self;
@@ -293,8 +289,7 @@ void transpose_points(void *self, adjoint *a, const double *λ)
   memset(m->e1, 0, 3 * (size_t)p->cells * sizeof *m->e1);
   for (int c = 0; c < p->cells; ++c) {
     const double *e0 = p->e0 + 3 * c, *e1 = p->e1 + 3 * c;
-    const double of_spring[3] = {m->springs ? m->row_bar[3 * c + 2] : 0};
-    const double *r_bar = m->springs ? of_spring : m->r_bar + 3 * c;
+    const double *r_bar = m->r_bar + 3 * c;
     for (int k = 0; k < 3; ++k) {
       m->e0_bar[3 * c + k] += p->rest[k] * (1 - θ) * r_bar[k];
       m->e1[3 * c + k] += p->rest[k] * θ * r_bar[k];
@@ -337,127 +332,6 @@ void finish_points(void *self, adjoint *a)
   add_products(a, 3, m->rest_bar, m->rest);
   add_products(a, 3 * strains, m->tangents_bar, m->tangents);
   add_products(a, strains, m->elastic_bar, m->elastic);
-  if (m->by_geometry) finish_form(m->by_geometry, a);
-}
-
-/* -- connectors ---------------------------------------------------------------------------------------- */
-
-/* Derivatives by a row of the table of connector i to those by its inputs and by parameters; the transpose
- * of change_of_row. */
-static void add_row_of_law(const connector_derivatives *m, adjoint *a, int i, int row, double factor, double *x_bar)
-{
-  const double *J = m->J + (size_t)i * m->outputs + row * m->columns;
-  const int number = m->term->connectors->number;
-  for (int j = 0; j < m->columns; ++j) x_bar[m->column[j]] += factor * J[j];
-  for (int p = 0; m->by_parameter && p < a->parameters; ++p)
-    a->gradient[p] += factor * m->by_parameter[((size_t)p * number + i) * m->rows + row];
-}
-
-/* From the slip of a rigid-plastic connector to the motion at the end and at the beginning of the slip. */
-static void enter_slip(const double *w, double slip_bar, double *motion_bar, double *w_bar)
-{
-  if (!(w[SLIP] > 0)) return;
-  if (motion_bar) *motion_bar += w[SLIP_DIRECTION] * slip_bar;
-  w_bar[SLIP_START] -= w[SLIP_DIRECTION] * slip_bar;
-}
-
-void transpose_connectors_state(void *self, adjoint *a)
-{
-  const connector_derivatives *m = self;
-  const connectors *c = m->term->connectors;
-  const int n = c->components, all = n * c->number;
-  double *x = a->values;
-  memcpy(m->e1, m->e0_bar, all * sizeof *m->e1);
-  memset(m->e0_bar, 0, all * sizeof *m->e1);
-  for (int i = 0; i < c->number; ++i) {
-    double *w_bar = m->w_bar + (size_t)i * m->width;
-    if (c->laws || c->asked) {
-      double *state = w_bar + 2 * n + 2;
-      memset(x, 0, m->width * sizeof *x);
-      for (int j = 0; j < m->variables; ++j) add_row_of_law(m, a, i, n + j, state[j], x), state[j] = 0;
-      for (int j = 0; j < n; ++j) m->e1[n * i + j] += x[j], m->e0_bar[n * i + j] += x[n + j];
-      for (int j = 2 * n; j < m->width; ++j) w_bar[j] += x[j];
-    } else if (c->rigid_plastic) {
-      const double *w = c->rigid_plastic->w + (size_t)i * c->rigid_plastic->width;
-      enter_slip(w, w_bar[SLIPPED] + w[SLIP_DIRECTION] * w_bar[SLIP_START], m->e1 + i, w_bar);
-    }
-  }
-  transpose_tables(m->motions, m->e1, 0, 0, a->q1);
-  if (m->by_geometry) transpose_tables(m->by_geometry, m->e1, 0, m->by_geometry->bar, 0);
-}
-
-/* From the last number in the rows of friction to the state before the step, to the inputs of laws and to
- * the limits; the transpose of friction_row. */
-static void transpose_friction(const connector_derivatives *m, adjoint *a)
-{
-  const connectors *c = m->term->connectors;
-  const friction *f = c->friction;
-  double *x = a->values;
-  for (int i = 0; i < c->number; ++i) {
-    const double row_bar = m->row_bar[3 * i + 2];
-    const double limit_bar = row_bar * (f->sticks[i] ? motion_by_limit(c, i, a->d->x) : f->slip[i]);
-    m->way[i] = f->sticks[i] && m->rate_by_v ? row_bar * way_by_rate(f, i) : 0;
-    if (f->sticks[i]) m->e0_bar[i] += row_bar;
-    if (c->laws) {
-      double *w_bar = m->w_bar + (size_t)i * m->width;
-      memset(x, 0, m->width * sizeof *x);
-      add_row_of_law(m, a, i, f->sticks[i] ? 1 + m->variables : 0, limit_bar, x);
-      m->e0_bar[i] += x[1];
-      for (int j = 2; j < m->width; ++j) w_bar[j] += x[j];
-    } else m->limit_bar[i] += limit_bar;
-  }
-  if (m->rate_by_v) transpose_tables(m->rate_by_v, m->way, 0, 0, a->rates[1]);
-  if (m->rate_by_q0) transpose_tables(m->rate_by_q0, m->way, 0, 0, a->q0);
-}
-
-void transpose_connectors(void *self, adjoint *a, const double *λ)
-{
-  const connector_derivatives *m = self;
-  const connector_term *t = m->term;
-  const connectors *c = t->connectors;
-  const int n = c->components;
-  double *x = a->values;
-  if (m->now) find_prescribed(m, a->step);
-  if (c->friction) {
-    transpose_friction(m, a);
-    return;
-  }
-  for (int i = 0; i < c->number; ++i) {
-    const double *row_bar = m->row_bar + n * (n + 2) * i + n + 1;
-    double *w_bar = m->w_bar + (size_t)i * m->width;
-    if (c->laws || c->asked) {
-      memset(x, 0, m->width * sizeof *x);
-      for (int j = 0; j < n; ++j) add_row_of_law(m, a, i, j, row_bar[j * (n + 2)], x);
-      for (int j = 0; j < n; ++j) m->e0_bar[n * i + j] += x[n + j];
-      for (int j = 2 * n; j < m->width; ++j) w_bar[j] += x[j];
-    } else if (c->rigid_plastic) {
-      const rigid_plastic *of = c->rigid_plastic;
-      const double *w = of->w + (size_t)i * of->width;
-      if (!of->direction[i]) w_bar[SLIP_START] += *row_bar;
-      else {
-        memset(x, 0, of->width * sizeof *x);
-        add_row_of_law(m, a, i, 0, -*row_bar / of->slope[i], x);
-        enter_slip(w, x[SLIP], 0, w_bar);
-        x[SLIP] = 0;
-        for (int j = 0; j < of->width; ++j) w_bar[j] += x[j];
-      }
-    } else if (t->viscosity) {
-      m->viscosity_bar[i] += *row_bar * (c->e1[i] - c->e0[i]) / *m->dt;
-      m->e0_bar[i] -= *row_bar * t->viscosity[i] / *m->dt;
-    } else if (m->now)
-      for (int p = 0; p < a->parameters; ++p) a->gradient[p] += *row_bar * m->now[p * c->number + i];
-  }
-}
-
-void finish_connectors(void *self, adjoint *a)
-{
-  const connector_derivatives *m = self;
-  const connectors *c = m->term->connectors;
-  const size_t all = (size_t)m->width * c->number;
-  add_products(a, all, m->w_bar, m->w);
-  add_products(a, c->number, m->viscosity_bar, m->viscosity);
-  if (c->friction && !c->laws) add_products(a, c->number, m->limit_bar, m->limit);
-  if (m->by_geometry) finish_form(m->by_geometry, a);
 }
 
 /* -- inertia, damping, loads ----------------------------------------------------------------------------- */

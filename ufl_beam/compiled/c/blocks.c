@@ -39,7 +39,14 @@ static inline double *input(const element_block *b, int c, int i) { return b->w 
 
 /* Indices of the first number of the state, and of the first number of the step. */
 static inline int first_state(const element_block *b) { return (2 + b->rates) * b->unknowns; }
-static inline int first_of_step(const element_block *b) { return b->width - b->steps; }
+static inline int first_of_step(const element_block *b) { return b->width - b->modes - b->steps; }
+
+/* Set a mode of all elements. */
+static void set_mode(const element_block *b, enum mode_of_block mode, double value)
+{
+  FOR_ACTING(b, c)
+    for (int l = 0; l < b->lanes; ++l) input(b, c, b->width - b->modes + mode)[l] = value;
+}
 
 /* Write the configuration q into the motions of elements, from the input `first` on. */
 static void gather(const element_block *b, const double *q, int first)
@@ -52,14 +59,16 @@ static void gather(const element_block *b, const double *q, int first)
   }
 }
 
-/* Add numbers of elements, `each` of them, to `out` at indices. */
-static void scatter(const element_block *b, int each, const double *values, const int32_t *index, double *out)
+/* Add the first `each` outputs of a function of elements to `out` at indices. */
+static void scatter(const element_block *b, const element_function *f, int each, const double *values,
+                    const int32_t *index, double *out)
 {
   const int n = b->lanes;
   FOR_ACTING(b, c)
     for (int i = 0, some = elements_in(b, c); i < each; ++i) {
-      const size_t at = ((size_t)c * each + i) * n;
-      for (int l = 0; l < some; ++l) out[index[at + l]] += values[at + l];
+      const int32_t *at = index + ((size_t)c * each + i) * n;
+      const double *x = values + ((size_t)c * f->outputs + i) * n;
+      for (int l = 0; l < some; ++l) out[at[l]] += x[l];
     }
 }
 
@@ -74,7 +83,7 @@ static void find_numbers_of_step(const element_block *b, const time_step *step)
   const double time[TIMES_OF_NUMBERS] = {
     [TIME_NOW] = now, [TIME_WHOLE] = t1, [TIME_BEFORE] = t, [TIME_BETWEEN] = a * t + (1 - a) * now, [TIME_END] = end,
     [TIME_HALF_BEFORE] = now - half, [TIME_HALF_AFTER] = now + half, [TIME_LATER] = end + later,
-    [TIME_TWICE_LATER] = end + 2 * later,
+    [TIME_TWICE_LATER] = end + 2 * later, [TIME_WHOLE_MOTION] = step->motion_time,
   };
   double *more = b->now + b->functions;
   b->t[1] = end;
@@ -128,17 +137,92 @@ static void take_inputs(const element_block *b, const time_step *step)
   }
 }
 
+/* Modes before the first iterate: those of the last step, or zero. */
+void begin_block_again(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const element_block *b = self;
+  const int n = b->lanes;
+  set_mode(b, MODE_FRESH, 1);
+  for (int k = 0; b->mode_of && k < b->modes - FIRST_MODE; ++k)
+    FOR_ACTING(b, c)
+      for (int l = 0; l < n; ++l)
+        input(b, c, b->width - b->modes + FIRST_MODE + k)[l] =
+          b->begins[k] < 0 ? 0 : b->state[((size_t)c * b->states + b->begins[k]) * n + l];
+}
+
+/* Lines of springs: the force of a material point and its derivative by the motion. */
+static void find_lines(const element_block *b)
+{
+  const int n = b->lanes, first = b->width - b->modes + FIRST_MODE;
+  const points *p = b->inner->points;
+  for (int i = 0; i < b->elements; ++i)
+    p->e1[3 * i] = b->out[((size_t)(i / n) * b->end_of->outputs + b->states + b->shares) * n + i % n];
+  respond(b->inner->points);
+  for (int i = 0; i < b->elements; ++i) {
+    double *slope = input(b, i / n, first) + i % n;
+    slope[0] = p->D[9 * i], slope[n] = p->r[3 * i];
+  }
+}
+
+/* Modes at the present motions, which are the first recorded numbers. Held elements keep theirs; the excess measures by how much that is violated. */
+static void find_modes(const element_block *b)
+{
+  const int n = b->lanes, first = b->width - b->modes, modes = b->modes - FIRST_MODE;
+  const int holds = b->opens && b->search[HOLD];
+  if (!b->mode_of) {
+    evaluate(b, b->end_of, b->out);
+    if (b->inner) find_lines(b);
+    else b->ask(b->asked);
+    set_mode(b, MODE_FRESH, 0);
+    return;
+  }
+  FOR_ACTING(b, c)
+    for (int l = 0; l < n; ++l) input(b, c, first + MODE_HELD)[l] = holds && !b->free[c * n + l];
+  evaluate(b, b->mode_of, b->out);
+  FOR_ACTING(b, c) {
+    const double *out = b->out + (size_t)c * b->mode_of->outputs * n, *excess = out + modes * n, *opened = excess + n;
+    memcpy(input(b, c, first + FIRST_MODE), out, modes * n * sizeof *out);
+    for (int l = 0; l < elements_in(b, c); ++l) {
+      b->excess[c * n + l] = excess[l];
+      if (excess[l] > 0) b->search[OVER] = 1;
+      if (opened[l] > 0) b->search[OPENED] = 1;
+    }
+  }
+  set_mode(b, MODE_FRESH, 0);
+}
+
+/* Compute the response of springs at q. */
+void respond_springs(const element_block *b, const double *q)
+{
+  gather(b, q, 0);
+  find_modes(b);
+}
+
+/* Note whether a law began or ceased to hold since the latest residual. */
+static void find_holds(const element_block *b)
+{
+  const int n = b->lanes, k = b->laws;
+  FOR_ACTING(b, c)
+    for (int i = 0; i < k * elements_in(b, c); ++i) {
+      const size_t at = (size_t)c * b->force_of->outputs + b->unknowns + i % k * (k + 2);
+      const int holds = (*b->each)[at * n + i / k] != 0;
+      int32_t *before = b->holds + c * n * k + i;
+      if (holds != *before) *before = holds, *b->switched = 1;
+    }
+}
+
 void begin_block(void *self, const time_step *step, const double *q1, const double *s)
 {
   const element_block *b = self;
   take_inputs(b, step);
+  if (b->modes) begin_block_again(self, step, q1, s);
   /* For the size of loads: iterates of a failed step may be far away, and a first step has no forces before it. */
   if (*b->begun) memcpy(b->force, b->force_before, b->size * sizeof *b->force);
   else if (b->size) {
     gather(b, step->q0, 0);
     evaluate(b, b->force_of, b->out);
     memset(b->force, 0, b->size * sizeof *b->force);
-    scatter(b, b->unknowns, b->out, b->at, b->force);
+    scatter(b, b->force_of, b->unknowns, b->out, b->at, b->force);
   }
 }
 
@@ -146,13 +230,15 @@ void add_block(void *self, const double *q, double *r)
 {
   const element_block *b = self;
   gather(b, q, 0);
+  if (b->modes) find_modes(b);
   evaluate(b, b->force_of, *b->each);
+  if (b->modes) find_holds(b);
   if (!b->size) {
-    scatter(b, b->unknowns, *b->each, b->dofs, r);
+    scatter(b, b->force_of, b->unknowns, *b->each, b->dofs, r);
     return;
   }
   memset(b->force, 0, b->size * sizeof *r);
-  scatter(b, b->unknowns, *b->each, b->at, b->force);
+  scatter(b, b->force_of, b->unknowns, *b->each, b->at, b->force);
   for (int i = 0; i < b->size; ++i) r[b->dof[i]] += b->force[i];
 }
 
@@ -160,8 +246,43 @@ void add_block_tangent(void *self, const double *q, double *tangent)
 {
   const element_block *b = self;
   gather(b, q, 0);
+  if (b->modes) set_mode(b, MODE_STIFFENED, b->search[STIFF] == STIFFEST);
   evaluate(b, b->tangent_of, b->out);
-  scatter(b, b->tangent_of->outputs, b->out, b->entry, tangent);
+  scatter(b, b->tangent_of, b->tangent_of->outputs, b->out, b->entry, tangent);
+}
+
+/* Power of an element, whose inputs are in b->space, after a fraction of the step; J per step. */
+static double power_at(const element_block *b, double fraction)
+{
+  double power;
+  b->space[first_state(b) + b->states] = fraction;
+  ask(b->power_of->one, b->space, 1, &power);
+  return power;
+}
+
+/* Largest number of halvings of a path, and error of Simpson's rule as a fraction of the work. */
+enum { HALVINGS = 14 };
+static const double WORK_ERROR = 1e-7;
+
+/* Work between the fractions s and t by Simpson's rule, halved where the powers have kinks. */
+static double work_between(const element_block *b, double s, double t, double at_s, double at_t, int halvings, double size)
+{
+  const double middle = (s + t) / 2, at = power_at(b, middle), mean = (at_s + at_t) / 2;
+  if (halvings >= 3 && (halvings == HALVINGS || fabs(at - mean) * (t - s) <= WORK_ERROR * size))
+    return (t - s) * (mean + 2 * at) / 3;
+  return work_between(b, s, middle, at_s, at, halvings + 1, size) + work_between(b, middle, t, at, at_t, halvings + 1, size);
+}
+
+/* Replace the first number of each element by its work on the path of the step. */
+static void find_works(const element_block *b)
+{
+  const int n = b->lanes;
+  FOR_ACTING(b, c)
+    for (int l = 0; l < n; ++l) {
+      for (int i = 0; i < b->width; ++i) b->space[i] = input(b, c, i)[l];
+      const double before = power_at(b, 0), now = power_at(b, 1), size = fabs(before) + fabs(now) + fabs(power_at(b, 0.5));
+      input(b, c, first_state(b) + b->states)[l] = work_between(b, 0, 1, before, now, 0, size);
+    }
 }
 
 /* Compute new states and energies. Stored energies are kept for add_energy_of_block. */
@@ -171,15 +292,24 @@ void end_step_of_block(const element_block *b, const double *q, enum end_of_step
   double *sum = b->new_shared;
   if (!b->end_of) return;
   gather(b, q, 0);
+  if (b->power_of) find_works(b);
   evaluate(b, b->end_of, b->out);
+  if (what == COMPUTE) return;
   if (what != TRIAL) memset(b->energy, 0, b->stored * sizeof(double));
   memset(sum, 0, b->groups * b->shares * sizeof *sum);
   FOR_ACTING(b, c) {
-    const double *out = b->out + (size_t)c * b->end_of->outputs * n, *shared = out + states, *energy = shared + b->shares * n;
+    const double *out = b->out + (size_t)c * b->end_of->outputs * n, *shared = out + states;
+    const double *record = shared + b->shares * n, *energy = record + b->recorded * n;
     const int some = elements_in(b, c);
     if (what >= BEGIN) memcpy(b->state + (size_t)c * states, out, states * sizeof *out);
     for (int i = 0; i < b->shares; ++i)
       for (int l = 0; l < some; ++l) sum[b->group[c * n + l] * b->shares + i] += shared[i * n + l];
+    for (int i = 0; i < b->recorded && what != TRIAL; ++i)
+      for (int l = 0; l < some; ++l) {
+        double *x = b->record + (c * n + l) * b->recorded + i, value = record[i * n + l];
+        if (b->recorded_kind[i] == RECORDED_STATE || what == ACCEPT)
+          *x = value + (b->recorded_kind[i] >= RECORDED_TOTAL ? *x : 0);
+      }
     for (int i = 0; i < energies && what != TRIAL; ++i)
       for (int l = 0; l < some; ++l)
         if (i < b->stored) b->energy[i] += energy[i * n + l];
@@ -207,9 +337,49 @@ void add_energy_of_block(void *self, const time_step *step, const double *q1, co
   for (int i = 0; i < b->stored; ++i) *b->entries[i] += b->energy[i];
 }
 
-/* Add the derivative of the tangent at q in the direction u; w is space for all inputs and for the motions in u. */
-void add_change_of_tangent(const element_block *b, const element_function *f, const double *q, const double *u, double *w,
-                           double *tangent)
+/* Largest residual of a law. Residuals of motions are divided by 1 % of `moved`, which is at most the size of the
+ * scene; residuals of forces are divided by `scale`. Round-off of the motions does not count; it grows with the
+ * distance from the initial position and with the number of turns.
+ *
+ * A law with internal variables computes its force from the elastic part of a motion, which has the round-off of the
+ * motions at both ends of the step. Times the elastic stiffness it is all that remains of the force of a spring that
+ * has failed, where the slope of the law and `scale` vanish. The law and the unknown force, which is the law of an
+ * earlier iterate, err by half a digit each. */
+double missed_by_block(void *self, const double *q, const double *r, double scale, double moved)
+{
+  const element_block *b = self;
+  const int n = b->lanes, k = b->laws, motions = b->unknowns - k;
+  const double amplitude = moved / b->scene;
+  double most = 0;
+  FOR_ACTING(b, c)
+    for (int l = 0; l < elements_in(b, c); ++l) {
+      const int32_t *dofs = b->dofs + (size_t)c * b->unknowns * n + l;
+      const double *slope = *b->each + ((size_t)c * b->force_of->outputs + b->unknowns) * n + l;
+      double far = amplitude;
+      for (int i = 0; i < motions; ++i)
+        far = fmax(far, amplitude + fabs(q[dofs[i * n]]) / (3 * i < 2 * motions ? b->scene : 1));
+      for (int j = 0; j < k; ++j, slope += (k + 2) * n) {
+        const double force = fabs(slope[n]) * scale * b->scene / b->length[j];
+        const double size = *slope ? 0.01 * b->length[j] * amplitude : force;
+        double reach = 0; /* of the motions in the law */
+        for (int i = 0; i < k; ++i) reach += fabs(slope[(i + 2) * n]) * b->length[i];
+        double round_off = 8 * reach * last_digit(far);
+        if (b->stiffness) {
+          const int at = (c * n + l) * k + j;
+          const double farthest = fmax(far, fabs(b->record[(size_t)at * (b->recorded / k)]) / b->length[j]);
+          round_off = fmax(round_off, fabs(slope[n]) * b->stiffness[at] * b->length[j] * last_digit(farthest));
+        }
+        const double left = fabs(r[dofs[(motions + j) * n]]) - round_off;
+        if (left > 0) most = fmax(most, left / size);
+      }
+    }
+  return most;
+}
+
+/* The outputs of a function at q that depends on the direction u, too; with a tangent, add them to entries. w is
+ * space for all inputs and for the motions in u. */
+void evaluate_along(const element_block *b, const element_function *f, const double *q, const double *u, double *w,
+                    const int32_t *entry, double *tangent)
 {
   element_block more = *b;
   more.w = w, more.width = b->width + b->unknowns;
@@ -218,7 +388,7 @@ void add_change_of_tangent(const element_block *b, const element_function *f, co
   gather(&more, q, 0);
   gather(&more, u, b->width);
   evaluate(&more, f, b->out);
-  scatter(b, f->outputs, b->out, b->entry, tangent);
+  if (tangent) scatter(b, f, f->outputs, b->out, entry, tangent);
 }
 
 /* -- derivatives ----------------------------------------------------------------------------------------- */
@@ -242,8 +412,19 @@ static void find_directions_of_step(const block_derivatives *m, const time_step 
 void tabulate_block(void *self, const time_step *step, const double *q1)
 {
   const block_derivatives *m = self;
-  gather(m->block, q1, 0);
-  evaluate(m->block, m->table_of, m->table);
+  const element_block *b = m->block;
+  gather(b, q1, 0);
+  if (m->inner) {
+    find_modes(b);
+    tabulate_points(m->inner, step, q1);
+  }
+  if (m->tabulate) {
+    evaluate(b, b->end_of, b->out);
+    m->tabulate(m->user);
+  }
+  evaluate(b, m->table_of, m->table);
+  for (size_t i = 0; i < (size_t)m->block->batches * m->table_of->outputs * m->block->lanes; ++i)
+    if (!isfinite(m->table[i])) m->table[i] = 0; /* zero times an infinite number of a branch that is not taken */
   find_directions_of_step(m, step);
 }
 
@@ -269,22 +450,40 @@ static void find_direction(const block_derivatives *m, const derivatives *d, int
 /* Number of rows of the table: forces, state, shared numbers. */
 static inline int rows_of(const element_block *b) { return b->unknowns + b->states + b->shares; }
 
+/* Row of the table of batch c, and its length. */
+static inline int columns(const element_block *b) { return b->width - b->modes; }
+static inline const double *row_of(const block_derivatives *m, int c, int row)
+{
+  return m->table + ((size_t)c * m->table_of->outputs + row * columns(m->block)) * m->block->lanes;
+}
+
 /* Product of a row of the table of batch c with the directions, in lanes. */
 static inline void multiply_row(const block_derivatives *m, int c, int row, double *sum)
 {
   const element_block *b = m->block;
   const int n = b->lanes;
-  const double *slope = m->table + ((size_t)c * rows_of(b) + row) * b->width * n;
+  const double *slope = row_of(m, c, row);
   memset(sum, 0, n * sizeof *sum);
-  for (int j = 0; j < b->width; ++j, slope += n)
+  for (int j = 0; j < columns(b); ++j, slope += n)
     for (int l = 0; l < n; ++l) sum[l] += slope[l] * m->direction[j * n + l];
 }
+
+/* The first number of element i, in an array of the numbers of all elements, whose size follows. */
+static inline double *number_of(const element_block *b, double *numbers, int i)
+{
+  return numbers + (size_t)(i / b->lanes) * b->numbers * b->lanes + i % b->lanes;
+}
+static inline size_t all_numbers(const element_block *b) { return (size_t)b->batches * b->numbers * b->lanes; }
 
 void add_block_derivative(void *self, const derivatives *d, int p, double *r)
 {
   const block_derivatives *m = self;
   const element_block *b = m->block;
   double sum[MOST_LANES];
+  if (m->inner) { /* the derivatives of the forces at constant motions are numbers of the elements */
+    add_points_derivative(m->inner, d, p, r);
+    for (int i = 0; i < b->elements; ++i) *number_of(b, m->by_number + (size_t)p * all_numbers(b), i) = m->inner->r[3 * i];
+  }
   FOR_ACTING(b, c) {
     find_direction(m, d, c, p, 0);
     for (int i = 0; i < b->unknowns; ++i) {
@@ -304,18 +503,30 @@ void accept_block_derivative(void *self, const derivatives *d, int p)
   memset(new_shared, 0, shared * sizeof *new_shared);
   FOR_ACTING(b, c) {
     double *z = m->by_state + ((size_t)p * b->batches + c) * b->states * n;
-    if (!b->states && !b->shares) break;
+    if (!b->states && !b->shares && !m->margins) break;
     find_direction(m, d, c, p, d->q1 + (size_t)p * d->size);
+    for (int k = 0; k < m->margins; ++k) {
+      const double *margin = row_of(m, c, rows_of(b) + m->margins) + k * n;
+      multiply_row(m, c, rows_of(b) + k, sum);
+      for (int l = 0; l < elements_in(b, c); ++l) note_margin(d, p, (c * n + l) * (b->laws ? b->laws : 1), margin[l], sum[l]);
+    }
     for (int i = 0; i < b->states && !d->initial; ++i) multiply_row(m, c, b->unknowns + i, z + i * n);
     for (int i = 0; i < b->shares; ++i) {
       multiply_row(m, c, b->unknowns + b->states + i, sum);
       for (int l = 0; l < elements_in(b, c); ++l) new_shared[b->group[c * n + l] * b->shares + i] += sum[l];
     }
   }
+  if (m->inner && !d->initial) {
+    for (int i = 0; i < b->elements; ++i)
+      m->inner->e1[3 * i] = m->by_state[(((size_t)p * b->batches + i / n) * b->states + b->states - 1) * n + i % n];
+    accept_points_derivative(m->inner, d, p);
+  }
   for (int i = 0; i < shared; ++i)
     if (!d->initial || i % b->shares >= b->kept) m->by_shared[(size_t)p * shared + i] = new_shared[i];
+  if (m->neighbours && !d->initial) memset(m->by_before + (size_t)p * b->functions, 0, b->functions * sizeof(double));
   for (int k = p * m->neighbours; k < (p + 1) * m->neighbours && !d->initial; ++k) {
     const element_block *one = m->neighbour[k];
+    for (int i = 0; i < b->functions; ++i) m->by_before[(size_t)p * b->functions + i] += m->weight[k] * (one->end[i] - b->end[i]);
     memcpy(one->before, one->end, b->functions * sizeof(double));
     one->t[0] = one->t[1];
   }
@@ -345,12 +556,17 @@ void transpose_block_state(void *self, adjoint *a)
   const int n = b->lanes, rows = rows_of(b);
   take_inputs(b, a->step);
   tabulate_block(self, a->step, a->d->x);
+  if (m->inner) { /* the last state of an element is its motion */
+    transpose_points_state(m->inner, a);
+    for (int i = 0; i < b->elements; ++i)
+      m->state_bar[((size_t)(i / n) * b->states + b->states - 1) * n + i % n] += m->inner->e1[3 * i];
+  }
   FOR_ACTING(b, c) {
     const int32_t *dofs = b->dofs + (size_t)c * b->unknowns * n;
     if (rows == b->unknowns) break;
     find_bars(m, a, c, 0, m->direction);
     for (int i = b->unknowns; i < rows; ++i) {
-      const double *slope = m->table + ((size_t)c * rows + i) * b->width * n, *bar = m->direction + i * n;
+      const double *slope = row_of(m, c, i), *bar = m->direction + i * n;
       for (int j = 0; j < b->unknowns; ++j)
         for (int l = 0; l < elements_in(b, c); ++l) a->q1[dofs[j * n + l]] += slope[j * n + l] * bar[l];
     }
@@ -370,8 +586,8 @@ void transpose_block(void *self, adjoint *a, const double *λ)
     find_bars(m, a, c, λ, m->direction);
     if (!a->d->initial) memset(z_bar, 0, b->states * n * sizeof *z_bar);
     for (int i = 0; i < rows; ++i) {
-      const double *slope = m->table + ((size_t)c * rows + i) * b->width * n + motions * n;
-      for (int j = motions; j < b->width; ++j, slope += n)
+      const double *slope = row_of(m, c, i) + motions * n;
+      for (int j = motions; j < columns(b); ++j, slope += n)
         for (int l = 0; l < elements_in(b, c); ++l) {
           const double x = slope[l] * m->direction[i * n + l];
           const int rate = j / motions - 1;
@@ -382,6 +598,19 @@ void transpose_block(void *self, adjoint *a, const double *λ)
         }
     }
   }
+  if (m->inner) {
+    for (int i = 0; i < b->elements; ++i) {
+      double *x = number_of(b, m->number_bar, i);
+      m->inner->r_bar[3 * i] = *x, *x = 0;
+    }
+    transpose_points(m->inner, a, λ);
+  }
+  if (m->tabulate) /* numbers that change in each step */
+    for (int p = 0; p < a->parameters; ++p)
+      for (int i = 0; i < b->elements; ++i)
+        for (int j = 0; j < m->shifts; ++j)
+          a->gradient[p] += number_of(b, m->number_bar, i)[j * n] * number_of(b, m->by_number + p * all_numbers(b), i)[j * n];
+  for (int i = 0; m->tabulate && i < b->elements * m->shifts; ++i) number_of(b, m->number_bar, i / m->shifts)[i % m->shifts * n] = 0;
   double *before = m->step_bar + m->of_step - shared;
   for (int i = 0; i < shared; ++i) {
     m->shared_bar[i] = before[i] + (a->d->initial && i % b->shares < b->kept ? m->shared_bar[i] : 0);
@@ -399,4 +628,5 @@ void finish_block(void *self, adjoint *a)
   add_products(a, all * b->states, m->state_bar, m->by_state);
   add_products(a, all * b->numbers, m->number_bar, m->by_number);
   add_products(a, b->groups * b->shares, m->shared_bar, m->by_shared);
+  if (m->inner) finish_points(m->inner, a);
 }

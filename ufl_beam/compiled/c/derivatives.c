@@ -115,11 +115,6 @@ void tabulate_points(void *self, const time_step *step, const double *q1)
     p->predicts = 0;
     respond_at(m->cells, q1);
     tabulate_derivative(m->strains, step, q1);
-  } else {
-    find_motions(m->springs, q1);
-    respond_springs(m->springs);
-    tabulate_derivative(m->strains, step, q1);
-    if (m->by_geometry) tabulate_derivative(m->by_geometry, step, q1);
   }
   for (int i = 0; i < p->cells * p->of_cell; ++i)
     ask_table(m->table, p->w + (size_t)i * p->width, m->outputs, m->margins, m->J + (size_t)i * m->outputs);
@@ -234,20 +229,12 @@ static void find_strain_directions(const point_derivatives *m, const derivatives
 {
   const points *p = m->points;
   memset(m->e1, 0, 3 * (size_t)p->cells * sizeof *m->e1);
-  if (m->cells) {
-    if (dq) multiply_tables(m->strains, 0, dq, 1, m->e1);
-    if (m->shape) add_shape(m->shape, d->x, q, m->e1);
-    for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
-    const double *imposed = m->imposed ? m->imposed + 6 * (size_t)q * p->cells : 0;
-    for (int k = 0; imposed && k < 3 * p->cells; ++k) m->e1[k] -= imposed[k / 3 * 6 + 3 + k % 3];
-    return;
-  }
-  if (!dq) return; /* the form of the forces has the derivative by geometry at constant unknowns */
-  memset(m->r, 0, p->cells * sizeof *m->r);
-  multiply_tables(m->strains, 0, dq, 1, m->r);
-  const form_derivative *g = m->by_geometry;
-  if (g) multiply_tables(g, g->direction + (size_t)q * g->stride, 0, 1, m->r);
-  for (int i = 0; i < p->cells; ++i) m->e1[3 * i] = m->r[i];
+  if (!m->cells) return; /* the block of springs has the derivatives of the motions */
+  if (dq) multiply_tables(m->strains, 0, dq, 1, m->e1);
+  if (m->shape) add_shape(m->shape, d->x, q, m->e1);
+  for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
+  const double *imposed = m->imposed ? m->imposed + 6 * (size_t)q * p->cells : 0;
+  for (int k = 0; imposed && k < 3 * p->cells; ++k) m->e1[k] -= imposed[k / 3 * 6 + 3 + k % 3];
 }
 
 /* Derivatives of the resultants at constant unknowns, for the form of the forces. */
@@ -256,8 +243,6 @@ void add_points_derivative(void *self, const derivatives *d, int q, double *r)
   const point_derivatives *m = self;
   find_strain_directions(m, d, q, 0);
   differentiate_points(m, d, q, m->e1, m->r, 0);
-  if (m->springs)
-    for (int i = 0; i < m->points->cells; ++i) m->row[3 * i + 2] = m->r[3 * i];
 }
 
 /* Derivatives of the committed tangents, see keep_tangents, in the direction of the inputs of the points,
@@ -301,194 +286,12 @@ static void differentiate_tangents(const point_derivatives *m, int q)
 void accept_points_derivative(void *self, const derivatives *d, int q)
 {
   const point_derivatives *m = self;
-  find_strain_directions(m, d, q, d->q1 + (size_t)q * d->size);
+  if (m->cells) find_strain_directions(m, d, q, d->q1 + (size_t)q * d->size);
   if (m->tangents) {
     differentiate_points(m, d, q, m->e1, 0, 0);
     differentiate_tangents(m, q);
   }
   differentiate_points(m, d, q, m->e1, 0, 1);
-}
-
-/* -- connectors -------------------------------------------------------------------------------------- */
-
-/* Derivatives of the motions of motors and of the forces of actuators in the step. */
-static void find_prescribed(const connector_derivatives *m, const time_step *step)
-{
-  const connector_term *t = m->term;
-  for (int k = 0; m->now && k < m->parameters * t->connectors->number; ++k) {
-    const int p = k / t->connectors->number, i = k % t->connectors->number;
-    double wanted = 0;
-    for (int j = 0; j < m->neighbours; ++j) {
-      const connector_term *one = m->neighbour[p * m->neighbours + j];
-      const double change = t->wanted_motion ? change_of(one->wanted_motion + i, t->wanted_motion + i, step->motion_time)
-                                             : -change_of(one->wanted_force + i, t->wanted_force + i, step->load_time);
-      wanted += m->weight[p * m->neighbours + j] * change;
-    }
-    const double before = t->wanted_motion ? m->e0[k] : m->reached[k];
-    m->end[k] = before + step->fraction * (wanted - before);
-    m->now[k] = t->wanted_motion ? m->end[k] : before + step->at * (m->end[k] - before);
-  }
-}
-
-/* Motions at the end of the step, their derivatives by the unknowns, and the derivatives of laws. */
-void tabulate_connectors(void *self, const time_step *step, const double *q1)
-{
-  const connector_derivatives *m = self;
-  const connector_term *t = m->term;
-  const connectors *c = t->connectors;
-  *m->dt = step->dt;
-  if (m->rate_by_v) tabulate_derivative(m->rate_by_v, step, step->q0);
-  if (m->rate_by_q0) tabulate_derivative(m->rate_by_q0, step, step->q0);
-  find_motions(c, q1);
-  tabulate_derivative(m->motions, step, q1);
-  if (m->by_geometry) tabulate_derivative(m->by_geometry, step, q1);
-  for (int i = 0; i < c->number && m->table; ++i) {
-    double *w = c->laws ? c->laws->w + i * c->laws->width : c->rigid_plastic->w + i * c->rigid_plastic->width;
-    if (c->laws) memcpy(w, c->e1 + c->components * i, c->components * sizeof *w);
-    else set_slip(w, c->e1[i] - w[SLIP_START], c->rigid_plastic->direction[i]);
-    ask_table(m->table, w, m->outputs, m->margins, m->J + (size_t)i * m->outputs);
-  }
-  if (m->tabulate_user) m->tabulate_user(m->user);
-  find_prescribed(m, step);
-}
-
-/* Set the derivative of the slip of a rigid-plastic connector from that of its motion. */
-static void set_slip_direction(const double *w, double de1, double *dw)
-{
-  dw[SLIP] = w[SLIP] > 0 ? w[SLIP_DIRECTION] * (de1 - dw[SLIP_START]) : 0;
-}
-
-/* Derivatives by parameter p of the inputs of the law of connector i. */
-static double *changes_of_inputs(const connector_derivatives *m, int p, int i)
-{
-  return m->w + ((size_t)p * m->term->connectors->number + i) * m->width;
-}
-
-/* Derivative of a row of the table of connector i by parameter p. */
-static double change_of_row(const connector_derivatives *m, int p, int i, int row, const double *dw)
-{
-  const double *J = m->J + (size_t)i * m->outputs + row * m->columns;
-  const size_t at = (size_t)p * m->term->connectors->number + i;
-  double sum = m->by_parameter ? m->by_parameter[at * m->rows + row] : 0;
-  for (int j = 0; j < m->columns; ++j) sum += J[j] * dw[m->column[j]];
-  return sum;
-}
-
-/* Motion to rest of friction connector i in a step by the rate of its motion before the step. */
-static double way_by_rate(const friction *f, int i)
-{
-  const double *of = f->rates->now->rates[0];
-  return f->against[i] ? 0 : -(of[1] + of[2]) / of[0];
-}
-
-/* Derivative of the motion of a sticking connector by its limit. */
-static double motion_by_limit(const connectors *c, int i, const double *q1)
-{
-  const friction *f = c->friction;
-  return *f->limit[i] > 0 ? -f->creep[i] / *f->limit[i] * q1[c->force[i]] : 0;
-}
-
-/* Derivatives of the motions of friction in a step that leads to rest, see begin_friction. */
-static void find_ways(const connector_derivatives *m, const derivatives *d, int p)
-{
-  const connectors *c = m->term->connectors;
-  double *way = m->way + (size_t)p * c->number;
-  memset(way, 0, c->number * sizeof *way);
-  if (!m->rate_by_v) return;
-  multiply_tables(m->rate_by_v, 0, d->rates[1] + (size_t)p * d->size, 1, way);
-  if (m->rate_by_q0) multiply_tables(m->rate_by_q0, 0, d->q0 + (size_t)p * d->size, 1, way);
-  for (int i = 0; i < c->number; ++i) way[i] *= way_by_rate(c->friction, i);
-}
-
-/* Derivative of the last number in the row of friction connector i, see set_rows_of_friction. */
-static double friction_row(const connector_derivatives *m, const derivatives *d, int p, int i, const double *e0)
-{
-  const connectors *c = m->term->connectors;
-  const friction *f = c->friction;
-  double *dw = c->laws ? changes_of_inputs(m, p, i) : 0;
-  double *limit = m->limit + (size_t)p * c->number + i;
-  if (dw) {
-    dw[0] = 0, dw[1] = e0[i];
-    *limit = change_of_row(m, p, i, 1 + m->variables, dw);
-  }
-  if (f->sticks[i]) return e0[i] + m->way[(size_t)p * c->number + i] + motion_by_limit(c, i, d->x) * *limit;
-  return f->slip[i] * (dw ? change_of_row(m, p, i, 0, dw) : *limit);
-}
-
-/* Derivatives of the rows of the laws at constant motions, for the form of the forces. */
-void add_connectors_derivative(void *self, const derivatives *d, int p, double *r)
-{
-  const connector_derivatives *m = self;
-  const connector_term *t = m->term;
-  const connectors *c = t->connectors;
-  const int n = c->components;
-  const double *e0 = m->e0 + (size_t)p * n * c->number;
-  if (c->friction) find_ways(m, d, p);
-  for (int i = 0; i < c->number; ++i) {
-    double *row = m->row + n * (n + 2) * i + n + 1; /* the last number of the first row */
-    if (c->friction) *row = friction_row(m, d, p, i, e0);
-    else if (c->laws || c->asked) {
-      double *dw = changes_of_inputs(m, p, i);
-      memset(dw, 0, n * sizeof *dw);
-      memcpy(dw + n, e0 + n * i, n * sizeof *dw);
-      for (int j = 0; j < n; ++j) row[j * (n + 2)] = change_of_row(m, p, i, j, dw);
-    } else if (c->rigid_plastic) {
-      const rigid_plastic *of = c->rigid_plastic;
-      double *dw = changes_of_inputs(m, p, i);
-      set_slip_direction(of->w + i * of->width, 0, dw);
-      *row = of->direction[i] ? -change_of_row(m, p, i, 0, dw) / of->slope[i] : dw[SLIP_START];
-    } else if (t->viscosity) {
-      const double dt = *m->dt;
-      *row = (m->viscosity[p * c->number + i] * (c->e1[i] - c->e0[i]) - t->viscosity[i] * e0[i]) / dt;
-    } else if (m->now) *row = m->now[p * c->number + i];
-  }
-}
-
-void accept_connectors_derivative(void *self, const derivatives *d, int p)
-{
-  const connector_derivatives *m = self;
-  const connector_term *t = m->term;
-  const connectors *c = t->connectors;
-  const int n = c->components, all = n * c->number;
-  double *e0 = m->e0 + (size_t)p * all;
-  const form_derivative *g = m->by_geometry;
-  memset(m->e1, 0, all * sizeof *e0);
-  multiply_tables(m->motions, 0, d->q1 + (size_t)p * d->size, 1, m->e1);
-  if (g) multiply_tables(g, g->direction + (size_t)p * g->stride, 0, 1, m->e1);
-  for (int i = 0; i < c->number; ++i) {
-    if (c->friction) {
-      const friction *f = c->friction;
-      const double force = d->x[c->force[i]], dforce = d->q1[(size_t)p * d->size + c->force[i]];
-      const double moved = c->e1[i] - c->e0[i], slip = f->slip[i];
-      if (f->sticks[i]) note_margin(d, p, i, fabs(force) - *f->limit[i], copysign(1, force) * dforce - m->limit[(size_t)p * all + i]);
-      else note_margin(d, p, i, slip * moved, slip * (m->e1[i] - e0[i]));
-    }
-    if (c->laws || c->asked) {
-      double *dw = changes_of_inputs(m, p, i), *end = m->variables_at_end;
-      memcpy(dw, m->e1 + n * i, n * sizeof *dw);
-      memcpy(dw + n, e0 + n * i, n * sizeof *dw);
-      for (int j = 0; j < m->variables; ++j) end[j] = change_of_row(m, p, i, n + j, dw);
-      for (int k = 0; k < m->margins; ++k)
-        note_margin(d, p, n * i, m->J[(size_t)(i + 1) * m->outputs - m->margins + k],
-                    change_of_row(m, p, i, m->rows - m->margins + k, dw));
-      memcpy(dw + 2 * n + 2, end, m->variables * sizeof *dw);
-    } else if (c->rigid_plastic) {
-      const rigid_plastic *of = c->rigid_plastic;
-      double *dw = changes_of_inputs(m, p, i);
-      const double force = d->x[c->force[i]] - of->back_force[i], *w = of->w + i * of->width;
-      double *limit = m->limit + (size_t)p * all + i, *back_force = m->back_force + (size_t)p * all + i;
-      set_slip_direction(w, m->e1[i], dw);
-      if (of->direction[i]) note_margin(d, p, i, w[SLIP], dw[SLIP]);
-      else
-        note_margin(d, p, i, fabs(force) - of->limit[i],
-                    copysign(1, force) * (d->q1[(size_t)p * d->size + c->force[i]] - *back_force) - *limit);
-      *limit = change_of_row(m, p, i, 1, dw), *back_force = change_of_row(m, p, i, 2, dw);
-      dw[SLIPPED] += dw[SLIP];
-      dw[SLIP_START] += of->direction[i] * dw[SLIP];
-    }
-  }
-  memcpy(e0, m->e1, all * sizeof *e0);
-  if (m->reached) memcpy(m->reached + (size_t)p * all, m->end + (size_t)p * all, all * sizeof *e0);
 }
 
 /* -- inertia and damping ----------------------------------------------------------------------------- */

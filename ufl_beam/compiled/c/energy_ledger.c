@@ -127,8 +127,7 @@ static void respond_in_term(const inelastic_term *t, const double *q)
 {
   if (t->cells) respond_at(t->cells, q);
   else {
-    find_motions(t->springs, q);
-    respond_springs(t->springs);
+    respond_springs(t->springs, q);
   }
 }
 
@@ -152,37 +151,6 @@ void add_energy_of_points(void *self, const time_step *step, const double *q1, c
   if (t->hardening) *t->hardening += t->points->sum[4];
 }
 
-void accept_connectors(void *self, const time_step *step, const double *q1, const double *s)
-{
-  connector_term *t = self;
-  const connectors *c = t->connectors;
-  const double taken = commit_connectors(c, q1, step->dt);
-  if (t->entry) *t->entry += t->sign * taken;
-  if (t->reached) memcpy(t->reached, t->end, c->number * sizeof *t->end);
-  if (c->friction) memcpy(c->friction->accepted, c->friction->slip, c->number * sizeof(double));
-  if (t->lost) *t->lost += c->laws->sum[0];
-  if (c->laws && t->points->numerical) *t->points->numerical += c->laws->sum[1];
-  if (c->points) accept_inelastic(t->points, step, q1, s);
-  if (c->rigid_plastic) {
-    double sums[3];
-    const rigid_plastic *p = c->rigid_plastic;
-    commit_rigid_plastic(p, c->e1, sums);
-    *t->points->hinges += sums[0];
-    if (t->points->numerical) *t->points->numerical += t->loss * sums[1];
-    *t->hardened = sums[2];
-  }
-}
-
-void add_energy_of_connectors(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const connector_term *t = self;
-  const connector_laws *l = t->connectors->laws;
-  if (t->connectors->points) add_energy_of_points(t->points, step, q1, s);
-  if (t->connectors->asked) *t->points->stored += *t->connectors->asked->held;
-  for (int i = 0; l && i < t->connectors->number; ++i) *t->points->stored += l->stored[i];
-  if (t->connectors->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
-}
-
 /* Energy that points store and dissipate in a step to q1. */
 static double change_by_response(const inelastic_term *t, const double *q1)
 {
@@ -196,28 +164,31 @@ static double change_by_response(const inelastic_term *t, const double *q1)
   return after[0] + after[1] + (after[3] - before[3]) + (after[4] - before[4]) + after[5] + after[6];
 }
 
+/* Energy that connectors of a block take: the work of their forces, by the rule with which all forces of a static step
+ * do work; on the path of rate-independent laws; of elastic laws, the energy that they store. */
+void change_of_block(void *self, const double *q1, energy_change *sum)
+{
+  const element_block *b = self;
+  const int n = b->lanes, first = b->states + b->shares, energies = first + b->recorded, elastic = b->stored && !b->lost;
+  const double *w = b->w + (size_t)((2 + b->rates) * b->unknowns + b->states) * n; /* works on paths */
+  end_step_of_block(b, q1, COMPUTE);
+  for (int i = 0; i < b->elements; ++i) {
+    const double *out = b->out + (size_t)(i / n) * b->end_of->outputs * n + i % n;
+    for (int k = 0; k < b->recorded; ++k) {
+      const double work = b->recorded_kind[k] == RECORDED_WORK ? out[(first + k) * n] : 0;
+      sum->effort += fabs(work);
+      if (!elastic && !b->power_of && !b->inner) sum->in_connectors += work;
+    }
+    for (int k = 0; elastic && k < b->stored; ++k) sum->in_connectors += out[(energies + k) * n];
+    if (b->power_of) sum->in_connectors += w[(size_t)(i / n) * b->width * n + i % n];
+  }
+  for (int k = 0; elastic && k < b->stored; ++k) sum->in_connectors -= b->energy[k];
+  if (b->inner) sum->in_connectors += change_by_response(b->inner, q1);
+}
+
 void change_of_points(void *self, const double *q1, energy_change *sum)
 {
   sum->in_beams += change_by_response(self, q1);
-}
-
-void change_of_connectors(void *self, const double *q1, energy_change *sum)
-{
-  const connector_term *t = self;
-  const connectors *c = t->connectors;
-  double taken = 0;
-  find_motions(c, q1);
-  const int loses = !c->laws || c->laws->loses, n = c->components;
-  for (int j = 0; j < n * c->number; ++j) {
-    const double work = taken_by(c, j, q1);
-    if (c->laws && c->laws->along_path) taken += j % n ? 0 : work_on_path(c, j / n);
-    else taken += loses ? work : 0;
-    sum->effort += fabs(work);
-  }
-  for (int i = 0; !loses && i < c->number; ++i)
-    taken += end_of_law(c, i)[LAW_STORED] - c->laws->stored[i];
-  if (c->points) taken = change_by_response(t->points, q1);
-  sum->in_connectors += taken;
 }
 
 int points_dissipate(void *self, const double *q1)

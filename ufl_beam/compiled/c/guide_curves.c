@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Points guided along curves that are Python functions, see connector_forces.py.
+/* Points guided along curves that are Python functions, see guides.py.
  *
  * Python computes five points of a curve at a time. The polynomial through them yields the nearest
  * point. This repeats around the nearest point until that coincides with the middle point up to

@@ -273,87 +273,7 @@ typedef struct {
   const double *imposed; /* strains of imposed_cells; or none */
 } inelastic;
 
-/* First inputs of the law of a rigid-plastic connector, and its outputs at the end of a step. */
-enum slip_input { SLIP, SLIP_DIRECTION, SLIPPED, SLIP_START, SLIP_INPUTS };
-enum slip_output {
-  SLIP_DISSIPATED, SLIP_LOST, SLIP_STORED, SLIP_LIMIT, SLIP_BACK_FORCE, SLIP_OUTPUTS
-};
-
-/* Rigid-plastic connectors, see connector_rows.py. */
-typedef struct {
-  int32_t *search;             /* the flags of points */
-  kernel *force, *end;         /* force of a slip and its derivative; outputs at the end of a step */
-  int number, width;
-  double *w;                   /* data of the kernels, `width` numbers of each connector */
-  double *limit, *back_force;  /* of the accepted state: |force - back force| up to which it is held */
-  double *dissipated;          /* energy, by each connector since the beginning */
-  const double *slope;         /* r > 0 of the equation of each, see rigid_plastic.c */
-  double *excess;              /* |force - back force| / limit - 1 of held connectors beyond the limit */
-  int32_t *free;               /* whether the search lets each slip while others are held */
-  int32_t *direction, *direction_before;   /* directions of slip, or 0: in the present iterate, in the last step */
-} rigid_plastic;
-
-typedef struct friction friction;
-
-/* Connectors whose laws are Python functions of a user, see compiled_connector_laws.py. */
-typedef struct {
-  double *force;        /* in the iterate, for find_rows, which writes the rows of `connectors` */
-  double *held;         /* energy that the connectors store */
-  void *begin_self, *rows_self, *again_self; /* data of the functions */
-  void (*begin)(void *self, double t, double dt);
-  void (*find_rows)(void *self), (*again)(void *self);
-} called_laws;
-
-/* Outputs of a connector law at the end of a step; its variables follow. */
-enum law_output { LAW_STORED, LAW_NUMERICAL, LAW_OUTPUTS };
-
-/* Connectors with compiled laws, see compiled_connector_laws.py. Inputs of a law are its motions, the motions
- * before the step, dt, theta, the variables before the step, and the parameters of the law. */
-typedef struct {
-  kernel *force, *end;        /* forces and their derivatives by the motions; outputs at the end of a step */
-  int width, variables;
-  int loses;                  /* 1: work that is not stored is dissipated; 0: the ledger stays open by it */
-  int along_path;             /* whether the work of a step is that of the law on its path */
-  double *w;                  /* data of the kernels, `width` numbers of each connector */
-  double *stored, *lost;      /* energy in the accepted state; energy dissipated by each since the
-                               * beginning */
-  double *answer;             /* space for the outputs of a law */
-  double *sum;                /* energy lost in the last step: by the laws, by the scheme */
-} connector_laws;
-
-/* Numbers of an accepted step that are kept, with the names of fields of `Connection`: work taken
- * since the beginning, and rate of the motion. */
-enum connector_number { CONNECTOR_WORK, CONNECTOR_RATE, CONNECTOR_NUMBERS };
-
-/* Connectors with the same components of motion, in cells whose unknowns include the forces. The
- * law of a component is a row a·e + b f = c in all motions e of the connector and the force f of
- * the component. Material points supply the rows of springs. Arrays without another comment have
- * one number for each component of each connector. */
-typedef struct {
-  const cells *work, *tangent, *motion;
-  points *points;                  /* or none */
-  rigid_plastic *rigid_plastic;    /* or none */
-  connector_laws *laws;            /* or none */
-  friction *friction;              /* or none */
-  called_laws *asked;               /* or none; if all of these are none, the rows are constant in a step */
-  int number, components;          /* components: 1, except for compiled laws */
-  const int32_t *force;            /* indices of the forces among the unknowns */
-  double *rows;                    /* latest (a, b, c) of each component */
-  int row, row_of_tangent;         /* positions of the rows in the coefficients of work and tangent */
-  double *e1;                      /* motions at the latest unknowns */
-  double *e0, *before, *kept[CONNECTOR_NUMBERS]; /* accepted state: motion, force, numbers kept */
-  double weight_of_before;         /* weight of the force before the step in the work of the step */
-  const int32_t *dofs;             /* of each connector: six of its nodes, then the forces */
-  const double *length;            /* 1 for a rotation, else the size of the scene */
-  const double *stiffness;         /* elastic stiffness; 0 if a law has none, or no internal variables */
-  double size;                     /* of the scene */
-} connectors;
-
-void find_motions(const connectors *c, const double *q);
-double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
-void find_rows(const connectors *c, const double *q);
-void ask_law(kernel *law, const double *w, int answers, double *s);
-part add_connectors_force, add_guides_force, add_guides_tangent;
+part add_guides_force, add_guides_tangent;
 void respond(points *p);
 void respond_at(const inelastic *m, const double *q);
 int gives_energy(const points *p);
@@ -522,7 +442,7 @@ enum { OF_LIBRARY = 76 }; /* PETSC_ERR_LIB: KLU reports a singular matrix by thi
  * moved is the largest motion, see find_motion. */
 typedef double (miss)(void *self, const double *q, const double *r, double scale, double moved);
 typedef struct { miss *missed; void *self; } law_residual;
-miss missed_by_connectors, missed_by_points, missed_by_guides;
+miss missed_by_points, missed_by_guides, missed_by_block;
 
 /* A point whose displacement is in the axes of a support at an angle; c and s are its cosine and
  * sine. The arrays list the entries of the tangent in the rows and in the columns of both degrees
@@ -714,27 +634,39 @@ typedef struct {
 /* Time of a number of a step. Growing: a value that grows from that at the end of the last step, by the applied
  * fraction of a step. Others are values at the time of the applied fraction of the loads, and of all loads; before
  * and at the end of the step, and at the time between for which the trapezoidal rule takes loads; half a step
- * before and after the loads; LATER and twice as much after the step. */
+ * before and after the loads; LATER and twice as much after the step; at the end of all motions. */
 enum time_of_number {
   TIME_GROWING, TIME_NOW, TIME_WHOLE, TIME_BEFORE, TIME_BETWEEN, TIME_END, TIME_HALF_BEFORE, TIME_HALF_AFTER,
-  TIME_LATER, TIME_TWICE_LATER, TIMES_OF_NUMBERS
+  TIME_LATER, TIME_TWICE_LATER, TIME_WHOLE_MOTION, TIMES_OF_NUMBERS
 };
 enum { LATER = 100 }; /* microseconds */
 
 /* Numbers of all steps: length (s), and the fraction of changes of loads at its end and in its equation. */
 enum number_of_step { LENGTH_OF_STEP, FRACTION, REACHED, NUMBERS_OF_STEP };
 
-/* Purpose of the computation of energies and of new numbers: energies of a state; rates after a trial step; state
- * that begins a run; step that is accepted. */
-enum end_of_step { ENERGIES, TRIAL, BEGIN, ACCEPT };
+/* Purpose of the computation of energies and of new numbers: outputs only; energies of a state; rates after a trial
+ * step; state that begins a run; step that is accepted. */
+enum end_of_step { COMPUTE, ENERGIES, TRIAL, BEGIN, ACCEPT };
+
+/* A number of an element that solutions record: of a state; of the last step; sums over all steps, of any number and
+ * of the work of a connector. */
+enum recorded_number { RECORDED_STATE, RECORDED_STEP, RECORDED_TOTAL, RECORDED_WORK };
 
 typedef struct rates rates;
+struct inelastic_term;
+
+/* First modes of an element, which C sets: whether it is held in the search; whether the iterate is the first one;
+ * whether softening has the opposite sign in the tangent. Others select the branch of a law in an iterate. */
+enum mode_of_block { MODE_HELD, MODE_FRESH, MODE_STIFFENED, FIRST_MODE };
 
 /* Inputs of an element are motions of its nodes at the end of the step and before it, `unknowns` each, `rates` of
- * them, its state, its numbers, and `steps` numbers of the step. */
+ * them, its state, its numbers, `steps` numbers of the step, and its modes, see mode_of_block. The last unknowns of an
+ * element with laws are their forces. The last outputs of force_of are its laws, then for each law whether it holds
+ * the motion, and its derivatives by the force and by all motions of the laws. */
 typedef struct {
-  const element_function *force_of, *tangent_of, *end_of; /* end_of: state, shared numbers, energies; or none */
-  int lanes, elements, batches, unknowns, rates, states, numbers, steps, width; /* lanes: elements of a batch */
+  const element_function *force_of, *tangent_of;
+  const element_function *end_of; /* state, shared numbers, recorded numbers, energies; or none */
+  int lanes, elements, batches, unknowns, rates, states, numbers, steps, modes, width; /* lanes: elements of a batch */
   int32_t *acting, *batch;  /* number of batches with elements that act in this step; their indices */
   int ranges;               /* the first numbers of the step, of which one is within the range of an acting element */
   const double *range;      /* lower ends, then upper ends, of a batch; or none */
@@ -755,7 +687,7 @@ typedef struct {
   double **each;            /* forces of elements in the latest residual */
   double *force, *force_before; /* of loads: forces in the latest residual and in the last step; size */
   double weight_of_before, *work; /* work: entry of the ledger of the work of loads, minus the forces; or none */
-  int stored, entered;      /* numbers of energies: of a state, and of a step */
+  int stored, lost, entered; /* numbers of energies: of a state; of a step, the first ones are lost */
   double *energy, *const *entries; /* energies of the state; entries of all in the ledger */
   /* Of elements with rates; otherwise none: */
   const rates *nodal;
@@ -764,6 +696,23 @@ typedef struct {
   const int32_t *group;     /* of each element */
   double *shared, *new_shared;
   const int *totals;        /* TOTAL for each shared number */
+  int laws;
+  const double *length;     /* of the motion of each law: 1 for a rotation, else the size of the scene */
+  int32_t *holds, *switched; /* whether each law of an element with modes holds; see equation */
+  const double *stiffness;  /* elastic stiffness of each law of an element with internal variables; or none */
+  const element_function *power_of; /* power at a part of the step, which is the first number of an element; or none */
+  double scene;             /* size of the scene */
+  const element_function *mode_of; /* modes in an iterate, excess, whether the element has opened; or none */
+  const int32_t *begins;    /* of each further mode: index of the state that is its value when a step begins, or -1 */
+  int32_t *search, *free;   /* see points; free: elements that may change their modes while others are held */
+  double *excess;           /* violation of the modes of held elements */
+  int opens;                /* whether elements are held in the search */
+  struct inelastic_term *inner; /* material points, one of each element, whose strain is the motion; or none */
+  void (*ask)(void *handle); /* function of Python that sets the modes; or none */
+  void *asked;
+  int recorded;             /* numbers that solutions record */
+  const int *recorded_kind; /* recorded_number of each */
+  double *record;           /* `recorded` numbers of each element */
 } element_block;
 
 /* Imposed strains of the cells of a term, see CellStrains: elastic cells, whose forms have the strains
@@ -788,8 +737,9 @@ typedef struct {
 } imposed_strains;
 
 void end_step_of_block(const element_block *b, const double *q, enum end_of_step what);
-void add_change_of_tangent(const element_block *b, const element_function *f, const double *q, const double *u, double *w,
-                           double *tangent);
+void respond_springs(const element_block *b, const double *q);
+void evaluate_along(const element_block *b, const element_function *f, const double *q, const double *u, double *w,
+                    const int32_t *entry, double *tangent);
 
 /* Vectors of loads at some degrees of freedom times functions of time, see DeadLoads. */
 typedef struct {
@@ -831,26 +781,6 @@ struct rates {
   const scheme_numbers *now;   /* coefficients of this step */
   int (*find)(void *handle, scheme_numbers *numbers);
   void *handle;
-};
-
-/* Dry friction: connectors stick (0) or slip in one of two directions (-1, 1). */
-struct friction {
-  int number;
-  const cells *rate;           /* rates of the motions */
-  int at_v;                    /* position of the velocities in its coefficients */
-  const rates *rates;          /* in dynamics */
-  double *const *limit;        /* limit force of each; N or N m */
-  connector_laws *laws;        /* laws of the sliding forces; or none, if sliding forces are the limits */
-  kernel *limit_of_law;        /* of these laws */
-  double *slip, *accepted;     /* direction of slip in the latest iterate, and in the accepted state */
-  double *way, *creep;         /* motion in the step that leads to rest at its end; motion for a unit of
-                                * force */
-  double *softness, *tiny;     /* creep at the limit; motion that is nothing but round-off */
-  int32_t *sticks, *against;   /* in the latest iterate; whether coming to rest would give energy */
-  int32_t *switched;           /* see equation */
-  int32_t *search, *free;      /* of laws: the flags of points; whether each may change in the iterates */
-  double *excess;              /* of laws: violation of the present branch */
-  int guessed;                 /* whether the next iterate is the initial guess */
 };
 
 /* Set `now` to the coefficients of a step of length dt; returns whether that succeeds. */
@@ -899,30 +829,14 @@ typedef struct {
 } moving_supports;
 
 /* Material points of cells or of springs, and their entries of the ledger, or none. */
-typedef struct {
+typedef struct inelastic_term {
   points *points;
-  inelastic *cells;          /* or none */
-  const connectors *springs; /* or none */
+  inelastic *cells;             /* or none */
+  const element_block *springs; /* or none */
   double alpha, *dt;
   points *copy; /* in statics: space for the points in the state at the end of a step */
   double *plastic, *hinges, *numerical, *released, *stored, *hardening;
 } inelastic_term;
-
-/* Connectors of one motion: springs, rigid-plastic connectors, locks, dampers, motors or actuators;
- * their entries of the ledger, or none. */
-typedef struct {
-  connectors *connectors;
-  const double *viscosity;            /* of dampers */
-  const time_function *wanted_motion; /* of motors */
-  const time_function *wanted_force;  /* of actuators */
-  double *end, *reached;              /* forces of actuators at the end of this step, and of the last one */
-  double *entry, sign;                /* of the work in the ledger */
-  int dt_of_law;       /* position of dt in the data of a rigid-plastic law */
-  double *hardened, loss; /* energy stored by rigid-plastic connectors; fraction of the loss of backward
-                           * Euler */
-  double *lost;           /* ledger entry of compiled laws */
-  inelastic_term *points; /* ledger entries of springs, rigid-plastic connectors and laws */
-} connector_term;
 
 /* Forces of laws of a user, watched for changes of direction at every step; see controllers.py. */
 typedef struct {
@@ -1066,11 +980,10 @@ phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, be
   
   begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
   begin_tangent_damping, accept_tangent_damping,
-  begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,
-  begin_connectors_again, accept_connectors, add_energy_of_connectors, begin_guides, accept_guides,
-  begin_block, accept_block, add_energy_of_block;
+  begin_inelastic, accept_inelastic, add_energy_of_points, begin_guides, accept_guides,
+  begin_block, begin_block_again, accept_block, add_energy_of_block;
 admission points_dissipate;
-change_of_energy change_of_form, change_of_points, change_of_connectors, change_of_imposed_strains;
+change_of_energy change_of_form, change_of_points, change_of_block, change_of_imposed_strains;
 double value_at(const time_function *f, double t);
 void keep_state(const time_loop *m, double *row);
 int solve_begun_step(time_loop *m, int hold);
@@ -1154,10 +1067,8 @@ typedef struct {
 typedef struct {
   points *points;
   inelastic *cells;               /* or none */
-  const connectors *springs;      /* or none */
-  form_derivative *strains;       /* strains of the sections, or motions of the springs, by q1 */
+  form_derivative *strains;       /* strains of the sections by q1; none of springs */
   const shape_derivative *shape;  /* strains of the sections by coordinates; or none */
-  form_derivative *by_geometry;   /* motions of the springs by their geometry; or none */
   kernel *table;
   int outputs, columns, equations, margin, margins; /* equations, margin: their first rows; margins: number */
   int unknown;                    /* index in w of the first variable at the end of the step */
@@ -1171,40 +1082,10 @@ typedef struct {
    * parameters for differences. */
   double *tangents;
   const double *elastic, *step;
-  double *r, *e1, *row;           /* of one parameter: of resultants and strains; of the rows of springs */
-  double *w_bar, *e0_bar, *r_bar, *row_bar, *B_bar, *weight_bar, *rest_bar; /* of the adjoint; or none */
+  double *r, *e1;                 /* of one parameter: of resultants and strains */
+  double *w_bar, *e0_bar, *r_bar, *B_bar, *weight_bar, *rest_bar; /* of the adjoint; or none */
   double *tangents_bar, *elastic_bar;
 } point_derivatives;
-
-/* Derivatives of the laws of connectors. Compiled laws have a table: columns are inputs of the law, rows
- * its forces, its variables at the end of a step, and the margins of its conditions; the margins follow.
- * Rigid-plastic laws have the limit and the back force instead of variables, and no margins; laws with a
- * limit have it after the variables. Python tabulates laws of users, whose inputs are in the order of
- * compiled laws. Arrays have a row for each parameter. */
-typedef struct {
-  int parameters, neighbours;
-  const connector_term *term;
-  form_derivative *motions;      /* motions of the connectors by q1 */
-  form_derivative *by_geometry;  /* by the geometry of the connectors; or none */
-  kernel *table;                 /* or none */
-  int rows, columns, margins, outputs;
-  int width, variables;          /* of a law: number of its inputs; number of its internal variables */
-  double *limit, *back_force;    /* of rigid-plastic laws; limit: also of friction */
-  form_derivative *rate_by_v, *rate_by_q0; /* rates of motions for friction in dynamics; or none */
-  double *way;                   /* of friction: derivatives of the motion in a step that leads to rest */
-  const int32_t *column;         /* index of each column in the inputs of a law */
-  double *J, *w;                 /* tables; derivatives of the inputs of all laws */
-  double *by_parameter;          /* of laws of users: derivatives of the rows at constant inputs; or none */
-  double *variables_at_end;      /* space: derivatives of the variables of one law */
-  double *e0, *e1, *row, *dt;    /* e0: of the motions before the step; of one parameter: motions, rows */
-  const double *viscosity;       /* of dampers; or none */
-  const connector_term *const *neighbour; /* of motors and actuators: the same in neighbouring scenes */
-  const double *weight;          /* see derivatives */
-  double *now, *end, *reached;   /* of motors: motions; of actuators: forces; or none */
-  double *w_bar, *e0_bar, *row_bar, *viscosity_bar, *limit_bar; /* of the adjoint */
-  void (*tabulate_user)(void *handle); /* of laws of users; or none */
-  void *user;
-} connector_derivatives;
 
 /* Matrix of rates, with its derivative by each parameter, or none. */
 typedef struct {
@@ -1212,18 +1093,23 @@ typedef struct {
   const constant_matrix *const *change;
 } product_derivative;
 
-/* Derivatives of a block by its inputs, with a row for each parameter. The table has the rows of forces and
- * states. */
+/* Derivatives of a block by its inputs except modes, with a row for each parameter. The table has the rows of forces, states,
+ * shared numbers and margins; the margins follow. */
 typedef struct {
   element_block *block;
-  int parameters, neighbours;
+  int parameters, neighbours, margins;
   element_block *const *neighbour;  /* in scenes with other values of a parameter */
   const double *weight;     /* see derivatives */
   const element_function *table_of;
   double *table, *direction; /* direction: space for the inputs of a batch */
   int of_step;              /* number of all numbers of the step */
-  double *by_state, *by_number, *by_step, *by_shared;
+  double *by_state, *by_number, *by_step, *by_shared, *by_before; /* by_before: of `before` of the block */
   double *state_bar, *number_bar, *step_bar, *shared_bar; /* of the adjoint */
+  point_derivatives *inner;   /* of material points; or none */
+  /* Function of Python that sets the modes for the table and derivatives of the first `shifts` numbers; or none. */
+  void (*tabulate)(void *handle);
+  void *user;
+  int shifts;
 } block_derivatives;
 
 /* Derivatives of dead loads, from the loads of scenes with other values of a parameter. */
@@ -1316,9 +1202,6 @@ int go_back(adjoint *a, time_loop *m);
 void finish_adjoint(adjoint *a, time_loop *m);
 void transpose_imposed(void *self, adjoint *a, const double *lambda);
 void transpose_points_state(void *self, adjoint *a);
-void transpose_connectors_state(void *self, adjoint *a);
-void transpose_connectors(void *self, adjoint *a, const double *lambda);
-void finish_connectors(void *self, adjoint *a);
 void transpose_form(void *self, adjoint *a, const double *lambda);
 void transpose_points(void *self, adjoint *a, const double *lambda);
 void transpose_product(void *self, adjoint *a, const double *lambda);
@@ -1348,16 +1231,13 @@ void tabulate_block(void *self, const time_step *step, const double *q1);
 void add_block_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_block_derivative(void *self, const derivatives *d, int p);
 void add_form_derivative(void *self, const derivatives *d, int p, double *r);
-void add_connectors_derivative(void *self, const derivatives *d, int p, double *r);
 void add_points_derivative(void *self, const derivatives *d, int p, double *r);
 void add_product_derivative(void *self, const derivatives *d, int p, double *r);
 void add_shape_derivative(void *self, const derivatives *d, int p, double *r);
 void add_load_derivative(void *self, const derivatives *d, int p, double *r);
-void accept_connectors_derivative(void *self, const derivatives *d, int p);
 void accept_points_derivative(void *self, const derivatives *d, int p);
 void accept_load_derivative(void *self, const derivatives *d, int p);
 void tabulate_derivative(void *self, const time_step *step, const double *q1);
-void tabulate_connectors(void *self, const time_step *step, const double *q1);
 void tabulate_points(void *self, const time_step *step, const double *q1);
 void differentiate_loads(void *self, const time_step *step, const double *q1);
 

@@ -338,7 +338,7 @@ static int followed(time_loop *m)
    * processes. */
   const double size = fabs(p->work) + fabs(of[BEAMS]) + of[EFFORT];
   /* Work of the residual that Newton's method leaves, and of forces on the violation of constraints,
-   * which missed_by_connectors limits to 1 % of its tolerance. */
+   * which missed_by_block limits to 1 % of its tolerance. */
   const double left = e->rtol * (e->loads + of[INNER]) * (e->scene * of[MOVES] + 0.01 * e->moved);
   const double slack = p->slack * size + left + of[ROUND_OFF] + DBL_MIN;
   /* A contact that closes shortly before the end of a step has a force at the end, but little energy.

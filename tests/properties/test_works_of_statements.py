@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""The work of each statement is what it stores, loses and supplies, in each step and by itself.
+
+The balance of a scene would not show two errors that cancel.
+"""
+
+import warnings
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+import stored_effects  # noqa: F401 - adds the effects
+from stored_scenes import EFFECTS, EXACT, SCENES
+
+import ufl_beam as ub
+from ufl_beam.blocks.block import Block
+from ufl_beam.blocks.springs import SpringBlock
+from ufl_beam.compiled.c_library import doubles, lib
+from ufl_beam.errors import StepFailed
+
+STEPS = 12
+TOLERANCE = 1e-9
+"""Largest unexplained work, as a part of the energies in the ledger.
+
+Newton's tolerance of 1e-12 is relative to the forces of a scene, of which a statement has a part.
+"""
+
+
+def works(block, trial):
+    """Work of the forces of a statement in a step, and the energy that it stores, loses, takes."""
+    forces, c = np.zeros(len(trial.q1)), block._c
+    block.add_residual(trial.q1, forces)
+    if isinstance(getattr(block, "forces_at", None), np.ndarray):
+        forces[block.forces_at] = 0.0  # residuals of laws
+    lib.end_step_of_block(c, doubles(trial.q1), lib.COMPUTE)
+    account = np.repeat([1.0, 1.0, -1.0], [c.stored, c.lost, c.entered - c.lost])
+    energies = block.outputs(c.end_of)[:, -len(account) :] if len(account) else np.zeros((0, 0))
+    return forces @ trial.s, (energies @ account).sum() - block._energy.sum()
+
+
+@pytest.mark.serial  # each process would compute the same
+@pytest.mark.parametrize("name", [x for x in EFFECTS if EFFECTS[x].draft(0).control is None])
+def test_work_is_explained(name):
+    drafts = [EFFECTS[name].draft(seed) for seed in range(SCENES)]
+    drafts = [x for x in drafts if x.scheme.weight_of_before == 0.0 and isinstance(x.dt, float)]
+    for draft in drafts:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ub.ModelWarning)
+            simulation = ub.Simulation(
+                ub.Scene(**draft.parts), draft.scheme, mesh=draft.mesh, newton=EXACT,
+                comm=MPI.COMM_SELF,
+            )  # fmt: skip
+        blocks = [
+            x for x in simulation.equation.terms
+            if isinstance(x, Block) and not x._supplies and not isinstance(x, SpringBlock)
+        ]  # fmt: skip
+        missing, size = dict.fromkeys(map(id, blocks), 0.0), 0.0
+        for n in range(STEPS if blocks and not simulation.time_loop.stages > 1 else 0):
+            try:
+                trial = simulation.attempt((n + 1) * draft.dt)
+            except StepFailed:
+                break
+            for block in blocks:
+                work, explained = works(block, trial)
+                missing[id(block)] = max(missing[id(block)], abs(work - explained))
+                size = max(size, abs(work), abs(explained))
+            simulation.accept(trial)
+            size = max(size, simulation.equation.ledger.size())
+        for block in blocks:
+            assert missing[id(block)] <= TOLERANCE * size, block.effect
