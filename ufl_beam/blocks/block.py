@@ -206,7 +206,7 @@ class Block(LoadTerm):
             each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
             weight_of_before=scheme.weight_of_before, stored=stored, lost=entered[0],
-            entered=sum(entered), power_of=made.power or ffi.NULL,
+            entered=sum(entered), knows_before=made.knows_before, power_of=made.power or ffi.NULL,
             mode_of=made.mode or ffi.NULL, begins=begins,
             holds=np.zeros(n * statement.laws, dtype=np.int32),
             energy=self._energy, nodal=self._nodal, groups=groups, shares=shares,
@@ -335,10 +335,7 @@ class Block(LoadTerm):
         """See the base class: compute stored energies, and recorded numbers of the state."""
         if (len(self._energy) or self.recorded.size) and not self.statement.shared:
             self._begin(q, float(self._t[0]), dt=math.inf, fraction=0.0)
-            if len(self._energy):  # internal variables are those of the state
-                self._c.end_of = kernels(self.statement.frozen).end
             lib.end_step_of_block(self._c, doubles(q), lib.ENERGIES)
-            self._c.end_of = self._kernels.end
 
     def _whole(self, forces: Array) -> Array:
         """Return forces at all local degrees of freedom from forces at the loaded ones."""

@@ -283,7 +283,7 @@ class ConnectorBlock(Block):
             self.state[name][:] = value
         rotates = [scene.all_connectors[i].is_rotation for i in all_connectors[:k]]
         fill(self._c, length=np.where(rotates, 1.0, scene.size))
-        self.law_residual = loop("missed_by_block", self._c)
+        self.law_residual, self._inputs = loop("missed_by_block", self._c), dict[str, Array]()
         if statement.modes:
             self._excess, self._free = np.zeros(len(mine)), np.zeros(len(mine), dtype=np.int32)
             fill(
@@ -333,7 +333,9 @@ class ConnectorBlock(Block):
 
     def input(self, name: str) -> Array:
         """Return a view of an input of the elements, in batches."""
-        return np.asarray(self._w[:, self.statement.inputs.index(name)])
+        if name not in self._inputs:
+            self._inputs[name] = self._w[:, self.statement.inputs.index(name)]
+        return self._inputs[name]
 
     def motion(self, q: Array) -> Array:
         """Return the relative motions at ``q``; (num_connectors,); m or rad."""

@@ -341,12 +341,15 @@ class FunctionBlock(ConnectorBlock):
 
     def _now(self, name: str) -> list[float]:
         """Return an input of each connector."""
-        return [float(x) for x in self.input(name).ravel()[: len(self._laws)]]
+        found: list[float] = self.input(name).ravel().tolist()
+        return found[: len(self._laws)]
 
     def _motions(self) -> list[float]:
         """Return the motions of which C has computed the outputs at the end of a step."""
-        motions = self.outputs(self._kernels.end)[:, len(self.statement.state)]
-        return [float(x) for x in motions]
+        outputs = self._kernels.end.outputs
+        ends = self._out[: len(self._w) * outputs * BATCH].reshape(-1, outputs, BATCH)
+        found: list[float] = ends[:, len(self.statement.state)].ravel().tolist()
+        return found[: len(self._laws)]
 
     def _begin_laws(self) -> None:
         """Begin a step in all laws."""

@@ -118,6 +118,7 @@ class OfEnergy(OnConnector):
             [λ - f for λ, f in zip(step.λ, end.forces, strict=True)],
             {f"state {n}": x for n, x in zip(law.variables, variables, strict=True)},
             {"stored": end.stored}, lost | numerical, power=power, recorded=dissipated,
+            before={"stored": ufl.as_ufl(before)} if law.variables else {},
         )  # fmt: skip
 
 

@@ -56,6 +56,8 @@ class Equations(NamedTuple):
         holds: 1 for each law that holds its motion, 0 for a law of its force; by default, laws hold
             that do not depend on their force.
         margins: Numbers that vanish where the element changes its modes, for ranges of derivatives.
+        before: Stored energies before the step, if they are functions of other variables than
+            ``stored`` at the end of a step without motion.
         power: Power at a part of the step (J per step), if the work on the path of a step is an
             input, see :attr:`Statement.integrates`.
         motions: Variables of UFL on which the laws depend, one for each law; m or rad.
@@ -72,6 +74,7 @@ class Equations(NamedTuple):
     opened: Expr | float = 0.0
     holds: Sequence[Expr] = ()
     margins: Sequence[Expr] = ()
+    before: Mapping[str, Expr] = {}
     power: Expr | None = None
     motions: Sequence[Expr] = ()
     recorded: Mapping[str, Expr] = {}
@@ -92,7 +95,7 @@ class Inputs(dict[str, Expr]):
         self.space = compiler.values
         self.domain = compiler.values(1).mesh.ufl_domain()
         self.stages: list[tuple[Expr, Expr, Expr, Expr]] = []
-        self._known: dict[tuple[Any, ...], list[Expr]] = {}
+        self._known: dict[tuple[int, ...], list[list[Expr]]] = {}
 
     def stage(self, value: Any, slope_of: Any = None) -> Expr:
         """Return a variable for an intermediate number, which is differentiated apart.
@@ -124,22 +127,22 @@ class Inputs(dict[str, Expr]):
 
     def slopes_by(self, outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:
         """Return the derivatives of expanded expressions by variables: of the first one, ..."""
-        total, n = _slopes(outputs, by), len(by)
-        for k, (stage, *_) in enumerate(self.stages):
-            outer = _slopes(outputs, [stage])
-            if all(isinstance(x, Zero) for x in outer):
-                continue
-            inner = self._slopes_of_stage(k, by)
-            for i, x in enumerate(outer):
-                row = slice(i * n, (i + 1) * n)
-                total[row] = [y + x * dx for y, dx in zip(total[row], inner, strict=True)]
-        return total
+        if not outputs or not by:
+            return []
+        stages, n = [stage for stage, *_ in self.stages], len(by)
+        every, inner = _slopes(outputs, [*by, *stages]), self._slopes_of_stages(by)
+        rows = (every[i : i + n + len(stages)] for i in range(0, len(every), n + len(stages)))
+        return [x for row in rows for x in _chained(row[:n], row[n:], inner)]
 
-    def _slopes_of_stage(self, k: int, by: Sequence[Expr]) -> list[Expr]:
-        """Return the derivatives of an intermediate number, which may depend on earlier ones."""
-        key = k, *map(id, by)
+    def _slopes_of_stages(self, by: Sequence[Expr]) -> list[list[Expr]]:
+        """Return the derivatives of each intermediate number, which may depend on earlier ones."""
+        key, stages, n = tuple(map(id, by)), [stage for stage, *_ in self.stages], len(by)
         if key not in self._known:
-            self._known[key] = self.slopes_by(_expanded([self.stages[k][2]]), by)
+            found = self._known[key] = list[list[Expr]]()
+            every = _slopes([alike for _, _, alike, _ in self.stages], [*by, *stages])
+            for k in range(len(stages)):
+                row = every[k * (n + len(stages)) : (k + 1) * (n + len(stages))]
+                found.append(_chained(row[:n], row[n : n + k], found))
         return self._known[key]
 
     def along(
@@ -282,7 +285,9 @@ class Kernels:
         nonzero = [i for i, slope in enumerate(slopes) if not isinstance(slope, Zero)]
         self.entries = [divmod(i, len(names)) for i in nonzero]
         self.energies = {"state": made.stored, "lost": made.lost, "supplied": made.supplied}
-        energies = [value for account in self.energies.values() for value in account.values()]
+        self.knows_before = bool(made.before)
+        accounts = *self.energies.values(), {name: made.before[name] for name in made.before}
+        energies = [value for account in accounts for value in account.values()]
         recorded = [made.recorded[name] for name in statement.recorded]
         modes = [made.modes[name] for name in statement.modes] if made.modes else []
         self.force, self.tangent, self.end, self.power, self.mode = self._compiled(
@@ -301,12 +306,13 @@ class Kernels:
 
     def _slopes_of_laws(self, made: Equations, at: Inputs) -> list[Expr]:
         """Return whether each law holds, and its derivatives by its force and by all motions."""
-        laws, found = made.forces[len(made.forces) - self._statement.laws :], list[Expr]()
-        for k, law in enumerate(laws):
-            by = [at[f"q1 force{k}"], *made.motions]
-            slopes = at.slopes_by(_expanded([law]), by)
-            holds = made.holds[k] if made.holds else float(isinstance(slopes[0], Zero))
-            found += [ufl.as_ufl(holds), *slopes]
+        laws, found = self._statement.laws, list[Expr]()
+        by = [*(at[f"q1 force{k}"] for k in range(laws)), *made.motions]
+        slopes = at.slopes_by(_expanded(made.forces[len(made.forces) - laws :]), by)
+        for k in range(laws):
+            row = slopes[2 * laws * k : 2 * laws * (k + 1)]
+            holds = made.holds[k] if made.holds else float(isinstance(row[k], Zero))
+            found += [ufl.as_ufl(holds), row[k], *row[laws:]]
         return found
 
     def _states(self, made: Equations) -> list[Expr]:
@@ -372,3 +378,11 @@ def _slopes(outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:
     every = ufl.as_vector(outputs)  # UFL differentiates a vector at once
     whole = components(ufl.as_tensor([ufl.diff(every, x) for x in by]))
     return [x for i in range(len(outputs)) for x in whole[i :: len(outputs)]]
+
+
+def _chained(slopes: list[Expr], outer: list[Expr], inner: list[list[Expr]]) -> list[Expr]:
+    """Add to derivatives the products of those by, and of, intermediate numbers."""
+    for x, row in zip(outer, inner, strict=True):
+        if not isinstance(x, Zero):
+            slopes = [y + x * dx for y, dx in zip(slopes, row, strict=True)]
+    return slopes

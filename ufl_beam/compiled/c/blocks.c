@@ -300,6 +300,7 @@ void end_step_of_block(const element_block *b, const double *q, enum end_of_step
   FOR_ACTING(b, c) {
     const double *out = b->out + (size_t)c * b->end_of->outputs * n, *shared = out + states;
     const double *record = shared + b->shares * n, *energy = record + b->recorded * n;
+    if (what == ENERGIES && b->knows_before) energy += energies * n;
     const int some = elements_in(b, c);
     if (what >= BEGIN) memcpy(b->state + (size_t)c * states, out, states * sizeof *out);
     for (int i = 0; i < b->shares; ++i)

@@ -688,6 +688,7 @@ typedef struct {
   double *force, *force_before; /* of loads: forces in the latest residual and in the last step; size */
   double weight_of_before, *work; /* work: entry of the ledger of the work of loads, minus the forces; or none */
   int stored, lost, entered; /* numbers of energies: of a state; of a step, the first ones are lost */
+  int knows_before;         /* whether the energies before the step follow these */
   double *energy, *const *entries; /* energies of the state; entries of all in the ledger */
   /* Of elements with rates; otherwise none: */
   const rates *nodal;
