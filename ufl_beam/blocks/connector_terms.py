@@ -83,7 +83,8 @@ def _kind(law: Any) -> object:
 def connector_terms(setting: BlockSetting) -> list[Any]:
     """Create the terms of the connectors of a process, one for each kind, guides last.
 
-    Every process creates all entries of the ledger, in the order of the scene.
+    Every process creates all entries of the ledger, in the order of the scene, and keeps the terms
+    of which it has connectors.
     """
     subdomain, scheme = setting.subdomain, setting.scheme
     connectors, made = setting.scene.all_connectors, list[Any]()
@@ -107,6 +108,7 @@ def connector_terms(setting: BlockSetting) -> list[Any]:
         for i, number in enumerate(subdomain.connectors)
         if isinstance(connectors[number].law, Guide)
     ]
+    made = [term for term in made if len(term.indices)]
     if guides:
         made.append(Guides(subdomain, np.array(guides), scheme, setting.A))
     return made

@@ -384,9 +384,10 @@ class ConnectorBlock(Block):
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore recorded numbers, states, and functions of time at the last step."""
         name, recorded = self._elements.name, self.recorded.reshape(-1, len(self._fields))
-        times = self._times[2, : len(self._elements.in_time), None]
-        indices = self._of_kind[: len(times)]
-        times[:] = archive.rows(f"functions of {name}", indices, times, known=True)
+        if self._elements.in_time:
+            mine = np.searchsorted(self._of_kind, self.indices)
+            times = self._times[2, mine, None]
+            self._times[2, mine] = archive.rows(f"functions of {name}", self.indices, times)[:, 0]
         k = self.statement.laws if self.statement.scheme.weight_of_before else 0
         self.keep_states(archive, k)
         forces = np.zeros(len(self.indices)) if q is NOWHERE else q[self.forces_at]
