@@ -169,8 +169,10 @@ def require_agreement(module: ModuleType, kernels: Sequence[tuple[int, Sizes]]) 
                 good = (np.abs(several - one) <= AGREEMENT * scale) | (several == one)
             wrong += np.sum(~good & ~(np.isnan(one) & np.isnan(several)))
         if wrong:
-            why = f"{wrong} of {4 * BATCH * entries} entries differ from FFCx's kernel"
-            LOGGER.warning("a vector kernel, from code of %s, is wrong: %s", VERSIONS, why)
+            why = f"{wrong} of {(every := 4 * BATCH * entries)} entries differ from FFCx's kernel"
+            # Few may differ beside a condition, or where numbers cancel
+            level = logging.WARNING if 3 * wrong > every else logging.INFO
+            LOGGER.log(level, "a vector kernel, from code of %s, is wrong: %s", VERSIONS, why)
             raise Refused(why)
 
 
