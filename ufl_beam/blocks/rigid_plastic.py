@@ -207,7 +207,7 @@ class HingeBlock(ConnectorBlock):
         return self._in_step(q, "nodal")
 
     def start(self, q: Array) -> None:
-        """See the base class: set the accepted motions to those of the nodes."""
+        """See the base class: take the motions of the nodes as the accepted motions."""
         self.state["start"][:] = in_batches(self.motion(q)[:, None], BATCH)[:, 0]
         super().start(q)
 

@@ -43,7 +43,7 @@ class OfSpring(OnConnector):
         return [*super().state, "e"]
 
     def law(self, at: Inputs, step: Step) -> Equations:
-        """See the base class; the energies are those of the material points."""
+        """See the base class; the material points have the energies."""
         (e1,), (λ,) = step.e1, step.λ
         force = at.stage(at["force"], at["slope"] * e1 + at["shift"])
         return Equations([λ - force], {"e": e1})
@@ -135,5 +135,5 @@ class SpringBlock(ConnectorBlock):
         self.points.restore(archive.rows("springs", self.indices, self.points.state()))
 
     def complete_derivatives(self, c: Any, neighbours: Neighbours, by_number: Array) -> None:
-        """See the base class: the derivatives of the points are inside of those of the springs."""
+        """See the base class: C differentiates the points together with the springs."""
         fill(c, inner=self.points.derivatives(neighbours, "points"))

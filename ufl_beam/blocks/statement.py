@@ -101,7 +101,7 @@ class Inputs(dict[str, Expr]):
         """Return a variable for an intermediate number, which is differentiated apart.
 
         Derivatives by inputs are products of derivatives by the number and of the number.  With
-        ``slope_of``, the derivatives of the number are those of another one.
+        ``slope_of``, another expression is differentiated in place of the number.
         """
         symbol = ufl.Coefficient(self.space(1))[0]
         alike = value if slope_of is None else slope_of

@@ -22,7 +22,7 @@ strains and energies do not belong to the present configuration of the scene."""
 
 
 class OtherVersion(ModelError):
-    """Error of saved arrays that are not those of this version of the package."""
+    """Error of saved arrays that another version of the package wrote in another form."""
 
 
 class Archive:

@@ -99,7 +99,7 @@ class Controllers:
             return
         values = np.column_stack([self.values, self._samples, np.full(len(self.values), t)])
         rows = archive.rows("asked", self._indices, values, known=True)
-        changing = [i for i, _ in self._changing]  # other limits are those of the scene
+        changing = [i for i, _ in self._changing]  # the scene has the other limits
         self.values[changing] = rows[changing, 0]
         if np.all(rows[:, 3] == t):
             self._samples[:] = rows[:, 1:3]

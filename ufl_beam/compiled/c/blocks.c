@@ -137,7 +137,7 @@ static void take_inputs(const element_block *b, const time_step *step)
   }
 }
 
-/* Modes before the first iterate: those of the last step, or zero. */
+/* Modes before the first iterate: the modes at the end of the last step, or zero. */
 void begin_block_again(void *self, const time_step *step, const double *q1, const double *s)
 {
   const element_block *b = self;
