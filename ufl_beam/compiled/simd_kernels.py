@@ -143,6 +143,11 @@ def in_batches(rows: npt.NDArray[Any], batch_size: int) -> npt.NDArray[Any]:
     return np.ascontiguousarray(batches.transpose(0, 2, 1))
 
 
+NEAR = 1e-13
+"""Relative change of inputs by which an entry of FFCx's own kernel changes by more than the
+tolerance, if round-off decides a condition in it, or its numbers cancel; such entries do not count.
+"""
+
 AGREEMENT = 1e-10
 """Tolerance on the difference from FFCx's kernel, relative to the largest entry of a cell, but at
 least of the median cell: all entries of a cell may be small differences of its numbers.
@@ -160,19 +165,24 @@ def require_agreement(module: ModuleType, kernels: Sequence[tuple[int, Sizes]]) 
         for signs in ([1.0], [1.0], [-1.0, 1.0], [-1.0, 1.0]):
             w = random.uniform(0.1, 1.0, (width, BATCH)) * random.choice(signs, (width, BATCH))
             x = np.array([[0, 0, 0, 1, 0.5, 0]]).T + random.uniform(-0.1, 0.1, (6, BATCH))
-            c, (one, several) = random.uniform(0.1, 0.9, constants), np.zeros((2, entries, BATCH))
+            c, (one, several, moved) = (
+                random.uniform(0.1, 0.9, constants),
+                np.zeros((3, entries, BATCH)),
+            )
             compute_both = getattr(module.lib, f"compute_both_{number}")
             compute_both(of_ffcx, *map(at, (w, c, x, one, several)))
             scale = np.abs(one).max(axis=0, where=np.isfinite(one), initial=0.0)
-            scale = np.maximum(scale, np.median(scale))
+            scale = AGREEMENT * np.maximum(scale, np.median(scale))
             with np.errstate(invalid="ignore"):
-                good = (np.abs(several - one) <= AGREEMENT * scale) | (several == one)
+                good = (np.abs(several - one) <= scale) | (several == one)
+                for _ in range(4 if not good.all() else 0):  # beside a condition, or cancellation
+                    near = w * (1.0 + NEAR * random.choice([-1.0, 1.0], w.shape))
+                    compute_both(of_ffcx, *map(at, (near, c, x, moved, several.copy())))
+                    good |= np.abs(moved - one) > scale
             wrong += np.sum(~good & ~(np.isnan(one) & np.isnan(several)))
         if wrong:
-            why = f"{wrong} of {(every := 4 * BATCH * entries)} entries differ from FFCx's kernel"
-            # Few may differ beside a condition, or where numbers cancel
-            level = logging.WARNING if 3 * wrong > every else logging.INFO
-            LOGGER.log(level, "a vector kernel, from code of %s, is wrong: %s", VERSIONS, why)
+            why = f"{wrong} of {4 * BATCH * entries} entries differ from FFCx's kernel"
+            LOGGER.warning("a vector kernel, from code of %s, is wrong: %s", VERSIONS, why)
             raise Refused(why)
 
 
