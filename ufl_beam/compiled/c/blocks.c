@@ -177,7 +177,7 @@ static void find_modes(const element_block *b)
     return;
   }
   FOR_ACTING(b, c)
-    for (int l = 0; l < n; ++l) input(b, c, first + MODE_HELD)[l] = holds && !b->free[c * n + l];
+    for (int l = 0; l < elements_in(b, c); ++l) input(b, c, first + MODE_HELD)[l] = holds && !b->free[c * n + l];
   evaluate(b, b->mode_of, b->out);
   FOR_ACTING(b, c) {
     const double *out = b->out + (size_t)c * b->mode_of->outputs * n, *excess = out + modes * n, *opened = excess + n;
