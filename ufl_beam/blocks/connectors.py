@@ -24,9 +24,8 @@ from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.state_io import NOWHERE, Archive
 from ufl_beam.mechanics.relative_motions import MOTIONS, Geometry, Pair
 from ufl_beam.mechanics.time_scheme import Scheme
-from ufl_beam.model.connector_laws import (
-    Controller,
-)
+from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_laws import Controller
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.derivatives import Each, Neighbours
 from ufl_beam.terms.term import Callbacks, Phases
@@ -50,6 +49,36 @@ class Step(NamedTuple):
     rate: Sequence[Expr]  # rates of the motions before the step, of statements with rates
 
 
+class Data(NamedTuple):
+    """Data of a law of a connector besides its equations.
+
+    Attributes:
+        numbers: Names of the parameters of the law.
+        variables: Initial values of the state besides forces, by name.
+        recorded: Fields of :class:`Connection` besides :data:`RECORDED`, with their kinds.
+        opens: True if connectors are held in the search for the one that opens first.
+        name: Name in files; by default the name of the statement.
+    """
+
+    numbers: Sequence[str] = ()
+    variables: Mapping[str, float] = {}
+    recorded: Mapping[str, int] = {}
+    opens: bool = False
+    name: str = ""
+
+    @classmethod
+    def of(
+        cls, law: ConnectorLaw, more: Sequence[str], recorded: Mapping[str, int], *,
+        opens: bool = False,
+    ) -> Data:  # fmt: skip
+        """Return the data of a law of a user, with more numbers before its parameters."""
+        numbers = [*more, *(f"number {name}" for name in law.parameters())]
+        variables = {f"state {name}": value for name, value in law.variables.items()}
+        return cls(
+            numbers, variables, recorded, opens, f"{type(law).__qualname__}{[*law.variables]}"
+        )
+
+
 @dataclass(frozen=True)
 class OnConnector(Statement):
     """Laws of the relative motions of two nodes.
@@ -69,54 +98,33 @@ class OnConnector(Statement):
         return len(self.motions)
 
     @property
-    def further(self) -> dict[str, int]:
-        """Fields of :class:`Connection` besides :data:`RECORDED`, with their kinds."""
-        return {}
+    def data(self) -> Data:
+        """Data of the law."""
+        return Data()
 
-    @property
-    def parameters(self) -> Sequence[str]:
-        """Names of the numbers of a law."""
-        return ()
+    def values(self, connector: Any, setting: BlockSetting) -> tuple[Sequence[float], Any]:
+        """Return the parameters of a connector, and its number "wanted" in time, if there is one.
 
-    def values(self, connector: Any, setting: BlockSetting) -> Sequence[float]:
-        """Return the parameters of the law of a connector."""
-        return ()
-
-    def function(self, connector: Any, setting: BlockSetting) -> Any:
-        """Return the number "wanted" of a step as a function of time; None without one."""
-        return None
-
-    @property
-    def name(self) -> str:
-        """Name of the law in files."""
-        return type(self).__name__
-
-    @property
-    def opens(self) -> bool:
-        """True if connectors are held in the search for the one that opens first."""
-        return False
-
-    @property
-    def initial(self) -> Mapping[str, float]:
-        """Initial values of the state that are not zero."""
-        return {}
+        By default the parameters are zero.
+        """
+        return [0.0] * len(self.data.numbers), None
 
     @property
     def numbers(self) -> list[str]:
         """Parameters of the law; geometry of each motion, except of relative rotations."""
         moving = (k for k, motion in enumerate(self.motions) if motion != "turning")
-        return [*self.parameters, *(f"{name} {k}" for k in moving for name in PLACES)]
+        return [*self.data.numbers, *(f"{name} {k}" for k in moving for name in PLACES)]
 
     @property
     def state(self) -> list[str]:
-        """Forces at the end of the last step, if they are in the work of a step."""
+        """Forces at the end of the last step, if they are in the work of a step; variables."""
         before = bool(self.scheme.weight_of_before)
-        return [f"force {k}" for k in range(before * self.laws)]
+        return [*(f"force {k}" for k in range(before * self.laws)), *self.data.variables]
 
     @property
     def recorded(self) -> dict[str, int]:
         """See the base class."""
-        kinds = RECORDED | self.further
+        kinds = RECORDED | {**self.data.recorded}
         return {f"{x} {k}": kind for k in range(self.laws) for x, kind in kinds.items()}
 
     @abstractmethod
@@ -180,9 +188,9 @@ class Driven(OnConnector):
 
     of_step = "dt", "fraction", "wanted"
 
-    def function(self, connector: Any, setting: BlockSetting) -> Any:
+    def values(self, connector: Any, setting: BlockSetting) -> tuple[Sequence[float], Any]:
         """See the base class."""
-        return InTime(connector.law.motion, connector, "whole_motion")
+        return (), InTime(connector.law.motion, connector, "whole_motion")
 
     def law(self, at: Inputs, step: Step) -> Equations:
         """See the base class."""
@@ -202,11 +210,11 @@ class Pushed(OnConnector):
     entry: str
     of_step = "dt", "wanted"
 
-    def function(self, connector: Any, setting: BlockSetting) -> Any:
+    def values(self, connector: Any, setting: BlockSetting) -> tuple[Sequence[float], Any]:
         """See the base class; C takes the force of a controller from an array."""
         controlled = isinstance(connector.law, Controller)
         known = setting.requested_forces(connector) if controlled else connector.law.force
-        return InTime(known, connector)
+        return (), InTime(known, connector)
 
     def law(self, at: Inputs, step: Step) -> Equations:
         """See the base class."""
@@ -218,11 +226,11 @@ class Damped(OnConnector):
     """Force in proportion to the mean rate of the motion in a step."""
 
     of_step = ("dt",)
-    parameters = ("viscosity",)  # N s/m or N m s/rad
+    data = Data(["viscosity"])  # N s/m or N m s/rad
 
-    def values(self, connector: Any, setting: BlockSetting) -> Sequence[float]:
+    def values(self, connector: Any, setting: BlockSetting) -> tuple[Sequence[float], Any]:
         """See the base class."""
-        return [connector.law.viscosity]
+        return [connector.law.viscosity], None
 
     def law(self, at: Inputs, step: Step) -> Equations:
         """See the base class."""
@@ -261,25 +269,25 @@ class ConnectorBlock(Block):
         dofs = subdomain.connector_dofs[mine].astype(np.int32)
         self.forces_at: Index = dofs[:, 6]
         moving = [j for j, motion in enumerate(statement.motions) if motion != "turning"]
+        of_kind = [scene.all_connectors[i] for i in all_connectors]
         numbers = [
-            [*statement.values(self.connectors[i], setting), *(
+            [*statement.values(self.connectors[i], setting)[0], *(
                 x for c in (self.connectors[i + j] for j in moving)
                 for x in (*c.arms[0], *c.arms[1], *c.apart, *c.axis)
             )]
             for i in range(0, len(mine), k)
         ]  # fmt: skip
-        of_kind = [scene.all_connectors[i] for i in all_connectors]
         self.law: Any = of_kind[0].law
-        in_time = [x for c in of_kind if (x := statement.function(c, setting)) is not None]
+        in_time = [x for c in of_kind if (x := statement.values(c, setting)[1]) is not None]
         positions = np.searchsorted(all_connectors, self.indices)
         elements = Elements(
-            statement.name, self.indices[::k],
+            statement.data.name or type(statement).__name__, self.indices[::k],
             np.column_stack([dofs[::k, :6], self.forces_at.reshape(-1, k)]),
             np.reshape(numbers, (len(numbers), len(statement.numbers))).T, in_time,
             {"wanted": positions} if in_time else {},
         )  # fmt: skip
         super().__init__(statement, elements, setting, kind="connectors")
-        for name, value in statement.initial.items():
+        for name, value in statement.data.variables.items():
             self.state[name][:] = value
         rotates = [scene.all_connectors[i].is_rotation for i in all_connectors[:k]]
         fill(self._c, length=np.where(rotates, 1.0, scene.size))
@@ -287,10 +295,10 @@ class ConnectorBlock(Block):
         if statement.modes:
             self._excess, self._free = np.zeros(len(mine)), np.zeros(len(mine), dtype=np.int32)
             fill(
-                self._c, search=setting.search, switched=setting.switched, opens=statement.opens,
-                excess=self._excess, free=self._free,
+                self._c, search=setting.search, switched=setting.switched,
+                opens=statement.data.opens, excess=self._excess, free=self._free,
             )  # fmt: skip
-        self._fields = [*(RECORDED | statement.further)]
+        self._fields = [*RECORDED, *statement.data.recorded]
         rows = self.recorded.reshape(len(mine), len(self._fields))
         self.fields = [
             (name, x) for name, x in zip(self._fields, rows.T, strict=True) if name != "nodal"
@@ -318,7 +326,7 @@ class ConnectorBlock(Block):
         if not self.statement.modes:
             return made
         fields = {"excess": doubles(self._excess), "free": integers(self._free)}
-        opens = {"number": len(self._excess), **fields} if self.statement.opens else None
+        opens = {"number": len(self._excess), **fields} if self.statement.data.opens else None
         return made._replace(opens=opens, again=loop("begin_block_again", self._c))
 
     @property

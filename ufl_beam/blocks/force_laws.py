@@ -16,7 +16,7 @@ import scipy  # loads its submodules at their first use
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import BlockSetting, InTime
-from ufl_beam.blocks.connectors import ConnectorBlock, OnConnector, Step
+from ufl_beam.blocks.connectors import ConnectorBlock, Data, OnConnector, Step
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import fill, lib
 from ufl_beam.compiled.simd_kernels import BATCH
@@ -266,23 +266,16 @@ class OfFunctions(OnConnector):
     variables: int
     of_step = "dt", "wanted"
 
-    def function(self, connector: Any, setting: BlockSetting) -> Any:
-        """See the base class: the time at which the function acts."""
-        return InTime(None, connector, "now")
-
     @property
-    def parameters(self) -> list[str]:
-        """See the base class."""
-        return [f"shift {k}" for k in range(1 + self.variables)]
-
-    def values(self, connector: Any, setting: BlockSetting) -> Sequence[float]:
-        """See the base class."""
-        return [0.0] * (1 + self.variables)
-
-    @property
-    def state(self) -> list[str]:
+    def data(self) -> Data:
         """See the base class; "e" is the motion."""
-        return [*super().state, *(f"state {k}" for k in range(self.variables)), "energy", "e"]
+        variables = *(f"state {k}" for k in range(self.variables)), "energy", "e"
+        shifts = [f"shift {k}" for k in range(1 + self.variables)]
+        return Data(shifts, dict.fromkeys(variables, 0.0))
+
+    def values(self, connector: Any, setting: BlockSetting) -> tuple[Sequence[float], Any]:
+        """See the base class; the function acts at the number "wanted"."""
+        return super().values(connector, setting)[0], InTime(None, connector, "now")
 
     @property
     def modes(self) -> list[str]:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.blocks.block import BlockSetting, InTime
-from ufl_beam.blocks.connectors import OnConnector, Step
+from ufl_beam.blocks.connectors import Data, OnConnector, Step
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.mechanics.connector_equations import law_step
@@ -54,12 +54,6 @@ class Rubbing(OnConnector):
     """Direction of slip, or 0; whether coming to rest would give energy."""
 
     @property
-    def name(self) -> str:
-        """See the base class."""
-        law = self.prototype
-        return "Coulomb" if law is None else f"{type(law).__qualname__}{[*law.variables]}"
-
-    @property
     def rates(self) -> int:
         """See the base class: velocities decide where a motion comes to rest."""
         return int(has_inertia(self.scheme))
@@ -71,44 +65,22 @@ class Rubbing(OnConnector):
         return ["dt", *of_rest, *["wanted"] * (self.prototype is None)]
 
     @property
-    def opens(self) -> bool:
+    def data(self) -> Data:
         """See the base class."""
-        return self.prototype is not None
+        more, last = ["tiny", "softness"], {"last slip": 0.0}
+        if self.prototype is None:
+            return Data(more, last, name="Coulomb")
+        dissipated = {"dissipated": lib.RECORDED_TOTAL}
+        data = Data.of(self.prototype, more, dissipated, opens=True)
+        return data._replace(variables=last | {**data.variables})
 
-    @property
-    def further(self) -> dict[str, int]:
-        """See the base class."""
-        return {} if self.prototype is None else {"dissipated": lib.RECORDED_TOTAL}
-
-    @property
-    def parameters(self) -> list[str]:
-        """See the base class."""
-        law = {} if self.prototype is None else self.prototype.parameters()
-        return ["tiny", "softness", *(f"number {name}" for name in law)]
-
-    def values(self, connector: Any, setting: BlockSetting) -> Sequence[float]:
-        """See the base class."""
+    def values(self, connector: Any, setting: BlockSetting) -> tuple[Sequence[float], Any]:
+        """See the base class; C takes limits that depend on other forces from an array."""
         size = 1.0 if connector.is_rotation else setting.scene.size
-        numbers = () if self.prototype is None else connector.law.parameters().values()
-        return [ROUND_OFF * size, CREEP * size * setting.friction_repeats, *numbers]
-
-    def function(self, connector: Any, setting: BlockSetting) -> Any:
-        """See the base class: the limit, which C takes from an array."""
-        if self.prototype is not None:
-            return None
-        return InTime(setting.requested_forces(connector), connector, "whole")
-
-    @property
-    def state(self) -> list[str]:
-        """See the base class."""
-        variables = () if self.prototype is None else self.prototype.variables
-        return [*super().state, "last slip", *(f"state {name}" for name in variables)]
-
-    @property
-    def initial(self) -> Mapping[str, float]:
-        """See the base class."""
-        variables = {} if self.prototype is None else self.prototype.variables
-        return {f"state {name}": value for name, value in variables.items()}
+        numbers = [ROUND_OFF * size, CREEP * size * setting.friction_repeats]
+        if self.prototype is None:
+            return numbers, InTime(setting.requested_forces(connector), connector, "whole")
+        return [*numbers, *connector.law.parameters().values()], None
 
     def _forces(self, at: Inputs, step: Step) -> tuple[Expr, Expr, dict[str, Expr]]:
         """Return the limit, the sliding force, and the variables after the step."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,11 +12,7 @@ import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import BlockSetting
-from ufl_beam.blocks.connectors import (
-    ConnectorBlock,
-    OnConnector,
-    Step,
-)
+from ufl_beam.blocks.connectors import ConnectorBlock, Data, OnConnector, Step
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import fill, lib
 from ufl_beam.mechanics.connector_equations import law_step
@@ -48,39 +44,19 @@ class OfEnergy(OnConnector):
         return self.prototype.rate_independent and bool(self.scheme.weight_of_before)
 
     @property
-    def further(self) -> dict[str, int]:
-        """See the base class."""
-        return {} if self.elastic else {"dissipated": lib.RECORDED_TOTAL}
-
-    @property
     def frozen(self) -> OfEnergy:
         """See the base class."""
         return replace(self, constant=bool(self.prototype.variables))
 
     @property
-    def parameters(self) -> Sequence[str]:
+    def data(self) -> Data:
         """See the base class."""
-        path = ["path"] * self.integrates
-        return [*path, *(f"number {name}" for name in self.prototype.parameters())]
+        recorded = {} if self.elastic else {"dissipated": lib.RECORDED_TOTAL}
+        return Data.of(self.prototype, ["path"] * self.integrates, recorded)
 
-    @property
-    def name(self) -> str:
+    def values(self, connector: Any, setting: BlockSetting) -> tuple[Sequence[float], Any]:
         """See the base class."""
-        return f"{type(self.prototype).__qualname__}{[*self.prototype.variables]}"
-
-    @property
-    def initial(self) -> Mapping[str, float]:
-        """See the base class."""
-        return {f"state {name}": value for name, value in self.prototype.variables.items()}
-
-    def values(self, connector: Any, setting: BlockSetting) -> Sequence[float]:
-        """See the base class."""
-        return [*[0.0] * self.integrates, *connector.law.parameters().values()]
-
-    @property
-    def state(self) -> list[str]:
-        """See the base class."""
-        return [*super().state, *(f"state {name}" for name in self.prototype.variables)]
+        return [*[0.0] * self.integrates, *connector.law.parameters().values()], None
 
     def law(self, at: Inputs, step: Step) -> Equations:
         """See the base class; work that is not stored is lost."""
@@ -175,7 +151,7 @@ class LawBlock(ConnectorBlock):
         The work is computed by the trapezoidal rule, which is smooth in ``q1``.
         """
         k, n = self.statement.laws, len(self.statement.unknowns)
-        if not self._law.rate_independent or self.statement.further == {}:
+        if not self._law.rate_independent or not self.statement.data.recorded:
             return 0.0
         before = self._w[:, n : 2 * n].transpose(0, 2, 1).reshape(-1, n)
         q0 = q1.copy()

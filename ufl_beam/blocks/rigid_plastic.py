@@ -13,7 +13,7 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import BlockSetting
-from ufl_beam.blocks.connectors import ConnectorBlock, OnConnector, Step
+from ufl_beam.blocks.connectors import ConnectorBlock, Data, OnConnector, Step
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
@@ -89,12 +89,6 @@ class Hinged(OnConnector):
     freed: bool = False
     of_step = ("dt",)
     modes = ("direction",)  # of slip, or 0
-    opens = True
-
-    @property
-    def further(self) -> dict[str, int]:
-        """See the base class."""
-        return {"dissipated": lib.RECORDED_TOTAL, "nodal": lib.RECORDED_STATE}
 
     @property
     def frozen(self) -> Hinged:
@@ -102,19 +96,17 @@ class Hinged(OnConnector):
         return replace(self, freed=not isinstance(self.prototype, ElastoPlastic))
 
     @property
-    def parameters(self) -> list[str]:
+    def data(self) -> Data:
         """See the base class."""
-        return ["r", *parameters(self.prototype)]
+        state = "slipped", "start", "limit", "back force", "last direction"
+        recorded = {"dissipated": lib.RECORDED_TOTAL, "nodal": lib.RECORDED_STATE}
+        numbers = ["r", *parameters(self.prototype)]
+        return Data(numbers, dict.fromkeys(state, 0.0), recorded, opens=True)
 
-    def values(self, connector: Any, setting: BlockSetting) -> Sequence[float]:
+    def values(self, connector: Any, setting: BlockSetting) -> tuple[Sequence[float], Any]:
         """See the base class."""
         law = law_of(connector)
-        return [_slope(connector, setting.scene.size), *parameters(law).values()]
-
-    @property
-    def state(self) -> list[str]:
-        """See the base class."""
-        return [*super().state, "slipped", "start", "limit", "back force", "last direction"]
+        return [_slope(connector, setting.scene.size), *parameters(law).values()], None
 
     def law(self, at: Inputs, step: Step) -> Equations:
         """See the base class."""

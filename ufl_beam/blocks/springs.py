@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import BlockSetting
-from ufl_beam.blocks.connectors import ConnectorBlock, OnConnector, Step
+from ufl_beam.blocks.connectors import ConnectorBlock, Data, OnConnector, Step
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import fill, loop, struct
 from ufl_beam.discretization.state_io import Archive
@@ -30,17 +29,8 @@ class OfSpring(OnConnector):
     """
 
     of_step = ("dt",)
-    parameters = ("shift",)
     modes = "slope", "force"
-
-    def values(self, connector: Any, setting: BlockSetting) -> Sequence[float]:
-        """See the base class."""
-        return [0.0]
-
-    @property
-    def state(self) -> list[str]:
-        """See the base class; "e" is the motion."""
-        return [*super().state, "e"]
+    data = Data(["shift"], {"e": 0.0})  # e: motion
 
     def law(self, at: Inputs, step: Step) -> Equations:
         """See the base class; the material points have the energies."""
