@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Laws for tests: of materials, by residuals and in closed form; of softening."""
+"""Laws for tests: of materials, by residuals and in closed form; of softening; statements."""
 
 from dataclasses import dataclass
 from typing import ClassVar
+
+import ufl
 
 import ufl_beam as ub
 
@@ -252,3 +254,60 @@ class Rising(ub.SofteningLaw):
     def traction(self, opening):
         x = opening / self.width
         return self.t * (1 + 4 * x) * f.exp(-2 * x)
+
+
+@dataclass(frozen=True)
+class HardeningSpring(ub.Statement):
+    """Spring along y between two places, k/2 e² + h/4 e⁴."""
+
+    nodes = 2
+    numbers = "k", "h"  # N/m, N/m³
+
+    def equations(self, at):
+        def energy(q, n):
+            e = q[1][1] - q[0][1]
+            return n["k"] / 2 * e**2 + n["h"] / 4 * e**4
+
+        return at.potential("spring", energy)
+
+
+@dataclass(frozen=True)
+class AirDrag(ub.Statement):
+    """Drag in proportion to the square of the velocity."""
+
+    numbers = ("c",)
+
+    def equations(self, at):
+        x, y, _ = at.v[0]
+        size = ufl.sqrt(x**2 + y**2 + 1e-12)
+        force = [[at["c"] * size * x, at["c"] * size * y, 0.0]]
+        return ub.Equations(force, lost={"drag": at.work(force)})
+
+
+@dataclass(frozen=True)
+class MaxwellElement(ub.Statement):
+    """Spring and dashpot in a row along y between two places; the dashpot has grown by ``flow``.
+
+    The force k (e - flow) and the growth of the dashpot belong to the same time.
+    """
+
+    nodes = 2
+    numbers = "k", "time"
+    state = ("flow",)
+
+    def equations(self, at):
+        θ, k = at.scheme.load_weight, at["k"]
+        e0, e1 = (q[1][1] - q[0][1] for q in (at.q0, at.q1))
+        rate = at["dt"] / at["time"]
+        # (flow1 - flow) = rate (e - flow) with the means of both in the step
+        e = (1.0 - θ) * e0 + θ * e1
+        flow = at["flow"] + rate / (1.0 + θ * rate) * (e - at["flow"])
+        mean = k * (e - (1.0 - θ) * at["flow"] - θ * flow)
+        force = [[0.0, -mean, 0.0], [0.0, mean, 0.0]]
+        stored = k / 2 * (e1 - flow) ** 2
+        before = k / 2 * (e0 - at["flow"]) ** 2
+        lost = at.work(force) - (stored - before)
+        return ub.Equations(
+            force, {"flow": flow}, {"stored": stored}, {"damping": lost},
+            before={"stored": before},
+        )  # fmt: skip

@@ -77,6 +77,7 @@ from ufl_beam.analysis.section_analysis import MomentCurvature as MomentCurvatur
 from ufl_beam.analysis.section_analysis import interaction_diagram, moment_curvature
 from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff as Tradeoff
+from ufl_beam.blocks.statement import Equations, Statement
 from ufl_beam.errors import (
     ArgumentError,
     ArgumentTypeError,
@@ -159,7 +160,7 @@ from ufl_beam.model.shapes import Shape
 from ufl_beam.model.softening_laws import LinearSoftening, Softening, SofteningLaw
 from ufl_beam.model.steel_laws import MenegottoPinto
 from ufl_beam.model.supports import Clamped, Pinned, PrescribedDisplacement, Roller, Support
-from ufl_beam.model.works import Potential, VirtualWork
+from ufl_beam.model.works import Effect, Potential, VirtualWork
 from ufl_beam.output.dolfinx_view import DolfinxView as DolfinxView
 from ufl_beam.output.engineering_results import HingeTable as HingeTable
 from ufl_beam.output.engineering_results import Storeys as Storeys
@@ -218,12 +219,14 @@ __all__ = [
     "DissipationControl",
     "DuvautLions",
     "DynamicScheme",
+    "Effect",
     "ElastoPlastic",
     "EnergyMomentum",
     "EnergyMomentumBase",
     "EnergyMomentumDecaying",
     "EnergyMomentumPrinted",
     "EnergyMomentumStatic",
+    "Equations",
     "Events",
     "Extremes",
     "Fatigue",
@@ -293,6 +296,7 @@ __all__ = [
     "SofteningLaw",
     "Solution",
     "Spring",
+    "Statement",
     "Static",
     "Step",
     "Stop",

@@ -219,6 +219,9 @@ INDEPENDENT = {
     "verification/test_tangent_damping.py": {
         "rayleigh": "test_a_yielding_oscillator_converges_with_first_order",
     },
+    "unit/test_statements_of_users.py": {
+        "own_statement": "test_a_maxwell_element_relaxes",
+    },
     "verification/test_wind_soil_magnets.py": {
         "virtual_work": "test_a_current_in_a_field",
         "potential": "test_beam_on_an_elastic_foundation",

@@ -12,6 +12,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import ArgumentError, ConvergenceError, StepFailed
 from ufl_beam.mechanics.time_scheme import has_inertia
+from ufl_beam.model.works import Effect
 from ufl_beam.output.recorder import StateView
 from ufl_beam.parallel import Agreement, ProcessComparison
 from ufl_beam.simulation.impacts import impacts_of
@@ -102,10 +103,11 @@ class OldSimulation(Solver):
 
 
 def simulation_by_either(scene, scheme, **options):
-    """The present solver, or the old one if the scene is beyond its scope."""
+    """The present solver, or the old one, which has no statements of users, for other scenes."""
     try:
         return ReferenceRun(scene, scheme, **options)
     except ArgumentError as error:
-        if "reference=True cannot be combined" not in str(error):
+        own = any(isinstance(work, Effect) for work in scene.works)
+        if own or "reference=True cannot be combined" not in str(error):
             raise
     return OldSimulation(scene, scheme, **options)

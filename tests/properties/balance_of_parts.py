@@ -4,6 +4,7 @@
 import math
 
 import numpy as np
+from user_laws import HardeningSpring
 
 import ufl_beam as ub
 from ufl_beam.model.bodies import GROUND, node
@@ -76,6 +77,11 @@ class Balance:
         for one in self.scene.connectors:
             if node(one.a) is GROUND:
                 yield one.b, self._of_connector(one, solution.connector(one).force[last])
+        for one in self.scene.works:
+            if isinstance(one, ub.Effect) and isinstance(one.statement, HardeningSpring):
+                e, place = solution.displacement(one.places[1])[last, 1], one.places[1]
+                force = one.numbers["k"] * e + one.numbers["h"] * e**3
+                yield place, self.at(place, np.array([0.0, -force]))
         for joint in self.scene.joints:
             if node(joint.places[0]) is GROUND:
                 history = solution.joint(joint)

@@ -155,7 +155,7 @@ def saved(case):
 
     Guide curves are saved as points, so that the directions of their forces have fewer digits.
     """
-    own = *LAWS, *SOFTENING, *CONNECTOR_LAWS
+    own = *LAWS, *SOFTENING, *CONNECTOR_LAWS, "ub.Effect"
     only(not case.combination.has(*own), "own laws cannot be saved")
     before, scene = case.whole.solution, case.whole.names["scene"]
     before.save(case.folder / "solution.h5")
@@ -351,6 +351,7 @@ def reference(case):
     """
     only(case.equal_steps, "its steps are equal")
     only(case.comm.size == 1, "it has one process")
+    only(not case.combination.has("ub.Effect"), "it has no statements of users")
     newton = ub.Newton(rtol=DIGITS, reference=True)
     with mock.patch.object(ufl_beam.simulation.run, "ReferenceRun", simulation_by_either):
         by_reference(case, newton)

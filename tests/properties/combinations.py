@@ -249,6 +249,7 @@ class Combination:
         found |= {"law_functions", "MaterialLaw"} if self.has(*LAWS) else set()
         found |= {"law_functions", "SofteningLaw"} if self.has(*SOFTENING) else set()
         found |= {"ConnectorLaw"} if self.has(*CONNECTOR_LAWS) else set()
+        found |= {"Equations", "Statement"} if self.has("ub.Effect") else set()
         own = {
             "Coefficients",
             "EnergyMomentumBase",

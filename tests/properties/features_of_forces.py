@@ -272,17 +272,26 @@ def rotating_frame(d):
 
 @feature("work")
 def virtual_work(d):
+    size = d.some(-15, 15)
     kinds = [
-        f"'current', current, numbers={{'p': {d.some(-15, 15):.3f}}}",
+        f"'current', current, numbers={{'p': {size:.3f}}}",
         f"'dead', dead, numbers={{'x': {d.some(-15, 15):.3f}, 'y': {d.time()}}}",
     ]
+    numbers = f"numbers={{'k': {10 * abs(size):.3f}, 'h': 1e3}}"
+    own = [f"HardeningSpring(), places=[ub.ground(0.3, 1.2), {d.last}.end], {numbers}"]
     if not d.static:
         kinds += [
             f"'drag', drag, numbers={{'c': {d.some(0.2, 3):.3f}}}",
             f"'wind', wind, numbers={{'c': {d.some(0.2, 2):.3f}, 'speed': {1 / d.end:.4g}}}",
         ]
+        numbers = f"numbers={{'k': {10 * abs(size):.3f}, 'time': {d.end / 4:.4g}}}"
+        own += [
+            f"AirDrag(), beams=[b0], numbers={{'c': {abs(size):.3f}}}",
+            f"MaxwellElement(), places=[b0.start, {d.last}.end], {numbers}",
+        ]
     beams = d.one(["", ", beams=[b0]"])
-    d.works.append(f"ub.VirtualWork({d.one(kinds)}{beams})")
+    works = [f"ub.VirtualWork({kind}{beams})" for kind in kinds]
+    d.works.append(d.one([*works, *(f"ub.Effect({kind})" for kind in own)]))
 
 
 @feature("potential")

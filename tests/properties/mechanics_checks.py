@@ -61,10 +61,9 @@ def jumps(case):
     scene, solution = case.exact.names["scene"], case.exact.solution
     attached, supports = {}, {}
     for owner, place in scene.attachments():
-        if isinstance(place, ub.Place) and not isinstance(
-            owner,
-            ub.LineLoad | ub.Pressure | ub.MovingLoad | ub.ImposedStrain | ub.VirtualWork,
-        ):
+        along = ub.LineLoad | ub.Pressure | ub.MovingLoad | ub.ImposedStrain | ub.VirtualWork
+        along = isinstance(owner, along) or bool(getattr(owner, "beams", None))
+        if isinstance(place, ub.Place) and not along:
             attached.setdefault((place.beam, round(place.s, 9)), []).append(owner)
     for support in scene.supports:
         supports[support.place.beam, round(support.place.s, 9)] = support
@@ -107,6 +106,7 @@ def momentum(case):
     only(
         not words.has(
             "VirtualWork",
+            "Effect",
             "Potential",
             "RotatingFrame",
             "Rayleigh",

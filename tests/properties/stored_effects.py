@@ -11,12 +11,15 @@ import math
 
 from stored_scenes import DYNAMIC, OVER_ANY_STEP, OVER_STEP, effect
 from user_classes import (
+    AirDrag,
     Brake,
     Cubic,
     Cushion,
     Dashpot,
+    HardeningSpring,
     Integral,
     Maxwell,
+    MaxwellElement,
     Petersson,
     PowerLaw,
     Relaxing,
@@ -226,6 +229,23 @@ def potential(d):
         ub.Potential("field", field, numbers={"size": lambda t: size * grows(t)}),
         ub.Potential("warming", warming, numbers={"M": lambda t: size * grows(t)}, degree=3),
     ))  # fmt: skip
+
+
+@effect(ub.Effect)
+def own_statement(d):
+    """Elements between places, one with a number that varies in time; drag along a beam."""
+    beam = arm(d)
+    x, y = beam.end.point
+    place, k, grows = ub.ground(x, y + 0.5), d.acts(100, 300), d.wave()
+    d.add("works", ub.Effect(
+        HardeningSpring(), places=[place, beam.end],
+        numbers={"k": lambda t: k * (1 + grows(t) / 2), "h": d.acts(1e4, 3e4)},
+    ))  # fmt: skip
+    numbers = {"k": d.acts(100, 300), "time": d.acts(0.02, 0.1)}
+    d.add("works", ub.Effect(MaxwellElement(), places=[beam.at(0.5), beam.end], numbers=numbers))
+    if not d.static:
+        drag = {"c": d.acts(0.5, 3)}
+        d.add("works", ub.Effect(AirDrag(), beams=[beam], numbers=drag, degree=3))
 
 
 @effect(ub.Rayleigh, schemes=DYNAMIC)

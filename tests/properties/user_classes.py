@@ -15,7 +15,15 @@ import ufl
 import ufl_beam as ub
 
 sys.path.append(str(Path(__file__).parents[1]))
-from user_laws import Dashpot, Petersson, PowerLaw, Rising  # noqa: F401
+from user_laws import (  # noqa: F401
+    AirDrag,
+    Dashpot,
+    HardeningSpring,
+    MaxwellElement,
+    Petersson,
+    PowerLaw,
+    Rising,
+)
 
 f = ub.law_functions
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import ufl
 from helpers import raises
+from user_laws import AirDrag, HardeningSpring, MaxwellElement
 
 import ufl_beam as ub
 from ufl_beam.analysis import derivatives
@@ -95,6 +96,20 @@ def works(c=0.8, k=3.0, stiffness=20.0, growth=0.5):
     return scene_of(100.0, works=lambda b: [air, ub.Potential("soil", soil, numbers=size)])
 
 
+def effects(c=0.8, k=3.0, growth=0.5, h=20.0, time=0.3):
+    """Statements of a user along the beam and between places, with states, and in time."""
+    hardening = {"k": lambda t: k * math.exp(growth * t), "h": h}
+    place, maxwell = ub.ground(2, 1), {"k": 9.0, "time": time}
+    return scene_of(
+        100.0,
+        works=lambda b: [
+            ub.Effect(AirDrag(), beams=[b], numbers={"c": c}),
+            ub.Effect(HardeningSpring(), places=[place, b.end], numbers=hardening),
+            ub.Effect(MaxwellElement(), places=[b.at(0.5), b.end], numbers=maxwell),
+        ],
+    )
+
+
 def imposed(axial=1e-3, curvature=0.3, rate=3.0, EI=100.0):
     """Strains that do not begin at zero, with a support that hinders them."""
     return scene_of(
@@ -146,8 +161,8 @@ def guided(radius=2.0, dent=0.5, load=8.0):
 
 
 MODELS = (
-    follower, pressure, frame, moving, moving_mass, works, imposed, imposed_on_points, viscous,
-    damped, damped_points, guided,
+    follower, pressure, frame, moving, moving_mass, works, effects, imposed, imposed_on_points,
+    viscous, damped, damped_points, guided,
 )  # fmt: skip
 ONLY_DYNAMIC = moving_mass, damped, damped_points
 
@@ -349,6 +364,7 @@ def test_strains_and_masses_that_begin_at_zero_are_refused():
         pressure,
         frame,
         works,
+        effects,
         viscous,
         imposed,
         moving,
@@ -360,7 +376,7 @@ def test_strains_and_masses_that_begin_at_zero_are_refused():
 )
 def test_adjoint_is_the_same_sum(model, scheme):
     """They are the same sums in another order; 1e-9 is round-off of differences in `of`."""
-    if model in (viscous, works, *ONLY_DYNAMIC) and scheme == ub.Static():
+    if model in (viscous, works, effects, *ONLY_DYNAMIC) and scheme == ub.Static():
         pytest.skip("forces by velocities")
     at = dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
     options = {"t": (0, 1), "dt": 0.05}

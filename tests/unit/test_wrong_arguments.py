@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from user_laws import AirDrag
 
 import ufl_beam as ub
 from ufl_beam.simulation import step_equation
@@ -141,6 +142,15 @@ HINGE = {
     "negative": V(None, optional(OBJECT)), "strength": CAPACITY, "softening": CAPACITY,
     "unloading": CAPACITY, "exponent": V(1.0, [*POSITIVE, 0.5]),
 }  # fmt: skip
+
+
+class Loose(ub.Statement):
+    """A class that is no dataclass."""
+
+    def equations(self, at):
+        return ub.Equations([[0.0, 0.0, 0.0]])
+
+
 OF_WORKS = {
     "name": V("wind", [*TEXT, "", "kinetic"]),
     "beams": V(None, optional(LIST)),
@@ -438,6 +448,12 @@ TABLE = {
     ),
     "Potential": call(
         ub.Potential, density=V(lambda q, c: c * q[1], [*FUNCTION, lambda w: w]), **OF_WORKS
+    ),
+    "Effect": call(
+        ub.Effect, statement=V(AirDrag(), [*OBJECT, AirDrag, Loose()]),
+        places=V([BEAM.end], [*LIST, [BEAM.end, BEAM.start]]),
+        beams=V(None, [[BEAM], *optional(LIST)]),
+        numbers=OF_WORKS["numbers"], degree=OF_WORKS["degree"],
     ),
     "RotatingFrame": call(ub.RotatingFrame, rate=V(1.0, NUMBER), about=V((0, 0), VECTOR)),
     "Table": call(
@@ -843,16 +859,16 @@ TABLE |= {
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Calibration", "Coefficients", "Connector", "CriticalPoint", "Cycles",
     "Decay", "DemandCurves", "Derivatives", "Diagram", "DolfinxView", "Energy", "Envelope",
-    "Event", "Extent", "Film", "Governing", "HingeFormation", "InteractionDiagram", "Joint",
-    "LinearModel", "LoadCombinations", "Modes", "MomentCurvature", "Path", "Pushover", "Solution",
-    "SpectralResponse", "Step", "Study", "Support", "TargetDisplacement", "Tradeoff",
+    "Equations", "Event", "Extent", "Film", "Governing", "HingeFormation", "InteractionDiagram",
+    "Joint", "LinearModel", "LoadCombinations", "Modes", "MomentCurvature", "Path", "Pushover",
+    "Solution", "SpectralResponse", "Step", "Study", "Support", "TargetDisplacement", "Tradeoff",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""
 
 WITHOUT_PARAMETERS = {
     "Static", "EnergyMomentumPrinted", "Recorder", "print_once", "Scheme",
     "DynamicScheme", "ConnectorLaw", "EnergyMomentumBase", "MidpointDynamics", "MaterialLaw",
-    "SofteningLaw", "law_functions",
+    "SofteningLaw", "Statement", "law_functions",
 }  # fmt: skip
 
 OF_SOLUTIONS = {

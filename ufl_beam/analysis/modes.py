@@ -38,7 +38,7 @@ from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.constraint_checks import require_no_mechanism, require_no_prestress
 from ufl_beam.model.loads import Load, RotatingFrame
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.works import VirtualWork
+from ufl_beam.model.works import Effect, VirtualWork
 from ufl_beam.output.paraview_files import VTKHDF, XDMF, TimeSeries
 from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.parallel import active_comm, on_first
@@ -420,7 +420,7 @@ def buckling(
     at = require_state("buckling", scene, at, mesh)
     require_number(t, "buckling: t")
     for load in (*scene.loads, *scene.works):
-        if isinstance(load, VirtualWork) or (isinstance(load, Load) and not load.dead):
+        if isinstance(load, VirtualWork | Effect) or (isinstance(load, Load) and not load.dead):
             raise ArgumentError(
                 f"buckling: the {type(load).__name__} has a stiffness of its own; use "
                 "modes(..., at=) about states with an increasing load, and find where a frequency "

@@ -45,7 +45,8 @@ class Equations(NamedTuple):
 
     Attributes:
         forces: Forces of the element in the equilibrium of its nodes, in the order of
-            :attr:`Statement.unknowns`; positive if they resist a positive motion.
+            :attr:`Statement.unknowns`, of a user's statement a vector (x, y, moment) for each
+            place; positive if they resist a positive motion; N, N, N m.
         state: New state and shared numbers at the end of the step, by name.
         stored: Energies that the element stores at the end of the step, by entry of the ledger; J.
         lost: Energies that it loses in the step, by entry of the ledger; J.
@@ -62,6 +63,11 @@ class Equations(NamedTuple):
             input, see :attr:`Statement.integrates`.
         motions: Variables of UFL on which the laws depend, one for each law; m or rad.
         recorded: Numbers that solutions record, by name; changes of numbers that are sums.
+
+    Example:
+        >>> weight = ub.Equations([[0.0, 9.81, 0.0]])  # N, on one place
+        >>> weight.stored, weight.state
+        ({}, {})
     """
 
     forces: Sequence[Expr]
@@ -155,12 +161,61 @@ class Inputs(dict[str, Expr]):
 
 
 class Statement(ABC):
-    """Effect on an element.  Equal statements, such as equal frozen dataclasses, share kernels."""
+    """Effect on an element.  Equal statements, such as equal frozen dataclasses, share kernels.
+
+    The statement of a user is a frozen dataclass, which an :class:`Effect` puts into a scene.  It
+    has the attributes ``nodes``, the number of places, by default 1; ``numbers``, names of numbers
+    whose values the effect has; and ``state``, names of numbers that an element remembers, or their
+    initial values by name.  Its method ``equations(at)`` returns :class:`Equations` in UFL with
+    ``forces``, ``state``, ``stored``, ``lost``, ``supplied`` and ``before``, or several whose
+    functions are added.  ``at`` has numbers and state before the step by name, the length
+    ``at["dt"]`` of the step (s), and these attributes:
+
+    * ``q0``, ``q1``: motion (x, y, rotation) of each place before the step and at its end, a list,
+    * ``q``: motions at which the scheme evaluates forces, see :class:`VirtualWork`,
+    * ``v``: mean velocities of the step, (q1 - q0)/dt,
+    * ``places``: position of each place in the undeformed scene; m,
+    * ``axis``: undeformed axis along beams, see :class:`VirtualWork`; None at places,
+    * ``work(forces)``: work of forces in the step, on q1 - q0, for the ledger of the scheme; J,
+    * ``potential(name, energy)``: equations of a stored energy with its forces, a function
+      ``energy(q, numbers)``, whose error in the ledger is that of :class:`Potential`.
+
+    The work of the forces must be what the statement stores, loses and supplies.  The names of
+    these energies are entries of the ledger: names of your own, or entries of the package for
+    losses ("damping", "friction", ...), "stored", and "loads" for supplied energy.
+
+    Raises:
+        ModelError: Before a run: an unknown name, other forces than places, a state that is not
+            returned, energies that are no scalars, or unexplained work.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> @dataclass(frozen=True)
+        ... class Tether(ub.Statement):
+        ...     nodes = 2
+        ...     numbers = "k", "length"  # N/m, m
+        ...
+        ...     def equations(self, at):
+        ...         a, b = at.places
+        ...
+        ...         def energy(q, n):
+        ...             x, y = (b[i] - a[i] + q[1][i] - q[0][i] for i in (0, 1))
+        ...             longer = (x**2 + y**2) ** 0.5 - n["length"]
+        ...             return n["k"] / 2 * ((longer + abs(longer)) / 2) ** 2
+        ...
+        ...         return at.potential("tether", energy)
+        >>> places = [ub.ground(2, 3), beam.end]
+        >>> tether = ub.Effect(Tether(), places=places, numbers={"k": 1e3, "length": 2.9})
+        >>> hanging = ub.Scene([beam], supports=[ub.Clamped(beam.start)], works=[tether])
+        >>> run = ub.simulate(hanging, ub.Static(), t=(0, 1), dt=1.0)
+        >>> print(run.energy["tether"][-1].round(1))  # J
+        5.0
+    """
 
     @property
-    @abstractmethod
     def nodes(self) -> int:
         """Number of nodes of an element."""
+        return 1
 
     @property
     def rates(self) -> int:
@@ -239,13 +294,13 @@ class Statement(ABC):
         return self
 
     @property
-    @abstractmethod
     def numbers(self) -> Sequence[str]:
         """Names of the constant numbers of an element."""
+        return ()
 
     @abstractmethod
-    def equations(self, at: Inputs) -> Equations:
-        """Return the functions of the inputs ``at``."""
+    def equations(self, at: Any) -> Equations:
+        """Return the functions of the inputs ``at``, which are :class:`Inputs`."""
 
     @property
     def unknowns(self) -> list[str]:

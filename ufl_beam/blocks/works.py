@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Statements of virtual works and potentials of a user, and checks of the user's functions."""
+"""Effects of a user at places and along beams: statements, virtual works, potentials."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,22 +16,263 @@ from ufl.classes import Zero
 from ufl.core.expr import Expr
 from ufl.domain import extract_domains
 
+from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
-from ufl_beam.blocks.cells import (
-    POINT,
-    AxisOfCell,
-    Cell,
-    StatementOnCell,
-    at_points,
-    places,
-    positions,
-)
-from ufl_beam.blocks.statement import Equations, Inputs, kernels
+from ufl_beam.blocks.cells import POINT, AxisOfCell, Cell, at_points, places, positions
+from ufl_beam.blocks.statement import COMPONENTS, Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.errors import ModelError, shorten
+from ufl_beam.errors import ModelError, calling, shorten
+from ufl_beam.mechanics.relative_motions import by_turning, virtual_displacement
 from ufl_beam.mechanics.time_scheme import Scheme
+from ufl_beam.model.bodies import arm
+from ufl_beam.model.connector_law import CONTRIBUTIONS, LOSSES
 from ufl_beam.model.functions import Constant, steady
-from ufl_beam.model.works import Potential, VirtualWork, Work
+from ufl_beam.model.works import Effect, Potential, VirtualWork, Work
+from ufl_beam.terms.derivatives import Each, Neighbours
+
+TIMES = "now", "end", "before", "between"
+"""Times of numbers that vary, see :data:`~ufl_beam.blocks.block.TIMES`."""
+
+ENTRIES = {"stored": ["stored"], "lost": [*LOSSES, "numerical"], "supplied": ["loads"]}
+"""Entries of the package in the ledger to which statements of a user may add, by account."""
+
+
+class Element(dict[str, Any]):
+    """Inputs of a user's statement by name, see :class:`Statement`.
+
+    Attributes:
+        inputs: Inputs of :class:`OfUser`.
+        steps: Virtual motions of the nodes whose values in a step are the changes of the motions.
+        virtual: The same at the places.
+        length: Length for which the element stands, m; 1 at places.
+        worked: Forces of :meth:`work`, by the names of their states; None before the call.
+    """
+
+    def __init__(self, statement: OfUser, at: Inputs) -> None:
+        inner, self.scheme, self.inputs = statement.inner, statement.scheme, at
+        self._statement, nodes = statement, range(statement.nodes)
+        self.nodes = [at.motions("q0"), at.motions("q1")]
+        self.variables = [[ufl.variable(ufl.as_ufl(0.0)) for _ in COMPONENTS] for _ in nodes]
+        self.axis, self.length, self.virtual = None, ufl.as_ufl(1.0), list[Expr]()
+        self.worked: dict[str, Expr] | None = None
+        if statement.degree:
+            self.axis = AxisOfCell(Cell(statement.degree, at), at["s"])
+            self.places, self.length = [self.axis.x], at["weight"] * self.axis.h
+        else:
+            self.places, self._arms = (
+                [ufl.as_vector([at[f"{name} {c}{k}"] for c in "xy"]) for k in nodes]
+                for name in ("place", "arm")
+            )
+        self.q0, self.q1 = map(self.motions, self.nodes)
+        θ = self.scheme.load_weight
+        pairs = [*zip(self.q0, self.q1, strict=True)]
+        self.q = [(1.0 - θ) * q0 + θ * q1 for q0, q1 in pairs]
+        self.v = [(q1 - q0) / at["dt"] for q0, q1 in pairs]
+        self.steps, w = list[Expr](), [ufl.as_vector(v) for v in self.variables]
+        for k, (q0, q1, u) in enumerate(zip(*self.nodes, w, strict=True)):
+            turn = self.scheme.virtual_rotation(0.0, q1[2] - q0[2], u[2])
+            self.steps.append(ufl.as_vector([u[0], u[1], turn]))
+            if not self.axis:
+                moved = virtual_displacement(q0, q1, u, self._arms[k], self.scheme)
+                self.virtual.append(ufl.as_vector([moved[0], moved[1], turn]))
+        if self.axis:
+            self.virtual = [self.axis.field(self.steps)]
+        super().__init__({x: at[f"state {x}"] for x in inner.state} | {"dt": at["dt"]})
+        self.update(self.numbers("now"))
+
+    def __missing__(self, name: str) -> Any:
+        raise KeyError(f"{name!r} is no input; the inputs are {', '.join(self)}")
+
+    def numbers(self, when: str) -> dict[str, Expr]:
+        """Return the numbers at one of :data:`TIMES`."""
+        time = when if self._statement.varies else "now"
+        return {name: self.inputs[f"{name} {time}"] for name in self._statement.names}
+
+    def motions(self, nodal: Sequence[Expr]) -> list[Expr]:
+        """Return the motions of the places from those of the nodes."""
+        if self.axis:
+            return [self.axis.field(nodal)]
+        moved = [by_turning(x, q[2]) for x, q in zip(self._arms, nodal, strict=True)]
+        pairs = zip(nodal, moved, strict=True)
+        return [ufl.as_vector([q[0] + u[0], q[1] + u[1], q[2]]) for q, u in pairs]
+
+    def work(self, forces: Sequence[Any]) -> Expr:
+        """Return the work of forces in the step, in the ledger of the scheme; J."""
+        if self.worked is not None:
+            raise ValueError("call work() once, with the sum of the forces")
+        if len(forces) != len(self.q1):
+            raise ValueError(f"work() takes a force for each of {len(self.q1)} places")
+        self.worked = {}
+        a, work, before = self.scheme.weight_of_before, ufl.as_ufl(0.0), 0.0
+        for k, (f, q0, q1) in enumerate(zip(forces, self.q0, self.q1, strict=True)):
+            for i, c in enumerate(COMPONENTS):
+                if a:
+                    self.worked[name := f"force {c}{k}"] = f[i]
+                    before = self.inputs[name]
+                work += (a * before + (1.0 - a) * f[i]) * (q1[i] - q0[i])
+        return work
+
+    def potential(
+        self, name: str, energy: Callable[[list[Expr], dict[str, Expr]], Any]
+    ) -> Equations:
+        """Return the forces of an energy, which is a function of motions and numbers; J."""
+        scheme, size = self.scheme, 3 * len(self.steps)
+        q0, q1, s = (
+            ufl.as_vector([x[i] for x in nodal for i in range(3)])
+            for nodal in (*self.nodes, self.steps)
+        )
+
+        def value(q: Expr, when: str) -> Expr:
+            nodal = [ufl.as_vector([q[k + i] for i in range(3)]) for k in range(0, size, 3)]
+            return ufl.as_ufl(energy(self.motions(nodal), self.numbers(when)))
+
+        def along(s: Expr, q: Expr) -> Expr:
+            variables = [ufl.variable(q[i]) for i in range(size)]
+            now = value(ufl.as_vector(variables), "now")
+            return sum((ufl.diff(now, x) * s[i] for i, x in enumerate(variables)), 0)
+
+        if isinstance(expand_derivatives(along(s, q1)), Zero):
+            raise ModelError(
+                f"{self._statement.label}: the energy must depend on the configuration q"
+            )
+        work, lost, supplied = scheme.mean(lambda q: along(s, q), q0, q1), {}, {}
+        if α := scheme.alpha:
+            work += α * (along(s, q1) - along(s, q0))
+            lost = {"numerical": α * (along(q1 - q0, q1) - along(q1 - q0, q0))}
+        stored = value(q1, "end")
+        if self._statement.varies:
+            moved = value(q1, "between") - value(q0, "between")
+            supplied = {f"{name} in time": stored - value(q0, "before") - moved}
+        return Equations(work, {}, {name: stored}, lost, supplied)
+
+
+@dataclass(frozen=True)
+class OfUser(Statement):
+    """Statement of a user, at places or at a quadrature point of a cell.
+
+    Attributes:
+        inner: The user's statement, or :class:`OfFunction`.
+        names: Names of its numbers.
+        scheme: Time scheme.
+        degree: Degree of the cells; 0 at places.
+        varies: Whether numbers may vary in time.
+        label: Name in messages.
+    """
+
+    inner: Statement
+    names: tuple[str, ...]
+    scheme: Scheme
+    degree: int
+    varies: bool
+    label: str
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes of the cell, or of places."""
+        return self.degree + 1 if self.degree else self.inner.nodes
+
+    @property
+    def numbers(self) -> list[str]:
+        """Quadrature point and positions of the nodes, or positions of places and their arms."""
+        if self.degree:
+            return [*POINT, *places(self.degree)]
+        nodes = range(self.nodes)
+        return [f"{name} {c}{k}" for name in ("place", "arm") for k in nodes for c in "xy"]
+
+    @property
+    def state(self) -> list[str]:
+        """State of the user; forces at the end of the last step, if they are in works."""
+        places = range(self.inner.nodes if self.scheme.weight_of_before else 0)
+        forces = [f"force {c}{k}" for k in places for c in COMPONENTS]
+        return [*(f"state {x}" for x in self.inner.state), *forces * self.remembers]
+
+    @property
+    def of_step(self) -> list[str]:
+        """Length of the step, and the numbers at each time."""
+        times = TIMES if self.varies else TIMES[:1]
+        return ["dt", *self.inner.of_step, *(f"{x} {when}" for x in self.names for when in times)]
+
+    @property
+    def remembers(self) -> bool:
+        """True for statements of a user, which may use the work of their forces."""
+        return not isinstance(self.inner, OfFunction)
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class."""
+        element, inner = Element(self, at), self.inner
+        if self.remembers:
+            with calling(f"{self.label}.equations fails"):
+                returned = inner.equations(element)
+            made = self._checked(returned)
+        else:
+            made = [inner.equations(element)]
+        work, state = ufl.as_ufl(0.0), dict[str, Any](element.worked or {})
+        accounts = [dict[str, Any]() for _ in range(4)]
+        for one in made:
+            if isinstance(one.forces, Expr):
+                work += one.forces
+            else:
+                pairs = zip(one.forces, element.virtual, strict=True)
+                work += sum(f[i] * s[i] for f, s in pairs for i in range(len(COMPONENTS)))
+            state |= {f"state {name}": x for name, x in one.state.items()}
+            energies = one.stored, one.lost, one.supplied, one.before
+            for account, some in zip(accounts, energies, strict=True):
+                for name, x in some.items():
+                    account[name] = account.get(name, 0.0) + element.length * x
+        by = [v[i] for i in range(len(COMPONENTS)) for v in element.variables]
+        forces = [ufl.diff(element.length * work, x) for x in by]
+        stored, lost, supplied, before = accounts
+        none = dict.fromkeys(self.state, ufl.as_ufl(0.0))
+        return Equations(forces, none | state, stored, lost, supplied, before=before)
+
+    def _checked(self, returned: Any) -> list[Equations]:
+        """Return the equations of a user, or raise :class:`ModelError`."""
+        made = [returned] if isinstance(returned, Equations) else returned
+        if not isinstance(made, Sequence) or not all(isinstance(x, Equations) for x in made):
+            raise ModelError(
+                f"{self.label}: equations returned {shorten(returned)}; it must return "
+                "ub.Equations, or several of them"
+            )
+        number, states = self.inner.nodes, [name for one in made for name in one.state]
+        for one in made:
+            forces: Any = one.forces
+            if isinstance(forces, Expr) and not forces.ufl_shape:
+                continue  # of a potential
+            if len(forces) != number or any(_size(f) != len(COMPONENTS) for f in forces):
+                raise ModelError(
+                    f"{self.label}: forces = {shorten(forces)} must be a vector (x, y, moment) for "
+                    f"each of {number} places"
+                )
+            for account, names in ENTRIES.items():
+                for entry, energy in getattr(one, account).items():
+                    if entry in CONTRIBUTIONS and entry not in names:
+                        raise ModelError(
+                            f"{self.label}: {entry!r} in {account} is an entry of the package; "
+                            f"use {', '.join(names)} or a name of your own"
+                        )
+                    if _size(energy) != 0:
+                        raise ModelError(
+                            f"{self.label}: the energy {entry!r} in {account} is "
+                            f"{shorten(energy)}; it must be a scalar"
+                        )
+        if sorted(states) != sorted(self.inner.state):
+            raise ModelError(
+                f"{self.label}: equations returned the state {', '.join(states) or 'nothing'}, and "
+                f"must return each of {', '.join(self.inner.state) or 'no names'} once"
+            )
+        return [*made]
+
+
+def _size(value: Any) -> int | None:
+    """Return the number of components of a vector; 0 for scalars, None for other objects."""
+    if isinstance(value, Expr) and len(value.ufl_shape) < 2 and not value.ufl_free_indices:
+        return int(sum(value.ufl_shape))
+    if isinstance(value, list | tuple):
+        return len(value) if all(_size(x) == 0 for x in value) else None
+    return 0 if isinstance(value, int | float) else None
+
+
+# -- virtual works and potentials ------------------------------------------------------------------
 
 
 class _Same:
@@ -48,39 +289,26 @@ class _Same:
 
 
 @dataclass(frozen=True)
-class _WorkOnCell(StatementOnCell):
-    """Effect of a user at a quadrature point of a cell.
+class OfFunction(Statement):
+    """Virtual work or potential by a function along beams.
 
     Attributes:
+        kind: Class of the work.
         name: Name of the work.
         density: The user's function.
-        names: Names of its numbers.
-        scheme: Time scheme.
+        names: Names of its numbers, without the time.
     """
 
+    kind: type[Work]
     name: str
     density: _Same
     names: tuple[str, ...]
-    scheme: Scheme
+    of_step = ("growth",)  # part of a virtual work in substeps of the first step
 
     @property
-    def numbers(self) -> tuple[str, ...]:
-        """Quadrature point, and positions of the nodes."""
-        return *POINT, *places(self.degree)
-
-    @property
-    @abstractmethod
     def work(self) -> Work:
         """A work with this function."""
-
-    def point(self, at: Inputs) -> tuple[Cell, AxisOfCell, Expr]:
-        """Return the cell, its axis at the quadrature point, and the length for which it stands."""
-        axis = AxisOfCell(cell := Cell(self.degree, at), at["s"])
-        return cell, axis, at["weight"] * axis.h
-
-    def numbers_at(self, at: Inputs, when: str = "") -> dict[str, Expr]:
-        """Return the time and the user's numbers at a time."""
-        return {"t": at[f"t{when}"]} | {x: at[f"number {x}{when}"] for x in self.names}
+        return self.kind(self.name, self.density.function, numbers=dict.fromkeys(self.names, 1.0))
 
     def returned(self, known: Mapping[str, Any], domain: ufl.Mesh) -> Expr:
         """Return the expression of the user's function, or raise :class:`ModelError`."""
@@ -111,148 +339,145 @@ class _WorkOnCell(StatementOnCell):
             )
         return value
 
-
-@dataclass(frozen=True)
-class WorkOnCell(_WorkOnCell):
-    """Virtual work of a user on a cell."""
-
-    @property
-    def of_step(self) -> tuple[str, ...]:
-        """Time of the work, length of the step, load factor, and the user's numbers."""
-        return "t", "dt", "growth", *(f"number {name}" for name in self.names)
-
-    @property
-    def work(self) -> Work:
+    def equations(self, at: Any) -> Equations:
         """See the base class."""
-        numbers = dict.fromkeys(self.names, 1.0)
-        return VirtualWork(self.name, self.density.function, numbers=numbers)
 
-    def equations(self, at: Inputs) -> Equations:
-        """See the base class."""
-        (cell, axis, length), weight = self.point(at), self.scheme.load_weight
-        w = ufl.TestFunction(at.space(len(self.unknowns)))
-        nodes = range(self.nodes)
-        virtual = [ufl.as_vector([w[i * self.nodes + k] for i in range(3)]) for k in nodes]
-        q0, q1 = axis.field(at.motions("q0")), axis.field(at.motions("q1"))
+        def energy(motions: Sequence[Expr], numbers: Mapping[str, Expr]) -> Expr:
+            return self.returned({"q": motions[0], "axis": at.axis, **numbers}, at.inputs.domain)
+
+        if self.kind is Potential:
+            made: Equations = at.potential(self.name, energy)
+            return made
+        inputs, nodes = at.inputs, range(len(at.variables))
+        w = ufl.TestFunction(inputs.space(3 * len(nodes)))
+        virtual = [ufl.as_vector([w[3 * k + i] for i in range(3)]) for k in nodes]
         known = {
-            "q0": q0, "q1": q1, "q": (1.0 - weight) * q0 + weight * q1, "axis": axis,
-            "v": (q1 - q0) / at["dt"], "w": axis.field(virtual), "dt": at["dt"],
+            "q0": at.q0[0], "q1": at.q1[0], "q": at.q[0], "axis": at.axis, "v": at.v[0],
+            "w": at.axis.field(virtual), "dt": at["dt"],
         }  # fmt: skip
-        work = length * self.returned(known | self.numbers_at(at), at.domain)
+        work = self.returned(known | at.numbers("now"), inputs.domain)
         try:
-            check_form_arity(expand_derivatives(work * ufl.dx(domain=at.domain)), (w,))
+            check_form_arity(expand_derivatives(work * ufl.dx(domain=inputs.domain)), (w,))
         except (ArityMismatch, ValueError):  # ValueError: UFL fails to write its message
             raise ModelError(
                 f"{self.work}: the function must return an expression that is linear in w, such "
                 "as f * w[1]"
             ) from None
-        every = ufl.as_vector([cell.virtual[k][i] for i in range(3) for k in nodes])
-        return Equations(cell.forces(-at["growth"] * ufl.replace(work, {w: every})))
+        every = ufl.as_vector([x for v in at.variables for x in v])
+        return Equations(-inputs["growth"] * ufl.replace(work, {w: every}))
 
 
-@dataclass(frozen=True)
-class PotentialOfCell(_WorkOnCell):
-    """Potential energy of a user along a cell.
+# -- blocks ----------------------------------------------------------------------------------------
 
-    Attributes:
-        varies: Whether the energy may change in time without motion.
-    """
 
-    varies: bool
+def statement_of(work: Work | Effect, degree: int, scheme: Scheme) -> OfUser:
+    """Return the statement of a work or effect; it serves all beams and values of numbers."""
+    varying, names = {name for name, x in work.numbers.items() if callable(x)}, (*work.numbers,)
+    if isinstance(work, Effect):
+        along = degree if work.beams else 0
+        label = type(work.statement).__name__
+        return OfUser(work.statement, names, scheme, along, bool(varying), label)
+    inner = OfFunction(type(work), work.name, _Same(work.density), names)
+    varies = isinstance(work, Potential) and bool((varying | {"t"}) & {*work.used_arguments})
+    return OfUser(inner, ("t", *names), scheme, degree, varies, str(work))
+
+
+class EffectBlock(Block):
+    """Effects of a user with one statement."""
+
+    statement: OfUser
 
     @property
-    def of_step(self) -> tuple[str, ...]:
-        """Time and numbers: in the equation, at the end of the step and, if they vary, before."""
-        times = " now", " end", *((" before", " between") if self.varies else ())
-        names = "t", *(f"number {name}" for name in self.names)
-        return tuple(name + when for when in times for name in names)
-
-    @property
-    def work(self) -> Work:
+    def effect(self) -> str:
         """See the base class."""
-        numbers = dict.fromkeys(self.names, 1.0)
-        return Potential(self.name, self.density.function, numbers=numbers)
+        return self.statement.label
 
-    def equations(self, at: Inputs) -> Equations:
-        """See the base class; s is the increment of q along the whole cell."""
-        (cell, axis, length), scheme, size = self.point(at), self.scheme, len(self.unknowns)
-        pairs = ([x[i] for x in at.motions(name) for i in range(3)] for name in ("q0", "q1"))
-        q0, q1 = map(ufl.as_vector, pairs)
+    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
+        """See the base class."""
+        label, others = self.statement.label, [x for some in neighbours.terms for x in some]
+        if self.statement.inner.state and any(x.statement != self.statement for x in others):
+            raise ModelError(
+                f"{label}: a parameter changes the statement, so that its state has no derivative; "
+                "make the parameter one of its numbers"
+            )
+        with calling(f"{label} has no derivative"):
+            return super().derivatives(neighbours)
 
-        def energy(q: Expr, when: str) -> Expr:
-            nodal = [ufl.as_vector([q[3 * k + i] for i in range(3)]) for k in range(self.nodes)]
-            known = {"q": axis.field(nodal), "axis": axis, **self.numbers_at(at, f" {when}")}
-            return length * self.returned(known, at.domain)
-
-        def along(s: Sequence[Expr], q: Expr) -> Expr:
-            variables = [ufl.variable(q[i]) for i in range(size)]
-            value = energy(ufl.as_vector(variables), "now")
-            return sum((ufl.diff(value, x) * y for x, y in zip(variables, s, strict=True)), 0)
-
-        changes = [q1[i] - q0[i] for i in range(size)]
-        s = [
-            w[i] if i < 2 else scheme.virtual_rotation(0.0, changes[3 * k + 2], w[2])
-            for k, w in enumerate(cell.virtual) for i in range(3)
-        ]  # fmt: skip
-        if isinstance(expand_derivatives(along(s, q1)), Zero):
-            raise ModelError(f"{self.work}: the energy must depend on the configuration q")
-        work, lost, supplied = scheme.mean(lambda q: along(s, q), q0, q1), {}, {}
-        if α := scheme.alpha:
-            work += α * (along(s, q1) - along(s, q0))
-            lost = {"numerical": α * (along(changes, q1) - along(changes, q0))}
-        stored = energy(q1, "end")
-        if self.varies:
-            moved = energy(q1, "between") - energy(q0, "between")
-            supplied = {self.work.in_time: stored - energy(q0, "before") - moved}
-        return Equations(cell.forces(work), {}, {self.name: stored}, lost, supplied)
-
-
-def work_statement(work: Work, degree: int, scheme: Scheme) -> _WorkOnCell:
-    """Return the statement of a work; it serves all beams and values of numbers."""
-    fields = (degree, work.name, _Same(work.density), tuple(work.numbers), scheme)
-    if isinstance(work, VirtualWork):
-        return WorkOnCell(*fields)
-    varying = {"t", *(name for name, x in work.numbers.items() if callable(x))}
-    return PotentialOfCell(*fields, bool(varying & {*work.used_arguments}))
-
-
-def require_work(work: Work, degree: int, scheme: Scheme) -> None:
-    """Raise :class:`ModelError` if the function of a work fails, or returns no work or energy."""
-    try:
-        kernels(work_statement(work, degree, scheme))
-    except ModelError:
-        raise
-    except Exception as error:
-        raise ModelError(f"{work}: its form cannot be compiled: {shorten(error)}") from error
+    def _begin_state(self, q: Array) -> None:
+        """Keep the state: a step without motion would change one that relaxes."""
 
 
 def work_blocks(setting: BlockSetting) -> list[Block]:
-    """Return the blocks of the works of a scene; every process has them.
+    """Return the blocks of the works and effects of a scene; every process has them.
 
     The ledger has virtual works in ``supplied``, and energies of potentials in ``state``.  Virtual
-    works grow in the substeps of the first step, as loads do; potentials act fully from the start.
+    works grow in the substeps of the first step, as loads do; all else acts fully from the start.
     """
-    subdomain, blocks = setting.subdomain, list[Block]()
-    numbering, scene = subdomain.numbering, subdomain.numbering.scene
-    for work in scene.works:
-        statement = work_statement(work, numbering.mesh.degree, setting.scheme)
-        in_time, of_step = [InTime(steady, work)], {"growth": 0}
-        values = {f"number {k}": x if callable(x) else Constant(x) for k, x in work.numbers.items()}
-        for name in statement.of_step:
-            plain, time = name.rsplit(" ", 1) if isinstance(work, Potential) else (name, "now")
-            if plain in ("t", *values):
-                of_step[name] = len(in_time)
-                in_time.append(InTime(values.get(plain), work, time))
-        of_work = np.concatenate([numbering.cells_of(beam) for beam in work.on(scene.beams)])
-        points = (work.degree + 2 * (numbering.mesh.degree - 1)) // 2 + 1
-        cells, point, at = at_points(np.flatnonzero(np.isin(subdomain.cells, of_work)), points)
-        elements = Elements(
-            f"work of {work.name}", subdomain.cells[cells] * points + point,
-            subdomain.cell_dofs[cells],
-            [*at, *positions(subdomain, cells)], in_time, of_step, cells, lib.WORK,
-        )  # fmt: skip
-        supplies = work.name if isinstance(work, VirtualWork) else None
-        blocks.append(
-            Block(statement, elements, setting, supplies=supplies, moves=work.takes_rates)
-        )
+    works, degree = setting.scene.works, setting.subdomain.numbering.mesh.degree
+    groups, names, blocks = defaultdict[Any, list[int]](list), Counter[str](), list[Block]()
+    for i, work in enumerate(works):
+        groups[statement_of(work, degree, setting.scheme), work.degree].append(i)
+    for (statement, _), indices in groups.items():
+        name = f"work of {works[indices[0]].name}"
+        names[name] += 1
+        blocks.append(_block(f"{name} {names[name]}", statement, indices, setting))
     return blocks
+
+
+def _block(name: str, statement: OfUser, indices: list[int], setting: BlockSetting) -> Block:
+    """Return the block of the works with the indices in the scene, which have one statement."""
+    subdomain, scene = setting.subdomain, setting.scene
+    numbering, works = subdomain.numbering, [scene.works[i] for i in indices]
+    rows, of_work, in_time = list[Any](), list[Array](), [InTime(steady, works[0])]
+    of_step = defaultdict[str, list[int]](list, growth=[0] * len(works))
+    for k, (i, work) in enumerate(zip(indices, works, strict=True)):
+        values = {x: f if callable(f) else Constant(f) for x, f in work.numbers.items()}
+        for timed in statement.of_step:
+            plain, _, time = timed.rpartition(" ")
+            if plain in statement.names:
+                of_step[timed].append(len(in_time))
+                in_time.append(InTime(values.get(plain), work, time))
+        if isinstance(work, Effect) and work.places:
+            mine = [i] if i in subdomain.effect_dofs else []
+            dofs = np.reshape([subdomain.effect_dofs[i] for i in mine], (-1, 3 * statement.nodes))
+            numbers = geometry(work)[:, None].repeat(len(mine), axis=1)
+            rows.append((np.array(mine, dtype=int), dofs, numbers, np.zeros(0, dtype=int)))
+        else:
+            of_beams = [numbering.cells_of(beam) for beam in work.on(scene.beams)]
+            points = (work.degree + 2 * (numbering.mesh.degree - 1)) // 2 + 1
+            on = np.flatnonzero(np.isin(subdomain.cells, np.concatenate(of_beams)))
+            cells, point, at = at_points(on, points)
+            elements = (k * len(numbering.cells) + subdomain.cells[cells]) * points + point
+            numbers = np.array([*at, *positions(subdomain, cells)])
+            rows.append((elements, subdomain.cell_dofs[cells], numbers, cells))
+        of_work.append(np.full(len(rows[-1][0]), k))
+    elements, dofs, numbers, cells = (
+        np.concatenate(x, axis=int(i == 2)) for i, x in enumerate(zip(*rows, strict=True))
+    )
+    of_element = np.concatenate(of_work)
+    block = EffectBlock(
+        statement,
+        Elements(
+            name, elements, dofs, numbers, in_time,
+            {x: np.array(at)[of_element] for x, at in of_step.items()},
+            cells if statement.degree else None, lib.WORK,
+        ),
+        setting, supplies=works[0].name if isinstance(works[0], VirtualWork) else None,
+        moves=works[0].takes_rates,
+    )  # fmt: skip
+    for state, value in zip(block.state.values(), initial_state(statement), strict=True):
+        state[:] = value
+    return block
+
+
+def geometry(effect: Effect) -> Array:
+    """Return the numbers of a statement at places: positions, and arms; m."""
+    return np.ravel([*(place.point for place in effect.places), *map(arm, effect.places)])
+
+
+def initial_state(statement: OfUser) -> Array:
+    """Return the initial state of an element."""
+    z, given = np.zeros(len(statement.state)), statement.inner.state
+    if isinstance(given, Mapping):
+        z[: len(given)] = [*given.values()]
+    return z

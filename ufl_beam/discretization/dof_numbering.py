@@ -38,6 +38,7 @@ from ufl_beam.model.functions import points_along
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.model.supports import COMPONENTS
+from ufl_beam.model.works import Effect
 
 
 class DofNumbering:
@@ -434,6 +435,18 @@ class DofNumbering:
         nodes = np.array([(self.node(c.a), self.node(c.b)) for c in connectors]).reshape(-1, 2, 3)
         both = nodes.transpose(0, 2, 1).reshape(-1, 6)
         return np.column_stack([both, self.multipliers]).astype(np.int64)
+
+    @cached_property
+    def dofs_of_effects(self) -> dict[int, Index]:
+        """Degrees of freedom of each effect at places, by its index in the works of the scene.
+
+        The order is u of all nodes, v of all nodes, ψ of all nodes; (3 * places,).
+        """
+        effects = {i: x for i, x in enumerate(self.scene.works) if isinstance(x, Effect)}
+        return {
+            i: np.array([self.node(place) for place in effect.places]).T.ravel()
+            for i, effect in effects.items() if effect.places
+        }  # fmt: skip
 
     def describe(self, dof: int) -> str:
         """Describe a degree of freedom by its component and beam or body, or by its connector."""

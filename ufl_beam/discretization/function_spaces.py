@@ -197,6 +197,7 @@ class Fields:
             subdomain = self.subdomain
             connectors = subdomain.numbering.scene.all_connectors
             couples = [subdomain.cell_dofs, subdomain.connector_dofs, subdomain.body_dofs]
+            couples += [dofs[None] for dofs in subdomain.effect_dofs.values()]
             component = np.array(
                 [connectors[i].component for i in subdomain.connectors], dtype=np.int32
             )

@@ -59,6 +59,8 @@ class Subdomain:
         body_dofs: Local degrees of freedom of the bodies on this process; shape (num_bodies, 3).
         connector_dofs: Local degrees of freedom of ``connectors``: u of both nodes, then v, then ψ,
             then the force; shape (len(connectors), 7).
+        effect_dofs: Local degrees of freedom of the effects at places on this process, by their
+            indices in the works of the scene.
         rotations: Local numbers of the rotations on this process, ascending; int32.
         multipliers: Local numbers of the forces of connectors on this process; int32.
     """
@@ -81,6 +83,12 @@ class Subdomain:
         connector_dofs = numbering.dofs_of_connectors
         connector_ranks = owner[connector_dofs].min(axis=1, initial=comm.size) % comm.size
         np.minimum.at(owner, connector_dofs, connector_ranks[:, None])
+        of_effects = dict[int, Index]()
+        for i, dofs in numbering.dofs_of_effects.items():
+            rank = owner[dofs].min() % comm.size
+            np.minimum.at(owner, dofs, rank)
+            if rank == comm.rank:
+                of_effects[i] = dofs
         owner[owner == comm.size] = 0  # for bodies to which nothing is attached
         self.connectors = np.flatnonzero(connector_ranks == comm.rank)
         order = np.argsort(owner, kind="stable")
@@ -91,7 +99,8 @@ class Subdomain:
         ghost = np.zeros(numbering.size, dtype=bool)
         ghost[cell_dofs] = True
         ghost[hinge_dofs[cell_ranks[hinge_cells] == comm.rank]] = True
-        ghost[connector_dofs[self.connectors]] = True
+        for dofs in (connector_dofs[self.connectors], *of_effects.values()):
+            ghost[dofs] = True
         ghost &= ~own
         self.dofs = np.concatenate([np.flatnonzero(x).astype(np.int32) for x in (own, ghost)])
         self.size, self.num_owned = len(self.dofs), int(own.sum())
@@ -100,6 +109,7 @@ class Subdomain:
         self._local[self.dofs] = np.arange(len(self.dofs))
         self.cell_dofs = self._local[cell_dofs]
         self.connector_dofs = self._local[connector_dofs[self.connectors]]
+        self.effect_dofs = {i: self._local[dofs] for i, dofs in of_effects.items()}
         body_dofs = self._local[numbering.dofs_of_bodies]
         self.body_dofs = body_dofs[(body_dofs >= 0).all(axis=1)]
         self._all_owned: Index = order

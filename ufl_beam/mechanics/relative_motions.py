@@ -39,10 +39,10 @@ class Pair(NamedTuple):
 
 def _turned(x: Expr, ψ: Expr) -> Expr:
     """Return Λ(ψ) x."""
-    return x + _by_turning(x, ψ)
+    return x + by_turning(x, ψ)
 
 
-def _by_turning(x: Expr, ψ: Expr) -> Expr:
+def by_turning(x: Expr, ψ: Expr) -> Expr:
     """Return (Λ(ψ) - 1) x, to the relative precision of ``ψ``."""
     cos_1, sin = frame(ψ)
     return cos_1 * x + sin * perpendicular(x)
@@ -51,7 +51,7 @@ def _by_turning(x: Expr, ψ: Expr) -> Expr:
 def _moved(q: Pair, n: Geometry) -> Expr:
     """Return the displacement of point b relative to point a."""
     (u_a, ψ_a), (u_b, ψ_b) = split(q.a), split(q.b)
-    return u_b - u_a + _by_turning(n.arm_b, ψ_b) - _by_turning(n.arm_a, ψ_a)
+    return u_b - u_a + by_turning(n.arm_b, ψ_b) - by_turning(n.arm_a, ψ_a)
 
 
 def _between(q: Pair, n: Geometry) -> Expr:
@@ -59,14 +59,16 @@ def _between(q: Pair, n: Geometry) -> Expr:
     return n.apart + _moved(q, n)
 
 
+def virtual_displacement(q0: Expr, q1: Expr, w: Expr, arm: Expr, scheme: Scheme) -> Expr:
+    """Return the variation of the displacement of a point with an arm from the node of a frame."""
+    w_u, w_ψ = split(w)
+    return w_u + w_ψ * perpendicular(scheme.average(_turned(arm, q0[2]), _turned(arm, q1[2])))
+
+
 def _virtually_between(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> Expr:
     """Return the variation of :func:`_between`."""
-
-    def at_point(x0: Expr, x1: Expr, w: Expr, arm: Expr) -> Expr:
-        w_u, w_ψ = split(w)
-        return w_u + w_ψ * perpendicular(scheme.average(_turned(arm, x0[2]), _turned(arm, x1[2])))
-
-    return at_point(q0.b, q1.b, w.b, n.arm_b) - at_point(q0.a, q1.a, w.a, n.arm_a)
+    of_b = virtual_displacement(q0.b, q1.b, w.b, n.arm_b, scheme)
+    return of_b - virtual_displacement(q0.a, q1.a, w.a, n.arm_a, scheme)
 
 
 def _length(d: Expr) -> Expr:
@@ -96,8 +98,8 @@ def parting(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[E
 
 def sliding(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[Expr, Expr]:
     """Return the displacement of b from a along an axis that turns with a, and its variation; m."""
-    by_turning = _by_turning(n.axis, q1.a[2])
-    value = ufl.dot(by_turning, _between(q1, n)) + ufl.dot(n.axis, _moved(q1, n))
+    change = by_turning(n.axis, q1.a[2])
+    value = ufl.dot(change, _between(q1, n)) + ufl.dot(n.axis, _moved(q1, n))
     axis = scheme.average(_turned(n.axis, q0.a[2]), _turned(n.axis, q1.a[2]))
     between = scheme.average(_between(q0, n), _between(q1, n))
     virtual = _virtually_between(q0, q1, w, n, scheme)

@@ -36,7 +36,7 @@ from ufl_beam.model.loads import MovingLoad, RotatingFrame
 from ufl_beam.model.material_law import initial_state
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.model.works import VirtualWork
+from ufl_beam.model.works import Effect, VirtualWork
 
 INSTEAD = "Add supports or joints, or run dynamics (EnergyMomentum)"
 """Advice if statics has no unique answer."""
@@ -268,8 +268,8 @@ def _constraints(
     """Assemble the matrix of constraints on rigid motions (u, v, size ψ) of beams and bodies.
 
     The n rows are for joints, supports, connectors that ``acts`` selects and degrees of freedom in
-    ``also``, and for beams with works, because a work may hold a beam.  The shape is (n, 3 times
-    the number of beams and bodies).
+    ``also``, and for beams and places with works, because a work may hold them.  The shape is
+    (n, 3 times the number of beams and bodies).
     """
     unit = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     rows: list[Row] = [
@@ -278,7 +278,8 @@ def _constraints(
         for second, _ in others
     ]
     rows += (row for _, row in _rows(scene, acts, scene.supports))
-    worked = (beam.start for work in scene.works for beam in work.on(scene.beams))
+    worked = [x for work in scene.works for x in work.places]
+    worked += [beam.start for work in scene.works for beam in work.on(scene.beams)]
     also = (*also, *((place, component) for place in worked for component in range(3)))
     rows += ([(node(place), unit[component])] for place, component in also)
     moving: dict[object, int] = {
@@ -485,7 +486,9 @@ def require_smooth(scene: Scene, scheme: object) -> None:
         if isinstance(load, MovingLoad):
             wrong.append((str(load), "has a kink in time where it passes from a cell to the next"))
     for work in scene.works:
-        if isinstance(work, VirtualWork) and not {"q0", "q1", "v", "dt"}.isdisjoint(
+        if isinstance(work, Effect):
+            wrong.append((str(work), "may dissipate, and may have kinks"))
+        elif isinstance(work, VirtualWork) and not {"q0", "q1", "v", "dt"}.isdisjoint(
             work.used_arguments
         ):
             wrong.append((str(work), "depends on the direction of time by q0, q1, v or dt"))

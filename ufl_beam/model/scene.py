@@ -55,7 +55,7 @@ from ufl_beam.model.loads import (
 )
 from ufl_beam.model.records import Record
 from ufl_beam.model.supports import COMPONENTS, Support
-from ufl_beam.model.works import Potential, VirtualWork, Work
+from ufl_beam.model.works import Effect, Potential, VirtualWork, Work
 
 
 def _all(*kinds: type) -> Callable[..., tuple[Any, ...]]:
@@ -82,7 +82,7 @@ class Scene(Record, Rich):
         bodies: :class:`Body`.
         connectors: :class:`Turn`, :class:`Stretch`, :class:`Slide`, :class:`Bushing`: springs,
             dampers, stops, friction, motors.
-        works: :class:`VirtualWork`, :class:`Potential`: effects along beams, written in UFL.
+        works: :class:`VirtualWork`, :class:`Potential`, :class:`Effect`: effects in UFL.
 
     Raises:
         ModelError: The objects do not fit together; the message names them.
@@ -102,7 +102,7 @@ class Scene(Record, Rich):
     damping: Annotated[Sequence[Damping], _all(*Damping.__args__)] = ()
     bodies: Annotated[Sequence[Body], _all(Body)] = ()
     connectors: Annotated[Sequence[Connector], _all(Connector)] = ()
-    works: Annotated[Sequence[Work], _all(VirtualWork, Potential)] = ()
+    works: Annotated[Sequence[Work | Effect], _all(VirtualWork, Potential, Effect)] = ()
 
     @no_garbage_collection()
     def __post_init__(self) -> None:
@@ -111,8 +111,9 @@ class Scene(Record, Rich):
             raise ModelError("Scene: no beams and no bodies")
         if GROUND in self.bodies:
             raise ModelError("Scene: the ground is in every scene; leave it out of bodies")
-        for work in self.works[:1] if not self.beams else ():
-            raise ModelError(f"{work}: there is no beam that it could act on")
+        for work in self.works if not self.beams else ():
+            if not isinstance(work, Effect):
+                raise ModelError(f"{work}: there is no beam that it could act on")
         self._require_once()
         known = {GROUND, *self.beams, *self.bodies}
         for owner, place in self.attachments():
@@ -266,6 +267,7 @@ class Scene(Record, Rich):
                     yield "KelvinVoigt", beam.start
         for work in self.works:
             yield from ((work, beam.start) for beam in work.beams or ())
+            yield from ((work, place) for place in work.places)
 
     @cached_property
     def attached(self) -> dict[Member, list[float]]:
@@ -293,13 +295,14 @@ class Scene(Record, Rich):
             ),
         ):  # fmt: skip
             raise ModelError(f"Scene: {joint} occurs {twice}; remove one")
-        for work, twice in _again("works", self.works, key=lambda work: work.name):
+        named = [work for work in self.works if isinstance(work, Work)]
+        for work, twice in _again("works", named, key=lambda work: work.name):
             raise ModelError(
                 f"Scene: {work.name!r}, the name of a work and of its entry in the energy ledger, "
                 f"occurs {twice}; rename one work"
             )
         in_time = {work.in_time: work for work in self.works if isinstance(work, Potential)}
-        for work in self.works:
+        for work in named:
             if work.name in in_time:
                 raise ModelError(
                     f"Scene: {work} has the name of another entry of the energy ledger, for energy "

@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""Virtual works and potentials along beams, which users write in UFL."""
+"""Effects of a user in UFL: statements, virtual works and potentials."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, is_dataclass
 from typing import Annotated, Any, ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError, closed, shorten
-from ufl_beam.model.bodies import Beams, Member
-from ufl_beam.model.checks import require_count, require_function, require_number, require_text
+from ufl_beam.model.bodies import AttachmentPoint, Beams, Member, require_place
+from ufl_beam.model.checks import (
+    require_count,
+    require_function,
+    require_number,
+    require_sequence,
+    require_text,
+)
 from ufl_beam.model.connector_law import CONTRIBUTIONS
 from ufl_beam.model.functions import TimeFunction, require_time_function
 from ufl_beam.model.records import Record, parameters_by_name
@@ -25,6 +31,23 @@ def _require_name(name: Any, what: str) -> None:
         )
 
 
+def _require_numbers(owner: Work | Effect) -> None:
+    """Require numbers and functions of time by name, and at least one beam."""
+    if owner.beams is not None and not owner.beams:
+        raise ModelError(f"{owner}: beams is empty; leave it out for all beams")
+    if not isinstance(owner.numbers, Mapping):
+        raise ModelError(
+            f"{owner}: numbers = {shorten(owner.numbers)} must be numbers by name, as {{'c': 1}}"
+        )
+    object.__setattr__(owner, "numbers", dict(owner.numbers))
+    for name, value in owner.numbers.items():
+        what = f"{owner}: numbers[{shorten(name)}]"
+        if callable(value):
+            require_time_function(value, what)
+        else:
+            require_number(value, what)
+
+
 @dataclass(frozen=True, eq=False)
 class Work(Record):
     """Base of effects along beams, defined by a function that returns a work or energy per length.
@@ -34,6 +57,7 @@ class Work(Record):
     """
 
     arguments: ClassVar[tuple[str, ...]]
+    places: ClassVar[tuple[()]] = ()
 
     name: Annotated[str, _require_name]
     density: Callable[..., Any]
@@ -44,21 +68,12 @@ class Work(Record):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.beams is not None and not self.beams:
-            raise ModelError(f"{self}: beams is empty; leave it out for all beams")
-        if not isinstance(self.numbers, Mapping):
-            raise ModelError(
-                f"{self}: numbers = {shorten(self.numbers)} must be numbers by name, as {{'c': 1}}"
-            )
-        object.__setattr__(self, "numbers", dict(self.numbers))
-        for name, value in self.numbers.items():
-            what = f"{self}: numbers[{shorten(name)}]"
+        _require_numbers(self)
+        for name in self.numbers:
             if name in self.arguments:
-                raise ModelError(f"{what}: the name has a meaning already; take another name")
-            if callable(value):
-                require_time_function(value, what)
-            else:
-                require_number(value, what)
+                raise ModelError(
+                    f"{self}: numbers[{name!r}]: the name has a meaning already; take another name"
+                )
         require_function(self.density, f"{self}: density", ", ".join(self.arguments))
         parameters = self.used_arguments
         for name in self.numbers:
@@ -185,3 +200,104 @@ class Potential(Work):
     arguments = ("q", "axis", "t")
 
     __repr__ = bracketed
+
+
+def _require_statement(statement: Any, what: str) -> None:
+    kind = type(statement)
+    if isinstance(statement, type) or not callable(getattr(statement, "equations", None)):
+        raise ModelError(
+            f"{what} = {shorten(statement)} must be an object of a class derived from ub.Statement"
+        )
+    if not is_dataclass(statement) or "__hash__" not in vars(kind) or kind.__hash__ is None:
+        raise ModelError(
+            f"{what}: {kind.__name__} must be a frozen dataclass, because compiled functions are "
+            "kept by statement; decorate the class with @dataclass(frozen=True)"
+        )
+
+
+def _require_places(places: Any, what: str) -> Sequence[AttachmentPoint]:
+    for place in (checked := require_sequence(places, what)):
+        require_place(place, what)
+    return checked
+
+
+@closed("give it a statement of your own")
+@dataclass(frozen=True, eq=False)
+class Effect(Record):
+    """Effect of a user, by a :class:`Statement`: at places, or along beams.
+
+    A statement of one place may also act along beams.  Its forces and energies are then those per
+    undeformed length, and each quadrature point has a state of its own.
+
+    Args:
+        statement: Forces, state and energies; a frozen dataclass derived from :class:`Statement`.
+        places: Places of beams, bodies and the ground, as many as the statement has.
+        beams: Beams on which the effect acts, instead of places.
+        numbers: Numbers of the statement by name: numbers or functions of time.  New values need no
+            compilation.
+        degree: Degree of polynomials along a cell that quadrature integrates exactly, see
+            :class:`VirtualWork`.
+
+    Raises:
+        ModelError: The statement is no frozen dataclass, or has other places or numbers.  Runs
+            refuse statements whose forces, state or energies do not fit, see :class:`Statement`.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> @dataclass(frozen=True)
+        ... class Drag(ub.Statement):
+        ...     numbers = ("c",)  # N s/m, or N s/m² along beams
+        ...
+        ...     def equations(self, at):
+        ...         force = [at["c"] * at.v[0][0], at["c"] * at.v[0][1], 0.0]
+        ...         return ub.Equations([force], lost={"drag": at.work([force])})
+        >>> air = ub.Effect(Drag(), beams=[beam], numbers={"c": 2.0})
+        >>> sail = ub.Effect(Drag(), places=[beam.end], numbers={"c": 5.0})
+        >>> kick = ub.Velocity((beam,), linear=(0.0, 30.0))  # m/s
+        >>> flying = ub.Scene([beam], initial=[kick], works=[air, sail])
+        >>> run = ub.simulate(flying, ub.EnergyMomentum(), t=(0, 1), dt=0.05)
+        >>> bool(run.energy.worst < 1e-9), bool(run.energy["drag"][-1] > 0)
+        (True, True)
+    """
+
+    used_arguments: ClassVar[tuple[str, ...]] = ()
+    takes_rates: ClassVar[bool] = False
+
+    statement: Annotated[Any, _require_statement]
+    _: KW_ONLY
+    places: Annotated[Sequence[AttachmentPoint], _require_places] = ()
+    beams: Beams = None
+    numbers: Mapping[str, float | TimeFunction] = field(default_factory=dict)
+    degree: Annotated[int, require_count] = 2
+
+    __repr__ = bracketed
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if bool(self.places) == bool(self.beams):
+            raise ModelError(f"{self}: give either places or beams")
+        _require_numbers(self)
+        if (places := len(self.places) or 1) != self.statement.nodes:
+            where = "along beams it has one" if self.beams else f"the effect has {places}"
+            raise ModelError(
+                f"{self}: the statement has {self.statement.nodes} places, and {where}"
+            )
+        if {*self.numbers} != {*self.statement.numbers}:
+            raise ModelError(
+                f"{self}: numbers has {', '.join(self.numbers) or 'no names'}, and the statement "
+                f"{', '.join(self.statement.numbers) or 'none'}"
+            )
+
+    def __str__(self) -> str:
+        return f"Effect {self.name}"
+
+    _label = __str__
+
+    @property
+    def name(self) -> str:
+        """Name of the statement."""
+        return type(self.statement).__name__
+
+    def on(self, beams: Sequence[Member]) -> Sequence[Member]:
+        """Return the beams on which the effect acts."""
+        return self.beams or ()

@@ -16,6 +16,7 @@ from ufl_beam.display import counted, html_page
 from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.loads import Gravity, Load, Rayleigh, RotatingFrame
 from ufl_beam.model.scene import Scene, attachment_points
+from ufl_beam.model.works import Effect
 from ufl_beam.plotting import notebook, style
 from ufl_beam.plotting.model_drawing import (
     CAPTIONS,
@@ -124,7 +125,9 @@ def model_notes(scene: Scene) -> list[str]:
             )
     for work in scene.works:
         where = "" if work.beams is None else " on " + ", ".join(b.name for b in work.beams[:4])
-        notes.append(f"{work.name}: acts as its function says{where}")
+        where += " at " * bool(work.places) + ", ".join(map(str, work.places[:4]))
+        said = "statement" if isinstance(work, Effect) else "function"
+        notes.append(f"{work.name}: acts as its {said} says{where}")
     laws = {b.section.hinge for b in scene.beams if b.section.hinge and b.section.hinge.opens}
     if laws:
         limits = sorted({with_unit(law.limit, "N m") for law in laws})

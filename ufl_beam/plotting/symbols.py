@@ -421,9 +421,14 @@ def law_symbol(law: laws.Law) -> LawSymbol:
 
 
 def connectors(shape: DeformedShape) -> Iterator[Stroke]:
-    """Draw springs, dampers, motors and other connectors."""
-    for connector in shape.canvas.scene.connectors:
+    """Draw springs, dampers, motors and other connectors, and effects at places."""
+    scene = shape.canvas.scene
+    for connector in scene.connectors:
         yield from (_around if connector.is_rotation else _straight)(shape, connector)
+    for effect in scene.works:
+        points = [shape.at(place) for place in effect.places]
+        yield from (Stroke(np.array(points), GREY, 1.0) for _ in points[1:2])
+        yield from (disc(at, 0.3 * shape.canvas.unit, INK, GREY) for at in points)
 
 
 def connector_ends(shape: DeformedShape, connector: Connector) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.blocks.works import require_work
+from ufl_beam.blocks.work_checks import require_works
 from ufl_beam.caches import no_garbage_collection
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.model_warnings import (
@@ -46,6 +46,7 @@ from ufl_beam.model.constraint_checks import (
 from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
+from ufl_beam.model.works import Effect
 from ufl_beam.output.output_files import version
 from ufl_beam.simulation.solution import Solution
 
@@ -79,8 +80,7 @@ def checked_numbering(
         if fresh and scheme.theta < 1:  # the run would oscillate about equilibrium
             instead = "begin with a run by Static() or EnergyMomentumStatic(theta=1), as start="
             require_no_prestress(scene, repr(scheme), instead)
-    for work in scene.works:
-        require_work(work, mesh.degree, scheme)
+    require_works(scene, mesh.degree, scheme)
     require_independent(scene)
     warn_of_far_points(scene)
     warn_of_free_hinges(scene)
@@ -125,6 +125,7 @@ def chosen_state(given: StateOf | None, what: str) -> Solution | None:
     scene, numbering = solution.scene, solution.numbering
     owners = [numbering.middle(int(cell)).beam.name for cell in numbering.inelastic_cells[:1]]
     owners += [str(c) for c in scene.all_connectors if remembers(c.law)]
+    owners += [str(x) for x in scene.works if isinstance(x, Effect) and x.statement.state]
     if owners:
         raise ArgumentError(
             f"{what}: {owners[0]} has internal variables, and solutions have those of their last "

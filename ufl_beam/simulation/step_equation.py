@@ -18,7 +18,7 @@ from ufl_beam.blocks.block import Block, BlockSetting
 from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, viscosity
 from ufl_beam.blocks.loads import load_blocks
-from ufl_beam.blocks.works import work_blocks
+from ufl_beam.blocks.works import EffectBlock, work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.dof_numbering import DofNumbering
@@ -220,6 +220,8 @@ class StepEquation:
             self._pass_on_step(archive, q)
         for load in self.loads:
             load.pass_on(archive)
+            if isinstance(load, EffectBlock):
+                load.keep_states(archive)
         return archive.state()
 
     def begin_energies(self, t: float, q: Array, v: Array) -> None:
@@ -240,6 +242,9 @@ class StepEquation:
         for term in (*self.inelastic, *self.connector_terms):
             term.save_or_restore(archive, NOWHERE)
         unknown = archive.unknown.copy()
+        for load in self.loads:
+            if isinstance(load, EffectBlock):
+                load.keep_states(archive)
         if "reactions" in internal:
             self.supports.carry_on(archive, q)
         if self.inertia is not None and same:
