@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -113,8 +114,7 @@ def require_explained(effect: Effect, statement: OfUser, scene: Scene) -> None:
         for k in range(STEPS):
             change = random.uniform(-1.0, 1.0, n) * sizes * (motion if k else FIRST_MOTION)
             now, z, energies = step(q, q + change, z, 1.0)
-            turns = (map(ufl.as_ufl, (0.0, float(x), 1.0)) for x in change[2 * n // 3 :])
-            slopes = [1.0] * (2 * n // 3) + [float(scheme.virtual_rotation(*x)) for x in turns]
+            slopes = [1.0] * (2 * n // 3) + [_slope(scheme, x) for x in change[2 * n // 3 :]]
             work = (a * forces + (1.0 - a) * now) @ (change / slopes)
             gone, came = np.split(energies[stored : stored + lost + supplied], [lost])
             terms = np.array([work, *(before - energies[:stored]), *-gone, *came])
@@ -143,6 +143,12 @@ def require_explained(effect: Effect, statement: OfUser, scene: Scene) -> None:
             f"{worst[0][1]} in a random step of {MOTIONS[0]:g} of the size of the scene; state it "
             "as an energy, such as lost={'damping': at.work(forces)}, or use at.potential"
         )
+
+
+@lru_cache(maxsize=1024)
+def _slope(scheme: Scheme, turn: float) -> float:
+    """Return the factor of the virtual rotation in a step in which a node turns."""
+    return float(scheme.virtual_rotation(*map(ufl.as_ufl, (0.0, float(turn), 1.0))))
 
 
 def _called(function: Any, w: Array) -> Array:
