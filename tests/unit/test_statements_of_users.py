@@ -439,7 +439,7 @@ class Loose(ub.Statement):
             lambda: ub.Effect(AirDrag(), places=[BEAM.end], beams=[BEAM]),
             ("Effect AirDrag: give either places or beams",),
         ),
-        (lambda: ub.Effect(AirDrag(), places=[3]), ("places = 3 is not a place",)),
+        (lambda: ub.Effect(AirDrag(), places=[3]), ("places[0] = 3 is not a Place",)),
         (
             lambda: ub.Effect(HardeningSpring(), places=[BEAM.end], numbers=SPRING),
             ("Effect HardeningSpring: the statement has 2 places, and the effect has 1",),

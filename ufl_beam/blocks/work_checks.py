@@ -20,11 +20,8 @@ from ufl_beam.model.functions import value_at
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import Effect, Work
 
-OF_PACKAGE = (
-    *("rates", "of_step", "acts_at", "shared", "trial", "laws", "recorded", "modes", "integrates"),
-    "frozen",
-)
-"""Members of statements that users cannot have."""
+OF_USERS = "nodes", "numbers", "state", "equations"
+"""Members of statements that users define; the others are for the package."""
 
 MOTIONS = 1e-3, 1e-5
 """Motions in the check of works, as fractions of the size of the scene, and rad."""
@@ -70,8 +67,8 @@ def _require_of_user(effect: Effect) -> None:
     statement, kind = effect.statement, type(effect.statement)
     if not isinstance(statement, Statement):
         raise ModelError(f"{effect}: {kind.__name__} must be a class derived from ub.Statement")
-    for name in OF_PACKAGE:
-        if getattr(kind, name) is not getattr(Statement, name):
+    for name in sorted(vars(Statement).keys() - {*OF_USERS}):
+        if not name.startswith("_") and getattr(kind, name) is not getattr(Statement, name):
             raise ModelError(
                 f"{effect}: {name} is for statements of the package; a statement of a user has "
                 "nodes, numbers, state and equations, and chooses branches by ufl.conditional"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -275,19 +275,6 @@ def _size(value: Any) -> int | None:
 # -- virtual works and potentials ------------------------------------------------------------------
 
 
-class _Same:
-    """Hashable wrapper of a user's function, compared by identity."""
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self.function = function
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.function is self.function
-
-    def __hash__(self) -> int:
-        return id(self.function)
-
-
 @dataclass(frozen=True)
 class OfFunction(Statement):
     """Virtual work or potential by a function along beams.
@@ -295,20 +282,22 @@ class OfFunction(Statement):
     Attributes:
         kind: Class of the work.
         name: Name of the work.
-        density: The user's function.
         names: Names of its numbers, without the time.
+        key: Identity of the user's function.
+        density: The function.
     """
 
     kind: type[Work]
     name: str
-    density: _Same
     names: tuple[str, ...]
+    key: int
+    density: Callable[..., Any] = field(compare=False)
     of_step = ("growth",)  # part of a virtual work in substeps of the first step
 
     @property
     def work(self) -> Work:
         """A work with this function."""
-        return self.kind(self.name, self.density.function, numbers=dict.fromkeys(self.names, 1.0))
+        return self.kind(self.name, self.density, numbers=dict.fromkeys(self.names, 1.0))
 
     def returned(self, known: Mapping[str, Any], domain: ufl.Mesh) -> Expr:
         """Return the expression of the user's function, or raise :class:`ModelError`."""
@@ -377,7 +366,7 @@ def statement_of(work: Work | Effect, degree: int, scheme: Scheme) -> OfUser:
         along = degree if work.beams else 0
         label = type(work.statement).__name__
         return OfUser(work.statement, names, scheme, along, bool(varying), label)
-    inner = OfFunction(type(work), work.name, _Same(work.density), names)
+    inner = OfFunction(type(work), work.name, names, id(work.density), work.density)
     varies = isinstance(work, Potential) and bool((varying | {"t"}) & {*work.used_arguments})
     return OfUser(inner, ("t", *names), scheme, degree, varies, str(work))
 

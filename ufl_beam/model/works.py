@@ -5,16 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, is_dataclass
+from functools import partial
 from typing import Annotated, Any, ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError, closed, shorten
-from ufl_beam.model.bodies import AttachmentPoint, Beams, Member, require_place
+from ufl_beam.model.bodies import AttachmentPoint, Beams, BodyPoint, Member, Place
 from ufl_beam.model.checks import (
+    require_all,
     require_count,
     require_function,
     require_number,
-    require_sequence,
     require_text,
 )
 from ufl_beam.model.connector_law import CONTRIBUTIONS
@@ -215,12 +216,6 @@ def _require_statement(statement: Any, what: str) -> None:
         )
 
 
-def _require_places(places: Any, what: str) -> Sequence[AttachmentPoint]:
-    for place in (checked := require_sequence(places, what)):
-        require_place(place, what)
-    return checked
-
-
 @closed("give it a statement of your own")
 @dataclass(frozen=True, eq=False)
 class Effect(Record):
@@ -265,7 +260,7 @@ class Effect(Record):
 
     statement: Annotated[Any, _require_statement]
     _: KW_ONLY
-    places: Annotated[Sequence[AttachmentPoint], _require_places] = ()
+    places: Annotated[Sequence[AttachmentPoint], partial(require_all, kind=(Place, BodyPoint))] = ()
     beams: Beams = None
     numbers: Mapping[str, float | TimeFunction] = field(default_factory=dict)
     degree: Annotated[int, require_count] = 2
