@@ -4,6 +4,7 @@
 import math
 from dataclasses import dataclass
 from functools import partial
+from unittest import mock
 
 from mpi4py import MPI
 
@@ -15,6 +16,7 @@ from scenes import clamped
 from user_laws import AirDrag, HardeningSpring, MaxwellElement
 
 import ufl_beam as ub
+from ufl_beam.blocks.statement import Kernels
 from ufl_beam.plotting.model import model_notes
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
@@ -302,6 +304,21 @@ def test_derivatives_by_numbers_in_a_statement():
         np.testing.assert_allclose(found[:, p], difference, rtol=0, atol=1e-6 * largest)
     with raises("PowerWithState: a parameter changes the statement"):
         ub.differentiate(partial(powers, kind=PowerWithState), at, scheme, **options)
+
+
+@pytest.mark.serial
+def test_a_derivative_that_cannot_be_compiled_has_the_name_of_the_statement():
+    """UFL has derivatives of all its functions, so that one is missing here on purpose."""
+
+    def missing(self):
+        raise NotImplementedError("this function has no derivative")
+
+    options = {"t": (0, 0.1), "dt": 0.05, "progress": False}
+    with (
+        mock.patch.object(Kernels, "derivative", property(missing)),
+        raises("Power has no derivative: this function has no derivative"),
+    ):
+        ub.differentiate(powers, {"k": 3.0}, ub.EnergyMomentum(), **options)
 
 
 # -- files and pictures ------------------------------------------------------------------------

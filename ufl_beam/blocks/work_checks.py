@@ -111,7 +111,7 @@ def require_explained(effect: Effect, statement: OfUser, scene: Scene) -> None:
         for k in range(STEPS):
             change = random.uniform(-1.0, 1.0, n) * sizes * (motion if k else FIRST_MOTION)
             now, z, energies = step(q, q + change, z, 1.0)
-            slopes = [1.0] * (2 * n // 3) + [_slope(scheme, x) for x in change[2 * n // 3 :]]
+            slopes = [1.0] * (2 * n // 3) + [_slope(statement, x) for x in change[2 * n // 3 :]]
             work = (a * forces + (1.0 - a) * now) @ (change / slopes)
             gone, came = np.split(energies[stored : stored + lost + supplied], [lost])
             terms = np.array([work, *(before - energies[:stored]), *-gone, *came])
@@ -143,9 +143,9 @@ def require_explained(effect: Effect, statement: OfUser, scene: Scene) -> None:
 
 
 @lru_cache(maxsize=1024)
-def _slope(scheme: Scheme, turn: float) -> float:
+def _slope(statement: OfUser, turn: float) -> float:
     """Return the factor of the virtual rotation in a step in which a node turns."""
-    return float(scheme.virtual_rotation(*map(ufl.as_ufl, (0.0, float(turn), 1.0))))
+    return float(statement.scheme.virtual_rotation(*map(ufl.as_ufl, (0.0, float(turn), 1.0))))
 
 
 def _called(function: Any, w: Array) -> Array:
