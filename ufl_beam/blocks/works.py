@@ -407,9 +407,10 @@ def work_blocks(setting: BlockSetting) -> list[Block]:
     for i, work in enumerate(works):
         groups[statement_of(work, degree, setting.scheme), work.degree].append(i)
     for (statement, _), indices in groups.items():
-        name = f"work of {works[indices[0]].name}"
-        names[name] += 1
-        blocks.append(_block(f"{name} {names[name]}", statement, indices, setting))
+        name = works[indices[0]].name
+        names[name] += statement.remembers  # works have different names
+        saved = f"effect {name} {names[name]}" if statement.remembers else f"work of {name}"
+        blocks.append(_block(saved, statement, indices, setting))
     return blocks
 
 
@@ -430,7 +431,7 @@ def _block(name: str, statement: OfUser, indices: list[int], setting: BlockSetti
             mine = [i] if i in subdomain.effect_dofs else []
             dofs = np.reshape([subdomain.effect_dofs[i] for i in mine], (-1, 3 * statement.nodes))
             numbers = geometry(work)[:, None].repeat(len(mine), axis=1)
-            rows.append((np.array(mine, dtype=int), dofs, numbers, np.zeros(0, dtype=int)))
+            rows.append((np.full(len(mine), k), dofs, numbers, np.zeros(0, dtype=int)))
         else:
             of_beams = [numbering.cells_of(beam) for beam in work.on(scene.beams)]
             points = (work.degree + 2 * (numbering.mesh.degree - 1)) // 2 + 1
