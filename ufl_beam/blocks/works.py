@@ -364,8 +364,7 @@ def statement_of(work: Work | Effect, degree: int, scheme: Scheme) -> OfUser:
     varying, names = {name for name, x in work.numbers.items() if callable(x)}, (*work.numbers,)
     if isinstance(work, Effect):
         along = degree if work.beams else 0
-        label = type(work.statement).__name__
-        return OfUser(work.statement, names, scheme, along, bool(varying), label)
+        return OfUser(work.statement, names, scheme, along, bool(varying), work.name)
     inner = OfFunction(type(work), work.name, names, id(work.density), work.density)
     varies = isinstance(work, Potential) and bool((varying | {"t"}) & {*work.used_arguments})
     return OfUser(inner, ("t", *names), scheme, degree, varies, str(work))
