@@ -119,7 +119,7 @@ from ufl_beam.model.connector_laws import (
 )
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
-from ufl_beam.model.functions import Table, ramp
+from ufl_beam.model.functions import Spline, Table, ramp
 from ufl_beam.model.ground_motion import GroundMotion
 from ufl_beam.model.hinge_laws import AxialBendingHinge, Backbone, IbarraKrawinkler, PinchingHinge
 from ufl_beam.model.imposed_strains import ImposedStrain
@@ -295,6 +295,7 @@ __all__ = [
     "Softening",
     "SofteningLaw",
     "Solution",
+    "Spline",
     "Spring",
     "Statement",
     "Static",

@@ -35,7 +35,6 @@ from ufl_beam.mechanics.time_scheme import Scheme, Step, acting
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.functions import REACH, nearest, parameter_step, tangent
 
 GUIDE_INCREMENT = 1e-5
 """Increment of central differences of the forces of guides, divided by the size of the scene.
@@ -288,7 +287,6 @@ class GuideForce(ConnectorGroup):
         last_digit = np.spacing(self._size + np.abs(self._point).max())
         self._shortest = self._size * (24 * last_digit / self._size) ** (1 / 3)
         self._s = self._s0 = self._distance = 0.0  # curve parameters: of the iterate, accepted
-        self._step = parameter_step(self._curve, 0.0, self._size)
 
     def begin(self, step: Step) -> None:
         """Set the start of the search for the nearest point to the accepted point."""
@@ -296,7 +294,7 @@ class GuideForce(ConnectorGroup):
 
     def _nearest(self, x: Array) -> float:
         """Return the parameter of the nearest point of the curve, searched from the latest one."""
-        s = nearest(self._curve, x, self._s, self._step, self._size)
+        s = self._curve.nearest(x, self._s, self._size)
         if not math.isfinite(s):
             raise NoNumber(f"{self._place}: no nearest point was found on its guide curve")
         return s
@@ -304,13 +302,13 @@ class GuideForce(ConnectorGroup):
     def _equation(self, x: Array) -> Array:
         """Return the distance from the curve, and the direction of the force in the step; (3,)."""
         s = self._nearest(x)
-        on, slope = np.array(self._curve(s), np.float64), tangent(self._curve, s, self._step)
+        on, slope, _ = self._curve.at(s)
         t = along = slope / math.hypot(*slope)
         chord = on - self._on0
         if self._over_step and math.hypot(*chord) > self._shortest:
             along = chord * np.sign(chord @ t)
         elif self._over_step:
-            along = tangent(self._curve, (self._s0 + s) / 2, self._step)
+            along = self._curve.at((self._s0 + s) / 2)[1]
         x_m, y_m = along / math.hypot(*along)
         return np.array([t[0] * (x - on)[1] - t[1] * (x - on)[0], -y_m, x_m])
 
@@ -335,9 +333,7 @@ class GuideForce(ConnectorGroup):
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Accept the point on the curve."""
-        self._on0 = np.array(self._curve(self._s), np.float64)
-        t = tangent(self._curve, self._s, self._step)
-        self._step, self._s0 = REACH * self._size / math.hypot(*t), self._s
+        self._on0, self._s0 = self._curve.at(self._s)[0], self._s
 
     def columns(self, q: Array) -> Array:
         """Return the columns of ``Connection``; the distance is NaN without a nearest point."""
@@ -349,11 +345,11 @@ class GuideForce(ConnectorGroup):
         return np.array([[self._distance, q[self._λ], 0.0, 0.0, 0.0]])
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore the distance, the parameters, the step for tangents, and the point."""
-        row = np.array([[self._distance, self._s, self._s0, self._step, *self._on0]])
+        """Save or restore the distance, the parameters, and the point."""
+        row = np.array([[self._distance, self._s, self._s0, *self._on0]])
         (row,) = archive.rows("guides", self.indices, row)
-        self._distance, self._s, self._s0, self._step = map(float, row[:4])
-        self._on0 = row[4:]
+        self._distance, self._s, self._s0 = map(float, row[:3])
+        self._on0 = row[3:]
 
 
 def all_connectors(setting: Setting) -> list[Connectors | GuideForce]:

@@ -116,7 +116,11 @@ def _is_ground(place):
 def _from_curve(solution, holder):
     """Distance of a place from its guide curve, sought on all sides of the last nearest point."""
     assert isinstance(holder.law, Guide)
-    curve, s, found = holder.law.curve, 0.0, []
+    law, s, found = holder.law, 0.0, []
+
+    def curve(parameter):
+        return law.curve.at(parameter)[0]
+
     speed = np.hypot(*np.subtract(curve(1e-3), curve(-1e-3))) / 2e-3
     for x, y in solution.position(holder.b):
         way = (math.dist(curve(s), (x, y)) + solution.scene.size * 1e-2) / speed

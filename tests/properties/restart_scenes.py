@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import ufl
 
 import ufl_beam as ub
 
@@ -53,7 +54,7 @@ def machine(dynamic=True):
         ub.Revolute(b.at(1.5, 0.1), c.at(1.5, 0.1)),
         ub.Rigid(c.at(2.5, 0.2), right.start),
         pin,
-        ub.Guided(right.end, lambda s: (3.5 + s, 0.2 + 0.3 * np.sin(s))),
+        ub.Guided(right.end, lambda s: (3.5 + s, 0.2 + 0.3 * ufl.sin(s))),
     ]
     random = np.random.default_rng(3)
     yields = ub.Spring(20.0, ub.ElastoPlastic(yield_limit=0.2, kinematic=2.0))

@@ -6,8 +6,6 @@ The equation of a step, its solution, the return map, the laws of connectors and
 written twice.
 """
 
-import math
-
 from mpi4py import MPI
 
 import numpy as np
@@ -199,30 +197,6 @@ def dense(A):
 
 
 # -- start and refusals ----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("first", [False, True])
-def test_a_guided_run_begins_where_another_one_ends(first):
-    """The point on the curve and its parameter go on, from a run of either kind."""
-    section = ub.Section(EA=1e5, GA=4e4, EI=80.0, rhoA=1.0, rhoI=1e-3)
-    beam = ub.Beam((0, 0), (1, 0), section, cells=3)
-    guide = ub.Guided(beam.end, lambda s: (math.cos(s), math.sin(s)))
-    push = ub.PointLoad(beam.end, force=(0.0, 30.0))
-    supports = [ub.Pinned(beam.start)]
-    scene = ub.Scene([beam], joints=[guide], supports=supports, loads=[push])
-    newton = {one: ub.Newton(rtol=1e-12, reference=one) for one in (False, True)}
-    options = {"dt": 5e-3}
-    begun = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), newton=newton[first], **options)
-    assert begun.internal["guides, 6"][0, 3] > 0.1  # rad along the circle
-    one, other = (
-        ub.simulate(
-            scene, ub.EnergyMomentum(), t=(0.2, 0.25), newton=newton[by], start=begun, **options
-        )
-        for by in (False, True)
-    )
-    assert max(differences(one, other).values()) < SAME
-    # The motion is the distance in the accepted state; the parameters are those of the same point.
-    assert difference(*(run.internal["guides, 6"][:, 2:] for run in (one, other))) < SAME
 
 
 def test_what_it_does_not_compute():

@@ -130,15 +130,6 @@ def work(fail):
     run(scene(works=[lift]))
 
 
-def guide(fail):
-    def curve(s):
-        if abs(s) > 1e-5:
-            fail()
-        return 1.0 + 0.1 * s, -s
-
-    run(scene(joints=[ub.Guided(BEAM.end, curve)]))
-
-
 def recorder(fail):
     run(scene(), record=Watch("write", fail))
 
@@ -172,7 +163,7 @@ def path(fail):
 EVERYWHERE = [load, load_in_statics, gravity, controller, recorder, beginning, checkpoint]
 """Cases whose function is called on all processes."""
 
-SOMEWHERE = [follower, prescribed, motor, actuator, function, work, guide, events, path]
+SOMEWHERE = [follower, prescribed, motor, actuator, function, work, events, path]
 """Cases whose function is called where the object is."""
 
 

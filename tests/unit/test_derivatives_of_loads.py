@@ -147,7 +147,7 @@ def guided(radius=2.0, dent=0.5, load=8.0):
     """
 
     def curve(s):
-        return 2 * math.cos(s) + dent * math.sin(s) ** 2, 0.3 + radius * math.sin(s) * (1 + s / 5)
+        return 2 * ufl.cos(s) + dent * ufl.sin(s) ** 2, 0.3 + radius * ufl.sin(s) * (1 + s / 5)
 
     def grow(t):
         return t

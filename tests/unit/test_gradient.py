@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+import ufl
 
 import ufl_beam as ub
 
@@ -185,7 +186,7 @@ def guided(radius=2.0, dent=0.5, load=8.0, EI=100.0, tau=0.01):
     """A curve whose points are not at equal distances for equal steps of its parameter."""
 
     def curve(s):
-        return 2 * math.cos(s) + dent * math.sin(s) ** 2, 0.3 + radius * math.sin(s) * (1 + s / 5)
+        return 2 * ufl.cos(s) + dent * ufl.sin(s) ** 2, 0.3 + radius * ufl.sin(s) * (1 + s / 5)
 
     section = ub.Section(EA=1e4, GA=8e3, EI=EI, rhoA=1.0, rhoI=0.05)
     beam = ub.Beam((0, 0), (2, 0.3), section, cells=4)

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+import ufl
 from scenes import clamped
 
 import ufl_beam as ub
@@ -180,7 +181,9 @@ def test_a_law_without_a_value_far_away_is_met_by_shorter_steps():
 def test_a_guide_that_ends_is_a_failed_step():
     """The curve is known up to 1 mm; the load along it brings the point there at t = 0.1 s."""
     scene = girder(
-        joints=lambda b: ub.Guided(b.end, lambda s: (1 + s, s) if s < 1e-3 else (math.nan,) * 2),
+        joints=lambda b: ub.Guided(
+            b.end, lambda s: (1 + s, ufl.conditional(s < 1e-3, s, math.nan))
+        ),
         loads=lambda b: ub.PointLoad(b.end, (100.0, 1.0), amplitude=lambda t: t),
     )
     with pytest.raises(ub.ConvergenceError, match=r"girder.end .* no nearest point") as failure:

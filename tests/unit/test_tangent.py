@@ -301,14 +301,13 @@ def test_static_tangent_of_associated_flow_is_symmetric(kind):
     assert np.abs(tangent - tangent.T).max() < 1e-14 * np.abs(tangent).max()
 
 
-@pytest.mark.parametrize("scheme", [ub.Newmark(0.6, 0.35), ub.GeneralizedAlpha(0.6)], ids=str)
+@pytest.mark.parametrize(
+    "scheme", [ub.Newmark(0.6, 0.35), ub.GeneralizedAlpha(0.6), ub.EnergyMomentum()], ids=str
+)
 def test_tangent_of_a_guide(scheme):
-    """Forces at the end of a step, on a curve whose parameter is no arc length.
-
-    Over a step the tangent neglects the distance from the curve, which vanishes in equilibrium.
-    """
+    """Forces at the end of a step or over it, on a curve whose parameter is no arc length."""
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
-    guide = ub.Guided(beam.end, lambda s: (1 + 2 * s, 0.4 * np.sin(3 * s)))
+    guide = ub.Guided(beam.end, lambda s: (1 + 2 * s, 0.4 * ufl.sin(3 * s)))
     guided = ub.Scene([beam], joints=[guide], supports=[ub.Roller(beam.start)])
     probe = Probe(guided, scheme, turn=0.3)
     tangent = probe.tangent()

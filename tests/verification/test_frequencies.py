@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 import pytest
+import ufl
 from convergence.study import extrapolated, romberg
 from numpy.polynomial import Legendre
 from scenes import clamped
@@ -251,7 +252,7 @@ def test_a_bead_in_a_bowl():
     """
     radius, g, mass = 2.0, 9.81, 3.0
     bead = ub.Body((0, -radius), mass=mass, inertia=1.0)
-    bowl = ub.Guided(bead.middle, lambda s: (radius * math.sin(s), -radius * math.cos(s)))
+    bowl = ub.Guided(bead.middle, lambda s: (radius * ufl.sin(s), -radius * ufl.cos(s)))
     # Statics needs something that holds the bead along the curve; it is next to nothing.
     here = ub.ground(0, -radius)
     soft = ub.Slide(here, bead.middle, ub.Spring(1e-8), axis=(1, 0))

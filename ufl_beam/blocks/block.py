@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.statement import OF_STEP, Kernels, Statement, kernels
-from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, names, struct
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib, loop, names, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.partition import Subdomain
@@ -390,13 +390,15 @@ class Block(LoadTerm):
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
         P, others = neighbours.weights.shape
-        by_number = neighbours.differences(lambda term: term._numbers)
-        by_state = neighbours.state(lambda term: term._states)
         terms, found = [term for some in neighbours.terms for term in some], list[Each]()
-        if any(term.statement != self.statement for term in terms):
-            # Numbers in the functions of a user are in kernels, not in arrays
-            found.append(differences(neighbours, lambda term: [term._times[2], term._t]))
-            terms, others, by_number = [], 0, np.zeros_like(by_number)
+        if all(map(self.is_like, terms)):
+            by_number = neighbours.differences(lambda term: term._numbers)
+            by_state = neighbours.state(lambda term: term._states)
+        else:  # numbers in the functions of a user are in kernels, not in arrays
+            found.append(differences(neighbours, lambda x: [x._times[2], x._t], self._begins))
+            by_number, by_state = (np.zeros((P, *x.shape)) for x in (self._numbers, self._states))
+            neighbours.states.append(by_state)
+            terms, others = [], 0
         neighbours.states += [x for term in terms for x in (term._times[2], term._t)]
         b, by_shared = self._c, neighbours.state(lambda term: term._shared)
         by_before = neighbours.state(lambda term: term._times[2, : b.functions])
@@ -414,6 +416,14 @@ class Block(LoadTerm):
         )  # fmt: skip
         self.complete_derivatives(c, neighbours, by_number)
         return [*found, in_c("block", c)]
+
+    def _begins(self, neighbour: Any) -> list[Loop]:
+        """Return phases that begin a step in a neighbouring scene before the block does."""
+        return []
+
+    def is_like(self, term: Block) -> bool:
+        """Return whether a block of another scene differs in numbers of its elements only."""
+        return self.statement == term.statement
 
     def complete_derivatives(self, c: Any, neighbours: Neighbours, by_number: Array) -> None:
         """Set further fields of ``block_derivatives`` of loops.h."""

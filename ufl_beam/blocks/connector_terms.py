@@ -18,6 +18,7 @@ from ufl_beam.blocks.connectors import (
 )
 from ufl_beam.blocks.force_laws import FunctionBlock, OfFunctions
 from ufl_beam.blocks.friction import Rubbing
+from ufl_beam.blocks.guides import GuideBlock, OnCurve
 from ufl_beam.blocks.laws_of_energy import LawBlock, OfEnergy
 from ufl_beam.blocks.rigid_plastic import HingeBlock, Hinged, prototype_of
 from ufl_beam.blocks.springs import OfSpring, SpringBlock
@@ -36,7 +37,6 @@ from ufl_beam.model.connector_laws import (
     Spring,
 )
 from ufl_beam.model.connectors import Connector
-from ufl_beam.terms.guides import Guides
 
 
 def statement_of(law: Any, motions: tuple[str, ...], scheme: Scheme) -> OnConnector:
@@ -58,6 +58,9 @@ def statement_of(law: Any, motions: tuple[str, ...], scheme: Scheme) -> OnConnec
         return Pushed(motions, scheme, "controllers")
     if isinstance(law, ForceLaw):
         return OfFunctions(motions, scheme, len(law.state))
+    if isinstance(law, Guide):
+        curve: Any = law.curve
+        return OnCurve(motions, scheme, curve.structure, len(curve.numbers), curve.tabulated)
     kinds: dict[type, type[OnConnector]] = {PrescribedMotion: Driven, Damper: Damped}
     return kinds[type(law)](motions, scheme)
 
@@ -77,38 +80,30 @@ def _kind(law: Any) -> object:
         return ForceLaw, len(law.state)
     if isinstance(law, ConnectorLaw):
         return type(law), law.elastic
+    if isinstance(law, Guide):
+        curve: Any = law.curve
+        return Guide, curve.structure
     return type(law), law is RIGID, isinstance(law, RigidPlastic) and type(law.law)
 
 
 def connector_terms(setting: BlockSetting) -> list[Any]:
-    """Create the terms of the connectors of a process, one for each kind, guides last.
+    """Create the terms of the connectors of a process, one for each kind.
 
     Every process creates all entries of the ledger, in the order of the scene, and keeps the terms
     of which it has connectors.
     """
-    subdomain, scheme = setting.subdomain, setting.scheme
-    connectors, made = setting.scene.all_connectors, list[Any]()
+    scheme, connectors, made = setting.scheme, setting.scene.all_connectors, list[Any]()
     keys = [(_motions_with(connector), _kind(connector.law)) for connector in connectors]
     for key, connector in dict(zip(keys, connectors, strict=True)).items():
         law, of_kind = connector.law, np.array([i for i, x in enumerate(keys) if x == key])
-        if isinstance(law, Guide):
-            continue
         if isinstance(law, Spring):
             springs = OfSpring(key[0], scheme)
             made.append(SpringBlock(springs, setting, of_kind, law))
             continue
         statement = statement_of(law, key[0], scheme)
         kinds: dict[type, type[ConnectorBlock]] = {
-            OfEnergy: LawBlock, Hinged: HingeBlock, OfFunctions: FunctionBlock,
+            OfEnergy: LawBlock, Hinged: HingeBlock, OfFunctions: FunctionBlock, OnCurve: GuideBlock,
         }  # fmt: skip
         kind = kinds.get(type(statement), ConnectorBlock)
         made.append(kind(statement, setting, of_kind))
-    guides = [
-        i
-        for i, number in enumerate(subdomain.connectors)
-        if isinstance(connectors[number].law, Guide)
-    ]
-    made = [term for term in made if len(term.indices)]
-    if guides:
-        made.append(Guides(subdomain, np.array(guides), scheme, setting.A))
-    return made
+    return [term for term in made if len(term.indices)]

@@ -30,6 +30,9 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.derivatives import Each, Neighbours
 from ufl_beam.terms.term import Callbacks, Phases
 
+WITHOUT_PLACES = "turning", "guided"
+"""Motions that depend on no :class:`Geometry`."""
+
 PLACES = [f"{vector} {c}" for vector in Geometry._fields for c in "xy"]
 """Names of the components of a :class:`Geometry`."""
 
@@ -111,8 +114,8 @@ class OnConnector(Statement):
 
     @property
     def numbers(self) -> list[str]:
-        """Parameters of the law; geometry of each motion, except of relative rotations."""
-        moving = (k for k, motion in enumerate(self.motions) if motion != "turning")
+        """Parameters of the law; geometry of each motion, if it depends on places."""
+        moving = (k for k, motion in enumerate(self.motions) if motion not in WITHOUT_PLACES)
         return [*self.data.numbers, *(f"{name} {k}" for k in moving for name in PLACES)]
 
     @property
@@ -268,7 +271,7 @@ class ConnectorBlock(Block):
         self.connectors: list[Connector] = [scene.all_connectors[i] for i in self.indices]
         dofs = subdomain.connector_dofs[mine].astype(np.int32)
         self.forces_at: Index = dofs[:, 6]
-        moving = [j for j, motion in enumerate(statement.motions) if motion != "turning"]
+        moving = [j for j, x in enumerate(statement.motions) if x not in WITHOUT_PLACES]
         of_kind = [scene.all_connectors[i] for i in all_connectors]
         numbers = [
             [*statement.values(self.connectors[i], setting)[0], *(

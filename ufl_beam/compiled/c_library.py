@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 SOURCES = (
     "assembly", "loops", "material_laws", "embedded_hinges", "material_points",
-    "guide_curves", "beam_elimination", "fronts", "newton", "cell_forces",
+    "beam_elimination", "fronts", "newton", "cell_forces",
     "term_phases", "energy_ledger", "derivatives", "adjoint", "blocks", "steps", "oscillators",
 )  # fmt: skip
 """C files in the folder c; they form one translation unit."""
@@ -35,7 +35,6 @@ FLAGS = ["-O3", NATIVE, "-fopenmp-simd", "-ffp-contract=off"]
 """Compiler flags: SIMD may change the order of sums; products are rounded before they are added."""
 
 _CALLBACKS = """
-extern "Python" void curve_in_python(void *handle, double s, double step, double *out);
 extern "Python" double time_in_python(void *handle, double t);
 extern "Python" void phase_in_python(void *handle, const time_step *step, const double *q1,
                                      const double *s);

@@ -14,7 +14,7 @@ from ufl_beam.errors import ModelError, closed
 from ufl_beam.model.checks import require_function, require_kind, require_number, require_returned
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_law import ForceLaw as ForceLaw
-from ufl_beam.model.functions import Constant, Curve, Timed
+from ufl_beam.model.functions import Constant, GuideCurve, Timed
 from ufl_beam.model.law_functions import Values, larger, positive, smaller, sqrt
 from ufl_beam.model.material_law import MaterialLaw, State, require_law
 from ufl_beam.model.material_laws import DuvautLions, ElastoPlastic
@@ -485,8 +485,7 @@ class RigidPlastic(Record):
 class Guide(Record):
     """Law that constrains a point to a curve of the plane; see :class:`Guided`."""
 
-    # ``s -> (x, y)``, smooth, for all s that the point may reach; m
-    curve: Annotated[Curve, partial(require_function, arguments="s that returns (x, y)")]
+    curve: Instance[GuideCurve]
 
 
 Law = (

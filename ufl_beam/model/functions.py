@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
+from abc import ABC, abstractmethod
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from functools import cached_property, singledispatch
+from itertools import accumulate, combinations, pairwise
 from operator import ge
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
+import scipy  # loads its submodules at their first use
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import compact_repr
@@ -33,7 +36,7 @@ REACH = 1e-3
 Tangents have a relative error of some 1e-12, mostly round-off, if radii are not much smaller."""
 
 MOST_ITERATIONS = 50
-"""Largest number of iterations in :func:`nearest`."""
+"""Largest number of iterations in :meth:`GuideCurve.nearest`."""
 
 WEIGHTS = np.array(
     [[-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1],
@@ -88,6 +91,75 @@ class Polyline:
         return between(self.points[i], self.points[i + 1], fraction)
 
 
+@closed("any function of s will do")
+@dataclass(frozen=True)
+class Spline:
+    """Cubic spline through points, a curve for :class:`Guided` or :meth:`Beam.along`.
+
+    It is smooth, with continuous curvature.  Beyond its ends the first and last cubic continue.
+
+    Args:
+        points: Two or more points (x, y); m.
+        s: Increasing parameter of each point, by default the sum of the distances from the first
+            point.
+
+    Raises:
+        ModelError: Fewer than two points, another number of parameters, or parameters that do not
+            increase.
+
+    Example:
+        >>> rail = ub.Spline([(2, 0), (2.5, 0.1), (3, 0.4), (3.5, 0.9)])
+        >>> guided = ub.Guided(beam.end, rail)
+    """
+
+    points: Sequence[Point]
+    s: Sequence[float] = ()
+
+    __repr__ = compact_repr
+
+    def __post_init__(self) -> None:
+        points = require_sequence(self.points, "Spline: points")
+        points = tuple(require_vector(p, f"Spline: points[{i}]") for i, p in enumerate(points))
+        steps = (math.dist(p, q) for p, q in pairwise(points))
+        s = require_sequence(
+            self.s if len(self.s) else [*accumulate(steps, initial=0.0)], "Spline: s"
+        )
+        for i, number in enumerate(s):
+            require_number(number, f"Spline: s[{i}]")
+        if len(points) < 2 or len(s) != len(points):
+            raise ModelError(
+                f"Spline: {len(points)} points and {len(s)} parameters; give at least two points, "
+                "and as many parameters"
+            )
+        if any(map(ge, s, s[1:])):
+            raise ModelError("Spline: parameters must increase; points that follow must be apart")
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "s", s)
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """Coefficients of powers of s from the begin of each segment; (segments, 4, 2)."""
+        cubics = scipy.interpolate.CubicSpline(self.s, self.points)
+        return np.ascontiguousarray(cubics.c[::-1].transpose(1, 0, 2))
+
+    def segment(self, s: float) -> int:
+        """Return the index of the segment with a parameter, the first or last one beyond them."""
+        return min(max(bisect_right(self.s, s) - 1, 0), len(self.s) - 2)
+
+    def at(self, s: float) -> Array:
+        """Return the point at a parameter, and its first two derivatives; (3, 2)."""
+        k = self.segment(s)
+        (a, b, c, d), u = self.coefficients[k], s - self.s[k]
+        return np.array(
+            [a + u * (b + u * (c + u * d)), b + u * (2 * c + u * 3 * d), 2 * c + u * 6 * d]
+        )
+
+    def __call__(self, s: float) -> Point:
+        """Return the point at a parameter; m."""
+        x, y = self.at(s)[0].tolist()
+        return x, y
+
+
 def between(p: Point, q: Point, s: float) -> Point:
     """Return the point at the fraction ``s`` of the line from ``p`` to ``q``; exact at the ends."""
     return p[0] * (1 - s) + q[0] * s, p[1] * (1 - s) + q[1] * s
@@ -117,14 +189,7 @@ def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] |
     return points
 
 
-# -- tangents and nearest points ---------------------------------------------------------------
-
-
-def tangent(curve: Curve, s: float, step: float) -> Array:
-    """Return the derivative of a curve at ``s``, from points at most two steps away; (2,); m."""
-    inner = np.subtract(curve(s + step), curve(s - step))
-    outer = np.subtract(curve(s + 2 * step), curve(s - 2 * step))
-    return np.asarray((8 * inner - outer) / (12 * step))
+# -- tangents and curves of guides ---------------------------------------------------------------
 
 
 def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
@@ -136,37 +201,36 @@ def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
     return np.asarray(WEIGHTS[before] @ points / step)
 
 
-def parameter_step(curve: Curve, s: float, length: float) -> float:
-    """Find the parameter step from ``s`` that moves a point by about ``REACH * length``.
+class GuideCurve(ABC):
+    """Curve of a guide; its equations in UFL are in mechanics/guide_curves.py."""
 
-    The unit of the parameter is unknown, so the search begins at an arbitrary step.
+    @abstractmethod
+    def at(self, s: float) -> Array:
+        """Return the point at a parameter, and its first two derivatives; (3, 2)."""
+
+    def nearest(self, point: Array, s: float, size: float) -> float:
+        """Return the parameter of the nearest point; NaN without convergence.
+
+        The search begins at ``s``; ``size`` is the size of the scene; m.
+        """
+        last_digits = 4 * np.spacing(size + math.hypot(*point))
+        for _ in range(MOST_ITERATIONS):
+            on, slope, bend = self.at(s)
+            gap, square = point - on, float(slope @ slope)
+            change = float(gap @ slope) / max(square - float(gap @ bend), square / 2)
+            s, moved = s + change, abs(change) * math.sqrt(square)
+            if not moved > last_digits:  # also if it is not a number
+                return s
+        return s if moved <= 1e-9 * size else math.nan
+
+
+@singledispatch
+def guide_curve(curve: Any, what: str) -> GuideCurve:
+    """Return the curve of a guide, or raise :class:`ModelError`.
+
+    The model does not import UFL; modules that do register functions for kinds of curves.
     """
-    step = 1e-6
-    for _ in range(60):
-        distance = math.dist(curve(s + step), curve(s - step)) / 2
-        if not math.isfinite(distance):
-            step /= 1e3
-        elif abs(distance / (REACH * length) - 1) < 0.5:
-            break
-        else:
-            step *= min(max(REACH * length / distance, 1e-3), 1e3) if distance else 1e3
-    return step
-
-
-def nearest(curve: Curve, point: Array, s: float, step: float, length: float) -> float:
-    """Find the parameter at which a curve is nearest to ``point``; NaN without convergence.
-
-    The search begins at ``s``.  ``step`` is the step of :func:`tangent`, ``length`` the size of the
-    scene; m.
-    """
-    last_digits = 4 * np.spacing(length + math.hypot(*point))
-    for _ in range(MOST_ITERATIONS):
-        t = tangent(curve, s, step)
-        change = float((point - curve(s)) @ t / (t @ t))
-        s += change
-        if abs(change) * math.hypot(*t) <= last_digits:
-            return s
-    return s if abs(change) * math.hypot(*t) <= 1e-9 * length else math.nan
+    raise NotImplementedError(what)
 
 
 def enclosing_diameter(points: Array) -> float:

@@ -6,7 +6,8 @@ from __future__ import annotations
 import math
 from abc import ABC
 from dataclasses import KW_ONLY, dataclass
-from typing import ClassVar
+from functools import partial
+from typing import Annotated, ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
@@ -21,9 +22,10 @@ from ufl_beam.model.bodies import (
     node,
     require_place,
 )
+from ufl_beam.model.checks import require_function, require_vector
 from ufl_beam.model.connector_laws import RIGID, Bearing, Guide
 from ufl_beam.model.connectors import Component, Connector, require_apart, unit_axis
-from ufl_beam.model.functions import Curve, Point, curve_point
+from ufl_beam.model.functions import Curve, Point, guide_curve
 from ufl_beam.model.records import Instance, Record, Switch, Text
 
 
@@ -254,11 +256,13 @@ class Guided(Joint):
     Args:
         place: Guided place: on a beam, or the centre of a body.  Another point of a body can be
             joined to a guided beam by a :class:`Revolute`.
-        curve: ``s -> (x, y)`` for all s that the place may reach; ``curve(0)`` is at the place; m.
+        curve: ``s -> (x, y)`` in UFL, smooth, for all s that the place may reach, or a
+            :class:`Spline`.  The point at s = 0 is at the place; m.
 
     Raises:
-        ModelError: The curve has no direction at s = 0, or the place is another point of a body.
-            A scene raises this error if ``curve(0)`` is not at the place.
+        ModelError: The curve is no function in UFL, or has no direction at s = 0, or the place is
+            another point of a body.  A scene raises this error if the curve is not at the place at
+            s = 0.
 
     Example:
         >>> rail = ub.Guided(beam.end, lambda s: (2 + s, 0.5 * s**2))
@@ -268,7 +272,7 @@ class Guided(Joint):
     """
 
     place: PlaceField
-    curve: Curve
+    curve: Annotated[Curve, partial(require_function, arguments="s that returns (x, y)")]
     meets = True
     advice = "curve(0) must be at the place"
 
@@ -276,19 +280,18 @@ class Guided(Joint):
         super().__post_init__()
         if not moves_with_node(self.place):
             raise ModelError(f"Guided({self.place}): the place must be the centre of the body")
-        law, name = Guide(self.curve), f"Guided({self.place}): curve"
-        start = ground(*curve_point(self.curve, 0.0, name))
-        (x0, y0), (x1, y1) = (curve_point(self.curve, s, name) for s in START_INTERVAL)
-        length = math.hypot(x1 - x0, y1 - y0)
-        if length == 0.0:
+        name = f"Guided({self.place}): curve"
+        law = Guide(guide_curve(self.curve, name))
+        (x, y), slope, _ = law.curve.at(0.0)
+        start, length = (
+            ground(*require_vector((float(x), float(y)), f"{name}(0)")),
+            math.hypot(*slope),
+        )
+        if not 0.0 < length < math.inf:
             raise ModelError(f"Guided({self.place}): the curve has no direction at s = 0")
-        across = (y0 - y1) / length, (x1 - x0) / length
+        across = -float(slope[1]) / length, float(slope[0]) / length
         holder = Component("Guided", "guided", start, self.place, law, across)
         vars(self).update(places=(start, self.place), holders=(holder,))
-
-
-START_INTERVAL = (-1e-6, 1e-6)
-"""Parameters of two points that give the direction of a guide curve at s = 0."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

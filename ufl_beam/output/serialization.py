@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import math
 import warnings
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -28,7 +29,7 @@ from scipy.interpolate import KroghInterpolator
 from ufl_beam.errors import ArgumentError, ModelWarning
 from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connector_laws import RIGID
-from ufl_beam.model.functions import Point, steady, still
+from ufl_beam.model.functions import GuideCurve, Point, Spline, guide_curve, steady, still
 from ufl_beam.output.output_files import WrongReader
 
 Data = Any  # JSON data
@@ -69,7 +70,7 @@ class SavedFunction:
 
 @dataclasses.dataclass(frozen=True)
 class SavedCurve:
-    """Curve through saved points, cubic between them and straight beyond."""
+    """Curve through saved points, cubic between them and straight beyond; a spline in guides."""
 
     name: str  # name of the function
     s: tuple[float, ...]  # parameters, ascending, at least two
@@ -77,16 +78,16 @@ class SavedCurve:
 
     @classmethod
     def sampled(
-        cls, curve: Callable[[float], Any], first: float, last: float, more: Iterable[float] = ()
+        cls, name: str, curve: Callable[[float], Any], parameters: Iterable[float]
     ) -> SavedCurve:
-        """Sample a curve from ``first`` to ``last`` and at ``more``; omit points with an error."""
-        even = (first + (last - first) * k / SAMPLES for k in range(SAMPLES + 1))
+        """Sample a curve; omit points with an error, and those that are no numbers."""
         known = {}
-        for s in sorted({*even, *more}):
+        for s in sorted({*map(float, parameters)}):
             with suppress(Exception):
-                x, y = curve(s)
-                known[s] = float(x), float(y)
-        return cls(function_name(curve), tuple(known), tuple(known.values()))
+                x, y = map(float, curve(s))
+                if math.isfinite(x) and math.isfinite(y):
+                    known[s] = x, y
+        return cls(name, tuple(known), tuple(known.values()))
 
     def __call__(self, s: float) -> Point:
         """Return the point at a parameter, m; exact at sampled parameters."""
@@ -98,6 +99,11 @@ class SavedCurve:
         nearest = slice(first, first + count)
         x, y = KroghInterpolator(self.s[nearest], self.points[nearest])(s)
         return float(x), float(y)
+
+
+@guide_curve.register(SavedCurve)
+def _through_saved_points(curve: SavedCurve, what: str) -> GuideCurve:
+    return guide_curve(Spline(curve.points, curve.s), what)
 
 
 @dataclasses.dataclass(frozen=True)

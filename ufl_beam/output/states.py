@@ -20,7 +20,6 @@ from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Member, Place, arm
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.functions import nearest, parameter_step, tangent
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import require_arrays
@@ -360,9 +359,9 @@ class States:
             curve, size, s, normals = connector.law.curve, self.scene.size, 0.0, []
             points, begun = ends[0][1].position(b), ends[-1][1].position(b)
             for n in range(len(self)):
-                step, chord = parameter_step(curve, s, size), np.array(points[n] - begun[n])
-                s = nearest(curve, np.array(points[n] + begun[n]) / 2, s, step, size)
-                x, y = tangent(curve, s, step)
+                chord = np.array(points[n] - begun[n])
+                s = curve.nearest(np.array(points[n] + begun[n]) / 2, s, size)
+                x, y = curve.at(s)[1]
                 if np.hypot(*chord) > SHORTEST_CHORD * size:  # the force is normal to it
                     x, y = chord * np.sign(chord @ (x, y))
                 normals.append((-y, x))

@@ -17,7 +17,6 @@ from ufl_beam.errors import require_kind, require_number
 from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.functions import nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.states import States
 
@@ -177,18 +176,12 @@ class Canvas:
         """Return the used parameters of a guide curve, with extensions where the curve goes on."""
         curve, size, parameters = law.curve, self.scene.size, [0.0]
         for point in () if self._solution is None else self._solution.position(holder.b):
-            step = parameter_step(curve, parameters[-1], size)
-            parameters.append(nearest(curve, point, parameters[-1], step, size))
+            parameters.append(curve.nearest(point, parameters[-1], size))
         used = [0.0, *(parameters[1:][n] for n in self._shown)]
         ends = []
         for s, more in ((np.nanmin(used), -3.0), (np.nanmax(used), 3.0)):
-            slope = tangent(curve, float(s), parameter_step(curve, float(s), size))
-            beyond = float(s + more * self.unit / math.hypot(*slope))
-            try:
-                goes_on = bool(np.isfinite(curve(beyond)).all())
-            except (ValueError, ArithmeticError):
-                goes_on = False
-            ends.append(beyond if goes_on else float(s))
+            beyond = float(s + more * self.unit / math.hypot(*curve.at(float(s))[1]))
+            ends.append(beyond if np.isfinite(curve.at(beyond)[0]).all() else float(s))
         return ends[0], ends[1]
 
     @cached_property

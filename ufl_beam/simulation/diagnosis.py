@@ -25,7 +25,15 @@ from ufl_beam.errors import (
 )
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
-from ufl_beam.model.connector_laws import Coulomb, Damper, ForceLaw, RigidPlastic, Spring, Stop
+from ufl_beam.model.connector_laws import (
+    Coulomb,
+    Damper,
+    ForceLaw,
+    Guide,
+    RigidPlastic,
+    Spring,
+    Stop,
+)
 from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.model.loads import Rayleigh
 from ufl_beam.model.material_law import MaterialLaw, dissipation_must_grow, has_quadratic_energies
@@ -120,7 +128,12 @@ def no_equilibrium(
         if not why and probe is not q0 and equation.evaluate(probe):
             why = _singularity(equation, probe)
         why = why or _limit_point(equation, solution, q0, probe)
-    reasons = [why, f"{failure} ({sizes})" if sizes else str(failure)]
+    lost = [
+        f"{c.b}: no nearest point was found on its guide curve"
+        for c in equation.subdomain.numbering.scene.all_connectors
+        if isinstance(c.law, Guide) and np.isnan(failure.residuals.get(f"force of {c}", 0.0))
+    ]
+    reasons = [*lost, why, f"{failure} ({sizes})" if sizes else str(failure)]
     if isinstance(failure, Reversal):
         reasons.reverse()
     return ConvergenceError(

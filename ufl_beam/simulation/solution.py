@@ -24,9 +24,9 @@ from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.fibres import SectionPoints
-from ufl_beam.model.functions import Curve, Table, nearest, parameter_step
+from ufl_beam.model.functions import Table
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.model.joints import START_INTERVAL
+from ufl_beam.model.joints import Guided
 from ufl_beam.model.loads import LoadAlongBeam, profile_at
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.engineering_results import HingeTable, Storeys, hinges_of, storeys_of
@@ -48,6 +48,7 @@ from ufl_beam.output.serialization import (
     add_new_fields,
     difference,
     from_data,
+    function_name,
     require_no_code,
     to_data,
 )
@@ -178,9 +179,11 @@ class Solution(States, Rich):
         def record(owner: Any, field: str, function: Any) -> Any:
             """Return a record to save for a function in a field of ``owner``, or None."""
             if field == "curve" and isinstance(owner, Member):
-                return SavedCurve.sampled(function, 0.0, 1.0, numbering.parameters(owner))
+                even = [k / SAMPLES for k in range(SAMPLES + 1)]
+                parameters = [*even, *numbering.parameters(owner)]
+                return SavedCurve.sampled(function_name(function), function, parameters)
             if field == "curve":
-                return _used_curve(self, function)
+                return _used_curve(self, owner)
             if isinstance(owner, LoadAlongBeam | ImposedStrain) and field != "amplitude":
                 even = np.linspace(*owner.span, SAMPLES + 1)
                 s = np.union1d(numbering.gauss_parameters(owner.beam), even)
@@ -532,19 +535,20 @@ TIME_FUNCTIONS = ("amplitude", "position", "u", "v", "psi", "motion", "force", "
 """Names of fields with functions of time; "force" of controllers and force laws is an exception."""
 
 
-def _used_curve(solution: Solution, curve: Curve) -> SavedCurve:
+def _used_curve(solution: Solution, joint: Guided) -> SavedCurve:
     """Sample the part of a guide curve that the motion used, extended at both ends.
 
-    The extension is a tenth of the part plus eight steps of :func:`parameter_step`.
+    The extension is a tenth of the part plus a hundredth of the scene.
     """
-    scene, used = solution.scene, [0.0]
-    for connector in scene.all_connectors:
-        if isinstance(connector.law, Guide) and connector.law.curve is curve:
-            s = 0.0
-            for point in solution.position(connector.b):
-                s = nearest(curve, point, s, parameter_step(curve, s, scene.size), scene.size)
-                used.append(s)
+    (holder,), size, used = joint.holders, solution.scene.size, [0.0]
+    assert isinstance(holder.law, Guide)
+    curve = holder.law.curve
+    for point in solution.position(holder.b):
+        used.append(curve.nearest(point, used[-1], size))
     first, last = float(np.nanmin(used)), float(np.nanmax(used))
-    steps = (parameter_step(curve, s, scene.size) for s in (first, last))
-    more = 0.1 * (last - first) + 8 * max(steps)
-    return SavedCurve.sampled(curve, first - more, last + more, (0.0, *START_INTERVAL))
+    slopes = [math.hypot(*curve.at(s)[1]) for s in (first, last)]
+    more = 0.1 * (last - first) + 0.01 * size / min(slopes)
+    step = (last - first + 2 * more) / SAMPLES  # the place of the undeformed scene is a sample
+    grid = range(math.floor((first - more) / step), math.ceil((last + more) / step) + 1)
+    name, at = function_name(joint.curve), [k * step for k in grid]
+    return SavedCurve.sampled(name, lambda s: curve.at(s)[0], at)

@@ -295,11 +295,10 @@ class Stepper(StateView):
             c.stop = lib.time_in_python
             c.stops = callbacks.handle(lambda t: controllers.next_sample(c.t, t))
         # Calls that may raise come first, before any loop of C has accepted the step.
-        asking = lib.phase_in_python, ffi.addressof(lib, "accept_guides")
-        mine = [call for call in loops["accept"] if call[0] in asking]
+        mine = [call for call in loops["accept"] if call[0] == lib.phase_in_python]
         if self._free_motion:
             mine.insert(0, callbacks.phase(self._require_stiffness))
-        loops["accept"] = mine + [call for call in loops["accept"] if call[0] not in asking]
+        loops["accept"] = mine + [x for x in loops["accept"] if x[0] != lib.phase_in_python]
         if controllers.needs_evaluation:
             loops["begin"].insert(0, callbacks.phase(self._evaluate_controllers))
         if self.comparison.several:

@@ -364,7 +364,7 @@ def agree_in_python(handle: Any, number: int, how: Any, values: Any) -> None:
 
 def _call(method: str, error: int | None, handle: Any, *data: Any) -> int | None:
     """Call a method of a solver from C, see c_library.py; if it raises, C gets ``error``."""
-    callbacks, solver, _ = ffi.from_handle(handle)
+    callbacks, solver = ffi.from_handle(handle)
     size = 8 * callbacks.c.size
     vectors = (np.frombuffer(ffi.buffer(x, size)) if isinstance(x, ffi.CData) else x for x in data)
     result = getattr(solver, method)(*vectors)

@@ -20,7 +20,7 @@ from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_post_traversal
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import ffi, lib, struct
+from ufl_beam.compiled.c_library import Loop, ffi, lib, struct
 from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.dolfinx_compat import fem
 
@@ -244,8 +244,9 @@ def shape_derivatives(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours
 
 
 def differences(
-    neighbours: Neighbours, state_of: Callable[[Any], Sequence[Array]] = lambda term: ()
-) -> Each:
+    neighbours: Neighbours, state_of: Callable[[Any], Sequence[Array]] = lambda term: (),
+    begins: Callable[[Any], Sequence[Loop]] = lambda term: (),
+) -> Each:  # fmt: skip
     """Return the derivative of a term by numbers of the scene, as differences of its forces.
 
     The term in the neighbouring scenes takes the steps of the run, so that functions of time of a
@@ -255,14 +256,16 @@ def differences(
     Args:
         neighbours: The term.
         state_of: Arrays of the state of a term that its next step needs.
+        begins: Further phases that begin a step in a neighbouring scene.
     """
     made = list[Any]()
     for some in neighbours.terms:
         neighbours.states += [array for term in some for array in state_of(term)]
     for term in (neighbours.term, *(x for some in neighbours.terms for x in some)):
-        phases = term.made_phases.begin, term.made_phases.accept
+        first = () if term is neighbours.term else begins(term)
+        phases = [*first, *term.made_phases.begin], term.made_phases.accept
         calls = [ffi.new("phase_call[]", list(some)) for some in phases]
-        neighbours.alive.append(calls)
+        neighbours.alive += [calls, first]
         both = [(len(some), call) for some, call in zip(phases, calls, strict=True)]
         made.append((*both, term.loops[0]))
     parameters, number = neighbours.weights.shape
@@ -277,7 +280,7 @@ def differences(
 LINEARIZE = {
     "form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads",
     "differences": "begin_neighbours",
-    "guides": "find_tangents_before", "imposed": "find_imposed_directions",
+    "imposed": "find_imposed_directions",
     "damping": "tabulate_damping", "block": "tabulate_block",
 }  # fmt: skip
 ACCEPT = {
@@ -317,7 +320,6 @@ TRANSPOSES = {
     "shape": ("", "transpose_shape", ""),
     "differences": ("", "transpose_differences", ""),
     "imposed": ("", "transpose_imposed", ""),
-    "guides": ("", "transpose_guides", ""),
     "damping": ("", "transpose_damping", ""),
 }
 """Functions of ``term_transposes`` of loops.h by the kind of a derivative."""
@@ -374,9 +376,6 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         groups = [damping.group[g] for g in range(damping.groups)]
         tangents = [(x.tangents, 8 * x.number * x.numbers) for x in groups]
         return [*rates(damping.damping.rates), *tangents]
-    if kind == "guides":
-        g = data.guides
-        return [(x, 8 * g.number) for x in (g.s0, g.step)]
     if kind == "points":
         points, blocks = data.points, [table(data.strains)] if data.strains else []
         number = points.cells * points.of_cell

@@ -273,9 +273,9 @@ class Callbacks:
         finally:
             self.error, self.c.raised = before
 
-    def handle(self, function: Any, size: int = 0) -> Any:
-        """Return a handle of a function for C; ``size`` is the length of its output array."""
-        self._alive.append(ffi.new_handle((self, function, size)))
+    def handle(self, function: Any) -> Any:
+        """Return a handle of a function for C."""
+        self._alive.append(ffi.new_handle((self, function)))
         return self._alive[-1]
 
 
@@ -285,14 +285,11 @@ def _record_error(kind: type, error: BaseException, traceback: Any) -> None:
     The handle is read from the arguments of the callback, because an interrupt may come before the
     first line of the callback.
     """
-    arguments = traceback.tb_frame.f_locals
-    callbacks, _, size = ffi.from_handle(arguments["handle"])
+    callbacks, _ = ffi.from_handle(traceback.tb_frame.f_locals["handle"])
     failed = isinstance(error, StepFailed)
     if callbacks.error is None or isinstance(callbacks.error, StepFailed):
         callbacks.error = error.with_traceback(traceback)
     callbacks.c.raised = max(callbacks.c.raised, 1 if failed else 2)
-    if "out" in arguments:
-        np.frombuffer(ffi.buffer(arguments["out"], 8 * size)).fill(math.nan)
 
 
 def from_c(
@@ -302,15 +299,6 @@ def from_c(
     more = {} if error is None else {"error": error}
     declared: Any = ffi.def_extern(name=name, onerror=_record_error, **more)
     return declared  # type: ignore[no-any-return]
-
-
-@from_c()
-def curve_in_python(handle: Any, s: float, step: float, out: Any) -> None:
-    """Write CURVE_POINTS points of a curve to ``out``, at equal parameter steps around ``s``."""
-    curve, far = ffi.from_handle(handle)[1], 2 * step
-    out[0 : 2 * lib.CURVE_POINTS] = (
-        *curve(s - far), *curve(s - step), *curve(s), *curve(s + step), *curve(s + far),
-    )  # fmt: skip
 
 
 @from_c(math.nan)

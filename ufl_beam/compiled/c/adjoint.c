@@ -416,25 +416,6 @@ void transpose_imposed(void *self, adjoint *a, const double *λ)
   }
 }
 
-void transpose_guides(void *self, adjoint *a, const double *λ)
-{
-  const guide_derivatives *m = self;
-  const guides *g = m->own;
-  find_tangents_before(self, a->step, a->d->x);
-  for (int p = 0; p < a->parameters; ++p) {
-    memset(a->values, 0, a->size * sizeof *a->values);
-    add_changes_of_curves(m, a->d->x, p, a->values);
-    a->gradient[p] += dot(a->size, a->values, λ);
-  }
-  for (int k = 0; k < g->number && g->over_step; ++k) {
-    const int32_t *dofs = g->dofs + 7 * k;
-    double by_way[2];
-    find_turn_of_chord(m, a->d->x, k, by_way);
-    const double way = by_way[0] * λ[dofs[1]] + by_way[1] * λ[dofs[3]];
-    for (int i = 0; i < 2; ++i) a->q0[dofs[1 + 2 * i]] += m->tangent[2 * k + i] * way;
-  }
-}
-
 /* The matrix and the tangents of the step, which the product with rates and the differences between scenes
  * also use; these follow. */
 void transpose_damping(void *self, adjoint *a, const double *λ)

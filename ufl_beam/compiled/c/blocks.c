@@ -137,6 +137,27 @@ static void take_inputs(const element_block *b, const time_step *step)
   }
 }
 
+/* Select the rows of tables by the mode before them; returns whether a row has changed. */
+static int select_rows(const element_block *b)
+{
+  const int n = b->lanes, modes = b->columns * n;
+  int changed = 0;
+  if (!modes) return 0;
+  FOR_ACTING(b, c)
+    for (int l = 0; l < n; ++l) {
+      const int i = c * n + l < b->elements ? c * n + l : b->elements - 1;
+      double *row = input(b, c, b->width - b->columns) + l;
+      int low = 0, high = b->table_rows[i];
+      while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        *(row[-n] >= b->table[i][middle * b->columns] ? &low : &high) = middle;
+      }
+      const double *wanted = b->table[i] + low * b->columns;
+      for (int k = 0; k < b->columns; ++k) changed |= row[k * n] != wanted[k], row[k * n] = wanted[k];
+    }
+  return changed;
+}
+
 /* Modes before the first iterate: the modes at the end of the last step, or zero. */
 void begin_block_again(void *self, const time_step *step, const double *q1, const double *s)
 {
@@ -148,6 +169,7 @@ void begin_block_again(void *self, const time_step *step, const double *q1, cons
       for (int l = 0; l < n; ++l)
         input(b, c, b->width - b->modes + FIRST_MODE + k)[l] =
           b->begins[k] < 0 ? 0 : b->state[((size_t)c * b->states + b->begins[k]) * n + l];
+  select_rows(b);
 }
 
 /* Lines of springs: the force of a material point and its derivative by the motion. */
@@ -164,6 +186,8 @@ static void find_lines(const element_block *b)
   }
 }
 
+enum { MOST_ROWS = 50 }; /* of a table that an iterate tries */
+
 /* Modes at the present motions, which are the first recorded numbers. Held elements keep theirs; the excess measures by how much that is violated. */
 static void find_modes(const element_block *b)
 {
@@ -178,10 +202,13 @@ static void find_modes(const element_block *b)
   }
   FOR_ACTING(b, c)
     for (int l = 0; l < elements_in(b, c); ++l) input(b, c, first + MODE_HELD)[l] = holds && !b->free[c * n + l];
-  evaluate(b, b->mode_of, b->out);
+  for (int i = 0; i == 0 || (i < MOST_ROWS && select_rows(b)); ++i) {
+    evaluate(b, b->mode_of, b->out);
+    FOR_ACTING(b, c)
+      memcpy(input(b, c, first + FIRST_MODE), b->out + (size_t)c * b->mode_of->outputs * n, modes * n * sizeof *b->out);
+  }
   FOR_ACTING(b, c) {
     const double *out = b->out + (size_t)c * b->mode_of->outputs * n, *excess = out + modes * n, *opened = excess + n;
-    memcpy(input(b, c, first + FIRST_MODE), out, modes * n * sizeof *out);
     for (int l = 0; l < elements_in(b, c); ++l) {
       b->excess[c * n + l] = excess[l];
       if (excess[l] > 0) b->search[OVER] = 1;
@@ -390,6 +417,19 @@ void evaluate_along(const element_block *b, const element_function *f, const dou
   gather(&more, u, b->width);
   evaluate(&more, f, b->out);
   if (tangent) scatter(b, f, f->outputs, b->out, entry, tangent);
+}
+
+/* Begin a step in a neighbouring scene from the state that its statement has at the configuration of the run. */
+void begin_neighbour(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const block_pair *m = self;
+  const element_block *b = m->neighbour;
+  memcpy(b->state, m->block->state, (size_t)b->batches * b->states * b->lanes * sizeof *b->state);
+  take_inputs(b, step);
+  begin_block_again(m->neighbour, step, q1, s);
+  gather(b, step->q0, 0);
+  find_modes(b);
+  end_step_of_block(b, step->q0, BEGIN);
 }
 
 /* -- derivatives ----------------------------------------------------------------------------------------- */

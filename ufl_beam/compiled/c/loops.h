@@ -273,54 +273,11 @@ typedef struct {
   const double *imposed; /* strains of imposed_cells; or none */
 } inelastic;
 
-part add_guides_force, add_guides_tangent;
 void respond(points *p);
 void respond_at(const inelastic *m, const double *q);
 int gives_energy(const points *p);
 void keep_tangents(const points *p);
 void commit(points *p);
-
-/* -- points on guide curves -------------------------------------------------------------------- */
-
-enum { CURVE_POINTS = 5 }; /* at equal steps of the parameter */
-
-/* The interpolation polynomial through CURVE_POINTS points of a curve around the middle parameter.
- * Its coefficients multiply powers of the number of steps. */
-typedef struct {
-  double middle; /* NaN if there is no polynomial */
-  double a[CURVE_POINTS][2];
-} curve_around;
-
-/* Frame of a guided point: position `at` for which it is valid, or NaN; nearest point `on` of the
- * curve and its derivative by parameter steps; distance and normal n; normal m over the step, and
- * its derivative by the position. smooth: whether derivatives of m are those of `secant`, the same
- * normal by find_secant; by_start is the derivative of the direction of the secant. */
-typedef struct {
-  double at[2], on[2], slope[2];
-  double distance, n[2], m[2], dm[2][2], secant[2], by_start[2];
-  int smooth;
-} guide_frame;
-
-/* Points guided along curves, see guide_curves.c. */
-typedef struct {
-  int number, over_step;   /* over_step: whether forces are normal to the chord of a step */
-  const int32_t *dofs;     /* seven of each guide */
-  const int32_t *entries;  /* of the tangent, eight of each guide: dm, m, n */
-  const double *point;     /* in the undeformed scene */
-  double size, reach;      /* size of the scene; length of a parameter step as a fraction of it */
-  const double *shortest;  /* shortest chord from which a direction is computed */
-  double *distance, *s0, *step, *on0; /* accepted state: parameter, parameter step, point of the curve */
-  double *s;               /* parameter of the latest nearest point */
-  guide_frame *frame;      /* of the latest iterate */
-  curve_around *around;    /* latest polynomials */
-  void (*points)(void *curve, double s, double step, double *out); /* computes CURVE_POINTS points of a curve */
-  void *const *curve;
-  int lost;                /* guide without a nearest point, which `report` tells Python */
-  void (*report)(void *handle);
-  void *handle;
-} guides;
-
-int find_frames(guides *g, const double *q);
 
 /* -- elimination along chains ------------------------------------------------------------------ */
 
@@ -442,7 +399,7 @@ enum { OF_LIBRARY = 76 }; /* PETSC_ERR_LIB: KLU reports a singular matrix by thi
  * moved is the largest motion, see find_motion. */
 typedef double (miss)(void *self, const double *q, const double *r, double scale, double moved);
 typedef struct { miss *missed; void *self; } law_residual;
-miss missed_by_points, missed_by_guides, missed_by_block;
+miss missed_by_points, missed_by_block;
 
 /* A point whose displacement is in the axes of a support at an angle; c and s are its cosine and
  * sine. The arrays list the entries of the tangent in the rows and in the columns of both degrees
@@ -670,6 +627,9 @@ typedef struct {
   int32_t *acting, *batch;  /* number of batches with elements that act in this step; their indices */
   int ranges;               /* the first numbers of the step, of which one is within the range of an acting element */
   const double *range;      /* lower ends, then upper ends, of a batch; or none */
+  int columns;              /* of tables: last modes that depend on the mode before them; or zero */
+  const double *const *table; /* of each element: rows, which begin with the least value of that mode */
+  const int32_t *table_rows;
   const int32_t *dofs;      /* degree of freedom of each motion of an element */
   int size;                 /* of loads: number of degrees of freedom on which they act */
   const int32_t *dof, *at;  /* of loads: these; index in `dof` of each motion of an element */
@@ -715,6 +675,9 @@ typedef struct {
   const int *recorded_kind; /* recorded_number of each */
   double *record;           /* `recorded` numbers of each element */
 } element_block;
+
+/* A block, and the same in a neighbouring scene, whose state follows from the configuration. */
+typedef struct { const element_block *block, *neighbour; } block_pair;
 
 /* Imposed strains of the cells of a term, see CellStrains: elastic cells, whose forms have the strains
  * as a coefficient, or cells with material points. */
@@ -981,8 +944,8 @@ phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, be
   
   begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
   begin_tangent_damping, accept_tangent_damping,
-  begin_inelastic, accept_inelastic, add_energy_of_points, begin_guides, accept_guides,
-  begin_block, begin_block_again, accept_block, add_energy_of_block;
+  begin_inelastic, accept_inelastic, add_energy_of_points,
+  begin_block, begin_block_again, begin_neighbour, accept_block, add_energy_of_block;
 admission points_dissipate;
 change_of_energy change_of_form, change_of_points, change_of_block, change_of_imposed_strains;
 double value_at(const time_function *f, double t);
@@ -1134,17 +1097,6 @@ typedef struct {
   double *here;              /* forces of the scene */
 } term_differences;
 
-/* Guides of the run, the same with other polynomials, and in neighbouring scenes; and the unit tangents of
- * their curves at the points before the step. */
-typedef struct {
-  const guides *guides;
-  guides *own;
-  int parameters, neighbours;
-  guides *const *neighbour;
-  const double *weight; /* see derivatives */
-  double *tangent;
-} guide_derivatives;
-
 /* Derivatives of the damping by the tangent of the accepted state, by the configuration in its forms and
  * by the tangents of sections. */
 typedef struct {
@@ -1209,7 +1161,6 @@ void transpose_product(void *self, adjoint *a, const double *lambda);
 void transpose_loads(void *self, adjoint *a, const double *lambda);
 void transpose_shape(void *self, adjoint *a, const double *lambda);
 void transpose_differences(void *self, adjoint *a, const double *lambda);
-void transpose_guides(void *self, adjoint *a, const double *lambda);
 void transpose_damping(void *self, adjoint *a, const double *lambda);
 void transpose_block_state(void *self, adjoint *a);
 void transpose_block(void *self, adjoint *a, const double *lambda);
@@ -1218,12 +1169,10 @@ void finish_form(void *self, adjoint *a);
 void finish_points(void *self, adjoint *a);
 int differentiate_step(derivatives *d, time_loop *m, int initial);
 void begin_neighbours(void *self, const time_step *step, const double *q1);
-void find_tangents_before(void *self, const time_step *step, const double *q1);
 void tabulate_damping(void *self, const time_step *step, const double *q1);
 void add_damping_derivative(void *self, const derivatives *d, int p, double *r);
 void find_imposed_directions(void *self, const time_step *step, const double *q1);
 void add_differences_derivative(void *self, const derivatives *d, int p, double *r);
-void add_guides_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_imposed_derivative(void *self, const derivatives *d, int p);
 void accept_differences_derivative(void *self, const derivatives *d, int p);
 void keep_derivatives(derivatives *d, const time_loop *m);
