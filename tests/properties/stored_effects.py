@@ -358,6 +358,18 @@ def guided(d):
     d.add("joints", ub.Guided(other.end, lambda s: (x + slope * s + bend * s**2, y + s)))
 
 
+@effect(ub.Spline)
+def spline(d):
+    """A guide through points; some of its segments are passed in the run."""
+    beam, other = joined(d)
+    d.add("joints", ub.Rigid(beam.end, other.start))
+    (x, y), slope, rate = other.end.point, d.acts(0.2, 0.6), d.acts(10, 20)
+    both = d.one(True, False)  # sides of the place; else the parameters are distances
+    s = [0.02 * k for k in range(-20 if both else 0, 21)]
+    points = [(x + slope * p + 0.02 * math.sin(rate * p), y + p) for p in s]
+    d.add("joints", ub.Guided(other.end, ub.Spline(points, s) if both else ub.Spline(points)))
+
+
 @effect(ub.Release)
 def release(d):
     beam, other = joined(d)

@@ -22,6 +22,7 @@ from ufl_beam.blocks.guides import GuideBlock, OnCurve
 from ufl_beam.blocks.laws_of_energy import LawBlock, OfEnergy
 from ufl_beam.blocks.rigid_plastic import HingeBlock, Hinged, prototype_of
 from ufl_beam.blocks.springs import OfSpring, SpringBlock
+from ufl_beam.mechanics.guide_curves import structure_of
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import (
@@ -59,8 +60,7 @@ def statement_of(law: Any, motions: tuple[str, ...], scheme: Scheme) -> OnConnec
     if isinstance(law, ForceLaw):
         return OfFunctions(motions, scheme, len(law.state))
     if isinstance(law, Guide):
-        curve: Any = law.curve
-        return OnCurve(motions, scheme, curve.structure, len(curve.numbers), curve.tabulated)
+        return OnCurve(motions, scheme, *structure_of(law.curve))
     kinds: dict[type, type[OnConnector]] = {PrescribedMotion: Driven, Damper: Damped}
     return kinds[type(law)](motions, scheme)
 
@@ -81,8 +81,7 @@ def _kind(law: Any) -> object:
     if isinstance(law, ConnectorLaw):
         return type(law), law.elastic
     if isinstance(law, Guide):
-        curve: Any = law.curve
-        return Guide, curve.structure
+        return Guide, structure_of(law.curve)
     return type(law), law is RIGID, isinstance(law, RigidPlastic) and type(law.law)
 
 

@@ -43,7 +43,7 @@ class OnCurve(OnConnector):
     other schemes the force is normal to the curve at the end of the step.
 
     Attributes:
-        structure: The curve, see :class:`~ufl_beam.mechanics.guide_curves.Curve`.
+        structure: The curve, see :func:`~ufl_beam.mechanics.guide_curves.structure_of`.
         count: Number of its numbers.
         tabulated: Whether they depend on s; then they are modes, from a table of each curve.
     """
@@ -71,7 +71,7 @@ class OnCurve(OnConnector):
         return [*place, round_off, *([] if self.tabulated else curve.numbers)], None
 
     @property
-    def modes(self) -> list[str]:  # type: ignore[override]
+    def modes(self) -> list[str]:
         """See the base class."""
         return ["s", *(self.of_curve if self.tabulated else ())]
 
@@ -97,7 +97,7 @@ class OnCurve(OnConnector):
 
     def _along(self, at: Inputs, s: Expr, on: Expr, slope: Expr) -> Expr:
         """Return the vector to which the force is normal."""
-        if self.scheme.average(0.0, 1.0) == 1.0:  # type: ignore[arg-type, comparison-overlap]
+        if self.scheme.average(0.0, 1.0) == 1.0:
             return slope
         way = s - at["last s"]
         _, middle, _, third = self._curve(at, (s + at["last s"]) / 2, 3)
@@ -149,7 +149,8 @@ class GuideBlock(ConnectorBlock):
     def __init__(self, statement: OnCurve, *arguments: Any) -> None:
         super().__init__(statement, *arguments)
         self.statement: OnCurve
-        curves = [connector.law.curve for connector in self.connectors]
+        laws: list[Any] = [connector.law for connector in self.connectors]
+        curves = [law.curve for law in laws]
         for i, (curve, connector) in enumerate(zip(curves, self.connectors, strict=True)):
             on, at = curve.at(0.0)[0] - connector.b.point, divmod(i, BATCH)
             self.state["on x"][at], self.state["on y"][at] = on

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -20,7 +20,7 @@ from ufl.utils.stacks import StackDict
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, calling, shorten
-from ufl_beam.model.functions import GuideCurve, Spline, guide_curve
+from ufl_beam.model.functions import GuideCurve, guide_curve
 
 _MESH = ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(1,)))
 
@@ -62,22 +62,13 @@ def expansion(structure: tuple[Expr, Expr], order: int) -> list[tuple[Expr, Expr
     return found
 
 
-class Curve(GuideCurve):
-    """Curve whose numbers are separate from its structure, which all such curves share.
+class CurveInUFL(GuideCurve):
+    """Curve of a user's function, which is called once.
 
     Attributes:
         structure: Coordinates as expressions of :data:`S` and of numbers, see :func:`number`.
-        numbers: The numbers.
-        tabulated: Whether the numbers depend on s.
+        numbers: The numbers; curves that differ in them have the same structure.
     """
-
-    structure: tuple[Expr, Expr]
-    numbers: Sequence[float]
-    tabulated = False
-
-
-class CurveInUFL(Curve):
-    """Curve of a user's function, which is called once."""
 
     def __init__(self, curve: Callable[[Any], Any], what: str) -> None:
         with calling(f"{what}: it cannot be called with a symbol of UFL", IN_UFL):
@@ -98,7 +89,7 @@ class CurveInUFL(Curve):
         self._expansion = expansion((x, y), 2)
 
     def at(self, s: float) -> Array:
-        """See the base class; not a number where the curve is undefined."""
+        """See the base class; NaN where the curve is undefined."""
         known, indices = {_S: s}, StackDict()
         try:
             rows = [[x.evaluate((), known, (), indices) for x in row] for row in self._expansion]
@@ -107,39 +98,14 @@ class CurveInUFL(Curve):
             return np.full((3, 2), math.nan)
 
 
-def _segment() -> tuple[Expr, Expr]:
-    """Return the structure of a segment; its numbers are a row of :attr:`SplineCurve.table`."""
-    u = S - number(0)
+guide_curve.register(object, CurveInUFL)
+guide_curve.register(GuideCurve, lambda curve, what: curve)
+
+
+def structure_of(curve: GuideCurve) -> tuple[tuple[Expr, Expr], int, bool]:
+    """Return the structure of a curve, how many numbers it has, and whether they depend on s."""
+    if isinstance(curve, CurveInUFL):
+        return curve.structure, len(curve.numbers), False
+    u = S - number(0)  # in a row of the table of a spline
     x, y = (sum(number(i + k) * u**k for k in range(4)) for i in (1, 5))
-    return x, y
-
-
-class SplineCurve(Curve):
-    """Cubic spline.
-
-    Attributes:
-        table: Numbers of each segment: its begin, and coefficients of x and y.
-    """
-
-    structure = _segment()
-    tabulated = True
-
-    def __init__(self, spline: Spline) -> None:
-        self._spline = spline
-        by_segment = spline.coefficients.transpose(0, 2, 1).reshape(-1, 8)
-        self.table: Array = np.column_stack([spline.s[:-1], by_segment])
-        self.numbers = self.table[0]
-
-    def at(self, s: float) -> Array:
-        """See the base class."""
-        return self._spline.at(s)
-
-
-@guide_curve.register(object)
-def _in_ufl(curve: Callable[[Any], Any], what: str) -> Curve:
-    return CurveInUFL(curve, what)
-
-
-@guide_curve.register(Spline)
-def _through_points(curve: Spline, what: str) -> Curve:
-    return SplineCurve(curve)
+    return (x, y), 9, True

@@ -91,9 +91,40 @@ class Polyline:
         return between(self.points[i], self.points[i + 1], fraction)
 
 
-@closed("any function of s will do")
+class GuideCurve(ABC):
+    """Curve of a guide; its equations in UFL are in mechanics/guide_curves.py."""
+
+    @abstractmethod
+    def at(self, s: float) -> Array:
+        """Return the point at a parameter, and its first two derivatives; (3, 2)."""
+
+    def nearest(self, point: Array, s: float, size: float) -> float:
+        """Return the parameter of the nearest point; NaN without convergence.
+
+        The search begins at ``s``; ``size`` is the size of the scene; m.
+        """
+        last_digits = 4 * np.spacing(size + math.hypot(*point))
+        for _ in range(MOST_ITERATIONS):
+            on, slope, bend = self.at(s)
+            gap, square = point - on, float(slope @ slope)
+            change = float(gap @ slope) / max(square - float(gap @ bend), square / 2)
+            s, moved = s + change, abs(change) * math.sqrt(square)
+            if not moved > last_digits:  # also if it is not a number
+                return s
+        return s if moved <= 1e-9 * size else math.nan
+
+
+@singledispatch
+def guide_curve(curve: Any, what: str) -> GuideCurve:
+    """Return the curve of a guide, or raise :class:`ModelError`.
+
+    The model does not import UFL; mechanics/guide_curves.py registers a class for functions.
+    """
+    raise NotImplementedError(what)
+
+
 @dataclass(frozen=True)
-class Spline:
+class Spline(GuideCurve):
     """Cubic spline through points, a curve for :class:`Guided` or :meth:`Beam.along`.
 
     It is smooth, with continuous curvature.  Beyond its ends the first and last cubic continue.
@@ -137,25 +168,27 @@ class Spline:
         object.__setattr__(self, "s", s)
 
     @cached_property
-    def coefficients(self) -> Array:
-        """Coefficients of powers of s from the begin of each segment; (segments, 4, 2)."""
-        cubics = scipy.interpolate.CubicSpline(self.s, self.points)
-        return np.ascontiguousarray(cubics.c[::-1].transpose(1, 0, 2))
+    def table(self) -> Array:
+        """Begin of each segment, and coefficients of powers of s from it in x, y; (n, 9)."""
+        cubics = scipy.interpolate.CubicSpline(self.s, self.points).c[::-1]
+        return np.column_stack([self.s[:-1], cubics.transpose(1, 2, 0).reshape(-1, 8)])
 
-    def segment(self, s: float) -> int:
-        """Return the index of the segment with a parameter, the first or last one beyond them."""
+    def _segment(self, s: float) -> int:
         return min(max(bisect_right(self.s, s) - 1, 0), len(self.s) - 2)
 
     def at(self, s: float) -> Array:
-        """Return the point at a parameter, and its first two derivatives; (3, 2)."""
-        k = self.segment(s)
-        (a, b, c, d), u = self.coefficients[k], s - self.s[k]
+        """See the base class."""
+        begin, *numbers = self.table[self._segment(s)]
+        (a, b, c, d), u = np.reshape(numbers, (2, 4)).T, s - begin
         return np.array(
             [a + u * (b + u * (c + u * d)), b + u * (2 * c + u * 3 * d), 2 * c + u * 6 * d]
         )
 
     def __call__(self, s: float) -> Point:
-        """Return the point at a parameter; m."""
+        """Return the point at a parameter, m; exact at given parameters."""
+        for k in (self._segment(s), self._segment(s) + 1):
+            if s == self.s[k]:
+                return self.points[k]
         x, y = self.at(s)[0].tolist()
         return x, y
 
@@ -189,7 +222,7 @@ def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] |
     return points
 
 
-# -- tangents and curves of guides ---------------------------------------------------------------
+# -- tangents ------------------------------------------------------------------------------------
 
 
 def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
@@ -199,38 +232,6 @@ def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
     before = left if left < 2 else max(2, 4 - right)
     points = np.array([curve(s + step * (k - before)) for k in range(5)], dtype=np.float64)
     return np.asarray(WEIGHTS[before] @ points / step)
-
-
-class GuideCurve(ABC):
-    """Curve of a guide; its equations in UFL are in mechanics/guide_curves.py."""
-
-    @abstractmethod
-    def at(self, s: float) -> Array:
-        """Return the point at a parameter, and its first two derivatives; (3, 2)."""
-
-    def nearest(self, point: Array, s: float, size: float) -> float:
-        """Return the parameter of the nearest point; NaN without convergence.
-
-        The search begins at ``s``; ``size`` is the size of the scene; m.
-        """
-        last_digits = 4 * np.spacing(size + math.hypot(*point))
-        for _ in range(MOST_ITERATIONS):
-            on, slope, bend = self.at(s)
-            gap, square = point - on, float(slope @ slope)
-            change = float(gap @ slope) / max(square - float(gap @ bend), square / 2)
-            s, moved = s + change, abs(change) * math.sqrt(square)
-            if not moved > last_digits:  # also if it is not a number
-                return s
-        return s if moved <= 1e-9 * size else math.nan
-
-
-@singledispatch
-def guide_curve(curve: Any, what: str) -> GuideCurve:
-    """Return the curve of a guide, or raise :class:`ModelError`.
-
-    The model does not import UFL; modules that do register functions for kinds of curves.
-    """
-    raise NotImplementedError(what)
 
 
 def enclosing_diameter(points: Array) -> float:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import math
 import warnings
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -24,12 +23,11 @@ from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any, NoReturn
 
 import numpy as np
-from scipy.interpolate import KroghInterpolator
 
-from ufl_beam.errors import ArgumentError, ModelWarning
+from ufl_beam.errors import ArgumentError, ModelWarning, require_vector
 from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connector_laws import RIGID
-from ufl_beam.model.functions import GuideCurve, Point, Spline, guide_curve, steady, still
+from ufl_beam.model.functions import Spline, steady, still
 from ufl_beam.output.output_files import WrongReader
 
 Data = Any  # JSON data
@@ -69,12 +67,10 @@ class SavedFunction:
 
 
 @dataclasses.dataclass(frozen=True)
-class SavedCurve:
-    """Curve through saved points, cubic between them and straight beyond; a spline in guides."""
+class SavedCurve(Spline):
+    """Spline through points of a curve."""
 
-    name: str  # name of the function
-    s: tuple[float, ...]  # parameters, ascending, at least two
-    points: tuple[Point, ...]  # a point for each parameter; m
+    name: str = ""  # name of the function
 
     @classmethod
     def sampled(
@@ -84,26 +80,8 @@ class SavedCurve:
         known = {}
         for s in sorted({*map(float, parameters)}):
             with suppress(Exception):
-                x, y = map(float, curve(s))
-                if math.isfinite(x) and math.isfinite(y):
-                    known[s] = x, y
-        return cls(name, tuple(known), tuple(known.values()))
-
-    def __call__(self, s: float) -> Point:
-        """Return the point at a parameter, m; exact at sampled parameters."""
-        n = bisect_left(self.s, s)
-        if n < len(self.s) and self.s[n] == s:
-            return self.points[n]
-        count = 4 if 0 < n < len(self.s) else 2
-        first = max(min(n - count // 2, len(self.s) - count), 0)
-        nearest = slice(first, first + count)
-        x, y = KroghInterpolator(self.s[nearest], self.points[nearest])(s)
-        return float(x), float(y)
-
-
-@guide_curve.register(SavedCurve)
-def _through_saved_points(curve: SavedCurve, what: str) -> GuideCurve:
-    return guide_curve(Spline(curve.points, curve.s), what)
+                known[s] = require_vector(curve(s), name)
+        return cls(tuple(known.values()), tuple(known), name)
 
 
 @dataclasses.dataclass(frozen=True)

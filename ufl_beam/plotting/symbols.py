@@ -239,7 +239,7 @@ def _guide(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
     (holder,) = joint.holders
     assert isinstance(holder.law, laws.Guide)
     low, high = shape.canvas.travels[holder]
-    curve = np.array([holder.law.curve.at(s)[0] for s in np.linspace(low, high, 200).tolist()])
+    curve = np.array([holder.law.curve.at(s)[0] for s in map(float, np.linspace(low, high, 200))])
     yield Stroke(curve, STEEL, 2.2, layer=BEHIND)
     yield from _hatches(curve, shape.canvas.unit)
 

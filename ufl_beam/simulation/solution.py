@@ -179,9 +179,9 @@ class Solution(States, Rich):
         def record(owner: Any, field: str, function: Any) -> Any:
             """Return a record to save for a function in a field of ``owner``, or None."""
             if field == "curve" and isinstance(owner, Member):
-                even = [k / SAMPLES for k in range(SAMPLES + 1)]
-                parameters = [*even, *numbering.parameters(owner)]
-                return SavedCurve.sampled(function_name(function), function, parameters)
+                grid = (k / SAMPLES for k in range(SAMPLES + 1))
+                samples = {*grid, *map(float, numbering.parameters(owner))}
+                return SavedCurve.sampled(function_name(function), function, samples)
             if field == "curve":
                 return _used_curve(self, owner)
             if isinstance(owner, LoadAlongBeam | ImposedStrain) and field != "amplitude":
