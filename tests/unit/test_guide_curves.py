@@ -105,8 +105,8 @@ def test_curves_that_differ_in_numbers_share_functions():
 @pytest.mark.parametrize(
     ("points", "s", "wrong"),
     [
-        ([(0, 0)], (), "1 points"), ([(0, 0), (1, 0)], [0, 1, 2], "3 parameters"),
-        ([(0, 0), (1, 0)], [1, 0], "must increase"), ([(0, 0), (0, 0)], (), "must increase"),
+        ([(0, 0)], None, "1 points"), ([(0, 0), (1, 0)], [0, 1, 2], "3 parameters s"),
+        ([(0, 0), (1, 0)], [1, 0], "s must increase"), ([(0, 0), (0, 0)], None, "s must increase"),
     ],
 )  # fmt: skip
 def test_splines_are_checked(points, s, wrong):

@@ -461,6 +461,11 @@ TABLE = {
         times=V([0, 1], [None, 1.0, "01", [1, 0], [0, NAN], [0, "1"], [0, 1j], [0, HUGE], [0]]),
         values=V([0, 1], [None, 1.0, "01", [0, NAN], [0, "1"], [0, 1j], [0, HUGE], [0]]),
     ),
+    "Spline": call(
+        ub.Spline,
+        points=V([(0, 0), (1, 0)], [None, 1.0, "01", [(0, 0)], [(0, 0), (1, NAN)], [0, 1]]),
+        s=V([0, 1], [1.0, "01", [1, 0], [0, NAN], [0, "1"], [0, 1j], [0, HUGE], [0]]),
+    ),
     "ramp": call(ub.ramp, duration=V(1.0, POSITIVE)),
     "GroundMotion": call(
         ub.GroundMotion,

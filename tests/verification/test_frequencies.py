@@ -249,7 +249,8 @@ def test_a_slender_portal_that_sways(join, cells):
 def test_a_bead_in_a_bowl(through_points):
     """[closed] ω = √(g/R + k/m) of a bead on a curve: its stiffness is force times curvature.
 
-    A spring along the curve has the stiffness k.  The curvature of a spline has an error of h²/12 of the fourth derivative, here 2e-8.
+    A spring along the curve has the stiffness k.  The curvature of a spline has an error of h²/12
+    of the fourth derivative, here 2e-8.
     """
     radius, g, mass = 2.0, 9.81, 3.0
     bead = ub.Body((0, -radius), mass=mass, inertia=1.0)

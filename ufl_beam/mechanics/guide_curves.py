@@ -12,7 +12,7 @@ import basix.ufl
 import numpy as np
 import ufl
 from ufl.algorithms import expand_derivatives
-from ufl.classes import FloatValue, Power
+from ufl.classes import ComplexValue, FloatValue, Power
 from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_post_traversal
 from ufl.domain import extract_domains
@@ -74,13 +74,14 @@ class CurveInUFL(GuideCurve):
         with calling(f"{what}: it cannot be called with a symbol of UFL", IN_UFL):
             returned = curve(S)
         try:
-            x, y = map(ufl.as_ufl, returned)
-            alike = x.ufl_shape == y.ufl_shape == () == x.ufl_free_indices == y.ufl_free_indices
+            x, y = returned
+            nodes = [*unique_post_traversal(both := ufl.as_vector([x, y]))]
+            whole = both.ufl_shape == (2,) and not both.ufl_free_indices
         except Exception:
-            alike = False
-        if not alike or {*extract_domains(ufl.as_vector([x, y]))} - {_MESH}:
+            whole, nodes = False, []
+        if not whole or {*extract_domains(both)} - {_MESH} or any(map(_is_complex, nodes)):
             raise ModelError(f"{what} returned {shorten(returned)}, no point (x, y){IN_UFL}")
-        nodes = [*unique_post_traversal(ufl.as_vector([x, y]))]
+        x, y = both
         exponents = [node.ufl_operands[1] for node in nodes if isinstance(node, Power)]
         values = [x for x in nodes if isinstance(x, FloatValue) and x not in exponents]
         symbols = {value: number(i) for i, value in enumerate(values)}
@@ -96,6 +97,10 @@ class CurveInUFL(GuideCurve):
             return np.array(rows, dtype=np.float64)
         except (ValueError, ArithmeticError):
             return np.full((3, 2), math.nan)
+
+
+def _is_complex(node: Expr) -> bool:
+    return isinstance(node, ComplexValue)
 
 
 guide_curve.register(object, CurveInUFL)

@@ -144,7 +144,7 @@ class Spline(GuideCurve):
     """
 
     points: Sequence[Point]
-    s: Sequence[float] = ()
+    s: Sequence[float] = None  # type: ignore[assignment]  # replaced by sums of distances
 
     __repr__ = compact_repr
 
@@ -152,18 +152,16 @@ class Spline(GuideCurve):
         points = require_sequence(self.points, "Spline: points")
         points = tuple(require_vector(p, f"Spline: points[{i}]") for i, p in enumerate(points))
         steps = (math.dist(p, q) for p, q in pairwise(points))
-        s = require_sequence(
-            self.s if len(self.s) else [*accumulate(steps, initial=0.0)], "Spline: s"
-        )
-        for i, number in enumerate(s):
+        given = [*accumulate(steps, initial=0.0)] if self.s is None else self.s
+        for i, number in enumerate(s := require_sequence(given, "Spline: s")):
             require_number(number, f"Spline: s[{i}]")
         if len(points) < 2 or len(s) != len(points):
             raise ModelError(
-                f"Spline: {len(points)} points and {len(s)} parameters; give at least two points, "
+                f"Spline: {len(points)} points, {len(s)} parameters s; give at least two points, "
                 "and as many parameters"
             )
         if any(map(ge, s, s[1:])):
-            raise ModelError("Spline: parameters must increase; points that follow must be apart")
+            raise ModelError("Spline: s must increase, so points that follow must be apart")
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "s", s)
 
