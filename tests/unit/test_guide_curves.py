@@ -90,6 +90,7 @@ def test_a_curve_is_called_once():
     assert len(calls) == 1
 
 
+@pytest.mark.serial  # one process has the guide
 def test_curves_that_differ_in_numbers_share_functions():
     """And splines with any number of points."""
     pairs = [
@@ -162,10 +163,10 @@ def test_a_run_goes_on_where_another_one_ended(curve):
     assert np.abs(whole.q[-1] - second.q[-1]).max() < 1e-11 * np.abs(whole.q).max()
 
 
-def test_a_loaded_scene_has_a_spline_that_goes_the_same_way(tmp_path):
+def test_a_loaded_scene_has_a_spline_that_goes_the_same_way(shared_path):
     solution = run(scene(wave))
-    solution.save(tmp_path / "guided.h5")
-    (joint,) = ub.Solution.load(tmp_path / "guided.h5").scene.joints
+    solution.save(shared_path / "guided.h5")
+    (joint,) = ub.Solution.load(shared_path / "guided.h5").scene.joints
     again = run(scene(joint.curve))
     # Splines of a thousand segments err by their fourth power
     assert np.abs(solution.q - again.q).max() < 1e-9 * np.abs(solution.q).max()
