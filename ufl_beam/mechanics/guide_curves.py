@@ -77,9 +77,11 @@ class CurveInUFL(GuideCurve):
             x, y = returned
             nodes = [*unique_post_traversal(both := ufl.as_vector([x, y]))]
             whole = both.ufl_shape == (2,) and not both.ufl_free_indices
+            whole &= {*extract_domains(both)} <= {_MESH}
+            whole &= not any(isinstance(node, ComplexValue) for node in nodes)
         except Exception:
-            whole, nodes = False, []
-        if not whole or {*extract_domains(both)} - {_MESH} or any(map(_is_complex, nodes)):
+            whole = False
+        if not whole:
             raise ModelError(f"{what} returned {shorten(returned)}, no point (x, y){IN_UFL}")
         x, y = both
         exponents = [node.ufl_operands[1] for node in nodes if isinstance(node, Power)]
@@ -97,10 +99,6 @@ class CurveInUFL(GuideCurve):
             return np.array(rows, dtype=np.float64)
         except (ValueError, ArithmeticError):
             return np.full((3, 2), math.nan)
-
-
-def _is_complex(node: Expr) -> bool:
-    return isinstance(node, ComplexValue)
 
 
 guide_curve.register(object, CurveInUFL)

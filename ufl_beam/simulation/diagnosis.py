@@ -25,15 +25,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
-from ufl_beam.model.connector_laws import (
-    Coulomb,
-    Damper,
-    ForceLaw,
-    Guide,
-    RigidPlastic,
-    Spring,
-    Stop,
-)
+from ufl_beam.model.connector_laws import Coulomb, Damper, ForceLaw, RigidPlastic, Spring, Stop
 from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.model.loads import Rayleigh
 from ufl_beam.model.material_law import MaterialLaw, dissipation_must_grow, has_quadratic_energies
@@ -131,7 +123,7 @@ def no_equilibrium(
     lost = [
         f"{c.b}: no nearest point was found on its guide curve"
         for c in equation.subdomain.numbering.scene.all_connectors
-        if isinstance(c.law, Guide) and np.isnan(failure.residuals.get(f"force of {c}", 0.0))
+        if c.motion == "guided" and np.isnan(failure.residuals.get(f"force of {c}", 0.0))
     ]
     reasons = [*lost, why, f"{failure} ({sizes})" if sizes else str(failure)]
     if isinstance(failure, Reversal):
@@ -246,11 +238,8 @@ def _deformations(equation: StepEquation, q: Array, x: Array, most: float = SOFT
     x_local, ε = x[subdomain.dofs], 1e-6
     connectors, left = np.zeros(len(scene.all_connectors)), np.ones(len(scene.all_connectors))
     for group in equation.connector_terms:
-        try:
-            change = (group.motion(q + ε * x_local) - group.motion(q - ε * x_local)) / (2 * ε)
-        except StepFailed:
-            continue  # beyond the end of a guide, which the failure of the step reports
-        connectors[group.indices] = np.abs(change)
+        change = (group.motion(q + ε * x_local) - group.motion(q - ε * x_local)) / (2 * ε)
+        connectors[group.indices] = np.abs(np.nan_to_num(change))  # not a number: end of a guide
         left[group.indices] = group.remaining()
         if isinstance(group.law, RigidPlastic):
             # A held connector cannot move, so one that moves slips in the latest tangent.
