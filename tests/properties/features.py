@@ -272,9 +272,11 @@ def connector(d):
 def guided(d):
     x, y = d.tip
     bend = d.some(-0.5, 0.5)
-    d.joints.append(
-        f"ub.Guided({d.last}.end, lambda s: ({x!r} + 0.4 * s, {y!r} + s + {bend:.3f} * s**2))"
-    )
+    curve = f"lambda s: ({x!r} + 0.4 * s, {y!r} + s + {bend:.3f} * s**2)"
+    if bend > 0:  # without another random number
+        s = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
+        curve = f"ub.Spline([({curve})(s) for s in {s}], {s})"
+    d.joints.append(f"ub.Guided({d.last}.end, {curve})")
 
 
 @feature("tip")

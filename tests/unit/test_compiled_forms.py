@@ -77,7 +77,7 @@ def test_forms_have_one_quadrature_rule(compiled, scheme):
     solution.section_forces(solution.scene.beams[0])
     if scheme.dynamic:
         solution.momentum()
-    assert len(compiled) >= 4
+    assert len(compiled) >= 2
     for form in compiled:
         data = ufl.algorithms.compute_form_data(form)
         integrals = [i for group in data.integral_data for i in group.integrals]
@@ -120,8 +120,8 @@ def names_of(simulation):
 
 def test_statics_has_no_inertia(compiled):
     simulation = ub.Simulation(make(loads=[ub.Gravity()]), ub.Static())
-    assert names_of(simulation) == ["ElasticBeams", "DeadLoads"]
-    assert len(compiled) == 4  # force, tangent, strains that are linear in it, stored energy
+    assert names_of(simulation) == ["ElasticCell", "DeadLoads"]
+    assert len(compiled) == 1  # all functions of elastic cells
     assert not hasattr(simulation, "inertia")
     assert simulation.velocities() == []
     assert list(simulation.ledger.state) == ["stored"]
@@ -130,24 +130,26 @@ def test_statics_has_no_inertia(compiled):
 
 def test_dynamics_adds_the_mass_and_nothing_else(compiled):
     simulation = ub.Simulation(make(), ub.EnergyMomentum())
-    assert names_of(simulation) == ["ElasticBeams", "Inertia"]
-    assert len(compiled) == 4
+    assert names_of(simulation) == ["ElasticCell", "Inertia"]
+    assert len(compiled) == 2  # all functions of elastic cells, mass
     assert [name for group in simulation.entries() for name in group] == ["stored", "kinetic"]
 
 
 @pytest.mark.parametrize(
-    ("scheme", "forms", "lost"),
+    ("scheme", "lost"),
     [
-        (ub.EnergyMomentum(), 4, []),
-        (ub.EnergyMomentum(alpha=0.1), 5, ["numerical"]),
-        (ub.EnergyMomentum(beta=0.1), 4, ["numerical"]),  # the matrix tells what is lost
-        (ub.EnergyMomentum(0.1, 0.1), 5, ["numerical"]),
+        (ub.EnergyMomentum(), []),
+        (ub.EnergyMomentum(alpha=0.1), ["numerical"]),
+        (ub.EnergyMomentum(beta=0.1), ["numerical"]),
+        (ub.EnergyMomentum(0.1, 0.1), ["numerical"]),
     ],
     ids=str,
 )
-def test_numerical_loss_only_where_there_is_some(compiled, scheme, forms, lost):
+def test_numerical_loss_only_where_there_is_some(compiled, scheme, lost):
     simulation = ub.Simulation(make(), scheme)
-    assert len(compiled) == forms
+    assert len(compiled) == 2  # the kernel of cells without a loss does not compute it
+    cells = simulation.equation.beams[0]
+    assert list(cells._kernels.energies["lost"]) == ["numerical"] * (scheme.alpha > 0)
     assert list(simulation.ledger.lost) == lost
 
 
@@ -163,10 +165,10 @@ def test_follower_loads_only_where_there_are_some(compiled):
     follower = [ub.FollowerLoad(beam.end, force=(1, 0))]
     both = ub.Simulation(ub.Scene([beam], loads=[ub.Gravity(), *follower]), ub.EnergyMomentum())
     alone = ub.Simulation(ub.Scene([beam], loads=follower), ub.EnergyMomentum())
-    assert names_of(dead) == ["ElasticBeams", "DeadLoads", "Inertia"]
-    assert names_of(both) == ["ElasticBeams", "DeadLoads", "FollowerForce", "Inertia"]
-    assert names_of(alone) == ["ElasticBeams", "FollowerForce", "Inertia"]
-    assert len(compiled) == 5  # dead loads need no form, and the beams are alike
+    assert names_of(dead) == ["ElasticCell", "DeadLoads", "Inertia"]
+    assert names_of(both) == ["ElasticCell", "DeadLoads", "FollowerForce", "Inertia"]
+    assert names_of(alone) == ["ElasticCell", "FollowerForce", "Inertia"]
+    assert len(compiled) == 3  # dead loads need no form, and the beams are alike
 
 
 def test_supports_that_stand_still_do_no_work():
@@ -200,7 +202,7 @@ def test_section_forces_are_compiled_when_asked_for(compiled):
     before = len(compiled)
     solution.section_forces(scene.beams[0])
     solution.section_forces_at(scene.beams[0].end)
-    assert (before, len(compiled)) == (4, 5)
+    assert (before, len(compiled)) == (2, 3)
 
 
 @pytest.fixture
@@ -213,7 +215,7 @@ def no_points(monkeypatch):
     forget_forms()
     monkeypatch.setattr("ufl_beam.terms.material_points.Points.__init__", refuse)
     monkeypatch.setattr("ufl_beam.terms.material_points.PointForms.__init__", refuse)
-    monkeypatch.setattr("ufl_beam.terms.beam_forces.InelasticBeams.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.blocks.beams.InelasticCells.__init__", refuse)
     monkeypatch.setattr("ufl_beam.model.softening_laws.Softening.traction", refuse)
     monkeypatch.setattr("ufl_beam.mechanics.point_equations.PointEquations.__init__", refuse)
 
@@ -346,7 +348,7 @@ def test_forms_are_compiled_once_in_a_process(compiled):
         ub.Simulation(scene, ub.EnergyMomentum())
         if n == 3:
             before = len(compiled)
-    assert before == len(compiled) > 8
+    assert before == len(compiled) > 6
 
 
 def test_components_have_no_tensors_inside():

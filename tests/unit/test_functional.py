@@ -151,7 +151,7 @@ def test_an_open_hinge_is_a_stationary_jump():
     simulation = pushed(SECTION)
     fields = on_cells(simulation)
     of = fields.element
-    cells, recorded = simulation.inelastic[0].recorded()
+    cells, recorded = simulation.inelastic[0].sections()
     kept = recorded[:, 0]  # of the Gauss point in the middle
     α = fem.Function(fem.functionspace(fields.mesh, ("DG", 0)))
     α.x.array[np.argsort(fields.order)[cells]] = kept[:, 3]

@@ -52,7 +52,7 @@ def gcc(*arguments, **options):
 
 def lanes_source(loop):
     """The loop in a file with a kernel that asks for every function of assembly_simd.h."""
-    names = "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "UNKNOWNS"
+    names = "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "UNKNOWNS", "ON_CELLS"
     defined = ["#define LANES 4", "#define AT 0", *(f"#define {name} 1" for name in names)]
     head = [jit.HEADERS, jit.DECLARATIONS, *defined, jit.text("assembly_simd.h")]
     # The functions that Python calls are declared in no header: cffi reads them as text.

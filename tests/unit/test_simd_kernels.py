@@ -10,9 +10,10 @@ from compiled_law import ask
 from scenes import SECTION, clamped
 
 import ufl_beam as ub
+from ufl_beam.blocks.beams import BeamCells
 from ufl_beam.compiled import code_cache, jit, simd_kernels
-from ufl_beam.compiled.c_library import doubles, ffi, lib
-from ufl_beam.compiled.simd_kernels import in_batches
+from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
+from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.compiled_forms import Kernel, Pointwise
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 
@@ -288,7 +289,9 @@ def test_the_check_is_made_once(fresh, monkeypatch):
     calls = []
     check = simd_kernels.require_agreement
     monkeypatch.setattr(
-        simd_kernels, "require_agreement", lambda *args: (calls.append(args), check(*args))
+        simd_kernels,
+        "require_agreement",
+        lambda *args, **more: (calls.append(args), check(*args, **more)),
     )
     for _ in range(2):
         kernel, _ = pointwise(ufl.cos, np.ones(2), several=True)
@@ -375,6 +378,24 @@ def cell_by_cell(kernel):
     return one
 
 
+def inserted_cells_of(term, q, entries):
+    """Forces and tangent of a block of cells, in lanes and one by one."""
+    if not isinstance(term, BeamCells):
+        return
+    made, block = term._kernels, ffi.cast("element_block *", term._c)
+    assert made.force.inserts
+    assert made.tangent.inserts
+    dofs = integers(in_batches(term._elements.dofs.astype(np.int32), BATCH))
+    pairs = (made.force, dofs), (made.tangent, term._entries(made))
+    for (function, at), form in zip(
+        pairs, (term.in_cells[0].form().cells, block.inserted), strict=True
+    ):
+        several, one = np.zeros((2, max(entries, len(q))))
+        lib.add_cells(form, doubles(q), doubles(several))
+        term._along(function, q, [], 0, at, doubles(one))
+        yield several, one
+
+
 @pytest.mark.serial
 @pytest.mark.parametrize("run", RUNS)
 def test_kernels_of_the_hot_loop(run):
@@ -386,6 +407,9 @@ def test_kernels_of_the_hot_loop(run):
     q = simulation.q + 1e-2 * rng.normal(size=len(simulation.q))
     compared = 0
     for term in simulation.terms:
+        for several, one in inserted_cells_of(term, q, simulation.equation.A.data.size):
+            compared += 1
+            assert np.allclose(several, one, rtol=0, atol=1e-13 * np.abs(one).max())
         for name, kernel in kernels(term).items():
             if kernel.cells.batch_size == 1:
                 assert name == "_first"  # once a step is not often

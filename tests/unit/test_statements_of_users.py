@@ -16,6 +16,7 @@ from scenes import clamped
 from user_laws import AirDrag, HardeningSpring, MaxwellElement
 
 import ufl_beam as ub
+from ufl_beam.blocks.beams import BeamCell
 from ufl_beam.blocks.statement import Kernels
 from ufl_beam.plotting.model import model_notes
 
@@ -322,7 +323,11 @@ def test_derivatives_by_numbers_in_a_statement():
 def test_a_derivative_that_cannot_be_compiled_has_the_name_of_the_statement():
     """UFL has derivatives of all its functions, so that one is missing here on purpose."""
 
+    real = vars(Kernels)["derivative"].func
+
     def missing(self):
+        if isinstance(self._statement, BeamCell):
+            return real(self)
         raise NotImplementedError("this function has no derivative")
 
     options = {"t": (0, 0.1), "dt": 0.05, "progress": False}

@@ -18,8 +18,10 @@ from scipy.sparse.csgraph import structural_rank
 from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array
+from ufl_beam.blocks.beams import section_law
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.beam_forms import inelastic_forms
 from ufl_beam.discretization.compiled_forms import cached_forms
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel
@@ -38,7 +40,6 @@ from ufl_beam.model.loads import MovingLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.beam_forces import inelastic_forms, section_law
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.term import InCells
 

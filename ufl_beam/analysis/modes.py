@@ -18,7 +18,9 @@ from ufl_beam.analysis.constant_loads import AT, duration
 from ufl_beam.analysis.linear_model_checks import warn_of_limits, warn_of_relaxation
 from ufl_beam.analysis.small_motions import SmallMotions
 from ufl_beam.arrays import Array, Complex
+from ufl_beam.blocks.beams import section_law
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.discretization.beam_forms import inelastic_forms
 from ufl_beam.discretization.dof_numbering import DofNumbering, velocity_at
 from ufl_beam.discretization.function_spaces import Fields, Strains
 from ufl_beam.discretization.model_warnings import warn_of_masses
@@ -45,7 +47,6 @@ from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import StateOf, chosen_state, mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.beam_forces import inelastic_forms, section_law
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.term import InCells
 

@@ -79,7 +79,7 @@ class PathCorrector:
         self.crossing: Crossing | None = None
         self._loading: list[Term] = [*simulation.loads, *simulation.connector_terms]
         # The forces of these cells depend on the load factor, too.
-        self._imposed = [beams for beams in simulation.beams if beams.imposed is not None]
+        self._imposed = simulation.equation.imposed
         self.direction = self.predicted_step = 0.0 * self.weights
 
     @property
@@ -190,7 +190,7 @@ class PathCorrector:
     def arrive(self, x: Array) -> None:
         """Store the iterate ``x``, and set the loads to the load factor :attr:`t`."""
         self._x = x.copy()
-        self.simulation.equation.begin(self.step_at(self.t), self._loading)
+        self.simulation.equation.begin(self.step_at(self.t), self._loading, self._imposed)
 
     def tangent(self, x: Array, r: Array) -> None:
         """Assemble the tangent, and add the derivative of the residual by the load factor to ``r``.
@@ -200,7 +200,7 @@ class PathCorrector:
         simulation, t = self.simulation, self.t
         q, ε = simulation.supports.in_plane(x), 1e-6 * max(1.0, abs(t))
         for δ, weight in ((ε, 0.5 / ε), (-ε, -0.5 / ε), (0.0, 0.0)):  # last: at the factor t
-            simulation.equation.begin(self.step_at(t + δ), self._loading)
+            simulation.equation.begin(self.step_at(t + δ), self._loading, self._imposed)
             forces = np.zeros(self.subdomain.size)
             for term in (*self._loading, *self._imposed):
                 term.add_residual(q, forces)

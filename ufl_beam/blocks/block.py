@@ -19,6 +19,7 @@ from ufl_beam.blocks.statement import OF_STEP, Kernels, Statement, kernels
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, integers, lib, loop, names, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
+from ufl_beam.discretization.compiled_forms import InsertedForces, inserted_cells, places_in
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.time_scheme import Scheme
@@ -173,10 +174,11 @@ class Block(LoadTerm):
                 begins[known[z]] = k
         functions_of = made.force, made.tangent, made.end, made.mode
         most = max(f.outputs for f in functions_of if f is not None)
-        each, second = np.zeros((2, batches, made.force.outputs, BATCH))
+        inserted = statement.inserts
+        each, second = np.zeros((2, 0 if inserted else batches, made.force.outputs, BATCH))
         self.recorded: Array = np.zeros((n, len(statement.recorded)))
         table = (rows + MOST_MARGINS) * (w.shape[1] + 1)
-        self._out: Array = np.zeros(batches * BATCH * most)
+        self._out: Array = np.zeros((1 if inserted else batches) * BATCH * most)
         self._each = ffi.new("double *[1]", [doubles(each)]), each
         self._times, self._t = np.zeros((3, self._of_step)), np.full(2, float(t0))
         self._begun = np.zeros(1, dtype=np.int32)
@@ -196,13 +198,13 @@ class Block(LoadTerm):
             ranges=len(statement.acts_at), range=in_batches(numbers[:, ranged], BATCH),
             size=len(self.dofs), dof=self.dofs,
             at=in_batches(np.searchsorted(self.dofs, dofs).astype(np.int32), BATCH),
-            entry=self._entries(made), functions=functions,
+            entry=ffi.NULL if inserted else self._entries(made), functions=functions,
             when=np.array([TIMES.index(x.when) for x in in_time], dtype=np.int32), t=self._t,
             begun=self._begun,
             now=self._times[0], end=self._times[1], before=self._times[2],
             **{"from": in_batches(np.array(from_, dtype=np.int32).reshape(len(from_), n).T, BATCH)},
             state=self._states, w=self._w, out=self._out,
-            space=np.zeros(motions + w.shape[1] + max(most, table)),
+            space=np.zeros(3 * motions + 2 + w.shape[1] + max(most, table)),
             each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
             weight_of_before=scheme.weight_of_before, stored=stored, lost=entered[0],
@@ -219,9 +221,23 @@ class Block(LoadTerm):
         )  # fmt: skip
         tangent = loop("add_block_tangent", self._c) if made.tangent else None
         self.loops = loop("add_block", self._c), tangent
-        if elements.cells is not None:
+        if inserted:
+            self._insert(made, dofs)
+        elif elements.cells is not None:
             forces = NodeForces(self._each[0], BATCH, second)
             self.in_cells = [InCells(lambda: forces, elements.force_kind, elements.cells)]
+
+    def _insert(self, made: Kernels, dofs: Index) -> None:
+        """Let C insert forces and tangents of cells as those of forms."""
+        elements, places = self._elements, places_in(self._A, dofs, BATCH)
+        force = inserted_cells(made.force, self._w, dofs)
+        tangent = inserted_cells(made.tangent, self._w, dofs, **places)
+        fill(self._c, inserted=tangent)
+        self.loops = loop("add_cells", force), loop("add_cells", tangent)
+        forces = InsertedForces(force)
+        q0 = None if elements.in_time or made.strains else forces
+        order = np.asarray(elements.cells)
+        self.in_cells = [InCells(lambda: forces, elements.force_kind, order, q0=q0)]
 
     def _entries(self, made: Kernels) -> Any:
         """Return the entries of the matrix of the outputs of a tangent, in batches."""
@@ -368,22 +384,48 @@ class Block(LoadTerm):
         """See the base class."""
         made = kernels(self.statement.frozen)
         if (change := made.change) is not None:
-            self._along(change, q1, u, self._entries(made), doubles(self._A.data))
+            self._along(change, q1, [u], 0, self._entries(made), doubles(self._A.data))
+
+    def tangent_work(self, q1: Array, x: Array, y: Array, u: Array | None = None) -> float:
+        """Return y·(K x), J; K is the tangent or, with ``u``, its derivative along ``u``.
+
+        The work is a sum over elements, computed from their relative motions.  A product with the
+        matrix would have the round-off of axial and shear stiffness.  In slender cells this
+        round-off may exceed the bending stiffness.
+        """
+        along = [x, y] if u is None else [x, y, u]
+        work = self._kernels.tangent_work if u is None else self._kernels.change_of_tangent_work
+        parts = len(along) - 1
+        return float(self._along(work, q1, along, parts).sum()) if work is not None else 0.0
 
     def _along(
-        self, function: Any, q: Array, u: Array, entries: Any = ffi.NULL, tangent: Any = ffi.NULL
-    ) -> Array:
-        """Return outputs at ``q`` of a function of motions ``u``, or add them to the tangent."""
-        batches, width, lanes = self._w.shape
-        w = np.zeros((batches, width + self._c.unknowns, lanes))
-        lib.evaluate_along(self._c, function, *map(doubles, (q, u, w)), entries, tangent)
-        return self.outputs(function)
+        self, function: Any, q: Array, directions: Sequence[Array], parts: int = 0,
+        entries: Any = ffi.NULL, tangent: Any = ffi.NULL,
+    ) -> Array:  # fmt: skip
+        """Return outputs at ``q`` of a function of motions, or add them to the tangent.
 
-    def outputs(self, function: Any) -> Array:
+        The last inputs of the function are ``parts`` zeros.
+        """
+        batches, width, lanes = self._w.shape
+        out: Array = np.zeros(batches * function.outputs * lanes)
+        width += len(directions) * self._c.unknowns + parts
+        w = np.zeros((batches, width, lanes))
+        lib.evaluate_along(
+            self._c, function, doubles(q), len(directions),
+            ffi.new("double *[]", [doubles(u) for u in directions]), width, doubles(w),
+            doubles(out), entries, tangent,
+        )  # fmt: skip
+        return self.outputs(function, out)
+
+    def outputs(self, function: Any, out: Array | None = None) -> Array:
         """Return the latest outputs of a function for each element; (elements, outputs)."""
-        outputs = self._out[: len(self._w) * function.outputs * BATCH]
-        by_element = outputs.reshape(-1, function.outputs, BATCH).transpose(0, 2, 1)
-        return np.array(by_element.reshape(-1, function.outputs)[: self._c.elements])
+        outputs = (self._out if out is None else out)[: len(self._w) * function.outputs * BATCH]
+        return self.by_element(outputs.reshape(-1, function.outputs, BATCH))
+
+    def by_element(self, batches: Array) -> Array:
+        """Return the values of each element from values in batches; (elements, values)."""
+        rows = batches.transpose(0, 2, 1).reshape(-1, batches.shape[1])
+        return np.array(rows[: self._c.elements])
 
     # -- derivatives of runs ---------------------------------------------------------------------
 
@@ -403,6 +445,10 @@ class Block(LoadTerm):
         b, by_shared = self._c, neighbours.state(lambda term: term._shared)
         by_before = neighbours.state(lambda term: term._times[2, : b.functions])
         table, conditions = self._kernels.derivative
+        changes = np.ones((P, b.width - b.modes), dtype=np.int32)
+        first = changes.shape[1] - b.steps - b.numbers
+        in_steps = [name.startswith("shift") for name in self.statement.numbers]
+        changes[:, first : first + b.numbers] = by_number.any(axis=(1, 3)) | np.array(in_steps)
         c = struct(
             "block_derivatives", block=b, parameters=P, neighbours=others,
             neighbour=ffi.new("element_block *[]", [term._c for term in terms]),
@@ -413,6 +459,8 @@ class Block(LoadTerm):
             by_before=by_before,
             state_bar=np.zeros(self._states.shape), number_bar=np.zeros(self._numbers.shape),
             step_bar=np.zeros(self._of_step), shared_bar=np.zeros(self._shared.shape),
+            strains=self._kernels.strains, changes=changes,
+            strain_bar=np.zeros(b.batches * self._kernels.strains * b.lanes),
         )  # fmt: skip
         self.complete_derivatives(c, neighbours, by_number)
         return [*found, in_c("block", c)]

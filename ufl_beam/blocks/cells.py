@@ -15,10 +15,25 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.statement import COMPONENTS, Inputs, Statement
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.mechanics.kinematics import Axis, perpendicular, split
 from ufl_beam.model.beams import Mesh
 from ufl_beam.quadrature import gauss_rule
+
+STIFFNESS = "EA", "GA", "EI"
+"""Names of the stiffnesses of a cell; N, N, N m²."""
+
+
+AXIS = "length", "1 / length", "tangent x", "tangent y"
+"""Names of the numbers of a straight cell that determine strains; m, 1/m, 1, 1."""
+
+
+def axes(fields: Fields) -> Array:
+    """Return :data:`AXIS` of the cells; (4, num_cells)."""
+    start, end = fields.coordinates().transpose(1, 2, 0)
+    h = np.hypot(*(end - start))
+    return np.array([h, 1 / h, *(end - start) / h])
 
 
 def places(degree: int) -> list[str]:
@@ -54,7 +69,8 @@ class Cell:
 
     Attributes:
         virtual: Virtual motion (x, y, rotation) of each node.
-        place: Position of each node of the undeformed cell; m.
+        place: Position of each node of the undeformed cell; m.  None without these inputs.
+        axis: The inputs :data:`AXIS`; none without them.
     """
 
     def __init__(self, degree: int, at: Inputs) -> None:
@@ -63,6 +79,7 @@ class Cell:
         self.virtual = [ufl.as_vector(v) for v in self._virtual]
         nodes = range(degree + 1)
         self.place = [ufl.as_vector([at[f"X{k}"], at[f"Y{k}"]]) for k in nodes if "X0" in at]
+        self.axis = [at[name] for name in AXIS if name in at]
 
     def moved(self, motions: Sequence[Expr]) -> list[Expr]:
         """Return the positions of the nodes after motions (x, y, rotation); m."""
@@ -100,6 +117,11 @@ class Cell:
         """Return the nodal forces whose work on the virtual motion is ``work``."""
         return [ufl.diff(work, v[i]) for i in range(len(COMPONENTS)) for v in self._virtual]
 
+    @property
+    def no_forces(self) -> list[Expr]:
+        """Nodal forces of zero."""
+        return [ufl.as_ufl(0.0)] * (len(COMPONENTS) * len(self._order))
+
 
 POINT = "s", "weight"
 """Names of a quadrature point as a fraction of the cell, and of its weight."""
@@ -119,20 +141,69 @@ class AxisOfCell(Axis):
         self.nodes, self.X = [float(a) for a in mesh.nodes], ufl.variable(ufl.as_ufl(s))
         nodes = [self.nodes[k] for k in mesh.order]
         self._weights = [math.prod((self.X - b) / (a - b) for b in nodes if b != a) for a in nodes]
-        start, end = cell.place[:2]
-        self.h = ufl.sqrt(ufl.dot(end - start, end - start))
-        self.t0 = (end - start) / self.h
+        if cell.axis:
+            self.h, self._per_h, *tangent = cell.axis
+            self.t0 = ufl.as_vector(tangent)
+        else:
+            start, end = cell.place[:2]
+            self.h = ufl.sqrt(ufl.dot(end - start, end - start))
+            self.t0, self._per_h = (end - start) / self.h, 1 / self.h
+            self.x = start + self.X * (end - start)
         self.n0 = perpendicular(self.t0)
-        self.x = start + self.X * (end - start)
 
     def field(self, nodal: Sequence[Expr]) -> Expr:
-        """Return the interpolation of nodal vectors."""
+        """Return the interpolation of nodal vectors, without slope for equal ones."""
+        (_, first), *pairs = zip(self._weights, nodal, strict=True)
         n = range(len(COMPONENTS))
-        pairs = [*zip(self._weights, nodal, strict=True)]
-        return ufl.as_vector([sum((a * x[i] for a, x in pairs), 0) for i in n])
+        return ufl.as_vector([sum((a * (x[i] - first[i]) for a, x in pairs), first[i]) for i in n])
 
     def d(self, f: Expr) -> Expr:
         """See the base class."""
         if f.ufl_shape:
             return ufl.as_vector([self.d(f[i]) for i in range(f.ufl_shape[0])])
-        return ufl.diff(f, self.X) / self.h
+        return ufl.diff(f, self.X) * self._per_h
+
+
+class PointOfCell:
+    """Point of a cell at the fraction ``s``.
+
+    In cells of degree 1, values and slopes of motions at the point are intermediate numbers.  There
+    are fewer of them than of motions of the nodes, so tangents have fewer products.
+
+    Attributes:
+        axis: Undeformed axis of the cell.
+        virtual: Virtual motion as a field.
+    """
+
+    def __init__(self, cell: Cell, s: float) -> None:
+        self.axis, self._cell, self._linear = AxisOfCell(cell, s), cell, cell.degree == 1
+        mesh = Mesh(degree=cell.degree)
+        self._weights = [np.asarray(x(s))[mesh.order] for x in (mesh.weights, mesh.slopes)]
+        self._away = self.axis.X - s
+        self._virtual = [[ufl.variable(ufl.as_ufl(0.0)) for _ in COMPONENTS] for _ in range(2)]
+        both = self._virtual
+        self.virtual = self._field(*both) if self._linear else self.axis.field(cell.virtual)
+
+    def _field(self, values: Sequence[Expr], slopes: Sequence[Expr]) -> Expr:
+        return ufl.as_vector([x + self._away * d for x, d in zip(values, slopes, strict=True)])
+
+    def field(self, at: Inputs, nodal: Sequence[Expr]) -> Expr:
+        """Return the field that interpolates nodal motions."""
+        if not self._linear:
+            return self.axis.field(nodal)
+        sums = (
+            [sum((float(a) * x[i] for a, x in zip(weights, nodal, strict=True)), 0) for i in n]
+            for weights, n in zip(self._weights, [range(len(COMPONENTS))] * 2, strict=True)
+        )
+        return self._field(*([at.stage(x) for x in some] for some in sums))
+
+    def forces(self, at: Inputs, work: Expr) -> list[Expr]:
+        """Return the nodal forces whose work on the virtual motion is ``work``."""
+        if not self._linear:
+            return self._cell.forces(work)
+        values, slopes = ([at.stage(ufl.diff(work, w)) for w in some] for some in self._virtual)
+        return [
+            float(a) * x + float(b) * y
+            for x, y in zip(values, slopes, strict=True)
+            for a, b in zip(*self._weights, strict=True)
+        ]

@@ -367,7 +367,7 @@ class ConnectorBlock(Block):
         self.add_residual(q, np.zeros(len(q)))
         holds, β, *_ = self.law_slopes.T
         if (about_force := holds == 0.0).any():
-            rates = self._along(self._kernels.motion_rates, q, v).ravel()
+            rates = self._along(self._kernels.motion_rates, q, [v]).ravel()
             works[self.forces_at[about_force]] = -rates[about_force] / β[about_force]
 
     @property

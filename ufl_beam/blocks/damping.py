@@ -13,7 +13,7 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import Block, BlockSetting, Elements
-from ufl_beam.blocks.cells import AxisOfCell, Cell, StatementOnCell, places, positions
+from ufl_beam.blocks.cells import AXIS, STIFFNESS, AxisOfCell, Cell, StatementOnCell, axes
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.function_spaces import Fields
@@ -22,9 +22,6 @@ from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.loads import KelvinVoigt
-
-STIFFNESS = "EA", "GA", "EI"
-"""Names of the stiffnesses of a cell; N, N, N m²."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +36,8 @@ class _Damping(StatementOnCell):
 
     @property
     def numbers(self) -> tuple[str, ...]:
-        """Stiffnesses and positions of the nodes."""
-        return *STIFFNESS, *places(self.degree)
+        """Stiffnesses, and the axis."""
+        return *STIFFNESS, *AXIS
 
     def damped(
         self, at: Inputs, factor: Expr, before: Mapping[int, Expr], entry: str
@@ -133,6 +130,6 @@ def _on_cells(name: str, numbers: list[Array], fields: Fields) -> Elements:
     subdomain, stiffness = fields.subdomain, fields.section_values(fields.element.stiffness)
     return Elements(
         name, subdomain.cells[fields.order], fields.cell_dofs,
-        [*numbers, *stiffness.T, *positions(subdomain, fields.order)], cells=fields.order,
+        [*numbers, *stiffness.T, *axes(fields)], cells=fields.order,
         force_kind=lib.STRESS,
     )  # fmt: skip

@@ -30,13 +30,13 @@ class OfSpring(OnConnector):
 
     of_step = ("dt",)
     modes = "slope", "force"
-    data = Data(["shift"], {"e": 0.0})  # e: motion
+    data = Data(["shift"])
 
     def law(self, at: Inputs, step: Step) -> Equations:
         """See the base class; the material points have the energies."""
         (e1,), (λ,) = step.e1, step.λ
         force = at.stage(at["force"], at["slope"] * e1 + at["shift"])
-        return Equations([λ - force], {"e": e1})
+        return Equations([λ - force], strains=[e1])
 
 
 class SpringBlock(ConnectorBlock):

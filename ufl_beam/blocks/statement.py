@@ -63,11 +63,13 @@ class Equations(NamedTuple):
             input, see :attr:`Statement.integrates`.
         motions: Variables of UFL on which the laws depend, one for each law; m or rad.
         recorded: Numbers that solutions record, by name; changes of numbers that are sums.
+        strains: Strains of material points inside the element.  Derivatives by the first numbers of
+            the element are those by the forces of the points, at constant strains.
+        predicted: Strains that the latest tangent of a static step predicts.
 
     Example:
-        >>> weight = ub.Equations([[0.0, 9.81, 0.0]])  # N, on one place
-        >>> weight.stored, weight.state
-        ({}, {})
+        >>> ub.Equations([[0.0, 9.81, 0.0]]).stored  # N, on one place
+        {}
     """
 
     forces: Sequence[Expr]
@@ -84,6 +86,8 @@ class Equations(NamedTuple):
     power: Expr | None = None
     motions: Sequence[Expr] = ()
     recorded: Mapping[str, Expr] = {}
+    strains: Sequence[Expr] = ()
+    predicted: Sequence[Expr] = ()
 
 
 class Inputs(dict[str, Expr]):
@@ -94,6 +98,7 @@ class Inputs(dict[str, Expr]):
         space: Function that returns a space of n values on it.
         stages: Intermediate numbers: a variable, its value, a number with the same derivatives, and
             the symbol in the variable.
+        in_tangent: Values of intermediate numbers in the tangent, by symbol, if they differ.
     """
 
     def __init__(self, compiler: Pointwise, at: Mapping[str, Expr]) -> None:
@@ -101,15 +106,19 @@ class Inputs(dict[str, Expr]):
         self.space = compiler.values
         self.domain = compiler.values(1).mesh.ufl_domain()
         self.stages: list[tuple[Expr, Expr, Expr, Expr]] = []
+        self.in_tangent: dict[Expr, Expr] = {}
         self._known: dict[tuple[int, ...], list[list[Expr]]] = {}
 
-    def stage(self, value: Any, slope_of: Any = None) -> Expr:
+    def stage(self, value: Any, slope_of: Any = None, in_tangent: Any = None) -> Expr:
         """Return a variable for an intermediate number, which is differentiated apart.
 
         Derivatives by inputs are products of derivatives by the number and of the number.  With
-        ``slope_of``, another expression is differentiated in place of the number.
+        ``slope_of``, another expression is differentiated in place of the number.  With
+        ``in_tangent``, the tangent has this value of the number.
         """
         symbol = ufl.Coefficient(self.space(1))[0]
+        if in_tangent is not None:
+            self.in_tangent[symbol] = ufl.as_ufl(in_tangent)
         alike = value if slope_of is None else slope_of
         self.stages.append((ufl.variable(symbol), *_expanded([value, alike]), symbol))
         return self.stages[-1][0]
@@ -278,7 +287,7 @@ class Statement(ABC):
     @property
     def all_modes(self) -> list[str]:
         """Names of all modes among the inputs."""
-        return [*FIRST_MODES, *self.modes] if self.modes else []
+        return [*FIRST_MODES, *self.modes] if self.modes and not self.inserts else [*self.modes]
 
     @property
     def integrates(self) -> bool:
@@ -286,6 +295,11 @@ class Statement(ABC):
 
         In the power this number is the part of the path, from 0 to 1.
         """
+        return False
+
+    @property
+    def inserts(self) -> bool:
+        """True for cells whose forces and tangent C inserts as of forms, with all entries."""
         return False
 
     @property
@@ -324,6 +338,8 @@ class Kernels:
         force: Forces of an element; derivatives of its laws, see loops.h.
         tangent: Their derivatives by the motions at the end of the step, without zeros.
         entries: Row and column of each entry of ``tangent``.
+        strain, predicted: See :attr:`Equations.strains` of cells; None if there are none.
+        strains: Number of strains of an element.
         power: See :attr:`Equations.power`; None if there is none.
         mode: Modes in an iterate, excess, and whether the element has opened; None if C sets modes.
         end: New state, recorded numbers, and stored, lost and supplied energies; None if there
@@ -337,7 +353,8 @@ class Kernels:
         names = [f"q1 {name}" for name in statement.unknowns]
         forces = _expanded(made.forces)
         slopes = at.slopes(forces, names)
-        nonzero = [i for i, slope in enumerate(slopes) if not isinstance(slope, Zero)]
+        whole = statement.inserts
+        nonzero = [i for i, x in enumerate(slopes) if whole or not isinstance(x, Zero)]
         self.entries = [divmod(i, len(names)) for i in nonzero]
         self.energies = {"state": made.stored, "lost": made.lost, "supplied": made.supplied}
         self.knows_before = bool(made.before)
@@ -345,18 +362,39 @@ class Kernels:
         energies = [value for account in accounts for value in account.values()]
         recorded = [made.recorded[name] for name in statement.recorded]
         modes = [made.modes[name] for name in statement.modes] if made.modes else []
-        self.force, self.tangent, self.end, self.power, self.mode = self._compiled(
-            at,
+        self.strains = len(made.strains)
+        cells = [
             [*forces, *_expanded(self._slopes_of_laws(made, at))],
-            [slopes[i] for i in nonzero],
-            _expanded([*self._states(made), *recorded, *energies]),
-            _expanded([made.power] if made.power else []),
-            _expanded([*modes, made.excess, made.opened] if modes else []),
+            self._in_tangent([slopes[i] for i in nonzero], at),
+            *(_expanded(x if whole else []) for x in (made.strains, made.predicted)),
+        ]
+        self.force, self.tangent, self.strain, self.predicted, self.end, self.power, self.mode = (
+            self._compiled(
+                at,
+                *cells,
+                _expanded([*self._states(made), *recorded, *energies]),
+                _expanded([made.power] if made.power else []),
+                _expanded([*modes, made.excess, made.opened] if modes else []),
+                inserted=sum(map(bool, cells)) if whole else 0,
+            )
         )
 
-    def _stated(self, names: Sequence[str]) -> tuple[Equations, Inputs]:
+    def _in_tangent(self, slopes: list[Expr], at: Inputs) -> list[Expr]:
+        """Replace intermediate numbers by their values in the tangent, which are numbers, too."""
+        if not at.in_tangent:
+            return slopes
+        others = {symbol: ufl.Coefficient(at.space(1))[0] for symbol in at.in_tangent}
+        values = _expanded([*at.in_tangent.values()])
+        zip_ = zip(others.values(), values, strict=True)
+        at.stages += [(other, value, value, other) for other, value in zip_]
+        return [*with_shared_nodes(slopes, others)]
+
+    def _inputs(self, names: Sequence[str]) -> Inputs:
         self._compilers.append(compiler := Pointwise(names))
-        at = Inputs(compiler, {name: ufl.variable(x) for name, x in compiler.at.items()})
+        return Inputs(compiler, {name: ufl.variable(x) for name, x in compiler.at.items()})
+
+    def _stated(self, names: Sequence[str]) -> tuple[Equations, Inputs]:
+        at = self._inputs(names)
         return self._statement.equations(at), at
 
     def _slopes_of_laws(self, made: Equations, at: Inputs) -> list[Expr]:
@@ -373,13 +411,15 @@ class Kernels:
     def _states(self, made: Equations) -> list[Expr]:
         return [made.state[name] for name in (*self._statement.state, *self._statement.shared)]
 
-    def _compiled(self, at: Inputs, *functions: Sequence[Expr]) -> list[Any]:
+    def _compiled(self, at: Inputs, *functions: Sequence[Expr], inserted: int = 0) -> list[Any]:
         instead = {symbol: value for _, value, _, symbol in at.stages}
-        return self._compilers[-1].compile_elements(*functions, instead=instead)
+        return self._compilers[-1].compile_elements(
+            *functions, instead=instead, inserted=inserted, unknowns=len(self._statement.unknowns)
+        )
 
     @cached_property
     def derivative(self) -> tuple[Any, int]:
-        """Derivatives of forces, new state, shared numbers and margins by all inputs; margins.
+        """Derivatives of forces, new state, shared numbers, strains and margins by all inputs.
 
         The rows of a function are the derivatives of one number; the margins follow.  The second
         item is the number of margins.
@@ -387,7 +427,7 @@ class Kernels:
         statement = self._statement
         names = statement.inputs[: len(statement.inputs) - len(statement.all_modes)]
         made, at = self._stated(statement.inputs)
-        rows = with_shared_nodes(_expanded([*made.forces, *self._states(made)]))
+        rows = with_shared_nodes(_expanded([*made.forces, *self._states(made), *made.strains]))
         conditions = [*margins(rows), *_expanded(made.margins)]
         every = [*rows, *conditions]
         table = [*at.slopes(every, names), *conditions]
@@ -407,11 +447,45 @@ class Kernels:
         made, at, names, along = self._stated_along()
         return self._compiled(at, at.along(made.motions, names, along))[0]
 
-    def _stated_along(self) -> tuple[Equations, Inputs, list[str], list[Expr]]:
-        """Return the equations, and the names and directions of the motions after the step."""
+    @cached_property
+    def tangent_work(self) -> Any:
+        """Work y·(K x) of the tangent K; the motions x and y are further inputs."""
+        return self._work(2)
+
+    @cached_property
+    def change_of_tangent_work(self) -> Any:
+        """Derivative of :attr:`tangent_work` along motions, which are further inputs; None if 0."""
+        return self._work(3)
+
+    def _work(self, directions: int) -> Any:
+        """Compile a work of motions x, y and, with 3 directions, u.
+
+        Motions are q1 + a x + b u, with inputs a and b of zero, by which the work is derived:
+        relative motions of x and u are computed before stiffnesses multiply them.
+        """
+        parts = [f"part{k}" for k in range(directions - 1)]
+        names, along = self._along(directions)
+        at = self._inputs([*self._statement.inputs, *(x for some in along for x in some), *parts])
+        x, y, *u = ([at[name] for name in some] for some in along)
+        for k, name in enumerate(names):
+            terms = (at[part] * some[k] for part, some in zip(parts, (x, *u), strict=True))
+            at[name] = sum(terms, at[name])
+        forces = self._statement.equations(at).forces
+        work = _expanded([sum((f * v for f, v in zip(forces, y, strict=True)), 0)])
+        for part in parts:
+            work = _expanded(at.slopes_by(work, [at[part]]))
+        return None if isinstance(work[0], Zero) else self._compiled(at, work)[0]
+
+    def _along(self, directions: int) -> tuple[list[str], list[list[str]]]:
+        """Return names of the motions after the step, and of motions in directions."""
         names = [f"q1 {name}" for name in self._statement.unknowns]
-        made, at = self._stated([*self._statement.inputs, *(f"along {x}" for x in names)])
-        return made, at, names, [at[f"along {name}"] for name in names]
+        return names, [[f"along{k} {x}" for x in names] for k in range(directions)]
+
+    def _stated_along(self) -> tuple[Equations, Inputs, list[str], list[Expr]]:
+        """Return equations, inputs, names of the motions after the step, and their direction."""
+        names, (along,) = self._along(1)
+        made, at = self._stated([*self._statement.inputs, *along])
+        return made, at, names, [at[x] for x in along]
 
 
 @lru_cache(maxsize=128)

@@ -72,7 +72,12 @@ void compute_both_{0}(void *of_ffcx, const double *w, const double *constants, c
 Sizes = tuple[int, int, int]
 """Numbers of entries, of coefficient values and of constants of a kernel."""
 
-OWN = "tabulate", "compute_both", "address", "evaluate_in_lanes"
+ASSEMBLY = "assembly_simd.c"
+
+OWN = (
+    "tabulate", "compute_both", "address", "evaluate_in_lanes", "add_in_lanes", "take_unknowns",
+    "insert_batch", "insert_rows_of_six",
+)  # fmt: skip
 """Functions of each kernel in C, whose names get the number of the kernel."""
 
 _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
@@ -123,6 +128,30 @@ def in_vectors(kernel: str) -> str:
     return "\n".join([f"static inline void tabulate(lanes *restrict A, {inputs})", *lines])
 
 
+def without_scale(kernel: str) -> str:
+    """Remove the length of the cell, which is 1, from the C code of an FFCx kernel of elements.
+
+    FFCx multiplies each entry by it.  The code remains if the length is not a factor.
+    """
+    jacobian = r"^static const double FE\w+\[1\]\[1\]\[1\]\[2\] = .*?^// Section: Jacobian\n.*?^}\n"
+    section = re.search(jacobian, kernel, re.M | re.S)
+    if section is None:
+        return kernel
+    scale, kept = {*re.findall(r"^double (J\w*_c\d) =", section[0], re.M)}, list[str]()
+    for line in kernel.replace(section[0], "").splitlines():
+        defined = re.match(r"double (sp_\w+) = (.*);", line)
+        used = re.findall(r"\b(?:sp_|J\d*_)\w+", defined[2] if defined else line)
+        if defined and used and scale.issuperset(used):
+            scale.add(defined[1])
+            continue
+        if defined and len(used) == 2 and " * " in line and len(scale.intersection(used)) == 1:
+            line = f"double {defined[1]} = {next(x for x in used if x not in scale)};"
+        elif scale.intersection(used):
+            return kernel
+        kept.append(line)
+    return "\n".join(kept)
+
+
 def written(source: Path) -> list[str]:
     """Return the kernels that FFCx wrote into the file ``source`` for the integrals of a form."""
     code = source.read_text() if source.exists() else ""
@@ -157,14 +186,19 @@ errors than the tolerance.
 """
 
 
-def require_agreement(module: ModuleType, kernels: Sequence[tuple[int, Sizes]]) -> None:
+def require_agreement(
+    module: ModuleType, kernels: Sequence[tuple[int, Sizes]], *, on_cells: bool
+) -> None:
     """Raise :class:`Refused` if a vector kernel differs from FFCx's kernel on random cells."""
     at = partial(module.ffi.from_buffer, "double[]")
     for number, (kernel, (entries, width, constants)) in enumerate(kernels):
         random, wrong, of_ffcx = np.random.default_rng(0), 0, module.ffi.cast("void *", kernel)
         for signs in ([1.0], [1.0], [-1.0, 1.0], [-1.0, 1.0]):
             w = random.uniform(0.1, 1.0, (width, BATCH)) * random.choice(signs, (width, BATCH))
-            x = np.array([[0, 0, 0, 1, 0.5, 0]]).T + random.uniform(-0.1, 0.1, (6, BATCH))
+            x = np.zeros((6, BATCH))
+            x[3] = 1.0
+            if on_cells:
+                x += np.array([[0, 0, 0, 0, 0.5, 0]]).T + random.uniform(-0.1, 0.1, (6, BATCH))
             c, (one, several, moved) = (
                 random.uniform(0.1, 0.9, constants),
                 np.zeros((3, entries, BATCH)),
@@ -193,8 +227,8 @@ def interleaved(source: Path, kernel: int, sizes: Sizes, unknowns: tuple[int, in
     ``unknowns`` are the position of the first unknown among the coefficients, and the number of
     unknowns.
     """
-    numbers = {"SIDE": math.isqrt(sizes[0]), "AT": unknowns[0], "UNKNOWNS": unknowns[1]}
-    return _loops("assembly_simd.c", source, [(kernel, sizes)], FLAGS, numbers)[0]
+    numbers = {"AT": unknowns[0], "UNKNOWNS": unknowns[1], "ON_CELLS": 1}
+    return _loops([ASSEMBLY], source, [(kernel, sizes)], FLAGS, numbers)[0]
 
 
 @cache
@@ -206,30 +240,42 @@ def point_loop(source: Path, kernel: int, sizes: Sizes) -> int | None:
     """
     if source.exists() and not re.search(_SLOW, source.read_text()):
         return None
-    return _loops("points_simd.c", source, [(kernel, sizes)], SCHEDULED)[0]
+    return _loops(["points_simd.c"], source, [(kernel, sizes)], SCHEDULED)[0]
 
 
 @cache
-def element_loops(source: Path, kernels: tuple[tuple[int, Sizes], ...]) -> list[int | None]:
-    """Return the addresses of the SIMD loops of functions of elements, compiled as one form."""
-    return _loops("elements_simd.c", source, kernels, FLAGS)
+def element_loops(
+    source: Path, kernels: tuple[tuple[int, Sizes], ...], inserted: int, unknowns: int
+) -> list[int | None]:
+    """Return the addresses of the SIMD loops of functions of elements, compiled as one form.
+
+    The first ``inserted`` functions of cells add to a vector or a matrix, as forms do; their first
+    inputs are the ``unknowns``.
+    """
+    files = [ASSEMBLY if k < inserted else "elements_simd.c" for k in range(len(kernels))]
+    numbers = {"AT": 0, "UNKNOWNS": unknowns, "ON_CELLS": 0}
+    return _loops(files, source, kernels, FLAGS, numbers)
 
 
 def _loops(
-    file: str, source: Path, kernels: Sequence[tuple[int, Sizes]], flags: list[str],
+    files: Sequence[str], source: Path, kernels: Sequence[tuple[int, Sizes]], flags: list[str],
     numbers: Mapping[str, int] = {},
 ) -> list[int | None]:  # fmt: skip
-    """Compile the loop in ``file`` over each kernel of FFCx, with ``numbers`` as macros."""
+    """Compile the loop in a file over each kernel of FFCx, with ``numbers`` as macros."""
     head = "\n".join([HEADERS, DECLARATIONS, f"#define LANES {BATCH}", text("assembly_simd.h")])
-    loop, which, macros = text("check_simd.c") + text(file), range(len(kernels)), []
+    on_cells = bool(numbers.get("ON_CELLS"))
+    loops, which, macros = [text("check_simd.c") + text(x) for x in files], range(len(kernels)), []
     for k in which:
-        values = zip(("ENTRIES", "WIDTH", "CONSTANTS"), kernels[k][1], strict=True)
-        defined = [*numbers.items(), *values, *((name, f"{name}_{k}") for name in OWN)]
+        sizes = kernels[k][1]
+        values = zip(("ENTRIES", "WIDTH", "CONSTANTS"), sizes, strict=True)
+        own = [("SIDE", math.isqrt(sizes[0])), *((name, f"{name}_{k}") for name in OWN)]
+        defined = [*numbers.items(), *values, *own]
         macros.append("".join(f"\n#undef {x}\n#define {x} {value}" for x, value in defined))
 
     def code() -> str:
-        bodies = zip(macros, map(in_vectors, written(source)), strict=True)
-        return head + "".join(f"{defined}\n{body}\n{loop}" for defined, body in bodies)
+        own = written(source) if on_cells else map(without_scale, written(source))
+        bodies = zip(macros, map(in_vectors, own), loops, strict=True)
+        return head + "".join(f"{defined}\n{body}\n{loop}" for defined, body, loop in bodies)
 
     try:
         lanes = compiled(
@@ -237,9 +283,9 @@ def _loops(
             "".join(map(INTERFACE.format, which)),
             code,
             # The name of the file is a hash of the form, options and versions of FFCx.
-            depends_on=[source.name, head, *macros, loop, Path(__file__).read_text()],
+            depends_on=[source.name, head, *macros, *loops, Path(__file__).read_text()],
             flags=flags,
-            check=lambda module: require_agreement(module, kernels),
+            check=lambda module: require_agreement(module, kernels, on_cells=on_cells),
         )
     except (Refused, CompilerError) as why:
         LOGGER.info("%s is computed cell by cell, which is slower: %s", source.stem, why)

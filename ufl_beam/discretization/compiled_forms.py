@@ -123,6 +123,16 @@ def _positions(indptr: Index, indices: Index, dofs: Index, batch_size: int) -> t
     return distinct[order], number[has], np.array([in_rows.sum()])
 
 
+def places_in(A: Csr, dofs: Index, batch_size: int) -> dict[str, Any]:
+    """Return fields of ``cells`` of loops.h for tangents of cells that are inserted in a matrix."""
+    places, *more = _positions(A.indptr, A.indices, dofs, batch_size)
+    if not more:
+        return {"row": places}
+    has, in_rows = more
+    pattern = ffi.from_buffer("uint8_t[]", places)
+    return {"begin": A.indptr, "pattern": pattern, "has": has, "in_rows": int(in_rows[0])}
+
+
 class Kernel:
     """Compiled cell form with the packed values of its coefficients.
 
@@ -203,13 +213,7 @@ class Kernel:
         if self._to_dofs or self._is_functional:
             return {}
         if self._matrix is not None:
-            A = self._matrix
-            places, *more = _positions(A.indptr, A.indices, self._dofs, self.batch_size)
-            if not more:
-                return {"row": places}
-            has, in_rows = more
-            pattern = ffi.from_buffer("uint8_t[]", places)
-            return {"begin": A.indptr, "pattern": pattern, "has": has, "in_rows": int(in_rows[0])}
+            return places_in(self._matrix, self._dofs, self.batch_size)
         places = np.zeros(shape, dtype=np.int32)
         if self._is_vector:
             places += np.arange(places.size, dtype=np.int32).reshape(shape)
@@ -266,24 +270,6 @@ class Kernel:
         blocks = [(x.start, at.start, at.stop - at.start) for x, at in pairs]
         return np.array(blocks, dtype=np.int32).reshape(-1, 3)
 
-    def reuse_values(self, source: Kernel) -> bool:
-        """Use the packed values of ``source``, if these contain this form's values as one block.
-
-        Returns:
-            Whether both forms use the same values now.
-        """
-        mine, others = self._columns, source._columns
-        shifts = {others[f].start - mine[f].start for f in mine.keys() & others.keys()}
-        if (
-            not mine.keys() <= others.keys()
-            or len(shifts) != 1
-            or self.batch_size != source.batch_size
-        ):
-            return False
-        (first,) = shifts
-        self._packed = source._packed[:, first : first + self._values.shape[1]]
-        return True
-
     def place(self, A: Csr) -> None:
         """Let :meth:`add` of a bilinear form add to entries of ``A`` from now on."""
         per_cell = self._dofs.shape[1]
@@ -315,6 +301,46 @@ class Kernel:
         """Return the value of the functional at the unknown ``q``."""
         value: float = lib.value_of_cells(self.cells, doubles(q))
         return value
+
+
+def inserted_cells(function: Any, w: Array, dofs: Index, **places: Any) -> Any:
+    """Return ``cells`` of loops.h for a function of cells, whose first inputs are the unknowns.
+
+    ``w`` are the inputs in batches; for ``places`` see :func:`places_in`.
+    """
+    number, unknowns = dofs.shape
+    return fill(
+        ffi.new("cells *"), tabulate=function.one, several=function.inserts, batch_size=BATCH,
+        number=number, of_cell=unknowns, dofs=dofs, unknowns=unknowns, width=w.shape[1],
+        w=view_pointer(w[:, unknowns:]), rows=function.outputs, coefficients=w.shape[1],
+        all=np.empty(w.shape[1]), **places,
+    )  # fmt: skip
+
+
+class InsertedForces:
+    """Forces of cells of a statement, which is evaluated as a form; see :class:`Kernel`."""
+
+    def __init__(self, cells: Any) -> None:
+        self.cells = cells
+
+    def uses(self, q0: object) -> bool:
+        """Return whether the forces depend on the configuration before the step."""
+        return True
+
+    def set(self, q0: object, q: Array) -> None:
+        """Set the configuration before the step, which follows the unknowns."""
+        lib.set_cells(self.cells, doubles(q), 0)
+
+    def add(self, q: Array, r: Array) -> None:
+        """Add the forces at ``q`` to ``r``."""
+        lib.add_cells(self.cells, doubles(q), doubles(r))
+
+    def keep_entries(self) -> tuple[Any, int, Array]:
+        """Store the forces of all cells in each evaluation, see :meth:`Kernel.keep_entries`."""
+        batches, rows = -(-self.cells.number // BATCH), self.cells.rows
+        each, second = np.zeros((2, batches, rows, BATCH))
+        fill(self.cells, each=each)
+        return ffi.addressof(self.cells, "each"), BATCH, second
 
 
 def with_shared_nodes(
@@ -419,18 +445,22 @@ class Pointwise:
         return ffi.cast("answer_loop *", point_loop(source, address, sizes) or 0)
 
     def compile_elements(
-        self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = MappingProxyType({})
-    ) -> list[Any]:
+        self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = MappingProxyType({}),
+        inserted: int = 0, unknowns: int = 0,
+    ) -> list[Any]:  # fmt: skip
         """Compile functions of elements together, each an ``element_function`` of loops.h.
 
-        A function without outputs is None.  Nodes that are keys of ``instead`` are replaced.
+        A function without outputs is None.  Nodes that are keys of ``instead`` are replaced.  For
+        ``inserted`` and ``unknowns`` see :func:`element_loops`.
         """
         compiled, source, kernels = self._compiled(*filter(None, functions), instead=instead)
-        loops, kind = element_loops(source, kernels), "void (*)(int, const double *, double *)"
-        made = [
-            struct("element_function", several=ffi.cast(kind, loop or 0), one=one, outputs=sizes[0])
-            for one, loop, (_, sizes) in zip(compiled, loops, kernels, strict=True)
-        ]
+        loops = element_loops(source, kernels, inserted, unknowns)
+        kinds = ("inserts", "tabulate_batch *"), ("several", "batch_function *")
+        made = list[Any]()
+        for k, (one, loop, (_, sizes)) in enumerate(zip(compiled, loops, kernels, strict=True)):
+            made.append(struct("element_function", one=one, outputs=sizes[0]))
+            name, kind = kinds[k >= inserted]
+            fill(made[-1], **{name: ffi.cast(kind, loop or 0)})
         return [made.pop(0) if outputs else None for outputs in functions]
 
     def _compiled(

@@ -162,26 +162,13 @@ class Fields:
         """
         dofs = self.cell_dofs if cell_dofs is None else cell_dofs
         batched = self._batched_coordinates if several else None
-        kernel = Kernel(form, unknown, dofs, self._coordinates(), batched)
+        kernel = Kernel(form, unknown, dofs, self.coordinates(), batched)
         for function in (self.element.stiffness, self.element.inertia):
             if kernel.uses(function):
                 kernel.put(function, self.section_values(function))
         return kernel
 
-    def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
-        """Compile a virtual work and its derivative, added to ``A``, with the same coefficients."""
-        form, batched = derivative(work, q1), self._batched_coordinates
-        force = self.kernel(work, q1)
-        tangent = Kernel(form, q1, self.cell_dofs, self._coordinates(), batched)
-        if force.batch_size != tangent.batch_size:  # they could not share coefficients
-            force = self.kernel(work, q1, several=False)
-            tangent = Kernel(form, q1, self.cell_dofs, self._coordinates())
-        if not tangent.reuse_values(force):
-            raise ValueError("force and tangent do not have the same coefficients")
-        tangent.place(A)
-        return force, tangent
-
-    def _coordinates(self) -> Array:
+    def coordinates(self) -> Array:
         """Return the vertices of the cells; (num_cells, 2, 2); m."""
         numbering = self.subdomain.numbering
         vertices = numbering.cells.take(self.subdomain.cells[self.order], axis=0)
@@ -189,7 +176,7 @@ class Fields:
 
     @cached_property
     def _batched_coordinates(self) -> Array:
-        return in_batches(self._coordinates(), BATCH)
+        return in_batches(self.coordinates(), BATCH)
 
     def matrix(self) -> Csr:
         """Create a zero matrix for the degrees of freedom of this process."""

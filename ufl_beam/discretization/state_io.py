@@ -43,6 +43,11 @@ class Archive:
         self._scalar = (1, np.zeros(1, dtype=int), int(subdomain.comm.rank == 0))
         self._dofs = (subdomain.numbering.size, subdomain.dofs, subdomain.num_owned)
 
+    @property
+    def restores(self) -> bool:
+        """True if methods return saved values."""
+        return self._restored is not None
+
     def number(self, name: str, value: float) -> float:
         """Save or restore a number that is equal on all processes."""
         return float(self._values(name, np.array([value]), *self._scalar)[0])

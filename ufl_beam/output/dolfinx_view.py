@@ -11,6 +11,8 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.blocks.beams import section_law
+from ufl_beam.discretization.beam_forms import elastic_form, imposed_at_points, inelastic_forms
 from ufl_beam.discretization.function_spaces import (
     DolfinxFields,
     derivative,
@@ -23,8 +25,6 @@ from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.terms.beam_forces import elastic_forms, inelastic_forms, section_law
-from ufl_beam.terms.imposed_strains import imposed_at_points
 
 
 class BeamForms(NamedTuple):
@@ -281,8 +281,8 @@ class DolfinxView:
         if self._imposed is not None:
             table = np.zeros((len(numbering.cells), numbering.mesh.degree, 6))
             for beams in self._view.beams:
-                if (imposed := beams.imposed) is not None:
-                    table[imposed.cells] = np.tile(imposed.strains[:, :, 1], 2)
+                cells, strains = beams.imposed_strains()
+                table[cells] = np.tile(strains, 2)
             put_in_cells(self._imposed, table[self.cells].reshape(len(self.cells), -1))
         return forms
 
@@ -296,11 +296,11 @@ class DolfinxView:
         self._around: tuple[fem.Function, ...] = ()
         imposed = any(isinstance(load, ImposedStrain) for load in self._view.scene.loads)
         self._imposed: fem.Function | None = imposed_at_points(element) if imposed else None
-        work = elastic_forms(element, scheme, imposed=imposed).work
+        work = elastic_form(element, scheme, imposed=imposed)
         if self._view.inelastic:
             points = inelastic_forms(element, scheme)
             work, self._around = work + points.around, (points.b, points.D)
-            cells = np.concatenate([beams.recorded()[0] for beams in self._view.inelastic])
+            cells = np.concatenate([beams.sections()[0] for beams in self._view.inelastic])
             dofs = dofs_of_cells(element.stiffness.function_space)
             element.stiffness.x.array[dofs[np.isin(self.cells, cells)]] = 0.0
         q0, q1 = element.q0, element.q1

@@ -13,6 +13,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, State
+from ufl_beam.blocks.beams import BeamCells, InelasticCells
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
@@ -31,7 +32,6 @@ from ufl_beam.output.states import States
 from ufl_beam.parallel import on_first
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.newton_options import Newton
-from ufl_beam.terms.beam_forces import Cells, InelasticBeams
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.inertia_and_damping import Inertia
 
@@ -119,8 +119,8 @@ class StateView(PresentState):
     cell_forces: CellForces
     solution: Any  # `Solution` of the run
     inertia: Inertia
-    beams: list[Cells]
-    inelastic: list[InelasticBeams]
+    beams: list[BeamCells]
+    inelastic: list[InelasticCells]
     solver: Solver  # Newton's method
     newton: Newton  # its options
     controllers: Any  # `Controllers` of the simulation

@@ -261,7 +261,7 @@ class StateWriter:
         mine = np.searchsorted(supports.dofs, subdomain.local(dofs))
         self._add(self._place(supports.reactions), mine, to)
         for term in inelastic:
-            (mine, recorded), p = term.recorded(), numbering.mesh.degree
+            (mine, recorded), p = term.sections(), numbering.mesh.degree
             k, width = np.flatnonzero(term.recorded_factors), recorded.shape[-1]
             sections = p * np.searchsorted(numbering.inelastic_cells, mine)[:, None] + np.arange(p)
             rows = at["material"].start + width * sections.ravel()

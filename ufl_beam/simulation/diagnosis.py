@@ -264,7 +264,7 @@ def _deformations(equation: StepEquation, q: Array, x: Array, most: float = SOFT
     # Works of the tangent, and of the elastic stiffness, at the Gauss points
     works = np.zeros((2, len(numbering.cells), numbering.mesh.degree))
     for beams in equation.inelastic:
-        cells, p = beams.recorded()[0], numbering.mesh.degree
+        cells, p = beams.sections()[0], numbering.mesh.degree
         in_points = beams.points.works(strains[cells].repeat(p, axis=0))
         works[:, cells] += in_points.reshape(2, -1, p)
     now, elastic = works

@@ -137,7 +137,7 @@ class Simulation(Stepper):
         if not fresh or (inertia is not None and inertia.scheme.further_rates):
             rates = None if inertia is None else inertia.v
             past = Archive(subdomain, internal) if same else None
-            loads = equation.loads
+            loads = [*equation.loads, *equation.imposed]
             loaded = together(lambda: [x.carry_on(t0, q_local, rates, past) for x in loads])
         elif inertia is not None:
             together(equation.begin_energies, t0, q_local, inertia.v)

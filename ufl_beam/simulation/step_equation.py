@@ -14,6 +14,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.blocks.beams import BeamCells, InelasticCells, elastic_cells
 from ufl_beam.blocks.block import Block, BlockSetting
 from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, viscosity
@@ -33,11 +34,9 @@ from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.loads import Rayleigh
 from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.controllers import Controllers
-from ufl_beam.terms.beam_forces import Cells, ElasticBeams, InelasticBeams
 from ufl_beam.terms.boundary_conditions import Supports
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.imposed_strains import CellStrains, ImposedStrains
 from ufl_beam.terms.inertia_and_damping import BEFORE, Inertia, rayleigh_forces
 from ufl_beam.terms.load_forces import DeadLoads, dead_loads
 from ufl_beam.terms.material_points import create_entries
@@ -65,6 +64,7 @@ class StepEquation:
         inertia: Inertia; None in statics.
         terms: All terms: ``inner``, with the internal forces of ``beams`` and ``connector_terms``,
             and ``others``.
+        imposed: Terms of ``beams`` with imposed strains.
         weights: Weights of residuals: 1 for forces, 1 / (size of the scene) for moments, 0 for
             ghosts and for equations of connectors.
         force: Internal forces in the latest residual, in statics; else empty.
@@ -91,14 +91,9 @@ class StepEquation:
             self.controllers.place, friction_repeats(scene),
         )  # fmt: skip
         strains = [load for load in scene.loads if isinstance(load, ImposedStrain)]
-        imposed = ImposedStrains(strains, subdomain, scheme, ledger, t0) if strains else None
-
-        def imposed_on(some: Fields) -> CellStrains | None:
-            return None if imposed is None else imposed.on_cells(some)
-
         # Terms create their ledger entries in the order of the columns of tables.  All processes
         # create the same entries, even without cells or connectors of a kind.
-        self.inelastic, elastic = list[InelasticBeams](), np.ones(len(subdomain.cells), dtype=bool)
+        self.inelastic, elastic = list[InelasticCells](), np.ones(len(subdomain.cells), dtype=bool)
         for section_points, cells in subdomain.numbering.inelastic:
             create_entries(section_points, scheme, ledger)
             indices = np.flatnonzero(np.isin(subdomain.cells, cells))
@@ -106,19 +101,14 @@ class StepEquation:
                 elastic[indices] = False
                 subset = Fields(subdomain, indices)
                 self.inelastic.append(
-                    InelasticBeams(subset, section_points, *setting, search, imposed_on(subset))
+                    InelasticCells(subset, section_points, cells, in_blocks, strains)
                 )
-        self.beams: list[Cells] = [*self.inelastic]
+        self.beams: list[BeamCells] = [*self.inelastic]
         numbering = subdomain.numbering
         some_elastic = len(numbering.inelastic_cells) < len(numbering.cells)
         if (scheme.alpha or scheme.lost_fraction) and some_elastic:
             ledger.lost["numerical"] += 0.0
         others: list[Term] = []
-        if elastic.any():
-            subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
-            self.beams.append(ElasticBeams(subset, *setting, imposed_on(subset)))
-            if scheme.lost_fraction:
-                others.append(second_differences(subset, in_blocks))
 
         self.connector_terms = together(connector_terms, in_blocks)
 
@@ -127,9 +117,12 @@ class StepEquation:
             self.loads += together(work_blocks, in_blocks)
         if scene.beams:
             ledger.state["stored"] += 0.0
+        if elastic.any():
+            subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
+            self.beams.append(elastic_cells(subset, in_blocks, strains))
+            if scheme.lost_fraction:
+                others.append(second_differences(subset, in_blocks))
         self.loads += load_blocks(in_blocks)
-        if imposed is not None:
-            self.loads.append(imposed)
         self.supports = Supports(subdomain, scheme, ledger, A)
         if inertia is not None:
             self.supports.stop(v)
@@ -145,6 +138,7 @@ class StepEquation:
         self.inner: list[Term] = [*self.beams, *self.connector_terms]
         self.others: list[Term] = [*self.loads, *others]
         self.terms: list[Term] = [*self.inner, *self.others]
+        self.imposed = [x for x in self.beams if x.imposed]
         self._fill_c(search, switched)
         in_cells = [forces for term in self.terms for forces in term.in_cells]
         in_c = [term.loads_in_cells() for term in self.loads if isinstance(term, DeadLoads)]
@@ -169,7 +163,7 @@ class StepEquation:
         product, cells = pop("add_step_tangent"), pop("add_cells")
         law_residuals = [term.law_residual for term in self.inner if term.law_residual is not None]
         demanding = subdomain.largest(float(bool(law_residuals)))
-        predicted = [term.predicted for term in self.beams if term.predicted is not None]
+        predicted = [x for x in (term.prediction for term in self.beams) if x is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
@@ -184,7 +178,7 @@ class StepEquation:
             plane=np.zeros(subdomain.size if supports.turned else 0),
             law_residuals=len(law_residuals), law_residual=ffi.new("law_residual[]", law_residuals),
             demanding=int(demanding),
-            predictions=len(predicted), predicted=ffi.new("predicted_strains *[]", predicted),
+            predictions=len(predicted), predicted=ffi.new("predicted_forces *[]", predicted),
             search=search, switched=switched,
         )  # fmt: skip
         self._alive = loops, law_residuals, predicted
@@ -264,8 +258,13 @@ class StepEquation:
 
     # -- forces and tangent --------------------------------------------------------------------
 
-    def begin(self, step: Step, terms: Sequence[Term] | None = None) -> None:
-        """Begin a step in some terms, by default all; beams then have exact tangents."""
+    def begin(
+        self, step: Step, terms: Sequence[Term] | None = None, imposed: Sequence[BeamCells] = ()
+    ) -> None:
+        """Begin a step in some terms, by default all; beams then have exact tangents.
+
+        Beams in ``imposed`` change their imposed strains only.
+        """
         some = self.terms if terms is None else terms
         before = step.q0 if step.q_before is None else step.q_before
         q0, q_before = (np.ascontiguousarray(q) for q in (step.q0, before))
@@ -281,9 +280,10 @@ class StepEquation:
             for term, phases in zip(self.terms, self.phases, strict=True):
                 for begin, data in phases.begin if term in some else ():
                     begin(data, c, ffi.NULL, ffi.NULL)
+            for beams in imposed:
+                beams.impose(c)
         for beams in self.beams:
-            if beams in some and beams.predicted is not None:
-                predicted = beams.predicted
+            if beams in some and (predicted := beams.prediction) is not None:
                 predicted.begins, predicted.stale, predicted.exact = 0, 1, 1
 
     def inner_forces(self, q: Array, t: float | None = None) -> Array:
@@ -292,7 +292,8 @@ class StepEquation:
         With a time ``t`` (s), forces of connectors are added, which are unknowns in ``q``.
         """
         short, forces = sys.float_info.min, np.zeros(self.subdomain.size)
-        self.begin(Step.create(self.scheme, 0.0, short, short, q), self.beams)
+        step = Step.create(self.scheme, 0.0, short, short, q)
+        self.begin(step._replace(fraction=0.0), self.beams)  # imposed strains remain
         for beam in self.beams:
             beam.add_residual(q, forces)
         if t is not None:

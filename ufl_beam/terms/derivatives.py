@@ -9,7 +9,6 @@ derivatives.c for the derivatives of a step.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -196,53 +195,6 @@ def form_derivative(
     )  # fmt: skip
 
 
-def _values(kernel_of: Callable[[Any], Kernel], coefficient: fem.Function, term: Any) -> Array:
-    return kernel_of(term).get(coefficient)
-
-
-def form_derivatives(
-    form: ufl.Form, kernel_of: Callable[[Any], Kernel], compile_form: Callable[[ufl.Form], Kernel],
-    q0: fem.Function, neighbours: Neighbours, without: Sequence[fem.Function] = (),
-) -> list[Each]:  # fmt: skip
-    """Return derivatives of a form by q0, and by coefficients that depend on parameters."""
-    kernel, made = kernel_of(neighbours.term), list[Any]()
-    for coefficient in kernel.coefficients:
-        if coefficient is q0:
-            made.append(form_derivative(form, kernel, compile_form, q0))
-        elif not any(coefficient is x for x in without):
-            change = neighbours.differences(partial(_values, kernel_of, coefficient))
-            if change.any():
-                direction = {"direction": change.ravel(), "stride": change[0].size}
-                made.append(form_derivative(form, kernel, compile_form, coefficient, **direction))
-    return [in_c("form", f) for f in made if f is not None] + shape_derivatives(
-        kernel_of, neighbours
-    )
-
-
-def shape_derivative(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours, size: int) -> Any:
-    """Return ``shape_derivative`` of loops.h for a form with ``size`` values; null if zero."""
-    kernel, coordinates = kernel_of(neighbours.term), list[Any]()
-    for p, some in enumerate(neighbours.terms):
-        found = [kernel_of(term).cells.coordinates for term in some]
-        moves = any(not np.array_equal(kernel_of(x).coordinates, kernel.coordinates) for x in some)
-        neighbours.enters[p] |= moves
-        coordinates += found if moves else [ffi.NULL] * len(found)
-    if not any(coordinates):
-        return ffi.NULL
-    parameters, number = neighbours.weights.shape
-    return struct(
-        "shape_derivative", form=kernel.cells, parameters=parameters, neighbours=number,
-        coordinates=ffi.new("double *[]", coordinates), weight=neighbours.weights, size=size,
-        space=np.zeros(size),
-    )  # fmt: skip
-
-
-def shape_derivatives(kernel_of: Callable[[Any], Kernel], neighbours: Neighbours) -> list[Each]:
-    """Return the derivatives of the forces of a form by coordinates, if these change."""
-    found = shape_derivative(kernel_of, neighbours, neighbours.size)
-    return [in_c("shape", found)] if found else []
-
-
 def differences(
     neighbours: Neighbours, state_of: Callable[[Any], Sequence[Array]] = lambda term: (),
     begins: Callable[[Any], Sequence[Loop]] = lambda term: (),
@@ -278,9 +230,9 @@ def differences(
 
 
 LINEARIZE = {
-    "form": "tabulate_derivative", "points": "tabulate_points", "load": "differentiate_loads",
+    "points": "tabulate_points", "load": "differentiate_loads",
     "differences": "begin_neighbours",
-    "imposed": "find_imposed_directions",
+
     "damping": "tabulate_damping", "block": "tabulate_block",
 }  # fmt: skip
 ACCEPT = {
@@ -289,7 +241,6 @@ ACCEPT = {
         "points",
         "load",
         "differences",
-        "imposed",
         "block",
     )
 }
@@ -313,13 +264,10 @@ def functions(kind: str) -> list[Any]:
 
 TRANSPOSES = {
     "block": ("transpose_block_state", "transpose_block", "finish_block"),
-    "form": ("", "transpose_form", "finish_form"),
     "points": ("transpose_points_state", "transpose_points", "finish_points"),
     "product": ("", "transpose_product", ""),
     "load": ("", "transpose_loads", ""),
-    "shape": ("", "transpose_shape", ""),
     "differences": ("", "transpose_differences", ""),
-    "imposed": ("", "transpose_imposed", ""),
     "damping": ("", "transpose_damping", ""),
 }
 """Functions of ``term_transposes`` of loops.h by the kind of a derivative."""
@@ -335,11 +283,6 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
 
     Instead of an address, the first item may be a pointer to it.
     """
-
-    def table(f: Any) -> tuple[Any, int]:
-        cells = f.table
-        batches = -(-cells.number // cells.batch_size)
-        return cells.each, 8 * batches * cells.rows * cells.batch_size
 
     def rates(c: Any) -> list[tuple[Any, int]]:
         return [(ffi.addressof(c, "rate", j), 8 * c.size) for j in range(1, c.number)]
@@ -359,14 +302,6 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         ]
         inner = recorded("points", data.inner) if data.inner else []
         return [*states, *times, *modes, *inner, *(rates(b.nodal) if b.rates else ())]
-    if kind == "form":
-        return [table(data)]
-    if kind == "shape":
-        form, batches = data.form, -(-data.form.number // data.form.batch_size)
-        stored = form.coefficients - form.unknowns
-        if not stored:
-            return []
-        return [(form.w, 8 * form.batch_size * ((batches - 1) * form.width + stored))]
     if kind == "product":
         product = data.matrix.product
         rate = ffi.addressof(product, "rate")  # C exchanges the vectors at this address
@@ -377,12 +312,10 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         tangents = [(x.tangents, 8 * x.number * x.numbers) for x in groups]
         return [*rates(damping.damping.rates), *tangents]
     if kind == "points":
-        points, blocks = data.points, [table(data.strains)] if data.strains else []
+        points = data.points
         number = points.cells * points.of_cell
-        if data.shape:
-            blocks += recorded("shape", data.shape)
         return [
-            *blocks, (data.J, 8 * number * data.outputs), (points.w, 8 * number * points.width),
+            (data.J, 8 * number * data.outputs), (points.w, 8 * number * points.width),
             (points.e0, 24 * points.cells), (points.e1, 24 * points.cells),
         ]  # fmt: skip
     return []

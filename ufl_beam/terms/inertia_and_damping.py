@@ -41,7 +41,6 @@ from ufl_beam.mechanics.time_scheme import (
     with_half_tangents,
 )
 from ufl_beam.model.loads import Rayleigh
-from ufl_beam.terms.beam_forces import InelasticBeams
 from ufl_beam.terms.derivatives import (
     Each,
     Neighbours,
@@ -321,7 +320,7 @@ class TangentRayleighForces(Term):
 
     def __init__(
         self, damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
-        rates: Inertia, inelastic: Sequence[InelasticBeams],
+        rates: Inertia, inelastic: Sequence[Any],
     ) -> None:  # fmt: skip
         (form, D), element = _tangent_stiffness(fields.element), fields.element
         K, M, C, dofs = fields.matrix(), rates.M, fields.matrix(), fields.cell_dofs
@@ -402,7 +401,7 @@ class TangentRayleighForces(Term):
 
 def rayleigh_forces(
     damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
-    rates: Inertia | None, inelastic: Sequence[InelasticBeams],
+    rates: Inertia | None, inelastic: Sequence[Any],
 ) -> Term:  # fmt: skip
     """Return the term of Rayleigh damping."""
     ledger.lost["damping"] += 0.0

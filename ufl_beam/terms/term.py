@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
@@ -316,20 +316,7 @@ for _name in ("run", "begin", "phase"):
     from_c(name=f"{_name}_in_python")(call_in_python)
 
 
-def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:
-    """Return loops that set ``q0``, the configuration before a step, in the kernels that use it."""
-    return [
-        loop("begin_forms", struct("form_of_step", form=kernel.cells, at=kernel.position(q0)))
-        for kernel in kernels if kernel.uses(q0)
-    ]  # fmt: skip
-
-
 def forms_of_step(kernels: Sequence[Any], function: fem.Function) -> Any:
     """Return ``form_of_step`` of loops.h of kernels in which a phase sets a function."""
     forms = [(kernel.cells, kernel.position(function)) for kernel in kernels]
     return ffi.new("form_of_step[]", forms)
-
-
-def entering(kernel: Any, entry: Any) -> Loop:
-    """Return a loop that adds the value of a compiled functional to an entry of the ledger."""
-    return loop("add_values", struct("form_value", form=kernel.cells, entry=entry))

@@ -39,39 +39,6 @@ static void add_products(adjoint *a, size_t size, const double *bar, const doubl
   for (int p = 0; bar && rows && p < a->parameters; ++p) a->gradient[p] += dot(size, bar, rows + p * size);
 }
 
-/* -- forms --------------------------------------------------------------------------------------------- */
-
-void transpose_form(void *self, adjoint *a, const double *λ)
-{
-  const form_derivative *f = self;
-  if (!f->bar) {
-    transpose_tables(f, 0, λ, 0, a->q0);
-    return;
-  }
-  /* A direction of one parameter belongs to the term that computes it. */
-  if (!f->stride) memset(f->bar, 0, (size_t)f->table->number * f->columns * sizeof *f->bar);
-  transpose_tables(f, 0, λ, f->bar, 0);
-}
-
-void finish_form(void *self, adjoint *a)
-{
-  const form_derivative *f = self;
-  add_products(a, f->stride, f->bar, f->direction);
-}
-
-/* Work of the derivative by coordinates on λ, for each parameter. */
-static void transpose_shape_of(const shape_derivative *s, adjoint *a, const double *λ)
-{
-  for (int p = 0; p < a->parameters; ++p) {
-    if (!s->coordinates[p * s->neighbours]) continue;
-    memset(a->values, 0, s->size * sizeof *a->values);
-    add_shape(s, a->d->x, p, a->values);
-    a->gradient[p] += dot(s->size, a->values, λ);
-  }
-}
-
-void transpose_shape(void *self, adjoint *a, const double *λ) { transpose_shape_of(self, a, λ); }
-
 /* -- material points ----------------------------------------------------------------------------------- */
 
 /* Remove the unknowns of a point from x_bar, the derivatives by all its inputs; the transpose of
@@ -117,12 +84,6 @@ static void enter_point(const point_derivatives *m, int c, int i, double *x_bar,
     x_bar[p->strain + a] = 0;
   }
   for (int j = 0; j < p->width; ++j) w_bar[j] += x_bar[j];
-}
-
-/* Derivatives by the strains of sections in e1 to those by imposed strains. */
-static void transpose_imposed_in_points(const point_derivatives *m)
-{
-  for (int k = 0; m->imposed && k < 3 * m->points->cells; ++k) m->imposed_bar[k / 3 * 6 + 3 + k % 3] -= m->e1[k];
 }
 
 /* Derivatives by D without negative eigenvalues, see remove_negative, to those by D and by C. */
@@ -237,8 +198,8 @@ static void transpose_tangent(const point_derivatives *m, int parameters, int c,
   }
 }
 
-/* Derivatives of the state at the end of a step to those by its beginning; q1 gets those by the
- * configuration at the end. */
+/* Derivatives of the state at the end of a step to those by its beginning; e1 gets those by the
+ * strains of the sections at the end. */
 void transpose_points_state(void *self, adjoint *a)
 {
   const point_derivatives *m = self;
@@ -269,12 +230,6 @@ void transpose_points_state(void *self, adjoint *a)
       remove_unknowns(m, w, J, x);
       enter_point(m, c, i, x, m->e1);
     }
-  }
-  if (m->cells) {
-    transpose_imposed_in_points(m);
-    for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
-    transpose_tables(m->strains, m->e1, 0, 0, a->q1);
-    if (m->shape) transpose_shape_of(m->shape, a, m->e1);
   }
 }
 
@@ -313,11 +268,6 @@ void transpose_points(void *self, adjoint *a, const double *λ)
       enter_point(m, c, i, x, m->e1);
     }
   }
-  /* Strains change at constant unknowns by imposed strains and coordinates only. */
-  transpose_imposed_in_points(m);
-  if (!m->shape) return;
-  for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
-  transpose_shape_of(m->shape, a, m->e1);
 }
 
 void finish_points(void *self, adjoint *a)
@@ -396,23 +346,6 @@ void transpose_differences(void *self, adjoint *a, const double *λ)
     memset(a->values, 0, a->size * sizeof *a->values);
     add_differences_derivative(self, a->d, p, a->values);
     a->gradient[p] += dot(a->size, a->values, λ);
-  }
-}
-
-/* Imposed strains, after all terms that use them. The run has whole steps, so that the strains at the
- * beginning are those at its time. */
-void transpose_imposed(void *self, adjoint *a, const double *λ)
-{
-  const imposed_derivatives *m = self;
-  for (int k = -1; k < m->parameters * m->neighbours; ++k) {
-    const imposed_strains *one = k < 0 ? m->here : m->neighbour[k];
-    for (int j = 0; j < one->functions; ++j) one->factors[j] = value_at(one->factor + j, a->step->t0);
-  }
-  begin_imposed_strains((void *)m->here, a->step, 0, 0);
-  find_imposed_directions(self, a->step, 0);
-  for (int g = 0; g < m->here->groups; ++g) {
-    add_products(a, m->size[g], m->bar[g], m->direction[g]);
-    memset(m->bar[g], 0, m->size[g] * sizeof(double));
   }
 }
 

@@ -31,11 +31,12 @@ static inline void put_in_cell(const cells *c, int cell, int at, int number, con
 static inline void insert_cell(const cells *c, const double *e, int k, double *b)
 {
   const int32_t *dofs = c->dofs + (size_t)k * c->of_cell;
+  const int n = c->batch_size, l = k % n;
   if (c->row)
-    for (int i = 0; i < c->rows; ++i) b[c->row[(size_t)k * c->rows + i]] += e[i];
+    for (int i = 0; i < c->rows; ++i) b[c->row[((size_t)(k / n) * c->rows + i) * n + l]] += e[i];
   else if (c->pattern) {
-    const uint8_t *pattern = c->pattern + (size_t)c->has[k] * c->rows;
-    for (int i = 0; i < c->rows; ++i) b[c->begin[dofs[i / c->of_cell]] + pattern[i]] += e[i];
+    const uint8_t *pattern = c->pattern + (size_t)c->has[k / n] * c->rows * n + l;
+    for (int i = 0; i < c->rows; ++i) b[c->begin[dofs[i / c->of_cell]] + pattern[i * n]] += e[i];
   } else if (c->is_functional)
     *b += *e;
   else
@@ -51,20 +52,21 @@ void add_cells(void *self, const double *q, double *b)
     c->several(c, q, b);
     return;
   }
-  const int after = c->at + c->unknowns;
-  double *w = c->all, e[MOST_ENTRIES], x[6] = {0};
+  const int after = c->at + c->unknowns, n = c->batch_size;
+  double *w = c->all, e[MOST_ENTRIES], x[6] = {[3] = 1};
   for (int k = 0; k < c->number; ++k) {
     const int32_t *dofs = c->dofs + (size_t)k * c->of_cell;
-    const double *stored = c->w + (size_t)k * c->width;
-    const double *at = c->coordinates + (size_t)k * 4;
-    const size_t first = (size_t)k * c->rows;
-    for (int i = 0; i < c->at; ++i) w[i] = stored[i];
+    const double *stored = in_cell(c, k, 0);
+    for (int i = 0; i < c->at; ++i) w[i] = stored[i * n];
     for (int i = 0; i < c->unknowns; ++i) w[c->at + i] = q[dofs[i]];
-    for (int i = after; i < c->coefficients; ++i) w[i] = stored[i - c->unknowns];
+    for (int i = after; i < c->coefficients; ++i) w[i] = stored[(i - c->unknowns) * n];
     memset(e, 0, c->rows * sizeof *e);
-    x[0] = at[0], x[1] = at[1], x[3] = at[2], x[4] = at[3];
+    if (c->coordinates) {
+      const double *at = c->coordinates + ((size_t)(k / n) * 4 * n + k % n);
+      x[0] = at[0], x[1] = at[n], x[3] = at[2 * n], x[4] = at[3 * n];
+    }
     CALL(c->tabulate, e, w, c->constants, x);
-    if (c->each) memcpy(c->each + first, e, c->rows * sizeof *e);
+    for (int i = 0; c->each && i < c->rows; ++i) c->each[((size_t)(k / n) * c->rows + i) * n + k % n] = e[i];
     if (b) insert_cell(c, e, k, b);
   }
 }

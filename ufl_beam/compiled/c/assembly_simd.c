@@ -100,8 +100,11 @@ static void add_in_lanes(const cells *c, const double *q, double *b)
     if (some == LANES) take_unknowns(dofs, q, LANES, w + AT);
     else take_unknowns(dofs, q, some, w + AT);
     for (int i = AT + UNKNOWNS; i < WIDTH; ++i) w[i] = stored[i - UNKNOWNS];
-    const lanes *at = (const lanes *)(c->coordinates + (size_t)first * 4);
-    x[0] = at[0], x[1] = at[1], x[3] = at[2], x[4] = at[3];
+    if (ON_CELLS) {
+      const lanes *at = (const lanes *)(c->coordinates + (size_t)first * 4);
+      x[0] = at[0], x[1] = at[1], x[3] = at[2], x[4] = at[3];
+    } else
+      x[3] = ALL(1);
     memset(e, 0, sizeof e);
     tabulate(e, w, constants, x);
     if (c->each) memcpy(c->each + (size_t)first * ENTRIES, e, sizeof e);

@@ -10,6 +10,12 @@
  * any numbers.
  */
 
+/* y -= A x */
+static inline void subtract(const double *A, const double *x, double *y)
+{
+  for (int i = 0; i < 3; ++i) y[i] -= A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
+}
+
 /* x = D^-1 b */
 static inline void solve_block(const double *D, const uint8_t *swap, const double *b, double *x)
 {

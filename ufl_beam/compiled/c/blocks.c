@@ -5,25 +5,28 @@
 /* For each batch c with elements that act in the step. */
 #define FOR_ACTING(b, c) for (int k_ = 0, c; k_ < *(b)->acting && (c = (b)->batch[k_], 1); ++k_)
 
-/* The outputs of a function for all acting elements; element by element if it has no loop in lanes. */
-static void evaluate(const element_block *b, const element_function *f, double *out)
+/* The outputs of a function for batch c; element by element if it has no loop in lanes. */
+static void evaluate_batch(const element_block *b, const element_function *f, int c, double *out)
 {
   const int n = b->lanes;
+  const double *w = b->w + (size_t)c * b->width * n;
   double *one = b->space, *e = one + b->width;
-  if (f->several && *b->acting == b->batches) {
-    f->several(b->batches, b->w, out);
+  if (f->several) {
+    f->several(1, w, out);
     return;
   }
-  FOR_ACTING(b, c) {
-    const double *w = b->w + (size_t)c * b->width * n;
-    double *to = out + (size_t)c * f->outputs * n;
-    if (f->several) f->several(1, w, to);
-    for (int l = 0; l < n && !f->several; ++l) {
-      for (int i = 0; i < b->width; ++i) one[i] = w[i * n + l];
-      ask(f->one, one, f->outputs, e);
-      for (int i = 0; i < f->outputs; ++i) to[i * n + l] = e[i];
-    }
+  for (int l = 0; l < n; ++l) {
+    for (int i = 0; i < b->width; ++i) one[i] = w[i * n + l];
+    ask(f->one, one, f->outputs, e);
+    for (int i = 0; i < f->outputs; ++i) out[i * n + l] = e[i];
   }
+}
+
+/* The outputs of a function for all acting elements. */
+static void evaluate(const element_block *b, const element_function *f, double *out)
+{
+  if (f->several && *b->acting == b->batches) f->several(b->batches, b->w, out);
+  else FOR_ACTING(b, c) evaluate_batch(b, f, c, out + (size_t)c * f->outputs * b->lanes);
 }
 
 /* Number of elements in batch c; copies of the last one fill up its lanes. */
@@ -41,11 +44,21 @@ static inline double *input(const element_block *b, int c, int i) { return b->w 
 static inline int first_state(const element_block *b) { return (2 + b->rates) * b->unknowns; }
 static inline int first_of_step(const element_block *b) { return b->width - b->modes - b->steps; }
 
+/* Index of the first motion at the latest tangent, among the inputs of cells in a static step. */
+static inline int about(const element_block *b) { return b->width - b->modes; }
+
 /* Set a mode of all elements. */
-static void set_mode(const element_block *b, enum mode_of_block mode, double value)
+static void set_mode(const element_block *b, int mode, double value)
 {
   FOR_ACTING(b, c)
     for (int l = 0; l < b->lanes; ++l) input(b, c, b->width - b->modes + mode)[l] = value;
+}
+
+/* Whether predictions of cells follow the motion since the latest tangent; part of the change of imposed strains in
+ * the step that they contain. */
+static void set_prediction(const element_block *b, int moved, double reached)
+{
+  set_mode(b, b->unknowns, moved), set_mode(b, b->unknowns + 1, reached);
 }
 
 /* Write the configuration q into the motions of elements, from the input `first` on. */
@@ -91,7 +104,12 @@ static void find_numbers_of_step(const element_block *b, const time_step *step)
     if (b->when[k] == TIME_GROWING) {
       const double change = step->fraction * (value_at(b->function + k, t1) - b->before[k]);
       b->end[k] = b->before[k] + change, b->now[k] = b->before[k] + step->at * change;
-    } else
+    } else if (b->when[k] == TIME_MOVING) {
+      const double before = b->before[k], f = step->fraction, wanted = f > 0 ? value_at(b->function + k, step->motion_time) : 0;
+      b->now[k] = b->end[k] = f == 1 ? wanted : f > 0 ? before + f * (wanted - before) : before;
+    } else if (b->when[k] == TIME_LAST)
+      b->now[k] = b->before[k - 1];
+    else
       b->now[k] = value_at(b->function + k, time[b->when[k]]);
   more[LENGTH_OF_STEP] = fmin(step->dt, at_rest), more[FRACTION] = step->fraction, more[REACHED] = reached;
   more += NUMBERS_OF_STEP;
@@ -156,6 +174,15 @@ static int select_rows(const element_block *b)
       for (int k = 0; k < b->columns; ++k) changed |= row[k * n] != wanted[k], row[k * n] = wanted[k];
     }
   return changed;
+}
+
+/* Set the numbers of a step only, which is then another step from the same beginning. */
+void set_numbers_of_step(const element_block *b, const time_step *step)
+{
+  const int steps = b->steps * b->lanes;
+  find_numbers_of_step(b, step);
+  FOR_ACTING(b, c)
+    for (int i = 0; i < steps; ++i) input(b, c, first_of_step(b))[i] = b->now[b->from[(size_t)c * steps + i]];
 }
 
 /* Modes before the first iterate: the modes at the end of the last step, or zero. */
@@ -242,7 +269,8 @@ void begin_block(void *self, const time_step *step, const double *q1, const doub
 {
   const element_block *b = self;
   take_inputs(b, step);
-  if (b->modes) begin_block_again(self, step, q1, s);
+  if (b->predicted) b->predicted->begins = 1, b->predicted->exact = 0;
+  if (b->modes && !b->inserted) begin_block_again(self, step, q1, s);
   /* For the size of loads: iterates of a failed step may be far away, and a first step has no forces before it. */
   if (*b->begun) memcpy(b->force, b->force_before, b->size * sizeof *b->force);
   else if (b->size) {
@@ -267,6 +295,22 @@ void add_block(void *self, const double *q, double *r)
   memset(b->force, 0, b->size * sizeof *r);
   scatter(b, b->force_of, b->unknowns, *b->each, b->at, b->force);
   for (int i = 0; i < b->size; ++i) r[b->dof[i]] += b->force[i];
+}
+
+/* Tangent of cells in a static step, with the forces that the latest tangent predicts. The first tangent has the
+ * forces before the step. */
+void add_predicted_tangent(void *self, const double *q, double *tangent)
+{
+  const element_block *b = self;
+  predicted_forces *p = b->predicted;
+  const int all = b->unknowns * b->lanes;
+  if (p->begins)
+    FOR_ACTING(b, c) memcpy(input(b, c, about(b)), input(b, c, b->unknowns), all * sizeof *q);
+  else if (p->exact) gather(b, q, about(b));
+  set_prediction(b, !p->begins, !p->begins);
+  add_cells((void *)b->inserted, q, tangent);
+  gather(b, q, about(b));
+  p->begins = 0, p->stale = 1;
 }
 
 void add_block_tangent(void *self, const double *q, double *tangent)
@@ -320,12 +364,14 @@ void end_step_of_block(const element_block *b, const double *q, enum end_of_step
   if (!b->end_of) return;
   gather(b, q, 0);
   if (b->power_of) find_works(b);
-  evaluate(b, b->end_of, b->out);
+  if (!b->inserted) evaluate(b, b->end_of, b->out);
   if (what == COMPUTE) return;
   if (what != TRIAL) memset(b->energy, 0, b->stored * sizeof(double));
   memset(sum, 0, b->groups * b->shares * sizeof *sum);
   FOR_ACTING(b, c) {
-    const double *out = b->out + (size_t)c * b->end_of->outputs * n, *shared = out + states;
+    double *out = b->out + (b->inserted ? 0 : (size_t)c * b->end_of->outputs * n);
+    if (b->inserted) evaluate_batch(b, b->end_of, c, out);
+    const double *shared = out + states;
     const double *record = shared + b->shares * n, *energy = record + b->recorded * n;
     if (what == ENERGIES && b->knows_before) energy += energies * n;
     const int some = elements_in(b, c);
@@ -404,19 +450,20 @@ double missed_by_block(void *self, const double *q, const double *r, double scal
   return most;
 }
 
-/* The outputs of a function at q that depends on the direction u, too; with a tangent, add them to entries. w is
- * space for all inputs and for the motions in u. */
-void evaluate_along(const element_block *b, const element_function *f, const double *q, const double *u, double *w,
-                    const int32_t *entry, double *tangent)
+/* The outputs of a function at q that depends on directions, too; with a tangent, add them to entries. w is space for
+ * all inputs of the function, which end with the motions in the directions and with numbers that remain. */
+void evaluate_along(const element_block *b, const element_function *f, const double *q, int directions,
+                    const double *const *direction, int width, double *w, double *out, const int32_t *entry,
+                    double *tangent)
 {
   element_block more = *b;
-  more.w = w, more.width = b->width + b->unknowns;
+  more.w = w, more.width = width;
   FOR_ACTING(b, c)
     memcpy(input(&more, c, 0), input(b, c, 0), (size_t)b->width * b->lanes * sizeof *w);
   gather(&more, q, 0);
-  gather(&more, u, b->width);
-  evaluate(&more, f, b->out);
-  if (tangent) scatter(b, f, f->outputs, b->out, entry, tangent);
+  for (int k = 0; k < directions; ++k) gather(&more, direction[k], b->width + k * b->unknowns);
+  evaluate(&more, f, out);
+  if (tangent) scatter(b, f, f->outputs, out, entry, tangent);
 }
 
 /* Begin a step in a neighbouring scene from the state that its statement has at the configuration of the run. */
@@ -426,248 +473,8 @@ void begin_neighbour(void *self, const time_step *step, const double *q1, const 
   const element_block *b = m->neighbour;
   memcpy(b->state, m->block->state, (size_t)b->batches * b->states * b->lanes * sizeof *b->state);
   take_inputs(b, step);
-  begin_block_again(m->neighbour, step, q1, s);
+  begin_block_again((void *)b, step, q1, s);
   gather(b, step->q0, 0);
   find_modes(b);
   end_step_of_block(b, step->q0, BEGIN);
-}
-
-/* -- derivatives ----------------------------------------------------------------------------------------- */
-
-/* Derivatives by the numbers of a step, from blocks in neighbouring scenes that take the same step. */
-static void find_directions_of_step(const block_derivatives *m, const time_step *step)
-{
-  const element_block *b = m->block;
-  const int shared = b->groups * b->shares;
-  memset(m->by_step, 0, (size_t)m->parameters * m->of_step * sizeof *m->by_step);
-  for (int k = 0; k < m->parameters * m->neighbours; ++k) {
-    const element_block *one = m->neighbour[k];
-    find_numbers_of_step(one, step);
-    double *direction = m->by_step + k / m->neighbours * m->of_step;
-    for (int i = 0; i < b->functions; ++i) direction[i] += m->weight[k] * (one->now[i] - b->now[i]);
-  }
-  for (int p = 0; p < m->parameters; ++p)
-    memcpy(m->by_step + (p + 1) * m->of_step - shared, m->by_shared + (size_t)p * shared, shared * sizeof(double));
-}
-
-void tabulate_block(void *self, const time_step *step, const double *q1)
-{
-  const block_derivatives *m = self;
-  const element_block *b = m->block;
-  gather(b, q1, 0);
-  if (m->inner) {
-    find_modes(b);
-    tabulate_points(m->inner, step, q1);
-  }
-  if (m->tabulate) {
-    evaluate(b, b->end_of, b->out);
-    m->tabulate(m->user);
-  }
-  evaluate(b, m->table_of, m->table);
-  for (size_t i = 0; i < (size_t)m->block->batches * m->table_of->outputs * m->block->lanes; ++i)
-    if (!isfinite(m->table[i])) m->table[i] = 0; /* zero times an infinite number of a branch that is not taken */
-  find_directions_of_step(m, step);
-}
-
-/* Derivatives of all inputs of the elements in batch c by parameter p. The derivatives of the motions at the end of
- * the step are in q1; without q1 they are zero. */
-static void find_direction(const block_derivatives *m, const derivatives *d, int c, int p, const double *q1)
-{
-  const element_block *b = m->block;
-  const int n = b->lanes, motions = b->unknowns * n, steps = b->steps * n;
-  const size_t states = b->states * n, numbers = b->numbers * n, at = (size_t)p * b->batches + c;
-  const double *now = m->by_step + p * m->of_step;
-  const int32_t *dofs = b->dofs + (size_t)c * motions, *from = b->from + (size_t)c * steps;
-  double *x = m->direction;
-  for (int j = -1; j <= b->rates; ++j, x += motions) {
-    const double *q = j < 0 ? q1 : (j ? d->rates[j] : d->q0) + (size_t)p * d->size;
-    for (int i = 0; i < motions; ++i) x[i] = q ? q[dofs[i]] : 0;
-  }
-  memcpy(x, m->by_state + at * states, states * sizeof *x), x += states;
-  memcpy(x, m->by_number + at * numbers, numbers * sizeof *x), x += numbers;
-  for (int i = 0; i < steps; ++i) x[i] = now[from[i]];
-}
-
-/* Number of rows of the table: forces, state, shared numbers. */
-static inline int rows_of(const element_block *b) { return b->unknowns + b->states + b->shares; }
-
-/* Row of the table of batch c, and its length. */
-static inline int columns(const element_block *b) { return b->width - b->modes; }
-static inline const double *row_of(const block_derivatives *m, int c, int row)
-{
-  return m->table + ((size_t)c * m->table_of->outputs + row * columns(m->block)) * m->block->lanes;
-}
-
-/* Product of a row of the table of batch c with the directions, in lanes. */
-static inline void multiply_row(const block_derivatives *m, int c, int row, double *sum)
-{
-  const element_block *b = m->block;
-  const int n = b->lanes;
-  const double *slope = row_of(m, c, row);
-  memset(sum, 0, n * sizeof *sum);
-  for (int j = 0; j < columns(b); ++j, slope += n)
-    for (int l = 0; l < n; ++l) sum[l] += slope[l] * m->direction[j * n + l];
-}
-
-/* The first number of element i, in an array of the numbers of all elements, whose size follows. */
-static inline double *number_of(const element_block *b, double *numbers, int i)
-{
-  return numbers + (size_t)(i / b->lanes) * b->numbers * b->lanes + i % b->lanes;
-}
-static inline size_t all_numbers(const element_block *b) { return (size_t)b->batches * b->numbers * b->lanes; }
-
-void add_block_derivative(void *self, const derivatives *d, int p, double *r)
-{
-  const block_derivatives *m = self;
-  const element_block *b = m->block;
-  double sum[MOST_LANES];
-  if (m->inner) { /* the derivatives of the forces at constant motions are numbers of the elements */
-    add_points_derivative(m->inner, d, p, r);
-    for (int i = 0; i < b->elements; ++i) *number_of(b, m->by_number + (size_t)p * all_numbers(b), i) = m->inner->r[3 * i];
-  }
-  FOR_ACTING(b, c) {
-    find_direction(m, d, c, p, 0);
-    for (int i = 0; i < b->unknowns; ++i) {
-      const int32_t *dofs = b->dofs + ((size_t)c * b->unknowns + i) * b->lanes;
-      multiply_row(m, c, i, sum);
-      for (int l = 0; l < elements_in(b, c); ++l) r[dofs[l]] += sum[l];
-    }
-  }
-}
-
-void accept_block_derivative(void *self, const derivatives *d, int p)
-{
-  const block_derivatives *m = self;
-  const element_block *b = m->block;
-  const int n = b->lanes, shared = b->groups * b->shares;
-  double sum[MOST_LANES], *new_shared = b->new_shared;
-  memset(new_shared, 0, shared * sizeof *new_shared);
-  FOR_ACTING(b, c) {
-    double *z = m->by_state + ((size_t)p * b->batches + c) * b->states * n;
-    if (!b->states && !b->shares && !m->margins) break;
-    find_direction(m, d, c, p, d->q1 + (size_t)p * d->size);
-    for (int k = 0; k < m->margins; ++k) {
-      const double *margin = row_of(m, c, rows_of(b) + m->margins) + k * n;
-      multiply_row(m, c, rows_of(b) + k, sum);
-      for (int l = 0; l < elements_in(b, c); ++l) note_margin(d, p, (c * n + l) * (b->laws ? b->laws : 1), margin[l], sum[l]);
-    }
-    for (int i = 0; i < b->states && !d->initial; ++i) multiply_row(m, c, b->unknowns + i, z + i * n);
-    for (int i = 0; i < b->shares; ++i) {
-      multiply_row(m, c, b->unknowns + b->states + i, sum);
-      for (int l = 0; l < elements_in(b, c); ++l) new_shared[b->group[c * n + l] * b->shares + i] += sum[l];
-    }
-  }
-  if (m->inner && !d->initial) {
-    for (int i = 0; i < b->elements; ++i)
-      m->inner->e1[3 * i] = m->by_state[(((size_t)p * b->batches + i / n) * b->states + b->states - 1) * n + i % n];
-    accept_points_derivative(m->inner, d, p);
-  }
-  for (int i = 0; i < shared; ++i)
-    if (!d->initial || i % b->shares >= b->kept) m->by_shared[(size_t)p * shared + i] = new_shared[i];
-  if (m->neighbours && !d->initial) memset(m->by_before + (size_t)p * b->functions, 0, b->functions * sizeof(double));
-  for (int k = p * m->neighbours; k < (p + 1) * m->neighbours && !d->initial; ++k) {
-    const element_block *one = m->neighbour[k];
-    for (int i = 0; i < b->functions; ++i) m->by_before[(size_t)p * b->functions + i] += m->weight[k] * (one->end[i] - b->end[i]);
-    memcpy(one->before, one->end, b->functions * sizeof(double));
-    one->t[0] = one->t[1];
-  }
-}
-
-/* Derivatives of batch c by the rows of the table, in lanes: of forces by λ, of new states and shared numbers by
- * the derivatives after the step, which a trial step has of some shared numbers only. */
-static void find_bars(const block_derivatives *m, const adjoint *a, int c, const double *λ, double *bar)
-{
-  const element_block *b = m->block;
-  const int n = b->lanes, motions = b->unknowns * n, states = b->states * n;
-  const int32_t *dofs = b->dofs + (size_t)c * motions;
-  for (int i = 0; i < motions; ++i) bar[i] = λ ? λ[dofs[i]] : 0;
-  for (int i = 0; i < states; ++i) bar[motions + i] = a->d->initial ? 0 : m->state_bar[(size_t)c * states + i];
-  for (int i = 0; i < b->shares; ++i)
-    for (int l = 0; l < n; ++l)
-      bar[motions + states + i * n + l] =
-        a->d->initial && i < b->kept ? 0 : m->shared_bar[b->group[c * n + l] * b->shares + i];
-}
-
-/* The table of a recorded step, whose state is restored. Forces and new states depend on the motions after the
- * step: the solution for λ needs the derivatives of new states by these. */
-void transpose_block_state(void *self, adjoint *a)
-{
-  const block_derivatives *m = self;
-  const element_block *b = m->block;
-  const int n = b->lanes, rows = rows_of(b);
-  take_inputs(b, a->step);
-  tabulate_block(self, a->step, a->d->x);
-  if (m->inner) { /* the last state of an element is its motion */
-    transpose_points_state(m->inner, a);
-    for (int i = 0; i < b->elements; ++i)
-      m->state_bar[((size_t)(i / n) * b->states + b->states - 1) * n + i % n] += m->inner->e1[3 * i];
-  }
-  FOR_ACTING(b, c) {
-    const int32_t *dofs = b->dofs + (size_t)c * b->unknowns * n;
-    if (rows == b->unknowns) break;
-    find_bars(m, a, c, 0, m->direction);
-    for (int i = b->unknowns; i < rows; ++i) {
-      const double *slope = row_of(m, c, i), *bar = m->direction + i * n;
-      for (int j = 0; j < b->unknowns; ++j)
-        for (int l = 0; l < elements_in(b, c); ++l) a->q1[dofs[j * n + l]] += slope[j * n + l] * bar[l];
-    }
-  }
-}
-
-/* Derivatives by all inputs but the motions after the step. */
-void transpose_block(void *self, adjoint *a, const double *λ)
-{
-  const block_derivatives *m = self;
-  const element_block *b = m->block;
-  const int n = b->lanes, motions = b->unknowns, z = first_state(b), end = z + b->states, rows = rows_of(b);
-  const int shared = b->groups * b->shares;
-  FOR_ACTING(b, c) {
-    const int32_t *dofs = b->dofs + (size_t)c * motions * n, *from = b->from + (size_t)c * b->steps * n;
-    double *z_bar = m->state_bar + (size_t)c * b->states * n;
-    find_bars(m, a, c, λ, m->direction);
-    if (!a->d->initial) memset(z_bar, 0, b->states * n * sizeof *z_bar);
-    for (int i = 0; i < rows; ++i) {
-      const double *slope = row_of(m, c, i) + motions * n;
-      for (int j = motions; j < columns(b); ++j, slope += n)
-        for (int l = 0; l < elements_in(b, c); ++l) {
-          const double x = slope[l] * m->direction[i * n + l];
-          const int rate = j / motions - 1;
-          if (j < z) (rate ? a->rates[rate] : a->q0)[dofs[j % motions * n + l]] += x;
-          else if (j < end) z_bar[(j - z) * n + l] += x;
-          else if (j < end + b->numbers) m->number_bar[((size_t)c * b->numbers + j - end) * n + l] += x;
-          else m->step_bar[from[(j - end - b->numbers) * n + l]] += x;
-        }
-    }
-  }
-  if (m->inner) {
-    for (int i = 0; i < b->elements; ++i) {
-      double *x = number_of(b, m->number_bar, i);
-      m->inner->r_bar[3 * i] = *x, *x = 0;
-    }
-    transpose_points(m->inner, a, λ);
-  }
-  if (m->tabulate) /* numbers that change in each step */
-    for (int p = 0; p < a->parameters; ++p)
-      for (int i = 0; i < b->elements; ++i)
-        for (int j = 0; j < m->shifts; ++j)
-          a->gradient[p] += number_of(b, m->number_bar, i)[j * n] * number_of(b, m->by_number + p * all_numbers(b), i)[j * n];
-  for (int i = 0; m->tabulate && i < b->elements * m->shifts; ++i) number_of(b, m->number_bar, i / m->shifts)[i % m->shifts * n] = 0;
-  double *before = m->step_bar + m->of_step - shared;
-  for (int i = 0; i < shared; ++i) {
-    m->shared_bar[i] = before[i] + (a->d->initial && i % b->shares < b->kept ? m->shared_bar[i] : 0);
-    before[i] = 0;
-  }
-  add_products(a, m->of_step, m->step_bar, m->by_step);
-  memset(m->step_bar, 0, m->of_step * sizeof *m->step_bar);
-}
-
-void finish_block(void *self, adjoint *a)
-{
-  const block_derivatives *m = self;
-  const element_block *b = m->block;
-  const size_t all = (size_t)b->batches * b->lanes;
-  add_products(a, all * b->states, m->state_bar, m->by_state);
-  add_products(a, all * b->numbers, m->number_bar, m->by_number);
-  add_products(a, b->groups * b->shares, m->shared_bar, m->by_shared);
-  if (m->inner) finish_points(m->inner, a);
 }

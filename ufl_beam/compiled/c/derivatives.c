@@ -66,34 +66,6 @@ static void multiply_tables(const form_derivative *f, const double *values, cons
   }
 }
 
-void add_form_derivative(void *self, const derivatives *d, int p, double *r)
-{
-  const form_derivative *f = self;
-  const double *values = f->direction ? f->direction + (size_t)p * f->stride : 0;
-  multiply_tables(f, values, d->q0 + (size_t)p * d->size, 0, r);
-}
-
-/* Derivative of the values of a form at q by the coordinates that depend on parameter p. */
-static void add_shape(const shape_derivative *s, const double *q, int p, double *out)
-{
-  const double *const *coordinates = s->coordinates + p * s->neighbours;
-  if (!*coordinates) return;
-  cells one = *s->form;
-  one.each = 0;
-  double all = 0;
-  for (int k = 0; k <= s->neighbours; ++k) {
-    /* The weight of the scene itself makes the sum of the weights zero. */
-    const double weight = k < s->neighbours ? s->weight[p * s->neighbours + k] : -all;
-    all += weight;
-    one.coordinates = k < s->neighbours ? coordinates[k] : s->form->coordinates;
-    memset(s->space, 0, s->size * sizeof *s->space);
-    add_cells(&one, q, s->space);
-    for (int i = 0; i < s->size; ++i) out[i] += weight * s->space[i];
-  }
-}
-
-void add_shape_derivative(void *self, const derivatives *d, int p, double *r) { add_shape(self, d->x, p, r); }
-
 /* -- material points --------------------------------------------------------------------------------- */
 
 /* Compute a table, whose last outputs are margins. Derivatives by infinite numbers, such as the limit of an
@@ -110,12 +82,6 @@ void tabulate_points(void *self, const time_step *step, const double *q1)
 {
   const point_derivatives *m = self;
   points *p = m->points;
-  if (m->cells) {
-    m->cells->latest[0] = NAN;
-    p->predicts = 0;
-    respond_at(m->cells, q1);
-    tabulate_derivative(m->strains, step, q1);
-  }
   for (int i = 0; i < p->cells * p->of_cell; ++i)
     ask_table(m->table, p->w + (size_t)i * p->width, m->outputs, m->margins, m->J + (size_t)i * m->outputs);
 }
@@ -224,24 +190,11 @@ static void differentiate_points(const point_derivatives *m, const derivatives *
   }
 }
 
-/* Derivatives of the strains by parameter q, at constant unknowns or, with dq, along these. */
-static void find_strain_directions(const point_derivatives *m, const derivatives *d, int q, const double *dq)
-{
-  const points *p = m->points;
-  memset(m->e1, 0, 3 * (size_t)p->cells * sizeof *m->e1);
-  if (!m->cells) return; /* the block of springs has the derivatives of the motions */
-  if (dq) multiply_tables(m->strains, 0, dq, 1, m->e1);
-  if (m->shape) add_shape(m->shape, d->x, q, m->e1);
-  for (int k = 0; k < 3 * p->cells; ++k) m->e1[k] /= m->cells->weight[k / 3 % m->cells->in_cell];
-  const double *imposed = m->imposed ? m->imposed + 6 * (size_t)q * p->cells : 0;
-  for (int k = 0; imposed && k < 3 * p->cells; ++k) m->e1[k] -= imposed[k / 3 * 6 + 3 + k % 3];
-}
-
-/* Derivatives of the resultants at constant unknowns, for the form of the forces. */
+/* Derivatives of the resultants at constant strains. */
 void add_points_derivative(void *self, const derivatives *d, int q, double *r)
 {
   const point_derivatives *m = self;
-  find_strain_directions(m, d, q, 0);
+  memset(m->e1, 0, 3 * (size_t)m->points->cells * sizeof *m->e1);
   differentiate_points(m, d, q, m->e1, m->r, 0);
 }
 
@@ -282,11 +235,10 @@ static void differentiate_tangents(const point_derivatives *m, int q)
   }
 }
 
-/* Derivatives of the strains, and of the state of the points, at the end of the step. */
+/* Derivatives of the state of the points at the end of the step. */
 void accept_points_derivative(void *self, const derivatives *d, int q)
 {
   const point_derivatives *m = self;
-  if (m->cells) find_strain_directions(m, d, q, d->q1 + (size_t)q * d->size);
   if (m->tangents) {
     differentiate_points(m, d, q, m->e1, 0, 0);
     differentiate_tangents(m, q);
@@ -460,33 +412,6 @@ void add_damping_derivative(void *self, const derivatives *d, int p, double *r)
   }
   if (of->groups) add_cells((void *)m->force, of->damping->product->rate, m->r);
   for (int i = 0; i < d->size; ++i) r[i] += of->factor * m->r[i];
-}
-
-/* -- imposed strains ------------------------------------------------------------------------------------- */
-
-/* Derivatives of the imposed strains at both ends of the step, from scenes that take the same step. */
-void find_imposed_directions(void *self, const time_step *step, const double *q1)
-{
-  const imposed_derivatives *m = self;
-  for (int g = 0; g < m->here->groups; ++g)
-    memset(m->direction[g], 0, (size_t)m->parameters * m->size[g] * sizeof(double));
-  for (int k = 0; k < m->parameters * m->neighbours; ++k) {
-    begin_imposed_strains(m->neighbour[k], step, 0, 0);
-    for (int g = 0; g < m->here->groups; ++g) {
-      const double *here = m->here->group[g]->strains, *there = m->neighbour[k]->group[g]->strains;
-      double *out = m->direction[g] + (size_t)(k / m->neighbours) * m->size[g];
-      for (int i = 0; i < m->size[g]; ++i) out[i] += m->weight[k] * (there[i] - here[i]);
-    }
-  }
-}
-
-void accept_imposed_derivative(void *self, const derivatives *d, int p)
-{
-  const imposed_derivatives *m = self;
-  for (int k = p * m->neighbours; k < (p + 1) * m->neighbours; ++k) {
-    imposed_strains *one = m->neighbour[k];
-    memcpy(one->factors, one->factors_at_end, one->functions * sizeof *one->factors);
-  }
 }
 
 /* -- the step ------------------------------------------------------------------------------------------ */

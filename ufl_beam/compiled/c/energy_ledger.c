@@ -2,29 +2,6 @@
 /* Energy ledger: each term accepts a step and enters its works and losses, and adds its energies; see
  * energy_ledger.py. */
 
-/* Work in a step s of the weighted mean of the forces in the previous equation (weight a) and in
- * the equation of this step. The forces are at the degrees of freedom `dof`, or at all degrees of
- * freedom if `dof` is null. */
-static double work_in_step(int size, const int32_t *dof, double a, const double *before, const double *force,
-                           const double *s)
-{
-  double work = 0;
-  for (int i = 0; i < size; ++i) work += (a * before[i] + (1 - a) * force[i]) * s[dof ? dof[i] : i];
-  return work;
-}
-
-void add_values(void *self, const time_step *step, const double *q1, const double *s)
-{
-  form_value *f = self;
-  *f->entry += f->held = value_of_cells(f->form, q1);
-}
-
-void change_of_form(void *self, const double *q1, energy_change *sum)
-{
-  const form_value *f = self;
-  sum->in_beams += value_of_cells(f->form, q1) - f->held;
-}
-
 /* x A y for the matrix A of m */
 static double product_with(const matrix_of_rates *m, const double *x, const double *y)
 {
@@ -35,41 +12,6 @@ static double product_with(const matrix_of_rates *m, const double *x, const doub
 #pragma omp simd reduction(+ : sum)
   for (int i = 0; i < p->size; ++i) sum += x[i] * Ay[i];
   return sum;
-}
-
-/* Work of the resultants in a step to q1 on the change of imposed strains; points have their response
- * to q1. */
-static double work_on_imposed_strains(const imposed_strains *all, const double *q1)
-{
-  double work = 0;
-  for (int g = 0; g < all->groups; ++g) {
-    const imposed_cells *x = all->group[g];
-    if (!x->inelastic) {
-      work += value_of_cells(x->work, q1);
-      continue;
-    }
-    const points *p = x->inelastic->points;
-    const double a = all->weight_of_before, *e = x->strains;
-    for (int c = 0; c < p->cells; ++c, e += 6)
-      for (int k = 0; k < 3; ++k)
-        work += p->length[c] * (a * x->before[3 * c + k] + (1 - a) * p->r[3 * c + k]) * (e[3 + k] - e[k]);
-  }
-  return work;
-}
-
-/* Internal forces do this work in addition to the energy that cells store and dissipate. */
-void change_of_imposed_strains(void *self, const double *q1, energy_change *sum)
-{
-  const double work = work_on_imposed_strains(self, q1);
-  sum->in_beams += work;
-  sum->effort += fabs(work);
-}
-
-void accept_imposed_strains(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const imposed_strains *all = self;
-  *all->supplied -= work_on_imposed_strains(all, q1);
-  memcpy(all->factors, all->factors_at_end, all->functions * sizeof *all->factors);
 }
 
 void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
@@ -186,9 +128,25 @@ void change_of_block(void *self, const double *q1, energy_change *sum)
   if (b->inner) sum->in_connectors += change_by_response(b->inner, q1);
 }
 
-void change_of_points(void *self, const double *q1, energy_change *sum)
+/* Energy that cells store in a step to q1, without the energy that they supply. */
+void change_of_cells(void *self, const double *q1, energy_change *sum)
 {
-  sum->in_beams += change_by_response(self, q1);
+  const element_block *b = self;
+  double *out = b->out, before = 0;
+  if (b->inner) sum->in_beams += change_by_response(b->inner, q1);
+  gather(b, q1, 0);
+  if (b->end_of) FOR_ACTING(b, c) {
+    evaluate_batch(b, b->end_of, c, out);
+    const double *energy = out + (b->states + b->shares + b->recorded) * b->lanes;
+    for (int i = 0; i < b->stored + b->entered; ++i)
+      for (int l = 0; l < elements_in(b, c); ++l) {
+        const double x = energy[i * b->lanes + l];
+        if (i < b->stored) sum->in_beams += x;
+        else if (i >= b->stored + b->lost) sum->in_beams -= x, sum->effort += fabs(x);
+      }
+  }
+  for (int i = 0; i < b->stored; ++i) before += b->energy[i];
+  sum->in_beams -= before;
 }
 
 int points_dissipate(void *self, const double *q1)

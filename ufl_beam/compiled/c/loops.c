@@ -1,60 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Loops over cells and rows of a Newton iteration; see loops.h. */
 
-/* e = factor e + weighted strains of p->change, linearized about a configuration */
-static void add_linear_strains(const predicted_strains *p, const double *about, double factor)
+/* Work in a step s of the weighted mean of the forces in the previous equation (weight a) and in
+ * the equation of this step. The forces are at the degrees of freedom `dof`, or at all degrees of
+ * freedom if `dof` is null. */
+static double work_in_step(int size, const int32_t *dof, double a, const double *before, const double *force,
+                           const double *s)
 {
-  for (int i = 0; i < p->strains->number * p->of_cell; ++i) p->e[i] *= factor;
-  set_cells(p->strains, about, p->at_about);
-  add_cells((void *)p->strains, p->change, p->e);
-}
-
-/* Strains at q, linearized about the configuration of the latest tangent. The first strains are
- * strains at the beginning of the step, extrapolated like the configuration. */
-static void predict_strains(predicted_strains *p, const double *q)
-{
-  double *e = p->e, factor = 1;
-  if (p->exact && !p->begins) memcpy(p->about, q, p->size * sizeof *q);
-  for (int i = 0; i < p->size; ++i) p->change[i] = p->begins ? 0 : q[i] - p->about[i];
-  memset(e, 0, (size_t)p->strains->number * p->of_cell * sizeof *e);
-  if (p->begins && p->ratio != 0) {
-    factor = 1 + p->ratio;
-    add_linear_strains(p, p->q_before, 1);
-  }
-  add_linear_strains(p, p->begins ? p->q0 : p->about, -p->ratio / factor);
-  for (int cell = 0; cell < p->strains->number; ++cell, e += p->of_cell)
-    for (int i = 0; i < p->of_cell; ++i) e[i] *= factor / p->weight[i];
-  if (p->imposed) {
-    /* At the beginning imposed strains are extrapolated as well, so without an extrapolation the
-     * tangent has the forces before the step. */
-    const double reached = p->begins ? p->ratio : 1;
-    const double *x = p->imposed;
-    e = p->e;
-    for (int k = 0; k < p->strains->number * p->of_cell; ++k) {
-      const int i = k / 3 * 6 + k % 3;
-      e[k] -= x[i] + reached * (x[i + 3] - x[i]);
-    }
-  }
-  p->stale = 0;
-}
-
-/* Store q as the configuration of the latest tangent. */
-static void predict_from(predicted_strains *p, const double *q)
-{
-  memcpy(p->about, q, p->size * sizeof *q);
-  p->begins = 0, p->stale = 1;
-}
-
-/* Tangent of a static step at q, with the forces that the latest tangent predicts. */
-void add_static_tangent(void *self, const double *q, double *tangent)
-{
-  static_tangent *t = self;
-  predicted_strains *p = t->predicted;
-  predict_strains(p, q);
-  for (int cell = 0; cell < t->tangent->number; ++cell)
-    put_in_cell(t->tangent, cell, t->at_e, p->of_cell, p->e + cell * p->of_cell);
-  add_cells((void *)t->tangent, q, tangent);
-  predict_from(p, q);
+  double work = 0;
+  for (int i = 0; i < size; ++i) work += (a * before[i] + (1 - a) * force[i]) * s[dof ? dof[i] : i];
+  return work;
 }
 
 /* Value of a functional at the unknowns q. */

@@ -8,7 +8,7 @@
 typedef void (part)(void *self, const double *q, double *out);
 typedef struct { part *add; void *self; } call;
 
-part add_cells, add_static_tangent, subtract_vector,
+part add_cells, add_predicted_tangent, subtract_vector,
   add_step_force,
   add_step_tangent, add_inelastic_force, add_inelastic_tangent, add_block, add_block_tangent;
 
@@ -42,7 +42,7 @@ struct cells {
   const int32_t *dofs;
   int at, width, coefficients; /* coefficients: of a cell, including unknowns */
   double *w, *all; /* all: space for the coefficients of a cell */
-  const double *constants, *coordinates; /* coordinates: x and y of both vertices */
+  const double *constants, *coordinates; /* coordinates: x and y of both vertices; none of functions of statements */
   int rows; /* entries of a cell */
   const int32_t *row, *begin; /* or none */
   const uint8_t *pattern;
@@ -52,27 +52,10 @@ struct cells {
   double *each; /* entries of all cells in the latest evaluation, in batches; or none */
 };
 
-/* Strains whose forces are in the tangent of a static step, see predicted_strains in beam_forces.py. */
-typedef struct {
-  const cells *strains;           /* form of the strains, linearized about a configuration */
-  int at_about;                   /* position of that configuration in its coefficients */
-  int size, of_cell;              /* of_cell: strains of a cell */
-  const double *weight;           /* of each strain of a cell */
-  const double *q0, *q_before;    /* configurations at the beginnings of this step and the last one */
-  double ratio;                   /* length of this step divided by the length of the last one */
-  int begins, exact;              /* begins: the next strains are extrapolated; exact: later strains
-                                   * are strains at the iterate, not predicted */
-  double *about, *change, *e;     /* configuration of the latest tangent; space; strains */
-  const double *imposed;          /* strains of imposed_cells, which are subtracted; or none */
-  int stale;                      /* whether a tangent has been computed since the strains */
-} predicted_strains;
-
-/* Tangent of elastic cells in a static step. */
-typedef struct {
-  predicted_strains *predicted;
-  const cells *tangent;
-  int at_e; /* position of the strains in its coefficients */
-} static_tangent;
+/* State of the forces that the tangents of cells in a static step contain. begins: forces before the step, or forces
+ * at extrapolated strains; exact: later forces are forces at the iterate, not predicted; stale: whether a tangent has
+ * been computed since the prediction. */
+typedef struct { int32_t begins, exact, stale; } predicted_forces;
 
 /* Some entries of a vector, or all of them. */
 typedef struct {
@@ -256,25 +239,27 @@ typedef struct {
   double *inputs;        /* space for the inputs of a point */
 } points;
 
-/* Cells with points in `in_cell` sections each: forms of the strains times the `weight` of each
- * section, of the forces with the resultants r, and of their tangent with the resultants as affine
- * functions b + D e of the strains. */
+/* Cells with points in `in_cell` sections each. The block of the cells computes the strains of the sections, and in
+ * statics those that the latest tangent predicts. */
+typedef struct element_block element_block;
 typedef struct {
   points *points;
   int in_cell;
-  const double *weight;
-  const cells *strains, *force, *tangent;
-  int at_r, at_b, at_D; /* positions of r, b and D in the coefficients of `force` and `tangent` */
-  predicted_strains *predicted; /* in statics; or none */
+  element_block *block;
+  const cells *strains, *predicted, *force; /* predicted: none in dynamics */
+  int at_r, at_predicted, at_D; /* indices of the first modes of resultants, resultants in the tangent, and D */
+  double *e, *change;           /* predicted strains; space */
   double *forces, *last_b, *last_D; /* of the tangent, in statics; b and D of the latest tangent */
+  const double *q0, *q_before;  /* configurations at the beginnings of this step and the last one */
+  double ratio;                 /* length of this step divided by the length of the last one */
   int size;
   double scene;   /* size of the scene */
   double *latest; /* unknowns of the latest response */
-  const double *imposed; /* strains of imposed_cells; or none */
 } inelastic;
 
 void respond(points *p);
 void respond_at(const inelastic *m, const double *q);
+void put_tangents(const inelastic *m);
 int gives_energy(const points *p);
 void keep_tangents(const points *p);
 void commit(points *p);
@@ -418,7 +403,7 @@ enum agreement { TOTAL, HYPOT, LARGEST };
  * the run. */
 enum raised { NOTHING, STEP_FAILED, OTHER };
 
-/* Forces in the tangents of static steps, see predicted_strains in beam_forces.py. PREDICTED: forces
+/* Forces in the tangents of static steps, see BeamCell of blocks/beams.py. PREDICTED: forces
  * before the step, then forces that the last iteration predicted. FIRST: forces before the step,
  * then forces at the iterate. EXACT: always forces at the iterate. */
 enum tangents { PREDICTED, FIRST, EXACT };
@@ -494,7 +479,7 @@ typedef struct {
   int raised;            /* see enum raised */
   const border *border;  /* or none */
   int predictions;
-  predicted_strains *const *predicted;
+  predicted_forces *const *predicted;
   int32_t *search;       /* flags of points that may open; or none */
   phases again;          /* restart a step: discard the trial values of iterates */
   double *conjugate, *start, *aside; /* space: of a line search; of a solution with stiffer tangents */
@@ -572,18 +557,14 @@ typedef struct {
  * q0 at the beginning of the step. */
 typedef struct { const cells *form; int at; } form_of_step;
 
-/* A form whose value is added to an entry of the ledger; `held` is the value added last. */
-typedef struct {
-  const cells *form;
-  double *entry, held;
-} form_value;
-
 /* -- blocks: all elements with one statement, see blocks/statement.py ---------------------------------- */
 
 /* A compiled function of elements. `several` computes all batches: the first input of each element of a
- * batch, then the second ones, and so on; outputs alike. */
+ * batch, then the second ones, and so on; outputs alike. `inserts` adds outputs for cells, see struct cells. */
+typedef void (batch_function)(int batches, const double *w, double *out);
 typedef struct {
-  void (*several)(int batches, const double *w, double *out); /* or none */
+  batch_function *several; /* or none */
+  tabulate_batch *inserts; /* or none */
   kernel *one;
   int outputs;
 } element_function;
@@ -591,10 +572,11 @@ typedef struct {
 /* Time of a number of a step. Growing: a value that grows from that at the end of the last step, by the applied
  * fraction of a step. Others are values at the time of the applied fraction of the loads, and of all loads; before
  * and at the end of the step, and at the time between for which the trapezoidal rule takes loads; half a step
- * before and after the loads; LATER and twice as much after the step; at the end of all motions. */
+ * before and after the loads; LATER and twice as much after the step; at the end of all motions. Moving: grows like a
+ * prescribed motion; last: the number before it, at the end of the last step. */
 enum time_of_number {
   TIME_GROWING, TIME_NOW, TIME_WHOLE, TIME_BEFORE, TIME_BETWEEN, TIME_END, TIME_HALF_BEFORE, TIME_HALF_AFTER,
-  TIME_LATER, TIME_TWICE_LATER, TIME_WHOLE_MOTION, TIMES_OF_NUMBERS
+  TIME_LATER, TIME_TWICE_LATER, TIME_WHOLE_MOTION, TIME_MOVING, TIME_LAST, TIMES_OF_NUMBERS
 };
 enum { LATER = 100 }; /* microseconds */
 
@@ -620,7 +602,7 @@ enum mode_of_block { MODE_HELD, MODE_FRESH, MODE_STIFFENED, FIRST_MODE };
  * them, its state, its numbers, `steps` numbers of the step, and its modes, see mode_of_block. The last unknowns of an
  * element with laws are their forces. The last outputs of force_of are its laws, then for each law whether it holds
  * the motion, and its derivatives by the force and by all motions of the laws. */
-typedef struct {
+struct element_block {
   const element_function *force_of, *tangent_of;
   const element_function *end_of; /* state, shared numbers, recorded numbers, energies; or none */
   int lanes, elements, batches, unknowns, rates, states, numbers, steps, modes, width; /* lanes: elements of a batch */
@@ -674,36 +656,20 @@ typedef struct {
   int recorded;             /* numbers that solutions record */
   const int *recorded_kind; /* recorded_number of each */
   double *record;           /* `recorded` numbers of each element */
-} element_block;
+  const cells *inserted;    /* cells whose tangent is inserted as that of a form; or none */
+  predicted_forces *predicted; /* of cells in static steps; further modes are then motions at the latest tangent, and
+                             * two numbers, see set_prediction */
+};
 
 /* A block, and the same in a neighbouring scene, whose state follows from the configuration. */
 typedef struct { const element_block *block, *neighbour; } block_pair;
 
-/* Imposed strains of the cells of a term, see CellStrains: elastic cells, whose forms have the strains
- * as a coefficient, or cells with material points. */
-typedef struct {
-  int cells, points;
-  const double *const *field; /* for each function of time: strains for a factor of 1; cells * points * 3 */
-  double *strains;            /* cells * points * 6: strains at the beginning and at the end of a step */
-  int forms;
-  const form_of_step *form;
-  const cells *work; /* of elastic resultants on the change of imposed strains */
-  const inelastic *inelastic;
-  double *before; /* with material points: resultants in the accepted state; cells * points * 3 */
-} imposed_cells;
-
-typedef struct {
-  int functions, groups;
-  const time_function *factor;
-  double *factors, *factors_at_end; /* at the beginning and at the end of the step */
-  imposed_cells *const *group;
-  double weight_of_before, *supplied;
-} imposed_strains;
-
+void set_numbers_of_step(const element_block *b, const time_step *step);
 void end_step_of_block(const element_block *b, const double *q, enum end_of_step what);
 void respond_springs(const element_block *b, const double *q);
-void evaluate_along(const element_block *b, const element_function *f, const double *q, const double *u, double *w,
-                    const int32_t *entry, double *tangent);
+void evaluate_along(const element_block *b, const element_function *f, const double *q, int directions,
+                    const double *const *direction, int width, double *w, double *out, const int32_t *entry,
+                    double *tangent);
 
 /* Vectors of loads at some degrees of freedom times functions of time, see DeadLoads. */
 typedef struct {
@@ -939,7 +905,7 @@ typedef struct {
   struct adjoint *adjoint;  /* or none */
 } time_loop;
 
-phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
+phase begin_dead_loads,
   accept_dead_loads,
   
   begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
@@ -947,7 +913,7 @@ phase begin_imposed_strains, accept_imposed_strains, begin_forms, add_values, be
   begin_inelastic, accept_inelastic, add_energy_of_points,
   begin_block, begin_block_again, begin_neighbour, accept_block, add_energy_of_block;
 admission points_dissipate;
-change_of_energy change_of_form, change_of_points, change_of_block, change_of_imposed_strains;
+change_of_energy change_of_block, change_of_cells;
 double value_at(const time_function *f, double t);
 void keep_state(const time_loop *m, double *row);
 int solve_begun_step(time_loop *m, int hold);
@@ -1013,26 +979,12 @@ typedef struct {
   double *bar;              /* of the adjoint: derivatives by the coefficient; or none */
 } form_derivative;
 
-/* Derivatives of forms by the coordinates of the cells, as differences: the values of a form with the
- * coordinates of neighbouring scenes. */
-typedef struct {
-  const cells *form;
-  int parameters, neighbours;
-  const double *const *coordinates; /* parameters x neighbours; none of a parameter that moves no vertex */
-  const double *weight;
-  int size;             /* number of values of the form */
-  double *space;
-} shape_derivative;
-
 /* Derivatives of material points by all their inputs. The columns of a table are the growth, the
  * variables that a law solves for, then the other inputs; its rows are the stresses, the changes of the
  * variables, the stress and the resistance at the end of the step, the equations of the unknowns, and the
  * margins of the conditions in the law. The stresses and the margins follow. */
 typedef struct {
   points *points;
-  inelastic *cells;               /* or none */
-  form_derivative *strains;       /* strains of the sections by q1; none of springs */
-  const shape_derivative *shape;  /* strains of the sections by coordinates; or none */
   kernel *table;
   int outputs, columns, equations, margin, margins; /* equations, margin: their first rows; margins: number */
   int unknown;                    /* index in w of the first variable at the end of the step */
@@ -1040,8 +992,6 @@ typedef struct {
   double *J;                      /* tables of all points */
   double *w, *e0;                 /* derivatives of the data of the points, and of the strains before the step */
   const double *B, *weight, *rest; /* of the geometry of the sections; or none */
-  const double *imposed;          /* see imposed_derivatives; or none */
-  double *imposed_bar;            /* of the adjoint */
   /* Of committed tangents, if a damping uses them: derivatives, also of the elastic stiffnesses; steps of
    * parameters for differences. */
   double *tangents;
@@ -1057,8 +1007,8 @@ typedef struct {
   const constant_matrix *const *change;
 } product_derivative;
 
-/* Derivatives of a block by its inputs except modes, with a row for each parameter. The table has the rows of forces, states,
- * shared numbers and margins; the margins follow. */
+/* Derivatives of a block by its inputs except modes, with a row for each parameter. The table has the rows of forces,
+ * states, shared numbers, strains of material points and margins; the margins follow. */
 typedef struct {
   element_block *block;
   int parameters, neighbours, margins;
@@ -1066,10 +1016,14 @@ typedef struct {
   const double *weight;     /* see derivatives */
   const element_function *table_of;
   double *table, *direction; /* direction: space for the inputs of a batch */
+  const int32_t *changes;   /* whether an input may depend on a parameter; parameters x inputs without modes */
   int of_step;              /* number of all numbers of the step */
   double *by_state, *by_number, *by_step, *by_shared, *by_before; /* by_before: of `before` of the block */
   double *state_bar, *number_bar, *step_bar, *shared_bar; /* of the adjoint */
   point_derivatives *inner;   /* of material points; or none */
+  int strains;                /* of these points in an element, or 0; derivatives of the first numbers are those of the
+                               * resultants at constant strains */
+  double *strain_bar;
   /* Function of Python that sets the modes for the table and derivatives of the first `shifts` numbers; or none. */
   void (*tabulate)(void *handle);
   void *user;
@@ -1110,17 +1064,6 @@ typedef struct {
   double *r;
 } damping_derivatives;
 
-/* Derivatives of imposed strains, for each group a row of `size` numbers for each parameter. */
-typedef struct {
-  int parameters, neighbours;
-  const int32_t *size;
-  const imposed_strains *here;
-  imposed_strains *const *neighbour; /* in scenes with other values of a parameter */
-  const double *weight;              /* see derivatives */
-  double *const *direction;
-  double *const *bar; /* of the adjoint: by the strains of a step; of the same size */
-} imposed_derivatives;
-
 /* Transposes of a term: from the state at the end of a step to the state before it; from lambda, the
  * derivatives by the forces, to the state before the step; from the initial state to the parameters.
  * `state` and `finish` may be none. */
@@ -1153,37 +1096,29 @@ struct adjoint {
 int record_step(adjoint *a, time_loop *m, int initial);
 int go_back(adjoint *a, time_loop *m);
 void finish_adjoint(adjoint *a, time_loop *m);
-void transpose_imposed(void *self, adjoint *a, const double *lambda);
 void transpose_points_state(void *self, adjoint *a);
-void transpose_form(void *self, adjoint *a, const double *lambda);
 void transpose_points(void *self, adjoint *a, const double *lambda);
 void transpose_product(void *self, adjoint *a, const double *lambda);
 void transpose_loads(void *self, adjoint *a, const double *lambda);
-void transpose_shape(void *self, adjoint *a, const double *lambda);
 void transpose_differences(void *self, adjoint *a, const double *lambda);
 void transpose_damping(void *self, adjoint *a, const double *lambda);
 void transpose_block_state(void *self, adjoint *a);
 void transpose_block(void *self, adjoint *a, const double *lambda);
 void finish_block(void *self, adjoint *a);
-void finish_form(void *self, adjoint *a);
 void finish_points(void *self, adjoint *a);
 int differentiate_step(derivatives *d, time_loop *m, int initial);
 void begin_neighbours(void *self, const time_step *step, const double *q1);
 void tabulate_damping(void *self, const time_step *step, const double *q1);
 void add_damping_derivative(void *self, const derivatives *d, int p, double *r);
-void find_imposed_directions(void *self, const time_step *step, const double *q1);
 void add_differences_derivative(void *self, const derivatives *d, int p, double *r);
-void accept_imposed_derivative(void *self, const derivatives *d, int p);
 void accept_differences_derivative(void *self, const derivatives *d, int p);
 void keep_derivatives(derivatives *d, const time_loop *m);
 void keep_substep(derivatives *d, const time_loop *m, double end);
 void tabulate_block(void *self, const time_step *step, const double *q1);
 void add_block_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_block_derivative(void *self, const derivatives *d, int p);
-void add_form_derivative(void *self, const derivatives *d, int p, double *r);
 void add_points_derivative(void *self, const derivatives *d, int p, double *r);
 void add_product_derivative(void *self, const derivatives *d, int p, double *r);
-void add_shape_derivative(void *self, const derivatives *d, int p, double *r);
 void add_load_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_points_derivative(void *self, const derivatives *d, int p);
 void accept_load_derivative(void *self, const derivatives *d, int p);

@@ -104,7 +104,8 @@ static cells some_cells(const cells *c, int first)
 {
   cells some = *c;
   some.number = c->number - first < SOME ? c->number - first : SOME;
-  some.dofs += (size_t)first * c->of_cell, some.coordinates += (size_t)first * 4;
+  some.dofs += (size_t)first * c->of_cell;
+  if (c->coordinates) some.coordinates += (size_t)first * 4;
   some.w += (size_t)first * c->width;
   if (c->row) some.row += (size_t)first * c->rows;
   if (c->pattern) some.has += first / c->batch_size;
@@ -461,7 +462,7 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 void restart(const equation *e, enum tangents kind)
 {
   for (int k = 0; k < e->predictions; ++k) {
-    predicted_strains *p = e->predicted[k];
+    predicted_forces *p = e->predicted[k];
     p->begins = kind != EXACT, p->stale = 1, p->exact = kind != PREDICTED;
   }
 }

@@ -18,58 +18,6 @@ double value_at(const time_function *f, double t)
   return (f->y[high] - f->y[low]) / (f->t[high] - f->t[low]) * (t - f->t[low]) + f->y[low];
 }
 
-void begin_forms(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const form_of_step *f = self;
-  set_cells(f->form, step->q0, f->at);
-}
-
-void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s)
-{
-  predicted_strains *p = self;
-  p->q0 = step->q0, p->q_before = step->q_before, p->ratio = step->ratio;
-  p->begins = 1, p->exact = 0;
-}
-
-/* Elastic cells have no branches: forces before the step suffice for the first tangent, and cost
- * less. */
-void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const static_tangent *t = self;
-  begin_predicted_strains(t->predicted, step, q1, s);
-  t->predicted->ratio = 0;
-}
-
-/* Imposed strains change between the ends of a step, as prescribed motions do. */
-void begin_imposed_strains(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const imposed_strains *all = self;
-  for (int k = 0; k < all->functions; ++k) {
-    const double wanted = value_at(all->factor + k, step->motion_time), before = all->factors[k];
-    all->factors_at_end[k] = step->fraction == 1 ? wanted : before + step->fraction * (wanted - before);
-  }
-  for (int g = 0; g < all->groups; ++g) {
-    const imposed_cells *x = all->group[g];
-    for (int i = 0; i < x->cells * x->points; ++i)
-      for (int k = 0; k < 3; ++k) {
-        double before = 0, now = 0;
-        for (int f = 0; f < all->functions; ++f) {
-          before += all->factors[f] * x->field[f][3 * i + k];
-          now += all->factors_at_end[f] * x->field[f][3 * i + k];
-        }
-        x->strains[6 * i + k] = before, x->strains[6 * i + 3 + k] = now;
-      }
-    for (int f = 0; f < x->forms; ++f)
-      for (int c = 0; c < x->cells; ++c)
-        put_in_cell(x->form[f].form, c, x->form[f].at, 6 * x->points, x->strains + 6 * x->points * c);
-    if (x->inelastic) {
-      const points *p = x->inelastic->points;
-      x->inelastic->latest[0] = NAN; /* compute the next response in any case */
-      for (int c = 0; c < p->cells; ++c) memcpy(x->before + 3 * c, p->kept + POINT_KEPT * c, 3 * sizeof(double));
-    }
-  }
-}
-
 /* forces = sum of factors times vectors of loads */
 static void sum_loads(const dead_loads *l, const double *factors, double *forces)
 {
@@ -173,5 +121,8 @@ void begin_inelastic(void *self, const time_step *step, const double *q1, const 
     for (int k = 0; k < p->cells * p->of_cell; ++k) p->w[k * p->width + DT] = step->dt;
   }
   p->tried = p->predicts = 0;
-  if (t->cells) t->cells->latest[0] = NAN; /* compute the next response in any case */
+  inelastic *m = t->cells;
+  if (!m) return;
+  m->latest[0] = NAN; /* compute the next response in any case */
+  m->q0 = step->q0, m->q_before = step->q_before, m->ratio = step->ratio;
 }
