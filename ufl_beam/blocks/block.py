@@ -145,6 +145,7 @@ class Block(LoadTerm):
         in_time, functions = elements.in_time, len(elements.in_time)
         dofs = np.asarray(elements.dofs, dtype=np.int32).reshape(n, motions)
         loaded: Array = np.zeros(subdomain.size)
+        loads = n if kind == "loads" else 0
         if kind == "loads":  # all processes have blocks of loads
             loaded[dofs] = 1.0
             # Other processes may load degrees of freedom that this process owns.
@@ -158,12 +159,12 @@ class Block(LoadTerm):
         from_ = [np.broadcast_to(index[x], n) for x in (*statement.of_step, *statement.shared)]
         self._of_step = first + shares * groups
         numbers = np.array(elements.numbers, dtype=np.float64).reshape(len(statement.numbers), n).T
-        w = np.zeros((n, len(statement.inputs)))
-        modes = len(statement.all_modes)
-        after = w.shape[1] - modes - len(from_)
-        w[:, after - len(statement.numbers) : after] = numbers
-        self._w = in_batches(w, BATCH)
+        of_groups = np.broadcast_to(elements.groups, n)[: n if shares else 0]
+        width, modes = len(statement.inputs), len(statement.all_modes)
+        after = width - modes - len(from_)
+        self._w: Array = np.zeros((-(-n // BATCH), width, BATCH))
         self._numbers = self._w[:, after - len(statement.numbers) : after]
+        self._numbers[:] = in_batches(numbers, BATCH)
         self._states = np.zeros((len(self._w), states, BATCH))
         self.state = {z: self._states[:, k] for k, z in enumerate(statement.state)}
         batches, rows = len(self._w), motions + states + shares
@@ -177,7 +178,7 @@ class Block(LoadTerm):
         inserted = statement.inserts
         each, second = np.zeros((2, 0 if inserted else batches, made.force.outputs, BATCH))
         self.recorded: Array = np.zeros((n, len(statement.recorded)))
-        table = (rows + MOST_MARGINS) * (w.shape[1] + 1)
+        table = (rows + MOST_MARGINS) * (width + 1)
         self._out: Array = np.zeros((1 if inserted else batches) * BATCH * most)
         self._each = ffi.new("double *[1]", [doubles(each)]), each
         self._times, self._t = np.zeros((3, self._of_step)), np.full(2, float(t0))
@@ -193,18 +194,18 @@ class Block(LoadTerm):
             "element_block", force_of=made.force, tangent_of=made.tangent or ffi.NULL,
             end_of=made.end or ffi.NULL, lanes=BATCH, elements=n, batches=batches,
             unknowns=motions, rates=statement.rates, states=states, numbers=len(statement.numbers),
-            steps=len(from_), modes=modes, width=w.shape[1], dofs=in_batches(dofs, BATCH),
+            steps=len(from_), modes=modes, width=width, dofs=in_batches(dofs, BATCH),
             acting=np.full(1, batches, dtype=np.int32), batch=np.arange(batches, dtype=np.int32),
             ranges=len(statement.acts_at), range=in_batches(numbers[:, ranged], BATCH),
             size=len(self.dofs), dof=self.dofs,
-            at=in_batches(np.searchsorted(self.dofs, dofs).astype(np.int32), BATCH),
+            at=in_batches(np.searchsorted(self.dofs, dofs[:loads]).astype(np.int32), BATCH),
             entry=ffi.NULL if inserted else self._entries(made), functions=functions,
             when=np.array([TIMES.index(x.when) for x in in_time], dtype=np.int32), t=self._t,
             begun=self._begun,
             now=self._times[0], end=self._times[1], before=self._times[2],
             **{"from": in_batches(np.array(from_, dtype=np.int32).reshape(len(from_), n).T, BATCH)},
             state=self._states, w=self._w, out=self._out,
-            space=np.zeros(3 * motions + 2 + w.shape[1] + max(most, table)),
+            space=np.zeros(3 * motions + 2 + width + max(most, table)),
             each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
             weight_of_before=scheme.weight_of_before, stored=stored, lost=entered[0],
@@ -214,7 +215,7 @@ class Block(LoadTerm):
             energy=self._energy, nodal=self._nodal, groups=groups, shares=shares,
             kept=shares - len(statement.trial), shared=self._shared,
             new_shared=np.zeros(self._shared.shape), totals=ffi.new("int[]", self._shared.size),
-            group=in_batches(np.broadcast_to(elements.groups, n).astype(np.int32)[:, None], BATCH),
+            group=in_batches(of_groups.astype(np.int32)[:, None], BATCH),
             laws=statement.laws, scene=subdomain.numbering.scene.size, record=self.recorded,
             recorded=len(statement.recorded),
             recorded_kind=ffi.new("int[]", [*statement.recorded.values()]),
