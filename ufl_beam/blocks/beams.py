@@ -44,10 +44,10 @@ class BeamCell(StatementOnCell):
 
     In statics, nodes move along straight lines in an iteration, so rotating beams become longer
     than linearized strains predict.  In slender beams the axial forces of this error spoil the next
-    iteration.  The tangent therefore has the resultants of the linearized strains, the residual
-    those of the strains.  This is Newton's method for displacements and resultants as independent
-    unknowns of the functional, with the resultants eliminated.  It converges in few iterations at
-    any slenderness.
+    iteration.  The residual has the resultants of the strains, and the tangent has the resultants
+    of the linearized strains.  This is Newton's method for displacements and resultants as
+    independent unknowns of the functional, with the resultants eliminated.  It converges in few
+    iterations at any slenderness.
 
     Magisano, Leonetti and Garcea, Computer Methods in Applied Mechanics and Engineering 313 (2017).
 
@@ -83,13 +83,13 @@ class BeamCell(StatementOnCell):
         """In statics: motions at the latest tangent, and numbers of set_prediction in blocks.c."""
         return [*(f"about {x}" for x in self.unknowns), "moved", "reached"] if self.static else []
 
-    def points(self, at: Inputs) -> Iterator[SectionOfCell]:
+    def sections(self, at: Inputs) -> Iterator[SectionOfCell]:
         """Generate the sections at the Gauss points of the cell."""
         cell, mesh = Cell(self.degree, at), Mesh(degree=self.degree)
         for g, (s, weight) in enumerate(zip(mesh.points, mesh.point_weights, strict=True)):
             yield SectionOfCell(self, at, PointOfCell(cell, float(s)), g, float(weight))
 
-    def change(self, before: Sequence[Expr], now: Sequence[Expr], imposed: Expr) -> Expr:
+    def work_on_imposed(self, before: Sequence[Expr], now: Sequence[Expr], imposed: Expr) -> Expr:
         """Return the work of resultants, given before and in the step, on imposed strains; J/m."""
         a, pairs = self.scheme.weight_of_before, zip(before, now, strict=True)
         return ufl.dot(ufl.as_vector([a * x + (1 - a) * y for x, y in pairs]), imposed)
@@ -151,7 +151,7 @@ class ElasticCell(BeamCell):
         """See the base class."""
         C = ufl.as_vector([at[name] for name in STIFFNESS])
         forces, on_imposed, stored, lost = list[list[Expr]](), 0, 0, 0
-        for section in self.points(at):
+        for section in self.sections(at):
             e0, e1, length = section.e0, section.e1, section.length
 
             def resultants(e: Expr, e0: Expr = e0) -> list[Expr]:
@@ -165,7 +165,7 @@ class ElasticCell(BeamCell):
             stored += length * elastic_energy(e1, C)
             if self.scheme.alpha:
                 lost += length * 2 * at["alpha"] * elastic_energy(e1 - e0, C)  # P(90)
-            on_imposed += length * self.change(resultants(e0), own, section.imposed)
+            on_imposed += length * self.work_on_imposed(resultants(e0), own, section.imposed)
         return Equations(
             added(forces), stored={"stored": stored},
             lost={"numerical": lost} if self.scheme.alpha else {},
@@ -195,14 +195,14 @@ class InelasticCell(BeamCell):
 
     @property
     def modes(self) -> list[str]:
-        """In statics, those of the base class and resultants in the tangent; r, D."""
+        """Resultants r and their derivatives D; in statics also predicted resultants."""
         predicted = self._names("predicted") if self.static else []
         return [*super().modes, *predicted, *self._names("r"), *self._names("D", 9)]
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
         forces, on_imposed, strains, predicted = [], 0, [], []
-        for section in self.points(at):
+        for section in self.sections(at):
             first, e, r = 3 * section.g, section.e1, list[Expr]()
             for k in range(first, first + 3):
                 D = [at[f"D {3 * k + l}"] for l in range(3)]
@@ -213,7 +213,7 @@ class InelasticCell(BeamCell):
             predicted += [*section.predicted] if section.predicted is not None else []
             now = [at[f"r {k}"] for k in range(first, first + 3)]
             before = [at[f"before {k}"] for k in range(first, first + 3)] if self.state else now
-            on_imposed += section.length * self.change(before, now, section.imposed)
+            on_imposed += section.length * self.work_on_imposed(before, now, section.imposed)
         return Equations(
             added(forces), state={f"before {k}": at[f"r {k}"] for k in range(len(self.state))},
             supplied={"loads": -on_imposed} if self.functions else {},

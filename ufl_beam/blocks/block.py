@@ -229,7 +229,7 @@ class Block(LoadTerm):
             self.in_cells = [InCells(lambda: forces, elements.force_kind, elements.cells)]
 
     def _insert(self, made: Kernels, dofs: Index) -> None:
-        """Let C insert forces and tangents of cells as those of forms."""
+        """Insert forces and tangents of cells by the loops for forms."""
         elements, places = self._elements, places_in(self._A, dofs, BATCH)
         force = inserted_cells(made.force, self._w, dofs)
         tangent = inserted_cells(made.tangent, self._w, dofs, **places)

@@ -31,9 +31,9 @@ class OnCurve(OnConnector):
     """Point that is held on a curve C(s), without friction.
 
     The parameter s of the nearest point follows from the position, by Newton's method from the
-    parameter of the last iterate, a mode.  So the unknowns are those of other joints, and scales of
-    s do not matter.  The last two corrections are in the equation: their error is of fourth order
-    in that of the mode, so that first and second derivatives are exact.
+    parameter of the last iterate, a mode.  So a guide has the same unknowns as other joints, and
+    scales of s do not matter.  The last two corrections are in the equation: their error is of
+    fourth order in the error of the mode, so that first and second derivatives are exact.
 
     In schemes whose forces act over the step, the force is normal to the chord C(s1) - C(s0), and
     does no work.  Round-off spoils the direction of a short chord, so it is replaced by its series
@@ -88,7 +88,7 @@ class OnCurve(OnConnector):
         return [rows[0] - ufl.as_vector([at["x"], at["y"]]), *rows[1:]]
 
     def _corrected(self, at: Inputs, p: Expr, s: Expr) -> Expr:
-        """Return a parameter that is closer to that of the point nearest to ``p``."""
+        """Return a better parameter of the point nearest to ``p``, by Newton's method."""
         on, slope, bend = self._curve(at, s, 2)
         square = ufl.dot(slope, slope)
         curved = square - ufl.dot(p - on, bend)

@@ -187,9 +187,9 @@ class Statement(ABC):
     * ``axis``: undeformed axis along beams, see :class:`VirtualWork`; None at places,
     * ``work(forces)``: work of forces in the step, on q1 - q0, for the ledger of the scheme; J,
     * ``potential(name, energy)``: equations of a stored energy with its forces, a function
-      ``energy(q, numbers)``, whose error in the ledger is that of :class:`Potential`.
+      ``energy(q, numbers)``; its error in the ledger is the same as of :class:`Potential`.
 
-    The work of the forces must be what the statement stores, loses and supplies.  The names of
+    The work of the forces must equal the stored, lost and supplied energies.  The names of
     these energies are entries of the ledger: names of your own, or entries of the package for
     losses ("damping", "friction", ...), "stored", and "loads" for supplied energy.
 

@@ -89,7 +89,7 @@ class Element(dict[str, Any]):
         return {name: self.inputs[f"{name} {time}"] for name in self._statement.names}
 
     def motions(self, nodal: Sequence[Expr]) -> list[Expr]:
-        """Return the motions of the places from those of the nodes."""
+        """Return the motions of the places from motions of the nodes."""
         if self.axis:
             return [self.axis.field(nodal)]
         moved = [by_turning(x, q[2]) for x, q in zip(self._arms, nodal, strict=True)]

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Cells whose resultants are those of material points; see InelasticCells of blocks/beams.py. */
+/* Cells with material points, which compute the resultants; see InelasticCells of blocks/beams.py. */
 
 /* out = A x */
 static inline void multiply(const double *A, const double *x, double *out)
