@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Imports of the package: subpackages import downwards, and few modules import DOLFINx or PETSc."""
+"""Imports and calls of the package: both go downwards; few modules import DOLFINx or PETSc."""
 
 import ast
+import re
 import sys
 from functools import cache
 from pathlib import Path
@@ -25,6 +26,34 @@ SUBPACKAGES = [
 
 A module imports from its own subpackage and from those before it.
 """
+
+C_FILES = {
+    "compiled": "assembly loops",
+    "terms": "material_laws embedded_hinges material_points cell_forces term_phases",
+    "blocks": "blocks inelastic_cells energy_ledger",
+    "solvers": "beam_elimination fronts newton",
+    "simulation": "steps derivatives adjoint block_derivatives",
+    "analysis": "oscillators",
+}
+"""C files of ``compiled/c`` by the subpackage that they belong to."""
+
+BELONG_ELSEWHERE = {
+    "some_cells": "compiled", "turn_axes": "compiled", "keep_state": "output",
+    **dict.fromkeys(["accept_dead_loads", "accept_inertia", "accept_rayleigh"], "terms"),
+    **dict.fromkeys(["accept_tangent_damping", "add_kinetic_energy", "product_with"], "terms"),
+}  # fmt: skip
+"""C functions that belong to another subpackage than their file."""
+
+STEPS = {
+    *("take_steps", "step_or_subdivide", "attempt_step", "accept_step"),
+    *("solve_begun_step", "repeat_steps", "take_back"),
+}
+"""C functions by which Python enters a step."""
+
+C_FUNCTION = re.compile(
+    r"^[a-z][\w *]*?(\w+)\([^;{}]*\)\s*\{(?:([^\n]*)\}$|\n(.*?)^\})", re.M | re.S
+)
+"""Definition of a function in C: its name, and its body in the same line or in several."""
 
 MOST_DEPTH = 22
 """Longest chain of imports at most."""
@@ -83,6 +112,38 @@ def reach(module):
     return found
 
 
+@cache
+def c_functions():
+    """Subpackage of each C function, and names that it calls, apart from calls of addresses."""
+    found = {}
+    for name, files in C_FILES.items():
+        for file in files.split():
+            text = (PACKAGE / "compiled" / "c" / f"{file}.c").read_text(encoding="utf-8")
+            text = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+            for function, line, lines in C_FUNCTION.findall(text):
+                calls = set(re.findall(r"(?<![\w.>])(\w+)\(", line or lines))
+                found[function] = BELONG_ELSEWHERE.get(function, name), calls
+    return {name: (of, calls & {*found}) for name, (of, calls) in found.items()}
+
+
+@cache
+def used_in_c(module):
+    """C functions that a module calls or passes to C by name, with repetitions."""
+    names = re.findall(
+        r"\blib\.(\w+)|\bloop\(\s*\"(\w+)\"", FILES[module].read_text(encoding="utf-8")
+    )
+    return [name for pair in names for name in pair if name in c_functions()]
+
+
+@cache
+def ways(function):
+    """Subpackages on each chain of calls that begins with a C function."""
+    of, calls = c_functions()[function]
+    return {(of,)} | {
+        way if way[0] == of else (of, *way) for x in calls - {function} for way in ways(x)
+    }
+
+
 def test_modules_and_their_imports_are_found():
     assert {"mechanics.kinematics", "model.scene", "simulation.simulation"} <= {*FILES}
     assert "dolfinx" in outside("dolfinx_compat")
@@ -97,6 +158,45 @@ def test_modules_import_no_higher_subpackage(module):
     assert known <= {*FILES}
     above = SUBPACKAGES[SUBPACKAGES.index(subpackage(module)) + 1 :]
     assert [other for other in known if subpackage(other) in above] == []
+
+
+def test_each_c_file_belongs_to_a_subpackage():
+    tree = ast.parse(FILES["compiled.c_library"].read_text(encoding="utf-8"))
+    sources = next(
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "SOURCES"
+    )
+    assert sorted(" ".join(C_FILES.values()).split()) == sorted(sources)
+    assert {*BELONG_ELSEWHERE, *STEPS, "newton", "add_block", "update_ghosts"} <= {*c_functions()}
+
+
+def test_c_functions_call_no_higher_subpackage():
+    for function, (of, calls) in c_functions().items():
+        above = SUBPACKAGES[SUBPACKAGES.index(of) + 1 :]
+        assert [x for x in calls if c_functions()[x][0] in above] == [], function
+
+
+@pytest.mark.parametrize("module", FILES)
+def test_modules_use_c_functions_of_no_higher_subpackage(module):
+    above = SUBPACKAGES[SUBPACKAGES.index(subpackage(module)) + 1 :]
+    assert [x for x in used_in_c(module) if c_functions()[x][0] in above] == []
+
+
+def test_a_step_enters_each_subpackage_once():
+    """From one place of Python, a chain of calls of C enters each subpackage once.
+
+    Steps and Newton's method call terms and blocks by their addresses, see `loop`.
+    """
+    entries = [(x, subpackage(m)) for m in FILES for x in used_in_c(m) if x in STEPS]
+    assert sorted(entries) == [(x, "simulation") for x in sorted(STEPS)]
+    chains = ways("take_steps")
+    assert ("simulation", "solvers", "compiled") in chains
+    by_address = {x for m in FILES if subpackage(m) in ("terms", "blocks") for x in used_in_c(m)}
+    below = {way for x in by_address for way in ways(x)}
+    assert {("blocks", "terms"), ("terms", "compiled")} <= below
+    assert {of for way in below for of in way} == {"compiled", "terms", "blocks"}
+    assert [way for way in chains | below if len(way) > len({*way})] == []
 
 
 def test_imports_have_no_cycles():

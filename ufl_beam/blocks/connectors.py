@@ -146,7 +146,7 @@ class OnConnector(Statement):
         e0, e1, rates, variations = (list[Expr]() for _ in range(4))
         for k, motion in enumerate(self.motions):
             none, names = dict.fromkeys(PLACES, 0.0), [f"{name} {k}" for name in PLACES]
-            given = none.values() if motion == "turning" else [at[name] for name in names]
+            given = none.values() if motion in WITHOUT_PLACES else [at[name] for name in names]
             geometry = Geometry(*map(ufl.as_vector, np.reshape([*given], (-1, 2)).tolist()))
             before, _ = MOTIONS[motion](q0, q0, w, geometry, self.scheme)
             now, variation = MOTIONS[motion](q0, q1, w, geometry, self.scheme)

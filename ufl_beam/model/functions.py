@@ -378,8 +378,8 @@ def value_at(function: TimeFunction, t: float, owner: object) -> float:
         ModelError: The value is not a number.
     """
     value = function(t)
-    if type(value) is not float:
+    if not isinstance(value, float):  # np.float64 is a float
         value = require_returned(value, f"{owner}: the time function", f"t = {t:.9g} s")
     if not math.isfinite(value):
         raise NoNumber(f"{owner}: the time function is {value} at t = {t:.9g} s")
-    return value
+    return float(value)

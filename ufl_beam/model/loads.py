@@ -457,6 +457,7 @@ class Rayleigh(Record):
     mass: NotNegative = 0.0
     stiffness: NotNegative = 0.0
     tangent: Switch = False
+    beams: ClassVar[None] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -45,7 +45,6 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import (
     LOADS,
     Damping,
-    KelvinVoigt,
     Load,
     LoadAlongBeam,
     LoadAtPlace,
@@ -262,9 +261,8 @@ class Scene(Record, Rich):
             for member in velocity.beams:
                 yield "Velocity", member.middle if isinstance(member, Body) else member.start
         for damping in self.damping:
-            if isinstance(damping, KelvinVoigt):
-                for beam in damping.beams or ():
-                    yield "KelvinVoigt", beam.start
+            for beam in damping.beams or ():
+                yield type(damping).__name__, beam.start
         for work in self.works:
             yield from ((work, beam.start) for beam in work.beams or ())
             yield from ((work, place) for place in work.places)
