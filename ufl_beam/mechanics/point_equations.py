@@ -46,9 +46,8 @@ def inputs(section_points: SectionPoints) -> tuple[str, ...]:
         section_points.softening.parameters() if section_points.softening is not None else {}
     )
     return (
-        *names("point_input"),
+        *names("point_input"), *prefixed("state", law.variables),
         *rows(law, "strain"), *rows(law, "before"), *rows(law, "stiffness"),
-        *prefixed("state", law.variables),
         *(prefixed("new", law.variables) if law.solves else ()),
         *prefixed("number", parameters), *prefixed("softening", softening),
     )  # fmt: skip

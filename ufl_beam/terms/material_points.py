@@ -31,12 +31,12 @@ from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
 from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms, with_shared_nodes
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.point_equations import End, PointEquations, curved, inputs, prefixed, rows
-from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
+from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Kind, SectionPoints
 from ufl_beam.model.material_law import traced
@@ -66,6 +66,9 @@ EXHAUSTED = 1e-6
 
 At this resistance an exponential law has the same fraction of its fracture energy left.
 """
+
+UNLIMITED = 1e300
+"""Traction above which a point has no limit."""
 
 FREED_STIFFNESS = 1e-30
 """Factor of the stiffness of such a hinge; the frequency of its motion is zero to round-off."""
@@ -107,7 +110,7 @@ class PointForms:
         law: Stresses and their derivatives with respect to strains.  A law that solves for its
             variables has more outputs, see improve_sized in material_laws.c.
         resistance: Resistance of the discontinuity, and its derivative with respect to the growth.
-        end: ``point_output`` of loops.h, stresses, and changes of the variables.
+        end: ``point_output`` of loops.h, the new state, and stresses.
         own: Dissipation of a law that must dissipate, and the size of its terms; else null.
     """
 
@@ -141,16 +144,41 @@ class PointForms:
                     *outputs,
                     *self._derivatives(stress, unknown),
                 ]
-            *energies, stress, changes = equations.end(at)
+            end = self._at_end(at)
             self.own = ffi.NULL
             if law.must_dissipate:
                 stored = ufl.as_ufl(equations.stored(at))
                 slopes = tuple(self._derivatives((stored,), unknown))
                 self.own = pointwise.compile(*equations.own_dissipation(at, slopes))
         self.law = pointwise.compile(*outputs)
-        end = in_order("point_output", dict(zip(End._fields, energies, strict=False)))
-        self.end = pointwise.compile(*end, *stress, *changes)
-        self._outputs = outputs, [*end, *stress, *changes]
+        self.end = pointwise.compile(*end)
+        self._outputs = outputs, end
+
+    def _at_end(self, at: At) -> list[Expr]:
+        """Return energies, the new state, and stresses at the end of a step.
+
+        The mean stress of each step of a broken point is zero, but stresses at the ends of steps
+        might alternate about zero.  So the discontinuity takes over the elastic strain, which
+        nothing holds any more, and its energy is released.
+        """
+        end, length = self._equations.end(at), at["length"]
+        elastic, released, (*stress,) = end.elastic, end.nonlinear_loss, end.stress
+        traction, jump = at["traction"], at["jump"] + at["direction"] * at["growth"]
+        if self._softening is not None:
+            holds = ufl.gt(end.resistance, 0.0)
+            jump += ufl.conditional(holds, 0.0, stress[0] / at["stiffness"] * length)
+            elastic = ufl.conditional(holds, end.elastic, end.left)
+            released += end.elastic - elastic
+            stress[0] = ufl.conditional(holds, stress[0], 0.0)
+            traction = ufl.conditional(ufl.lt(traction, UNLIMITED), end.resistance, traction)
+        energies = {
+            "worked": end.worked, "broken": end.broken / length, "lost": end.lost,
+            "elastic": elastic, "hardening": end.hardening, "released": released,
+            "relaxed": end.relaxed,
+        }  # fmt: skip
+        changes = zip(prefixed("state", self._kind.law.variables), end.changes, strict=True)
+        state = traction, jump, at["opening"] + at["growth"], *(at[n] + x for n, x in changes)
+        return [*map(ufl.as_ufl, (*in_order("point_output", energies), *state, *stress))]
 
     @cached_property
     def loops(self) -> dict[str, Any]:
@@ -175,21 +203,22 @@ class PointForms:
             ``point_derivatives`` of loops.h.
         """
         inputs, equations, law = self._pointwise.at, self._equations, self._kind.law
-        fixed = "direction", "traction", "flows", "theta", "dt"
+        fixed = "direction", "flows", "theta", "dt"
         new = prefixed("new", law.variables) if law.solves else ()
         first = ("growth", *new)
         by = [*first, *(name for name in inputs if name not in (*fixed, *first))]
         at = inputs | {name: ufl.variable(inputs[name]) for name in by}
         with traced(law):
             stress = tuple(map(ufl.as_ufl, equations.stress(at)))
-            end = equations.end(at)
+            end = self._at_end(at)
+            changes = equations.end(at).changes
             unknowns = tuple(map(ufl.as_ufl, equations.residuals(at))) if law.solves else ()
         if self._softening is not None:
             with traced(self._softening):
                 resistance = equations.resistance(at, at["growth"])
             unknowns = (at["direction"] * stress[0] - resistance, *unknowns)
-        ends = *end.changes, ufl.as_ufl(end.stress[0]), ufl.as_ufl(end.resistance)
-        answers = [*stress, *map(ufl.as_ufl, end.changes), *unknowns]
+        ends = end[lib.POINT_OUTPUTS : -len(stress)]
+        answers = [*stress, *map(ufl.as_ufl, changes), *unknowns]
         conditions = margins(with_shared_nodes(answers))
         outputs = (*stress, *ends, *unknowns, *conditions)
         derivatives = [ufl.diff(ufl.as_ufl(f), at[name]) for f in outputs for name in by]
@@ -248,11 +277,7 @@ class Points:
         recorded: For each cell: (N, V, M) in the accepted state, the jump of the last point, and
             the energies that plastic strains and discontinuities have dissipated since the
             beginning; (cells, 6); N, N, N m, rad or m, J, J.
-        sums: Seven sums over all cells; J.  Energies in the accepted state: (3) elastic, (4) stored
-            by hardening.  Energies lost in the last step: (0) by plastic strains, (1) by
-            discontinuities, (2) numerically if θ were 1, (5) numerically, see :func:`releases`.
-            (6) For points whose stress relaxes in the last step: work of the mean stress on plastic
-            strains minus the work of the end stress.
+        sums: Sums of ``point_output`` of loops.h over all cells, in the last step; J.
     """
 
     def __init__(
@@ -297,14 +322,13 @@ class Points:
             self._update_resistance()
 
         self.recorded = np.zeros((cells, int(lib.POINT_KEPT)))
-        self.sums = np.zeros(int(lib.POINT_SUMS))
+        self.sums = np.zeros(int(lib.POINT_OUTPUTS))
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
         self.over = np.zeros(1)
         self.committed: Array | None = None
 
         self._forms = forms = _point_forms(self.names, section_points.kind, softening, scheme)
-        self._dynamic = has_inertia(scheme)
         arrays = {
             "B": section_points.strains,
             "weight": section_points.weights,
@@ -483,7 +507,7 @@ class Points:
 
     def accept(self) -> None:
         """Accept the strains of the latest response."""
-        lib.commit(self.c)
+        lib.end_points(self.c, self.c.sum, 1)
 
     def dissipation(self) -> float:
         """Return the energy that :meth:`accept` would add to the dissipated energies; J.
@@ -491,21 +515,12 @@ class Points:
         A plastic dissipation within the round-off of the elastic energies counts as zero, because
         laws may compute it as a difference of energies.
         """
-        copy = self._copy()
-        lib.commit(copy)
-        plastic, broken = copy.sum[0], copy.sum[1]
+        lib.end_points(self.c, doubles(sums := np.zeros_like(self.sums)), 0)
+        plastic, broken = sums[: lib.LOST]
         size, volume = 0.0, self._section_points.weights * self["length"]
         for C, *ends in zip(*map(self._rows, ("stiffness", "strain", "before")), strict=True):
             size += sum(float(np.sum(volume * self[C] * self[e] ** 2)) for e in ends)
         return float(broken + (plastic if abs(plastic) > DIGITS * size else 0.0))
-
-    def _copy(self) -> Any:
-        """Return ``points`` of loops.h with the latest response and its own copy of the state."""
-        copy = ffi.new("points *", self.c[0])
-        return fill(
-            copy, e0=self._e0.copy(), w=self._storage.copy(), kept=self.recorded.copy(),
-            sum=self.sums.copy(),
-        )  # fmt: skip
 
     def freeze(self) -> None:
         """Make all points elastic from now on; discontinuities without resistance are free.
@@ -526,21 +541,19 @@ class Points:
     # -- the ledger ----------------------------------------------------------------------------
 
     def in_steps(self, ledger: Ledger) -> dict[str, Any]:
-        """Return fields of ``inelastic_term`` of loops.h, with entries of the ledger.
-
-        In statics the fields include a copy of the points, with which C computes the change of
-        energy in a step before the step is accepted.
-        """
+        """Return fields of ``inelastic_term`` of loops.h, with entries of the ledger."""
         state, lost = ledger.state, ledger.lost
-        kinds = {
-            "stored": (True, state, "stored"), "hardening": (self._yields, state, "hardening"),
-            "plastic": (self._yields, lost, "plastic"), "hinges": (self.softens, lost, "hinges"),
-            "numerical": (bool(self._alpha), lost, "numerical"),
-            "released": (self._releases, lost, "numerical"),
-        }  # fmt: skip
-        pointers = {k: account.pointer(name) for k, (has, account, name) in kinds.items() if has}
-        copy = {} if self._dynamic else {"copy": self._copy()}
-        return {"dt": self.dt, "alpha": self._alpha, **pointers, **copy}
+        entries = {
+            "worked": self._yields and lost.pointer("plastic"),
+            "broken": self.softens and lost.pointer("hinges"),
+            "lost": self._alpha and lost.pointer("numerical"),
+            "elastic": state.pointer("stored"),
+            "hardening": self._yields and state.pointer("hardening"),
+            "released": self._releases and lost.pointer("numerical"),
+            "relaxed": None,
+        }
+        entry = [pointer or ffi.NULL for pointer in in_order("point_output", entries)]
+        return {"dt": self.dt, "alpha": self._alpha, "entry": entry}
 
     # -- the state -----------------------------------------------------------------------------
 

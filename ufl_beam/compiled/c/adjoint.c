@@ -132,12 +132,12 @@ static double answer_at_end(const points *p, double *inputs, double *s)
 static double step_of_input(const point_derivatives *m, int parameters, const double *w, size_t at, int j)
 {
   const points *p = m->points;
-  const int d = p->components, z = p->strain + 3 * d;
+  const int d = p->components;
   double size = 0;
   if (j == GROWTH || (p->solves && j >= m->unknown && j < m->unknown + p->variables)) return 0;
   if (j >= p->strain && j < p->strain + 2 * d)
     for (int a = 0; a < 2 * d; ++a) size = fmax(size, fabs(w[p->strain + a]));
-  else if (j == JUMP || j == OPENING || j == TRACTION || (j >= z && j < z + p->variables)) size = fabs(w[j]);
+  else if (j >= TRACTION && j < POINT_INPUTS + p->variables) size = fabs(w[j]);
   else {
     const size_t all = (size_t)p->cells * p->of_cell * p->width;
     for (int q = 0; q < parameters; ++q) size = fmax(size, m->step[q] * fabs(m->w[q * all + at + j]));
@@ -204,8 +204,8 @@ void transpose_points_state(void *self, adjoint *a)
 {
   const point_derivatives *m = self;
   const points *p = m->points;
-  const int d = p->components, width = p->width;
-  double out[POINT_OUTPUTS + 3 + MOST_VARIABLES], *x = a->values;
+  const int d = p->components, width = p->width, states = POINT_INPUTS - TRACTION + p->variables;
+  double *x = a->values;
   memcpy(m->e1, m->e0_bar, 3 * (size_t)p->cells * sizeof *m->e1);
   memset(m->e0_bar, 0, 3 * (size_t)p->cells * sizeof *m->e0_bar);
   for (int c = 0; c < p->cells; ++c) {
@@ -214,18 +214,10 @@ void transpose_points_state(void *self, adjoint *a)
     for (int i = 0; i < p->of_cell; ++i) {
       const size_t k = c * p->of_cell + i;
       double *w = p->w + k * width, *w_bar = m->w_bar + k * width;
-      const double *J = m->J + k * m->outputs, *state = w_bar + p->strain + 3 * d;
+      const double *J = m->J + k * m->outputs;
       memset(x, 0, width * sizeof *x);
-      for (int j = 0; j < p->variables; ++j) add_row(m, J, d + j, state[j], x);
-      x[GROWTH] += w[DIRECTION] * w_bar[JUMP] + w_bar[OPENING];
-      if (w[TRACTION] < INFINITY) {
-        ask(p->end, w, POINT_OUTPUTS + d + p->variables, out);
-        if (out[RESISTANCE] == 0) {
-          const double C = w[p->strain + 2], L = w[LENGTH], s = out[POINT_OUTPUTS], bar = w_bar[JUMP];
-          add_row(m, J, d + p->variables, bar * L / C, x);
-          x[LENGTH] += bar * s / C, x[p->strain + 2] -= bar * s * L / (C * C);
-        }
-      }
+      for (int j = 0; j < states; ++j) add_row(m, J, d + j, w_bar[TRACTION + j], x);
+      memset(w_bar + TRACTION, 0, states * sizeof *x);
       if (m->tangents) transpose_tangent(m, a->parameters, c, i, sum_bar, x);
       remove_unknowns(m, w, J, x);
       enter_point(m, c, i, x, m->e1);

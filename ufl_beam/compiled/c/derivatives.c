@@ -138,7 +138,8 @@ static void differentiate_points(const point_derivatives *m, const derivatives *
   const int d = p->components, width = p->width, per_cell = p->of_cell, one = 3 * d * per_cell;
   const double θ = p->theta, *B = p->B;
   double *dw = m->w + (size_t)q * p->cells * per_cell * width, *de0 = m->e0 + (size_t)q * 3 * p->cells;
-  double *w = p->w, *J = m->J, out[POINT_OUTPUTS + 3 + MOST_VARIABLES];
+  double *w = p->w, *J = m->J, state[POINT_INPUTS + MOST_VARIABLES];
+  const int states = POINT_INPUTS - TRACTION + p->variables;
   for (int c = 0; c < p->cells; ++c) {
     const double *e0 = p->e0 + 3 * c, *e1 = p->e1 + 3 * c, *de = de1 + 3 * c;
     for (int k = 0; dr && k < 3; ++k) {
@@ -162,27 +163,16 @@ static void differentiate_points(const point_derivatives *m, const derivatives *
       }
       if (!end) continue;
       /* All derivatives are by the inputs before the step; these are updated afterwards. */
-      double change[MOST_VARIABLES], traction = dw[TRACTION], released = 0;
       const int place = c * per_cell + i;
-      for (int j = 0; j < p->variables; ++j) change[j] = along(m, J, d + j, dw);
+      for (int j = 0; j < states; ++j) state[j] = along(m, J, d + j, dw);
       for (int k = 0; k < m->margins; ++k)
         note_margin(of, q, place, J[m->outputs - m->margins + k], along(m, J, m->margin + k, dw));
       if (w[TRACTION] < INFINITY) {
         const double stress = J[m->outputs - d - m->margins];
         if (w[DIRECTION] != 0) note_margin(of, q, place, w[GROWTH], dw[GROWTH]);
         else note_margin(of, q, place, fabs(stress) - w[TRACTION], copysign(1, stress) * along(m, J, 0, dw) - dw[TRACTION]);
-        traction = along(m, J, d + p->variables + 1, dw);
-        ask(p->end, w, POINT_OUTPUTS + d + p->variables, out);
-        if (out[RESISTANCE] == 0) { /* see commit: the discontinuity takes over the elastic strain */
-          const double C = w[p->strain + 2], L = w[LENGTH], dC = strain[2], dL = dw[LENGTH];
-          const double s = out[POINT_OUTPUTS], ds = along(m, J, d + p->variables, dw);
-          released = (ds * L + s * dL) / C - s * L * dC / (C * C);
-        }
       }
-      for (int j = 0; j < p->variables; ++j) strain[3 * d + j] += change[j];
-      dw[JUMP] += w[DIRECTION] * dw[GROWTH] + released;
-      dw[OPENING] += dw[GROWTH];
-      dw[TRACTION] = traction;
+      memcpy(dw + TRACTION, state, states * sizeof *state);
       for (int a = 0; a < d; ++a) strain[d + a] = strain[a];
       dw[GROWTH] = 0;
     }

@@ -68,42 +68,37 @@ void accept_tangent_damping(void *self, const time_step *step, const double *q1,
 static void respond_in_term(const inelastic_term *t, const double *q)
 {
   if (t->cells) respond_at(t->cells, q);
-  else {
-    respond_springs(t->springs, q);
-  }
+  else respond_springs(t->springs, q);
 }
 
 void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
-  const double *sum = t->points->sum;
+  points *p = t->points;
   respond_in_term(t, q1);
-  if (t->points->committed) keep_tangents(t->points);
-  commit(t->points);
-  if (t->plastic) *t->plastic += sum[0];
-  if (t->hinges) *t->hinges += sum[1];
-  if (t->numerical) *t->numerical += 2 * t->alpha * sum[2];
-  if (t->released) *t->released += sum[5];
+  if (p->committed) keep_tangents(p);
+  end_points(p, p->sum, 1);
+  for (int k = 0; k < POINT_OUTPUTS; ++k)
+    if (t->entry[k] && k != ELASTIC && k != HARDENING) *t->entry[k] += (k == LOST ? 2 * t->alpha : 1) * p->sum[k];
 }
 
 void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
-  *t->stored += t->points->sum[3];
-  if (t->hardening) *t->hardening += t->points->sum[4];
+  for (int k = ELASTIC; k <= HARDENING; ++k)
+    if (t->entry[k]) *t->entry[k] += t->points->sum[k];
 }
 
 /* Energy that points store and dissipate in a step to q1. */
 static double change_by_response(const inelastic_term *t, const double *q1)
 {
-  const points *p = t->points, *copy = t->copy;
+  const double *before = t->points->sum;
+  double after[POINT_OUTPUTS], change = 0;
   respond_in_term(t, q1);
-  memcpy(copy->w, p->w, (size_t)p->cells * p->of_cell * p->width * sizeof *p->w);
-  memcpy(copy->e0, p->e0, 3 * (size_t)p->cells * sizeof *p->e0);
-  memcpy(copy->kept, p->kept, POINT_KEPT * (size_t)p->cells * sizeof *p->kept);
-  commit(t->copy);
-  const double *after = copy->sum, *before = p->sum;
-  return after[0] + after[1] + (after[3] - before[3]) + (after[4] - before[4]) + after[5] + after[6];
+  end_points(t->points, after, 0);
+  for (int k = 0; k < POINT_OUTPUTS; ++k)
+    if (k != LOST) change += after[k] - (k == ELASTIC || k == HARDENING ? before[k] : 0);
+  return change;
 }
 
 /* Energy that connectors of a block take: the work of their forces, by the rule with which all forces of a static step

@@ -171,29 +171,29 @@ void watch_step(const watch *w, int now, double t, const double *before, const d
 
 /* Python reads the names in these enums in their order; the last name is their number. */
 
-/* The first inputs of the law of a point. Further inputs begin at the index `strain` of `points`:
- * strains at the end of the step, strains before the step, and stiffnesses, `components` of each;
- * `variables` before the step; if `solves`, the variables at the end of the step, which are unknowns;
- * and parameters of the law. */
+/* The first inputs of the law of a point. `variables` before the step follow, which belong to the state. Further
+ * inputs begin at the index `strain` of `points`: strains at the end of the step, strains before the step, and
+ * stiffnesses, `components` of each; if `solves`, the variables at the end of the step, which are unknowns; and
+ * parameters of the law. */
 enum point_input {
-  GROWTH, DIRECTION,             /* of an iterate */
-  TRACTION, JUMP, OPENING, FLOWS, /* the state before the step */
-  LENGTH, THETA, DT,
+  GROWTH, DIRECTION, /* of an iterate */
+  FLOWS, LENGTH, THETA, DT,
+  TRACTION, JUMP, OPENING, /* the state before the step */
   POINT_INPUTS
 };
 
 /* FLOWS: the jump did not grow in the last step, grew in the last step, may grow in this step. */
 enum { CLOSED, FLOWING, MAY_OPEN };
 
-/* Outputs of a point at the end of a step; stresses and changes of variables follow. */
-enum point_output {
-  WORKED, BROKEN, LOST, ELASTIC, HARDENING, RELAXED, RESISTANCE, LEFT, NONLINEAR_LOSS,
-  POINT_OUTPUTS
-};
+/* Energies of a point at the end of a step, J/m³; the new state from TRACTION on, and stresses follow. Energies of
+ * the state are stored elastically and by hardening. Energies of the step are dissipated by plastic strains and by
+ * the discontinuity; lost numerically if theta were 1; released by breaking and by the error of steps for nonlinear
+ * elasticity; and the excess of the work of mean stresses on plastic strains over that of smaller end stresses. */
+enum point_output { WORKED, BROKEN, LOST, ELASTIC, HARDENING, RELEASED, RELAXED, POINT_OUTPUTS };
 
 enum { MOST_VARIABLES = 16, MOST_CORRECTIONS = 100 }; /* of a law */
 
-enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a section in `kept`, numbers in `sum`, see commit */
+enum { POINT_KEPT = 6 }; /* numbers of a section in `kept`, see end_points */
 
 extern const double NO_ENERGY; /* relative size below which dissipation counts as zero */
 
@@ -262,7 +262,7 @@ void respond_at(const inelastic *m, const double *q);
 void put_tangents(const inelastic *m);
 int gives_energy(const points *p);
 void keep_tangents(const points *p);
-void commit(points *p);
+void end_points(points *p, double *sum, int accepts);
 
 /* -- elimination along chains ------------------------------------------------------------------ */
 
@@ -764,8 +764,7 @@ typedef struct inelastic_term {
   inelastic *cells;             /* or none */
   const element_block *springs; /* or none */
   double alpha, *dt;
-  points *copy; /* in statics: space for the points in the state at the end of a step */
-  double *plastic, *hinges, *numerical, *released, *stored, *hardening;
+  double *entry[POINT_OUTPUTS]; /* of the ledger, for each energy; or none */
 } inelastic_term;
 
 /* Forces of laws of a user, watched for changes of direction at every step; see controllers.py. */
@@ -980,9 +979,8 @@ typedef struct {
 } form_derivative;
 
 /* Derivatives of material points by all their inputs. The columns of a table are the growth, the
- * variables that a law solves for, then the other inputs; its rows are the stresses, the changes of the
- * variables, the stress and the resistance at the end of the step, the equations of the unknowns, and the
- * margins of the conditions in the law. The stresses and the margins follow. */
+ * variables that a law solves for, then the other inputs; its rows are the stresses, the new state, the
+ * equations of the unknowns, and the margins of the conditions in the law. The stresses and the margins follow. */
 typedef struct {
   points *points;
   kernel *table;

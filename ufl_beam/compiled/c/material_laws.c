@@ -70,7 +70,7 @@ static inline int improve_sized(int m, int d, const points *p, double *w, double
 {
   enum { M = MOST_VARIABLES };
   const int all = m * (1 + m + d) + d * (1 + d + m);
-  double *z = w + p->strain + 3 * d + m, x[M], sizes[M], a[M * (1 + M + 3) + 3 * (1 + 3 + M)];
+  double *z = w + p->strain + 3 * d, x[M], sizes[M], a[M * (1 + M + 3) + 3 * (1 + 3 + M)];
   double J[M * M], B[M * 4];
   ask(p->law, w, all, a);
   for (int corrections = 0;; ++corrections) {
@@ -167,10 +167,10 @@ enum { NEARBY = 2 };
 static void solve_law(const points *p, double *w, double *s)
 {
   const int m = p->variables, d = p->components;
-  double *z = w + p->strain + 3 * d + m;
+  double *z = w + p->strain + 3 * d;
   const int found = p->tried ? improve(p, w, s) : 0, near = found <= 1 + NEARBY || !p->own;
   if (found && (near || own_dissipation(p, w) >= -NO_ENERGY)) return;
-  memcpy(z, z - m, m * sizeof *z);
+  memcpy(z, w + POINT_INPUTS, m * sizeof *z);
   if (improve(p, w, s)) return;
   for (int i = 0; i < d + d * d; ++i) s[i] = NAN;
 }

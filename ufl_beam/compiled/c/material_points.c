@@ -61,7 +61,7 @@ static const double ALIKE = 0.01, DIGITS = 1e-9;
 static double follow_prediction(const points *p, double *w, double linear, const double *known,
                                 const double *line, double *s)
 {
-  double *strain = w + p->strain, *z = strain + 3 + p->variables, now[2], kept[MOST_VARIABLES];
+  double *strain = w + p->strain, *z = strain + 3, now[2], kept[MOST_VARIABLES];
   const double start = *strain, elastic = strain[2], beside = BESIDE_STRESS * p->theta * elastic;
   const double first = line ? s[0] - line[1] - line[2] * (start - line[0]) : 0;
   if (line && !(fabs(first) > elastic * (ALIKE * fabs(start - line[0]) + DIGITS * fabs(start)))) return 0;
@@ -235,67 +235,46 @@ void keep_tangents(const points *p)
   }
 }
 
-/* Accept the end of the step as the new state.
+/* Energies of all points at the end of the step, see point_output. If `accepts`, the end becomes the new state.
  *
  * `kept` of a section has its resultants (3), the jump of its last point, and the dissipation by
- * plastic strains and by discontinuities. `sum` gets, over all sections: these dissipations in the
- * step; the numerical loss at theta = 1; the elastic energy and the energy stored by hardening; the
- * energy released by breaking points and the error of steps for nonlinear elasticity; the excess of
- * the work of mean stresses on plastic strains over that of smaller end stresses.
+ * plastic strains and by discontinuities.
  */
-void commit(points *p)
+void end_points(points *p, double *sum, int accepts)
 {
-  double own[POINT_OUTPUTS + 3 + MOST_VARIABLES], *s = own, *e0 = p->e0, *w = p->w, *kept = p->kept, *sum = p->sum;
-  const double *e1 = p->e1, *rest = p->rest, *length = p->length, *weight = p->weight;
-  const int d = p->components, answers = POINT_OUTPUTS + d + p->variables;
-  memset(sum, 0, POINT_SUMS * sizeof *sum);
-  for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, kept += POINT_KEPT) {
-    double plastic = 0, broken = 0;
+  double own[POINT_OUTPUTS + POINT_INPUTS + MOST_VARIABLES + 3], *s = own, *w = p->w, *kept = p->kept;
+  const int d = p->components, states = POINT_INPUTS - TRACTION + p->variables, answers = POINT_OUTPUTS + states + d;
+  memset(sum, 0, POINT_OUTPUTS * sizeof *sum);
+  for (int c = 0; c < p->cells; ++c, kept += POINT_KEPT) {
+    const double *e1 = p->e1 + 3 * c, length = p->length[c];
+    double *e0 = p->e0 + 3 * c, r[3], plastic = 0, broken = 0;
     for (int k = 0; k < 3; ++k) {
-      double change = e1[k] - e0[k];
-      kept[k] = rest[k] * e1[k];
-      sum[2] += rest[k] * change * change / 2 * length[c];
-      sum[3] += rest[k] * e1[k] * e1[k] / 2 * length[c];
-      e0[k] = e1[k];
+      const double rest = p->rest[k], change = e1[k] - e0[k];
+      r[k] = rest * e1[k];
+      sum[LOST] += rest * change * change / 2 * length;
+      sum[ELASTIC] += rest * e1[k] * e1[k] / 2 * length;
     }
     if (p->end_loop) p->end_loop(p->of_cell, w, p->answers);
     for (int i = 0; i < p->of_cell; ++i, w += p->width) {
-      const double volume = weight[i] * length[c];
-      double *strain = w + p->strain;
+      const double volume = p->weight[i] * length;
       if (p->end_loop) s = p->answers + answers * i;
       else ask(p->end, w, answers, s);
-      const double *stress = s + POINT_OUTPUTS, *changes = stress + d;
-      for (int a = 0; a < d; ++a) strain[d + a] = strain[a];
-      for (int j = 0; j < p->variables; ++j) strain[3 * d + j] += changes[j];
-      w[JUMP] += w[DIRECTION] * w[GROWTH];
-      w[OPENING] += w[GROWTH];
+      const double *state = s + POINT_OUTPUTS, *stress = state + states;
+      for (int k = 0; k < POINT_OUTPUTS; ++k) sum[k] += volume * s[k];
+      plastic += volume * s[WORKED], broken += volume * s[BROKEN];
+      for (int a = 0; a < d; ++a)
+        for (int k = 0; k < 3; ++k) r[k] += p->weight[i] * stress[a] * p->B[3 * (d * i + a) + k];
+      if (!accepts) continue;
+      double *strain = w + p->strain;
+      memcpy(strain + d, strain, d * sizeof *w);
+      memcpy(w + TRACTION, state, states * sizeof *w);
       w[FLOWS] = w[GROWTH] > 0 ? FLOWING : CLOSED;
       w[GROWTH] = w[DIRECTION] = 0;
-      if (w[TRACTION] < INFINITY) w[TRACTION] = s[RESISTANCE];
-      if (w[TRACTION] == 0) {
-        /* Broken: the mean stress of each step is zero from now on, but stresses at the ends of
-         * steps might alternate about zero. The discontinuity takes over the elastic strain, which
-         * nothing holds any more. */
-        w[JUMP] += stress[0] / strain[2] * w[LENGTH];
-        sum[5] += volume * (s[ELASTIC] - s[LEFT]);
-        s[ELASTIC] = s[LEFT];
-        s[POINT_OUTPUTS] = 0;
-      }
-      plastic += volume * s[WORKED];
-      broken += weight[i] * s[BROKEN];
-      sum[2] += volume * s[LOST];
-      sum[3] += volume * s[ELASTIC];
-      sum[4] += volume * s[HARDENING];
-      sum[5] += volume * s[NONLINEAR_LOSS];
-      sum[6] += volume * s[RELAXED];
-      for (int a = 0; a < d; ++a)
-        for (int k = 0; k < 3; ++k) kept[k] += weight[i] * stress[a] * p->B[3 * (d * i + a) + k];
     }
-    kept[3] = w[JUMP - p->width];
-    kept[4] += plastic;
-    kept[5] += broken;
-    sum[0] += plastic;
-    sum[1] += broken;
+    if (!accepts) continue;
+    memcpy(e0, e1, sizeof r);
+    memcpy(kept, r, sizeof r);
+    kept[3] = w[JUMP - p->width], kept[4] += plastic, kept[5] += broken;
   }
-  p->tried = p->predicts = 0;
+  if (accepts) p->tried = p->predicts = 0;
 }
