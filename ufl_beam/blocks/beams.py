@@ -15,7 +15,15 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
-from ufl_beam.blocks.cells import AXIS, STIFFNESS, Cell, PointOfCell, StatementOnCell, axes
+from ufl_beam.blocks.cells import (
+    AXIS,
+    STIFFNESS,
+    Cell,
+    PointOfCell,
+    StatementOnCell,
+    added,
+    axes,
+)
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import doubles, fill, lib, loop, struct
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
@@ -133,11 +141,6 @@ class SectionOfCell:
         return self._point.forces(self._at, work)
 
 
-def added(forces: Iterable[Sequence[Expr]]) -> list[Expr]:
-    """Return the sums of nodal forces."""
-    return [sum(some[1:], some[0]) for some in zip(*forces, strict=True)]
-
-
 @dataclass(frozen=True)
 class ElasticCell(BeamCell):
     """Cell whose resultants are linear in its strains."""
@@ -225,6 +228,8 @@ class BeamCells(Block):
     """Elastic cells of beams.
 
     Attributes:
+        name: Name of the block.
+        fields: The cells.
         prediction: ``predicted_forces`` of loops.h in statics; else None.
     """
 
@@ -241,7 +246,7 @@ class BeamCells(Block):
             force_kind=lib.STRESS,
         )  # fmt: skip
         super().__init__(statement, elements, setting, kind="beams")
-        self.prediction = None
+        self.name, self.fields, self.prediction = name, fields, None
         if not has_inertia(setting.scheme):
             self.prediction = struct("predicted_forces")
             fill(self._c, predicted=self.prediction)
@@ -480,24 +485,13 @@ class InelasticCells(BeamCells):
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the internal variables, and tangents for damping."""
-        state, tangents = self.points.state(), self.points.committed
+        state, damped = self.points.state(), self.points.damped
         rows = archive.rows("cells", self._rows, state.reshape(len(self._rows), -1))
         self.points.restore(rows.reshape(state.shape))
-        if tangents is not None:
-            rows = archive.rows(TANGENTS, self._rows, tangents.reshape(len(self._rows), -1))
-            tangents[:] = rows.reshape(tangents.shape)
+        if damped is not None:
+            damped.set_tangents(archive.rows(TANGENTS, self._rows, damped.tangents))
         self.keep_factors(archive)
         self.keep_states(archive)
-
-    def keep_tangents(self) -> tuple[Index, Array]:
-        """Let the points store tangents for damping; return positions of the cells, and tangents.
-
-        The tangents are (num_cells, 9 p) at p integration points; C updates them.
-        """
-        self.points.keep_tangents()
-        assert self.points.committed is not None
-        order = np.asarray(self._elements.cells, dtype=np.int32)
-        return order, self.points.committed.reshape(len(order), -1)
 
     def sections(self) -> tuple[Index, Array]:
         """Return cells (scene numbers), and :attr:`Points.recorded`; (num_cells, degree, 6)."""

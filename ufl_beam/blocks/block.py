@@ -448,7 +448,10 @@ class Block(LoadTerm):
         table, conditions = self._kernels.derivative
         changes = np.ones((P, b.width - b.modes), dtype=np.int32)
         first = changes.shape[1] - b.steps - b.numbers
-        in_steps = np.array([name.startswith("shift") for name in self.statement.numbers], bool)
+        given = self.statement.given
+        in_steps = np.array(
+            [x.startswith("shift") or x in given for x in self.statement.numbers], bool
+        )
         changes[:, first : first + b.numbers] = by_number.any(axis=(1, 3)) | in_steps
         c = struct(
             "block_derivatives", block=b, parameters=P, neighbours=others,

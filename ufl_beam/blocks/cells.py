@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -207,3 +207,8 @@ class PointOfCell:
             for x, y in zip(values, slopes, strict=True)
             for a, b in zip(*self._weights, strict=True)
         ]
+
+
+def added(forces: Iterable[Sequence[Expr]]) -> list[Expr]:
+    """Return the sums of nodal forces."""
+    return [sum(some[1:], some[0]) for some in zip(*forces, strict=True)]

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Statements of resultants from changes of strain in a step: viscosity, and numerical damping."""
+"""Statements of resultants from changes of strain in a step: viscous and numerical damping."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import ufl
@@ -13,15 +14,27 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import Block, BlockSetting, Elements
-from ufl_beam.blocks.cells import AXIS, STIFFNESS, AxisOfCell, Cell, StatementOnCell, axes
+from ufl_beam.blocks.cells import (
+    AXIS,
+    STIFFNESS,
+    AxisOfCell,
+    Cell,
+    PointOfCell,
+    StatementOnCell,
+    added,
+    axes,
+)
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.functional import resultants, virtual_work
-from ufl_beam.mechanics.kinematics import strain
+from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.loads import KelvinVoigt
+from ufl_beam.model.loads import KelvinVoigt, Rayleigh
+from ufl_beam.terms.derivatives import Neighbours
+from ufl_beam.terms.term import Callbacks, Phases
 
 
 @dataclass(frozen=True)
@@ -103,6 +116,118 @@ class SecondDifferences(_Damping):
         return made._replace(state=dict(zip(self.state, values, strict=True)))
 
 
+@dataclass(frozen=True)
+class TangentDamping(StatementOnCell):
+    """Rayleigh damping by tangents of sections at the beginning of a step, P(92).
+
+    The resultants are ``time D e``, with the rates e of the strains about the configuration before
+    the step.  D is positive semidefinite, so damping dissipates energy.
+
+    Attributes:
+        scheme: Scheme of the velocity in the step.
+        elastic: Whether D are the constant stiffnesses.
+    """
+
+    scheme: Any
+    elastic: bool
+
+    @property
+    def numbers(self) -> list[str]:
+        """Derivatives D of (N, V, M) by the strains, a1 (s), the axis."""
+        return [*(STIFFNESS if self.elastic else self.given), "time", *AXIS]
+
+    @property
+    def given(self) -> list[str]:
+        """D, unless it is constant: material points set it after each step."""
+        return [] if self.elastic else [f"D {k}" for k in range(9 * self.degree)]
+
+    @property
+    def rates(self) -> int:
+        """Velocity, velocity before the last step, and further rates of the scheme."""
+        return 2 + len(self.scheme.further_rates)
+
+    @property
+    def of_step(self) -> list[str]:
+        """Length of the step, and coefficients of the velocity."""
+        return ["dt", *(f"velocity {j}" for j in range(self.rates + 1))]
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class."""
+        cell, mesh, forces, lost = Cell(self.degree, at), Mesh(degree=self.degree), [], 0
+        q0 = at.motions("q0")
+        steps = [q1 - q for q, q1 in zip(q0, at.motions("q1"), strict=True)]
+        if self.scheme.half_tangents:
+            halves = [turn / 2 for _, _, turn in steps]
+            tangents = [at.stage(ufl.sin(x) / ufl.cos(x)) for x in halves]
+            steps = [
+                ufl.as_vector([s[0], s[1], 2 * x]) for s, x in zip(steps, tangents, strict=True)
+            ]
+        motions = steps, *(at.motions(f"rate{j + 1}") for j in range(self.rates))
+        velocity = [
+            sum((at[f"velocity {j}"] * x for j, x in enumerate(some)), ufl.zero(3))
+            for some in zip(*motions, strict=True)
+        ]
+        for g, (s, weight) in enumerate(zip(mesh.points, mesh.point_weights, strict=True)):
+            point = PointOfCell(cell, float(s))
+            about, *fields = (point.field(at, x) for x in (q0, velocity, steps))
+            e, e_step, w_e = (
+                virtual_strain(about, w, point.axis) for w in (*fields, point.virtual)
+            )
+            if self.elastic:
+                D = ufl.diag(ufl.as_vector([at[name] for name in STIFFNESS]))
+            else:
+                rows = (self.given[9 * g + 3 * k : 9 * g + 3 * k + 3] for k in range(3))
+                D = ufl.as_matrix([[at[name] for name in row] for row in rows])
+            factor = float(weight) * point.axis.h * at["time"]
+            forces.append(point.forces(at, factor * virtual_work(ufl.dot(D, e), w_e)))
+            lost += factor * virtual_work(ufl.dot(D, e_step), e_step) / at["dt"]
+        return Equations(added(forces), lost={"damping": lost})
+
+
+class DampedCells(Block):
+    """Cells with tangent damping and material points.
+
+    Attributes:
+        points: The points.
+    """
+
+    def __init__(self, damping: Rayleigh, cells: Any, setting: BlockSetting) -> None:
+        statement = TangentDamping(cells.statement.degree, setting.scheme, elastic=False)
+        numbers = [*[math.nan] * len(statement.given), damping.stiffness]
+        elements = _on_cells(f"damping of {cells.name}", numbers, cells.fields)
+        super().__init__(statement, elements, setting, kind="damping")
+        self.points = cells.points
+        self.points.keep_tangents(self, damped=self._c, in_damped=statement.degree)
+
+    @property
+    def tangents(self) -> Array:
+        """Tangents D of material points; (cells, 9 degree)."""
+        return self.by_element(self._numbers)[:, : len(self.statement.given)]
+
+    def set_tangents(self, values: Array) -> None:
+        """Set :attr:`tangents` of all cells."""
+        self._numbers[:, : values.shape[1]] = in_batches(values, BATCH)
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """See the base class; the points accept a step before they set new tangents."""
+        return super().phases(callbacks)._replace(accept=[])
+
+    def complete_derivatives(self, c: Any, neighbours: Neighbours, by_number: Array) -> None:
+        """See the base class."""
+        self.points.complete_derivatives(c, neighbours)
+
+
+def tangent_damping(
+    damping: Rayleigh, elastic: Fields, inelastic: Sequence[Any], setting: BlockSetting
+) -> Iterator[Block]:
+    """Yield the blocks of a damping by tangents, of elastic cells and of cells with points."""
+    if len(elastic.order):
+        statement = TangentDamping(elastic.element.degree, setting.scheme, elastic=True)
+        elements = _on_cells("tangent damping", [*_stiffness(elastic), damping.stiffness], elastic)
+        yield Block(statement, elements, setting, kind="damping")
+    yield from (DampedCells(damping, cells, setting) for cells in inelastic)
+
+
 def viscosity(damping: KelvinVoigt, fields: Fields, setting: BlockSetting) -> Block:
     """Return the block of a viscosity."""
     setting.ledger.lost["damping"] += 0.0
@@ -111,8 +236,7 @@ def viscosity(damping: KelvinVoigt, fields: Fields, setting: BlockSetting) -> Bl
     pairs = (zip(numbering.cells_of(beam), numbering.hinges(beam), strict=True) for beam in beams)
     cells = [cell for beam_cells in pairs for cell, hinge in beam_cells if hinge is None]
     some = Fields(subdomain, np.flatnonzero(np.isin(subdomain.cells, cells)))
-    times = np.full(len(some.order), damping.retardation_time)
-    elements = _on_cells("viscosity", [times], some)
+    elements = _on_cells("viscosity", [damping.retardation_time, *_stiffness(some)], some)
     return Block(
         Viscosity(numbering.mesh.degree, setting.scheme), elements, setting, kind="damping"
     )
@@ -121,15 +245,21 @@ def viscosity(damping: KelvinVoigt, fields: Fields, setting: BlockSetting) -> Bl
 def second_differences(fields: Fields, setting: BlockSetting) -> Block:
     """Return the block of the numerical damping of elastic cells."""
     statement = SecondDifferences(fields.element.degree, setting.scheme)
-    block = Block(statement, _on_cells("changes of strains", [], fields), setting, kind="beams")
+    elements = _on_cells("changes of strains", _stiffness(fields), fields)
+    block = Block(statement, elements, setting, kind="beams")
     block.state["last dt"][:] = math.inf
     return block
 
 
-def _on_cells(name: str, numbers: list[Array], fields: Fields) -> Elements:
-    subdomain, stiffness = fields.subdomain, fields.section_values(fields.element.stiffness)
+def _stiffness(fields: Fields) -> list[Array]:
+    return [*fields.section_values(fields.element.stiffness).T]
+
+
+def _on_cells(name: str, numbers: Sequence[Array | float], fields: Fields) -> Elements:
+    """Return cells with some numbers and the axis."""
+    n = len(fields.order)
+    own = [np.broadcast_to(x, n) for x in numbers]
     return Elements(
-        name, subdomain.cells[fields.order], fields.cell_dofs,
-        [*numbers, *stiffness.T, *axes(fields)], cells=fields.order,
-        force_kind=lib.STRESS,
+        name, fields.subdomain.cells[fields.order], fields.cell_dofs, [*own, *axes(fields)],
+        cells=fields.order, force_kind=lib.STRESS,
     )  # fmt: skip

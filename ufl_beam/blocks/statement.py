@@ -312,6 +312,11 @@ class Statement(ABC):
         """Names of the constant numbers of an element."""
         return ()
 
+    @property
+    def given(self) -> Sequence[str]:
+        """Names of the first numbers, if another term sets them after each step."""
+        return ()
+
     @abstractmethod
     def equations(self, at: Any) -> Equations:
         """Return the functions of the inputs ``at``, which are :class:`Inputs`."""

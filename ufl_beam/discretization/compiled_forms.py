@@ -264,12 +264,6 @@ class Kernel:
         """Coefficients of the form, without the unknown."""
         return [f for f in self._form.coefficients if id(f) in self._columns]
 
-    def common_blocks(self, source: Kernel) -> Index:
-        """Return positions in ``source``, positions here and lengths of the common coefficients."""
-        pairs = ((source._columns[k], at) for k, at in self._columns.items())
-        blocks = [(x.start, at.start, at.stop - at.start) for x, at in pairs]
-        return np.array(blocks, dtype=np.int32).reshape(-1, 3)
-
     def place(self, A: Csr) -> None:
         """Let :meth:`add` of a bilinear form add to entries of ``A`` from now on."""
         per_cell = self._dofs.shape[1]

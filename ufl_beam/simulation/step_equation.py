@@ -17,7 +17,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.beams import BeamCells, InelasticCells, elastic_cells
 from ufl_beam.blocks.block import Block, BlockSetting
 from ufl_beam.blocks.connector_terms import connector_terms
-from ufl_beam.blocks.damping import second_differences, viscosity
+from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosity
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.works import EffectBlock, work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
@@ -117,8 +117,8 @@ class StepEquation:
             self.loads += together(work_blocks, in_blocks)
         if scene.beams:
             ledger.state["stored"] += 0.0
+        subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
         if elastic.any():
-            subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
             self.beams.append(elastic_cells(subset, in_blocks, strains))
             if scheme.lost_fraction:
                 others.append(second_differences(subset, in_blocks))
@@ -132,7 +132,9 @@ class StepEquation:
             others.append(inertia)
         for damping in scene.damping:
             if isinstance(damping, Rayleigh):
-                others.append(rayleigh_forces(damping, fields, *setting, inertia, self.inelastic))
+                others += rayleigh_forces(damping, fields, *setting, inertia)
+                if damping.tangent:
+                    others += tangent_damping(damping, subset, self.inelastic, in_blocks)
             else:
                 others.append(viscosity(damping, fields, in_blocks))
         self.inner: list[Term] = [*self.beams, *self.connector_terms]
@@ -376,11 +378,6 @@ class StepEquation:
                 if term.kind != "inertia":
                     term.add_residual(q, r)
                     term.add_tangent(q)
-            still = np.zeros(len(q))
-            for term, phases in zip(self.terms, self.phases, strict=True):
-                # Some damping computes forces of cells when a step is accepted
-                for accept, data in phases.accept if term.kind == "damping" else ():
-                    accept(data, self._begun[0], doubles(q), doubles(still))
         return r, self.A.data.copy()
 
     def tangent_change(self, q: Array, u: Array) -> Array:

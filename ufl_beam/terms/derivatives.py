@@ -13,15 +13,12 @@ from typing import Any
 
 import numpy as np
 import ufl
-from ufl.algorithms import expand_derivatives
 from ufl.classes import EQ, GE, GT, LE, LT, NE, Conditional, Division, Product, Zero
 from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_post_traversal
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, ffi, lib, struct
-from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
-from ufl_beam.dolfinx_compat import fem
 
 FAR = 1e300
 """Margin of a comparison that does not matter."""
@@ -78,14 +75,6 @@ class Neighbours:
                 derivatives[p] += self.weights[p, k] * np.where(np.isfinite(change), change, 0.0)
         self.enters |= derivatives.reshape(len(self), -1).any(axis=1)
         return derivatives
-
-
-@cached_forms
-def _derivative(form: ufl.Form, coefficient: fem.Function) -> ufl.Form | None:
-    """Return the derivative of a form by a coefficient; None if it is zero."""
-    trial = ufl.TrialFunction(coefficient.function_space)
-    derivative = ufl.derivative(form, coefficient, trial)
-    return None if expand_derivatives(derivative).empty() else derivative
 
 
 Branches = dict[int, tuple[Expr, bool]]
@@ -164,37 +153,6 @@ def margins(outputs: Sequence[Expr]) -> list[Expr]:
     return [*found.values()] if len(found) <= MOST_MARGINS else []
 
 
-def form_derivative(
-    form: ufl.Form, kernel: Kernel, compile_form: Callable[[ufl.Form], Kernel],
-    coefficient: fem.Function, **direction: Any,
-) -> Any:  # fmt: skip
-    """Return ``form_derivative`` of loops.h for a form and a coefficient; None if it is zero.
-
-    Args:
-        form: Linear form in cells.
-        kernel: The form compiled, with its values.
-        compile_form: Compiles another form on the same cells.
-        coefficient: Coefficient of the form, or its unknown.
-        direction: Fields ``direction`` and ``stride``; none if the coefficient is q0.  A direction
-            of one parameter has the stride 0, and ``bar`` of the term that computes it.
-    """
-    if (derivative := _derivative(form, coefficient)) is None:
-        return None
-    table = compile_form(derivative)
-    table.keep_entries()
-    blocks, columns = (
-        table.common_blocks(kernel),
-        coefficient.function_space.element.space_dimension,
-    )
-    if "direction" in direction:
-        direction.setdefault("bar", np.zeros(table.cells.number * columns))
-    return struct(
-        "form_derivative", form=kernel.cells, table=table.cells,
-        columns=columns, copies=len(blocks),
-        copy=np.ascontiguousarray(blocks), **direction,
-    )  # fmt: skip
-
-
 def differences(
     neighbours: Neighbours, state_of: Callable[[Any], Sequence[Array]] = lambda term: (),
     begins: Callable[[Any], Sequence[Loop]] = lambda term: (),
@@ -231,9 +189,7 @@ def differences(
 
 LINEARIZE = {
     "points": "tabulate_points", "load": "differentiate_loads",
-    "differences": "begin_neighbours",
-
-    "damping": "tabulate_damping", "block": "tabulate_block",
+    "differences": "begin_neighbours", "block": "tabulate_block",
 }  # fmt: skip
 ACCEPT = {
     name: f"accept_{name}_derivative"
@@ -268,7 +224,6 @@ TRANSPOSES = {
     "product": ("", "transpose_product", ""),
     "load": ("", "transpose_loads", ""),
     "differences": ("", "transpose_differences", ""),
-    "damping": ("", "transpose_damping", ""),
 }
 """Functions of ``term_transposes`` of loops.h by the kind of a derivative."""
 
@@ -306,16 +261,16 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         product = data.matrix.product
         rate = ffi.addressof(product, "rate")  # C exchanges the vectors at this address
         return [(rate, 8 * product.size), (product.half, 8 * product.rotations)]
-    if kind == "damping":
-        damping = data.damping
-        groups = [damping.group[g] for g in range(damping.groups)]
-        tangents = [(x.tangents, 8 * x.number * x.numbers) for x in groups]
-        return [*rates(damping.damping.rates), *tangents]
     if kind == "points":
-        points = data.points
+        points, b = data.points, data.points.damped
         number = points.cells * points.of_cell
+        first = (2 + b.rates) * b.unknowns if b else 0
+        tangents = [
+            (b.w + (c * b.width + first) * b.lanes, 72 * points.in_damped * b.lanes)
+            for c in range(b.batches if b else 0)
+        ]
         return [
             (data.J, 8 * number * data.outputs), (points.w, 8 * number * points.width),
-            (points.e0, 24 * points.cells), (points.e1, 24 * points.cells),
+            (points.e0, 24 * points.cells), (points.e1, 24 * points.cells), *tangents,
         ]  # fmt: skip
     return []

@@ -7,7 +7,7 @@ Coefficients of a scheme are cached, because steps have only a few different len
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, struct
+from ufl_beam.compiled.c_library import doubles, ffi, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, Product, StepProduct
 from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.function_spaces import (
@@ -26,7 +26,6 @@ from ufl_beam.discretization.function_spaces import (
     mass_matrix,
 )
 from ufl_beam.discretization.state_io import Archive
-from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ModelError
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import virtual_strain
@@ -44,12 +43,10 @@ from ufl_beam.model.loads import Rayleigh
 from ufl_beam.terms.derivatives import (
     Each,
     Neighbours,
-    differences,
-    form_derivative,
     in_c,
 )
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, forms_of_step
+from ufl_beam.terms.term import Callbacks, InCells, Phases, Term
 
 BEFORE = "velocity before"
 """Name of the velocities at the beginning of the last step in saved data."""
@@ -301,116 +298,18 @@ class RayleighForces(Term):
         return product_derivative(neighbours, self._in_steps, lambda term: term._times.matrix())
 
 
-@cached_forms
-def _tangent_stiffness(element: Element) -> tuple[ufl.Form, fem.Function]:
-    """Return the material stiffness about ``q0``, and the tangents of the sections in it."""
-    D, motions = element.at_points(3, 3), (ufl.TrialFunction(element.space), element.w)
-    e, w_e = (virtual_strain(element.q0, w, element.axis) for w in motions)
-    return virtual_work(ufl.dot(D, e), w_e) * element.dx(1), D
-
-
-class TangentRayleighForces(Term):
-    """Rayleigh damping with the tangent stiffness of the accepted state; constant in a step.
-
-    The stiffness has the tangents of sections, and the directions of the cells, at the end of the
-    last step.  It is positive semidefinite, so damping dissipates energy.
-    """
-
-    kind = "damping"
-
-    def __init__(
-        self, damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
-        rates: Inertia, inelastic: Sequence[Any],
-    ) -> None:  # fmt: skip
-        (form, D), element = _tangent_stiffness(fields.element), fields.element
-        K, M, C, dofs = fields.matrix(), rates.M, fields.matrix(), fields.cell_dofs
-        width = dofs.shape[1]
-        C.data[:] = M.data != 0.0
-        C.data[C.positions(dofs.repeat(width, axis=1).ravel(), np.tile(dofs, width).ravel())] = 1.0
-        rotations = with_half_tangents(scheme, fields.subdomain.rotations)
-        self._times = StepProduct(C, rotations, A, fields.subdomain.scratch)
-        self.loops = self._times.loops
-        self._ledger, self._rates, self._A = ledger, rates, A
-        stiffness = fields.kernel(form, element.q0)
-        stiffness.place(K)
-        force = fields.kernel(applied(form, element.q1), element.q1)
-        elastic = fields.section_values(element.stiffness)[:, None, :, None] * np.eye(3)
-        at_points = np.repeat(elastic, len(fields.subdomain.numbering.mesh.point_weights), axis=1)
-        kernels = stiffness, force
-        for kernel in kernels:
-            kernel.put(D, at_points.reshape(len(elastic), -1))
-        forms = forms_of_step(kernels, D)
-        self._inelastic = inelastic
-        cells = [beams.keep_tangents() for beams in inelastic]
-        groups = [(*tangents.shape, integers(cell), doubles(tangents)) for cell, tangents in cells]
-        at, _ = self._times.A.places(C)
-        self._in_c = struct(
-            "tangent_damping", stiffness=stiffness.cells, force=force.cells,
-            at_q0=force.position(element.q0), form=forms, groups=len(groups),
-            group=ffi.new("committed_cells[]", groups), entries=len(K.data), K=K.data,
-            number=len(at), at=at, mass=damping.mass * M.data[at], factor=damping.stiffness,
-            C=self._times.A.data,
-        )  # fmt: skip
-        self._alive = kernels, groups
-        self._form, self._tangents, self._fields, self._kernels = form, D, fields, kernels
-        self.in_cells = [
-            InCells(lambda: force, lib.STRESS, fields.order, factor=damping.stiffness),
-            InCells(
-                partial(mass_kernel, fields), lib.DENSITY, fields.order, self._times.rate,
-                damping.mass,
-            ),
-        ]  # fmt: skip
-
-    def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the cells, the matrix and the velocities."""
-        c = self._rates.times(self._times, damps=1, lost=self._ledger.lost.pointer("damping"))
-        fill(self._in_c, damping=c)
-        begin, accept = (loop(f"{x}_tangent_damping", self._in_c) for x in ("begin", "accept"))
-        return Phases([begin], [accept])
-
-    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
-        """See the base class."""
-        element, fields, own = self._fields.element, self._fields, self._in_c
-        for other in (x for some in neighbours.terms for x in some):
-            # Differences at the same rates, and at the same tangents of points
-            other._in_c.damping.rates = own.damping.rates
-            for g in range(own.groups):
-                other._in_c.group[g].tangents = own.group[g].tangents
-        kernel, form = partial(fields.kernel, unknown=element.q1), applied(self._form, element.q1)
-        by_q0 = form_derivative(form, self._kernels[1], kernel, element.q0)
-        force = kernel(form)
-        force.put(self._tangents, np.zeros(1))
-        directions = [doubles(beams.points.tangents) for beams in self._inelastic]
-        bars = [doubles(beams.points.tangents_bar) for beams in self._inelastic]
-        by_tangents: Any = ffi.NULL
-        if own.groups:  # of the adjoint only
-            columns = {"direction": ffi.NULL, "stride": 0}
-            by_tangents = form_derivative(form, self._kernels[1], kernel, self._tangents, **columns)
-        c = struct(
-            "damping_derivatives", damping=own, by_q0=by_q0, force=force.cells,
-            at_q0=force.position(element.q0), at_tangents=force.position(self._tangents),
-            tangents=ffi.new("double *[]", directions), r=np.zeros(fields.subdomain.size),
-            by_tangents=by_tangents, tangents_bar=ffi.new("double *[]", bars),
-        )  # fmt: skip
-        neighbours.alive.append((force, directions, bars))
-        same = ffi.new("constant_matrix *[]", len(neighbours))
-        by_rates = struct("product_derivative", matrix=own.damping, change=same)
-        found = [in_c("product", by_rates), in_c("damping", c)]
-        return [differences(neighbours), *found]
-
-
 def rayleigh_forces(
     damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
-    rates: Inertia | None, inelastic: Sequence[Any],
-) -> Term:  # fmt: skip
-    """Return the term of Rayleigh damping."""
+    rates: Inertia | None,
+) -> Iterator[Term]:  # fmt: skip
+    """Yield the term of Rayleigh damping with constant matrices, if there is one."""
     ledger.lost["damping"] += 0.0
     if rates is None:
         raise ModelError(
             "Rayleigh: it damps vibrations, and statics has no inertia. Leave it out, by "
             "dataclasses.replace(scene, damping=())"
         )
-    setting = (damping, fields, scheme, A, ledger, rates)
-    return (
-        TangentRayleighForces(*setting, inelastic) if damping.tangent else RayleighForces(*setting)
-    )
+    if not damping.tangent:
+        yield RayleighForces(damping, fields, scheme, A, ledger, rates)
+    elif damping.mass:
+        yield RayleighForces(Rayleigh(mass=damping.mass), fields, scheme, A, ledger, rates)

@@ -268,12 +268,9 @@ class Points:
         softens: True if points may break.
         over: Largest ``|stress| / limit - 1`` of the points that the latest response has held
             closed, at least zero; (1,).
-        committed: Derivatives of (N, V, M) in the accepted state by the strains, with negative
-            eigenvalues set to zero; (cells, 9).  None if no damping needs them, NaN until
-            :meth:`start_tangents`.
-        tangents: Derivatives of ``committed`` by parameters, if they are asked for; (parameters,
-            cells, 9).
-        tangents_bar: Derivatives of a number by ``committed``, for the adjoint; (cells, 9).
+        damped: Block of damped cells, whose first numbers are the derivatives of (N, V, M) in the
+            accepted state by the strains, with negative eigenvalues set to zero; they are NaN until
+            :meth:`start_tangents`.  None if there is no such damping.
         recorded: For each cell: (N, V, M) in the accepted state, the jump of the last point, and
             the energies that plastic strains and discontinuities have dissipated since the
             beginning; (cells, 6); N, N, N m, rad or m, J, J.
@@ -326,7 +323,7 @@ class Points:
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
         self.over = np.zeros(1)
-        self.committed: Array | None = None
+        self.damped: Any = None
 
         self._forms = forms = _point_forms(self.names, section_points.kind, softening, scheme)
         arrays = {
@@ -372,17 +369,18 @@ class Points:
             if values.any():
                 bar = {f"{field}_bar": np.zeros(values[0].size)}
                 fill(c, **{field: np.ascontiguousarray(values)}, **bar)
-        if self.committed is not None:
-            self.tangents = neighbours.state(attrgetter(f"{path}.committed"))
-            elastic = neighbours.differences(attrgetter(f"{path}._elastic"))
-            # An eighth of the neighbours' distance: near the scene, and 1e-12 of round-off
-            step = 1 / (8 * np.abs(neighbours.weights).max(axis=1))
-            self.tangents_bar = np.zeros(self.committed.shape)
-            fill(
-                c, tangents=self.tangents, elastic=elastic, step=step,
-                tangents_bar=self.tangents_bar, elastic_bar=np.zeros(self._elastic.shape),
-            )  # fmt: skip
+        self._derivatives = c
         return c
+
+    def complete_derivatives(self, c: Any, neighbours: Neighbours) -> None:
+        """Connect derivatives with those of :attr:`damped`, ``block_derivatives`` of loops.h."""
+        elastic = neighbours.differences(attrgetter("points._elastic"))
+        # An eighth of the neighbours' distance: near the scene, and 1e-12 of round-off
+        step = 1 / (8 * np.abs(neighbours.weights).max(axis=1))
+        fill(
+            self._derivatives, tangents=c.by_number, elastic=elastic, step=step,
+            tangents_bar=c.number_bar, elastic_bar=np.zeros(self._elastic.shape),
+        )  # fmt: skip
 
     def __getitem__(self, name: str) -> Array:
         """Return a view of the values of the input ``name`` at the points; (cells, n)."""
@@ -448,35 +446,31 @@ class Points:
             for array, values in zip(arrays, before, strict=True):
                 array[:] = values
 
-    def keep_tangents(self) -> None:
-        """Store :attr:`committed` after each step from now on.
+    def keep_tangents(self, block: Any, **fields: Any) -> None:
+        """Store tangents in :attr:`damped` after each step; ``fields`` are of ``points``.
 
         Eigenvalues are computed relative to the elastic stiffness of the section.
         """
-        if self.committed is not None:
-            return
         section_points, elastic = self._section_points, np.zeros((len(self.recorded), 3))
         elastic += section_points.rest
         for k, name in enumerate(self._rows("stiffness")):
             B = section_points.strains[k :: self._components]
             elastic += (section_points.weights * self[name]) @ B**2
-        self.committed = np.full((len(elastic), 9), np.nan)
-        space = np.zeros(len(self.names))
-        self._elastic = elastic
-        fill(self.c, committed=self.committed, elastic=elastic, inputs=space)
+        self.damped, self._elastic = block, elastic
+        fill(self.c, elastic=elastic, inputs=np.zeros(len(self.names)), **fields)
 
     def start_tangents(self) -> None:
-        """Replace NaN in :attr:`committed` by the elastic stiffness at the accepted strains."""
-        if self.committed is None:
+        """Replace tangents for damping that are NaN by the elastic stiffness."""
+        if self.damped is None:
             return
-        known, law = self.committed.copy(), (self.c.law, self.c.law_loop, self.c.solves)
+        known, law = self.damped.tangents, (self.c.law, self.c.law_loop, self.c.solves)
         with self._unchanged():
             self["traction"][:] = np.inf
             self.c.law, self.c.law_loop, self.c.solves = self._forms.elastic, ffi.NULL, False
             self.return_map(self._e0)
             lib.keep_tangents(self.c)
         self.c.law, self.c.law_loop, self.c.solves = law
-        self.committed[:] = np.where(np.isnan(known), self.committed, known)
+        self.damped.set_tangents(np.where(np.isnan(known), self.damped.tangents, known))
 
     def works(self, change: Array) -> Array:
         """Return works of the tangent and of the elastic stiffness on strains; (2, cells).
@@ -534,8 +528,8 @@ class Points:
             self["stiffness"][:, breaking] *= np.where(spent, FREED_STIFFNESS, 1.0)
         self["traction"][:] = np.inf
         self.c.law, self.c.law_loop, self.c.solves = self._forms.elastic, ffi.NULL, False
-        if self.committed is not None:
-            self.committed[:] = np.nan
+        if self.damped is not None:
+            self.damped.set_tangents(np.full(self.damped.tangents.shape, np.nan))
             self.start_tangents()
 
     # -- the ledger ----------------------------------------------------------------------------

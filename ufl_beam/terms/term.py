@@ -23,7 +23,6 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.state_io import Archive
-from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ArgumentError, StepFailed
 from ufl_beam.model.functions import Constant, Table, TimeFunction, value_at
 
@@ -314,9 +313,3 @@ def call_in_python(handle: Any, *arguments: Any) -> None:
 
 for _name in ("run", "begin", "phase"):
     from_c(name=f"{_name}_in_python")(call_in_python)
-
-
-def forms_of_step(kernels: Sequence[Any], function: fem.Function) -> Any:
-    """Return ``form_of_step`` of loops.h of kernels in which a phase sets a function."""
-    forms = [(kernel.cells, kernel.position(function)) for kernel in kernels]
-    return ffi.new("form_of_step[]", forms)

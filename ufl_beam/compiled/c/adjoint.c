@@ -6,26 +6,6 @@
  * state at the end of a step to those by the state before it. Arrays `..._bar` are derivatives of the
  * number. */
 
-/* Transposed product with the tables: values of the rows of each cell, or of q at its degrees of freedom
- * if `values` is null, times the columns. The product is added to `apart`, cell after cell, or else to
- * out at the degrees of freedom. */
-static void transpose_tables(const form_derivative *f, const double *values, const double *q, double *apart,
-                             double *out)
-{
-  const cells *table = f->table;
-  const int n = table->batch_size, columns = f->columns, rows = table->rows / columns;
-  for (int c = 0; c < table->number; ++c) {
-    const double *entry = table->each + (size_t)(c & -n) * table->rows + (c & (n - 1));
-    const int32_t *dofs = table->dofs + (size_t)c * table->of_cell;
-    for (int i = 0; i < rows; ++i) {
-      const double x = values ? values[c * rows + i] : q[dofs[i]];
-      for (int j = 0; j < columns; ++j, entry += n)
-        if (apart) apart[c * columns + j] += *entry * x;
-        else out[dofs[j]] += *entry * x;
-    }
-  }
-}
-
 static double dot(size_t size, const double *x, const double *y)
 {
   double sum = 0;
@@ -159,8 +139,8 @@ static void transpose_sum_of_tangents(const point_derivatives *m, int c, double 
     const double share = answer_at_end(p, p->inputs, s);
     add_answer(d, p->B + 3 * d * i, share * p->weight[i], s, r, D);
   }
-  memcpy(sum_bar, m->tangents_bar + 9 * (size_t)c, 9 * sizeof *s);
-  memset(m->tangents_bar + 9 * (size_t)c, 0, 9 * sizeof *s);
+  double *bar = tangent_of(p, m->tangents_bar, p->damped->numbers, c);
+  for (int k = 0; k < 9; ++k, bar += p->damped->lanes) sum_bar[k] = *bar, *bar = 0;
   transpose_remove_negative(p->elastic + 3 * c, D, sum_bar, m->elastic_bar + 3 * c);
   for (int k = 0; m->rest && k < 3; ++k) m->rest_bar[k] += sum_bar[4 * k];
 }
@@ -272,7 +252,6 @@ void finish_points(void *self, adjoint *a)
   add_products(a, 3 * p->components * p->of_cell, m->B_bar, m->B);
   add_products(a, p->of_cell, m->weight_bar, m->weight);
   add_products(a, 3, m->rest_bar, m->rest);
-  add_products(a, 3 * strains, m->tangents_bar, m->tangents);
   add_products(a, strains, m->elastic_bar, m->elastic);
 }
 
@@ -338,29 +317,6 @@ void transpose_differences(void *self, adjoint *a, const double *λ)
     memset(a->values, 0, a->size * sizeof *a->values);
     add_differences_derivative(self, a->d, p, a->values);
     a->gradient[p] += dot(a->size, a->values, λ);
-  }
-}
-
-/* The matrix and the tangents of the step, which the product with rates and the differences between scenes
- * also use; these follow. */
-void transpose_damping(void *self, adjoint *a, const double *λ)
-{
-  const damping_derivatives *m = self;
-  double *x = a->values;
-  begin_tangent_damping((void *)m->damping, a->step, 0, 0);
-  tabulate_damping(self, a->step, 0);
-  for (int i = 0; i < a->size; ++i) x[i] = m->damping->factor * λ[i];
-  transpose_tables(m->by_q0, 0, x, 0, a->q0);
-  form_derivative *f = m->by_tangents;
-  if (!f) return;
-  tabulate_derivative(f, a->step, m->damping->damping->product->rate);
-  memset(f->bar, 0, (size_t)f->table->number * f->columns * sizeof *x);
-  transpose_tables(f, 0, x, f->bar, 0);
-  for (int g = 0; g < m->damping->groups; ++g) {
-    const committed_cells *group = m->damping->group + g;
-    for (int c = 0; c < group->number; ++c)
-      for (int i = 0; i < group->numbers; ++i)
-        m->tangents_bar[g][c * group->numbers + i] += f->bar[group->cell[c] * f->columns + i];
   }
 }
 

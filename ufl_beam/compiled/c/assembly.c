@@ -20,13 +20,6 @@ void set_cells(const cells *c, const double *q, int at)
       for (int i = 0; i < c->of_cell; ++i) batch[i * n + l] = q[dofs[i]];
 }
 
-/* Write some values into the packed coefficients of a cell. */
-static inline void put_in_cell(const cells *c, int cell, int at, int number, const double *values)
-{
-  double *w = in_cell(c, cell, at);
-  for (int i = 0; i < number; ++i) w[i * c->batch_size] = values[i];
-}
-
 /* Add the entries of a cell to a matrix, a vector or a number; see insert_batch for several cells. */
 static inline void insert_cell(const cells *c, const double *e, int k, double *b)
 {

@@ -89,12 +89,11 @@ static inline void multiply_row(const block_derivatives *m, int c, int row, int 
     for (int l = 0; changes[j] && l < n; ++l) sum[l] += slope[l] * m->direction[j * n + l];
 }
 
-/* The first number of element i, in an array of the numbers of all elements, whose size follows. */
+/* The first number of element i, in an array of the numbers of all elements. */
 static inline double *number_of(const element_block *b, double *numbers, int i)
 {
   return numbers + (size_t)(i / b->lanes) * b->numbers * b->lanes + i % b->lanes;
 }
-static inline size_t all_numbers(const element_block *b) { return (size_t)b->batches * b->numbers * b->lanes; }
 
 void add_block_derivative(void *self, const derivatives *d, int p, double *r)
 {

@@ -23,49 +23,6 @@ static double change_of(const time_function *one, const time_function *own, doub
   return value_at(one, t) - value_at(own, t);
 }
 
-/* -- forms ------------------------------------------------------------------------------------------- */
-
-/* Copy the coefficients of a form to the form of its derivative, and compute the entries of all cells. */
-void tabulate_derivative(void *self, const time_step *step, const double *q1)
-{
-  const form_derivative *f = self;
-  const cells *table = f->table;
-  const int n = table->batch_size, batches = (table->number + n - 1) / n;
-  for (int b = 0; b < batches; ++b) {
-    const double *from = f->form->w + (size_t)b * n * f->form->width;
-    double *to = table->w + (size_t)b * n * table->width;
-    for (int k = 0; k < f->copies; ++k)
-      memcpy(to + f->copy[3 * k + 1] * n, from + f->copy[3 * k] * n, f->copy[3 * k + 2] * n * sizeof *to);
-  }
-  add_cells((void *)table, q1, 0);
-}
-
-/* Product of the table of each cell with values of the cell, or with a vector q at its degrees of
- * freedom if `values` is null. The product is added to out, at the degrees of freedom or, if `apart`,
- * cell after cell. */
-static void multiply_tables(const form_derivative *f, const double *values, const double *q, int apart, double *out)
-{
-  const cells *table = f->table;
-  const int n = table->batch_size, columns = f->columns, rows = table->rows / columns;
-  double x[MOST_LANES * MOST_ENTRIES], sum[MOST_LANES];
-  for (int first = 0; first < table->number; first += n) {
-    const double *entry = table->each + (size_t)first * table->rows;
-    const int some = table->number - first < n ? table->number - first : n;
-    const int32_t *dofs = table->dofs + (size_t)first * table->of_cell;
-    memset(x, 0, columns * n * sizeof *x);
-    for (int l = 0; l < some; ++l)
-      for (int j = 0; j < columns; ++j)
-        x[j * n + l] = values ? values[(size_t)(first + l) * columns + j] : q[dofs[l * table->of_cell + j]];
-    for (int i = 0; i < rows; ++i) {
-      memset(sum, 0, n * sizeof *sum);
-      for (int j = 0; j < columns; ++j, entry += n)
-        for (int l = 0; l < n; ++l) sum[l] += entry[l] * x[j * n + l];
-      for (int l = 0; l < some; ++l)
-        out[apart ? (first + l) * rows + i : dofs[l * table->of_cell + i]] += sum[l];
-    }
-  }
-}
-
 /* -- material points --------------------------------------------------------------------------------- */
 
 /* Compute a table, whose last outputs are margins. Derivatives by infinite numbers, such as the limit of an
@@ -199,7 +156,7 @@ static void differentiate_tangents(const point_derivatives *m, int q)
   at_end.tried = 0;
   for (int c = 0; c < p->cells; ++c) {
     const size_t number = (size_t)q * p->cells + c;
-    memset(m->tangents + 9 * number, 0, 9 * sizeof(double));
+    double sum[9] = {0};
     for (int k = 0; k < 4; ++k) {
       const double h = at[k] * m->step[q], *w = p->w + (size_t)c * p->of_cell * width;
       const double *dw = m->w + number * p->of_cell * width;
@@ -220,8 +177,9 @@ static void differentiate_tangents(const point_derivatives *m, int q)
         add_answer(d, b, weight, s, r, D);
       }
       remove_negative(C, D);
-      for (int j = 0; j < 9; ++j) m->tangents[9 * number + j] += share[k] / m->step[q] * D[j];
+      for (int j = 0; j < 9; ++j) sum[j] += share[k] / m->step[q] * D[j];
     }
+    put_tangent(p, m->tangents + q * all_numbers(p->damped), p->damped->numbers, c, sum);
   }
 }
 
@@ -376,32 +334,6 @@ void accept_differences_derivative(void *self, const derivatives *d, int p)
   const term_differences *t = self;
   for (int k = p * t->neighbours; k < (p + 1) * t->neighbours; ++k)
     run(&t->term[1 + k].accept, d->step, d->x, d->s);
-}
-
-/* -- damping by the tangent of the accepted state ------------------------------------------------------ */
-
-void tabulate_damping(void *self, const time_step *step, const double *q1)
-{
-  const damping_derivatives *m = self;
-  tabulate_derivative(m->by_q0, step, m->damping->damping->product->rate);
-}
-
-/* Derivative of the damping matrix times the rates; the forms are linear in the tangents of sections. */
-void add_damping_derivative(void *self, const derivatives *d, int p, double *r)
-{
-  const damping_derivatives *m = self;
-  const tangent_damping *of = m->damping;
-  memset(m->r, 0, d->size * sizeof *r);
-  multiply_tables(m->by_q0, 0, d->q0 + (size_t)p * d->size, 0, m->r);
-  set_cells(m->force, d->step->q0, m->at_q0);
-  for (int g = 0; g < of->groups; ++g) {
-    const committed_cells *group = of->group + g;
-    const double *change = m->tangents[g] + (size_t)p * group->number * group->numbers;
-    for (int c = 0; c < group->number; ++c)
-      put_in_cell(m->force, group->cell[c], m->at_tangents, group->numbers, change + group->numbers * c);
-  }
-  if (of->groups) add_cells((void *)m->force, of->damping->product->rate, m->r);
-  for (int i = 0; i < d->size; ++i) r[i] += of->factor * m->r[i];
 }
 
 /* -- the step ------------------------------------------------------------------------------------------ */

@@ -58,13 +58,6 @@ void accept_rayleigh(void *self, const time_step *step, const double *q1, const 
   *m->lost += product_with(m, s, s) / step->dt;
 }
 
-void accept_tangent_damping(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const tangent_damping *t = self;
-  accept_rayleigh((void *)t->damping, step, q1, s);
-  add_cells((void *)t->force, t->damping->product->rate, 0); /* forces in cells */
-}
-
 static void respond_in_term(const inelastic_term *t, const double *q)
 {
   if (t->cells) respond_at(t->cells, q);
@@ -76,7 +69,10 @@ void accept_inelastic(void *self, const time_step *step, const double *q1, const
   const inelastic_term *t = self;
   points *p = t->points;
   respond_in_term(t, q1);
-  if (p->committed) keep_tangents(p);
+  if (p->damped) {
+    accept_block((void *)p->damped, step, q1, s);
+    keep_tangents(p);
+  }
   end_points(p, p->sum, 1);
   for (int k = 0; k < POINT_OUTPUTS; ++k)
     if (t->entry[k] && k != ELASTIC && k != HARDENING) *t->entry[k] += (k == LOST ? 2 * t->alpha : 1) * p->sum[k];
@@ -107,7 +103,7 @@ void change_of_block(void *self, const double *q1, energy_change *sum)
 {
   const element_block *b = self;
   const int n = b->lanes, first = b->states + b->shares, energies = first + b->recorded, elastic = b->stored && !b->lost;
-  const double *w = b->w + (size_t)((2 + b->rates) * b->unknowns + b->states) * n; /* works on paths */
+  const double *w = first_numbers(b); /* works on paths */
   end_step_of_block(b, q1, COMPUTE);
   for (int i = 0; i < b->elements; ++i) {
     const double *out = b->out + (size_t)(i / n) * b->end_of->outputs * n + i % n;

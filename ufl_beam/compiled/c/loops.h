@@ -209,6 +209,8 @@ enum { STIFFEST = 2 };
 /* Computes the answers of several points at once, from the inputs of each, point after point. */
 typedef void (answer_loop)(int number, const double *w, double *answers);
 
+typedef struct element_block element_block;
+
 /* Points in cross-sections, `of_cell` in each of `cells` sections, with `width` numbers of each point
  * in w; see material_points.py. The sections are at the integration points of cells, one cell after
  * the other; a spring has one section. */
@@ -234,14 +236,16 @@ typedef struct {
   int predicts;
   const double *linear; /* strains of sections that a static iteration predicts; or none */
   double *unlike; /* largest (N, V, M) by which a point's answer differs from the stress of its strain */
-  double *committed; /* derivatives D of the accepted state without negative eigenvalues; or none */
+  /* Cells with tangent damping, whose first numbers are the derivatives D of the accepted state without negative
+   * eigenvalues; or none. Number of sections in each. */
+  const element_block *damped;
+  int in_damped;
   const double *elastic; /* stiffnesses of sections, to which eigenvalues are relative */
   double *inputs;        /* space for the inputs of a point */
 } points;
 
 /* Cells with points in `in_cell` sections each. The block of the cells computes the strains of the sections, and in
  * statics those that the latest tangent predicts. */
-typedef struct element_block element_block;
 typedef struct {
   points *points;
   int in_cell;
@@ -553,10 +557,6 @@ typedef struct {
   void *handle;
 } time_function;
 
-/* Form with numbers of a step in its coefficients, from `at` on; for example, with the configuration
- * q0 at the beginning of the step. */
-typedef struct { const cells *form; int at; } form_of_step;
-
 /* -- blocks: all elements with one statement, see blocks/statement.py ---------------------------------- */
 
 /* A compiled function of elements. `several` computes all batches: the first input of each element of a
@@ -725,29 +725,6 @@ typedef struct {
   double *kept, *lost; /* entries of the ledger, energy stored and dissipated; or none */
 } matrix_of_rates;
 
-/* Committed tangents of some cells, for damping: `numbers` of each of the cells `cell`. */
-typedef struct {
-  int number, numbers;
-  const int32_t *cell;
-  const double *tangents;
-} committed_cells;
-
-/* Rayleigh damping with the tangent of the accepted state; see TangentRayleighForces. */
-typedef struct {
-  const matrix_of_rates *damping;
-  const cells *stiffness, *force; /* forms: the stiffness of cells; its product with a vector */
-  int at_q0;                      /* position of the configuration in the coefficients of `force` */
-  const form_of_step *form;       /* positions of the tangents of sections in both forms */
-  int groups;
-  const committed_cells *group;
-  int entries;
-  double *K;                      /* entries of the stiffness */
-  int number;                     /* entries of the damping matrix C: C = mass + factor K[at] */
-  const int32_t *at;
-  const double *mass;
-  double factor, *C;
-} tangent_damping;
-
 /* Prescribed motions of supports, and their work. */
 typedef struct {
   int held, moving;
@@ -908,7 +885,6 @@ phase begin_dead_loads,
   accept_dead_loads,
   
   begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
-  begin_tangent_damping, accept_tangent_damping,
   begin_inelastic, accept_inelastic, add_energy_of_points,
   begin_block, begin_block_again, begin_neighbour, accept_block, add_energy_of_block;
 admission points_dissipate;
@@ -968,16 +944,6 @@ struct derivatives {
   double *substep, *substep_q, *substep_dq;
 };
 
-/* Forces of a form differentiated by one of its coefficients, with a table of each cell. */
-typedef struct {
-  const cells *form, *table;
-  int columns, copies, stride;
-  const int32_t *copy;      /* of each block of coefficients: its positions in both forms, its length */
-  const double *direction;  /* derivatives of the coefficient, `stride` numbers apart for each parameter;
-                             * or none: the coefficient is the configuration before the step */
-  double *bar;              /* of the adjoint: derivatives by the coefficient; or none */
-} form_derivative;
-
 /* Derivatives of material points by all their inputs. The columns of a table are the growth, the
  * variables that a law solves for, then the other inputs; its rows are the stresses, the new state, the
  * equations of the unknowns, and the margins of the conditions in the law. The stresses and the margins follow. */
@@ -990,8 +956,8 @@ typedef struct {
   double *J;                      /* tables of all points */
   double *w, *e0;                 /* derivatives of the data of the points, and of the strains before the step */
   const double *B, *weight, *rest; /* of the geometry of the sections; or none */
-  /* Of committed tangents, if a damping uses them: derivatives, also of the elastic stiffnesses; steps of
-   * parameters for differences. */
+  /* Of committed tangents, if a damping uses them: derivatives of its numbers, also of the elastic stiffnesses; steps
+   * of parameters for differences. */
   double *tangents;
   const double *elastic, *step;
   double *r, *e1;                 /* of one parameter: of resultants and strains */
@@ -1049,19 +1015,6 @@ typedef struct {
   double *here;              /* forces of the scene */
 } term_differences;
 
-/* Derivatives of the damping by the tangent of the accepted state, by the configuration in its forms and
- * by the tangents of sections. */
-typedef struct {
-  const tangent_damping *damping;
-  form_derivative *by_q0;
-  const cells *force;            /* the form of the forces, for derivatives of the tangents */
-  int at_q0, at_tangents;        /* positions in its coefficients */
-  const double *const *tangents; /* of each group: derivatives, with a row for each parameter */
-  form_derivative *by_tangents;  /* of the adjoint; or none */
-  double *const *tangents_bar;
-  double *r;
-} damping_derivatives;
-
 /* Transposes of a term: from the state at the end of a step to the state before it; from lambda, the
  * derivatives by the forces, to the state before the step; from the initial state to the parameters.
  * `state` and `finish` may be none. */
@@ -1099,15 +1052,12 @@ void transpose_points(void *self, adjoint *a, const double *lambda);
 void transpose_product(void *self, adjoint *a, const double *lambda);
 void transpose_loads(void *self, adjoint *a, const double *lambda);
 void transpose_differences(void *self, adjoint *a, const double *lambda);
-void transpose_damping(void *self, adjoint *a, const double *lambda);
 void transpose_block_state(void *self, adjoint *a);
 void transpose_block(void *self, adjoint *a, const double *lambda);
 void finish_block(void *self, adjoint *a);
 void finish_points(void *self, adjoint *a);
 int differentiate_step(derivatives *d, time_loop *m, int initial);
 void begin_neighbours(void *self, const time_step *step, const double *q1);
-void tabulate_damping(void *self, const time_step *step, const double *q1);
-void add_damping_derivative(void *self, const derivatives *d, int p, double *r);
 void add_differences_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_differences_derivative(void *self, const derivatives *d, int p);
 void keep_derivatives(derivatives *d, const time_loop *m);
@@ -1120,7 +1070,6 @@ void add_product_derivative(void *self, const derivatives *d, int p, double *r);
 void add_load_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_points_derivative(void *self, const derivatives *d, int p);
 void accept_load_derivative(void *self, const derivatives *d, int p);
-void tabulate_derivative(void *self, const time_step *step, const double *q1);
 void tabulate_points(void *self, const time_step *step, const double *q1);
 void differentiate_loads(void *self, const time_step *step, const double *q1);
 

@@ -206,6 +206,25 @@ static int answer_at(const points *p, double theta, double *w, double *s)
   return 1;
 }
 
+/* Numbers of the elements of a block: of the first one, among its inputs; how many there are. */
+static inline double *first_numbers(const element_block *b)
+{
+  return b->w + (size_t)((2 + b->rates) * b->unknowns + b->states) * b->lanes;
+}
+static inline size_t all_numbers(const element_block *b) { return (size_t)b->batches * b->numbers * b->lanes; }
+
+/* The tangent of a section among the first numbers of a damped cell; `rows` is the number of numbers of a batch. */
+static inline double *tangent_of(const points *p, double *numbers, int rows, int section)
+{
+  const int n = p->damped->lanes, i = section / p->in_damped;
+  return numbers + ((size_t)(i / n) * rows + 9 * (section % p->in_damped)) * n + i % n;
+}
+static inline void put_tangent(const points *p, double *numbers, int rows, int section, const double *D)
+{
+  double *to = tangent_of(p, numbers, rows, section);
+  for (int k = 0; k < 9; ++k) to[k * p->damped->lanes] = D[k];
+}
+
 /* Store the tangents at the strains of the latest response, which remains.
  *
  * The law holds at the end of the step here, and its iteration starts from the state before the
@@ -217,10 +236,10 @@ void keep_tangents(const points *p)
 {
   const int d = p->components, width = p->width;
   points at_end = *p;
-  double s[3 + 9], r[3], *w = p->w, *D = p->committed, *own = p->inputs;
+  double s[3 + 9], r[3], *w = p->w, *own = p->inputs;
   at_end.tried = 0;
-  for (int c = 0; c < p->cells; ++c, D += 9) {
-    memset(D, 0, 9 * sizeof *D);
+  for (int c = 0; c < p->cells; ++c) {
+    double D[9] = {0};
     for (int k = 0; k < 3; ++k) D[4 * k] = p->rest[k];
     for (int i = 0; i < p->of_cell; ++i, w += width) {
       memcpy(own, w, width * sizeof *w);
@@ -232,6 +251,7 @@ void keep_tangents(const points *p)
       add_answer(d, p->B + 3 * d * i, weight, s, r, D);
     }
     remove_negative(p->elastic + 3 * c, D);
+    put_tangent(p, first_numbers(p->damped), p->damped->width, c, D);
   }
 }
 

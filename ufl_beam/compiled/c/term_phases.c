@@ -95,23 +95,6 @@ void begin_product(void *self, const time_step *step, const double *q1, const do
   if (some != 1) combine_rates(r, row, 1, m->v);
 }
 
-/* Damping matrix of the step, from the tangents and the configuration of the accepted state. */
-void begin_tangent_damping(void *self, const time_step *step, const double *q1, const double *s)
-{
-  const tangent_damping *t = self;
-  for (int g = 0; g < t->groups; ++g) {
-    const committed_cells *of = t->group + g;
-    for (int k = 0; k < 2; ++k)
-      for (int c = 0; c < of->number; ++c)
-        put_in_cell(t->form[k].form, of->cell[c], t->form[k].at, of->numbers, of->tangents + of->numbers * c);
-  }
-  set_cells(t->force, step->q0, t->at_q0);
-  memset(t->K, 0, t->entries * sizeof *t->K);
-  add_cells((void *)t->stiffness, step->q0, t->K);
-  for (int i = 0; i < t->number; ++i) t->C[i] = t->mass[i] + t->factor * t->K[t->at[i]];
-  begin_product((void *)t->damping, step, q1, s);
-}
-
 void begin_inelastic(void *self, const time_step *step, const double *q1, const double *s)
 {
   const inelastic_term *t = self;
