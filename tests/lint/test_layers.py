@@ -40,7 +40,7 @@ C_FILES = {
 BELONG_ELSEWHERE = {
     "some_cells": "compiled", "turn_axes": "compiled", "keep_state": "output",
     **dict.fromkeys(["accept_dead_loads", "accept_inertia", "accept_rayleigh"], "terms"),
-    **dict.fromkeys(["accept_tangent_damping", "add_kinetic_energy", "product_with"], "terms"),
+    **dict.fromkeys(["add_kinetic_energy", "product_with"], "terms"),
 }  # fmt: skip
 """C functions that belong to another subpackage than their file."""
 
