@@ -10,7 +10,7 @@ import ufl_beam as ub
 @pytest.mark.parametrize("name", bench.CASES)
 def test_the_effects_are_idle(name):
     (record,) = bench.measure(name, rounds=1, steps={4: 20})
-    assert 0.0 < record["us_per_step"] < float("inf")
+    assert record["us_per_step_without"] > 0
 
 
 def test_an_effect_that_acts_is_refused(monkeypatch):
@@ -22,7 +22,7 @@ def test_an_effect_that_acts_is_refused(monkeypatch):
 
 def test_the_table_has_a_row_for_each_effect_and_two_columns_for_each_mesh():
     records = [
-        {"case": name, "cells": n, "us_per_step": 12.0, "us_per_step_without": 8.0, "ratio": 1.5}
+        {"case": name, "cells": n, "us_per_step_without": 8.0, "ratio": 1.5}
         for name in ("one", "other")
         for n in (8, 64)
     ]
