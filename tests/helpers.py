@@ -55,22 +55,6 @@ def assert_balanced(energy):
     require_no_gain(energy)
 
 
-def require_reference(run, scene, connector, scheme, **more):
-    """The reference solver, with the laws by NumPy, finds the same, ledger included; the run."""
-    found, reference = (
-        run(scene, scheme, newton=ub.Newton(rtol=1e-12, reference=one), **more)
-        for one in (False, True)
-    )
-    np.testing.assert_allclose(found.q, reference.q, rtol=0, atol=1e-9 * np.abs(found.q).max())
-    for mine, other in zip(found.connector(connector), reference.connector(connector), strict=True):
-        np.testing.assert_allclose(mine, other, rtol=0, atol=1e-9 * max(np.abs(mine).max(), 1e-3))
-    assert list(found.energy) == list(reference.energy)
-    for entry in found.energy:
-        a, b = found.energy[entry], reference.energy[entry]
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * found.energy.energy_transferred)
-    return found
-
-
 def require_restart(run, scene, connectors, scheme, folder, until):
     """A run resumed at half time ends bit for bit as the whole one, one from `start=` nearly so."""
     half, whole = until / 2, run(scene, scheme, t=(0, until))

@@ -20,14 +20,12 @@ from combination_case import (
     results,
 )  # fmt: skip
 from helpers import stop_after
-from old_reference.run import simulation_by_either
-from old_reference.solver import Solver as OldSolver
 from user_classes import CONNECTOR_LAWS, LAWS, SOFTENING, LargestCurvature
 
 import ufl_beam as ub
-import ufl_beam.simulation.run
 from ufl_beam import parallel
 from ufl_beam.reference.solver import Solver
+from ufl_beam.simulation.reference_run import require_scope
 
 MEMORY = "MenegottoPinto", "KentPark", "Mander"
 """Laws with memory."""
@@ -343,22 +341,15 @@ def are_near(one, other, tolerance):
 
 @check
 def reference(case):
-    """The reference solver finds the same motions, forces and energies.
-
-    A run has line searches for points that flow, the reference solver those of PETSc.  It alone cut
-    one of the 272 shortest steps of combination 20206: 2e-6 of the work of its loads, by trapezes,
-    differed.  With the same cut the run agreed to 4e-12.
-    """
+    """The reference solver finds the same motions, forces and energies."""
     only(case.equal_steps, "its steps are equal")
     only(case.comm.size == 1, "it has one process")
-    only(not case.combination.has("ub.Effect"), "it has no statements of users")
+    solution = case.whole.solution
+    try:
+        require_scope(solution.numbering, solution.scheme, MPI.COMM_SELF)
+    except ub.ArgumentError as error:
+        only(False, str(error))
     newton = ub.Newton(rtol=DIGITS, reference=True)
-    with mock.patch.object(ufl_beam.simulation.run, "ReferenceRun", simulation_by_either):
-        by_reference(case, newton)
-
-
-def by_reference(case, newton):
-    """Compare a run by the present or the old reference solver with the run of the case."""
     try:
         assert_agree(case, newton=newton)
     except StepsAreCut as flag:
@@ -379,31 +370,22 @@ def with_guesses(case, newton):
     laws, but if a solver takes the states of the other for equilibria, it has the same.
     """
     ends, q = case.exact.solution.times, case.exact.solution.q
-    find, solve, find_by_old, times = (
-        Solver._equilibrium, Solver._solve, OldSolver._equilibrium, [0.0, 0.0],
-    )  # fmt: skip
+    find, solve, times = Solver._equilibrium, Solver._solve, [0.0, 0.0]
 
     def solve_to(solver, step):
         times[:] = step.t1, step.dt
         return solve(solver, step)
 
-    def at_end(t1, dt):
-        return np.flatnonzero(np.abs(ends - t1) < 1e-9 * dt)
-
     def find_near(solver, guess):
-        at, frame = at_end(*times), solver.frame
+        t1, dt = times
+        at, frame = np.flatnonzero(np.abs(ends - t1) < 1e-9 * dt), solver.frame
         near = (frame.E.T @ q[at[0]])[frame.mine] if len(at) else guess
         near[frame.fixed] = guess[frame.fixed]  # prescribed motions
         return find(solver, near)
 
-    def find_near_by_old(solver, guess, step):
-        at = at_end(step.t1, step.dt)
-        return find_by_old(solver, solver.supports.axes @ q[at[0]] if len(at) else guess, step)
-
     with (
         mock.patch.object(Solver, "_solve", solve_to),
         mock.patch.object(Solver, "_equilibrium", find_near),
-        mock.patch.object(OldSolver, "_equilibrium", find_near_by_old),
     ):
         return case.run(newton=newton)
 

@@ -178,10 +178,10 @@ def effect(*kinds, schemes=ANY, seeds=None):
 # -- numbers -----------------------------------------------------------------------------------
 
 
-def numbers(scene, solution):
-    """Numbers of a run by name; the first word of a name is their kind."""
+def numbers(scene, solution, rows=None):
+    """Numbers of a run at three times, or in `rows`; the first word of a name is their kind."""
     n = len(solution) - 1
-    rows = [n // 3, 2 * n // 3, n]
+    rows = [n // 3, 2 * n // 3, n] if rows is None else rows
     found = {"count steps": [n], "time": solution.times[rows]}
     places = {
         f"{beam.name} {k}/{beam.cells}": beam.at(k / beam.cells)
@@ -244,16 +244,20 @@ def compute(one):
     return scenes
 
 
+def in_lines(numbers):
+    """Text of numbers in a file, with each list in one line."""
+    rows = [
+        f'  "{key}": [{", ".join(f"{x:.13g}" for x in values)}]' for key, values in numbers.items()
+    ]
+    return "{\n" + ",\n".join(rows) + "}"
+
+
 def write(name, scenes):
     """Write a file with each list of numbers in one line."""
     lines = []
     for scene in scenes:
         acts = ", ".join(f"{x:.1e}" for x in scene["acts"])
-        rows = [
-            f'  "{key}": [{", ".join(f"{x:.13g}" for x in values)}]'
-            for key, values in scene["numbers"].items()
-        ]
-        lines.append(f'{{"acts": [{acts}],\n "numbers": {{\n' + ",\n".join(rows) + "}}")
+        lines.append(f'{{"acts": [{acts}],\n "numbers": {in_lines(scene["numbers"])}}}')
     FOLDER.mkdir(exist_ok=True)
     (FOLDER / f"{name}.json").write_text("[" + ",\n".join(lines) + "]\n", "utf-8")
 

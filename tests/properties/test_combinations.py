@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Combinations of features agree with themselves: 29 of them, and 400 in `make verify`.
+"""Combinations of features agree with themselves: 24 of them, and 400 in `make verify`.
 
 ``python3 tests/properties/combinations.py --from 1000 --number 500`` checks others and prints a
 table, ``--show SEED`` prints the script of one.
@@ -19,14 +19,11 @@ import ufl_beam as ub
 NUMBER = 400
 """Combinations that draw everything."""
 
-LONG = {10, 11, 13, 29, 131, 252, 301}
-"""Combinations whose reference solutions take more than 10 s; only `make long` checks them."""
-
 
 def covering():
     """Combinations that draw every feature, base, scheme and name: the most new ones first."""
     drawn = {}
-    for n in set(range(NUMBER)) - LONG:
+    for n in range(NUMBER):
         c = draw(n)
         schemes = {x for x in (*STATICS, *DYNAMICS) if c.has(f".{x}\n", f"= {x}\n")}
         drawn[n] = {f.name for f in c.features} | c.names | schemes | {c.base}
@@ -121,18 +118,14 @@ def test_all_checks_of_a_combination_pass(seed, tmp_path):
 @pytest.mark.serial
 @pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 def test_all_checks_pass_if_iterates_go_far(tmp_path):
-    """Forces of a rotating frame are 10⁷ times those in equilibrium at some iterates.
-
-    The reference solver cuts steps, however small, so that there is nothing to compare.
-    """
+    """Forces of a rotating frame are 10⁷ times those in equilibrium at some iterates."""
     source = Path(__file__).with_name("far_iterates.txt").read_text(encoding="utf-8")
     features = tuple(one for one in FEATURES if one.name in source.splitlines()[0])
-    checks = [name for name in CHECKS if name != "reference"]
-    require_all_checks(Combination(157, "chain", features, source), tmp_path, checks)
+    require_all_checks(Combination(157, "chain", features, source), tmp_path)
 
 
-def require_all_checks(combination, folder, checks=CHECKS):
-    found = outcome_of(combination, folder, checks)
+def require_all_checks(combination, folder):
+    found = outcome_of(combination, folder, CHECKS)
     flags = {name: words for name, words in found.items() if words not in KNOWN}
     assert not flags, f"{flags}\n{combination.source}"
 

@@ -280,19 +280,13 @@ def stepped(scene, scheme, t=(0, 0.9), **options):
     [("steel", ub.EnergyMomentum()), ("Kent-Park", ub.Static()), ("Mander", ub.EnergyMomentum())],
     ids=str,
 )
-def test_the_reference_solver_finds_the_same(law, scheme):
+def test_the_reference_solver_finds_the_same(law, scheme, as_by_reference):
     """Displacements and energies to the tolerance of both solvers; the ledger closes."""
     scene, _ = column(LAWS[law])
-    found, reference = (
-        stepped(scene, scheme, (0, 0.4), newton=ub.Newton(rtol=1e-12, reference=one))
-        for one in (False, True)
-    )
-    np.testing.assert_allclose(found.q, reference.q, rtol=0, atol=1e-9 * np.abs(found.q).max())
+    found = stepped(scene, scheme, (0, 0.4), newton=ub.Newton(rtol=1e-12))
+    as_by_reference(found)
     lost = found.energy["plastic"]
     assert lost[-1] > 5.0  # J
-    for entry in found.energy:
-        a, b = found.energy[entry], reference.energy[entry]
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * found.energy.energy_transferred)
     if isinstance(scheme, ub.EnergyMomentum):
         assert found.energy.worst < 1e-9
     if law != "steel":

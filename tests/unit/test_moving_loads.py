@@ -70,27 +70,18 @@ def test_reactions_and_diagrams_are_those_of_a_force_at_its_place(degree):
         (ub.EnergyMomentum(), 3), (ub.GeneralizedAlpha(0.8), 1), (ub.EnergyMomentumDecaying(), 2),
     ],
 )  # fmt: skip
-def test_moving_loads_and_masses_in_both_solvers(scheme, degree):
+def test_moving_loads_and_masses_in_both_solvers(scheme, degree, as_by_reference):
     scene, beam = crossed(mass=2.0, cells=3)
-    mine, other = (
-        run(scene, scheme, t=(0, 0.28), dt=0.04, mesh=ub.Mesh(degree=degree), newton=newton)
-        for newton in (ub.Newton(rtol=1e-12), ub.Newton(rtol=1e-12, reference=True))
-    )
+    newton = ub.Newton(rtol=1e-12)
+    mine = run(scene, scheme, t=(0, 0.28), dt=0.04, mesh=ub.Mesh(degree=degree), newton=newton)
+    as_by_reference(mine)
     assert np.abs(mine.displacement(beam.end)).max() > 0.05
-    np.testing.assert_allclose(mine.q, other.q, rtol=0, atol=1e-9)
-    size = mine.energy.energy_transferred
-    for entry in mine.energy:
-        np.testing.assert_allclose(mine.energy[entry], other.energy[entry], atol=1e-9 * size)
-    for n in (3, 6):
-        M, reference = mine.diagram(beam, n).M, other.diagram(beam, n).M
-        np.testing.assert_allclose(M, reference, rtol=0, atol=1e-9 * np.abs(M).max())
     if isinstance(scheme, ub.EnergyMomentum):
         assert_balanced(mine.energy)
 
 
-@pytest.mark.parametrize("reference", [False, True])
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentumDecaying(), ub.GeneralizedAlpha(0.5)], ids=str)
-def test_work_of_the_drive_of_a_mass_that_begins_on_the_beam(scheme, reference):
+def test_work_of_the_drive_of_a_mass_that_begins_on_the_beam(scheme):
     """A mass m moves outwards with the speed u along a beam that turns with ω."""
     m, ω, u = 3.0, 3.0, 1.0
     beam = ub.Beam((0, 0), (2, 0), ub.Section(EA=1e7, GA=1e7, EI=1e6, rhoA=0.01, rhoI=1e-4))
@@ -99,8 +90,7 @@ def test_work_of_the_drive_of_a_mass_that_begins_on_the_beam(scheme, reference):
         [beam], supports=[turned], loads=[ub.MovingLoad(beam, lambda t: 0.2 + u * t, mass=m)],
         initial=[ub.Velocity((beam,), angular=ω)],
     )  # fmt: skip
-    newton = ub.Newton(reference=True) if reference else None
-    energy = run(scene, scheme, t=(0, 0.5), dt=0.01, newton=newton).energy
+    energy = run(scene, scheme, t=(0, 0.5), dt=0.01).energy
     assert energy.state["kinetic"][0] == pytest.approx(m / 2 * (u**2 + (0.2 * ω) ** 2), rel=0.06)
     assert energy.supplied["loads"][-1] == pytest.approx(m * ω**2 * (0.2**2 - 0.7**2) / 2, rel=0.01)
     assert energy.supplied["supports"][-1] == pytest.approx(m * ω**2 * (0.7**2 - 0.2**2), rel=0.01)

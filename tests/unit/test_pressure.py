@@ -27,24 +27,15 @@ def blown(**load):
     ("scheme", "degree"),
     [*zip([ub.Static(), ub.EnergyMomentumStatic(), *SCHEMES], [1, 2, 3, 1, 2], strict=True)],
 )
-def test_pressure_in_both_solvers(scheme, degree):
+def test_pressure_in_both_solvers(scheme, degree, as_by_reference):
     """With the amplitude, span and profile of a load in a large motion."""
     scene, beam = blown(
         amplitude=ub.Table([0, 0.2, 0.4], [0, 1, 0.5]), span=(0.2, 0.9), profile=(0.5, 1.5)
     )
-    runs = [
-        run(scene, scheme, t=(0, 0.4), dt=0.04, mesh=ub.Mesh(degree=degree), newton=newton)
-        for newton in (ub.Newton(rtol=1e-12), ub.Newton(rtol=1e-12, reference=True))
-    ]
-    mine, other = runs
+    newton = ub.Newton(rtol=1e-12)
+    mine = run(scene, scheme, t=(0, 0.4), dt=0.04, mesh=ub.Mesh(degree=degree), newton=newton)
+    as_by_reference(mine)
     assert np.abs(mine.displacement(beam.end)).max() > 0.3
-    np.testing.assert_allclose(mine.q, other.q, rtol=0, atol=1e-9)
-    size = mine.energy.energy_transferred
-    for entry in mine.energy:
-        np.testing.assert_allclose(mine.energy[entry], other.energy[entry], atol=1e-9 * size)
-    for n in (3, 10):
-        M, reference = mine.diagram(beam, n), other.diagram(beam, n)
-        np.testing.assert_allclose(M.M, reference.M, rtol=0, atol=1e-9 * np.abs(M.M).max())
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentumStatic()])

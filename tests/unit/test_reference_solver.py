@@ -20,7 +20,6 @@ from ufl_beam.reference.step_problem import StepProblem
 from ufl_beam.simulation.reference_run import ReferenceRun
 
 pytestmark = [
-    pytest.mark.present_reference,
     pytest.mark.filterwarnings("ignore:.*opened in 1 cell, in the middle of a cell"),
 ]
 

@@ -91,7 +91,7 @@ def test_an_inclined_roller_settles():
     [ub.Static(), ub.EnergyMomentumStatic(0.5), ub.EnergyMomentum(), ub.GeneralizedAlpha(0.8)],
 )
 def test_a_support_at_an_angle_moves_far(scheme):
-    """In both solvers, and as the same model in turned axes."""
+    """As the same model in turned axes."""
 
     def swung(angle):
         c, s = math.cos(angle), math.sin(angle)
@@ -103,16 +103,15 @@ def test_a_support_at_an_angle_moves_far(scheme):
         return clamped(beam, held), beam
 
     runs = []
-    for angle, reference in ((0.0, False), (0.7, False), (0.7, True)):
+    for angle in (0.0, 0.7):
         scene, beam = swung(angle)
-        newton = ub.Newton(rtol=1e-12, reference=reference)
-        moved = run(scene, scheme, newton=newton, dt=0.05)
+        moved = run(scene, scheme, newton=ub.Newton(rtol=1e-12), dt=0.05)
         runs.append((moved.section_forces_at(beam.start), moved.energy.supplied["supports"]))
         if isinstance(scheme, ub.EnergyMomentum | ub.EnergyMomentumStatic):
             assert_balanced(moved.energy)
-    for force, work in runs[1:]:
-        assert force == pytest.approx(runs[0][0], abs=1e-7 * np.abs(force).max())
-        assert work == pytest.approx(runs[0][1], abs=1e-7 * np.abs(work).max())
+    (other_force, other_work), (force, work) = runs
+    assert force == pytest.approx(other_force, abs=1e-7 * np.abs(force).max())
+    assert work == pytest.approx(other_work, abs=1e-7 * np.abs(work).max())
 
 
 def test_a_direction_must_not_be_zero():

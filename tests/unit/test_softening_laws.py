@@ -224,29 +224,19 @@ each_scheme = pytest.mark.parametrize(
 
 @pytest.mark.parametrize("place", [*enumerate([*PLACES, "fibres"])], ids=lambda x: x[1])
 @pytest.mark.parametrize("name", [*enumerate(CRACKS)], ids=lambda x: x[1])
-def test_both_solvers_agree(name, place):
+def test_both_solvers_agree(name, place, as_by_reference):
     """To and fro; works and losses to 1e-9; the ledger closes.
 
     Each law, and each place, is in statics as well as in dynamics.
     """
     (i, name), (j, place) = name, place
     scheme = (ub.Static(), ub.EnergyMomentum(0.1))[(i + j) % 2]
-    runs = [
-        ub.simulate(
-            scene_of(name, place), scheme, t=(0, 1), dt=1 / 10,
-            newton=ub.Newton(rtol=1e-12, reference=reference),
-        )
-        for reference in (False, True)
-    ]  # fmt: skip
-    through = runs[0].energy.energy_transferred
-    for kind in ("state", "lost"):
-        mine, other = (getattr(run.energy, kind) for run in runs)
-        for entry in mine:
-            assert np.abs(mine[entry] - other[entry]).max() < 1e-9 * through
-    assert np.abs(runs[0].q - runs[1].q).max() < 1e-9
-    assert runs[0].energy.lost["hinges"][-1] > 1e-2 * through
+    newton = ub.Newton(rtol=1e-12)
+    run = ub.simulate(scene_of(name, place), scheme, t=(0, 1), dt=1 / 10, newton=newton)
+    as_by_reference(run)
+    assert run.energy.lost["hinges"][-1] > 1e-2 * run.energy.energy_transferred
     if scheme.dynamic:
-        assert max(run.energy.worst for run in runs) < 1e-9
+        assert run.energy.worst < 1e-9
 
 
 @pytest.mark.parametrize("place", [*PLACES, "fibres"])
@@ -304,12 +294,10 @@ def test_modes_of_what_is_left(place):
     assert found[1] == pytest.approx(found[2], rel=1e-6)
 
 
-@pytest.mark.parametrize("reference", [False, True])
-def test_a_spring_that_never_breaks(reference):
+def test_a_spring_that_never_breaks():
     """[closed] A spring and a beam of the same stiffness bear half of what one would."""
     scene = turned(ub.Softening(np.inf, 1.0), lambda t: 0.1 * t, "spring")
-    newton = ub.Newton(reference=reference)
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=newton)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
     assert run.connector(scene.connectors[0]).force == pytest.approx([0.0, 25.0, 50.0], rel=1e-9)
 
 

@@ -275,15 +275,10 @@ def test_a_scene_without_works_has_no_term():
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1), ub.Newmark()])
-def test_the_reference_path(scheme):
+def test_the_reference_path(scheme, as_by_reference):
     """DOLFINx assembles the same forms."""
-    by_dolfinx, compiled = (
-        run(flying(lambda t: 5 + t), scheme, t=(0, 0.5), newton=ub.Newton(reference=by))
-        for by in (True, False)
-    )
-    np.testing.assert_allclose(by_dolfinx.q, compiled.q, atol=1e-9)
-    for name in ("soil", "magnet", "air", "magnet in time"):
-        np.testing.assert_allclose(by_dolfinx.energy[name], compiled.energy[name], atol=1e-9)
+    newton = ub.Newton(rtol=1e-12)
+    as_by_reference(run(flying(lambda t: 5 + t), scheme, t=(0, 0.5), newton=newton))
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Newmark()])

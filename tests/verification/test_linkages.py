@@ -167,17 +167,6 @@ def test_a_trammel_does_not_leap():
     assert y == pytest.approx(np.sqrt(1 - x**2), abs=1e-9)
 
 
-def test_the_reference_solver_divides_the_same_steps():
-    for kind, lengths in (("link", (1.0, 0.5, 1.2, 0.8)), ("beams", (1.41, 0.83, 1.45, 0.9))):
-        linkage = FourBar(*lengths, kind=kind)
-        runs = [
-            ub.simulate(linkage.scene, ub.Static(), t=(0, 1), dt=1 / 8, newton=newton)
-            for newton in (None, ub.Newton(reference=True))
-        ]
-        assert runs[0].substeps == runs[1].substeps > 8
-        assert linkage.error(runs[1]) < 1e-6
-
-
 @pytest.mark.filterwarnings("ignore:.* jumps:ufl_beam.ModelWarning")
 def test_a_jump_of_a_motor_is_refused_with_a_remedy():
     arm = bar(0j, 1 + 0j, "arm")

@@ -179,11 +179,10 @@ def test_softening_supplies_no_energy(kind):
 
 
 @pytest.mark.parametrize("kind", ["fibres", pytest.param("hinge", marks=pytest.mark.slow)])
-def test_the_reference_solver_finds_the_same(kind):
+def test_the_reference_solver_finds_the_same(kind, as_by_reference):
     """Tolerance: variables of laws have 9 digits, as corrections below this end their iteration."""
-    newton = [ub.Newton(rtol=1e-12, reference=x) for x in (False, True)]
-    runs = [shaken(kind, t=(0, 0.15), newton=one)[1] for one in newton]
-    np.testing.assert_allclose(runs[0].q, runs[1].q, rtol=0, atol=1e-9 * np.abs(runs[0].q).max())
+    run = shaken(kind, t=(0, 0.15), newton=ub.Newton(rtol=1e-12))[1]
+    as_by_reference(run)
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentumDecaying(), ub.GeneralizedAlpha()])
