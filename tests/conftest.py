@@ -70,7 +70,7 @@ def pytest_collection_modifyitems(config, items):
 
 
 REFERENCE = HERE / "data" / "reference.json"
-"""Numbers in the middle and at the end of runs by the reference solver of version 0.1.0, in the order of each test.
+"""Numbers in the middle and at the end of runs of the reference solver of version 0.1.0, by tests.
 
 It had the laws of connectors and materials, loads, schemes and the ledger in NumPy, apart from what
 the package computed at that time.  It is gone: a test whose scene changes needs other numbers, of a
