@@ -131,7 +131,8 @@ class Block(LoadTerm):
         kind: str = "loads", supplies: str | None = None, moves: bool = False,
     ) -> None:  # fmt: skip
         subdomain, scheme, self._A, self._ledger, t0, nodal, *_ = setting
-        self.statement, self._elements, self._supplies = statement, elements, supplies
+        self.statement, self._supplies = statement, supplies
+        self._elements = elements._replace(numbers=())  # the block has copies
         self.kind, self._moves, self._subdomain = kind, moves, subdomain
         self._passes_on = bool(statement.shared or (moves and scheme.weight_of_before))
         self._kernels = made = kernels(statement)
@@ -158,13 +159,13 @@ class Block(LoadTerm):
         index = more | {**elements.of_step} | dict(zip(statement.shared, of_group, strict=True))
         from_ = [np.broadcast_to(index[x], n) for x in (*statement.of_step, *statement.shared)]
         self._of_step = first + shares * groups
-        numbers = np.array(elements.numbers, dtype=np.float64).reshape(len(statement.numbers), n).T
         of_groups = np.broadcast_to(elements.groups, n)[: n if shares else 0]
         width, modes = len(statement.inputs), len(statement.all_modes)
         after = width - modes - len(from_)
         self._w: Array = np.zeros((-(-n // BATCH), width, BATCH))
         self._numbers = self._w[:, after - len(statement.numbers) : after]
-        self._numbers[:] = in_batches(numbers, BATCH)
+        for k, number in enumerate(elements.numbers):  # one by one, as all may be large
+            self._numbers[:, k] = in_batches(np.asarray(number).reshape(n, 1), BATCH)[:, 0]
         self._states = np.zeros((len(self._w), states, BATCH))
         self.state = {z: self._states[:, k] for k, z in enumerate(statement.state)}
         batches, rows = len(self._w), motions + states + shares
@@ -189,14 +190,16 @@ class Block(LoadTerm):
         self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
         self._shared = np.zeros((groups, shares))
         ranged = [statement.numbers.index(x) for x in ("low", "high") if statement.acts_at]
+        ranges = np.ascontiguousarray(self._numbers[:, ranged])
         self._nodal = nodal if statement.rates else ffi.NULL
         self._c = struct(
             "element_block", force_of=made.force, tangent_of=made.tangent or ffi.NULL,
             end_of=made.end or ffi.NULL, lanes=BATCH, elements=n, batches=batches,
             unknowns=motions, rates=statement.rates, states=states, numbers=len(statement.numbers),
-            steps=len(from_), modes=modes, width=width, dofs=in_batches(dofs, BATCH),
+            steps=len(from_), modes=modes, width=width,
+            dofs=ffi.NULL if inserted else in_batches(dofs, BATCH),
             acting=np.full(1, batches, dtype=np.int32), batch=np.arange(batches, dtype=np.int32),
-            ranges=len(statement.acts_at), range=in_batches(numbers[:, ranged], BATCH),
+            ranges=len(statement.acts_at), range=ranges,
             size=len(self.dofs), dof=self.dofs,
             at=in_batches(np.searchsorted(self.dofs, dofs[:loads]).astype(np.int32), BATCH),
             entry=ffi.NULL if inserted else self._entries(made), functions=functions,
@@ -444,6 +447,7 @@ class Block(LoadTerm):
             terms, others = [], 0
         neighbours.states += [x for term in terms for x in (term._times[2], term._t)]
         b, by_shared = self._c, neighbours.state(lambda term: term._shared)
+        fill(b, dofs=in_batches(np.asarray(self._elements.dofs, dtype=np.int32), BATCH))
         by_before = neighbours.state(lambda term: term._times[2, : b.functions])
         table, conditions = self._kernels.derivative
         changes = np.ones((P, b.width - b.modes), dtype=np.int32)

@@ -92,7 +92,7 @@ class Solver:
 
     def __init__(self, subdomain: Subdomain, equation: Any, newton: Newton, least: int) -> None:
         self._subdomain, self._equation, self._newton = subdomain, equation, newton
-        self._weights, A = subdomain.weights(), equation.A
+        self._weights, A = equation.weights, equation.A
         self._factors = CondensedSolver(subdomain, A)
         (self._x, self.unknowns), (self._f, self._r), (self._y, self.change) = (
             _vector(subdomain) for _ in range(3)

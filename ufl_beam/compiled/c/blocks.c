@@ -64,11 +64,19 @@ static void set_prediction(const element_block *b, int moved, double reached)
 /* Write the configuration q into the motions of elements, from the input `first` on. */
 static void gather(const element_block *b, const double *q, int first)
 {
-  const int all = b->unknowns * b->lanes;
+  const int n = b->lanes, all = b->unknowns * n;
   FOR_ACTING(b, c) {
-    const int32_t *dofs = b->dofs + (size_t)c * all;
     double *w = input(b, c, first);
-    for (int i = 0; i < all; ++i) w[i] = q[dofs[i]];
+    if (b->inserted) /* as of forms, cell after cell; copies of the last cell fill up the lanes */
+      for (int l = 0; l < n; ++l) {
+        const int last = b->elements - 1, cell = c * n + l;
+        const int32_t *dofs = b->inserted->dofs + (size_t)(cell < last ? cell : last) * b->unknowns;
+        for (int i = 0; i < b->unknowns; ++i) w[i * n + l] = q[dofs[i]];
+      }
+    else {
+      const int32_t *dofs = b->dofs + (size_t)c * all;
+      for (int i = 0; i < all; ++i) w[i] = q[dofs[i]];
+    }
   }
 }
 

@@ -612,7 +612,7 @@ struct element_block {
   int columns;              /* of tables: last modes that depend on the mode before them; or zero */
   const double *const *table; /* of each element: rows, which begin with the least value of that mode */
   const int32_t *table_rows;
-  const int32_t *dofs;      /* degree of freedom of each motion of an element */
+  const int32_t *dofs;      /* degree of freedom of each motion of an element; of inserted cells, for derivatives only */
   int size;                 /* of loads: number of degrees of freedom on which they act */
   const int32_t *dof, *at;  /* of loads: these; index in `dof` of each motion of an element */
   const int32_t *entry;     /* entry of the matrix of each output of tangent_of */
