@@ -32,7 +32,7 @@ C_FILES = {
     "terms": "material_laws embedded_hinges material_points cell_forces term_phases",
     "blocks": "blocks inelastic_cells energy_ledger",
     "solvers": "beam_elimination fronts newton",
-    "simulation": "steps derivatives adjoint block_derivatives",
+    "simulation": "steps derivatives adjoint block_derivatives point_derivatives",
     "analysis": "oscillators",
 }
 """C files of ``compiled/c`` by the subpackage that they belong to."""

@@ -8,9 +8,9 @@ from uniaxial_points import Bars
 from user_laws import Dashpot, GivesEnergy, PowerLaw, SameHardening, Swelling, TwoRoots
 
 import ufl_beam as ub
+from ufl_beam.blocks.material_points import Points
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.model.fibres import SectionPoints
-from ufl_beam.terms.material_points import Points
 
 EA, EI, NP, MP = 2e3, 1.0, 4.0, 0.4
 

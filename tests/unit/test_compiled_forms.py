@@ -213,8 +213,8 @@ def no_points(monkeypatch):
         raise AssertionError("made for a scene that is elastic")
 
     forget_forms()
-    monkeypatch.setattr("ufl_beam.terms.material_points.Points.__init__", refuse)
-    monkeypatch.setattr("ufl_beam.terms.material_points.PointForms.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.blocks.material_points.Points.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.blocks.material_points.PointForms.__init__", refuse)
     monkeypatch.setattr("ufl_beam.blocks.beams.InelasticCells.__init__", refuse)
     monkeypatch.setattr("ufl_beam.model.softening_laws.Softening.traction", refuse)
     monkeypatch.setattr("ufl_beam.mechanics.point_equations.PointEquations.__init__", refuse)

@@ -6,8 +6,8 @@ import pytest
 from scenes import clamped
 
 import ufl_beam as ub
+from ufl_beam.blocks.material_points import Points
 from ufl_beam.model.fibres import SectionPoints
-from ufl_beam.terms.material_points import Points
 
 EA, EI, NP, MP = 1000.0, 50.0, 10.0, 2.0
 LAW = ub.AxialBending(NP, MP)

@@ -469,7 +469,7 @@ def test_loops_over_fibres_change_nothing(law, scheme, number, monkeypatch):
     several = fibre_run(law, scheme, number)
     assert several.inelastic[0].points.c.law_loop
     assert several.inelastic[0].points.c.end_loop
-    monkeypatch.setattr("ufl_beam.terms.material_points.BATCH", 100)
+    monkeypatch.setattr("ufl_beam.blocks.material_points.BATCH", 100)
     one = fibre_run(law, scheme, number)
     assert not one.inelastic[0].points.c.law_loop
     assert np.allclose(several.q, one.q, rtol=0, atol=1e-7 * np.abs(one.q).max())

@@ -3,8 +3,8 @@
 
 import numpy as np
 
+from ufl_beam.blocks.material_points import Points
 from ufl_beam.model.fibres import SectionPoints
-from ufl_beam.terms.material_points import Points
 
 C, LENGTH = 200.0, 0.5
 

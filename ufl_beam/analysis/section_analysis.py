@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array
+from ufl_beam.blocks.material_points import Points
 from ufl_beam.errors import (
     ArgumentError,
     StepFailed,
@@ -27,7 +28,6 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_schemes import Static
 from ufl_beam.model.fibres import Fibres
 from ufl_beam.model.sections import Section
-from ufl_beam.terms.material_points import Points
 
 SUBSTEPS = 1024  # number of smallest substeps in a step of curvature and axial force
 

@@ -24,6 +24,7 @@ from ufl_beam.blocks.cells import (
     added,
     axes,
 )
+from ufl_beam.blocks.material_points import Points
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import doubles, fill, lib, loop, struct
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
@@ -39,7 +40,6 @@ from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.terms.derivatives import Neighbours
-from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.term import Callbacks, Phases
 
 STRAINS = "Σ", "Γ", "K"
@@ -414,7 +414,7 @@ class InelasticCells(BeamCells):
 
     def complete_derivatives(self, c: Any, neighbours: Neighbours, by_number: Array) -> None:
         """See the base class: C differentiates the points together with the cells."""
-        fill(c, inner=self.points.derivatives(neighbours, "points"))
+        fill(c, inner=self.points.derivatives(neighbours))
 
     # -- the step ------------------------------------------------------------------------------
 

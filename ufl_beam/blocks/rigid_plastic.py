@@ -14,6 +14,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import BlockSetting
 from ufl_beam.blocks.connectors import ConnectorBlock, Data, OnConnector, Step
+from ufl_beam.blocks.material_points import EXHAUSTED, FREED_STIFFNESS
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
@@ -27,7 +28,6 @@ from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.softening_laws import SofteningLaw
-from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS
 
 REFERENCE_MOTION = 0.01
 """Motion m for which r m is the limit force, in rad or as a fraction of scene size.

@@ -11,13 +11,13 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import BlockSetting
 from ufl_beam.blocks.connectors import ConnectorBlock, Data, OnConnector, Step
+from ufl_beam.blocks.material_points import Points, create_entries
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import fill, loop, struct
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.model.connector_laws import Spring
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.terms.derivatives import Neighbours
-from ufl_beam.terms.material_points import Points, create_entries
 from ufl_beam.terms.term import Callbacks, Phases
 
 
@@ -126,4 +126,4 @@ class SpringBlock(ConnectorBlock):
 
     def complete_derivatives(self, c: Any, neighbours: Neighbours, by_number: Array) -> None:
         """See the base class: C differentiates the points together with the springs."""
-        fill(c, inner=self.points.derivatives(neighbours, "points"))
+        fill(c, inner=self.points.derivatives(neighbours))

@@ -120,7 +120,7 @@ class Inputs(dict[str, Expr]):
         if in_tangent is not None:
             self.in_tangent[symbol] = ufl.as_ufl(in_tangent)
         alike = value if slope_of is None else slope_of
-        self.stages.append((ufl.variable(symbol), *_expanded([value, alike]), symbol))
+        self.stages.append((ufl.variable(symbol), *expanded([value, alike]), symbol))
         return self.stages[-1][0]
 
     def motions(self, group: str) -> list[Expr]:
@@ -166,7 +166,7 @@ class Inputs(dict[str, Expr]):
         """Return the derivatives of expanded expressions along directions of inputs."""
         slopes = np.array(self.slopes(outputs, names), dtype=object).reshape(-1, len(names))
         pairs = (zip(row, directions, strict=True) for row in slopes)
-        return _expanded([sum((slope * u for slope, u in some), 0) for some in pairs])
+        return expanded([sum((slope * u for slope, u in some), 0) for some in pairs])
 
 
 class Statement(ABC):
@@ -356,7 +356,7 @@ class Kernels:
         self._statement, self._compilers = statement, list[Pointwise]()
         made, at = self._stated(statement.inputs)
         names = [f"q1 {name}" for name in statement.unknowns]
-        forces = _expanded(made.forces)
+        forces = expanded(made.forces)
         slopes = at.slopes(forces, names)
         whole = statement.inserts
         nonzero = [i for i, x in enumerate(slopes) if whole or not isinstance(x, Zero)]
@@ -369,17 +369,17 @@ class Kernels:
         modes = [made.modes[name] for name in statement.modes] if made.modes else []
         self.strains = len(made.strains)
         cells = [
-            [*forces, *_expanded(self._slopes_of_laws(made, at))],
+            [*forces, *expanded(self._slopes_of_laws(made, at))],
             self._in_tangent([slopes[i] for i in nonzero], at),
-            *(_expanded(x if whole else []) for x in (made.strains, made.predicted)),
+            *(expanded(x if whole else []) for x in (made.strains, made.predicted)),
         ]
         self.force, self.tangent, self.strain, self.predicted, self.end, self.power, self.mode = (
             self._compiled(
                 at,
                 *cells,
-                _expanded([*self._states(made), *recorded, *energies]),
-                _expanded([made.power] if made.power else []),
-                _expanded([*modes, made.excess, made.opened] if modes else []),
+                expanded([*self._states(made), *recorded, *energies]),
+                expanded([made.power] if made.power else []),
+                expanded([*modes, made.excess, made.opened] if modes else []),
                 inserted=sum(map(bool, cells)) if whole else 0,
             )
         )
@@ -389,7 +389,7 @@ class Kernels:
         if not at.in_tangent:
             return slopes
         others = {symbol: ufl.Coefficient(at.space(1))[0] for symbol in at.in_tangent}
-        values = _expanded([*at.in_tangent.values()])
+        values = expanded([*at.in_tangent.values()])
         zip_ = zip(others.values(), values, strict=True)
         at.stages += [(other, value, value, other) for other, value in zip_]
         return [*with_shared_nodes(slopes, others)]
@@ -406,7 +406,7 @@ class Kernels:
         """Return whether each law holds, and its derivatives by its force and by all motions."""
         laws, found = self._statement.laws, list[Expr]()
         by = [*(at[f"q1 force{k}"] for k in range(laws)), *made.motions]
-        slopes = at.slopes_by(_expanded(made.forces[len(made.forces) - laws :]), by)
+        slopes = at.slopes_by(expanded(made.forces[len(made.forces) - laws :]), by)
         for k in range(laws):
             row = slopes[2 * laws * k : 2 * laws * (k + 1)]
             holds = made.holds[k] if made.holds else float(isinstance(row[k], Zero))
@@ -432,8 +432,8 @@ class Kernels:
         statement = self._statement
         names = statement.inputs[: len(statement.inputs) - len(statement.all_modes)]
         made, at = self._stated(statement.inputs)
-        rows = with_shared_nodes(_expanded([*made.forces, *self._states(made), *made.strains]))
-        conditions = [*margins(rows), *_expanded(made.margins)]
+        rows = with_shared_nodes(expanded([*made.forces, *self._states(made), *made.strains]))
+        conditions = [*margins(rows), *expanded(made.margins)]
         every = [*rows, *conditions]
         table = [*at.slopes(every, names), *conditions]
         return self._compiled(at, table)[0], len(conditions)
@@ -442,7 +442,7 @@ class Kernels:
     def change(self) -> Any:
         """Derivatives of ``tangent`` along motions, which are further inputs; None if zero."""
         made, at, names, along = self._stated_along()
-        slopes = at.slopes(_expanded(made.forces), names)
+        slopes = at.slopes(expanded(made.forces), names)
         changes = at.along([slopes[i * len(names) + j] for i, j in self.entries], names, along)
         return None if all(isinstance(x, Zero) for x in changes) else self._compiled(at, changes)[0]
 
@@ -476,9 +476,9 @@ class Kernels:
             terms = (at[part] * some[k] for part, some in zip(parts, (x, *u), strict=True))
             at[name] = sum(terms, at[name])
         forces = self._statement.equations(at).forces
-        work = _expanded([sum((f * v for f, v in zip(forces, y, strict=True)), 0)])
+        work = expanded([sum((f * v for f, v in zip(forces, y, strict=True)), 0)])
         for part in parts:
-            work = _expanded(at.slopes_by(work, [at[part]]))
+            work = expanded(at.slopes_by(work, [at[part]]))
         return None if isinstance(work[0], Zero) else self._compiled(at, work)[0]
 
     def _along(self, directions: int) -> tuple[list[str], list[list[str]]]:
@@ -499,7 +499,7 @@ def kernels(statement: Statement) -> Kernels:
     return Kernels(statement)
 
 
-def _expanded(outputs: Sequence[Expr]) -> list[Expr]:
+def expanded(outputs: Sequence[Expr]) -> list[Expr]:
     """Return expressions with all derivatives expanded together."""
     shared = with_shared_nodes([*map(ufl.as_ufl, outputs)])
     return components(ufl.as_vector(shared)) if outputs else []

@@ -27,8 +27,8 @@ T = TypeVar("T")
 SOURCES = (
     "assembly", "loops", "material_laws", "embedded_hinges", "material_points", "blocks",
     "inelastic_cells", "beam_elimination", "fronts", "newton", "cell_forces",
-    "term_phases", "energy_ledger", "derivatives", "adjoint", "block_derivatives", "steps",
-    "oscillators",
+    "term_phases", "energy_ledger", "derivatives", "adjoint", "block_derivatives",
+    "point_derivatives", "steps", "oscillators",
 )  # fmt: skip
 """C files in the folder c; they form one translation unit."""
 

@@ -4,7 +4,7 @@
 A law acts on a resultant of a cross-section (N or N m; strain 1 or 1/m), on N and M together, on a
 fibre (Pa; strain 1) or on a spring (N or N m; m or rad).  The laws are functions of arrays and of
 UFL expressions.  UFL derives the tangents, and FFCx compiles the laws for the time loop, see
-:mod:`ufl_beam.terms.material_points`.
+:mod:`ufl_beam.blocks.material_points`.
 """
 
 from __future__ import annotations

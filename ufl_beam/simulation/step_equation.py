@@ -19,6 +19,7 @@ from ufl_beam.blocks.block import Block, BlockSetting
 from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosity
 from ufl_beam.blocks.loads import load_blocks
+from ufl_beam.blocks.material_points import create_entries
 from ufl_beam.blocks.works import EffectBlock, work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
@@ -39,7 +40,6 @@ from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inertia_and_damping import BEFORE, Inertia, rayleigh_forces
 from ufl_beam.terms.load_forces import DeadLoads, dead_loads
-from ufl_beam.terms.material_points import create_entries
 from ufl_beam.terms.term import Callbacks, LoadTerm, Term
 
 MOVING = "inertia", "damping"

@@ -188,13 +188,11 @@ def differences(
 
 
 LINEARIZE = {
-    "points": "tabulate_points", "load": "differentiate_loads",
-    "differences": "begin_neighbours", "block": "tabulate_block",
+    "load": "differentiate_loads", "differences": "begin_neighbours", "block": "tabulate_block",
 }  # fmt: skip
 ACCEPT = {
     name: f"accept_{name}_derivative"
     for name in (
-        "points",
         "load",
         "differences",
         "block",
@@ -220,7 +218,6 @@ def functions(kind: str) -> list[Any]:
 
 TRANSPOSES = {
     "block": ("transpose_block_state", "transpose_block", "finish_block"),
-    "points": ("transpose_points_state", "transpose_points", "finish_points"),
     "product": ("", "transpose_product", ""),
     "load": ("", "transpose_loads", ""),
     "differences": ("", "transpose_differences", ""),
@@ -255,22 +252,18 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
             (b.w + (c * b.width + at) * b.lanes, 8 * b.modes * b.lanes)
             for c in range(b.batches if b.modes else 0)
         ]
-        inner = recorded("points", data.inner) if data.inner else []
+        inner = list[tuple[Any, int]]()
+        if data.inner:
+            p = data.inner.points
+            inner = [(p.w, 8 * p.cells * p.of_cell * p.width), (p.e0, 24 * p.cells)]
+            inner.append((p.e1, 24 * p.cells))
+            if p.damped:
+                c, first = p.damped, (2 + p.damped.rates) * p.damped.unknowns
+                tangents = (c.w + (k * c.width + first) * c.lanes for k in range(c.batches))
+                inner += [(at, 72 * p.in_damped * c.lanes) for at in tangents]
         return [*states, *times, *modes, *inner, *(rates(b.nodal) if b.rates else ())]
     if kind == "product":
         product = data.matrix.product
         rate = ffi.addressof(product, "rate")  # C exchanges the vectors at this address
         return [(rate, 8 * product.size), (product.half, 8 * product.rotations)]
-    if kind == "points":
-        points, b = data.points, data.points.damped
-        number = points.cells * points.of_cell
-        first = (2 + b.rates) * b.unknowns if b else 0
-        tangents = [
-            (b.w + (c * b.width + first) * b.lanes, 72 * points.in_damped * b.lanes)
-            for c in range(b.batches if b else 0)
-        ]
-        return [
-            (data.J, 8 * number * data.outputs), (points.w, 8 * number * points.width),
-            (points.e0, 24 * points.cells), (points.e1, 24 * points.cells), *tangents,
-        ]  # fmt: skip
     return []

@@ -17,6 +17,51 @@ static void find_directions_of_step(const block_derivatives *m, const time_step 
     memcpy(m->by_step + (p + 1) * m->of_step - shared, m->by_shared + (size_t)p * shared, shared * sizeof(double));
 }
 
+/* Number of rows of the table: forces, state, shared numbers, strains of material points. */
+static inline int rows_of(const block_derivatives *m)
+{
+  const element_block *b = m->block;
+  return b->unknowns + b->states + b->shares + m->strains;
+}
+
+/* Length of a row of the table. */
+static inline int columns(const element_block *b) { return b->width - b->modes; }
+
+/* Remove the unknowns of the elements of a batch from their table T. */
+static void condense(const block_derivatives *m, double *T)
+{
+  const int u = m->unknowns, n = m->block->lanes, inputs = columns(m->block), all = inputs + u;
+  const int rows = rows_of(m) + m->margins;
+  double A[(1 + MOST_VARIABLES) * (1 + MOST_VARIABLES)], *B = m->direction;
+  for (int l = 0; l < n; ++l) {
+    for (int i = 0; i < u; ++i)
+      for (int j = 0; j < all; ++j) *(j < inputs ? B + i * inputs + j : A + i * u + j - inputs) = T[((rows + i) * all + j) * n + l];
+    solve_dense(u, A, inputs, B);
+    for (int i = 0; i < rows; ++i)
+      for (int j = 0; j < inputs; ++j) {
+        double x = T[(i * all + j) * n + l];
+        for (int k = 0; k < u; ++k) x -= T[(i * all + inputs + k) * n + l] * B[k * inputs + j];
+        T[(i * inputs + j) * n + l] = x;
+      }
+  }
+  memmove(T + rows * inputs * n, T + (rows + u) * all * n, m->margins * n * sizeof *T);
+}
+
+/* Compute the table. Derivatives by infinite numbers, such as the limit of an elastic law, and zero times an infinite
+ * number of a branch that is not taken, are not finite; they count as zero. */
+static void find_table(const block_derivatives *m)
+{
+  const element_block *b = m->block;
+  const int outputs = m->table_of->outputs, slopes = (rows_of(m) + m->margins + m->unknowns) * (columns(b) + m->unknowns);
+  evaluate(b, m->table_of, m->table);
+  for (int c = 0; c < b->batches; ++c) {
+    double *T = m->table + (size_t)c * outputs * b->lanes;
+    for (int i = 0; i < slopes * b->lanes; ++i)
+      if (!isfinite(T[i])) T[i] = 0;
+    if (m->unknowns) condense(m, T);
+  }
+}
+
 void tabulate_block(void *self, const time_step *step, const double *q1)
 {
   const block_derivatives *m = self;
@@ -26,15 +71,13 @@ void tabulate_block(void *self, const time_step *step, const double *q1)
     inelastic *sections = b->inner->cells;
     if (sections) sections->latest[0] = NAN, sections->points->predicts = 0, respond_at(sections, q1);
     else find_modes(b);
-    tabulate_points(m->inner, step, q1);
+    tabulate_points(m->inner);
   }
   if (m->tabulate) {
     evaluate(b, b->end_of, b->out);
     m->tabulate(m->user);
   }
-  evaluate(b, m->table_of, m->table);
-  for (size_t i = 0; i < (size_t)m->block->batches * m->table_of->outputs * m->block->lanes; ++i)
-    if (!isfinite(m->table[i])) m->table[i] = 0; /* zero times an infinite number of a branch that is not taken */
+  find_table(m);
   find_directions_of_step(m, step);
 }
 
@@ -57,21 +100,13 @@ static void find_direction(const block_derivatives *m, const derivatives *d, int
   for (int i = 0; i < steps; ++i) x[i] = now[from[i]];
 }
 
-/* Number of rows of the table: forces, state, shared numbers, strains of material points. */
-static inline int rows_of(const block_derivatives *m)
-{
-  const element_block *b = m->block;
-  return b->unknowns + b->states + b->shares + m->strains;
-}
-
 /* Strain k of the points of element i, in an array of three strains of each section. A spring has one strain only. */
 static inline size_t strain_of(const block_derivatives *m, int i, int k)
 {
   return (m->strains == 1 ? 3 : m->strains) * (size_t)i + k;
 }
 
-/* Row of the table of batch c, and its length. */
-static inline int columns(const element_block *b) { return b->width - b->modes; }
+/* Row of the table of batch c. */
 static inline const double *row_of(const block_derivatives *m, int c, int row)
 {
   return m->table + ((size_t)c * m->table_of->outputs + row * columns(m->block)) * m->block->lanes;
@@ -83,10 +118,15 @@ static inline void multiply_row(const block_derivatives *m, int c, int row, int 
   const element_block *b = m->block;
   const int n = b->lanes;
   const int32_t *changes = m->changes + (size_t)p * columns(b);
-  const double *slope = row_of(m, c, row) + first * n;
-  memset(sum, 0, n * sizeof *sum);
-  for (int j = first; j < columns(b); ++j, slope += n)
-    for (int l = 0; changes[j] && l < n; ++l) sum[l] += slope[l] * m->direction[j * n + l];
+  const double *slope = row_of(m, c, row), *x = m->direction;
+  double own[MOST_LANES] = {0};
+#define SUM(n) for (int j = first; j < columns(b); ++j) \
+    if (changes[j]) \
+      for (int l = 0; l < n; ++l) own[l] += slope[j * n + l] * x[j * n + l]
+  if (n == 8) { SUM(8); } /* the compiler knows the usual size */
+  else { SUM(n); }
+#undef SUM
+  memcpy(sum, own, n * sizeof *sum);
 }
 
 /* The first number of element i, in an array of the numbers of all elements. */
@@ -101,7 +141,7 @@ void add_block_derivative(void *self, const derivatives *d, int p, double *r)
   const element_block *b = m->block;
   double sum[MOST_LANES];
   if (m->inner) { /* the derivatives of the forces at constant motions are numbers of the elements */
-    add_points_derivative(m->inner, d, p, r);
+    add_points_derivative(m->inner, d, p);
     for (int i = 0; i < b->elements; ++i)
       for (int k = 0; k < m->strains; ++k)
         number_of(b, m->by_number + (size_t)p * all_numbers(b), i)[k * b->lanes] = m->inner->r[strain_of(m, i, k)];
@@ -135,7 +175,7 @@ void accept_block_derivative(void *self, const derivatives *d, int p)
     for (int i = 0; i < b->states && !d->initial; ++i) multiply_row(m, c, b->unknowns + i, p, 0, z + i * n);
     for (int i = 0; i < m->strains && !d->initial; ++i) {
       multiply_row(m, c, b->unknowns + b->states + b->shares + i, p, 0, sum);
-      for (int l = 0; l < elements_in(b, c); ++l) m->inner->e1[strain_of(m, c * n + l, i)] = sum[l];
+      for (int l = 0; l < elements_in(b, c); ++l) m->inner->e1[(size_t)p * 3 * m->inner->points->cells + strain_of(m, c * n + l, i)] = sum[l];
     }
     for (int i = 0; i < b->shares; ++i) {
       multiply_row(m, c, b->unknowns + b->states + i, p, 0, sum);
@@ -170,13 +210,29 @@ static void find_bars(const block_derivatives *m, const adjoint *a, int c, const
   memcpy(bar + motions + states + b->shares * n, m->strain_bar + (size_t)c * m->strains * n, m->strains * n * sizeof *bar);
 }
 
+/* Derivatives by new states to those by the motions after the step. */
+static void transpose_new_states(const block_derivatives *m, adjoint *a)
+{
+  const element_block *b = m->block;
+  const int n = b->lanes, rows = rows_of(m);
+  if (rows > b->unknowns) FOR_ACTING(b, c) {
+    const int32_t *dofs = b->dofs + (size_t)c * b->unknowns * n;
+    find_bars(m, a, c, 0, m->direction);
+    for (int i = b->unknowns; i < rows; ++i) {
+      const double *slope = row_of(m, c, i), *bar = m->direction + i * n;
+      for (int j = 0; j < b->unknowns; ++j)
+        for (int l = 0; l < elements_in(b, c); ++l) a->q1[dofs[j * n + l]] += slope[j * n + l] * bar[l];
+    }
+  }
+}
+
 /* The table of a recorded step, whose state is restored. Forces and new states depend on the motions after the
  * step: the solution for λ needs the derivatives of new states by these. */
 void transpose_block_state(void *self, adjoint *a)
 {
   const block_derivatives *m = self;
   const element_block *b = m->block;
-  const int n = b->lanes, rows = rows_of(m);
+  const int n = b->lanes;
   /* The run has whole steps, so that moving numbers before the step are those at its time. */
   for (int k = -1; k < m->parameters * m->neighbours; ++k) {
     const element_block *one = k < 0 ? b : m->neighbour[k];
@@ -189,18 +245,9 @@ void transpose_block_state(void *self, adjoint *a)
     transpose_points_state(m->inner, a);
     for (int i = 0; i < b->elements; ++i)
       for (int k = 0; k < m->strains; ++k)
-        m->strain_bar[((size_t)(i / n) * m->strains + k) * n + i % n] = m->inner->e1[strain_of(m, i, k)];
+        m->strain_bar[((size_t)(i / n) * m->strains + k) * n + i % n] = m->inner->e1_bar[strain_of(m, i, k)];
   }
-  FOR_ACTING(b, c) {
-    const int32_t *dofs = b->dofs + (size_t)c * b->unknowns * n;
-    if (rows == b->unknowns) break;
-    find_bars(m, a, c, 0, m->direction);
-    for (int i = b->unknowns; i < rows; ++i) {
-      const double *slope = row_of(m, c, i), *bar = m->direction + i * n;
-      for (int j = 0; j < b->unknowns; ++j)
-        for (int l = 0; l < elements_in(b, c); ++l) a->q1[dofs[j * n + l]] += slope[j * n + l] * bar[l];
-    }
-  }
+  transpose_new_states(m, a);
 }
 
 /* Derivatives by all inputs but the motions after the step. */
@@ -234,7 +281,7 @@ void transpose_block(void *self, adjoint *a, const double *λ)
         double *x = number_of(b, m->number_bar, i) + k * n;
         m->inner->r_bar[strain_of(m, i, k)] = *x, *x = 0;
       }
-    transpose_points(m->inner, a, λ);
+    transpose_points(m->inner, a);
   }
   if (m->tabulate) /* numbers that change in each step */
     for (int p = 0; p < a->parameters; ++p)

@@ -240,7 +240,6 @@ typedef struct {
    * eigenvalues; or none. Number of sections in each. */
   const element_block *damped;
   int in_damped;
-  const double *elastic; /* stiffnesses of sections, to which eigenvalues are relative */
   double *inputs;        /* space for the inputs of a point */
 } points;
 
@@ -944,25 +943,18 @@ struct derivatives {
   double *substep, *substep_q, *substep_dq;
 };
 
-/* Derivatives of material points by all their inputs. The columns of a table are the growth, the
- * variables that a law solves for, then the other inputs; its rows are the stresses, the new state, the
- * equations of the unknowns, and the margins of the conditions in the law. The stresses and the margins follow. */
+/* Derivatives of material points, as elements whose motions are the strains of a section. */
+typedef struct block_derivatives block_derivatives;
 typedef struct {
   points *points;
-  kernel *table;
-  int outputs, columns, equations, margin, margins; /* equations, margin: their first rows; margins: number */
-  int unknown;                    /* index in w of the first variable at the end of the step */
-  const int32_t *column;          /* index in w of each column */
-  double *J;                      /* tables of all points */
-  double *w, *e0;                 /* derivatives of the data of the points, and of the strains before the step */
-  const double *B, *weight, *rest; /* of the geometry of the sections; or none */
-  /* Of committed tangents, if a damping uses them: derivatives of its numbers, also of the elastic stiffnesses; steps
-   * of parameters for differences. */
+  const block_derivatives *of;
+  const int32_t *column;          /* index in w of `points` of each input of an element, or -1 */
+  int geometry;                   /* first input for B, weight and rest of a point */
+  double *e0, *e1, *r;            /* derivatives of strains before the step and at its end; by one parameter: of resultants */
+  /* Of committed tangents, if a damping uses them: derivatives of its numbers; steps of parameters for differences. */
   double *tangents;
-  const double *elastic, *step;
-  double *r, *e1;                 /* of one parameter: of resultants and strains */
-  double *w_bar, *e0_bar, *r_bar, *B_bar, *weight_bar, *rest_bar; /* of the adjoint; or none */
-  double *tangents_bar, *elastic_bar;
+  const double *step;
+  double *e0_bar, *e1_bar, *r_bar, *tangents_bar, *input_bar; /* of the adjoint */
 } point_derivatives;
 
 /* Matrix of rates, with its derivative by each parameter, or none. */
@@ -972,10 +964,11 @@ typedef struct {
 } product_derivative;
 
 /* Derivatives of a block by its inputs except modes, with a row for each parameter. The table has the rows of forces,
- * states, shared numbers, strains of material points and margins; the margins follow. */
-typedef struct {
+ * states, shared numbers, strains of material points and margins, then the equations of the unknowns of an element,
+ * by which the last columns are; the margins follow. The unknowns are removed. */
+struct block_derivatives {
   element_block *block;
-  int parameters, neighbours, margins;
+  int parameters, neighbours, margins, unknowns;
   element_block *const *neighbour;  /* in scenes with other values of a parameter */
   const double *weight;     /* see derivatives */
   const element_function *table_of;
@@ -992,7 +985,7 @@ typedef struct {
   void (*tabulate)(void *handle);
   void *user;
   int shifts;
-} block_derivatives;
+};
 
 /* Derivatives of dead loads, from the loads of scenes with other values of a parameter. */
 typedef struct {
@@ -1047,15 +1040,16 @@ struct adjoint {
 int record_step(adjoint *a, time_loop *m, int initial);
 int go_back(adjoint *a, time_loop *m);
 void finish_adjoint(adjoint *a, time_loop *m);
-void transpose_points_state(void *self, adjoint *a);
-void transpose_points(void *self, adjoint *a, const double *lambda);
+void transpose_points_state(const point_derivatives *m, adjoint *a);
+void transpose_points(const point_derivatives *m, adjoint *a);
 void transpose_product(void *self, adjoint *a, const double *lambda);
 void transpose_loads(void *self, adjoint *a, const double *lambda);
 void transpose_differences(void *self, adjoint *a, const double *lambda);
 void transpose_block_state(void *self, adjoint *a);
 void transpose_block(void *self, adjoint *a, const double *lambda);
 void finish_block(void *self, adjoint *a);
-void finish_points(void *self, adjoint *a);
+void finish_points(const point_derivatives *m, adjoint *a);
+void tabulate_points(const point_derivatives *m);
 int differentiate_step(derivatives *d, time_loop *m, int initial);
 void begin_neighbours(void *self, const time_step *step, const double *q1);
 void add_differences_derivative(void *self, const derivatives *d, int p, double *r);
@@ -1065,12 +1059,11 @@ void keep_substep(derivatives *d, const time_loop *m, double end);
 void tabulate_block(void *self, const time_step *step, const double *q1);
 void add_block_derivative(void *self, const derivatives *d, int p, double *r);
 void accept_block_derivative(void *self, const derivatives *d, int p);
-void add_points_derivative(void *self, const derivatives *d, int p, double *r);
+void add_points_derivative(const point_derivatives *m, const derivatives *d, int q);
 void add_product_derivative(void *self, const derivatives *d, int p, double *r);
 void add_load_derivative(void *self, const derivatives *d, int p, double *r);
-void accept_points_derivative(void *self, const derivatives *d, int p);
+void accept_points_derivative(const point_derivatives *m, const derivatives *d, int q);
 void accept_load_derivative(void *self, const derivatives *d, int p);
-void tabulate_points(void *self, const time_step *step, const double *q1);
 void differentiate_loads(void *self, const time_step *step, const double *q1);
 
 /* -- oscillators, see oscillators.c --------------------------------------------------------------- */

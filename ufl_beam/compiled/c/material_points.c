@@ -225,32 +225,36 @@ static inline void put_tangent(const points *p, double *numbers, int rows, int s
   for (int k = 0; k < 9; ++k) to[k * p->damped->lanes] = D[k];
 }
 
-/* Store the tangents at the strains of the latest response, which remains.
+/* Add a point, whose inputs change, to the committed tangent D of its section, and to its elastic stiffnesses C.
  *
  * The law holds at the end of the step here, and its iteration starts from the state before the
  * step. If a scheme satisfies the law within the step, stresses at the ends may alternate about the
  * yield surface. Every second step of flowing material is then elastic, and its tangent is not the
  * tangent of the motion.
  */
+static void add_committed(const points *p, double *inputs, const double *b, double weight, double *D, double *C)
+{
+  const int d = p->components;
+  points at_end = *p;
+  double s[3 + 9], r[3] = {0}, share = 1;
+  at_end.tried = 0;
+  if (!answer_at(&at_end, 1, inputs, s)) answer_at(&at_end, p->theta, inputs, s), share = 1 / p->theta;
+  add_answer(d, b, share * weight, s, r, D);
+  for (int i = 0; i < 3 * d; ++i) C[i % 3] += weight * inputs[p->strain + 2 * d + i / 3] * b[i] * b[i];
+}
+
+/* Store the tangents at the strains of the latest response, which remains. */
 void keep_tangents(const points *p)
 {
-  const int d = p->components, width = p->width;
-  points at_end = *p;
-  double s[3 + 9], r[3], *w = p->w, *own = p->inputs;
-  at_end.tried = 0;
+  double *w = p->w;
   for (int c = 0; c < p->cells; ++c) {
-    double D[9] = {0};
-    for (int k = 0; k < 3; ++k) D[4 * k] = p->rest[k];
-    for (int i = 0; i < p->of_cell; ++i, w += width) {
-      memcpy(own, w, width * sizeof *w);
-      double weight = p->weight[i];
-      if (!answer_at(&at_end, 1, own, s)) {
-        answer_at(p, p->theta, own, s);
-        weight /= p->theta;
-      }
-      add_answer(d, p->B + 3 * d * i, weight, s, r, D);
+    double D[9] = {0}, C[3];
+    for (int k = 0; k < 3; ++k) D[4 * k] = C[k] = p->rest[k];
+    for (int i = 0; i < p->of_cell; ++i, w += p->width) {
+      memcpy(p->inputs, w, p->width * sizeof *w);
+      add_committed(p, p->inputs, p->B + 3 * p->components * i, p->weight[i], D, C);
     }
-    remove_negative(p->elastic + 3 * c, D);
+    remove_negative(C, D);
     put_tangent(p, first_numbers(p->damped), p->damped->width, c, D);
   }
 }

@@ -22,8 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from operator import attrgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -31,14 +30,16 @@ from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.blocks.statement import Inputs, expanded
 from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
-from ufl_beam.compiled.simd_kernels import BATCH
+from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms, with_shared_nodes
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Kind, SectionPoints
+from ufl_beam.model.law_functions import absolute
 from ufl_beam.model.material_law import traced
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.derivatives import Neighbours, margins
@@ -66,6 +67,9 @@ EXHAUSTED = 1e-6
 
 At this resistance an exponential law has the same fraction of its fracture energy left.
 """
+
+FIXED = "growth", "direction", "flows", "theta", "dt"
+"""Inputs of a point that parameters do not change directly."""
 
 UNLIMITED = 1e300
 """Traction above which a point has no limit."""
@@ -99,6 +103,23 @@ def releases(section_points: SectionPoints, scheme: Scheme) -> bool:
     return scheme.average(0.0, 1.0) != 1.0 and (
         section_points.softening is not None or curved(section_points.kind)
     )
+
+
+class PointTable(NamedTuple):
+    """Derivatives of a point, see ``point_derivatives`` of loops.h.
+
+    Attributes:
+        function: An ``element_function`` of loops.h.
+        names: Names of its inputs.
+        states, numbers, unknowns, conditions: Numbers of these.
+    """
+
+    function: Any
+    names: list[str]
+    states: int
+    numbers: int
+    unknowns: int
+    conditions: int
 
 
 class PointForms:
@@ -195,39 +216,53 @@ class PointForms:
         }
 
     @cached_property
-    def table(self) -> tuple[Any, list[str], dict[str, int]]:
-        """Derivatives of the outputs of a point with respect to its inputs, see loops.h.
-
-        Returns:
-            A C function, the inputs by which it differentiates, and numbers of
-            ``point_derivatives`` of loops.h.
-        """
-        inputs, equations, law = self._pointwise.at, self._equations, self._kind.law
-        fixed = "direction", "flows", "theta", "dt"
+    def table(self) -> PointTable:
+        """Derivatives of the resultants of a section by its strains and all numbers of a point."""
+        equations, law = self._equations, self._kind.law
+        strain, before = (rows(law, name) for name in ("strain", "before"))
         new = prefixed("new", law.variables) if law.solves else ()
-        first = ("growth", *new)
-        by = [*first, *(name for name in inputs if name not in (*fixed, *first))]
-        at = inputs | {name: ufl.variable(inputs[name]) for name in by}
+        softens, of_jump = self._softening is not None, ("traction", "jump", "opening")
+        state = [*of_jump * softens, *prefixed("state", law.variables)]
+        modes = [*FIXED, *strain, *before, *new, *(() if softens else of_jump)]
+        B = [f"B {a}{k}" for a in range(len(strain)) for k in range(3)]
+        numbers = [name for name in self._pointwise.at if name not in (*state, *modes)]
+        numbers += [*B, "weight", "rest 0", "rest 1", "rest 2"]
+        motions = [f"{e} {k}" for e in ("e1", "e0") for k in range(3)]
+        compiler = Pointwise([*motions, *state, *numbers, *modes])
+        at = Inputs(compiler, {name: ufl.variable(x) for name, x in compiler.at.items()})
+        for e, own in (("e1", strain), ("e0", before)):
+            for a, name in enumerate(own):
+                sums = sum(at[f"B {a}{k}"] * at[f"{e} {k}"] for k in range(3))
+                at[name] = at.stage(at[name], sums)
         with traced(law):
-            stress = tuple(map(ufl.as_ufl, equations.stress(at)))
-            end = self._at_end(at)
-            changes = equations.end(at).changes
-            unknowns = tuple(map(ufl.as_ufl, equations.residuals(at))) if law.solves else ()
+            stress = expanded(equations.stress(at))
+            end, changes = self._at_end(at), equations.end(at).changes
+            unknowns = expanded(equations.residuals(at)) if law.solves else []
+        answers, of_opening = [*stress, *expanded(changes), *unknowns], list[Expr]()
         if self._softening is not None:
             with traced(self._softening):
                 resistance = equations.resistance(at, at["growth"])
-            unknowns = (at["direction"] * stress[0] - resistance, *unknowns)
-        ends = end[lib.POINT_OUTPUTS : -len(stress)]
-        answers = [*stress, *map(ufl.as_ufl, changes), *unknowns]
-        conditions = margins(with_shared_nodes(answers))
-        outputs = (*stress, *ends, *unknowns, *conditions)
-        derivatives = [ufl.diff(ufl.as_ufl(f), at[name]) for f in outputs for name in by]
-        values, first_equation = [*derivatives, *stress, *conditions], len(stress) + len(ends)
-        numbers = {
-            "outputs": len(values), "columns": len(by), "equations": first_equation,
-            "margin": first_equation + len(unknowns), "margins": len(conditions),
-        }  # fmt: skip
-        return self._pointwise.compile(*values), by, numbers
+            answers += expanded([excess := at["direction"] * stress[0] - resistance])
+            opens, distance = ufl.ne(at["direction"], 0.0), absolute(stress[0]) - at["traction"]
+            unknowns[:0] = [ufl.conditional(opens, excess, at["growth"])]
+            of_opening = [ufl.conditional(opens, at["growth"], distance)]
+        conditions = [*margins(with_shared_nodes(answers)), *of_opening]
+        new_state = end[lib.POINT_OUTPUTS : -len(stress)][0 if softens else len(of_jump) :]
+        σ, θ = [at.stage(x) for x in stress], at["theta"]
+        resultants = [
+            at[f"rest {k}"] * ((1 - θ) * at[f"e0 {k}"] + θ * at[f"e1 {k}"])
+            + at["weight"] * sum(x * at[f"B {a}{k}"] for a, x in enumerate(σ))
+            for k in range(3)
+        ]
+        outputs = expanded([*resultants, *new_state, *conditions, *unknowns])
+        inputs = [*motions, *state, *numbers, *["growth"] * softens, *new]
+        (function,) = compiler.compile_elements(
+            [*at.slopes(outputs, inputs), *conditions],
+            instead={symbol: value for _, value, _, symbol in at.stages},
+        )
+        return PointTable(
+            function, list(compiler.at), len(state), len(numbers), len(unknowns), len(conditions)
+        )
 
     @cached_property
     def elastic(self) -> Any:
@@ -293,7 +328,9 @@ class Points:
         self._releases = releases(section_points, scheme)
         self.names, law = inputs(section_points), section_points.kind.law
         cells, per_cell, width = len(length), len(section_points.weights), len(self.names)
-        self._storage = storage = np.zeros((cells, per_cell, width))
+        n = cells * per_cell
+        self._padded = np.zeros((-(-n // BATCH) * BATCH, width))
+        self._storage = storage = self._padded[:n].reshape(cells, per_cell, width)
         self._at = {name: storage[:, :, i] for i, name in enumerate(self.names)}
         # Internal variables, and further data of an accepted state for the next step
         others = ("jump", "opening", *rows(law, "before"), "traction", "flows")
@@ -347,39 +384,69 @@ class Points:
             lines = np.zeros((2, cells, per_cell, int(lib.LINE)))
             fill(self.c, line=lines[0], predicted=lines[1])
 
-    def derivatives(self, neighbours: Neighbours, path: str, **fields: Any) -> Any:
-        """Return ``point_derivatives`` of loops.h, with further ``fields``.
+    def derivatives(self, neighbours: Neighbours) -> Any:
+        """Return ``point_derivatives`` of loops.h for terms with ``points``."""
+        function, names, states, numbers, unknowns, conditions = self._forms.table
+        (cells, per_cell, _), P = self._storage.shape, len(neighbours)
+        n, columns = cells * per_cell, 6 + states + numbers
+        place = {name: k for k, name in enumerate(self.names)}
+        column = np.array([place.get(name, -1) for name in names], dtype=np.int32)
+        adjacent = slice(first := column[6], first + states)
+        of_w = column[(own := slice(6 + states, columns))][column[own] >= 0]
 
-        ``path`` is the attribute of a term that has its points.
-        """
-        table, by, numbers = self._forms.table
-        cells, per_cell, _ = self._storage.shape
-        c = struct(
-            "point_derivatives", points=self.c, table=table, **numbers,
-            unknown=self.names.index(by[1]) if by[1].startswith("new ") else 0,
-            column=np.array([self.names.index(name) for name in by], dtype=np.int32),
-            J=np.zeros((cells, per_cell, numbers["outputs"])),
-            w=neighbours.state(attrgetter(f"{path}._storage")),
-            e0=neighbours.state(attrgetter(f"{path}._e0")),
-            r=np.zeros((cells, 3)), e1=np.zeros((cells, 3)), w_bar=np.zeros(self._storage.shape),
-            e0_bar=np.zeros((cells, 3)), r_bar=np.zeros((cells, 3)), **fields,
+        def numbers_of(term: Any) -> Array:
+            points = term.points
+            of = points._section_points
+            more = [
+                np.reshape(of.strains, (per_cell, -1)), of.weights[:, None],
+                np.tile(of.rest / per_cell, (per_cell, 1)),
+            ]  # fmt: skip
+            tiled = np.tile(np.hstack(more), (cells, 1))
+            return in_batches(np.hstack([points._storage[:, :, of_w].reshape(n, -1), tiled]), BATCH)
+
+        def states_of(term: Any) -> Array:
+            """Return a view, which users of the derivatives change."""
+            rows = term.points._padded.reshape(-1, BATCH, len(self.names))
+            return np.asarray(rows[:, :, adjacent].transpose(0, 2, 1))
+
+        by_number, none = neighbours.differences(numbers_of), np.zeros(0)
+        by_state, known = neighbours.state(states_of), numbers_of(neighbours.term)
+        w = np.zeros((batches := len(known), len(names), BATCH))
+        w[:, own] = known
+        changes = np.ones((P, columns), dtype=np.int32)
+        changes[:, own] = by_number.any(axis=(1, 3))
+        dofs = 3 * (np.arange(n)[:, None] // per_cell) + np.arange(3)
+        block = struct(
+            "element_block", lanes=BATCH, elements=n, batches=batches, unknowns=3, states=states,
+            numbers=numbers, modes=len(names) - columns, width=len(names), w=w,
+            acting=np.full(1, batches, dtype=np.int32), batch=np.arange(batches, dtype=np.int32),
+            dofs=in_batches(dofs.astype(np.int32), BATCH),
+            space=np.zeros(2 * len(names) + function.outputs), new_shared=none,
         )  # fmt: skip
-        for field, name in (("B", "strains"), ("weight", "weights"), ("rest", "rest")):
-            values = neighbours.differences(attrgetter(f"{path}._section_points.{name}"))
-            if values.any():
-                bar = {f"{field}_bar": np.zeros(values[0].size)}
-                fill(c, **{field: np.ascontiguousarray(values)}, **bar)
+        of = struct(
+            "block_derivatives", block=block, parameters=P, margins=conditions, unknowns=unknowns,
+            table_of=function, table=np.zeros(batches * function.outputs * BATCH), changes=changes,
+            direction=np.zeros(columns * max(unknowns, BATCH)), by_state=by_state,
+            by_number=by_number, state_bar=np.zeros(by_state.shape[1:]),
+            number_bar=np.zeros(known.shape), step_bar=none, shared_bar=none, strain_bar=none,
+        )  # fmt: skip
+        c = struct(
+            "point_derivatives", points=self.c, of=of, column=column, geometry=names.index("B 00"),
+            e0=neighbours.state(lambda term: term.points._e0), e1=np.zeros((P, cells, 3)),
+            r=np.zeros((cells, 3)), e0_bar=np.zeros((cells, 3)), e1_bar=np.zeros((cells, 3)),
+            r_bar=np.zeros((cells, 3)),
+        )  # fmt: skip
         self._derivatives = c
         return c
 
     def complete_derivatives(self, c: Any, neighbours: Neighbours) -> None:
         """Connect derivatives with those of :attr:`damped`, ``block_derivatives`` of loops.h."""
-        elastic = neighbours.differences(attrgetter("points._elastic"))
         # An eighth of the neighbours' distance: near the scene, and 1e-12 of round-off
-        step = 1 / (8 * np.abs(neighbours.weights).max(axis=1))
+        step, of = 1 / (8 * np.abs(neighbours.weights).max(axis=1)), self._derivatives.of.block
+        inputs = np.zeros(of.elements * (of.width - of.modes))
         fill(
-            self._derivatives, tangents=c.by_number, elastic=elastic, step=step,
-            tangents_bar=c.number_bar, elastic_bar=np.zeros(self._elastic.shape),
+            self._derivatives, tangents=c.by_number, step=step, tangents_bar=c.number_bar,
+            input_bar=inputs,
         )  # fmt: skip
 
     def __getitem__(self, name: str) -> Array:
@@ -447,17 +514,9 @@ class Points:
                 array[:] = values
 
     def keep_tangents(self, block: Any, **fields: Any) -> None:
-        """Store tangents in :attr:`damped` after each step; ``fields`` are of ``points``.
-
-        Eigenvalues are computed relative to the elastic stiffness of the section.
-        """
-        section_points, elastic = self._section_points, np.zeros((len(self.recorded), 3))
-        elastic += section_points.rest
-        for k, name in enumerate(self._rows("stiffness")):
-            B = section_points.strains[k :: self._components]
-            elastic += (section_points.weights * self[name]) @ B**2
-        self.damped, self._elastic = block, elastic
-        fill(self.c, elastic=elastic, inputs=np.zeros(len(self.names)), **fields)
+        """Store tangents in :attr:`damped` after each step; ``fields`` are of ``points``."""
+        self.damped = block
+        fill(self.c, inputs=np.zeros(len(self.names)), **fields)
 
     def start_tangents(self) -> None:
         """Replace tangents for damping that are NaN by the elastic stiffness."""
