@@ -514,3 +514,124 @@ def test_combinations_that_are_refused():
         run(scene, ub.EnergyMomentum(order=4))
     with raises("the Effect has a stiffness of its own"):
         ub.buckling(scene, 1)
+
+
+# -- equations in Python -----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Brake(ub.Statement):
+    """Forces by motions, rates, a state and numbers, in operations that Python and UFL share."""
+
+    nodes = 2
+    numbers = "k", "c"
+    state = ("way",)
+
+    def equations(self, at):
+        apart = at.q[1][0] - at.q[0][0] + 0.1 * (at.places[1][0] - at.places[0][0])
+        force = at["k"] * (1 + apart**2 + at["way"] ** 2) * (at.v[1][1] - at.v[0][1])
+        forces = [[0.0, -force, at["c"] * at.v[0][2]], [0.0, force, 0.0]]
+        way = at["way"] + (at.q1[1][1] - at.q0[1][1])
+        return ub.Equations(forces, {"way": way}, lost={"brake": at.work(forces)})
+
+
+@dataclass(frozen=True)
+class BrakeInPython(Brake):
+    in_python = True
+
+
+@dataclass(frozen=True)
+class Net(ub.Statement):
+    """Drag along beams."""
+
+    numbers = ("c",)
+
+    def equations(self, at):
+        force = [[at["c"] * at.v[0][0], at["c"] * at.v[0][1] * (1 + at.q[0][1] ** 2), 0.0]]
+        return ub.Equations(force, lost={"net": at.work(force)})
+
+
+@dataclass(frozen=True)
+class NetInPython(Net):
+    in_python = True
+
+
+def braked(brake, net, k=10.0):
+    def between(beam, body):
+        places, numbers = [beam.at(0.75), body.at(2.3, 1.1)], {"k": k, "c": 0.5}
+        return ub.Effect(brake(), places=places, numbers=numbers)
+
+    return pulled(between, lambda beam, body: ub.Effect(net(), beams=[beam], numbers={"c": 0.8}))
+
+
+@pytest.mark.parametrize("k", [10.0, lambda t: 10.0 + 20.0 * t], ids=["constant", "varies"])
+@pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
+def test_equations_in_python_are_those_in_ufl(scheme, k):
+    """Slopes are differences, so that iterates differ, but solutions by their tolerance only."""
+    own, compiled = (
+        run(braked(*x, k), scheme) for x in ((BrakeInPython, NetInPython), (Brake, Net))
+    )
+    alike(own, compiled)
+    for entry in ("brake", "net"):
+        lost = compiled.energy[entry]
+        assert lost[-1] > 0.05
+        np.testing.assert_allclose(own.energy[entry], lost, rtol=0, atol=1e-10)
+    assert own.energy.worst < 1e-10 or scheme not in EXACT
+
+
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Newmark()], ids=repr)
+def test_equations_in_python_continue(scheme, tmp_path):
+    require_restart(run, braked(BrakeInPython, NetInPython), (), scheme, tmp_path, 0.5)
+
+
+@dataclass(frozen=True)
+class Table(ub.Statement):
+    """Force by a table, as an energy that is stored."""
+
+    in_python = True
+
+    def equations(self, at):
+        at_points, forces = np.array([-2.0, 0.0, 0.5, 3.0]), np.array([-8.0, 0.0, 4.0, 9.0])
+        x = at.q1[0][1]
+        grid = np.r_[at_points[(at_points > 0) & (at_points < x)], x]
+        energy = np.trapezoid(np.r_[0.0, np.interp(grid, at_points, forces)], np.r_[0.0, grid])
+        return ub.Equations([[0.0, np.interp(x, at_points, forces), 0.0]], stored={"own": energy})
+
+
+def test_a_force_by_a_table_bears_a_load_in_statics():
+    """On the second branch, 4 N + 2 N/m (x - 0.5 m) = 6 N at x = 1.5 m; the energy is its area."""
+    body = ub.Body((0, 0), mass=1.0, inertia=1.0)
+    works = [ub.Effect(Table(), places=[body.middle])]
+    scene = ub.Scene(
+        [], bodies=[body], works=works, loads=[ub.PointLoad(body.middle, force=(0.0, 6.0))],
+        supports=[ub.PrescribedDisplacement(body.middle, u=0.0, psi=0.0)],
+    )  # fmt: skip
+    found = run(scene, ub.Static(), t=(0, 1), dt=1.0)
+    assert found.displacement(body.middle)[-1, 1] == pytest.approx(1.5, rel=1e-12)
+    assert found.energy["own"][-1] == pytest.approx(1.0 + 5.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("equations", "says"),
+    [
+        (lambda at: ub.Equations([[0.0, 1.0]]), ("must be a vector (x, y, moment)",)),
+        (lambda at: None, ("equations returned None",)),
+        (lambda at: ub.Equations([[math.nan, 0.0, 0.0]]), ("numbers that are not finite",)),
+        (lambda at: ub.Equations([[1 / 0.0, 0.0, 0.0]]), ("Mine.equations fails", "division")),
+        (lambda at: ub.Equations([[at.v[0][0], 0.0, 0.0]]), ("neither stored, lost nor",)),
+        (lambda at: at.potential("own", None), ("Mine.equations fails", "potential")),
+    ],
+)
+def test_wrong_equations_in_python_are_refused(equations, says):
+    own = statement(equations, in_python=True)
+    with raises(*says, kind=ub.ModelError):
+        ub.Simulation(clamped(BEAM, works=[ub.Effect(own, places=[BEAM.end])]), ub.EnergyMomentum())
+
+
+def test_equations_in_python_have_no_derivatives():
+    def model(c):
+        works = [ub.Effect(NetInPython(), beams=[BEAM], numbers={"c": c})]
+        return clamped(BEAM, works=works, loads=[ub.PointLoad(BEAM.end, force=(0.0, 1.0))])
+
+    with raises("NetInPython has no derivative, because its equations are in Python"):
+        ub.differentiate(model, {"c": 1.0}, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05)

@@ -189,13 +189,18 @@ class Statement(ABC):
     * ``potential(name, energy)``: equations of a stored energy with its forces, a function
       ``energy(q, numbers)``; its error in the ledger is the same as of :class:`Potential`.
 
+    With ``in_python = True`` in the class, ``equations`` gets and returns numbers, so that it may
+    use tables, loops and branches.  Motions are then arrays.  Derivatives by motions are
+    differences, ``potential`` is missing, and runs have no derivatives by parameters.
+
     The work of the forces must equal the stored, lost and supplied energies.  The names of
     these energies are entries of the ledger: names of your own, or entries of the package for
     losses ("damping", "friction", ...), "stored", and "loads" for supplied energy.
 
     Raises:
         ModelError: Before a run: an unknown name, other forces than places, a state that is not
-            returned, energies that are no scalars, or unexplained work.
+            returned, energies that are no scalars, unexplained work, or numbers that are not
+            finite.
 
     Example:
         >>> from dataclasses import dataclass
@@ -311,6 +316,11 @@ class Statement(ABC):
     def numbers(self) -> Sequence[str]:
         """Names of the constant numbers of an element."""
         return ()
+
+    @property
+    def in_python(self) -> bool:
+        """True if the equations of a user are not in UFL, but compute numbers in Python."""
+        return False
 
     @property
     def given(self) -> Sequence[str]:

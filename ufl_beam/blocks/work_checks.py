@@ -11,16 +11,22 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.blocks.statement import Statement, kernels
-from ufl_beam.blocks.works import OfUser, geometry, initial_state, statement_of
+from ufl_beam.blocks.effect_blocks import OfPython, computed
+from ufl_beam.blocks.statement import COMPONENTS, Statement, kernels
+from ufl_beam.blocks.works import (
+    OfUser,
+    geometry,
+    initial_state,
+    statement_of,
+    values_at_zero,
+)
 from ufl_beam.compiled.c_library import doubles, ffi
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.mechanics.time_scheme import Scheme
-from ufl_beam.model.functions import value_at
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import Effect, Work
 
-OF_USERS = "nodes", "numbers", "state", "equations"
+OF_USERS = "nodes", "numbers", "state", "equations", "in_python"
 """Members of statements that users define; the others are for the package."""
 
 MOTIONS = 1e-3, 1e-5
@@ -71,7 +77,8 @@ def _require_of_user(effect: Effect) -> None:
         if not name.startswith("_") and getattr(kind, name) is not getattr(Statement, name):
             raise ModelError(
                 f"{effect}: {name} is for statements of the package; a statement of a user has "
-                "nodes, numbers, state and equations, and chooses branches by ufl.conditional"
+                "nodes, numbers, state, equations and in_python, and chooses branches by "
+                "ufl.conditional"
             )
     names = [*statement.numbers, *statement.state, "dt"]
     for name in names:
@@ -92,12 +99,25 @@ def require_explained(effect: Effect, statement: OfUser, scene: Scene) -> None:
     if beams:  # a quadrature point of a cell that is a whole beam
         ends = [beams[0].curve(k) for k in np.linspace(0.0, 1.0, statement.nodes)]
         of_places = np.array([0.3, 1.0, *np.ravel(ends, "F")])
-    known = {x: value_at(f, 0.0, effect) if callable(f) else f for x, f in effect.numbers.items()}
+    known, inner = values_at_zero(effect), statement.inner
     numbers = [known[name.rpartition(" ")[0]] for name in statement.of_step[1:]]
+    if isinstance(inner, OfPython):  # motions of the places
+        n = len(COMPONENTS) * inner.nodes
     sizes, worst = np.repeat([scene.size, scene.size, 1.0], n // 3), list[tuple[float, str]]()
 
     def step(q0: Array, q1: Array, z: Array, dt: float) -> tuple[Array, Array, Array]:
         """Return forces, new state and energies of a step."""
+        if isinstance(inner, OfPython):
+            points = beams[0].curve(0.3) if beams else of_places[: 2 * inner.nodes]
+            mine, past = np.split(z, [len(inner.state)])
+            past = past if len(past) else np.zeros(n)
+            values = known | dict(zip(inner.state, mine, strict=True)) | {"dt": dt}
+            motions = np.array([q0, q1]).reshape(2, -1, inner.nodes).transpose(0, 2, 1)
+            f, new, of = computed(
+                statement, values, np.reshape(points, (-1, 2)), motions,
+                past.reshape(-1, len(COMPONENTS)),
+            )  # fmt: skip
+            return f.T.ravel(), np.r_[new, f.ravel()][:states], np.array([*of.values()])
         w = np.array([*q1, *q0, *z, *of_places, dt, *numbers])
         end = _called(made.end, w)
         return _called(made.force, w)[:n], end[:states], end[states:]
@@ -111,7 +131,9 @@ def require_explained(effect: Effect, statement: OfUser, scene: Scene) -> None:
         for k in range(STEPS):
             change = random.uniform(-1.0, 1.0, n) * sizes * (motion if k else FIRST_MOTION)
             now, z, energies = step(q, q + change, z, 1.0)
-            slopes = [1.0] * (2 * n // 3) + [_slope(statement, x) for x in change[2 * n // 3 :]]
+            slopes = np.ones(n)
+            if not isinstance(inner, OfPython):
+                slopes[2 * n // 3 :] = [_slope(statement, x) for x in change[2 * n // 3 :]]
             work = (a * forces + (1.0 - a) * now) @ (change / slopes)
             gone, came = np.split(energies[stored : stored + lost + supplied], [lost])
             terms = np.array([work, *(before - energies[:stored]), *-gone, *came])

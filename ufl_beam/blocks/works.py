@@ -19,6 +19,7 @@ from ufl.domain import extract_domains
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import POINT, AxisOfCell, Cell, at_points, places, positions
+from ufl_beam.blocks.effect_blocks import EffectBlock, OfPython, PythonBlock, computed
 from ufl_beam.blocks.statement import COMPONENTS, Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.errors import ModelError, calling, shorten
@@ -26,9 +27,8 @@ from ufl_beam.mechanics.relative_motions import by_turning, virtual_displacement
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.bodies import arm
 from ufl_beam.model.connector_law import CONTRIBUTIONS, LOSSES
-from ufl_beam.model.functions import Constant, steady
+from ufl_beam.model.functions import Constant, steady, value_at
 from ufl_beam.model.works import Effect, Potential, VirtualWork, Work
-from ufl_beam.terms.derivatives import Each, Neighbours
 
 TIMES = "now", "end", "before", "between"
 """Times of numbers that vary, see :data:`~ufl_beam.blocks.block.TIMES`."""
@@ -193,6 +193,16 @@ class OfUser(Statement):
         return ["dt", *self.inner.of_step, *(f"{x} {when}" for x in self.names for when in times)]
 
     @property
+    def modes(self) -> Sequence[str]:
+        """Modes of equations in Python."""
+        return self.inner.modes
+
+    @property
+    def recorded(self) -> Mapping[str, int]:
+        """Inputs of equations in Python."""
+        return self.inner.recorded
+
+    @property
     def remembers(self) -> bool:
         """True for statements of a user, which may use the work of their forces."""
         return not isinstance(self.inner, OfFunction)
@@ -203,7 +213,7 @@ class OfUser(Statement):
         if self.remembers:
             with calling(f"{self.label}.equations fails"):
                 returned = inner.equations(element)
-            made = self._checked(returned)
+            made = self.checked(returned)
         else:
             made = [inner.equations(element)]
         work, state = ufl.as_ufl(0.0), dict[str, Any](element.worked or {})
@@ -223,9 +233,12 @@ class OfUser(Statement):
         forces = [ufl.diff(element.length * work, x) for x in by]
         stored, lost, supplied, before = accounts
         none = dict.fromkeys(self.state, ufl.as_ufl(0.0))
-        return Equations(forces, none | state, stored, lost, supplied, before=before)
+        recorded = {name: x for one in made for name, x in one.recorded.items()}
+        return Equations(
+            forces, none | state, stored, lost, supplied, before=before, recorded=recorded
+        )
 
-    def _checked(self, returned: Any) -> list[Equations]:
+    def checked(self, returned: Any) -> list[Equations]:
         """Return the equations of a user, or raise :class:`ModelError`."""
         made = [returned] if isinstance(returned, Equations) else returned
         if not isinstance(made, Sequence) or not all(isinstance(x, Equations) for x in made):
@@ -269,7 +282,9 @@ def _size(value: Any) -> int | None:
         return int(sum(value.ufl_shape))
     if isinstance(value, list | tuple):
         return len(value) if all(_size(x) == 0 for x in value) else None
-    return 0 if isinstance(value, int | float) else None
+    if isinstance(value, np.ndarray):
+        return value.size if value.ndim == 1 else 0 if value.ndim == 0 else None
+    return 0 if isinstance(value, int | float | np.number) else None
 
 
 # -- virtual works and potentials ------------------------------------------------------------------
@@ -363,36 +378,31 @@ def statement_of(work: Work | Effect, degree: int, scheme: Scheme) -> OfUser:
     """Return the statement of a work or effect; it serves all beams and values of numbers."""
     varying, names = {name for name, x in work.numbers.items() if callable(x)}, (*work.numbers,)
     if isinstance(work, Effect):
-        along = degree if work.beams else 0
-        return OfUser(work.statement, names, scheme, along, bool(varying), work.name)
+        inner = work.statement
+        if inner.in_python:
+            inner = _of_python(work, names, scheme)
+        return OfUser(inner, names, scheme, degree if work.beams else 0, bool(varying), work.name)
     inner = OfFunction(type(work), work.name, names, id(work.density), work.density)
     varies = isinstance(work, Potential) and bool((varying | {"t"}) & {*work.used_arguments})
     return OfUser(inner, ("t", *names), scheme, degree, varies, str(work))
 
 
-class EffectBlock(Block):
-    """Effects of a user with one statement."""
+def _of_python(effect: Effect, names: tuple[str, ...], scheme: Scheme) -> OfPython:
+    """Return a statement in Python with the names of its energies, from a step without motion."""
+    inner = OfPython(effect.statement, ())
+    given = inner.state.items() if isinstance(inner.state, Mapping) else ()
+    state = dict.fromkeys(inner.state, 0.0) | dict(given)
+    known = values_at_zero(effect) | state | {"dt": 1.0}
+    none, points = np.zeros((3, inner.nodes, 3)), np.zeros((inner.nodes, 2))
+    statement = OfUser(inner, names, scheme, 0, False, effect.name)
+    _, _, energies = computed(statement, known, points, none[:2], none[2])
+    return OfPython(effect.statement, (*energies,))
 
-    statement: OfUser
 
-    @property
-    def effect(self) -> str:
-        """See the base class."""
-        return self.statement.label
-
-    def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
-        """See the base class."""
-        label, others = self.statement.label, [x for some in neighbours.terms for x in some]
-        if self.statement.inner.state and any(x.statement != self.statement for x in others):
-            raise ModelError(
-                f"{label}: a parameter changes the statement, so that its state has no derivative; "
-                "make the parameter one of its numbers"
-            )
-        with calling(f"{label} has no derivative"):
-            return super().derivatives(neighbours)
-
-    def _begin_state(self, q: Array) -> None:
-        """Keep the state: a step without motion would change one that relaxes."""
+def values_at_zero(effect: Effect) -> dict[str, float]:
+    """Return the numbers of an effect at the time 0."""
+    numbers = effect.numbers.items()
+    return {x: value_at(f, 0.0, effect) if callable(f) else float(f) for x, f in numbers}
 
 
 def work_blocks(setting: BlockSetting) -> list[Block]:
@@ -444,7 +454,8 @@ def _block(name: str, statement: OfUser, indices: list[int], setting: BlockSetti
         np.concatenate(x, axis=int(i == 2)) for i, x in enumerate(zip(*rows, strict=True))
     )
     of_element = np.concatenate(of_work)
-    block = EffectBlock(
+    kind = PythonBlock if isinstance(statement.inner, OfPython) else EffectBlock
+    block = kind(
         statement,
         Elements(
             name, elements, dofs, numbers, in_time,

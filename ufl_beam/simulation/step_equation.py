@@ -18,9 +18,10 @@ from ufl_beam.blocks.beams import BeamCells, InelasticCells, elastic_cells
 from ufl_beam.blocks.block import Block, BlockSetting
 from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosity
+from ufl_beam.blocks.effect_blocks import EffectBlock
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.material_points import create_entries
-from ufl_beam.blocks.works import EffectBlock, work_blocks
+from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.dof_numbering import DofNumbering
