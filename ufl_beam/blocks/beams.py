@@ -360,7 +360,7 @@ class InelasticCells(BeamCells):
         self.points = points = Points(
             section_points, keys, lengths, setting.scheme, setting.search, predicts=True
         )
-        self.must_dissipate = section_points.kind.law.must_dissipate
+        self.must_dissipate = points.must_dissipate
         made, order, n = self._kernels, statement.modes, len(lengths)
         rows = in_batches(
             np.arange(len(own) * made.strains, dtype=np.int32).reshape(len(own), -1), BATCH
@@ -390,21 +390,8 @@ class InelasticCells(BeamCells):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops that begin and accept a step, and enter energies."""
-        made = super().phases(callbacks)
-        c = struct(
-            "inelastic_term", points=self.points.c, cells=self._sections,
-            **self.points.in_steps(self._ledger),
-        )  # fmt: skip
-        fill(self._c, inner=c)
-        begin, accept, energies = (
-            loop(name, c)
-            for name in ("begin_inelastic", "accept_inelastic", "add_energy_of_points")
-        )
-        opens = {"points": self.points.c, "cells": self._sections} if self.points.softens else None
-        return made._replace(
-            begin=[*made.begin, begin], accept=[accept, *made.accept], add_state=[energies],
-            opens=opens, admits=loop("points_dissipate", c) if self.must_dissipate else None,
-        )  # fmt: skip
+        fill(self._c, sections=self._sections)
+        return self.points.phases(self._c, super().phases(callbacks), self._ledger)
 
     def describe(self, place: int) -> str:
         """Return the cell of a material point."""

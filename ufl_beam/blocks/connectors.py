@@ -19,7 +19,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.statement import COMPONENTS, Equations, Inputs, Statement
-from ufl_beam.compiled.c_library import doubles, fill, integers, lib, loop
+from ufl_beam.compiled.c_library import doubles, fill, lib, loop
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.state_io import NOWHERE, Archive
 from ufl_beam.mechanics.relative_motions import MOTIONS, Geometry, Pair
@@ -328,8 +328,7 @@ class ConnectorBlock(Block):
         self.callbacks, made = callbacks, super().phases(callbacks)
         if not self.statement.modes:
             return made
-        fields = {"excess": doubles(self._excess), "free": integers(self._free)}
-        opens = {"number": len(self._excess), **fields} if self.statement.data.opens else None
+        opens = self._c if self.statement.data.opens else None
         return made._replace(opens=opens, again=loop("begin_block_again", self._c))
 
     @property

@@ -31,7 +31,7 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.statement import Inputs, expanded
-from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, loop, struct
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms, with_shared_nodes
 from ufl_beam.errors import StepFailed
@@ -44,6 +44,7 @@ from ufl_beam.model.material_law import traced
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.derivatives import Neighbours, margins
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.term import Phases
 
 
 @law_functions.where.register(Condition)
@@ -299,8 +300,8 @@ class Points:
         names: Names of the inputs of a point.
         strains: Strains of the cells in the latest response; (cells, 3); 1, 1, 1/m.
         r, D: The latest response, see :meth:`return_map`.
-        dt: Length of the step; (1,); s.
         softens: True if points may break.
+        must_dissipate: True if a law must not give energy.
         over: Largest ``|stress| / limit - 1`` of the points that the latest response has held
             closed, at least zero; (1,).
         damped: Block of damped cells, whose first numbers are the derivatives of (N, V, M) in the
@@ -326,6 +327,7 @@ class Points:
         self._section_points, self._alpha = section_points, scheme.alpha
         self._yields, self.softens = section_points.yields, section_points.softening is not None
         self._releases = releases(section_points, scheme)
+        self.must_dissipate = section_points.kind.law.must_dissipate
         self.names, law = inputs(section_points), section_points.kind.law
         cells, per_cell, width = len(length), len(section_points.weights), len(self.names)
         n = cells * per_cell
@@ -347,8 +349,7 @@ class Points:
             self._at[f"state {name}"][:] = initial
         self._at["length"][:] = length[:, None]
         self._at["theta"][:] = scheme.theta
-        self.dt: Array = np.ones(1)
-        self._at["dt"][:] = self.dt
+        self._at["dt"][:] = 1.0
         self._at["traction"][:] = np.inf
         if section_points.softening is not None:
             for name, value in section_points.softening.parameters().items():
@@ -479,8 +480,7 @@ class Points:
 
     def begin(self, dt: float) -> None:
         """Begin a step of length ``dt``; s."""
-        if dt != self.dt[0]:
-            self["dt"][:] = self.dt[0] = dt
+        self["dt"][:] = dt
         self.c.tried = 0  # a law that solves for its variables has no iterate to start from
 
     def return_map(self, strains: Array) -> tuple[Array, Array]:
@@ -593,8 +593,8 @@ class Points:
 
     # -- the ledger ----------------------------------------------------------------------------
 
-    def in_steps(self, ledger: Ledger) -> dict[str, Any]:
-        """Return fields of ``inelastic_term`` of loops.h, with entries of the ledger."""
+    def phases(self, block: Any, made: Phases, ledger: Ledger) -> Phases:
+        """Add the points of ``element_block`` of loops.h to the functions of the block."""
         state, lost = ledger.state, ledger.lost
         entries = {
             "worked": self._yields and lost.pointer("plastic"),
@@ -606,7 +606,16 @@ class Points:
             "relaxed": None,
         }
         entry = [pointer or ffi.NULL for pointer in in_order("point_output", entries)]
-        return {"dt": self.dt, "alpha": self._alpha, "entry": entry}
+        fill(self.c, alpha=self._alpha, entry=entry)
+        begin, accept, add = (
+            loop(name, fill(block, inner=self.c))
+            for name in ("begin_points", "accept_points", "add_energy_of_points")
+        )
+        dissipates = loop("points_dissipate", block) if self.must_dissipate else None
+        return made._replace(
+            begin=[*made.begin, begin], accept=[accept, *made.accept], add_state=[add],
+            opens=block if self.softens else None, admits=dissipates, again=None,
+        )  # fmt: skip
 
     # -- the state -----------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ from ufl_beam.blocks.block import BlockSetting
 from ufl_beam.blocks.connectors import ConnectorBlock, Data, OnConnector, Step
 from ufl_beam.blocks.material_points import Points, create_entries
 from ufl_beam.blocks.statement import Equations, Inputs
-from ufl_beam.compiled.c_library import fill, loop, struct
+from ufl_beam.compiled.c_library import fill
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.model.connector_laws import Spring
 from ufl_beam.model.fibres import SectionPoints
@@ -61,27 +61,13 @@ class SpringBlock(ConnectorBlock):
         self.points = Points(section_points, keys, np.ones(number), setting.scheme, setting.search)
         create_entries(section_points, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
-        self.must_dissipate = section_points.kind.law.must_dissipate
+        self.must_dissipate = self.points.must_dissipate
         fill(self._c, stiffness=np.full(number, law.stiffness))
         self.fields += [("dissipated", x) for x in self.points.recorded.T[4:6]]
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """See the base class."""
-        made = super().phases(callbacks)
-        self._inner = term = struct(
-            "inelastic_term", points=self.points.c, springs=self._c,
-            **self.points.in_steps(self._ledger),
-        )  # fmt: skip
-        fill(self._c, inner=term)
-        begin, accept, energies = (
-            loop(name, term)
-            for name in ("begin_inelastic", "accept_inelastic", "add_energy_of_points")
-        )
-        return made._replace(
-            begin=[*made.begin, begin], accept=[*made.accept, accept], add_state=[energies],
-            opens={"points": self.points.c} if self.points.softens else None, again=None,
-            admits=loop("points_dissipate", term) if self.must_dissipate else None,
-        )  # fmt: skip
+        return self.points.phases(self._c, super().phases(callbacks), self._ledger)
 
     def _at(self, e: Array) -> Array:
         self._strains[:, 0] = e

@@ -237,7 +237,7 @@ class Stepper(StateView):
         loads = [load.vector for load in equation.loads]
         multipliers = subdomain.multipliers.astype(np.int32)
         opens = [phase.opens for phase in phases if phase.opens is not None]
-        places = ffi.new("openable[]", opens)
+        places = ffi.new("element_block *[]", opens)
         admits = [phase.admits for phase in phases if phase.admits is not None]
         s = np.zeros(subdomain.size) if equation.supports.turned else solver.change
         self.time_loop = fill(

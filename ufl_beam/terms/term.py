@@ -75,8 +75,8 @@ class Phases(NamedTuple):
     """C functions of a term in a step, each with its data; loops.h declares their types.
 
     ``begin`` and ``accept`` begin and accept a step; ``add_state`` adds the energies of a state to
-    the ledger.  ``change`` computes the energy that a step stores and dissipates.  ``opens`` has
-    the fields of ``openable``, if points or connectors may open.  ``admits`` checks a step before
+    the ledger.  ``change`` computes the energy that a step stores and dissipates.  ``opens`` is
+    ``element_block`` of loops.h, if points or connectors may open.  ``admits`` checks a step before
     its end is accepted.  ``again`` discards earlier iterates when a step is restarted.
     """
 
@@ -84,7 +84,7 @@ class Phases(NamedTuple):
     accept: Sequence[Loop] = ()
     add_state: Sequence[Loop] = ()
     change: Loop | None = None
-    opens: dict[str, Any] | None = None
+    opens: Any = None
     admits: Loop | None = None
     again: Loop | None = None
 

@@ -68,7 +68,7 @@ void tabulate_block(void *self, const time_step *step, const double *q1)
   const element_block *b = m->block;
   gather(b, q1, 0);
   if (m->inner) {
-    inelastic *sections = b->inner->cells;
+    inelastic *sections = b->sections;
     if (sections) sections->latest[0] = NAN, sections->points->predicts = 0, respond_at(sections, q1);
     else find_modes(b);
     tabulate_points(m->inner);

@@ -211,10 +211,10 @@ void begin_block_again(void *self, const time_step *step, const double *q1, cons
 static void find_lines(const element_block *b)
 {
   const int n = b->lanes, first = b->width - b->modes + FIRST_MODE;
-  const points *p = b->inner->points;
+  points *p = b->inner;
   for (int i = 0; i < b->elements; ++i)
     p->e1[3 * i] = b->out[((size_t)(i / n) * b->end_of->outputs + b->states + b->shares) * n + i % n];
-  respond(b->inner->points);
+  respond(p);
   for (int i = 0; i < b->elements; ++i) {
     double *slope = input(b, i / n, first) + i % n;
     slope[0] = p->D[9 * i], slope[n] = p->r[3 * i];

@@ -58,42 +58,41 @@ void accept_rayleigh(void *self, const time_step *step, const double *q1, const 
   *m->lost += product_with(m, s, s) / step->dt;
 }
 
-static void respond_in_term(const inelastic_term *t, const double *q)
+/* The points of a block after their response at q. */
+static points *respond_in(const element_block *b, const double *q)
 {
-  if (t->cells) respond_at(t->cells, q);
-  else respond_springs(t->springs, q);
+  if (b->sections) respond_at(b->sections, q);
+  else respond_springs(b, q);
+  return b->inner;
 }
 
-void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
+void accept_points(void *self, const time_step *step, const double *q1, const double *s)
 {
-  const inelastic_term *t = self;
-  points *p = t->points;
-  respond_in_term(t, q1);
+  points *p = respond_in(self, q1);
   if (p->damped) {
     accept_block((void *)p->damped, step, q1, s);
     keep_tangents(p);
   }
   end_points(p, p->sum, 1);
   for (int k = 0; k < POINT_OUTPUTS; ++k)
-    if (t->entry[k] && k != ELASTIC && k != HARDENING) *t->entry[k] += (k == LOST ? 2 * t->alpha : 1) * p->sum[k];
+    if (p->entry[k] && k != ELASTIC && k != HARDENING) *p->entry[k] += (k == LOST ? 2 * p->alpha : 1) * p->sum[k];
 }
 
 void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s)
 {
-  const inelastic_term *t = self;
+  const points *p = ((element_block *)self)->inner;
   for (int k = ELASTIC; k <= HARDENING; ++k)
-    if (t->entry[k]) *t->entry[k] += t->points->sum[k];
+    if (p->entry[k]) *p->entry[k] += p->sum[k];
 }
 
 /* Energy that points store and dissipate in a step to q1. */
-static double change_by_response(const inelastic_term *t, const double *q1)
+static double change_by_response(const element_block *b, const double *q1)
 {
-  const double *before = t->points->sum;
+  points *p = respond_in(b, q1);
   double after[POINT_OUTPUTS], change = 0;
-  respond_in_term(t, q1);
-  end_points(t->points, after, 0);
+  end_points(p, after, 0);
   for (int k = 0; k < POINT_OUTPUTS; ++k)
-    if (k != LOST) change += after[k] - (k == ELASTIC || k == HARDENING ? before[k] : 0);
+    if (k != LOST) change += after[k] - (k == ELASTIC || k == HARDENING ? p->sum[k] : 0);
   return change;
 }
 
@@ -116,7 +115,7 @@ void change_of_block(void *self, const double *q1, energy_change *sum)
     if (b->power_of) sum->in_connectors += w[(size_t)(i / n) * b->width * n + i % n];
   }
   for (int k = 0; elastic && k < b->stored; ++k) sum->in_connectors -= b->energy[k];
-  if (b->inner) sum->in_connectors += change_by_response(b->inner, q1);
+  if (b->inner) sum->in_connectors += change_by_response(b, q1);
 }
 
 /* Energy that cells store in a step to q1, without the energy that they supply. */
@@ -124,7 +123,7 @@ void change_of_cells(void *self, const double *q1, energy_change *sum)
 {
   const element_block *b = self;
   double *out = b->out, before = 0;
-  if (b->inner) sum->in_beams += change_by_response(b->inner, q1);
+  if (b->inner) sum->in_beams += change_by_response(b, q1);
   gather(b, q1, 0);
   if (b->end_of) FOR_ACTING(b, c) {
     evaluate_batch(b, b->end_of, c, out);
@@ -142,9 +141,7 @@ void change_of_cells(void *self, const double *q1, energy_change *sum)
 
 int points_dissipate(void *self, const double *q1)
 {
-  const inelastic_term *t = self;
-  respond_in_term(t, q1);
-  return gives_energy(t->points) < 0;
+  return gives_energy(respond_in(self, q1)) < 0;
 }
 
 static void accept_supports(time_loop *m)

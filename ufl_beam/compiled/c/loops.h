@@ -241,6 +241,7 @@ typedef struct {
   const element_block *damped;
   int in_damped;
   double *inputs;        /* space for the inputs of a point */
+  double alpha, *entry[POINT_OUTPUTS]; /* alpha of the scheme; entries of the ledger, or none */
 } points;
 
 /* Cells with points in `in_cell` sections each. The block of the cells computes the strains of the sections, and in
@@ -591,7 +592,6 @@ enum end_of_step { COMPUTE, ENERGIES, TRIAL, BEGIN, ACCEPT };
 enum recorded_number { RECORDED_STATE, RECORDED_STEP, RECORDED_TOTAL, RECORDED_WORK };
 
 typedef struct rates rates;
-struct inelastic_term;
 
 /* First modes of an element, which C sets: whether it is held in the search; whether the iterate is the first one;
  * whether softening has the opposite sign in the tangent. Others select the branch of a law in an iterate. */
@@ -649,7 +649,8 @@ struct element_block {
   int32_t *search, *free;   /* see points; free: elements that may change their modes while others are held */
   double *excess;           /* violation of the modes of held elements */
   int opens;                /* whether elements are held in the search */
-  struct inelastic_term *inner; /* material points, one of each element, whose strain is the motion; or none */
+  points *inner;            /* material points, of cells or one of each spring, whose strain is the motion; or none */
+  inelastic *sections;      /* of cells with points; or none */
   void (*ask)(void *handle); /* function of Python that sets the modes; or none */
   void *asked;
   int recorded;             /* numbers that solutions record */
@@ -734,15 +735,6 @@ typedef struct {
   double weight_of_before;
 } moving_supports;
 
-/* Material points of cells or of springs, and their entries of the ledger, or none. */
-typedef struct inelastic_term {
-  points *points;
-  inelastic *cells;             /* or none */
-  const element_block *springs; /* or none */
-  double alpha, *dt;
-  double *entry[POINT_OUTPUTS]; /* of the ledger, for each energy; or none */
-} inelastic_term;
-
 /* Forces of laws of a user, watched for changes of direction at every step; see controllers.py. */
 typedef struct {
   int number, most;            /* most: successive changes of direction at which a force is reported */
@@ -782,16 +774,6 @@ typedef struct {
   double moves, work, stored; /* largest motion, in the unit of `far`; J */
   double rejected; /* energy of the first attempt to go to the end of a step that leapt, else zero; J */
 } static_path;
-
-/* Places that open beyond a limit: points of cells or of springs, rigid-plastic connectors, or
- * friction connectors; the other pointers are none. */
-typedef struct {
-  points *points;
-  inelastic *cells;
-  int number; /* of connectors */
-  const double *excess;
-  int32_t *free;
-} openable;
 
 /* Parts that a step may turn without strain. */
 typedef struct {
@@ -843,7 +825,7 @@ typedef struct {
   const vector *const *load; /* their forces */
   moving_supports *supports;
   int opens, places;  /* opens: whether places may open, on any process */
-  const openable *place;
+  const element_block *const *place; /* blocks whose points or elements open beyond a limit */
   phases begin, accept, add_state;
   int states;
   double *state;      /* entries of the ledger that are functions of the state, contiguous */
@@ -884,7 +866,7 @@ phase begin_dead_loads,
   accept_dead_loads,
   
   begin_product, accept_inertia, add_kinetic_energy, accept_rayleigh,
-  begin_inelastic, accept_inelastic, add_energy_of_points,
+  begin_points, accept_points, add_energy_of_points,
   begin_block, begin_block_again, begin_neighbour, accept_block, add_energy_of_block;
 admission points_dissipate;
 change_of_energy change_of_block, change_of_cells;

@@ -150,9 +150,9 @@ static double largest_excess(const time_loop *m)
 {
   double most = 0;
   for (int k = 0; k < m->places; ++k) {
-    const openable *o = m->place + k;
-    if (o->points) most = fmax(most, *o->points->over);
-    for (int i = 0; i < o->number; ++i) most = fmax(most, o->excess[i]);
+    const element_block *b = m->place[k];
+    if (b->inner) most = fmax(most, *b->inner->over);
+    else for (int i = 0; i < b->elements; ++i) most = fmax(most, b->excess[i]);
   }
   return most;
 }
@@ -161,10 +161,10 @@ static double largest_excess(const time_loop *m)
 static void open_places(time_loop *m, double least)
 {
   for (int k = 0; k < m->places; ++k) {
-    const openable *o = m->place + k;
-    if (o->points) allow_opening(o->points, least);
-    if (o->cells) o->cells->latest[0] = NAN;
-    for (int i = 0; i < o->number; ++i) o->free[i] |= o->excess[i] > 0 && o->excess[i] >= least;
+    const element_block *b = m->place[k];
+    if (b->sections) b->sections->latest[0] = NAN;
+    if (b->inner) allow_opening(b->inner, least);
+    else for (int i = 0; i < b->elements; ++i) b->free[i] |= b->excess[i] > 0 && b->excess[i] >= least;
   }
 }
 
@@ -173,11 +173,11 @@ static void end_search(time_loop *m, int opened)
 {
   memset(m->equation->search, 0, SEARCH_FLAGS * sizeof(int32_t));
   for (int k = 0; opened && k < m->places; ++k) {
-    const openable *o = m->place + k;
-    const points *p = o->points;
+    const element_block *b = m->place[k];
+    const points *p = b->inner;
     for (int i = 0; p && i < p->cells * p->of_cell; ++i)
       if (p->w[i * p->width + FLOWS] == MAY_OPEN) p->w[i * p->width + FLOWS] = CLOSED;
-    if (o->number) memset(o->free, 0, o->number * sizeof *o->free);
+    if (!p) memset(b->free, 0, b->elements * sizeof *b->free);
   }
 }
 

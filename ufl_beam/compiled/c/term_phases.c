@@ -95,16 +95,14 @@ void begin_product(void *self, const time_step *step, const double *q1, const do
   if (some != 1) combine_rates(r, row, 1, m->v);
 }
 
-void begin_inelastic(void *self, const time_step *step, const double *q1, const double *s)
+void begin_points(void *self, const time_step *step, const double *q1, const double *s)
 {
-  const inelastic_term *t = self;
-  points *p = t->points;
-  if (step->dt != *t->dt) {
-    *t->dt = step->dt;
-    for (int k = 0; k < p->cells * p->of_cell; ++k) p->w[k * p->width + DT] = step->dt;
-  }
+  const element_block *b = self;
+  points *p = b->inner;
+  inelastic *m = b->sections;
+  for (int k = 0; k < p->cells * p->of_cell && p->w[k * p->width + DT] != step->dt; ++k)
+    p->w[k * p->width + DT] = step->dt;
   p->tried = p->predicts = 0;
-  inelastic *m = t->cells;
   if (!m) return;
   m->latest[0] = NAN; /* compute the next response in any case */
   m->q0 = step->q0, m->q_before = step->q_before, m->ratio = step->ratio;
