@@ -26,8 +26,9 @@ from ufl_beam.terms import material_points
 plan = beam_elimination._plan
 
 
-def nothing(*_):
-    """Replace `interleaved`: there is no loop over several cells at once."""
+def one_by_one(_source, kernels, *_):
+    """Replace `element_loops`: there is no loop over several cells at once."""
+    return [None] * len(kernels)
 
 
 def without_chains(cell_dofs, indptr, indices, alone, *more):
@@ -100,7 +101,7 @@ class Variant(NamedTuple):
             return ub.Simulation(scene, ub.EnergyMomentum(), newton=ub.Newton(**self.newton))
 
 
-CELL_BY_CELL = (compiled_forms, "interleaved", nothing)
+CELL_BY_CELL = (compiled_forms, "element_loops", one_by_one)
 POINT_BY_POINT = (material_points, "BATCH", math.inf)
 NO_CHAINS = (beam_elimination, "_plan", without_chains)
 NO_FRONTS = (beam_elimination, "Multifrontal", klu)

@@ -11,15 +11,11 @@ import cffi
 import dolfinx
 import numpy as np
 import pytest
-import ufl
 
 import ufl_beam as ub
 from ufl_beam import dolfinx_compat
 from ufl_beam.compiled import c_library
 from ufl_beam.compiled.c_library import ffi, in_order, lib, names, petsc
-from ufl_beam.discretization import compiled_forms
-from ufl_beam.discretization.compiled_forms import Kernel
-from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.mechanics.point_equations import inputs as inputs_of_points
 
 pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
@@ -195,29 +191,3 @@ def test_arrays_live_as_long_as_the_struct_that_points_to_them():
 def test_integers_of_another_size_are_refused():
     with pytest.raises(TypeError, match="32 bits, not int64"):
         c_library.integers(np.arange(3))
-
-
-def kernel(degree=1, cells=2, coordinates=None):
-    """The matrix of masses on a line."""
-    points = np.column_stack([np.arange(cells + 1.0), np.zeros(cells + 1)])
-    mesh = line_mesh(points, np.column_stack([np.arange(cells), np.arange(1, cells + 1)]))
-    space = fem.functionspace(mesh, ("Lagrange", degree))
-    u, w = ufl.TrialFunction(space), ufl.TestFunction(space)
-    f = fem.Function(space)
-    form = f * u * w * ufl.dx(domain=mesh, metadata={"quadrature_degree": 2})
-    x = cell_coordinates(mesh)[:, :, :2] if coordinates is None else coordinates
-    return Kernel(form, f, np.asarray(space.dofmap.list), x)
-
-
-def test_cells_with_more_entries_than_there_is_room_for():
-    with pytest.raises(ValueError, match=r"19 x 19 .* has 361 entries; loops.h allows 324"):
-        kernel(degree=18)
-
-
-def test_arrays_of_other_sizes_are_refused(monkeypatch):
-    with pytest.raises(ValueError, match=r"4 entries .* on 2 cells, .* of shape \(3, 2, 2\)"):
-        kernel(coordinates=np.zeros((3, 2, 2)))
-    pack = compiled_forms.pack
-    monkeypatch.setattr(compiled_forms, "pack", lambda form: (pack(form)[0], np.zeros((2, 1))))
-    with pytest.raises(ValueError, match=r"DOLFINx .* pack 1 values of a cell, not 2"):
-        kernel()

@@ -436,8 +436,8 @@ def test_a_kernel_without_vectors_is_remembered(place, tmp_path):
     source = tmp_path / "libffcx_forms_0.c"
     source.write_text("nothing")
     for _ in range(2):
-        simd_kernels.interleaved.cache_clear()
-        assert simd_kernels.interleaved(source, 0, (1, 1, 0), (0, 1)) is None
+        simd_kernels.element_loops.cache_clear()
+        assert simd_kernels.element_loops(source, ((0, (1, 1)),), 0, 0) == [None]
     assert len([path for path in place.iterdir() if path.is_dir()]) == 1
 
 

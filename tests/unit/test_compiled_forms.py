@@ -16,13 +16,13 @@ from ufl.corealg.traversal import unique_pre_traversal
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import doubles
 from ufl_beam.compiled.simd_kernels import BATCH
-from ufl_beam.discretization import compiled_forms
+from ufl_beam.discretization import cell_functions, compiled_forms
+from ufl_beam.discretization.beam_forms import elastic_form, mass_form
 from ufl_beam.discretization.compiled_forms import Pointwise, components
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import DolfinxFields, Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.dolfinx_compat import VERSION, cpp, fem, line_mesh
-from ufl_beam.mechanics.kinematics import Axis, strain
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
 
@@ -270,19 +270,11 @@ def test_changing_alpha_compiles_no_other_code(compiled):
 # -- the loops of the package against DOLFINx's assemblers ---------------------------------------
 
 
-def fields_of_a_frame():
+def fields_of_a_frame(mesh=None):
     a = ub.Beam((0, 0), (0, 2), SECTION, cells=3)
     b = ub.Beam((0, 2), (3, 1), SECTION, cells=4)
     scene = ub.Scene([a, b], joints=[ub.Revolute(a.end, b.start)])
-    return Fields(Subdomain(DofNumbering(scene), MPI.COMM_SELF))
-
-
-def forms_of(q, axis, dx):
-    """An energy and both its derivatives."""
-    e, space = strain(q, axis), q.function_space
-    energy = sum(c * e[i] ** 2 for i, c in enumerate((3.0, 2.0, 1.0))) * dx
-    force = ufl.derivative(energy, q, ufl.TestFunction(space))
-    return energy, force, ufl.derivative(force, q, ufl.TrialFunction(space))
+    return Fields(Subdomain(DofNumbering(scene, mesh or ub.Mesh()), MPI.COMM_SELF))
 
 
 def space_with_dofs(domain, element, cell_dofs, size):
@@ -297,45 +289,43 @@ def space_with_dofs(domain, element, cell_dofs, size):
     return fem.FunctionSpace(domain, element, cpp.fem.FunctionSpace_float64(*arguments))
 
 
-def test_kernels_give_what_dolfinx_assembles():
-    """Stated on one cell, and stated on the mesh of the scene."""
-    fields = fields_of_a_frame()
-    element = fields.element
-    energy, force, tangent = forms_of(element.q1, element.axis, element.dx(1))
+@pytest.mark.parametrize(
+    "mesh", [ub.Mesh(), ub.Mesh(degree=2), ub.Mesh(degree=3, lumped=True)], ids=str
+)
+def test_functions_of_cells_are_what_dolfinx_assembles(mesh):
+    """Forces of strains, masses and the stiffness at rest; sums over cells in another order."""
+    fields = fields_of_a_frame(mesh)
     q = np.random.default_rng(0).uniform(-1, 1, fields.subdomain.size)
-    vector = np.zeros(fields.subdomain.size)
-    fields.kernel(force, element.q1).add(q, vector)
-    matrix = fields.matrix()
-    kernel = fields.kernel(tangent, element.q1)
-    kernel.place(matrix)
-    kernel.add(q, matrix.data)
-    value = fields.kernel(energy, element.q1).value(q)
+    C = np.diag([SECTION.EA, SECTION.GA, SECTION.EI]).ravel()
+    law = (
+        np.zeros((len(fields.order), 3 * mesh.degree)),
+        np.tile(C, (len(fields.order), mesh.degree)),
+    )
+    forces = np.zeros(len(q))
+    cell_functions.stress_forces(fields, law).add(q, forces)
 
-    of_three, meshed = element.space.ufl_element(), DolfinxFields(fields.subdomain)
-    space = space_with_dofs(meshed.mesh, of_three, meshed.cell_dofs, fields.subdomain.size)
-    function = fem.Function(space)
-    function.x.array[:] = q
-    dx = ufl.Measure("dx", domain=meshed.mesh, metadata={"quadrature_degree": 1})
-    of_all = [fem.form(form) for form in forms_of(function, Axis(meshed.mesh), dx)]
-    expected = fem.assemble_matrix(of_all[2])
-    assert np.array_equal(expected.indices, matrix.indices)
-    scale = np.abs(expected.data).max()
-    # The same kernels; sums over cells in another order
-    assert value == pytest.approx(fem.assemble_scalar(of_all[0]), rel=1e-14)
-    assert np.abs(vector - fem.assemble_vector(of_all[1]).array).max() < 1e-14 * scale
-    assert np.abs(matrix.data - expected.data).max() < 1e-14 * scale
-
-
-def test_a_form_without_coefficients_is_added_in_all_cells():
-    """DOLFINx packs an array of shape (0, 0) for it, whatever the number of cells."""
-    fields = fields_of_a_frame()
-    element = fields.element
-    u, w = ufl.TrialFunction(element.space), ufl.TestFunction(element.space)
-    kernel, matrix = fields.kernel(u[0] * w[0] * element.dx(2), element.q1), fields.matrix()
-    kernel.place(matrix)
-    kernel.add(np.zeros(fields.subdomain.size), matrix.data)
-    # The integral of 1 over both beams; entries of the cells of a partition of unity
-    assert matrix.data.sum() == pytest.approx(2 + math.sqrt(10), rel=1e-14)
+    meshed = DolfinxFields(fields.subdomain)
+    of, size = meshed.element, fields.subdomain.size
+    space = space_with_dofs(meshed.mesh, of.space.ufl_element(), meshed.cell_dofs, size)
+    now, w, u = fem.Function(space), ufl.TestFunction(space), ufl.TrialFunction(space)
+    now.x.array[:] = q
+    work = elastic_form(of, ub.Static())
+    assembled = fem.assemble_vector(fem.form(ufl.replace(work, {of.q1: now, of.w: w}))).array
+    assert np.abs(forces - assembled).max() < 1e-13 * np.abs(assembled).max()
+    rest = fem.Function(space)  # where the tangent of the forces is the stiffness
+    tangent = ufl.derivative(ufl.replace(work, {of.q1: rest, of.w: w}), rest, u)
+    mass = ufl.replace(mass_form(of), {of.w: w, ufl.TrialFunction(of.space): u})
+    for form, matrix in (
+        (tangent, cell_functions.stiffness_matrix(fields)),
+        (mass, cell_functions.mass_matrix(fields)),
+    ):
+        expected = fem.assemble_matrix(fem.form(form)).to_dense()
+        found = matrix.sparse().toarray()
+        assert np.abs(found - expected).max() < 1e-13 * np.abs(expected).max()
+        product = np.zeros(size)
+        on_cells = cell_functions.stiffness_forces, cell_functions.mass_forces
+        on_cells[form is mass](fields).add(q, product)
+        assert np.abs(product - expected @ q).max() < 1e-13 * np.abs(expected).max()
 
 
 def test_forms_are_compiled_once_in_a_process(compiled):

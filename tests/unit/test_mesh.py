@@ -14,8 +14,9 @@ from scenes import clamped
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
+from ufl_beam.discretization.cell_functions import mass_matrix
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.discretization.function_spaces import Fields, mass_matrix
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 
 STEEL = ub.Section(EA=1e6, GA=4e5, EI=1e3, rhoA=2.0, rhoI=1e-3)  # N, N, N m2, kg/m, kg m

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Kernels for several cells at once against the same kernels cell by cell."""
 
-from copy import copy
+import shutil
 
 import numpy as np
 import pytest
@@ -14,38 +14,31 @@ from ufl_beam.blocks.beams import BeamCells
 from ufl_beam.compiled import code_cache, jit, simd_kernels
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
-from ufl_beam.discretization.compiled_forms import Kernel, Pointwise
-from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
+from ufl_beam.discretization.compiled_forms import Pointwise
 
 
-def pointwise(expression, values, *, several=False):
-    """The kernel of an expression of one number in each cell, all cells of length 1.
+def pointwise(expression):
+    """A function of one number, compiled, and its compiler, which keeps it."""
+    compiler = Pointwise(["x"])
+    return *compiler.compile_elements([expression(compiler.at["x"])]), compiler
 
-    It computes ``several`` cells at once if it can.
-    """
-    n = len(values)
-    points = np.column_stack([np.arange(n + 1.0), np.zeros(n + 1)])
-    mesh = line_mesh(points, np.column_stack([np.arange(n), np.arange(1, n + 1)]))
-    space = fem.functionspace(mesh, ("DG", 0))
-    f, z = fem.Function(space), ufl.TestFunction(space)
-    form = expression(f) * z * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})
-    x = cell_coordinates(mesh)[:, :, :2]
-    interleaved = [in_batches(x, simd_kernels.BATCH)] if several else []
-    kernel = Kernel(form, f, np.asarray(space.dofmap.list), x, *interleaved)
-    by_cell = np.empty(n)
-    by_cell[np.asarray(space.dofmap.list)[:, 0]] = values
-    return kernel, by_cell
+
+def one_by_one(function, values):
+    """Values of a function of one number, by FFCx's kernel."""
+    found = np.zeros((len(values), 1))
+    for x, out in zip(values, found, strict=True):
+        ask(function.one, np.array([x]), out)
+    return found[:, 0]
 
 
 def both(expression, values):
-    """What the kernel makes of the values cell by cell, and several cells at once."""
-    kernel, q = pointwise(expression, values)
-    one, several = np.zeros((2, len(q)))
-    kernel.add(q, one)
-    kernel, _ = pointwise(expression, values, several=True)
-    assert kernel.cells.batch_size > 1
-    kernel.add(q, several)
-    return one, several
+    """What the function makes of the values one by one, and several at once."""
+    function, _compiler = pointwise(expression)
+    assert function.several
+    w = in_batches(np.asarray(values)[:, None], BATCH)
+    several = np.empty(w.shape)
+    function.several(len(w), doubles(w), doubles(several))
+    return one_by_one(function, values), several.ravel()[: len(values)]
 
 
 ANGLES = np.concatenate(
@@ -171,11 +164,10 @@ def test_expressions_hold_for_any_number_of_cells(expression, cells):
     ids=["another function", "beside a power"],
 )
 def test_what_vectors_cannot_is_computed_cell_by_cell(expression, meant):
-    kernel, q = pointwise(expression, np.linspace(-1.0, 2.0, 5), several=True)
-    assert kernel.cells.batch_size == 1
-    values = np.zeros(len(q))
-    kernel.add(q, values)
-    assert np.allclose(values, meant(q), rtol=1e-14)
+    function, _compiler = pointwise(expression)
+    assert not function.several
+    x = np.linspace(-1.0, 2.0, 5)
+    assert np.allclose(one_by_one(function, x), meant(x), rtol=1e-14)
 
 
 def test_without_the_text_of_the_kernel(tmp_path):
@@ -211,9 +203,9 @@ def test_logical_operators_choose_exactly(condition):
 def fresh(tmp_path, monkeypatch):
     """Nothing is compiled or known yet."""
     monkeypatch.setattr(code_cache, "_place", lambda: tmp_path)
-    simd_kernels.interleaved.cache_clear()
+    simd_kernels.element_loops.cache_clear()
     yield
-    simd_kernels.interleaved.cache_clear()
+    simd_kernels.element_loops.cache_clear()
 
 
 @pytest.mark.serial
@@ -225,15 +217,14 @@ def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
     )
     caplog.set_level("INFO", logger="ufl_beam")
     for told in (["WARNING", "INFO"], ["INFO"]):
-        kernel, q = pointwise(ufl.sin, np.linspace(0.1, 1.0, 5), several=True)
-        assert kernel.cells.batch_size == 1
+        function, _compiler = pointwise(ufl.sin)
+        assert not function.several
         assert [record.levelname for record in caplog.records] == told
         assert "entries differ from FFCx's kernel" in caplog.text
-        values = np.zeros(len(q))
-        kernel.add(q, values)
-        assert np.allclose(values, np.sin(q), rtol=1e-14)
+        x = np.linspace(0.1, 1.0, 5)
+        assert np.allclose(one_by_one(function, x), np.sin(x), rtol=1e-14)
         caplog.clear()
-        simd_kernels.interleaved.cache_clear()
+        simd_kernels.element_loops.cache_clear()
 
 
 @pytest.mark.serial
@@ -243,9 +234,8 @@ def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
     ids=["logical", "known"],
 )
 def test_the_compiler_says_nothing(fresh, capfd, condition):
-    values = np.linspace(0, 1, 9)
-    kernel, _ = pointwise(lambda x: ufl.conditional(condition(x), x, -1.0), values, several=True)
-    assert kernel.cells.batch_size > 1
+    function, _compiler = pointwise(lambda x: ufl.conditional(condition(x), x, -1.0))
+    assert function.several
     assert "error" not in capfd.readouterr().err
 
 
@@ -294,21 +284,24 @@ def test_the_check_is_made_once(fresh, monkeypatch):
         lambda *args, **more: (calls.append(args), check(*args, **more)),
     )
     for _ in range(2):
-        kernel, _ = pointwise(ufl.cos, np.ones(2), several=True)
-        assert kernel.cells.batch_size > 1
-        simd_kernels.interleaved.cache_clear()
+        function, _compiler = pointwise(ufl.cos)
+        assert function.several
+        simd_kernels.element_loops.cache_clear()
     assert len(calls) == 1
 
 
 @pytest.mark.serial
-def test_what_is_slower_is_said(fresh, caplog, monkeypatch):
+def test_what_is_slower_is_said(fresh, caplog, monkeypatch, tmp_path):
     caplog.set_level("INFO", logger="ufl_beam")
-    pointwise(ufl.atan, np.ones(2), several=True)
+    pointwise(ufl.atan)
     assert "computed cell by cell, which is slower: assembly_simd.h has no atan" in caplog.text
-    pointwise(ufl.sin, np.ones(2))
+    pointwise(ufl.sin)  # FFCx's kernel is in the cache now
+    for path in tmp_path.glob("ufl_beam_lanes*"):
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    simd_kernels.element_loops.cache_clear()
     monkeypatch.setenv("CC", "no-such-compiler")
-    kernel, _ = pointwise(ufl.sin, np.ones(2), several=True)
-    assert kernel.cells.batch_size == 1
+    function, _compiler = pointwise(ufl.sin)
+    assert not function.several
     assert "which is slower: ufl_beam_lanes cannot be compiled" in caplog.text
 
 
@@ -353,31 +346,6 @@ RUNS = {
 }
 
 
-def kernels(term):
-    """The kernels that a term keeps."""
-    found = {}
-    for name, value in vars(term).items():
-        if isinstance(value, Kernel):
-            found[name] = value
-        elif isinstance(getattr(value, "kernel", None), Kernel):
-            found[name] = value.kernel
-    found.update({f"_losses {i}": k for i, k in enumerate(getattr(term, "_losses", ()))})
-    return found
-
-
-def cell_by_cell(kernel):
-    """The same kernel without lanes."""
-    n, one = len(kernel._dofs), copy(kernel)
-    for name in ("_packed", "coordinates"):
-        batches = getattr(kernel, name).transpose(0, 2, 1)
-        rows = batches.reshape(len(batches) * batches.shape[1], batches.shape[2])[:n]
-        setattr(one, name, in_batches(rows, 1))
-    one.batch_size, one._tabulate_batch = 1, ffi.NULL
-    for name in ("_places", "cells"):
-        vars(one).pop(name, None)
-    return one
-
-
 def inserted_cells_of(term, q, entries):
     """Forces and tangent of a block of cells, in lanes and one by one."""
     if not isinstance(term, BeamCells):
@@ -408,16 +376,6 @@ def test_kernels_of_the_hot_loop(run):
     compared = 0
     for term in simulation.terms:
         for several, one in inserted_cells_of(term, q, simulation.equation.A.data.size):
-            compared += 1
-            assert np.allclose(several, one, rtol=0, atol=1e-13 * np.abs(one).max())
-        for name, kernel in kernels(term).items():
-            if kernel.cells.batch_size == 1:
-                assert name == "_first"  # once a step is not often
-                continue
-            entries = len(kernel._dofs) * kernel._num_values
-            several, one = np.zeros((2, max(entries, len(simulation.equation.A.data))))
-            kernel.add(q, several)
-            cell_by_cell(kernel).add(q, one)
             compared += 1
             assert np.allclose(several, one, rtol=0, atol=1e-13 * np.abs(one).max())
     assert compared >= 2

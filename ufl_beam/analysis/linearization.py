@@ -12,7 +12,6 @@ from functools import cached_property
 from mpi4py import MPI
 
 import numpy as np
-import ufl
 from scipy.sparse import block_array, csr_array, diags_array, eye_array
 from scipy.sparse.csgraph import structural_rank
 from scipy.sparse.linalg import splu
@@ -21,16 +20,14 @@ from ufl_beam.arrays import Array
 from ufl_beam.blocks.beams import section_law
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.beam_forms import inelastic_forms
-from ufl_beam.discretization.compiled_forms import cached_forms
+from ufl_beam.discretization.cell_functions import mass_forces, stress_forces
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_touching
 from ufl_beam.discretization.partition import Subdomain
-from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ArgumentError, ModelWarning, each_warning_once
 from ufl_beam.mechanics.time_scheme import Coefficients, Step
-from ufl_beam.mechanics.time_schemes import Newmark, Static
+from ufl_beam.mechanics.time_schemes import Newmark
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connectors import Connector
@@ -414,14 +411,6 @@ class Linearization:
         return g + change(rest), change
 
 
-@cached_forms
-def _linear_forces(element: Element) -> tuple[ufl.Form, fem.Function]:
-    """Return the forces of cells, linearized about a configuration, and this configuration."""
-    about = element.configuration()
-    work = ufl.replace(inelastic_forms(element, Static()).around, {element.q1: about})
-    return ufl.derivative(work, about, element.q1), about
-
-
 def linear_forces_of_cells(
     numbering: DofNumbering, q: Array, section_law: tuple[Array, Array]
 ) -> Callable[[Array, Array], Array]:
@@ -432,8 +421,7 @@ def linear_forces_of_cells(
     """
     subdomain = Subdomain(numbering, MPI.COMM_SELF)
     fields, space = Fields(subdomain), np.zeros(subdomain.size)
-    form, about = _linear_forces(fields.element)
-    stress, inertia = fields.kernel(form, fields.element.q1), mass_kernel(fields)
+    stress, inertia = stress_forces(fields, section_law, about=q), mass_forces(fields)
     cells = CellForces(
         subdomain,
         [
@@ -441,10 +429,6 @@ def linear_forces_of_cells(
             InCells(lambda: inertia, lib.DENSITY, fields.order),
         ],
     )
-    stress.set(about, q)
-    forms = inelastic_forms(fields.element, Static())
-    for function, values in zip((forms.b, forms.D), section_law, strict=True):
-        stress.put(function, values)
 
     def forces(x: Array, acceleration: Array) -> Array:
         stress.add(x, space)

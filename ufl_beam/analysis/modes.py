@@ -20,9 +20,9 @@ from ufl_beam.analysis.small_motions import SmallMotions
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.blocks.beams import section_law
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.discretization.beam_forms import inelastic_forms
+from ufl_beam.discretization.cell_functions import strains_of, stress_forces
 from ufl_beam.discretization.dof_numbering import DofNumbering, velocity_at
-from ufl_beam.discretization.function_spaces import Fields, Strains
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Rich
@@ -131,10 +131,7 @@ class Shapes(Rich, ABC):
         states = np.ascontiguousarray(self.q + swing)
         subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
         fields, r = Fields(subdomain), np.zeros(subdomain.size)
-        forms = inelastic_forms(fields.element, Static())
-        form = fields.kernel(forms.around, fields.element.q1)
-        for function, values in zip((forms.b, forms.D), self.section_law, strict=True):
-            form.put(function, values)
+        form = stress_forces(fields, self.section_law)
         cell_forces = CellForces(subdomain, [InCells(lambda: form, lib.STRESS, fields.order)])
         stresses = []
         for q in (self.q, *states):
@@ -167,7 +164,7 @@ class Shapes(Rich, ABC):
     def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()
         subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
-        strains = Strains(Fields(subdomain))
+        strains = strains_of(Fields(subdomain))
         frames: list[Any] = [
             _Frame(self, subdomain, strains, float(k), self._scaled(k, amplitude).real)
             for k in range(len(self))
@@ -201,7 +198,7 @@ class _Frame:
     may_break = False
 
     def __init__(
-        self, shapes: Shapes, subdomain: Subdomain, strains: Strains, t: float, change: Array
+        self, shapes: Shapes, subdomain: Subdomain, strains: Any, t: float, change: Array
     ) -> None:
         self.scene, self.numbering = shapes.scene, shapes.numbering
         self.comm, self.subdomain = subdomain.comm, subdomain

@@ -15,19 +15,12 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
-from ufl_beam.blocks.cells import (
-    AXIS,
-    STIFFNESS,
-    Cell,
-    PointOfCell,
-    StatementOnCell,
-    added,
-    axes,
-)
+from ufl_beam.blocks.cells import PointOfCell, StatementOnCell, added
 from ufl_beam.blocks.material_points import Points
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import doubles, fill, lib, loop, struct
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
+from ufl_beam.discretization.cell_functions import AXIS, STIFFNESS, Cell, axes
 from ufl_beam.discretization.compiled_forms import inserted_cells
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
@@ -311,13 +304,13 @@ def elastic_cells(
     """Return the block of elastic cells."""
     scheme, numbering = setting.scheme, setting.subdomain.numbering
     stiffness, alpha = (
-        fields.section_values(fields.element.stiffness).T,
+        fields.section_values(*STIFFNESS).T,
         np.zeros(len(fields.order)),
     )
     numbers = [*stiffness, *axes(fields), *[alpha + scheme.alpha] * bool(scheme.alpha)]
     inelastic = numbering.inelastic_cells
     some = [x for x in strains if not np.isin(numbering.cells_of(x.beam), inelastic).all()]
-    statement = ElasticCell(fields.element.degree, _alike(scheme), functions_of(some))
+    statement = ElasticCell(fields.degree, _alike(scheme), functions_of(some))
     return BeamCells(statement, "elastic cells", fields, setting, some, numbers)
 
 
@@ -346,7 +339,7 @@ class InelasticCells(BeamCells):
         self, fields: Fields, section_points: SectionPoints, cells: Index, setting: BlockSetting,
         strains: Sequence[ImposedStrain],
     ) -> None:  # fmt: skip
-        numbering, degree = fields.subdomain.numbering, fields.element.degree
+        numbering, degree = fields.subdomain.numbering, fields.degree
         some = [x for x in strains if np.isin(numbering.cells_of(x.beam), cells).any()]
         statement = InelasticCell(degree, _alike(setting.scheme), functions_of(some))
         name = f"cells with points {section_points.number}"
@@ -365,12 +358,13 @@ class InelasticCells(BeamCells):
         rows = in_batches(
             np.arange(len(own) * made.strains, dtype=np.int32).reshape(len(own), -1), BATCH
         )
-        dofs = np.ascontiguousarray(self._elements.dofs, dtype=np.int32)
+        dofs = np.asarray(self._elements.dofs)
+        w = self._w[:, dofs.shape[1] :]
         self._latest: Array = np.full(fields.subdomain.size, np.nan)
         self._sections = struct(
             "inelastic", size=len(self._latest), latest=self._latest, points=points.c,
             scene=numbering.scene.size, in_cell=degree, block=self._c,
-            strains=inserted_cells(made.strain, self._w, dofs, row=rows), force=self.loops[0][1],
+            strains=inserted_cells(made.strain, w, dofs, row=rows), force=self.loops[0][1],
             at_r=order.index("r 0"), at_D=order.index("D 0"),
         )  # fmt: skip
         if self.prediction is not None:
@@ -378,7 +372,7 @@ class InelasticCells(BeamCells):
             fill(
                 self._sections, forces=forces, last_b=last_b, e=e, change=change,
                 last_D=np.zeros((n, 9)), at_predicted=order.index("predicted 0"),
-                predicted=inserted_cells(made.predicted, self._w, dofs, row=rows),
+                predicted=inserted_cells(made.predicted, w, dofs, row=rows),
             )  # fmt: skip
         names = "add_inelastic_force", "add_inelastic_tangent"
         force, tangent = (loop(name, self._sections) for name in names)

@@ -228,14 +228,15 @@ class Block(LoadTerm):
         if inserted:
             self._insert(made, dofs)
         elif elements.cells is not None:
-            forces = NodeForces(self._each[0], BATCH, second)
+            forces = NodeForces(self._each[0], second)
             self.in_cells = [InCells(lambda: forces, elements.force_kind, elements.cells)]
 
     def _insert(self, made: Kernels, dofs: Index) -> None:
         """Insert forces and tangents of cells by the loops for forms."""
         elements, places = self._elements, places_in(self._A, dofs, BATCH)
-        force = inserted_cells(made.force, self._w, dofs)
-        tangent = inserted_cells(made.tangent, self._w, dofs, **places)
+        w = self._w[:, dofs.shape[1] :]
+        force = inserted_cells(made.force, w, dofs)
+        tangent = inserted_cells(made.tangent, w, dofs, **places)
         fill(self._c, inserted=tangent)
         self.loops = loop("add_cells", force), loop("add_cells", tangent)
         forces = InsertedForces(force)

@@ -18,10 +18,11 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
-from ufl_beam.blocks.statement import COMPONENTS, Equations, Inputs, Statement
+from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import doubles, fill, lib, loop
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.state_io import NOWHERE, Archive
+from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.mechanics.relative_motions import MOTIONS, Geometry, Pair
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.connector_law import ConnectorLaw

@@ -14,19 +14,11 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import Block, BlockSetting, Elements
-from ufl_beam.blocks.cells import (
-    AXIS,
-    STIFFNESS,
-    AxisOfCell,
-    Cell,
-    PointOfCell,
-    StatementOnCell,
-    added,
-    axes,
-)
+from ufl_beam.blocks.cells import PointOfCell, StatementOnCell, added
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
+from ufl_beam.discretization.cell_functions import AXIS, STIFFNESS, AxisOfCell, Cell, axes
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
@@ -222,7 +214,7 @@ def tangent_damping(
 ) -> Iterator[Block]:
     """Yield the blocks of a damping by tangents, of elastic cells and of cells with points."""
     if len(elastic.order):
-        statement = TangentDamping(elastic.element.degree, setting.scheme, elastic=True)
+        statement = TangentDamping(elastic.degree, setting.scheme, elastic=True)
         elements = _on_cells("tangent damping", [*_stiffness(elastic), damping.stiffness], elastic)
         yield Block(statement, elements, setting, kind="damping")
     yield from (DampedCells(damping, cells, setting) for cells in inelastic)
@@ -244,7 +236,7 @@ def viscosity(damping: KelvinVoigt, fields: Fields, setting: BlockSetting) -> Bl
 
 def second_differences(fields: Fields, setting: BlockSetting) -> Block:
     """Return the block of the numerical damping of elastic cells."""
-    statement = SecondDifferences(fields.element.degree, setting.scheme)
+    statement = SecondDifferences(fields.degree, setting.scheme)
     elements = _on_cells("changes of strains", _stiffness(fields), fields)
     block = Block(statement, elements, setting, kind="beams")
     block.state["last dt"][:] = math.inf
@@ -252,7 +244,7 @@ def second_differences(fields: Fields, setting: BlockSetting) -> Block:
 
 
 def _stiffness(fields: Fields) -> list[Array]:
-    return [*fields.section_values(fields.element.stiffness).T]
+    return [*fields.section_values(*STIFFNESS).T]
 
 
 def _on_cells(name: str, numbers: Sequence[Array | float], fields: Fields) -> Elements:

@@ -11,10 +11,11 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import Block, BlockSetting
-from ufl_beam.blocks.statement import COMPONENTS, Equations, Statement
+from ufl_beam.blocks.statement import Equations, Statement
 from ufl_beam.compiled.c_library import doubles, fill, lib
 from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.errors import ModelError, NoNumber, calling
+from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.terms.derivatives import Each, Neighbours
 from ufl_beam.terms.term import Callbacks, Phases

@@ -11,9 +11,10 @@ import numpy as np
 import ufl
 
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
-from ufl_beam.blocks.cells import Cell, StatementOnCell, places, positions
+from ufl_beam.blocks.cells import StatementOnCell, places, positions
 from ufl_beam.blocks.moving_loads import moving_loads
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.discretization.cell_functions import Cell
 from ufl_beam.discretization.function_spaces import point_masses
 from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import has_inertia

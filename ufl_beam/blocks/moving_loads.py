@@ -12,9 +12,10 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import BlockSetting, Elements, InTime
-from ufl_beam.blocks.cells import AxisOfCell, Cell, StatementOnCell, places, positions
+from ufl_beam.blocks.cells import StatementOnCell, places, positions
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.discretization.cell_functions import AxisOfCell, Cell
 from ufl_beam.mechanics.kinematics import split
 from ufl_beam.mechanics.time_scheme import DynamicScheme, has_inertia
 from ufl_beam.model.loads import MovingLoad

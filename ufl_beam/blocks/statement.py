@@ -20,10 +20,8 @@ from ufl.core.expr import Expr
 
 from ufl_beam.compiled.c_library import lib, names
 from ufl_beam.discretization.compiled_forms import Pointwise, components, with_shared_nodes
+from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.terms.derivatives import margins
-
-COMPONENTS = "x", "y", "rotation"
-"""Components of the motion of a node: displacements (m) and rotation (rad)."""
 
 COEFFICIENTS = [
     *(f"{row} {j}" for row in ("inertia", "velocity") for j in range(lib.MOST_RATES)),

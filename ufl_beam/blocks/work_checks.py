@@ -12,7 +12,7 @@ import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.effect_blocks import OfPython, computed
-from ufl_beam.blocks.statement import COMPONENTS, Statement, kernels
+from ufl_beam.blocks.statement import Statement, kernels
 from ufl_beam.blocks.works import (
     OfUser,
     geometry,
@@ -22,6 +22,7 @@ from ufl_beam.blocks.works import (
 )
 from ufl_beam.compiled.c_library import doubles, ffi
 from ufl_beam.errors import ModelError, shorten
+from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import Effect, Work

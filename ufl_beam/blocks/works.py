@@ -18,11 +18,13 @@ from ufl.domain import extract_domains
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
-from ufl_beam.blocks.cells import POINT, AxisOfCell, Cell, at_points, places, positions
+from ufl_beam.blocks.cells import POINT, at_points, places, positions
 from ufl_beam.blocks.effect_blocks import EffectBlock, OfPython, PythonBlock, computed
-from ufl_beam.blocks.statement import COMPONENTS, Equations, Inputs, Statement
+from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.discretization.cell_functions import AxisOfCell, Cell
 from ufl_beam.errors import ModelError, calling, shorten
+from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.mechanics.relative_motions import by_turning, virtual_displacement
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.bodies import arm

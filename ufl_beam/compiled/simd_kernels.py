@@ -11,7 +11,7 @@ import logging
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
@@ -64,15 +64,12 @@ lanes_power others."""
 
 INTERFACE = """
 void *address_{0}(void);
-void compute_both_{0}(void *of_ffcx, const double *w, const double *constants, const double *x,
-                      double *one, double *several);
+void compute_both_{0}(void *of_ffcx, const double *w, double *one, double *several);
 """
 """Functions of each kernel that Python calls, in check_simd.c and the file of the loop."""
 
-Sizes = tuple[int, int, int]
-"""Numbers of entries, of coefficient values and of constants of a kernel."""
-
-ASSEMBLY = "assembly_simd.c"
+Sizes = tuple[int, int]
+"""Numbers of outputs and of inputs of a kernel."""
 
 OWN = (
     "tabulate", "compute_both", "address", "evaluate_in_lanes", "add_in_lanes", "take_unknowns",
@@ -186,49 +183,29 @@ errors than the tolerance.
 """
 
 
-def require_agreement(
-    module: ModuleType, kernels: Sequence[tuple[int, Sizes]], *, on_cells: bool
-) -> None:
+def require_agreement(module: ModuleType, kernels: Sequence[tuple[int, Sizes]]) -> None:
     """Raise :class:`Refused` if a vector kernel differs from FFCx's kernel on random cells."""
     at = partial(module.ffi.from_buffer, "double[]")
-    for number, (kernel, (entries, width, constants)) in enumerate(kernels):
+    for number, (kernel, (entries, width)) in enumerate(kernels):
         random, wrong, of_ffcx = np.random.default_rng(0), 0, module.ffi.cast("void *", kernel)
         for signs in ([1.0], [1.0], [-1.0, 1.0], [-1.0, 1.0]):
             w = random.uniform(0.1, 1.0, (width, BATCH)) * random.choice(signs, (width, BATCH))
-            x = np.zeros((6, BATCH))
-            x[3] = 1.0
-            if on_cells:
-                x += np.array([[0, 0, 0, 0, 0.5, 0]]).T + random.uniform(-0.1, 0.1, (6, BATCH))
-            c, (one, several, moved) = (
-                random.uniform(0.1, 0.9, constants),
-                np.zeros((3, entries, BATCH)),
-            )
+            one, several, moved = np.zeros((3, entries, BATCH))
             compute_both = getattr(module.lib, f"compute_both_{number}")
-            compute_both(of_ffcx, *map(at, (w, c, x, one, several)))
+            compute_both(of_ffcx, *map(at, (w, one, several)))
             scale = np.abs(one).max(axis=0, where=np.isfinite(one), initial=0.0)
             scale = AGREEMENT * np.maximum(scale, np.median(scale))
             with np.errstate(invalid="ignore"):
                 good = (np.abs(several - one) <= scale) | (several == one)
                 for _ in range(4 if not good.all() else 0):  # beside a condition, or cancellation
                     near = w * (1.0 + NEAR * random.choice([-1.0, 1.0], w.shape))
-                    compute_both(of_ffcx, *map(at, (near, c, x, moved, several.copy())))
+                    compute_both(of_ffcx, *map(at, (near, moved, several.copy())))
                     good |= np.abs(moved - one) > scale
             wrong += np.sum(~good & ~(np.isnan(one) & np.isnan(several)))
         if wrong:
             why = f"{wrong} of {4 * BATCH * entries} entries differ from FFCx's kernel"
             LOGGER.warning("a vector kernel, from code of %s, is wrong: %s", VERSIONS, why)
             raise Refused(why)
-
-
-@cache
-def interleaved(source: Path, kernel: int, sizes: Sizes, unknowns: tuple[int, int]) -> int | None:
-    """Return the address of the SIMD loop of a compiled form, or None if the form has none.
-
-    ``unknowns`` are the position of the first unknown among the coefficients, and the number of
-    unknowns.
-    """
-    numbers = {"AT": unknowns[0], "UNKNOWNS": unknowns[1], "ON_CELLS": 1}
-    return _loops([ASSEMBLY], source, [(kernel, sizes)], FLAGS, numbers)[0]
 
 
 @cache
@@ -249,32 +226,30 @@ def element_loops(
 ) -> list[int | None]:
     """Return the addresses of the SIMD loops of functions of elements, compiled as one form.
 
-    The first ``inserted`` functions of cells add to a vector or a matrix, as forms do; their first
-    inputs are the ``unknowns``.
+    The first ``inserted`` functions of cells add to a vector or a matrix; their first inputs are
+    the ``unknowns``.
     """
-    files = [ASSEMBLY if k < inserted else "elements_simd.c" for k in range(len(kernels))]
-    numbers = {"AT": 0, "UNKNOWNS": unknowns, "ON_CELLS": 0}
-    return _loops(files, source, kernels, FLAGS, numbers)
+    files = ["assembly_simd.c" if k < inserted else "elements_simd.c" for k in range(len(kernels))]
+    return _loops(files, source, kernels, FLAGS, unknowns)
 
 
 def _loops(
     files: Sequence[str], source: Path, kernels: Sequence[tuple[int, Sizes]], flags: list[str],
-    numbers: Mapping[str, int] = {},
+    unknowns: int = 0,
 ) -> list[int | None]:  # fmt: skip
-    """Compile the loop in a file over each kernel of FFCx, with ``numbers`` as macros."""
+    """Compile the loop in a file over each kernel of FFCx."""
     head = "\n".join([HEADERS, DECLARATIONS, f"#define LANES {BATCH}", text("assembly_simd.h")])
-    on_cells = bool(numbers.get("ON_CELLS"))
     loops, which, macros = [text("check_simd.c") + text(x) for x in files], range(len(kernels)), []
     for k in which:
         sizes = kernels[k][1]
-        values = zip(("ENTRIES", "WIDTH", "CONSTANTS"), sizes, strict=True)
+        values = zip(("UNKNOWNS", "ENTRIES", "WIDTH"), (unknowns, *sizes), strict=True)
         own = [("SIDE", math.isqrt(sizes[0])), *((name, f"{name}_{k}") for name in OWN)]
-        defined = [*numbers.items(), *values, *own]
+        defined = [*values, *own]
         macros.append("".join(f"\n#undef {x}\n#define {x} {value}" for x, value in defined))
 
     def code() -> str:
-        own = written(source) if on_cells else map(without_scale, written(source))
-        bodies = zip(macros, map(in_vectors, own), loops, strict=True)
+        own = map(in_vectors, map(without_scale, written(source)))
+        bodies = zip(macros, own, loops, strict=True)
         return head + "".join(f"{defined}\n{body}\n{loop}" for defined, body, loop in bodies)
 
     try:
@@ -285,7 +260,7 @@ def _loops(
             # The name of the file is a hash of the form, options and versions of FFCx.
             depends_on=[source.name, head, *macros, *loops, Path(__file__).read_text()],
             flags=flags,
-            check=lambda module: require_agreement(module, kernels, on_cells=on_cells),
+            check=lambda module: require_agreement(module, kernels),
         )
     except (Refused, CompilerError) as why:
         LOGGER.info("%s is computed cell by cell, which is slower: %s", source.stem, why)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Forms of the virtual work of beams, for views in DOLFINx and for linear models.
+"""Forms of the virtual work of beams, for views in DOLFINx.
 
 In steps, forces inside beams are the statements of :mod:`ufl_beam.blocks.beams`.
 """
@@ -13,7 +13,7 @@ import ufl
 from ufl_beam.caches import cached_forms
 from ufl_beam.discretization.function_spaces import Element
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.mechanics.functional import virtual_work
+from ufl_beam.mechanics.functional import kinetic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_scheme import Scheme
 
@@ -33,6 +33,20 @@ def elastic_form(element: Element, scheme: Scheme, *, imposed: bool = False) -> 
     e0, e1 = (e - part if imposed else e for e, part in zip(ends, parts, strict=True))
     r = scheme.resultants(element.stiffness, e0, e1, element.constant)
     return virtual_work(r, scheme.virtual_strain(q0, q1, w, element.axis)) * element.dx(1)
+
+
+@cached_forms
+def derivative(work: ufl.Form, q1: fem.Function) -> ufl.Form:
+    """Return the derivative of a virtual work with respect to ``q1``."""
+    return ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
+
+
+@cached_forms
+def mass_form(element: Element) -> ufl.Form:
+    """Return the mass of the beams as a bilinear form; kg, kg m²."""
+    v = element.configuration()
+    energy = kinetic_energy(v, element.inertia) * element.dx_of_mass()
+    return derivative(ufl.derivative(energy, v, element.w), v)
 
 
 class InelasticForms(NamedTuple):

@@ -1,21 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Compilation to C of UFL forms, and of functions at a point such as the laws of materials.
+"""Compilation to C of functions in UFL, such as statements and laws of materials.
 
-Coefficients of forms are packed once; later only changed values are packed.
-
-A form is compiled with one quadrature rule only, because FFCx 0.9 to 0.11 gives wrong results for
-forms that mix a one-point rule with another rule.
+A function is compiled as a form with one quadrature point.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from functools import cached_property, lru_cache
-from itertools import accumulate, islice
+from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import basix.ufl
 import numpy as np
@@ -32,14 +27,8 @@ from ufl_beam.caches import cached_forms as cached_forms
 from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib, struct, view_pointer
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
-from ufl_beam.compiled.simd_kernels import (
-    BATCH,
-    element_loops,
-    in_batches,
-    interleaved,
-    point_loop,
-)
-from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
+from ufl_beam.compiled.simd_kernels import BATCH, element_loops, point_loop
+from ufl_beam.dolfinx_compat import fem, line_mesh
 
 
 def tabulators(compiled: fem.Form) -> list[Any]:
@@ -47,52 +36,6 @@ def tabulators(compiled: fem.Form) -> list[Any]:
     form = compiled.ufcx_form
     integrals = [form.form_integrals[i] for i in range(form.form_integral_offsets[1])]
     return [kernel(x.tabulate_tensor_float64, compiled.module.ffi) for x in integrals]
-
-
-class Prepared(NamedTuple):
-    """Form compiled for all scenes.
-
-    Attributes:
-        form, source: Form of DOLFINx, and the C file that FFCx wrote for it.
-        tabulate: C function of the form.
-        coefficients: Coefficients that the C function uses.
-        columns: Columns of each coefficient in ``packed``, by ``id`` of the coefficient.
-        constants: Values of the constants.
-        packed: Values of the coefficients in each cell of the mesh of the form.
-        entries: Number of entries of the vector or matrix of a cell; 1 for a functional.
-    """
-
-    form: fem.Form
-    source: Path
-    tabulate: Any
-    coefficients: list[fem.Function]
-    columns: dict[int, slice]
-    constants: Array
-    packed: Array
-    entries: int
-
-
-@lru_cache(maxsize=512)
-def prepared(form: ufl.Form) -> Prepared:
-    """Compile a form; a second call returns the first result."""
-    compiled, source = compiled_form(form)
-    ufcx, (constants, packed) = compiled.ufcx_form, pack(compiled)
-    positions = ufcx.original_coefficient_positions[0 : ufcx.num_coefficients]
-    used = [form.coefficients()[i] for i in positions]
-    ends = [0, *accumulate(f.function_space.element.space_dimension for f in used)]
-    if packed.shape[1] != ends[-1]:
-        raise ValueError(f"{VERSIONS} pack {packed.shape[1]} values of a cell, not {ends[-1]}")
-    # Keys are identities, because Python computes hashes of UFL functions slowly.
-    columns = {id(f): slice(*ends[i : i + 2]) for i, f in enumerate(used)}
-    sizes = [x.ufl_function_space().element.space_dimension for x in form.arguments()]
-    entries = math.prod(sizes)
-    if entries > lib.MOST_ENTRIES:
-        raise ValueError(
-            f"a form on cells of {' x '.join(map(str, sizes))} degrees of freedom has {entries} "
-            f"entries; loops.h allows {lib.MOST_ENTRIES}"
-        )
-    (tabulate,) = tabulators(compiled)
-    return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
 
 
 @cached_by_structure
@@ -133,186 +76,26 @@ def places_in(A: Csr, dofs: Index, batch_size: int) -> dict[str, Any]:
     return {"begin": A.indptr, "pattern": pattern, "has": has, "in_rows": int(in_rows[0])}
 
 
-class Kernel:
-    """Compiled cell form with the packed values of its coefficients.
-
-    The form is stated on a mesh of one cell, and the kernel evaluates it on all cells.
-    Coefficients have the values in this one cell until :meth:`put` or :meth:`set` changes them.  A
-    linear form whose test function is in the space of the unknown adds to the degrees of freedom of
-    the cells.  Any other linear form returns separate entries for each cell.  After :meth:`place`,
-    a bilinear form adds to a matrix.
-
-    Args:
-        form: Cell integrals with one quadrature rule.
-        unknown: The configuration that is an argument of :meth:`add` and :meth:`value`; the form
-            need not depend on it.
-        cell_dofs: Degrees of freedom of the unknown; shape (num_cells, dofs per cell).
-        coordinates: Vertices of the cells; shape (num_cells, 2, 2); m.
-        several: ``coordinates`` in batches of :data:`BATCH`, by :func:`in_batches`; None: no SIMD.
-
-    Attributes:
-        batch_size: Number of cells that are computed at once with SIMD; else 1.
-        coordinates: Vertices of the cells, in batches; m.
-    """
-
-    def __init__(
-        self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array,
-        several: Array | None = None,
-    ) -> None:  # fmt: skip
-        self._form = ready = prepared(form)
-        self._num_values = ready.entries
-        self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
-        num_cells = len(cell_dofs)
-        spaces = [argument.ufl_function_space() for argument in form.arguments()]
-        self._is_functional, self._is_vector = not spaces, len(spaces) == 1
-        self._to_dofs = self._is_vector and spaces[0] is unknown.function_space
-        per_cell = self._dofs.shape[1] if self._to_dofs else self._num_values
-        expected = (0, per_cell, (num_cells, 2, 2))
-        if expected != (num_cells % len(ready.packed), self._num_values, coordinates.shape):
-            raise ValueError(
-                f"a form with {self._num_values} entries of a cell, stated on {len(ready.packed)} "
-                f"cells, got rows of shape {(num_cells, per_cell)} and coordinates of shape "
-                f"{coordinates.shape}"
-            )
-        self._matrix: Csr | None = None
-        self._at, self._unknowns = 0, 0
-        self._values, self._columns = ready.packed, ready.columns  # the unknown is removed below
-        if self.uses(unknown):
-            columns, self._unknowns = dict(ready.columns), self._dofs.shape[1]
-            removed = columns.pop(id(unknown))
-            self._at, width = removed.start, removed.stop - removed.start
-            values = ready.packed
-            self._values = np.hstack([values[:, : removed.start], values[:, removed.stop :]])
-            self._columns = {
-                function: x if x.stop <= removed.start else slice(x.start - width, x.stop - width)
-                for function, x in columns.items()
-            }
-        address = None
-        if several is not None:
-            sizes = (self._num_values, ready.packed.shape[1], len(ready.constants))
-            tabulate = int(ffi.cast("intptr_t", ready.tabulate))
-            address = interleaved(ready.source, tabulate, sizes, (self._at, self._unknowns))
-        if several is None or address is None:
-            self.batch_size, self._tabulate_batch = 1, ffi.NULL
-            self.coordinates = in_batches(coordinates, 1)
-        else:
-            self.batch_size = BATCH
-            self._tabulate_batch = ffi.cast("tabulate_batch *", address)
-            self.coordinates = several
-
-    @cached_property
-    def _packed(self) -> Array:
-        """Values of all coefficients except the unknown in the cells, in batches."""
-        values = self._values
-        return in_batches(np.tile(values, (len(self._dofs) // len(values), 1)), self.batch_size)
-
-    @cached_property
-    def _places(self) -> dict[str, Any]:
-        """Fields of the struct ``cells`` with the positions to which entries are added."""
-        shape = len(self._dofs), self._num_values
-        if self._to_dofs or self._is_functional:
-            return {}
-        if self._matrix is not None:
-            return places_in(self._matrix, self._dofs, self.batch_size)
-        places = np.zeros(shape, dtype=np.int32)
-        if self._is_vector:
-            places += np.arange(places.size, dtype=np.int32).reshape(shape)
-        return {"row": in_batches(places, self.batch_size)}
-
-    @cached_property
-    def cells(self) -> Any:
-        """Argument of ``add_cells`` of loops.h, created at the first use."""
-        number, cell_size = self._dofs.shape
-        packed, coefficients = self._packed, self._form.packed.shape[1]
-        return fill(
-            ffi.new("cells *"),
-            tabulate=self._form.tabulate, several=self._tabulate_batch, batch_size=self.batch_size,
-            number=number, of_cell=cell_size, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
-            width=packed.strides[0] // (packed.itemsize * self.batch_size), w=view_pointer(packed),
-            constants=self._form.constants, coordinates=self.coordinates, rows=self._num_values,
-            coefficients=coefficients, all=np.empty(coefficients),
-            is_functional=self._is_functional, **self._places,
-        )  # fmt: skip
-
-    def uses(self, function: fem.Function) -> bool:
-        """Return whether ``function`` is a coefficient of the form."""
-        return id(function) in self._form.columns
-
-    def position(self, function: fem.Function) -> int:
-        """Return the first column of ``function`` in the packed values without the unknown."""
-        return int(self._columns[id(function)].start)
-
-    def set(self, function: fem.Function, q: Array) -> None:
-        """Set ``function`` to the configuration ``q``, if the form depends on it."""
-        if (columns := self._columns.get(id(function))) is not None:
-            lib.set_cells(self.cells, doubles(q), columns.start)
-
-    def put(self, function: fem.Function, values: Array) -> None:
-        """Set the values of ``function`` in the cells; (num_cells, dofs per cell)."""
-        columns = self._columns[id(function)]
-        rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
-        self._packed[:, columns] = in_batches(rows, self.batch_size)
-
-    def get(self, function: fem.Function) -> Array:
-        """Return the values of ``function`` in the cells; (num_cells, dofs per cell)."""
-        columns = self._packed[:, self._columns[id(function)]]
-        by_cell = columns.transpose(0, 2, 1).reshape(-1, columns.shape[1])
-        return by_cell[: len(self._dofs)].copy()
-
-    @property
-    def coefficients(self) -> list[fem.Function]:
-        """Coefficients of the form, without the unknown."""
-        return [f for f in self._form.coefficients if id(f) in self._columns]
-
-    def place(self, A: Csr) -> None:
-        """Let :meth:`add` of a bilinear form add to entries of ``A`` from now on."""
-        per_cell = self._dofs.shape[1]
-        if self._num_values != per_cell**2:
-            raise ValueError(
-                f"{self._num_values} entries of a cell are no matrix of {per_cell} rows"
-            )
-        self._matrix = A
-
-    def keep_entries(self) -> tuple[Any, int, Array]:
-        """Store the entries of all cells in each evaluation from now on.
-
-        Call :meth:`place` before this method; it has no effect afterwards.
-
-        Returns:
-            A pointer to the address of the array of entries; the number of cells in a batch, see
-            :func:`in_batches`; and a second array, by which C may replace the first.
-        """
-        batches = -(-len(self._dofs) // self.batch_size)
-        each, second = np.zeros((2, batches, self._num_values, self.batch_size))
-        fill(self.cells, each=each)
-        return ffi.addressof(self.cells, "each"), self.batch_size, second
-
-    def add(self, q: Array, b: Array) -> None:
-        """Add the form at the unknown ``q`` to ``b``, a vector or the entries of a matrix."""
-        lib.add_cells(self.cells, doubles(q), doubles(b))
-
-    def value(self, q: Array) -> float:
-        """Return the value of the functional at the unknown ``q``."""
-        value: float = lib.value_of_cells(self.cells, doubles(q))
-        return value
-
-
 def inserted_cells(function: Any, w: Array, dofs: Index, **places: Any) -> Any:
     """Return ``cells`` of loops.h for a function of cells, whose first inputs are the unknowns.
 
-    ``w`` are the inputs in batches; for ``places`` see :func:`places_in`.
+    ``w`` are the inputs after the unknowns, in batches, see :func:`in_batches`; it may be a part of
+    a longer array.  For ``places`` see :func:`places_in`.
     """
     number, unknowns = dofs.shape
+    inputs = unknowns + w.shape[1]
+    if not function.inserts and function.outputs > lib.MOST_ENTRIES:
+        raise ValueError(f"a cell has {function.outputs} values; loops.h allows {lib.MOST_ENTRIES}")
     return fill(
         ffi.new("cells *"), tabulate=function.one, several=function.inserts, batch_size=BATCH,
-        number=number, of_cell=unknowns, dofs=dofs, unknowns=unknowns, width=w.shape[1],
-        w=view_pointer(w[:, unknowns:]), rows=function.outputs, coefficients=w.shape[1],
-        all=np.empty(w.shape[1]), **places,
+        number=number, of_cell=unknowns, dofs=np.ascontiguousarray(dofs, dtype=np.int32),
+        width=w.strides[0] // (w.itemsize * BATCH), w=view_pointer(w), rows=function.outputs,
+        inputs=inputs, all=np.empty(inputs), **places,
     )  # fmt: skip
 
 
 class InsertedForces:
-    """Forces of cells of a statement, which is evaluated as a form; see :class:`Kernel`."""
+    """Forces on the nodes of cells, see :class:`~ufl_beam.terms.cell_forces.CellForces`."""
 
     def __init__(self, cells: Any) -> None:
         self.cells = cells
@@ -325,16 +108,21 @@ class InsertedForces:
         """Set the configuration before the step, which follows the unknowns."""
         lib.set_cells(self.cells, doubles(q), 0)
 
-    def add(self, q: Array, r: Array) -> None:
-        """Add the forces at ``q`` to ``r``."""
-        lib.add_cells(self.cells, doubles(q), doubles(r))
+    def add(self, q: Array, out: Array) -> None:
+        """Add the values at the unknowns ``q`` to a vector, a matrix or an array of values."""
+        lib.add_cells(self.cells, doubles(q), doubles(out))
 
-    def keep_entries(self) -> tuple[Any, int, Array]:
-        """Store the forces of all cells in each evaluation, see :meth:`Kernel.keep_entries`."""
+    def keep_entries(self) -> tuple[Any, Array]:
+        """Store the values of all cells in each evaluation from now on, see :func:`in_batches`.
+
+        Returns:
+            A pointer to the address of the array of values, and a second array, by which C may
+            replace the first.
+        """
         batches, rows = -(-self.cells.number // BATCH), self.cells.rows
         each, second = np.zeros((2, batches, rows, BATCH))
         fill(self.cells, each=each)
-        return ffi.addressof(self.cells, "each"), BATCH, second
+        return ffi.addressof(self.cells, "each"), second
 
 
 def with_shared_nodes(
@@ -467,10 +255,10 @@ class Pointwise:
         """
         every = [x for outputs in functions for x in outputs]
         shared = iter(with_shared_nodes(every, instead))
-        sizes = [(len(outputs), len(self.at), 0) for outputs in functions]
+        sizes = [(len(outputs), len(self.at)) for outputs in functions]
         z = ufl.TestFunction(self.values(most := max(sizes)[0]))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
-        values = ([*islice(shared, n), *[0] * (most - n)] for n, *_ in sizes)
+        values = ([*islice(shared, n), *[0] * (most - n)] for n, _ in sizes)
         parts = (ufl.dot(ufl.as_vector(x), z) * dx(k) for k, x in enumerate(values))
         form, source = compiled_form(sum(parts))
         self._alive.append(form)

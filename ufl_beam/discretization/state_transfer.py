@@ -10,8 +10,9 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.discretization.cell_functions import mass_matrix
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.discretization.function_spaces import Fields, mass_matrix
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import ModelError

@@ -12,6 +12,9 @@ from itertools import accumulate, pairwise
 import ufl
 from ufl.core.expr import Expr
 
+COMPONENTS = "x", "y", "rotation"
+"""Components of the motion of a node: displacements (m) and rotation (rad)."""
+
 
 class Axis:
     """Undeformed axis of the beams on a mesh of straight cells.

@@ -12,13 +12,17 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.beams import section_law
-from ufl_beam.discretization.beam_forms import elastic_form, imposed_at_points, inelastic_forms
+from ufl_beam.discretization.beam_forms import (
+    derivative,
+    elastic_form,
+    imposed_at_points,
+    inelastic_forms,
+    mass_form,
+)
 from ufl_beam.discretization.function_spaces import (
     DolfinxFields,
-    derivative,
     dofs_of_cells,
     integrated,
-    mass_form,
 )
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
@@ -172,9 +176,7 @@ class DolfinxView:
             >>> bool(view.stiffness.x.array[2] == section.EI)
             True
         """
-        return self._function(
-            "stiffness", self._fields.section_values(self._fields.element.stiffness)
-        )
+        return self._function("stiffness", self._fields.section_values("EA", "GA", "EI"))
 
     @property
     def configuration(self) -> fem.Function:

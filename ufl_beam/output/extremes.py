@@ -12,13 +12,13 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index, State
+from ufl_beam.caches import cached_forms
 from ufl_beam.compiled.c_library import doubles, fill, lib, struct
-from ufl_beam.compiled.simd_kernels import in_batches
-from ufl_beam.discretization.compiled_forms import cached_forms
+from ufl_beam.compiled.simd_kernels import BATCH, in_batches
+from ufl_beam.discretization.compiled_forms import InsertedForces, Pointwise, inserted_cells
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.discretization.function_spaces import Element, Fields
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.display import in_one_line
-from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ArgumentError, require_number, require_switch
 from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.beams import Mesh
@@ -61,25 +61,23 @@ class Extent(NamedTuple):  # with the fields of ``extent`` in loops.h
 
 
 @cached_forms
-def along_cells(
-    element: Element, fractions: tuple[float, ...], works: bool
-) -> tuple[ufl.Form, fem.Function, fem.Function, fem.Function]:
-    """Build a form of :func:`section_force`; its entries in a cell are (N, V, M) at the fractions.
+def along_cells(degree: int, fractions: tuple[float, ...], works: bool) -> tuple[Any, ...]:
+    """Compile :func:`section_force`; its values in a cell are (N, V, M) at the fractions.
 
     If all fractions are 0 or 1, displacements and forces between the ends have no effect.
 
     Returns:
-        The form, and its coefficients: degrees of freedom of a cell, or only rotations if all
-        fractions are 0 or 1; resultants (``cell_number`` of loops.h); directions of the axis at
-        both ends of a cell.
+        The function, compiled, of unknowns, of resultants (``cell_number`` of loops.h), of the
+        directions of the axis at both ends of a cell, and of the vector between the ends; the
+        numbers of unknowns, all of a cell or only rotations, and of resultants; the compiler, which
+        keeps the code.
     """
-    mesh, h, between = Mesh(degree=element.degree), element.axis.h, set(fractions) > {0.0, 1.0}
+    mesh, between = Mesh(degree=degree), set(fractions) > {0.0, 1.0}
     n = len(mesh.nodes)
     first, moves = (lib.CELL_NUMBERS, 3 * n) if between else (lib.COUPLE, n)
-    # Coefficients are constant in cells, because interpolation would take most of the time.
-    motions, resultants, angles, values = map(
-        element.in_cells, (moves, first, 2, 3 * len(fractions))
-    )
+    names = [*(f"motion {k}" for k in range(moves)), *(f"force {k}" for k in range(first))]
+    compiler = Pointwise([*names, "angle 0", "angle 1", "x", "y"])
+    motions, at = [*compiler.at.values()][:moves], compiler.at
     order = [0, *range(2, n), 1]  # order of nodes along a cell
     *displacements, rotations = ([motions[k + i] for i in order] for k in range(0, moves, n))
 
@@ -87,23 +85,22 @@ def along_cells(
         return sum(float(a) * x for a, x in zip(weights, values, strict=True))
 
     def tangent(fraction: float) -> tuple[Any, Any]:
-        x, y = h * element.axis.t0[0], h * element.axis.t0[1]
         if not between:
-            return x, y
+            return at["x"], at["y"]
         u, v = (weighted(mesh.slopes(fraction), nodes) for nodes in displacements)
-        return x + u, y + v
+        return at["x"] + u, at["y"] + v
 
-    known = [resultants[k] for k in range(first)] + [0.0] * (lib.CELL_NUMBERS - first)
-    at, at_end = section_force(known, tangent, works=works), known[lib.END_X : lib.END_M + 1]
+    known = [at[f"force {k}"] for k in range(first)] + [0.0] * (lib.CELL_NUMBERS - first)
+    at_fraction = section_force(known, tangent, works=works)
+    at_end = known[lib.END_X : lib.END_M + 1]
     rows = list[Expr]()
     for fraction in fractions:
         rotation = weighted(mesh.weights(fraction), rotations)
-        angle = (1 - fraction) * angles[0] + fraction * angles[1] + rotation
-        plane = at(fraction) if fraction < 1 else tuple(at_end)
+        angle = (1 - fraction) * at["angle 0"] + fraction * at["angle 1"] + rotation
+        plane = at_fraction(fraction) if fraction < 1 else tuple(at_end)
         rows += in_section(plane, ufl.cos(angle), ufl.sin(angle))
-    test = ufl.TestFunction(values.function_space)
-    form = ufl.dot(ufl.as_vector(rows), test) / h * element.dx(1)
-    return form, motions, resultants, angles
+    (function,) = compiler.compile_elements(rows, inserted=1, unknowns=moves)
+    return function, moves, first, compiler
 
 
 class ExtremesInC:
@@ -121,25 +118,23 @@ class ExtremesInC:
     ) -> None:
         self._subdomain = subdomain = fields.subdomain
         size, works = subdomain.size, bool(subdomain.numbering.scene.works)
-        form, motions, resultants, angles = along_cells(
-            fields.element, tuple(map(float, fractions)), works
-        )
-        moves, first = (x.ufl_shape[0] for x in (motions, resultants))
-        self._kernel = fields.kernel(form, motions, fields.cell_dofs[:, -moves:])
-        _, self._batch, spare = self._kernel.keep_entries()
-        axes: Array = subdomain.numbering.axis_angles[subdomain.cells]
+        kept = tuple(map(float, fractions))
+        function, moves, first, self._compiler = along_cells(fields.degree, kept, works)
+        space = np.empty((1, first + 4, BATCH))  # C has the numbers of cells elsewhere
+        cells = inserted_cells(function, space, fields.cell_dofs[:, -moves:])
+        self._along = InsertedForces(cells)
+        _, spare = self._along.keep_entries()
+        start, end = fields.coordinates().transpose(1, 0, 2)
+        axes = np.hstack([subdomain.numbering.axis_angles[subdomain.cells], end - start])
         self._points, self._forces = len(fractions), cell_forces
         sizes = spare.size, size
         self._extents = [Extent(*np.zeros((4, n))) for n in sizes]
         cell_forces.keep_latest()
         self.c = struct(
-            "watch", forces=cell_forces.c, along=self._kernel.cells, between=between,
-            angles=in_batches(axes, self._batch), q=np.zeros(size), first=first,
-            at_angles=self._kernel.position(angles),
-            at_numbers=self._kernel.position(resultants),
-            numbers=np.zeros(lib.CELL_NUMBERS * len(axes)),
-            some=np.zeros(lib.SOME * self._kernel.cells.width),
-            in_order=cell_forces.in_order(self._batch),
+            "watch", forces=cell_forces.c, along=cells, between=between,
+            axes=in_batches(axes, BATCH), q=np.zeros(size), first=first,
+            numbers=np.zeros(lib.CELL_NUMBERS * len(axes)), some=np.zeros(lib.SOME * cells.width),
+            in_order=cell_forces.in_order(),
         )  # fmt: skip
         self.seen = -1
         for c, extent in zip((self.c.of_forces, self.c.of_motion), self._extents, strict=True):
@@ -162,7 +157,7 @@ class ExtremesInC:
     def begin(self, steps: int, forces: Extent, motion: Extent) -> None:
         """Set the extremes after ``steps`` steps, in the form that :meth:`extents` returns."""
         for to, values in zip(self._extents[0], forces, strict=True):
-            to[:] = in_batches(values[self._subdomain.cells], self._batch).ravel()
+            to[:] = in_batches(values[self._subdomain.cells], BATCH).ravel()
         for to, values in zip(self._extents[1], motion, strict=True):
             to[:] = values[self._subdomain.dofs]
         self.seen, self._gathered = steps, [forces, motion]
@@ -170,7 +165,7 @@ class ExtremesInC:
     def gather(self) -> None:
         """Gather the extremes of all processes that share the scene; they call it together."""
         subdomain, (forces, motion) = self._subdomain, self._extents
-        cells, shape = subdomain.cells, (-1, 3 * self._points, self._batch)
+        cells, shape = subdomain.cells, (-1, 3 * self._points, BATCH)
         whole: Array = np.zeros((4, len(subdomain.numbering.cells), self._points, 3))
         for k, values in enumerate(forces):
             in_order = values.reshape(shape).transpose(0, 2, 1).reshape(-1, self._points, 3)

@@ -13,8 +13,9 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.compiled.csr import Product
+from ufl_beam.discretization.cell_functions import mass_matrix, strains_of
 from ufl_beam.discretization.dof_numbering import DofNumbering, turned, values_at, velocity_at
-from ufl_beam.discretization.function_spaces import Fields, Strains, mass_matrix
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Member, Place, arm
@@ -75,9 +76,9 @@ class Cells:
         return Fields(Subdomain(self.numbering, MPI.COMM_SELF))
 
     @cached_property
-    def strains(self) -> Strains:
-        """Object that computes the strains of all cells."""
-        return Strains(self.fields)
+    def strains(self) -> Callable[[Array], Array]:
+        """Function that computes the strains of all cells, see :func:`strains_of`."""
+        return strains_of(self.fields)
 
     @cached_property
     def along(self) -> ForcesAlongCells:
@@ -505,7 +506,9 @@ class States:
     def mean_strains(self, n: int) -> Array:
         """Return (Σ, Γ, K) in all cells in the n-th state; (num_cells, 3); 1, 1, 1/m."""
         strains = np.empty((len(self.numbering.cells), 3))
-        strains[self.cells.fields.order] = self.cells.strains.mean(self._row("q", n))
+        in_points = self.cells.strains(self._row("q", n)).reshape(len(strains), -1, 3)
+        weights = self.numbering.mesh.point_weights
+        strains[self.cells.fields.order] = np.einsum("kpi,p->ki", in_points, weights)
         return strains
 
     def material(self, beam: Member, n: int = -1) -> Material:

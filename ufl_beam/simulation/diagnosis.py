@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.discretization.cell_functions import strains_of
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
@@ -230,15 +231,13 @@ def _deformations(equation: StepEquation, q: Array, x: Array, most: float = SOFT
 
     Those with at most the fraction ``most`` of their elastic stiffness are soft.
     """
-    subdomain, numbering, scene = (
-        equation.subdomain,
-        equation.subdomain.numbering,
-        equation.subdomain.numbering.scene,
-    )
-    x_local, ε = x[subdomain.dofs], 1e-6
+    subdomain, numbering = equation.subdomain, equation.subdomain.numbering
+    scene, p, ε = numbering.scene, numbering.mesh.degree, 1e-6
+    ends = [q + way * ε * x[subdomain.dofs] for way in (1.0, -1.0)]
     connectors, left = np.zeros(len(scene.all_connectors)), np.ones(len(scene.all_connectors))
     for group in equation.connector_terms:
-        change = (group.motion(q + ε * x_local) - group.motion(q - ε * x_local)) / (2 * ε)
+        after, before = map(group.motion, ends)
+        change = (after - before) / (2 * ε)
         connectors[group.indices] = np.abs(np.nan_to_num(change))  # not a number: end of a guide
         left[group.indices] = group.remaining()
         if isinstance(group.law, RigidPlastic):
@@ -247,34 +246,23 @@ def _deformations(equation: StepEquation, q: Array, x: Array, most: float = SOFT
     connectors /= np.where(
         [connector.is_rotation for connector in scene.all_connectors], 1.0, scene.size
     )
-    # Strains in the small motion, times the lengths of cells; (num_cells, 3); m, m, rad
-    first, last = numbering.cells[:, 0], numbering.cells[:, 1]
-    position, motion = (
-        numbering.points + subdomain.gather(q)[numbering.dofs[:, :2]],
-        x[numbering.dofs],
-    )
-    d = position[last] - position[first]
-    across = np.column_stack([-d[:, 1], d[:, 0]])
-    change = motion[last] - motion[first]
-    ψ = (motion[first, 2] + motion[last, 2]) / 2
-    apart = change[:, :2] - ψ[:, None] * across
-    length = np.linalg.norm(d, axis=1)
-    along, shear = (np.sum(apart * axis, axis=1) / length for axis in (d, across))
-    strains = np.column_stack([along, shear, change[:, 2]])
-    # Works of the tangent, and of the elastic stiffness, at the Gauss points
-    works = np.zeros((2, len(numbering.cells), numbering.mesh.degree))
+    # Strains in the small motion, at the Gauss points; 1, 1, 1/m
+    strains = np.zeros((len(numbering.cells), p, 3))
+    after, before = map(strains_of(equation.fields), ends)
+    strains[subdomain.cells] = ((after - before) / (2 * ε)).reshape(-1, p, 3)
+    # Works of the tangent, and of the elastic stiffness, there
+    works = np.zeros((2, len(numbering.cells), p))
     for beams in equation.inelastic:
-        cells, p = beams.sections()[0], numbering.mesh.degree
-        in_points = beams.points.works(strains[cells].repeat(p, axis=0))
-        works[:, cells] += in_points.reshape(2, -1, p)
+        cells = beams.sections()[0]
+        works[:, cells] += beams.points.works(strains[cells].reshape(-1, 3)).reshape(2, -1, p)
+    sizes = np.abs(strains / [scene.size, scene.size, 1.0]).max(axis=(1, 2), initial=0.0)
+    sizes *= numbering.lengths(np.arange(len(numbering.cells)))
     now, elastic = works
     left_in_cells = np.divide(now, elastic, out=np.ones_like(now), where=elastic > 0).min(axis=1)
     if subdomain.comm.size > 1:
-        subdomain.comm.Allreduce(MPI.IN_PLACE, connectors)
-        subdomain.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)
+        for values, of in ((connectors, MPI.SUM), (sizes, MPI.SUM), (left, MPI.MIN)):
+            subdomain.comm.Allreduce(MPI.IN_PLACE, values, op=of)
         subdomain.comm.Allreduce(MPI.IN_PLACE, left_in_cells, op=MPI.MIN)
-    strains[:, :2] /= scene.size
-    sizes = np.abs(strains).max(axis=1, initial=0.0)
     deformations = []
     for deformed, remaining in ((connectors, left), (sizes, left_in_cells)):
         soft = remaining <= most

@@ -14,10 +14,10 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
-from ufl_beam.discretization.compiled_forms import Kernel
+from ufl_beam.compiled.simd_kernels import BATCH
+from ufl_beam.discretization.compiled_forms import InsertedForces
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
-from ufl_beam.dolfinx_compat import fem
 from ufl_beam.terms.term import InCells
 
 
@@ -39,13 +39,14 @@ class CellForces:
         self._subdomain, self._space = subdomain, np.zeros(subdomain.size)
         self._alive: list[Any] = [forces]
         self._unmade = list[tuple[InCells, Any]]()
-        self._step_forms: list[tuple[Kernel, fem.Function, Any, Array]] = []
+        self._step_forms: list[tuple[InsertedForces, Any, Any, Array]] = []
         self.vectors, self.entries = list[Any](), list[tuple[Any, int]]()
         self.factors = list[tuple[Any, int]]()
         self._forces = ffi.new("force_in_cells[]", len(forces))
         vectors: dict[Any, Any] = {}  # by latest vector: pointer to the accepted one
         for c, force in zip(self._forces, forces, strict=True):
             c.kind, c.factor, c.number = force.kind, force.factor, len(force.order)
+            c.batch_size = BATCH
             if not np.array_equal(force.order, np.arange(len(subdomain.cells))):
                 order = force.order.astype(np.int32)
                 c.cell = integers(order)
@@ -59,7 +60,7 @@ class CellForces:
                 self._unmade.append((force, c))
             else:
                 form = force.form()
-                each, c.batch_size, accepted_values = form.keep_entries()
+                each, accepted_values = form.keep_entries()
                 c.entries = accepted
                 self._alive.append(each)
                 if force.q0 is None:
@@ -112,14 +113,14 @@ class CellForces:
         """Create the forms that only cell forces need, at the first call."""
         for force, c in self._unmade:
             form = force.form()
-            each, c.batch_size, _ = form.keep_entries()
+            each, _ = form.keep_entries()
             c.entries, c.form = each, form.cells
             self._alive.append((form, each))
         self._unmade = []
 
-    def in_order(self, batch_size: int) -> bool:
-        """Return whether each form has all cells, in batches of ``batch_size`` cells."""
-        return all(not c.cell and c.batch_size == batch_size for c in self._forces)
+    def in_order(self) -> bool:
+        """Return whether the forces of each form are those of all cells."""
+        return not any(c.cell for c in self._forces)
 
     def keep_latest(self) -> None:
         """Store all entries of forms in each residual from now on, for use after a step."""

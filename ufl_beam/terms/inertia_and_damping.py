@@ -12,23 +12,19 @@ from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
-import ufl
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, Product, StepProduct
-from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
-from ufl_beam.discretization.function_spaces import (
-    Element,
-    Fields,
-    applied,
-    mass_kernel,
+from ufl_beam.discretization.cell_functions import (
+    mass_forces,
     mass_matrix,
+    stiffness_forces,
+    stiffness_matrix,
 )
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ModelError
-from ufl_beam.mechanics.functional import resultants, virtual_work
-from ufl_beam.mechanics.kinematics import virtual_strain
 from ufl_beam.mechanics.time_scheme import (
     FURTHER,
     V_BEFORE,
@@ -120,7 +116,7 @@ class Inertia(Term):
         rotations = with_half_tangents(scheme, fields.subdomain.rotations)
         self._times = StepProduct(mass_matrix(fields), rotations, A, fields.subdomain.scratch)
         self.loops, at = self._times.loops, (fields.order, self._times.rate)
-        self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at)]
+        self.in_cells = [InCells(partial(mass_forces, fields), lib.DENSITY, *at)]
         self._ledger, self._A, self.scheme = ledger, A, scheme
         size, number = len(v), FURTHER + len(scheme.further_rates)
         self.loses_energy = checked_coefficients(scheme).velocity_defect is not None
@@ -252,14 +248,6 @@ def product_derivative(
 # -- damping ---------------------------------------------------------------------------------------
 
 
-@cached_forms
-def _reference_stiffness(element: Element) -> ufl.Form:
-    rest = element.configuration()
-    motions = ufl.TrialFunction(element.space), element.w
-    e, w_e = (virtual_strain(rest, w, element.axis) for w in motions)
-    return virtual_work(resultants(e, element.stiffness), w_e) * element.dx(1)
-
-
 class RayleighForces(Term):
     """Constant matrix of mass and stiffness times the velocity of the step, P(92)."""
 
@@ -269,22 +257,18 @@ class RayleighForces(Term):
         self, damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
         rates: Inertia,
     ) -> None:  # fmt: skip
-        C, form = rates.M, _reference_stiffness(fields.element)
+        C, at = rates.M, fields.order
         C.data *= damping.mass
         if damping.stiffness:
-            C.data += damping.stiffness * fields.assembled(form).data  # P(92)
+            C.data += damping.stiffness * stiffness_matrix(fields).data  # P(92)
         rotations = with_half_tangents(scheme, fields.subdomain.rotations)
         self._times = StepProduct(C, rotations, A, fields.subdomain.scratch)
         self.loops = self._times.loops
         self._ledger, self._rates, self._A = ledger, rates, A
-        at, q1 = (fields.order, self._times.rate), fields.element.q1
-
-        def stiffness() -> Kernel:
-            return fields.kernel(applied(form, q1), q1)
-
+        stress, density, rate = lib.STRESS, lib.DENSITY, self._times.rate
         self.in_cells = [
-            InCells(stiffness, lib.STRESS, *at, damping.stiffness),
-            InCells(partial(mass_kernel, fields), lib.DENSITY, *at, damping.mass),
+            InCells(partial(stiffness_forces, fields), stress, at, rate, damping.stiffness),
+            InCells(partial(mass_forces, fields), density, at, rate, damping.mass),
         ]
 
     def phases(self, callbacks: Callbacks) -> Phases:

@@ -58,17 +58,15 @@ class NodeForces(NamedTuple):
 
     Attributes:
         each: Pointer to the address of the array of forces, in batches.
-        batch_size: Number of cells in a batch.
         second: Array by which C may replace the first.
     """
 
     each: Any
-    batch_size: int
     second: Array
 
-    def keep_entries(self) -> tuple[Any, int, Array]:
-        """Return the forces in the form of :meth:`Kernel.keep_entries`."""
-        return self.each, self.batch_size, self.second
+    def keep_entries(self) -> tuple[Any, Array]:
+        """Return the forces in the form of :meth:`InsertedForces.keep_entries`."""
+        return self.each, self.second
 
 
 class Phases(NamedTuple):

@@ -2,14 +2,14 @@
 /* Assembly: values of forms on cells into vectors and matrices, one cell at a time, and the pattern of
  * a matrix. Cells of one form are assembled several at a time by assembly_simd.c. */
 
-/* Coefficients of a cell from `at` on, c->batch_size apart from each other. c->batch_size is a power of two,
+/* Inputs of a cell from `at` on, c->batch_size apart from each other. c->batch_size is a power of two,
  * so cell & -lanes cells come before the batch of the cell. */
 static inline double *in_cell(const cells *c, int cell, int at)
 {
   return c->w + (cell & -c->batch_size) * c->width + at * c->batch_size + (cell & (c->batch_size - 1));
 }
 
-/* Write the values q at the unknowns of the cells into their packed coefficients, from `at` on. */
+/* Write the values q at the unknowns of the cells into their inputs, from `at` on. */
 void set_cells(const cells *c, const double *q, int at)
 {
   const int32_t *dofs = c->dofs;
@@ -20,7 +20,7 @@ void set_cells(const cells *c, const double *q, int at)
       for (int i = 0; i < c->of_cell; ++i) batch[i * n + l] = q[dofs[i]];
 }
 
-/* Add the entries of a cell to a matrix, a vector or a number; see insert_batch for several cells. */
+/* Add the values of a cell to a matrix or a vector; see insert_batch for several cells. */
 static inline void insert_cell(const cells *c, const double *e, int k, double *b)
 {
   const int32_t *dofs = c->dofs + (size_t)k * c->of_cell;
@@ -30,13 +30,11 @@ static inline void insert_cell(const cells *c, const double *e, int k, double *b
   else if (c->pattern) {
     const uint8_t *pattern = c->pattern + (size_t)c->has[k / n] * c->rows * n + l;
     for (int i = 0; i < c->rows; ++i) b[c->begin[dofs[i / c->of_cell]] + pattern[i * n]] += e[i];
-  } else if (c->is_functional)
-    *b += *e;
-  else
+  } else
     for (int i = 0; i < c->rows; ++i) b[dofs[i]] += e[i];
 }
 
-/* Add the form at the unknowns q to a vector, to the entries of a matrix, or to nothing if b is
+/* Add the function at the unknowns q to a vector, to the entries of a matrix, or to nothing if b is
  * null. */
 void add_cells(void *self, const double *q, double *b)
 {
@@ -45,20 +43,15 @@ void add_cells(void *self, const double *q, double *b)
     c->several(c, q, b);
     return;
   }
-  const int after = c->at + c->unknowns, n = c->batch_size;
+  const int unknowns = c->of_cell, n = c->batch_size;
   double *w = c->all, e[MOST_ENTRIES], x[6] = {[3] = 1};
   for (int k = 0; k < c->number; ++k) {
-    const int32_t *dofs = c->dofs + (size_t)k * c->of_cell;
+    const int32_t *dofs = c->dofs + (size_t)k * unknowns;
     const double *stored = in_cell(c, k, 0);
-    for (int i = 0; i < c->at; ++i) w[i] = stored[i * n];
-    for (int i = 0; i < c->unknowns; ++i) w[c->at + i] = q[dofs[i]];
-    for (int i = after; i < c->coefficients; ++i) w[i] = stored[(i - c->unknowns) * n];
+    for (int i = 0; i < unknowns; ++i) w[i] = q[dofs[i]];
+    for (int i = unknowns; i < c->inputs; ++i) w[i] = stored[(i - unknowns) * n];
     memset(e, 0, c->rows * sizeof *e);
-    if (c->coordinates) {
-      const double *at = c->coordinates + ((size_t)(k / n) * 4 * n + k % n);
-      x[0] = at[0], x[1] = at[n], x[3] = at[2 * n], x[4] = at[3 * n];
-    }
-    CALL(c->tabulate, e, w, c->constants, x);
+    CALL(c->tabulate, e, w, 0, x);
     for (int i = 0; c->each && i < c->rows; ++i) c->each[((size_t)(k / n) * c->rows + i) * n + k % n] = e[i];
     if (b) insert_cell(c, e, k, b);
   }

@@ -70,10 +70,6 @@ static inline void insert_batch(const cells *c, const lanes *e, int first, int s
     for (int i = 0; i < ENTRIES; ++i)
 #pragma GCC unroll 4
       for (int l = 0; l < some; ++l) b[row[i * LANES + l]] += e[i][l];
-  } else if (c->is_functional) {
-    double sum = 0;
-    for (int l = 0; l < some; ++l) sum += (*e)[l];
-    *b += sum;
   } else
     for (int i = 0; i < ENTRIES; ++i)
 #pragma GCC unroll 4
@@ -90,23 +86,17 @@ static inline void take_unknowns(const int32_t *dofs, const double *q, int some,
 
 static void add_in_lanes(const cells *c, const double *q, double *b)
 {
-  lanes e[ENTRIES], w[COEFFICIENTS] = {0}, x[6] = {0}, constants[NUMBERS];
-  for (int i = 0; i < CONSTANTS; ++i) constants[i] = ALL(c->constants[i]);
+  lanes e[ENTRIES], w[WIDTH], x[6] = {0}, none[1] = {0};
+  x[3] = ALL(1);
   for (int first = 0; first < c->number; first += LANES) {
     const int some = c->number - first < LANES ? c->number - first : LANES;
     const lanes *stored = (const lanes *)(c->w + (size_t)first * c->width);
     const int32_t *dofs = c->dofs + (size_t)first * UNKNOWNS;
-    for (int i = 0; i < AT; ++i) w[i] = stored[i];
-    if (some == LANES) take_unknowns(dofs, q, LANES, w + AT);
-    else take_unknowns(dofs, q, some, w + AT);
-    for (int i = AT + UNKNOWNS; i < WIDTH; ++i) w[i] = stored[i - UNKNOWNS];
-    if (ON_CELLS) {
-      const lanes *at = (const lanes *)(c->coordinates + (size_t)first * 4);
-      x[0] = at[0], x[1] = at[1], x[3] = at[2], x[4] = at[3];
-    } else
-      x[3] = ALL(1);
+    if (some == LANES) take_unknowns(dofs, q, LANES, w);
+    else take_unknowns(dofs, q, some, w);
+    for (int i = UNKNOWNS; i < WIDTH; ++i) w[i] = stored[i - UNKNOWNS];
     memset(e, 0, sizeof e);
-    tabulate(e, w, constants, x);
+    tabulate(e, w, none, x);
     if (c->each) memcpy(c->each + (size_t)first * ENTRIES, e, sizeof e);
     if (!b) continue;
     if (some == LANES) insert_batch(c, e, first, LANES, b);

@@ -136,13 +136,13 @@ void watch_step(const watch *w, int now, double t, const double *before, const d
   if (!in_order) find_cell_forces(w->forces, now, w->numbers);
   for (int first = 0; first < c->number; first += SOME) {
     cells some = some_cells(c, first);
-    const places p = {w->some + w->at_numbers * n, n, c->width, n, w->first};
+    const places p = {w->some, n, c->width, n, w->first};
     const int all = (some.number + n - 1) / n * n;
     some.w = w->some;
     for (int k = 0; k < all; k += n) {
       double *batch = w->some + k * c->width;
-      memset(batch + w->at_numbers * n, 0, w->first * n * sizeof *batch);
-      memcpy(batch + w->at_angles * n, w->angles + 2 * (size_t)(first + k), 2 * n * sizeof *batch);
+      memset(batch, 0, w->first * n * sizeof *batch);
+      memcpy(batch + w->first * n, w->axes + 4 * (size_t)(first + k), 4 * n * sizeof *batch);
     }
     if (in_order)
       add_forms(w->forces, now, first, some.number, p);

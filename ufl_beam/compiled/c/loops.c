@@ -12,14 +12,6 @@ static double work_in_step(int size, const int32_t *dof, double a, const double 
   return work;
 }
 
-/* Value of a functional at the unknowns q. */
-double value_of_cells(const cells *c, const double *q)
-{
-  double value = 0;
-  add_cells((void *)c, q, &value);
-  return value;
-}
-
 /* b -= a at its degrees of freedom */
 void subtract_vector(void *self, const double *q, double *b)
 {

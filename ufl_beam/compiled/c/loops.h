@@ -19,16 +19,15 @@ part add_cells, add_predicted_tangent, subtract_vector,
 enum { MOST_ENTRIES = 324 };
 enum { SOME = 128 };         /* cells of a block whose data stay in the processor's cache between loops */
 
-/* A compiled form on some cells. w holds the packed coefficients of a cell without its unknowns,
- * which the form expects from `at` on. `width` is the distance to the coefficients of the next
- * cell, as they may be a part of the coefficients of another form.
+/* A compiled function of some cells. Its inputs are the unknowns of a cell and, in w, numbers.
+ * `width` is the distance to the numbers of the next cell, as they may be a part of other inputs.
  *
  * The entry of a cell is added at the index in `row`. Without `row`, it is added in the matrix row
  * that starts at `begin`, at the offset in the `pattern` of the cell. Without either, it is added
- * at its degree of freedom, or to the value of a functional.
+ * at its degree of freedom.
  *
- * If a form is computed for several cells at once, `several` replaces the loop of add_cells. Data
- * of cells (w, coordinates, row, patterns) then come in batches: the first number of each cell of a
+ * If several cells are computed at once, `several` replaces the loop of add_cells. Data of cells
+ * (w, row, patterns) come in batches: the first number of each cell of a
  * batch, then the second numbers, and so on. Copies of the last cell fill up the last batch.
  */
 typedef struct cells cells;
@@ -36,19 +35,16 @@ typedef void (tabulate_batch)(const cells *self, const double *q, double *out);
 struct cells {
   kernel *tabulate;
   tabulate_batch *several; /* or none */
-  int batch_size; /* cells of a batch, a power of two; else 1 */
-  int number, of_cell, unknowns; /* cells, degrees of freedom of each, degrees of freedom that the form
-                                  * depends on */
+  int batch_size; /* cells of a batch, a power of two */
+  int number, of_cell; /* cells, unknowns of each */
   const int32_t *dofs;
-  int at, width, coefficients; /* coefficients: of a cell, including unknowns */
-  double *w, *all; /* all: space for the coefficients of a cell */
-  const double *constants, *coordinates; /* coordinates: x and y of both vertices; none of functions of statements */
-  int rows; /* entries of a cell */
+  int width, inputs; /* inputs: of a cell, including unknowns */
+  double *w, *all; /* all: space for the inputs of a cell */
+  int rows; /* values of a cell */
   const int32_t *row, *begin; /* or none */
   const uint8_t *pattern;
   const int32_t *has; /* index of the pattern of each batch */
   int in_rows; /* number of patterns, the first ones, in which the entries of a row are adjacent */
-  int is_functional;
   double *each; /* entries of all cells in the latest evaluation, in batches; or none */
 };
 
@@ -90,7 +86,6 @@ typedef struct {
 } step_product;
 
 void set_cells(const cells *c, const double *q, int at);
-double value_of_cells(const cells *c, const double *q);
 int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
                  const int32_t *row, const int32_t *column, int32_t *found);
 int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int number, int of_cell,
@@ -155,13 +150,12 @@ typedef struct {
 /* Extremes of section forces at points of the cells and of motions, see extremes.py. */
 typedef struct {
   const cell_forces *forces;
-  const cells *along;       /* form of the section forces with its entries and two angles of a cell */
-  const double *angles;     /* of all cells, in batches */
-  int at_angles;            /* position of the angles in its coefficients */
-  int at_numbers, first;    /* position of the first of CELL_NUMBERS, and how many of these it has */
+  const cells *along;       /* section forces as functions of the first of CELL_NUMBERS and of `axes` */
+  const double *axes;       /* angles at both ends of each cell, vector between them; in batches */
+  int first;                /* number of CELL_NUMBERS that matter */
   int in_order;             /* whether all forms have all cells, in the same batches */
   double between, *q;       /* fraction of the step for the configuration of the forces; space for it */
-  double *numbers, *some;   /* space: for all cells; for the coefficients of SOME cells */
+  double *numbers, *some;   /* space: for all cells; for the numbers of SOME cells */
   extent of_forces, of_motion;
 } watch;
 

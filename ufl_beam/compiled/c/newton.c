@@ -105,7 +105,6 @@ static cells some_cells(const cells *c, int first)
   cells some = *c;
   some.number = c->number - first < SOME ? c->number - first : SOME;
   some.dofs += (size_t)first * c->of_cell;
-  if (c->coordinates) some.coordinates += (size_t)first * 4;
   some.w += (size_t)first * c->width;
   if (c->row) some.row += (size_t)first * c->rows;
   if (c->pattern) some.has += first / c->batch_size;
