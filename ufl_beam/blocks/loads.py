@@ -20,7 +20,7 @@ from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.functions import steady
 from ufl_beam.model.loads import FollowerLoad, MovingLoad, Pressure, RotatingFrame
-from ufl_beam.terms.load_forces import loaded_cells
+from ufl_beam.terms.dead_loads import loaded_cells
 
 
 @dataclass(frozen=True)

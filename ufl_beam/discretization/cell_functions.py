@@ -109,11 +109,6 @@ class Cell:
         """Return the nodal forces whose work on the virtual motion is ``work``."""
         return [ufl.diff(work, v[i]) for i in range(len(COMPONENTS)) for v in self._virtual]
 
-    @property
-    def no_forces(self) -> list[Expr]:
-        """Nodal forces of zero."""
-        return [ufl.as_ufl(0.0)] * (len(COMPONENTS) * len(self._order))
-
 
 class AxisOfCell(Axis):
     """Undeformed axis of a cell at the fraction ``s``, for fields that are interpolated by it."""

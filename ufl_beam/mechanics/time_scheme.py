@@ -8,7 +8,6 @@ only through the protocols in this module.  The schemes are in time_schemes.py.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol, TypeGuard
 
@@ -264,17 +263,6 @@ def nodal_step(scheme: Scheme, q0: Array, q1: Array, rotations: Index) -> Array:
     s, turned = q1 - q0, with_half_tangents(scheme, rotations)
     s[turned] = 2 * np.tan(s[turned] / 2)
     return np.asarray(s)
-
-
-def increment_to_rest(scheme: Scheme, dt: float) -> float:
-    """Return the displacement in a step that ends at rest, divided by the initial velocity; s.
-
-    The step has no previous step.  The result is zero in statics and without a mean velocity.
-    """
-    if not has_inertia(scheme) or not scheme.has_mean_velocity:
-        return 0.0
-    c_step, c_velocity, *_ = scheme.coefficients(dt, math.inf, 0).rates[0]
-    return -c_velocity / c_step
 
 
 def combined(row: Sequence[float], s: Array, rates: Any) -> Array:

@@ -38,9 +38,9 @@ from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.terms.boundary_conditions import Supports
 from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.dead_loads import DeadLoads, dead_loads
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inertia_and_damping import BEFORE, Inertia, rayleigh_forces
-from ufl_beam.terms.load_forces import DeadLoads, dead_loads
 from ufl_beam.terms.term import Callbacks, LoadTerm, Term
 
 MOVING = "inertia", "damping"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Dead loads."""
+"""Dead loads: vectors of nodal forces, which cost nothing in an iteration."""
 
 from __future__ import annotations
 
@@ -11,22 +11,13 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, loop, struct
-from ufl_beam.discretization.function_spaces import (
-    point_masses,
-)
+from ufl_beam.discretization.function_spaces import point_masses
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.functions import value_at
-from ufl_beam.model.loads import (
-    Gravity,
-    LineLoad,
-    Load,
-    LoadAlongBeam,
-    MovingLoad,
-    PointLoad,
-)
+from ufl_beam.model.loads import Gravity, LineLoad, Load, LoadAlongBeam, MovingLoad, PointLoad
 from ufl_beam.terms.derivatives import Each, Neighbours, in_c
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, LoadTerm, Phases
