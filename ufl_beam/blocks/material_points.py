@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import ufl
@@ -31,7 +31,7 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.statement import Inputs, expanded
-from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, loop, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, loop, names, struct
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms, with_shared_nodes
 from ufl_beam.errors import StepFailed
@@ -72,11 +72,27 @@ At this resistance an exponential law has the same fraction of its fracture ener
 FIXED = "growth", "direction", "flows", "theta", "dt"
 """Inputs of a point that parameters do not change directly."""
 
-UNLIMITED = 1e300
-"""Traction above which a point has no limit."""
-
 FREED_STIFFNESS = 1e-30
 """Factor of the stiffness of such a hinge; the frequency of its motion is zero to round-off."""
+
+
+def entries(section_points: SectionPoints, scheme: Scheme) -> dict[str, tuple[str, str]]:
+    """Return accounts and names in the ledger of energies, by their name in ``point_output``.
+
+    Schemes with forces over the step have two losses besides the loss by ``alpha``.  A point that
+    breaks loses the energy of its stress at the end of the step.  In nonlinear elasticity the work
+    of the stress at t_n+θ differs from the change of the energy.
+    """
+    softens, found = section_points.softening is not None, dict[str, tuple[str, str]]()
+    if section_points.yields:
+        found = {"hardening": ("state", "hardening"), "worked": ("lost", "plastic")}
+    if softens:
+        found["broken"] = "lost", "hinges"
+    if scheme.alpha:
+        found["lost"] = "lost", "numerical"
+    if scheme.average(0.0, 1.0) != 1.0 and (softens or curved(section_points.kind)):
+        found["released"] = "lost", "numerical"
+    return found
 
 
 def create_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger) -> None:
@@ -85,42 +101,11 @@ def create_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger
     Every process calls this function, even without such points, so that all ledgers have the same
     entries in the same order.
     """
-    if section_points.yields:
-        ledger.state["hardening"] += 0.0
-        ledger.lost["plastic"] += 0.0
-    if section_points.softening is not None:
-        ledger.lost["hinges"] += 0.0
-    if scheme.alpha or releases(section_points, scheme):
-        ledger.lost["numerical"] += 0.0
+    for account, name in entries(section_points, scheme).values():
+        getattr(ledger, account)[name] += 0.0
 
 
-def releases(section_points: SectionPoints, scheme: Scheme) -> bool:
-    """Return whether points have numerical losses besides the loss by ``alpha`` of a scheme.
-
-    Schemes with forces over the step have two such losses.  A point that breaks loses the energy of
-    its stress at the end of the step.  In nonlinear elasticity the work of the stress at t_n+θ
-    differs from the change of the energy.
-    """
-    return scheme.average(0.0, 1.0) != 1.0 and (
-        section_points.softening is not None or curved(section_points.kind)
-    )
-
-
-class PointTable(NamedTuple):
-    """Derivatives of a point, see ``point_derivatives`` of loops.h.
-
-    Attributes:
-        function: An ``element_function`` of loops.h.
-        names: Names of its inputs.
-        states, numbers, unknowns, conditions: Numbers of these.
-    """
-
-    function: Any
-    names: list[str]
-    states: int
-    numbers: int
-    unknowns: int
-    conditions: int
+PointTable = tuple[Any, list[str], tuple[int, int, int, int]]
 
 
 class PointForms:
@@ -177,30 +162,11 @@ class PointForms:
         self._outputs = outputs, end
 
     def _at_end(self, at: At) -> list[Expr]:
-        """Return energies, the new state, and stresses at the end of a step.
-
-        The mean stress of each step of a broken point is zero, but stresses at the ends of steps
-        might alternate about zero.  So the discontinuity takes over the elastic strain, which
-        nothing holds any more, and its energy is released.
-        """
-        end, length = self._equations.end(at), at["length"]
-        elastic, released, (*stress,) = end.elastic, end.nonlinear_loss, end.stress
-        traction, jump = at["traction"], at["jump"] + at["direction"] * at["growth"]
-        if self._softening is not None:
-            holds = ufl.gt(end.resistance, 0.0)
-            jump += ufl.conditional(holds, 0.0, stress[0] / at["stiffness"] * length)
-            elastic = ufl.conditional(holds, end.elastic, end.left)
-            released += end.elastic - elastic
-            stress[0] = ufl.conditional(holds, stress[0], 0.0)
-            traction = ufl.conditional(ufl.lt(traction, UNLIMITED), end.resistance, traction)
-        energies = {
-            "worked": end.worked, "broken": end.broken / length, "lost": end.lost,
-            "elastic": elastic, "hardening": end.hardening, "released": released,
-            "relaxed": end.relaxed,
-        }  # fmt: skip
-        changes = zip(prefixed("state", self._kind.law.variables), end.changes, strict=True)
-        state = traction, jump, at["opening"] + at["growth"], *(at[n] + x for n, x in changes)
-        return [*map(ufl.as_ufl, (*in_order("point_output", energies), *state, *stress))]
+        """Return energies, the new state, and stresses at the end of a step."""
+        end = self._equations.end(at)
+        energies = in_order("point_output", {x: getattr(end, x) for x in names("point_output")})
+        state = end.traction, end.jump, end.opening, *end.variables
+        return [*map(ufl.as_ufl, (*energies, *state, *end.stress))]
 
     @cached_property
     def loops(self) -> dict[str, Any]:
@@ -218,7 +184,12 @@ class PointForms:
 
     @cached_property
     def table(self) -> PointTable:
-        """Derivatives of the resultants of a section by its strains and all numbers of a point."""
+        """Derivatives of the resultants of a section by its strains and all numbers of a point.
+
+        Returns:
+            An ``element_function`` of loops.h; names of its inputs; numbers of states, numbers,
+            unknowns and margins, see ``point_derivatives`` there.
+        """
         equations, law = self._equations, self._kind.law
         strain, before = (rows(law, name) for name in ("strain", "before"))
         new = prefixed("new", law.variables) if law.solves else ()
@@ -237,9 +208,9 @@ class PointForms:
                 at[name] = at.stage(at[name], sums)
         with traced(law):
             stress = expanded(equations.stress(at))
-            end, changes = self._at_end(at), equations.end(at).changes
+            end, variables = self._at_end(at), equations.end(at).variables
             unknowns = expanded(equations.residuals(at)) if law.solves else []
-        answers, of_opening = [*stress, *expanded(changes), *unknowns], list[Expr]()
+        answers, of_opening = [*stress, *expanded(variables), *unknowns], list[Expr]()
         if self._softening is not None:
             with traced(self._softening):
                 resistance = equations.resistance(at, at["growth"])
@@ -261,9 +232,8 @@ class PointForms:
             [*at.slopes(outputs, inputs), *conditions],
             instead={symbol: value for _, value, _, symbol in at.stages},
         )
-        return PointTable(
-            function, list(compiler.at), len(state), len(numbers), len(unknowns), len(conditions)
-        )
+        counts = len(state), len(numbers), len(unknowns), len(conditions)
+        return function, list(compiler.at), counts
 
     @cached_property
     def elastic(self) -> Any:
@@ -326,7 +296,7 @@ class Points:
         self._search: Index = np.zeros(lib.SEARCH_FLAGS, np.int32) if search is None else search
         self._section_points, self._alpha = section_points, scheme.alpha
         self._yields, self.softens = section_points.yields, section_points.softening is not None
-        self._releases = releases(section_points, scheme)
+        self._entries = entries(section_points, scheme)
         self.must_dissipate = section_points.kind.law.must_dissipate
         self.names, law = inputs(section_points), section_points.kind.law
         cells, per_cell, width = len(length), len(section_points.weights), len(self.names)
@@ -387,11 +357,11 @@ class Points:
 
     def derivatives(self, neighbours: Neighbours) -> Any:
         """Return ``point_derivatives`` of loops.h for terms with ``points``."""
-        function, names, states, numbers, unknowns, conditions = self._forms.table
+        function, inputs, (states, numbers, unknowns, conditions) = self._forms.table
         (cells, per_cell, _), P = self._storage.shape, len(neighbours)
         n, columns = cells * per_cell, 6 + states + numbers
         place = {name: k for k, name in enumerate(self.names)}
-        column = np.array([place.get(name, -1) for name in names], dtype=np.int32)
+        column = np.array([place.get(name, -1) for name in inputs], dtype=np.int32)
         adjacent = slice(first := column[6], first + states)
         of_w = column[(own := slice(6 + states, columns))][column[own] >= 0]
 
@@ -412,17 +382,17 @@ class Points:
 
         by_number, none = neighbours.differences(numbers_of), np.zeros(0)
         by_state, known = neighbours.state(states_of), numbers_of(neighbours.term)
-        w = np.zeros((batches := len(known), len(names), BATCH))
+        w = np.zeros((batches := len(known), len(inputs), BATCH))
         w[:, own] = known
         changes = np.ones((P, columns), dtype=np.int32)
         changes[:, own] = by_number.any(axis=(1, 3))
         dofs = 3 * (np.arange(n)[:, None] // per_cell) + np.arange(3)
         block = struct(
             "element_block", lanes=BATCH, elements=n, batches=batches, unknowns=3, states=states,
-            numbers=numbers, modes=len(names) - columns, width=len(names), w=w,
+            numbers=numbers, modes=len(inputs) - columns, width=len(inputs), w=w,
             acting=np.full(1, batches, dtype=np.int32), batch=np.arange(batches, dtype=np.int32),
             dofs=in_batches(dofs.astype(np.int32), BATCH),
-            space=np.zeros(2 * len(names) + function.outputs), new_shared=none,
+            space=np.zeros(2 * len(inputs) + function.outputs), new_shared=none,
         )  # fmt: skip
         of = struct(
             "block_derivatives", block=block, parameters=P, margins=conditions, unknowns=unknowns,
@@ -432,7 +402,7 @@ class Points:
             number_bar=np.zeros(known.shape), step_bar=none, shared_bar=none, strain_bar=none,
         )  # fmt: skip
         c = struct(
-            "point_derivatives", points=self.c, of=of, column=column, geometry=names.index("B 00"),
+            "point_derivatives", points=self.c, of=of, column=column, geometry=inputs.index("B 00"),
             e0=neighbours.state(lambda term: term.points._e0), e1=np.zeros((P, cells, 3)),
             r=np.zeros((cells, 3)), e0_bar=np.zeros((cells, 3)), e1_bar=np.zeros((cells, 3)),
             r_bar=np.zeros((cells, 3)),
@@ -595,17 +565,9 @@ class Points:
 
     def phases(self, block: Any, made: Phases, ledger: Ledger) -> Phases:
         """Add the points of ``element_block`` of loops.h to the functions of the block."""
-        state, lost = ledger.state, ledger.lost
-        entries = {
-            "worked": self._yields and lost.pointer("plastic"),
-            "broken": self.softens and lost.pointer("hinges"),
-            "lost": self._alpha and lost.pointer("numerical"),
-            "elastic": state.pointer("stored"),
-            "hardening": self._yields and state.pointer("hardening"),
-            "released": self._releases and lost.pointer("numerical"),
-            "relaxed": None,
-        }
-        entry = [pointer or ffi.NULL for pointer in in_order("point_output", entries)]
+        of = self._entries | {"elastic": ("state", "stored")}
+        pointers = {x: getattr(ledger, account).pointer(y) for x, (account, y) in of.items()}
+        entry = [pointers.get(name, ffi.NULL) for name in names("point_output")]
         fill(self.c, alpha=self._alpha, entry=entry)
         begin, accept, add = (
             loop(name, fill(block, inner=self.c))

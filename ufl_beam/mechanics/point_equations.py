@@ -21,9 +21,12 @@ from ufl_beam.compiled.c_library import names
 from ufl_beam.mechanics.functional import strain_by_jump
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.fibres import Kind, SectionPoints
-from ufl_beam.model.law_functions import Values, absolute, positive
+from ufl_beam.model.law_functions import Values, absolute, below, positive, where
 from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.softening_laws import SofteningLaw
+
+UNLIMITED = 1e300
+"""Traction above which a point has no limit."""
 
 At = Mapping[str, Values]
 """Inputs of points by name, see :func:`inputs`."""
@@ -54,19 +57,20 @@ def inputs(section_points: SectionPoints) -> tuple[str, ...]:
 
 
 class End(NamedTuple):
-    """Changes and energies of a point at the end of a step; J/m³ or J/m."""
+    """Energies (J/m³ or J/m), stresses and state of a point at the end of a step."""
 
     worked: Values  # dissipated by the bulk
-    broken: Values  # dissipated by the discontinuity, per area instead of volume
+    broken: Values  # dissipated by the discontinuity
     lost: Values  # numerical loss of backward Euler, divided by ``2 alpha`` of the scheme
     elastic: Values  # stored elastically
     hardening: Values  # stored by hardening
+    released: Values  # numerical loss by breaking, and in nonlinear elasticity
     relaxed: Values  # work on plastic strain by the mean stress, minus work by the end stress
-    resistance: Values  # of the discontinuity
-    left: Values  # stored elastically after a break has removed the stress
-    nonlinear_loss: Values  # numerical loss in nonlinear elasticity, with forces over the step
+    traction: Values  # resistance of the discontinuity
+    jump: Values
+    opening: Values
+    variables: tuple[Values, ...]
     stress: tuple[Values, ...]
-    changes: tuple[Values, ...]  # of the variables
 
 
 @lru_cache(maxsize=128)
@@ -197,7 +201,12 @@ class PointEquations:
         )
 
     def end(self, at: At) -> End:
-        """Return changes and energies at the end of the step."""
+        """Return energies, stresses and the state at the end of the step.
+
+        The mean stress of each step of a broken point is zero, but stresses at the ends of steps
+        might alternate about zero.  So the discontinuity takes over the elastic strain, which
+        nothing holds any more, and its energy is released.
+        """
         law, softening, θ, a = self.law(at), self.softening(at), at["theta"], at["growth"]
         argument, zero = law.as_argument, 0 * a
         jump, length = at["jump"], at["length"]
@@ -247,16 +256,22 @@ class PointEquations:
             relaxed = hardened
             for σ0, σ1, e, c in zip(before, now, elastically, C, strict=True):
                 relaxed = relaxed - (σ1 - σ0) / 2 * (e - (σ1 - σ0) / c)
-        broken, resistance, left = zero, zero, zero
+        broken, released, traction = zero, zero, at["traction"]
+        if self._over_step:
+            released = nonlinear_loss + zero
         if softening is not None:
-            broken = a * softening.mean_traction(at["opening"], a)
+            broken = a * softening.mean_traction(at["opening"], a) / length
             resistance = softening.traction(at["opening"] + a)
+            traction = where(below(traction, UNLIMITED), resistance, traction)
             left = law.elastic_energy(e1[0] - now[0] / at["stiffness"], new)
+            holds = below(-resistance, 0.0)
+            jump = jump + where(holds, 0.0, now[0] / at["stiffness"] * length)
+            released = released + where(holds, 0.0, elastic - left)
+            elastic, now = where(holds, elastic, left), (where(holds, now[0], 0.0),)
         return End(
-            worked + zero, broken, lost + zero, elastic + zero, hardening + zero,
-            positive(relaxed) + zero, resistance, left,
-            nonlinear_loss + zero if self._over_step else zero, now,
-            tuple(getattr(changes, name) for name in self._names),
+            worked + zero, broken, lost + zero, elastic + zero, hardening + zero, released,
+            positive(relaxed) + zero, traction, jump, at["opening"] + a,
+            tuple(getattr(new, name) for name in self._names), now,
         )  # fmt: skip
 
 

@@ -75,9 +75,9 @@ class Points:
         if softening:
             limit[section.breaking] = softening.limit
         self.names = [f"state {name}" for name in law.variables]
-        self.columns = [*self.names, "jump", "opening", "strain", "limit", "flows"]
+        self.columns = [*self.names, "jump", "opening", "strain", "traction", "flows"]
         start: dict[str, Any] = dict(zip(self.names, law.variables.values(), strict=True))
-        start |= {"jump": 0.0, "opening": 0.0, "limit": limit, "flows": 0.0}
+        start |= {"jump": 0.0, "opening": 0.0, "traction": limit, "flows": 0.0}
         self.variables = {name: fields.at_points((n,)) for name in start}
         self._set(start)
         self.recorded: Array = np.zeros((len(cells), 6))
@@ -100,7 +100,7 @@ class Points:
         """
         self.at: dict[str, Any] = {**self._old(), "before": self.e0 @ self.B.T}
         self.at["dt"] = np.full_like(self.at["before"], dt)
-        self.may_open = (self.at["flows"] > 0) | (self.at["limit"] == 0) | (not hold)
+        self.may_open = (self.at["flows"] > 0) | (self.at["traction"] == 0) | (not hold)
 
     @np.errstate(all="ignore")
     def return_map(self, strains: Array, *, stiff: bool) -> None:
@@ -113,9 +113,9 @@ class Points:
         self.e1: Array = strains[self.cells]
         at |= {"strain": self.e1 @ B.T, "growth": growth, "direction": direction}
         stress, D = slope(self._stress, at, "strain")
-        over = np.abs(stress) > at["limit"]  # P(51)
+        over = np.abs(stress) > at["traction"]  # P(51)
         opens = over & self.may_open
-        self.excess = np.where(over & ~opens, np.abs(stress) / at["limit"] - 1, 0.0)
+        self.excess = np.where(over & ~opens, np.abs(stress) / at["traction"] - 1, 0.0)
         D = θ * at["stiffness"] if stiff else D
         if opens.any():
             part = {name: x[opens] for name, x in at.items()}
@@ -178,8 +178,8 @@ class Points:
     def change(self) -> float:
         """Return the energy stored and dissipated in the step; J."""
         end = self.equations.end(self.at)
-        bulk = end.worked + end.elastic + end.hardening + end.nonlinear_loss + end.relaxed
-        energies = self._sum(self.length * bulk) + self._sum(end.broken) + self._rest(self.e1)
+        points = end.worked + end.broken + end.elastic + end.hardening + end.released + end.relaxed
+        energies = self._sum(self.length * points) + self._rest(self.e1)
         return float(energies.sum() - self.stored.sum())
 
     @np.errstate(all="ignore")
@@ -187,18 +187,12 @@ class Points:
         """Accept the internal variables of the latest return map."""
         at, end, α, length = self.at, self.equations.end(self.at), self.scheme.alpha, self.length
         self.recorded[:, 4] += self._sum(length * end.worked)
-        self.recorded[:, 5] += self._sum(end.broken)
-        lost = self._sum(length * (2 * α * end.lost + end.nonlinear_loss))
+        self.recorded[:, 5] += self._sum(length * end.broken)
+        lost = self._sum(length * (2 * α * end.lost + end.released))
         lost += 2 * α * self._rest(self.e1 - self.e0)
-        limit = np.where(np.isfinite(at["limit"]), end.resistance, np.inf)
-        # Broken points bear nothing; their elastic strain becomes a part of the jump.
-        broken = limit == 0
-        relieved = np.where(broken, end.stress[0] / at["stiffness"] * length, 0.0)
-        lost += self._sum(np.where(broken, length * (end.elastic - end.left), 0.0))
         self.numerical += float(lost.sum())
-        new = {"limit": limit, "flows": at["growth"] > 0, "opening": at["opening"] + at["growth"]}
-        new["jump"] = at["jump"] + at["direction"] * at["growth"] + relieved
-        new |= {n: at[n] + change for n, change in zip(self.names, end.changes, strict=True)}
+        new = {"traction": end.traction, "jump": end.jump, "opening": end.opening}
+        new |= dict(zip(self.names, end.variables, strict=True)) | {"flows": at["growth"] > 0}
         self._set(new)
         self._store(self.e1)
 
@@ -207,7 +201,7 @@ class Points:
         self.e0, at, section = strains, self._old(), self.section
         law, z = self.equations.law(at), self.equations.state(at)
         e = law.as_argument((strains @ self.B.T + strain_by_jump(at["jump"], self.length),))
-        stress = law.as_tuple(law.stress(e, z))[0] * (at["limit"] != 0)
+        stress = law.as_tuple(law.stress(e, z))[0] * (at["traction"] != 0)
         self.recorded[:, :3] = section.rest * strains + (section.weights * stress) @ self.B
         self.recorded[:, 3] = section.hinges * at["jump"][:, -1]
         elastic = self._sum(self.length * law.elastic_energy(e, z)) + self._rest(strains)
