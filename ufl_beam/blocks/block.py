@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +28,7 @@ from ufl_beam.model.functions import TimeFunction
 from ufl_beam.model.scene import Scene
 from ufl_beam.terms.derivatives import MOST_MARGINS, Each, Neighbours, differences, in_c
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, NodeForces, Phases
+from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, Phases
 
 TIMES = names("time_of_number", "time_")
 """Times of the numbers of a step, see loops.h."""
@@ -228,7 +229,8 @@ class Block(LoadTerm):
         if inserted:
             self._insert(made, dofs)
         elif elements.cells is not None:
-            forces = NodeForces(self._each[0], second)
+            kept = self._each[0], second
+            forces = SimpleNamespace(keep_entries=lambda: kept)
             self.in_cells = [InCells(lambda: forces, elements.force_kind, elements.cells)]
 
     def _insert(self, made: Kernels, dofs: Index) -> None:
@@ -240,9 +242,9 @@ class Block(LoadTerm):
         fill(self._c, inserted=tangent)
         self.loops = loop("add_cells", force), loop("add_cells", tangent)
         forces = InsertedForces(force)
-        q0 = None if elements.in_time or made.strains else forces
-        order = np.asarray(elements.cells)
-        self.in_cells = [InCells(lambda: forces, elements.force_kind, order, q0=q0)]
+        on_demand, order = not (elements.in_time or made.strains), np.asarray(elements.cells)
+        kind = elements.force_kind
+        self.in_cells = [InCells(lambda: forces, kind, order, on_demand=on_demand)]
 
     def _entries(self, made: Kernels) -> Any:
         """Return the entries of the matrix of the outputs of a tangent, in batches."""

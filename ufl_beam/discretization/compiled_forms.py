@@ -100,11 +100,7 @@ class InsertedForces:
     def __init__(self, cells: Any) -> None:
         self.cells = cells
 
-    def uses(self, q0: object) -> bool:
-        """Return whether the forces depend on the configuration before the step."""
-        return True
-
-    def set(self, q0: object, q: Array) -> None:
+    def begin(self, q: Array) -> None:
         """Set the configuration before the step, which follows the unknowns."""
         lib.set_cells(self.cells, doubles(q), 0)
 

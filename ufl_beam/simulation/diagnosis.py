@@ -37,7 +37,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.factorization import Factorization
 from ufl_beam.solvers.newton import Solver
-from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vectors
+from ufl_beam.solvers.null_vectors import SINGULAR, soft_motions
 from ufl_beam.terms.term import KINDS
 
 LEAST_NAMED = 0.1
@@ -150,12 +150,11 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
     for q in (solution.q[0][equation.subdomain.dofs], q0, probe):
         if not np.isfinite(q).all() or not equation.evaluate(q):
             return ""
-        K, free = free_matrix(equation.subdomain, equation.A, equation.supports.dofs)
-        if not len(free):
+        if (found := soft_motions(equation)) is None:
             return ""
+        K, free, sizes, vectors = found
         try:
             signs.append(Factorization(csr_array(K)).negative)
-            sizes, vectors = null_vectors(K)
         except (np.linalg.LinAlgError, RuntimeError):
             return ""
         least.append(sizes[-1])
@@ -194,14 +193,10 @@ def _probe_state(equation: StepEquation, q0: Array, q1: Array) -> Array:
 def _singularity(equation: StepEquation, q: Array) -> str:
     """Describe a singularity or a mechanism in the latest tangent, evaluated at ``q``; else ""."""
     numbering, scene = equation.subdomain.numbering, equation.subdomain.numbering.scene
-    K, free = free_matrix(equation.subdomain, equation.A, equation.supports.dofs)
-    if not len(free) or not np.isfinite(K.data).all():
-        return ""
-    try:
-        sizes, vectors = null_vectors(K)
-    except (np.linalg.LinAlgError, RuntimeError):
+    if (found := soft_motions(equation)) is None:
         return ""
     x: Array = np.zeros(numbering.size)
+    _, free, sizes, vectors = found
     x[free], size = vectors[:, -1], sizes[-1]
     motions = np.abs(x) * numbering.scales
     largest = float(motions.max())

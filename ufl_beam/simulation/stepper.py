@@ -33,7 +33,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StaticPath, StepEquation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.newton_options import Newton
-from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
+from ufl_beam.solvers.null_vectors import soft_motions
 
 # -- prediction ------------------------------------------------------------------------------------
 
@@ -347,10 +347,9 @@ class Stepper(StateView):
         if not free_motion:
             return
         newton.forget_zero_modes()
-        if equation.evaluate(self._copy(q1)):
-            K, free = free_matrix(self.subdomain, equation.A, self.supports.dofs)
-            vectors, scales = null_vectors(K)[1], numbering.scales[free]
-            x = vectors[:, -1]
+        if equation.evaluate(self._copy(q1)) and (found := soft_motions(equation)) is not None:
+            K, free, _, vectors = found
+            x, scales = vectors[:, -1], numbering.scales[free]
             motion = np.abs(x * scales).max()
             forces = np.linalg.norm((K @ x)[scales > 0] / scales[scales > 0])
             if forces <= FREE_STIFFNESS * newton.scale() * numbering.scene.size * motion:

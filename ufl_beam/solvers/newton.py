@@ -32,7 +32,7 @@ from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.beam_elimination import CondensedSolver
 from ufl_beam.solvers.newton_options import PREFIX, Newton, apply_options, database
-from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
+from ufl_beam.solvers.null_vectors import soft_motions
 from ufl_beam.terms.term import from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
@@ -203,13 +203,9 @@ class Solver:
         Residuals, and so forces, energies and solutions, do not contain this stiffness.
         """
         subdomain, A, numbering = self._subdomain, self._equation.A, self._subdomain.numbering
-        K, free = free_matrix(subdomain, A, self._equation.supports.dofs)
-        if not len(free) or not np.isfinite(K.data).all():
+        if (found := soft_motions(self._equation)) is None:
             return False
-        try:
-            _, vectors = null_vectors(K)
-        except (np.linalg.LinAlgError, RuntimeError):
-            return False
+        _, free, _, vectors = found
         motions = numbering.scales[free, None] * vectors
         # One degree of freedom for each mode, chosen so that the modes are independent there
         pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]

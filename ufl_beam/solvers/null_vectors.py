@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.partition import Subdomain
 
 DENSE = 300  # number of unknowns up to which null vectors come from a singular value decomposition
 
@@ -19,19 +19,28 @@ SINGULAR = 1e-12
 ROUNDS = 40  # largest number of scaling passes
 
 
-def free_matrix(subdomain: Subdomain, A: Csr, constrained: Index) -> tuple[csc_array, Index]:
-    """Assemble the tangent of the dofs that no support holds; return it and their scene numbers.
+def soft_motions(equation: Any) -> tuple[csc_array, Index, Array, Array] | None:
+    """Find the motions that the latest tangent of a step equation resists least.
 
-    All processes call it together, with the local matrix ``A`` and local dofs ``constrained``.
+    All processes call it together.
+
+    Returns:
+        The tangent of the degrees of freedom that no support holds, their numbers in the scene, and
+        the results of :func:`null_vectors`; None if the tangent is empty or not finite.
     """
-    dofs = subdomain.dofs
-    local = dofs[A.rows()], dofs[A.indices], A.data, dofs[constrained]
+    subdomain, A, dofs = equation.subdomain, equation.A, equation.subdomain.dofs
+    local = dofs[A.rows()], dofs[A.indices], A.data, dofs[equation.supports.dofs]
     gathered = [local] if subdomain.alone else subdomain.comm.allgather(local)
     rows, columns, data, fixed = (np.concatenate(x) for x in zip(*gathered, strict=True))
     n = subdomain.numbering.size
     free = np.setdiff1d(np.arange(n), fixed)
-    K = coo_array((data, (rows, columns)), shape=(n, n)).tocsc()
-    return csc_array(K[:, free][free]), free
+    K = csc_array(coo_array((data, (rows, columns)), shape=(n, n)).tocsc()[:, free][free])
+    if not len(free) or not np.isfinite(K.data).all():
+        return None
+    try:
+        return K, free, *null_vectors(K)
+    except (np.linalg.LinAlgError, RuntimeError):
+        return None
 
 
 def null_vectors(K: csc_array) -> tuple[Array, Array]:

@@ -39,7 +39,7 @@ class CellForces:
         self._subdomain, self._space = subdomain, np.zeros(subdomain.size)
         self._alive: list[Any] = [forces]
         self._unmade = list[tuple[InCells, Any]]()
-        self._step_forms: list[tuple[InsertedForces, Any, Any, Array]] = []
+        self._step_forms: list[tuple[InsertedForces, Any, Array]] = []
         self.vectors, self.entries = list[Any](), list[tuple[Any, int]]()
         self.factors = list[tuple[Any, int]]()
         self._forces = ffi.new("force_in_cells[]", len(forces))
@@ -63,17 +63,17 @@ class CellForces:
                 each, accepted_values = form.keep_entries()
                 c.entries = accepted
                 self._alive.append(each)
-                if force.q0 is None:
+                if force.on_demand:
+                    each[0] = ffi.NULL
+                    self._step_forms.append((form, each, accepted_values))
+                else:
                     c.latest = each
                     self.entries.append((accepted, accepted_values.size))
-                else:
-                    each[0] = ffi.NULL
-                    self._step_forms.append((form, force.q0, each, accepted_values))
             c.accepted = doubles(accepted_values)
             self._alive.append(accepted_values)
         if loads != ffi.NULL:
             self.factors.append((ffi.addressof(loads, "accepted"), loads.vectors))
-        self.needs_q0 = any(form.uses(q0) for form, q0, *_ in self._step_forms)
+        self.needs_q0 = bool(self._step_forms)
         first, *between, last = subdomain.numbering.mesh.nodes - 0.5
         from_middle = np.array([first, last, *between])
         self.c = fill(
@@ -100,9 +100,9 @@ class CellForces:
         ``q`` and ``before`` are the configurations at the end and at the beginning of the step.
         """
         self._make()
-        for form, q0, each, values in self._step_forms:
+        for form, each, values in self._step_forms:
             latest, each[0] = each[0], doubles(values)
-            form.set(q0, before)
+            form.begin(before)
             form.add(np.ascontiguousarray(q), self._space)
             each[0] = latest
         out: Array = np.empty((lib.CELL_NUMBERS, self.c.cells))

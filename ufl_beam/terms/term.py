@@ -34,15 +34,15 @@ class InCells(NamedTuple):
     """Forces of a term on the nodes of cells; see cell_forces.py.
 
     Attributes:
-        form: Function that returns the compiled form whose values are the nodal forces.  Without
-            a ``vector``, the forces are the values of the form in the latest residual.
+        form: Function that returns an object with ``keep_entries`` of :class:`InsertedForces`.
+            Without a ``vector``, the forces are the values in the latest residual.
         kind: Value of ``force_kind`` in loops.h.
-        order: Positions of the cells of the form in ``subdomain.cells``.
-        vector: Pointer to the address of the vector at which the form is evaluated, if the form is
-            linear and the residual does not evaluate the form; else None.
+        order: Positions of the cells in ``subdomain.cells``.
+        vector: Pointer to the address of the vector at which linear :class:`InsertedForces` are
+            evaluated, if the residual does not evaluate them; else None.
         factor: Factor of the forces.
-        q0: Function of the configuration at the beginning of the step, if the form depends only on
-            the configurations at the beginning and at the end; else None.
+        on_demand: Whether the forces depend on the configurations at both ends of the step only,
+            so that they are computed again from these.
     """
 
     form: Callable[[], Any]
@@ -50,23 +50,7 @@ class InCells(NamedTuple):
     order: Index
     vector: Any = None
     factor: float = 1.0
-    q0: Any = None
-
-
-class NodeForces(NamedTuple):
-    """Forces on the nodes of cells that C stores in each residual, as a compiled form does.
-
-    Attributes:
-        each: Pointer to the address of the array of forces, in batches.
-        second: Array by which C may replace the first.
-    """
-
-    each: Any
-    second: Array
-
-    def keep_entries(self) -> tuple[Any, Array]:
-        """Return the forces in the form of :meth:`InsertedForces.keep_entries`."""
-        return self.each, self.second
+    on_demand: bool = False
 
 
 class Phases(NamedTuple):
