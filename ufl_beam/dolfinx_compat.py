@@ -31,8 +31,8 @@ try:
     import dolfinx
     import ffcx
     import ufl
-    from dolfinx import cpp, graph, jit
     from dolfinx import fem as fem
+    from dolfinx import graph, jit
     from dolfinx import mesh as mesh
 except ImportError as error:  # pragma: no cover - depends on the machine
     raise ImportError(
@@ -122,16 +122,6 @@ def form_key(form: ufl.Form) -> str:
     system = [sysconfig.get_config_var(name) for name in ("CFLAGS", "EXT_SUFFIX")]
     ours = (form.signature(), ffcx.__version__, dolfinx.__version__, ffcx.get_options(), options)
     return "\0".join(map(repr, (*ours, *system)))
-
-
-def pack(form: fem.Form) -> tuple[Array, Array]:
-    """Return the packed constants (n,) and coefficients (num_cells, m) of a form over cells."""
-    coefficients = cpp.fem.pack_coefficients(form._cpp_object)
-    (cells,) = coefficients.values()
-    topology = form.mesh.topology
-    # Without coefficients DOLFINx returns an array of shape (0, 0).
-    packed = np.array(cells).reshape(topology.index_map(topology.dim).size_local, cells.shape[1])
-    return cpp.fem.pack_constants(form._cpp_object), packed
 
 
 def line_mesh(

@@ -9,6 +9,7 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import ufl
+from dolfinx import cpp
 from scenes import clamped
 from ufl.classes import Operator
 from ufl.corealg.traversal import unique_pre_traversal
@@ -22,7 +23,7 @@ from ufl_beam.discretization.compiled_forms import Pointwise, components
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import DolfinxFields, Fields
 from ufl_beam.discretization.partition import Subdomain
-from ufl_beam.dolfinx_compat import VERSION, cpp, fem, line_mesh
+from ufl_beam.dolfinx_compat import VERSION, fem, line_mesh
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
 
