@@ -24,11 +24,13 @@ def strut(law=None, **more):
     return body, parts, ub.Scene(bodies=[body], joints=[rail], connectors=parts, **more)
 
 
-def test_a_spring_pulls_a_mass_to_its_free_length(tmp_path, as_by_reference):
+def test_a_spring_pulls_a_mass_to_its_free_length(tmp_path, request):
     """[closed] Damped oscillation about x = -0.2 m; the midpoint rule has the error (ω dt)²/12."""
     body, (spring, *_), scene = strut()
     newton = ub.Newton(rtol=1e-12)
-    as_by_reference(ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=0.02, newton=newton))
+    if ub.parallel.active_comm().size == 1:
+        short = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=0.02, newton=newton)
+        request.getfixturevalue("as_by_reference")(short)
     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=1e-3)
     d, t = C / (2 * MASS), run.times
     ω = math.sqrt(K / MASS - d**2)
