@@ -156,39 +156,41 @@ void add_block_derivative(void *self, const derivatives *d, int p, double *r)
   }
 }
 
-void accept_block_derivative(void *self, const derivatives *d, int p)
+void accept_block_derivative(void *self, const derivatives *d)
 {
   const block_derivatives *m = self;
   const element_block *b = m->block;
-  const int n = b->lanes, shared = b->groups * b->shares;
-  double sum[MOST_LANES], *new_shared = b->new_shared;
-  memset(new_shared, 0, shared * sizeof *new_shared);
-  FOR_ACTING(b, c) {
-    double *z = m->by_state + ((size_t)p * b->batches + c) * b->states * n;
-    if (!b->states && !b->shares && !m->margins && !m->strains) break;
-    find_direction(m, d, c, p, d->q1 + (size_t)p * d->size);
-    for (int k = 0; k < m->margins; ++k) {
-      const double *margin = row_of(m, c, rows_of(m) + m->margins) + k * n;
-      multiply_row(m, c, rows_of(m) + k, p, 0, sum);
-      for (int l = 0; l < elements_in(b, c); ++l) note_margin(d, p, (c * n + l) * (b->laws ? b->laws : 1), margin[l], sum[l]);
+  const int n = b->lanes, shared = b->groups * b->shares, computes = b->states || b->shares || m->margins || m->strains;
+  double sum[MOST_LANES];
+  for (int i = 0; i < m->parameters * shared; ++i) /* numbers of the step have copies of the values before it */
+    if (!d->initial || i % b->shares >= b->kept) m->by_shared[i] = 0;
+  FOR_ACTING(b, c)
+    for (int p = 0; computes && p < m->parameters; ++p) {
+      double *z = m->by_state + ((size_t)p * b->batches + c) * b->states * n;
+      find_direction(m, d, c, p, d->q1 + (size_t)p * d->size);
+      for (int k = 0; k < m->margins; ++k) {
+        const double *margin = row_of(m, c, rows_of(m) + m->margins) + k * n;
+        multiply_row(m, c, rows_of(m) + k, p, 0, sum);
+        for (int l = 0; l < elements_in(b, c); ++l) note_margin(d, p, (c * n + l) * (b->laws ? b->laws : 1), margin[l], sum[l]);
+      }
+      for (int i = 0; i < b->states && !d->initial; ++i) multiply_row(m, c, b->unknowns + i, p, 0, z + i * n);
+      for (int i = 0; i < m->strains && !d->initial; ++i) {
+        multiply_row(m, c, b->unknowns + b->states + b->shares + i, p, 0, sum);
+        for (int l = 0; l < elements_in(b, c); ++l) m->inner->e1[(size_t)p * 3 * m->inner->points->cells + strain_of(m, c * n + l, i)] = sum[l];
+      }
+      for (int i = 0; i < b->shares; ++i) {
+        if (d->initial && i < b->kept) continue;
+        multiply_row(m, c, b->unknowns + b->states + i, p, 0, sum);
+        for (int l = 0; l < elements_in(b, c); ++l) m->by_shared[(size_t)p * shared + b->group[c * n + l] * b->shares + i] += sum[l];
+      }
     }
-    for (int i = 0; i < b->states && !d->initial; ++i) multiply_row(m, c, b->unknowns + i, p, 0, z + i * n);
-    for (int i = 0; i < m->strains && !d->initial; ++i) {
-      multiply_row(m, c, b->unknowns + b->states + b->shares + i, p, 0, sum);
-      for (int l = 0; l < elements_in(b, c); ++l) m->inner->e1[(size_t)p * 3 * m->inner->points->cells + strain_of(m, c * n + l, i)] = sum[l];
-    }
-    for (int i = 0; i < b->shares; ++i) {
-      multiply_row(m, c, b->unknowns + b->states + i, p, 0, sum);
-      for (int l = 0; l < elements_in(b, c); ++l) new_shared[b->group[c * n + l] * b->shares + i] += sum[l];
-    }
-  }
-  if (m->inner && !d->initial) accept_points_derivative(m->inner, d, p);
-  for (int i = 0; i < shared; ++i)
-    if (!d->initial || i % b->shares >= b->kept) m->by_shared[(size_t)p * shared + i] = new_shared[i];
-  if (m->neighbours && !d->initial) memset(m->by_before + (size_t)p * b->functions, 0, b->functions * sizeof(double));
-  for (int k = p * m->neighbours; k < (p + 1) * m->neighbours && !d->initial; ++k) {
+  if (d->initial) return;
+  if (m->inner) accept_points_derivative(m->inner, d);
+  if (m->neighbours) memset(m->by_before, 0, (size_t)m->parameters * b->functions * sizeof(double));
+  for (int k = 0; k < m->parameters * m->neighbours; ++k) {
     const element_block *one = m->neighbour[k];
-    for (int i = 0; i < b->functions; ++i) m->by_before[(size_t)p * b->functions + i] += m->weight[k] * (one->end[i] - b->end[i]);
+    double *before = m->by_before + k / m->neighbours * b->functions;
+    for (int i = 0; i < b->functions; ++i) before[i] += m->weight[k] * (one->end[i] - b->end[i]);
     memcpy(one->before, one->end, b->functions * sizeof(double));
     one->t[0] = one->t[1];
   }

@@ -113,10 +113,10 @@ void add_load_derivative(void *self, const derivatives *d, int p, double *r)
   for (int i = 0; i < l->size; ++i) r[i] -= l->now[(size_t)p * l->size + i];
 }
 
-void accept_load_derivative(void *self, const derivatives *d, int p)
+void accept_load_derivative(void *self, const derivatives *d)
 {
   const load_derivatives *l = self;
-  memcpy(l->before + (size_t)p * l->size, l->end + (size_t)p * l->size, l->size * sizeof *l->end);
+  memcpy(l->before, l->end, (size_t)l->parameters * l->size * sizeof *l->end);
 }
 
 /* Derivatives of the prescribed motions at the end of the step, in the axes of supports; else zero. */
@@ -158,10 +158,10 @@ void add_differences_derivative(void *self, const derivatives *d, int p, double 
   }
 }
 
-void accept_differences_derivative(void *self, const derivatives *d, int p)
+void accept_differences_derivative(void *self, const derivatives *d)
 {
   const term_differences *t = self;
-  for (int k = p * t->neighbours; k < (p + 1) * t->neighbours; ++k)
+  for (int k = 0; k < t->parameters * t->neighbours; ++k)
     run(&t->term[1 + k].accept, d->step, d->x, d->s);
 }
 
@@ -222,8 +222,8 @@ int differentiate_step(derivatives *d, time_loop *m, int initial)
   d->t = m->step.t1, d->initial = initial;
   for (d->now = 0; d->now < d->terms; ++d->now) {
     const term_derivative *term = d->term + d->now;
-    void (*accept)(void *, const derivatives *, int) = initial ? term->accept_trial : term->accept;
-    for (int p = 0; accept && p < d->parameters; ++p) accept(term->self, d, p);
+    void (*accept)(void *, const derivatives *) = initial ? term->accept_trial : term->accept;
+    if (accept) accept(term->self, d);
   }
   if (product) advance_rates(d, m, product, initial);
   if (initial) return 1;

@@ -884,8 +884,8 @@ typedef struct {
   void *self;
   void (*linearize)(void *self, const time_step *step, const double *q1);
   void (*add)(void *self, const derivatives *d, int p, double *r);
-  void (*accept)(void *self, const derivatives *d, int p);
-  void (*accept_trial)(void *self, const derivatives *d, int p); /* of a step with `initial`; or none */
+  void (*accept)(void *self, const derivatives *d); /* of all parameters */
+  void (*accept_trial)(void *self, const derivatives *d); /* of a step with `initial`; or none */
 } term_derivative;
 
 /* Derivatives of the state of a run. Arrays have a row for each parameter. */
@@ -1029,17 +1029,17 @@ void tabulate_points(const point_derivatives *m);
 int differentiate_step(derivatives *d, time_loop *m, int initial);
 void begin_neighbours(void *self, const time_step *step, const double *q1);
 void add_differences_derivative(void *self, const derivatives *d, int p, double *r);
-void accept_differences_derivative(void *self, const derivatives *d, int p);
+void accept_differences_derivative(void *self, const derivatives *d);
 void keep_derivatives(derivatives *d, const time_loop *m);
 void keep_substep(derivatives *d, const time_loop *m, double end);
 void tabulate_block(void *self, const time_step *step, const double *q1);
 void add_block_derivative(void *self, const derivatives *d, int p, double *r);
-void accept_block_derivative(void *self, const derivatives *d, int p);
+void accept_block_derivative(void *self, const derivatives *d);
 void add_points_derivative(const point_derivatives *m, const derivatives *d, int q);
 void add_product_derivative(void *self, const derivatives *d, int p, double *r);
 void add_load_derivative(void *self, const derivatives *d, int p, double *r);
-void accept_points_derivative(const point_derivatives *m, const derivatives *d, int q);
-void accept_load_derivative(void *self, const derivatives *d, int p);
+void accept_points_derivative(const point_derivatives *m, const derivatives *d);
+void accept_load_derivative(void *self, const derivatives *d);
 void differentiate_loads(void *self, const time_step *step, const double *q1);
 
 /* -- oscillators, see oscillators.c --------------------------------------------------------------- */

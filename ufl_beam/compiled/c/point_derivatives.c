@@ -81,13 +81,12 @@ static void differentiate_tangents(const point_derivatives *m, const derivatives
 }
 
 /* Derivatives of the state of the points at the end of the step, from those of the strains e1. */
-void accept_points_derivative(const point_derivatives *m, const derivatives *d, int q)
+void accept_points_derivative(const point_derivatives *m, const derivatives *d)
 {
   const derivatives inner = of_sections(m, d);
-  const size_t at = (size_t)q * inner.size;
-  if (m->tangents) differentiate_tangents(m, &inner, q);
-  accept_block_derivative((void *)m->of, &inner, q);
-  memcpy(m->e0 + at, m->e1 + at, inner.size * sizeof *m->e1);
+  for (int q = 0; m->tangents && q < d->parameters; ++q) differentiate_tangents(m, &inner, q);
+  accept_block_derivative((void *)m->of, &inner);
+  memcpy(m->e0, m->e1, (size_t)d->parameters * inner.size * sizeof *m->e1);
 }
 
 /* -- the adjoint --------------------------------------------------------------------------------------- */
