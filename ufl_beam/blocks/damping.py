@@ -149,11 +149,9 @@ class TangentDamping(StatementOnCell):
         q0 = at.motions("q0")
         steps = [q1 - q for q, q1 in zip(q0, at.motions("q1"), strict=True)]
         if self.scheme.half_tangents:
-            halves = [turn / 2 for _, _, turn in steps]
-            tangents = [at.stage(ufl.sin(x) / ufl.cos(x)) for x in halves]
-            steps = [
-                ufl.as_vector([s[0], s[1], 2 * x]) for s, x in zip(steps, tangents, strict=True)
-            ]
+            tangents = [at.stage(2 * ufl.tan(x[2] / 2)) for x in steps]
+            pairs = zip(steps, tangents, strict=True)
+            steps = [ufl.as_vector([x[0], x[1], tangent]) for x, tangent in pairs]
         motions = steps, *(at.motions(f"rate{j + 1}") for j in range(self.rates))
         velocity = [
             sum((at[f"velocity {j}"] * x for j, x in enumerate(some)), ufl.zero(3))

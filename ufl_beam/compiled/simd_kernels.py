@@ -58,7 +58,7 @@ SCHEDULED = [*FLAGS, "-fschedule-insns"]
 chosen.  Long laws take up to 40 % less time with it, but tangents of cells of degree 3 a sixth
 more."""
 
-FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "exp", "log", "pow"}
+FUNCTIONS = {"sin", "cos", "tan", "sqrt", "fabs", "exp", "log", "pow"}
 """Functions that assembly_simd.h provides for vectors; lanes_pow has whole constants as exponents,
 lanes_power others."""
 

@@ -50,6 +50,7 @@ static inline lanes trigonometric(lanes x, int64_t quarter)
 
 static inline lanes lanes_sin(lanes x) { return trigonometric(x, 0); }
 static inline lanes lanes_cos(lanes x) { return trigonometric(x, 1); }
+static inline lanes lanes_tan(lanes x) { return lanes_sin(x) / lanes_cos(x); }
 static inline lanes lanes_fabs(lanes x) { return (lanes)((mask)x & INT64_MAX); }
 
 /* exp(x), nearly always accurate to the last digit. The nearest multiple of log(2) is subtracted in
