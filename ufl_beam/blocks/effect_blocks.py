@@ -37,7 +37,7 @@ class Numbers(dict[str, float]):
         before: Array,
     ) -> None:  # fmt: skip
         super().__init__(known)
-        self.places, (self.q0, self.q1) = places, motions
+        self.scheme, self.places, (self.q0, self.q1) = scheme, places, motions
         θ, self._a, self._before = scheme.load_weight, scheme.weight_of_before, before
         self.q, self.v = (1.0 - θ) * self.q0 + θ * self.q1, (self.q1 - self.q0) / self["dt"]
 
