@@ -73,7 +73,7 @@ class CellForces:
             self._alive.append(accepted_values)
         if loads != ffi.NULL:
             self.factors.append((ffi.addressof(loads, "accepted"), loads.vectors))
-        self.needs_q0 = bool(self._step_forms)
+        self.needs_q0 = subdomain.largest(float(bool(self._step_forms))) > 0  # on any process
         first, *between, last = subdomain.numbering.mesh.nodes - 0.5
         from_middle = np.array([first, last, *between])
         self.c = fill(
