@@ -55,7 +55,6 @@ ACCELERATIONS = {
             "compiled/simd_kernels.py", "compiled/c/assembly_simd.c", "compiled/c/assembly_simd.h",
             "compiled/c/points_simd.c", "compiled/c/check_simd.c",
             "discretization/compiled_forms.py~several|BATCH|batch_size",
-            "discretization/function_spaces.py:Fields._batched_coordinates",
         ),
     ),
     "elimination along beams": Acceleration(

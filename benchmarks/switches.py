@@ -5,7 +5,6 @@ Some have an option for that.  For the others, classes and functions of the pack
 while a simulation is built.
 """
 
-import math
 from contextlib import ExitStack, contextmanager
 from functools import cache
 from typing import Any, NamedTuple
@@ -14,6 +13,8 @@ from unittest.mock import patch
 import numpy as np
 
 import ufl_beam as ub
+from ufl_beam.blocks import block, material_points
+from ufl_beam.blocks.statement import Kernels
 from ufl_beam.compiled import c_library
 from ufl_beam.compiled.jit import compiled
 from ufl_beam.discretization import compiled_forms
@@ -21,7 +22,6 @@ from ufl_beam.simulation import stepper
 from ufl_beam.simulation.stepper import Prediction
 from ufl_beam.solvers import beam_elimination, newton
 from ufl_beam.solvers.substructuring import Klu
-from ufl_beam.terms import material_points
 
 plan = beam_elimination._plan
 
@@ -101,8 +101,12 @@ class Variant(NamedTuple):
             return ub.Simulation(scene, ub.EnergyMomentum(), newton=ub.Newton(**self.newton))
 
 
-CELL_BY_CELL = (compiled_forms, "element_loops", one_by_one)
-POINT_BY_POINT = (material_points, "BATCH", math.inf)
+# Besides the loops, caches of what has been compiled with them
+CELL_BY_CELL = (compiled_forms, "element_loops", one_by_one), (block, "kernels", Kernels)
+POINT_BY_POINT = (
+    (compiled_forms, "point_loop", lambda *_: None),
+    (material_points, "_point_forms", material_points.PointForms),
+)
 NO_CHAINS = (beam_elimination, "_plan", without_chains)
 NO_FRONTS = (beam_elimination, "Multifrontal", klu)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
@@ -116,7 +120,7 @@ TANGENTS, VELOCITY = "a tangent in each iteration", "guess at the last velocity"
 VARIANTS = {
     SHIPPED: Variant(),
     PETSC: Variant(newton={"petsc": {"snes_type": "newtonls"}}),
-    SCALAR: Variant((CELL_BY_CELL, POINT_BY_POINT)),
+    SCALAR: Variant((*CELL_BY_CELL, *POINT_BY_POINT)),
     WHOLE: Variant((NO_CHAINS,)),
     LEFT: Variant((NO_FRONTS,)),
     TANGENTS: Variant((ALL_TANGENTS,)),

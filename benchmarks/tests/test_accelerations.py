@@ -64,7 +64,7 @@ def state_of(simulation):
     elimination = simulation.solver._factors._elimination.c
     return {
         "newton": simulation.solver._snes.getType(),
-        "SIMD": simulation.beams[0]._force.cells.batch_size > 1,
+        "SIMD": bool(simulation.beams[0]._kernels.force.inserts),
         "two ends": elimination.count == 2,
         "no chains": elimination.left_size == len(simulation.q),
         "fronts": bool(simulation.equation.c.fronts),
