@@ -635,3 +635,19 @@ def test_equations_in_python_have_no_derivatives():
 
     with raises("NetInPython has no derivative, because its equations are in Python"):
         ub.differentiate(model, {"c": 1.0}, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05)
+
+
+@pytest.mark.parametrize("in_python", [False, True])
+def test_work_is_asked_once_with_all_forces(in_python):
+    works = (
+        (lambda at: at.work(force(1)) + at.work(force()), "call work() once"),
+        (lambda at: at.work([]), "a force for each of 1 places"),
+    )
+    for work, says in works:
+
+        def equations(at, work=work):
+            return ub.Equations(force(1), lost={"a": work(at)})
+
+        own = statement(equations, in_python=in_python)
+        with raises("Mine.equations fails", says, kind=ub.ModelError):
+            ub.Simulation(clamped(BEAM, works=[ub.Effect(own, places=[BEAM.end])]), ub.Newmark())

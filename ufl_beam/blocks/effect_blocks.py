@@ -27,10 +27,28 @@ ACCOUNTS = "stored", "lost", "supplied", "before"
 """Fields of :class:`Equations` with energies, in the order of the outputs of a step."""
 
 
+def require_work(forces: int, places: int, *, again: bool) -> None:
+    """Raise ValueError if ``work()`` is called again, or with another number of forces."""
+    if again:
+        raise ValueError("call work() once, with the sum of the forces")
+    if forces != places:
+        raise ValueError(f"work() takes a force for each of {places} places")
+
+
+def work_in_step(weight: float, before: Any, forces: Any, q0: Any, q1: Any) -> Any:
+    """Return the work of forces on the change of a motion, in the ledger of a scheme; J.
+
+    Forces before the step have the ``weight`` :attr:`Scheme.weight_of_before`.  All arguments are
+    numbers or arrays, or expressions of one component.
+    """
+    return (weight * before + (1.0 - weight) * forces) * (q1 - q0)
+
+
 class Numbers(dict[str, float]):
     """Inputs of equations in Python, see :class:`Statement`; motions and places are arrays."""
 
     axis = None
+    _worked = False
 
     def __init__(
         self, scheme: Scheme, known: Mapping[str, float], places: Array, motions: Array,
@@ -43,8 +61,9 @@ class Numbers(dict[str, float]):
 
     def work(self, forces: Sequence[Sequence[float]]) -> float:
         """Return the work of forces in the step, see :meth:`Element.work`; J."""
-        mean = self._a * self._before + (1.0 - self._a) * np.array(forces, dtype=np.float64)
-        return float((mean * (self.q1 - self.q0)).sum())
+        require_work(len(forces), len(self.q1), again=self._worked)
+        self._worked, values = True, np.array(forces, dtype=np.float64)
+        return float(work_in_step(self._a, self._before, values, self.q0, self.q1).sum())
 
 
 @dataclass(frozen=True)

@@ -411,7 +411,7 @@ class Points:
         return c
 
     def complete_derivatives(self, c: Any, neighbours: Neighbours) -> None:
-        """Connect derivatives with those of :attr:`damped`, ``block_derivatives`` of loops.h."""
+        """Let C differentiate tangents for damping; ``c``: derivatives of the damped cells."""
         # An eighth of the neighbours' distance: near the scene, and 1e-12 of round-off
         step, of = 1 / (8 * np.abs(neighbours.weights).max(axis=1)), self._derivatives.of.block
         inputs = np.zeros(of.elements * (of.width - of.modes))

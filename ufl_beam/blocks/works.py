@@ -19,7 +19,14 @@ from ufl.domain import extract_domains
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import POINT, at_points, places, positions
-from ufl_beam.blocks.effect_blocks import EffectBlock, OfPython, PythonBlock, computed
+from ufl_beam.blocks.effect_blocks import (
+    EffectBlock,
+    OfPython,
+    PythonBlock,
+    computed,
+    require_work,
+    work_in_step,
+)
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.cell_functions import AxisOfCell, Cell
@@ -100,10 +107,7 @@ class Element(dict[str, Any]):
 
     def work(self, forces: Sequence[Any]) -> Expr:
         """Return the work of forces in the step, in the ledger of the scheme; J."""
-        if self.worked is not None:
-            raise ValueError("call work() once, with the sum of the forces")
-        if len(forces) != len(self.q1):
-            raise ValueError(f"work() takes a force for each of {len(self.q1)} places")
+        require_work(len(forces), len(self.q1), again=self.worked is not None)
         self.worked = {}
         a, work, before = self.scheme.weight_of_before, ufl.as_ufl(0.0), 0.0
         for k, (f, q0, q1) in enumerate(zip(forces, self.q0, self.q1, strict=True)):
@@ -111,7 +115,7 @@ class Element(dict[str, Any]):
                 if a:
                     self.worked[name := f"force {c}{k}"] = f[i]
                     before = self.inputs[name]
-                work += (a * before + (1.0 - a) * f[i]) * (q1[i] - q0[i])
+                work += work_in_step(a, before, f[i], q0[i], q1[i])
         return work
 
     def potential(

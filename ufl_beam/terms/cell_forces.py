@@ -119,7 +119,7 @@ class CellForces:
         self._unmade = []
 
     def in_order(self) -> bool:
-        """Return whether the forces of each form are those of all cells."""
+        """Return whether each form has forces of all cells, in their order."""
         return not any(c.cell for c in self._forces)
 
     def keep_latest(self) -> None:

@@ -80,7 +80,7 @@ static void differentiate_tangents(const point_derivatives *m, const derivatives
   }
 }
 
-/* Derivatives of the state of the points at the end of the step, from those of the strains e1. */
+/* Derivatives of the state of the points at the end of the step; e1 has the derivatives of the strains. */
 void accept_points_derivative(const point_derivatives *m, const derivatives *d)
 {
   const derivatives inner = of_sections(m, d);
