@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -182,9 +182,12 @@ class PointForms:
             "answers": np.zeros(max(2 * len(law), len(end))),
         }
 
-    @cached_property
-    def table(self) -> PointTable:
+    @cache  # noqa: B019 - forms are kept in a cache of their own
+    def table(self, shapes: bool) -> PointTable:
         """Derivatives of the resultants of a section by its strains and all numbers of a point.
+
+        Args:
+            shapes: Whether parameters change strains or weights of points, the shape of a section.
 
         Returns:
             An ``element_function`` of loops.h; names of its inputs; numbers of states, numbers,
@@ -198,7 +201,8 @@ class PointForms:
         modes = [*FIXED, *strain, *before, *new, *(() if softens else of_jump)]
         B = [f"B {a}{k}" for a in range(len(strain)) for k in range(3)]
         numbers = [name for name in self._pointwise.at if name not in (*state, *modes)]
-        numbers += [*B, "weight", "rest 0", "rest 1", "rest 2"]
+        numbers += ["rest 0", "rest 1", "rest 2"]
+        (numbers if shapes else modes).extend([*B, "weight"])
         motions = [f"{e} {k}" for e in ("e1", "e0") for k in range(3)]
         compiler = Pointwise([*motions, *state, *numbers, *modes])
         at = Inputs(compiler, {name: ufl.variable(x) for name, x in compiler.at.items()})
@@ -357,8 +361,15 @@ class Points:
 
     def derivatives(self, neighbours: Neighbours) -> Any:
         """Return ``point_derivatives`` of loops.h for terms with ``points``."""
-        function, inputs, (states, numbers, unknowns, conditions) = self._forms.table
         (cells, per_cell, _), P = self._storage.shape, len(neighbours)
+
+        def shape_of(term: Any) -> Array:
+            of = term.points._section_points
+            return np.hstack([np.reshape(of.strains, (per_cell, -1)), of.weights[:, None]])
+
+        shape = shape_of(neighbours.term)
+        shapes = bool(neighbours.differences(shape_of).any())
+        function, inputs, (states, numbers, unknowns, conditions) = self._forms.table(shapes)
         n, columns = cells * per_cell, 6 + states + numbers
         place = {name: k for k, name in enumerate(self.names)}
         column = np.array([place.get(name, -1) for name in inputs], dtype=np.int32)
@@ -367,12 +378,8 @@ class Points:
 
         def numbers_of(term: Any) -> Array:
             points = term.points
-            of = points._section_points
-            more = [
-                np.reshape(of.strains, (per_cell, -1)), of.weights[:, None],
-                np.tile(of.rest / per_cell, (per_cell, 1)),
-            ]  # fmt: skip
-            tiled = np.tile(np.hstack(more), (cells, 1))
+            rest = np.tile(points._section_points.rest / per_cell, (per_cell, 1))
+            tiled = np.tile(np.hstack([rest, shape_of(term)]) if shapes else rest, (cells, 1))
             return in_batches(np.hstack([points._storage[:, :, of_w].reshape(n, -1), tiled]), BATCH)
 
         def states_of(term: Any) -> Array:
@@ -384,6 +391,9 @@ class Points:
         by_state, known = neighbours.state(states_of), numbers_of(neighbours.term)
         w = np.zeros((batches := len(known), len(inputs), BATCH))
         w[:, own] = known
+        geometry = inputs.index("B 00")
+        given = slice(geometry, geometry + shape.shape[1])
+        w[:, given] = in_batches(np.tile(shape, (cells, 1)), BATCH)
         changes = np.ones((P, columns), dtype=np.int32)
         changes[:, own] = by_number.any(axis=(1, 3))
         dofs = 3 * (np.arange(n)[:, None] // per_cell) + np.arange(3)
@@ -402,7 +412,8 @@ class Points:
             number_bar=np.zeros(known.shape), step_bar=none, shared_bar=none, strain_bar=none,
         )  # fmt: skip
         c = struct(
-            "point_derivatives", points=self.c, of=of, column=column, geometry=inputs.index("B 00"),
+            "point_derivatives", points=self.c, of=of, column=column, geometry=geometry,
+            rest=inputs.index("rest 0"),
             e0=neighbours.state(lambda term: term.points._e0), e1=np.zeros((P, cells, 3)),
             r=np.zeros((cells, 3)), e0_bar=np.zeros((cells, 3)), e1_bar=np.zeros((cells, 3)),
             r_bar=np.zeros((cells, 3)),

@@ -925,7 +925,7 @@ typedef struct {
   points *points;
   const block_derivatives *of;
   const int32_t *column;          /* index in w of `points` of each input of an element, or -1 */
-  int geometry;                   /* first input for B, weight and rest of a point */
+  int geometry, rest;             /* first inputs for B and weight, and for rest, of a point */
   double *e0, *e1, *r;            /* derivatives of strains before the step and at its end; by one parameter: of resultants */
   /* Of committed tangents, if a damping uses them: derivatives of its numbers; steps of parameters for differences. */
   double *tangents;

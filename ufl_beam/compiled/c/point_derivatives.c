@@ -38,7 +38,7 @@ static void add_changed(const point_derivatives *m, const double *y, double *D, 
 {
   const points *p = m->points;
   const int d = p->components;
-  const double *B = y + m->geometry, *rest = B + 3 * d + 1;
+  const double *B = y + m->geometry, *rest = y + m->rest;
   double *inputs = p->inputs;
   for (int j = 0; j < m->of->block->width; ++j)
     if (m->column[j] >= 0) inputs[m->column[j]] = y[j];
