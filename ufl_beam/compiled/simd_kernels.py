@@ -149,6 +149,16 @@ def without_scale(kernel: str) -> str:
     return "\n".join(kept)
 
 
+def with_stored_inputs(kernel: str, unknowns: int) -> str:
+    """Let a kernel read the inputs after the unknowns from ``c``, which avoids copies of them."""
+
+    def place(match: re.Match[str]) -> str:
+        at = int(match[1])
+        return match[0] if at < unknowns else f"c[{at - unknowns}]"
+
+    return re.sub(r"\bw\[(\d+)\]", place, kernel)
+
+
 def written(source: Path) -> list[str]:
     """Return the kernels that FFCx wrote into the file ``source`` for the integrals of a form."""
     code = source.read_text() if source.exists() else ""
@@ -248,7 +258,9 @@ def _loops(
         macros.append("".join(f"\n#undef {x}\n#define {x} {value}" for x, value in defined))
 
     def code() -> str:
-        own = map(in_vectors, map(without_scale, written(source)))
+        own = list(map(in_vectors, map(without_scale, written(source))))
+        for k in range(files.count("assembly_simd.c")):
+            own[k] = with_stored_inputs(own[k], unknowns)
         bodies = zip(macros, own, loops, strict=True)
         return head + "".join(f"{defined}\n{body}\n{loop}" for defined, body, loop in bodies)
 

@@ -86,7 +86,7 @@ static inline void take_unknowns(const int32_t *dofs, const double *q, int some,
 
 static void add_in_lanes(const cells *c, const double *q, double *b)
 {
-  lanes e[ENTRIES], w[WIDTH], x[6] = {0}, none[1] = {0};
+  lanes e[ENTRIES], w[UNKNOWNS], x[6] = {0};
   x[3] = ALL(1);
   for (int first = 0; first < c->number; first += LANES) {
     const int some = c->number - first < LANES ? c->number - first : LANES;
@@ -94,9 +94,10 @@ static void add_in_lanes(const cells *c, const double *q, double *b)
     const int32_t *dofs = c->dofs + (size_t)first * UNKNOWNS;
     if (some == LANES) take_unknowns(dofs, q, LANES, w);
     else take_unknowns(dofs, q, some, w);
-    for (int i = UNKNOWNS; i < WIDTH; ++i) w[i] = stored[i - UNKNOWNS];
+    /* Processors do not find the next batch by themselves if unused inputs lie between. */
+    for (int i = 0; i < WIDTH - UNKNOWNS; ++i) __builtin_prefetch(stored + i + c->width);
     memset(e, 0, sizeof e);
-    tabulate(e, w, none, x);
+    tabulate(e, w, stored, x);
     if (c->each) memcpy(c->each + (size_t)first * ENTRIES, e, sizeof e);
     if (!b) continue;
     if (some == LANES) insert_batch(c, e, first, LANES, b);

@@ -67,6 +67,7 @@ static void gather(const element_block *b, const double *q, int first)
   const int n = b->lanes, all = b->unknowns * n;
   FOR_ACTING(b, c) {
     double *w = input(b, c, first);
+    for (int i = 0; i < b->unknowns; ++i) __builtin_prefetch(w + (b->width + i) * n, 1); /* see add_in_lanes */
     if (b->inserted) /* as of forms, cell after cell; copies of the last cell fill up the lanes */
       for (int l = 0; l < n; ++l) {
         const int last = b->elements - 1, cell = c * n + l;

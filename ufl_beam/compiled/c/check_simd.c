@@ -6,10 +6,10 @@
 void compute_both(void *of_ffcx, const double *w, double *one, double *several)
 {
   const double x_l[6] = {[3] = 1};
-  lanes e[ENTRIES], x[6] = {0}, none[1] = {0};
+  lanes e[ENTRIES], x[6] = {0};
   x[3] = ALL(1);
   memset(e, 0, sizeof e);
-  tabulate(e, (const lanes *)w, none, x);
+  tabulate(e, (const lanes *)w, (const lanes *)w + UNKNOWNS, x);
   memcpy(several, e, sizeof e);
   for (int l = 0; l < LANES; ++l) {
     double w_l[WIDTH + 1], e_l[ENTRIES] = {0};
