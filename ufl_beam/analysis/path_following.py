@@ -12,7 +12,7 @@ from typing import cast
 from mpi4py import MPI
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
+import scipy  # its subpackages are loaded when they are used
 
 from ufl_beam.analysis.critical_points import Branch, Candidate, CriticalPoint, Stiffness
 from ufl_beam.analysis.path_controls import Control, Crossing, PathCorrector
@@ -466,7 +466,7 @@ class PathStepper:
         if not whole[-1] * first.direction[-1] * last.direction[-1]:
             raise StepFailed("the load factor turns here")
         speeds = [whole[-1] / state.direction[-1] * state.direction for state in pair]
-        path = CubicHermiteSpline([0.0, 1.0], [first.end, last.end], speeds)
+        path = scipy.interpolate.CubicHermiteSpline([0.0, 1.0], [first.end, last.end], speeds)
         (x0, λ0), (x, λ) = ((float(k), state.stiffness.softest[0]) for k, state in enumerate(pair))
         for _ in range(MOST_CROSSING_STEPS):
             x0, x = x, (x0 * λ - x * λ0) / (λ - λ0) if λ != λ0 else math.nan

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.integrate import trapezoid
-from scipy.optimize import brentq
+import scipy  # its subpackages are loaded when they are used
 
 from ufl_beam.analysis.spectra import Spectrum, spectral_accelerations
 from ufl_beam.arrays import Array
@@ -223,7 +222,7 @@ class Pushover(Rich):
         """
         corner = require_number(corner, "n2: corner", positive=True)
         d, V = self._curve(upto, "n2")
-        energy = float(trapezoid(V, d))
+        energy = float(scipy.integrate.trapezoid(V, d))
         strength = float(V[-1])
         yields = 2.0 * (float(d[-1]) - energy / strength)
         if yields * self.stiffness < 0.99 * strength:
@@ -296,7 +295,7 @@ def bilinear(d: Array, V: Array, end: float) -> tuple[float, float]:
     """
     last, inside = float(np.interp(end, d, V)), d < end
     d, V = np.append(d[inside], end), np.append(V[inside], last)
-    energy = float(trapezoid(V, d))
+    energy = float(scipy.integrate.trapezoid(V, d))
     rising = np.maximum.accumulate(V)
 
     def stiffness(strength: float) -> float:
@@ -309,5 +308,5 @@ def bilinear(d: Array, V: Array, end: float) -> tuple[float, float]:
 
     if more(last) <= STRAIGHT:
         return last, stiffness(last)
-    strength = float(brentq(more, 1e-6 * last, last, xtol=1e-12 * last))
+    strength = float(scipy.optimize.brentq(more, 1e-6 * last, last, xtol=1e-12 * last))
     return strength, stiffness(strength)
