@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable
 from itertools import cycle, pairwise
 from pathlib import Path
+from textwrap import fill
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +41,7 @@ from switches import SHIPPED, VARIANTS
 import ufl_beam as ub
 
 PAGE = Path(__file__).parents[1] / "docs" / "accelerations.md"
+WIDTH = 155  # of lines of the page
 
 WARM = 3  # steps before the states are compared
 EQUAL = 1e-9
@@ -254,12 +256,13 @@ def conditions(cases, seconds):
     """How it was measured."""
     here, loads = machine(), sorted(case["load"] for case in cases)
     steps = {(c["cells"], c["rounds"] * c["steps"]) for c in cases}
-    return (
+    return fill(
         f"Commit {here['commit']}, Python {here['python']}, DOLFINx {here['dolfinx']}, "
         f"{here['processor']}, {os.cpu_count()} cores, one thread; load average {loads[0]:.1f} to "
         f"{loads[-1]:.1f}; {seconds / 60:.0f} minutes. Steps of each variant: "
         + ", ".join(f"{number} with {cells} cells" for cells, number in sorted(steps))
-        + "."
+        + ".",
+        WIDTH,
     )
 
 
@@ -269,9 +272,10 @@ def paragraphs(found):
         least, most = (number(f(found[name].values())) for f in (min, max))
         where = ", ".join(f"`{file}`" for file in files(one.code))
         said = f" {count(one.code)} lines in {where}." if where else ""
-        yield (
+        yield fill(
             f"**{name[0].upper()}{name[1:]}**. {one.text} Gain {least} to {most}: "
-            f'"{one.with_}" compared with "{one.without}".{said}'
+            f'"{one.with_}" compared with "{one.without}".{said}',
+            WIDTH,
         )
 
 

@@ -12,7 +12,6 @@ line per case goes to ``benchmarks/results/bench_idle.jsonl``.
 """
 
 import argparse
-import datetime
 import statistics
 import tempfile
 import time
@@ -201,7 +200,7 @@ def table(records, rounds):
     of, sizes = machine(), list(dict.fromkeys(record["cells"] for record in records))
     heads = [x for n in sizes for x in (f"ratio, {n} cells", f"µs more, {n} cells")]
     lines = [
-        f"Commit {of['commit']}, {datetime.date.today()}, {of['processor']}; {rounds} rounds.", "",
+        f"Commit {of['commit']}, {of['processor']}; {rounds} rounds.", "",
         f"| idle effect | {' | '.join(heads)} |", "|---" + "|--:" * len(heads) + "|",
     ]  # fmt: skip
     for name in dict.fromkeys(record["case"] for record in records):

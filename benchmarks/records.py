@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What benchmarks keep of a measurement: a line of JSON, with commit, versions and machine."""
 
+import datetime
 import json
 import platform
 import subprocess
@@ -41,12 +42,12 @@ def _has_records(value):
 
 @cache
 def machine():
-    """Commit, versions and machine of a measurement."""
+    """Commit and date, versions and machine of a measurement."""
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
     ).stdout.strip()
     return {
-        "commit": commit or "unknown",
+        "commit": f"{commit or 'unknown'}, {datetime.date.today()}",
         "python": platform.python_version(),
         "dolfinx": dolfinx.__version__,
         "machine": platform.machine(),

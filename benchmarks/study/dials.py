@@ -16,12 +16,20 @@ SCHEMES: dict[str, ub.mechanics.time_scheme.Scheme] = {
     "EnergyMomentum(0.05, 0.05)": ub.EnergyMomentum(alpha=0.05, beta=0.05),
     "EnergyMomentumDecaying": ub.EnergyMomentumDecaying(),
     "EnergyMomentumPrinted": ub.EnergyMomentumPrinted(),
+    "EnergyMomentum(order=4)": ub.EnergyMomentum(order=4),
     "Newmark": ub.Newmark(),
     "GeneralizedAlpha": ub.GeneralizedAlpha(),
 }
 STATIC: dict[str, ub.mechanics.time_scheme.Scheme] = {
     "Static": ub.Static(),
     "EnergyMomentumStatic": ub.EnergyMomentumStatic(),
+}
+
+
+SOLVERS = {
+    "Newton's method in C": {},
+    "PETSc's newtonls": {"petsc": {"snes_type": "newtonls"}},
+    "the card": {"reference": True},
 }
 
 
@@ -35,6 +43,7 @@ class Setting:
         refine: Parts of each of the coarsest cells.
         degree: Of the cells.
         lumped: Whether masses are those of nodes.
+        solver: Name, see SOLVERS.
         rtol: Of Newton's method.
         adaptive: Tolerance of adaptive steps, instead of equal steps; 0: none.
         every: Steps from one that is kept to the next.
@@ -46,6 +55,7 @@ class Setting:
     refine: int
     degree: int = 1
     lumped: bool = False
+    solver: str = "Newton's method in C"
     rtol: float = 1e-10
     adaptive: float = 0.0
     every: int = 1
@@ -60,7 +70,7 @@ class Setting:
             "t": (0.0, case.end),
             "dt": ub.Adaptive(self.adaptive, stops=stops) if self.adaptive else dt,
             "mesh": ub.Mesh(refine=self.refine, degree=self.degree, lumped=self.lumped),
-            "newton": ub.Newton(rtol=self.rtol),
+            "newton": ub.Newton(rtol=self.rtol, **SOLVERS[self.solver]),
             "every": self.every,
         }
 
@@ -114,6 +124,8 @@ def one_by_one(case: Case, quick: bool) -> Iterator[tuple[str, Setting]]:
             if scheme != here.scheme:
                 yield f"scheme: {scheme}", replace(here, scheme=scheme)
         yield "mass: lumped", replace(here, lumped=True)
+    for solver in list(SOLVERS)[1:]:
+        yield f"solver: {solver}", replace(here, solver=solver)
     for rtol in (1e-8, 1e-6, 1e-4):
         yield f"Newton: rtol {rtol:g}", replace(here, rtol=rtol)
     steps = case.steps * 2**here.halvings // len(case.instants)

@@ -14,7 +14,7 @@ from ufl_beam.analysis.richardson import pareto
 from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY
 
 Case = dict[str, Any]
-COLORS = (BLUE, SKY, GREEN, PINK, ORANGE, RED)
+COLORS = (BLUE, SKY, GREEN, PINK, ORANGE, RED, INK)
 MARKERS = {1: "o", 2: "s", 3: "^"}
 
 
@@ -49,7 +49,7 @@ def draw_dials(cases: list[Case], path: Path) -> None:
     names = list(dict.fromkeys(run["dial"] for case in cases for run in case["dials"]))
     with ub.picture((11.0, 1.5 + 0.33 * len(names))) as figure:
         left, right = figure.subplots(1, 2, sharey=True)
-        for case, color in zip(cases, (*COLORS, INK), strict=False):
+        for case, color in zip(cases, COLORS, strict=False):
             here = case["base"]
             runs = [run for run in case["dials"] if "failed" not in run and "failed" not in here]
             rows = [names.index(run["dial"]) for run in runs]

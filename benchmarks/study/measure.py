@@ -66,7 +66,7 @@ class Bench:
 
     def _run(self, setting: Setting, times: int) -> dict[str, Any]:
         try:
-            form = (setting.scheme, setting.degree, setting.lumped)
+            form = (setting.scheme, setting.degree, setting.lumped, setting.solver)
             if form not in self._compiled:
                 self._simulate(setting)
                 self._compiled.add(form)
