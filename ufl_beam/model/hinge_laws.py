@@ -417,7 +417,9 @@ class IbarraKrawinkler(_DeterioratingHinge):
     where E_n is the energy that this excursion has dissipated up to the reversal.  It remains above
     a tenth of the elastic one and above twice the hardening slope, and changes neither on elastic
     lines nor where the moment changes its sign.  When one of the β reaches 1, the moment is
-    zero after the end of the excursion.  After Ibarra, Medina and Krawinkler, Earthquake Eng.
+    zero after the end of the excursion.  The entry "plastic" of the ledger is the work minus the
+    energy M²/2K that unloading with the present stiffness K would return.  It falls where K falls
+    fast at a nearly constant moment.  After Ibarra, Medina and Krawinkler, Earthquake Eng.
     Struct. Dyn. 34 (2005), and Lignos and Krawinkler, J. Struct. Eng. 137 (2011).
 
     Args:
