@@ -142,17 +142,20 @@ class Block(LoadTerm):
                 getattr(self._ledger, account)[entry] += 0.0
         if supplies:
             self._ledger.supplied[supplies] += 0.0
-        n, motions, states = len(elements.indices), len(statement.unknowns), len(statement.state)
-        shares, groups = len(statement.shared), elements.number_of_groups
+        n, fields, groups = len(elements.indices), made.fields, elements.number_of_groups
+        motions, states, shares, width, numbers, modes, stored = (
+            fields[x]
+            for x in ("unknowns", "states", "shares", "width", "numbers", "modes", "stored")
+        )
         in_time, functions = elements.in_time, len(elements.in_time)
         dofs = np.asarray(elements.dofs, dtype=np.int32).reshape(n, motions)
-        loaded: Array = np.zeros(subdomain.size)
         loads = n if kind == "loads" else 0
+        self.dofs: Index = np.zeros(0, np.int32)
         if kind == "loads":  # all processes have blocks of loads
+            loaded: Array = np.zeros(subdomain.size)
             loaded[dofs] = 1.0
             # Other processes may load degrees of freedom that this process owns.
-            loaded = subdomain.added(loaded)
-        self.dofs: Index = np.flatnonzero(loaded).astype(np.int32)
+            self.dofs = np.flatnonzero(subdomain.added(loaded)).astype(np.int32)
         # Positions in the array of a step: functions of time, OF_STEP, shared numbers of each group
         more = {name: functions + i for i, name in enumerate(OF_STEP)}
         first = functions + len(more if statement.rates else OF_STEP[: lib.NUMBERS_OF_STEP])
@@ -161,32 +164,25 @@ class Block(LoadTerm):
         from_ = [np.broadcast_to(index[x], n) for x in (*statement.of_step, *statement.shared)]
         self._of_step = first + shares * groups
         of_groups = np.broadcast_to(elements.groups, n)[: n if shares else 0]
-        width, modes = len(statement.inputs), len(statement.all_modes)
         after = width - modes - len(from_)
-        self._w: Array = np.zeros((-(-n // BATCH), width, BATCH))
-        self._numbers = self._w[:, after - len(statement.numbers) : after]
+        self._w: Array = np.zeros((batches := -(-n // BATCH), width, BATCH))
+        self._numbers = self._w[:, after - numbers : after]
+        row = np.empty(batches * BATCH)
         for k, number in enumerate(elements.numbers):  # one by one, as all may be large
-            self._numbers[:, k] = in_batches(np.asarray(number).reshape(n, 1), BATCH)[:, 0]
-        self._states = np.zeros((len(self._w), states, BATCH))
+            row[:n] = np.asarray(number).reshape(n)
+            row[n:] = row[n - 1 : n]
+            self._numbers[:, k] = row.reshape(batches, BATCH)
+        self._states = np.zeros((batches, states, BATCH))
         self.state = {z: self._states[:, k] for k, z in enumerate(statement.state)}
-        batches, rows = len(self._w), motions + states + shares
-        known = {f"last {name}": k for k, name in enumerate(statement.modes)}
-        begins = np.full(len(known), -1, dtype=np.int32)
-        for k, z in enumerate(statement.state):
-            if z in known:
-                begins[known[z]] = k
-        functions_of = made.force, made.tangent, made.end, made.mode
-        most = max(f.outputs for f in functions_of if f is not None)
         inserted = statement.inserts
         each, second = np.zeros((2, 0 if inserted else batches, made.force.outputs, BATCH))
-        self.recorded: Array = np.zeros((n, len(statement.recorded)))
-        table = (rows + MOST_MARGINS) * (width + 1)
-        self._out: Array = np.zeros((1 if inserted else batches) * BATCH * most)
+        self.recorded: Array = np.zeros((n, fields["recorded"]))
+        table = (motions + states + shares + MOST_MARGINS) * (width + 1)
+        self._out: Array = np.zeros((1 if inserted else batches) * BATCH * made.most)
         self._each = ffi.new("double *[1]", [doubles(each)]), each
         self._times, self._t = np.zeros((3, self._of_step)), np.full(2, float(t0))
         self._begun = np.zeros(1, dtype=np.int32)
         self._forces = np.zeros((2, len(self.dofs)))
-        stored, *entered = map(len, made.energies.values())
         self._energy = np.zeros(stored)
         self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
         self._shared = np.zeros((groups, shares))
@@ -194,14 +190,10 @@ class Block(LoadTerm):
         ranges = np.ascontiguousarray(self._numbers[:, ranged])
         self._nodal = nodal if statement.rates else ffi.NULL
         self._c = struct(
-            "element_block", force_of=made.force, tangent_of=made.tangent or ffi.NULL,
-            end_of=made.end or ffi.NULL, lanes=BATCH, elements=n, batches=batches,
-            unknowns=motions, rates=statement.rates, states=states, numbers=len(statement.numbers),
-            steps=len(from_), modes=modes, width=width,
+            "element_block", **fields, lanes=BATCH, elements=n, batches=batches,
             dofs=ffi.NULL if inserted else in_batches(dofs, BATCH),
             acting=np.full(1, batches, dtype=np.int32), batch=np.arange(batches, dtype=np.int32),
-            ranges=len(statement.acts_at), range=ranges,
-            size=len(self.dofs), dof=self.dofs,
+            range=ranges, size=len(self.dofs), dof=self.dofs,
             at=in_batches(np.searchsorted(self.dofs, dofs[:loads]).astype(np.int32), BATCH),
             entry=ffi.NULL if inserted else self._entries(made), functions=functions,
             when=np.array([TIMES.index(x.when) for x in in_time], dtype=np.int32), t=self._t,
@@ -209,20 +201,15 @@ class Block(LoadTerm):
             now=self._times[0], end=self._times[1], before=self._times[2],
             **{"from": in_batches(np.array(from_, dtype=np.int32).reshape(len(from_), n).T, BATCH)},
             state=self._states, w=self._w, out=self._out,
-            space=np.zeros(3 * motions + 2 + width + max(most, table)),
+            space=np.zeros(3 * motions + 2 + width + max(made.most, table)),
             each=self._each[0],
             force=self._forces[0], force_before=self._forces[1],
-            weight_of_before=scheme.weight_of_before, stored=stored, lost=entered[0],
-            entered=sum(entered), knows_before=made.knows_before, power_of=made.power or ffi.NULL,
-            mode_of=made.mode or ffi.NULL, begins=begins,
+            weight_of_before=scheme.weight_of_before,
             holds=np.zeros(n * statement.laws, dtype=np.int32),
-            energy=self._energy, nodal=self._nodal, groups=groups, shares=shares,
-            kept=shares - len(statement.trial), shared=self._shared,
+            energy=self._energy, nodal=self._nodal, groups=groups, shared=self._shared,
             new_shared=np.zeros(self._shared.shape), totals=ffi.new("int[]", self._shared.size),
             group=in_batches(of_groups.astype(np.int32)[:, None], BATCH),
-            laws=statement.laws, scene=subdomain.numbering.scene.size, record=self.recorded,
-            recorded=len(statement.recorded),
-            recorded_kind=ffi.new("int[]", [*statement.recorded.values()]),
+            scene=subdomain.numbering.scene.size, record=self.recorded,
         )  # fmt: skip
         tangent = loop("add_block_tangent", self._c) if made.tangent else None
         self.loops = loop("add_block", self._c), tangent

@@ -18,7 +18,7 @@ import ufl
 from ufl.classes import Zero
 from ufl.core.expr import Expr
 
-from ufl_beam.compiled.c_library import lib, names
+from ufl_beam.compiled.c_library import ffi, in_c, lib, names
 from ufl_beam.discretization.compiled_forms import Pointwise, components, with_shared_nodes
 from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.terms.derivatives import margins
@@ -358,6 +358,8 @@ class Kernels:
         end: New state, recorded numbers, and stored, lost and supplied energies; None if there
             are none.
         energies: Names of these energies in the ledger, by account.
+        fields: Fields of ``element_block`` of loops.h that all blocks of the statement share.
+        most: Largest number of outputs of a function of a step.
     """
 
     def __init__(self, statement: Statement) -> None:
@@ -391,6 +393,26 @@ class Kernels:
                 inserted=sum(map(bool, cells)) if whole else 0,
             )
         )
+
+        functions = self.force, self.tangent, self.end, self.mode
+        self.most = max(function.outputs for function in functions if function is not None)
+        state, last = list(statement.state), [f"last {name}" for name in statement.modes]
+        begins = [state.index(name) if name in state else -1 for name in last]
+        stored, lost, supplied = map(len, self.energies.values())
+        self.fields = in_c({
+            "force_of": self.force, "tangent_of": self.tangent or ffi.NULL,
+            "end_of": self.end or ffi.NULL, "power_of": self.power or ffi.NULL,
+            "mode_of": self.mode or ffi.NULL, "unknowns": len(statement.unknowns),
+            "rates": statement.rates, "states": len(state), "numbers": len(statement.numbers),
+            "steps": len(statement.of_step) + len(statement.shared),
+            "modes": len(statement.all_modes), "width": len(statement.inputs),
+            "ranges": len(statement.acts_at), "stored": stored, "lost": lost,
+            "entered": lost + supplied, "knows_before": self.knows_before,
+            "begins": np.array(begins, dtype=np.int32), "shares": len(statement.shared),
+            "kept": len(statement.shared) - len(statement.trial), "laws": statement.laws,
+            "recorded": len(recorded),
+            "recorded_kind": ffi.new("int[]", [*statement.recorded.values()]),
+        })  # fmt: skip
 
     def _in_tangent(self, slopes: list[Expr], at: Inputs) -> list[Expr]:
         """Replace intermediate numbers by their values in the tangent, which are numbers, too."""
