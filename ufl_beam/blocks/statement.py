@@ -398,7 +398,7 @@ class Kernels:
         self.most = max(function.outputs for function in functions if function is not None)
         state, last = list(statement.state), [f"last {name}" for name in statement.modes]
         begins = [state.index(name) if name in state else -1 for name in last]
-        stored, lost, supplied = map(len, self.energies.values())
+        stored, *entered = map(len, self.energies.values())
         self.fields = in_c({
             "force_of": self.force, "tangent_of": self.tangent or ffi.NULL,
             "end_of": self.end or ffi.NULL, "power_of": self.power or ffi.NULL,
@@ -406,8 +406,8 @@ class Kernels:
             "rates": statement.rates, "states": len(state), "numbers": len(statement.numbers),
             "steps": len(statement.of_step) + len(statement.shared),
             "modes": len(statement.all_modes), "width": len(statement.inputs),
-            "ranges": len(statement.acts_at), "stored": stored, "lost": lost,
-            "entered": lost + supplied, "knows_before": self.knows_before,
+            "ranges": len(statement.acts_at), "stored": stored, "lost": entered[0],
+            "entered": sum(entered), "knows_before": self.knows_before,
             "begins": np.array(begins, dtype=np.int32), "shares": len(statement.shared),
             "kept": len(statement.shared) - len(statement.trial), "laws": statement.laws,
             "recorded": len(recorded),
