@@ -153,9 +153,12 @@ def test_processes_agree(seed, shared_path):
 @pytest.mark.serial
 @pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 def test_few_combinations_are_refused_or_fail(tmp_path):
-    """In statics what breaks or flows has limit loads, beyond which there is no equilibrium."""
+    """In statics what breaks or flows has limit loads, beyond which there is no equilibrium.
+
+    Embedded hinges and fibres in one section, which some seeds draw, are refused.
+    """
     found = [outcome_of(draw(seed), tmp_path, ["failed_step"]) for seed in range(NUMBER)]
     refused = sum("run" in one for one in found)
     failed = sum(one.get("failed_step") == "passed" for one in found)
-    assert refused <= 0.01 * NUMBER
+    assert refused <= 0.02 * NUMBER
     assert failed <= 0.03 * NUMBER

@@ -99,6 +99,7 @@ def test_random_starts_end_at_the_same_minimum(exact):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*ended where computed values jump")
 @pytest.mark.parametrize("given", [True, False])
 def test_intervals_cover_the_truth_in_95_of_100_data_sets(exact, given):
     """The number is binomial with mean 95 and standard deviation 2.2."""
