@@ -112,7 +112,8 @@ static inline lanes quotient(lanes a, lanes b, lanes over_b)
   const lanes near = a * over_b;
   lanes rest;
   for (int l = 0; l < LANES; ++l) rest[l] = __builtin_fma(-near[l], b[l], a[l]);
-  return PICK(rest - rest == 0, near + over_b * rest, near); /* infinite numbers have no remainder */
+  const lanes more = over_b * rest;
+  return near + (lanes)((mask)more & (more - more == 0)); /* infinite numbers have no remainder */
 #else
   return a / b;
 #endif
