@@ -156,6 +156,8 @@ def with_stored_inputs(kernel: str, unknowns: int) -> str:
         at = int(match[1])
         return match[0] if at < unknowns else f"c[{at - unknowns}]"
 
+    if other := re.search(r"\bw\[(?!\d+\]).*", kernel):
+        raise Refused(f"inputs are not read one by one: {other[0]}")
     return re.sub(r"\bw\[(\d+)\]", place, kernel)
 
 
