@@ -2,6 +2,7 @@
 """The adjoint of runs, against direct differentiation of the same runs."""
 
 import dataclasses
+import inspect
 import math
 from dataclasses import dataclass
 from itertools import pairwise
@@ -522,3 +523,21 @@ def test_friction_with_the_force_of_a_joint_is_refused_by_name():
         return ub.Scene([beam], supports=[pin], connectors=[brake])
 
     refused("Coulomb has no derivatives", brake)
+
+
+@pytest.mark.parametrize("name", ["damping by tangents, fibres", "damping by tangents, hinge"])
+def test_a_derivative_does_not_depend_on_other_parameters(name):
+    """Directly, where tangents are differenced along the motion of each parameter."""
+    model, _, scheme, end, dt = CASES[name]
+    values = {key: x.default for key, x in inspect.signature(model).parameters.items()}
+
+    def sway(solution):
+        return solution.displacement(solution.scene.beams[0].end)[:, 0]
+
+    def derivatives(at):
+        return ub.differentiate(model, at, scheme, t=(0.0, end / 4), dt=dt, progress=False).of(sway)
+
+    together = derivatives(values)
+    for k, (key, value) in enumerate(values.items()):
+        alone = derivatives({key: value})[:, 0]
+        assert np.abs(together[:, k] - alone).max() <= 1e-9 * np.abs(alone).max(), key

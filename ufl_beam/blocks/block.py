@@ -167,11 +167,8 @@ class Block(LoadTerm):
         after = width - modes - len(from_)
         self._w: Array = np.zeros((batches := -(-n // BATCH), width, BATCH))
         self._numbers = self._w[:, after - numbers : after]
-        row = np.empty(batches * BATCH)
         for k, number in enumerate(elements.numbers):  # one by one, as all may be large
-            row[:n] = np.asarray(number).reshape(n)
-            row[n:] = row[n - 1 : n]
-            self._numbers[:, k] = row.reshape(batches, BATCH)
+            self._numbers[:, k] = in_batches(np.asarray(number).reshape(n, 1), BATCH)[:, 0]
         self._states = np.zeros((batches, states, BATCH))
         self.state = {z: self._states[:, k] for k, z in enumerate(statement.state)}
         inserted = statement.inserts

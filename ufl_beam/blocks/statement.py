@@ -18,7 +18,7 @@ import ufl
 from ufl.classes import Zero
 from ufl.core.expr import Expr
 
-from ufl_beam.compiled.c_library import ffi, in_c, lib, names
+from ufl_beam.compiled.c_library import ffi, lib, names
 from ufl_beam.discretization.compiled_forms import Pointwise, components, with_shared_nodes
 from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.terms.derivatives import margins
@@ -399,7 +399,7 @@ class Kernels:
         state, last = list(statement.state), [f"last {name}" for name in statement.modes]
         begins = [state.index(name) if name in state else -1 for name in last]
         stored, *entered = map(len, self.energies.values())
-        self.fields = in_c({
+        self.fields: dict[str, Any] = {
             "force_of": self.force, "tangent_of": self.tangent or ffi.NULL,
             "end_of": self.end or ffi.NULL, "power_of": self.power or ffi.NULL,
             "mode_of": self.mode or ffi.NULL, "unknowns": len(statement.unknowns),
@@ -412,7 +412,7 @@ class Kernels:
             "kept": len(statement.shared) - len(statement.trial), "laws": statement.laws,
             "recorded": len(recorded),
             "recorded_kind": ffi.new("int[]", [*statement.recorded.values()]),
-        })  # fmt: skip
+        }  # fmt: skip
 
     def _in_tangent(self, slopes: list[Expr], at: Inputs) -> list[Expr]:
         """Replace intermediate numbers by their values in the tangent, which are numbers, too."""

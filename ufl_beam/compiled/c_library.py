@@ -117,14 +117,14 @@ def fill(struct: Any, **fields: Any) -> Any:
 
     Arrays of float64 or int32 become pointers.
     """
-    values = in_c(fields)
+    values = _in_c(fields)
     for name, value in values.items():
         setattr(struct, name, value)
     _alive.setdefault(struct, {}).update(values)
     return struct
 
 
-def in_c(fields: dict[str, Any]) -> dict[str, Any]:
+def _in_c(fields: dict[str, Any]) -> dict[str, Any]:
     """Return the values of fields, with pointers to arrays instead of the arrays."""
     for name, value in fields.items():
         if isinstance(value, np.ndarray):
@@ -134,7 +134,7 @@ def in_c(fields: dict[str, Any]) -> dict[str, Any]:
 
 def struct(kind: str, **fields: Any) -> Any:
     """Return a pointer to a new struct of loops.h, see :func:`fill`."""
-    values = in_c(fields)
+    values = _in_c(fields)
     _alive[made := ffi.new(f"{kind} *", values)] = values
     return made
 

@@ -69,7 +69,7 @@ static void differentiate_tangents(const point_derivatives *m, const derivatives
       double D[9] = {0}, C[3] = {0};
       for (int i = c * p->of_cell; i < (c + 1) * p->of_cell; ++i) {
         double *y = inputs_of(m, i);
-        find_direction(m->of, inner, i / b->lanes, q, inner->q1);
+        find_direction(m->of, inner, i / b->lanes, q, inner->q1 + (size_t)q * inner->size);
         for (int j = 0; j < columns(b); ++j) y[j] += NEAR[k] * m->step[q] * m->of->direction[j * b->lanes + i % b->lanes];
         add_changed(m, y, D, C);
       }
