@@ -146,7 +146,7 @@ def empty_cache(tmp_path, monkeypatch):
 def test_flags_of_the_user_reach_c_and_are_part_of_its_key(empty_cache, monkeypatch):
     source = "int get(void) { return CHOSEN; }"
     for number in (3, 4):
-        monkeypatch.setattr(jit, "FLAGS", [f"-DCHOSEN={number}"])
+        monkeypatch.setattr(jit, "FLAGS", ["-UCHOSEN", f"-DCHOSEN={number}"])
         module = jit.compiled(
             "flags", "int get(void);", lambda: source, depends_on=[source], flags=["-DCHOSEN=1"]
         )
