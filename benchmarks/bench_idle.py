@@ -23,6 +23,7 @@ import numpy as np
 from records import keep, machine
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.simulation import run as runs
 
 PAGE = Path(__file__).parents[1] / "docs" / "steps.md"
@@ -87,7 +88,7 @@ FIXED = {"foot": ub.Pinned, "connectors": lambda beam, body: [
 """Scene whose beam is pinned, and a motor at rest holds its rotation."""
 
 SPRING, STOP = slide(ub.Spring(1e4)), slide(ub.Stop(1e5, low=-0.5))
-CURVE = ub.SNCurve.eurocode(71e6)
+CURVE = st.SNCurve.eurocode(71e6)
 AS_LONG = ub.Adaptive(1.0, first=DT, longest=DT)
 """Adaptive steps with a tolerance that allows the longest step."""
 
@@ -146,7 +147,7 @@ CASES = {
     "`Extremes`": ({"record": lambda beam: [ub.Extremes()]}, {}),
     "`Fatigue` at one spot": (
         {"record": lambda beam: [
-            ub.Fatigue(ub.HotSpot.fibre(beam.start, y=0.01, E=210e9), CURVE)
+            st.Fatigue(st.HotSpot.fibre(beam.start, y=0.01, E=210e9), CURVE)
         ]}, {},
     ),
     "`History` of one place, a row every 1000 steps": (

@@ -20,6 +20,7 @@ from bench_step import time_loop
 from records import keep, machine
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 
 def flying_beam(cells, **laws):
@@ -56,9 +57,9 @@ LAW = ub.ElastoPlastic(yield_limit=1.0, kinematic=10.0)
 FIBRES = ub.Fibres(ub.ElastoPlastic(250e6, kinematic=2e9), number=200)
 TENSION = ub.Softening(250e6, 5e6)
 LAWS = {
-    "MenegottoPinto": ub.MenegottoPinto(250e6, 0.01),
-    "KentPark": ub.KentPark(250e6, residual=200e6, ultimate=0.05, tension=TENSION),
-    "Mander": ub.Mander(500e6, strain=0.005, tension=TENSION),
+    "MenegottoPinto": st.MenegottoPinto(250e6, 0.01),
+    "KentPark": st.KentPark(250e6, residual=200e6, ultimate=0.05, tension=TENSION),
+    "Mander": st.Mander(500e6, strain=0.005, tension=TENSION),
 }
 PAIRS = {  # name: (scene without, scene with, steps, dt)
     "8 cells, all yield": (flying_beam(8), flying_beam(8, bending=LAW), 500, 0.01),

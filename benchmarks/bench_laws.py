@@ -49,7 +49,7 @@ def scene(add):
 
 
 @dataclass(frozen=True)
-class Cubic(ub.ConnectorLaw):
+class Cubic(ub.extend.ConnectorLaw):
     """A spring that stiffens."""
 
     stiffness: float
@@ -59,7 +59,7 @@ class Cubic(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Mount(ub.ConnectorLaw):
+class Mount(ub.extend.ConnectorLaw):
     """A mount that stiffens in all directions together."""
 
     stiffness: float
@@ -71,7 +71,7 @@ class Mount(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Brake(ub.ConnectorLaw):
+class Brake(ub.extend.ConnectorLaw):
     """More to break loose than to slide."""
 
     rest: float

@@ -132,7 +132,7 @@ def main():
         for tolerance in (1e-2, 1e-3, 1e-4):
             try:
                 found, one = answer(question, reference, tolerance)
-            except ub.TradeoffError as error:
+            except ub.errors.TradeoffError as error:
                 print(f"{question.case.name:20s} {tolerance:6.0e} refused: {error}")
                 continue
             if options.say:

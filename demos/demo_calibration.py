@@ -9,8 +9,8 @@
 #
 # This demo shows
 #
-# * `ub.Measurement`, measured values with the run that computes them,
-# * `ub.calibrate`, weighted least squares from several starts, and its `Calibration`,
+# * `st.Measurement`, measured values with the run that computes them,
+# * `st.calibrate`, weighted least squares from several starts, and its `Calibration`,
 # * intervals from each test alone, correlations, and a warning if one test is not enough.
 
 # %%
@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 output = Path("output")
 output.mkdir(exist_ok=True)
@@ -99,7 +100,7 @@ for name, test in tests.items():
     run = ub.simulate(scene, test["scheme"], t=test["t"], dt=test["dt"])
     values = test["quantity"](run)[2::2]
     noise = 0.02 * np.abs(values).max() * random.normal(size=len(values))
-    measured[name] = ub.Measurement(
+    measured[name] = st.Measurement(
         run.times[2::2], values + noise, name=name, arguments={"test": name}, **test
     )
 
@@ -116,10 +117,10 @@ start = {
     "energy": (10e3, 3e3, 12e3),  # J
     "stiffness": (5e6, 1.5e6, 6e6),  # N m/rad
 }
-pushover = ub.calibrate(column, start, [measured["pushover"]], progress=False)
+pushover = st.calibrate(column, start, [measured["pushover"]], progress=False)
 ub.print_once(pushover, "\n")
 try:
-    ub.calibrate(column, start, [measured["free decay"]], progress=False)
+    st.calibrate(column, start, [measured["free decay"]], progress=False)
 except ub.ArgumentError as error:
     refused = str(error)
     ub.print_once(refused, "\n")
@@ -145,12 +146,12 @@ def elastic(EI, stiffness):
     )
 
 
-decay = ub.Measurement(
+decay = st.Measurement(
     measured["free decay"].times, measured["free decay"].values, name="decay", **tests["free decay"]
 )
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", ub.ModelWarning)  # it is printed below
-    both = ub.calibrate(elastic, {"EI": 8e6, "stiffness": 4e6}, [decay], progress=False)
+    both = st.calibrate(elastic, {"EI": 8e6, "stiffness": 4e6}, [decay], progress=False)
 ub.print_once(*both.warnings, "", sep="\n")
 
 # %% [markdown]
@@ -160,7 +161,7 @@ ub.print_once(*both.warnings, "", sep="\n")
 # several processes share the starts.
 
 # %%
-fit = ub.calibrate(column, start, [*measured.values()], starts=8)
+fit = st.calibrate(column, start, [*measured.values()], starts=8)
 ub.print_once(fit, "\n")
 for parameter, name in fit.identified_by.items():
     ub.print_once(f"{parameter} is identified by the {name}")
@@ -204,4 +205,4 @@ ub.print_once("the pushover identifies limit and energy, the free decay the stif
 # * a free decay of 2 s with the same bounds: other minima appear in the list of starts,
 # * a rope of 25 kN: the connection opens in the dynamic test, which alone then determines all three
 #   numbers, within 6 %; a remark says that computed values jump,
-# * `sigma=` of the true noise in `ub.Measurement`, instead of an estimate.
+# * `sigma=` of the true noise in `st.Measurement`, instead of an estimate.

@@ -23,6 +23,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 output = Path("output")
 output.mkdir(exist_ok=True)
@@ -89,9 +90,9 @@ gap = 2 * outer / 3 - bar  # m, between bars
 arching = 1 - 12 * gap**2 / 6 / within**2
 k_e = arching * (1 - (spacing - hoop) / 2 / within) ** 2 / (1 - 12 * A / within**2)
 tension = ub.Softening(0.62e6 * np.sqrt(f_c / 1e6), fracture_energy=100.0)  # Pa, J/m²
-cover = ub.Mander(f_c, strain=0.002, spalling=0.006, tension=tension)
-core = ub.Mander.confined(f_c, k_e * volume_ratio / 2 * f_h, tension=tension)
-bars = ub.MenegottoPinto(f_y, hardening=0.01)
+cover = st.Mander(f_c, strain=0.002, spalling=0.006, tension=tension)
+core = st.Mander.confined(f_c, k_e * volume_ratio / 2 * f_h, tension=tension)
+bars = st.MenegottoPinto(f_y, hardening=0.01)
 ub.print_once(f"efficiency of the hoops {k_e:.3f}, confined strength {core.strength / 1e6:.1f} MPa")
 
 section = ub.Section.rectangle(
@@ -242,5 +243,5 @@ assert np.abs(computed_peaks / tested_peaks - 1).max() < 0.11
 # * `hardening=0.02`: the forces at large displacements rise,
 # * a spring for the slip of the bars: `Turn(ground(0, 0), column.start, Spring(...))` and a support
 #   `Pinned` instead of `Clamped`,
-# * `ub.KentPark.confined` instead of `ub.Mander`, with `E=1000 * f_c` and `cells=6`; with 8 cells
+# * `st.KentPark.confined` instead of `st.Mander`, with `E=1000 * f_c` and `cells=6`; with 8 cells
 #   Newton's method fails in the last cycles, at t = 110.

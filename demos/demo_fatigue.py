@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 output = Path("output")
 output.mkdir(exist_ok=True)
@@ -97,15 +98,15 @@ calm = ub.simulate(frame(lambda t: pressure(0.0)), ub.Static(), t=(0, 1), dt=1, 
 # the detail category 71 MPa.
 
 # %%
-weld = ub.SNCurve.eurocode(71e6)  # Pa
+weld = st.SNCurve.eurocode(71e6)  # Pa
 E = steel["E"]
 spots = {
-    "windward foot": ub.HotSpot.fibre(left.start, y=0.18, E=E),
-    "leeward foot": ub.HotSpot.fibre(right.start, y=-0.18, E=E),
-    "lower girder": ub.HotSpot.fibre(lower.start, y=-0.15, E=E),
-    "upper girder": ub.HotSpot.fibre(upper.start, y=-0.15, E=E),
+    "windward foot": st.HotSpot.fibre(left.start, y=0.18, E=E),
+    "leeward foot": st.HotSpot.fibre(right.start, y=-0.18, E=E),
+    "lower girder": st.HotSpot.fibre(lower.start, y=-0.15, E=E),
+    "upper girder": st.HotSpot.fibre(upper.start, y=-0.15, E=E),
 }
-fatigue, extremes = ub.Fatigue(list(spots.values()), weld), ub.Extremes()
+fatigue, extremes = st.Fatigue(list(spots.values()), weld), ub.Extremes()
 table = output / "fatigue.csv"
 
 # %% [markdown]
@@ -146,9 +147,9 @@ ub.print_once(f"the {first} cracks first")
 cycles = fatigue.cycles(spots[first])
 curves = {
     "category 71": weld,
-    "category 90": ub.SNCurve.eurocode(90e6),
-    "category 160, Goodman": ub.SNCurve(
-        range=160e6, slope=3.0, knee=5e6, limit=1e8, mean=ub.Goodman(510e6)
+    "category 90": st.SNCurve.eurocode(90e6),
+    "category 160, Goodman": st.SNCurve(
+        range=160e6, slope=3.0, knee=5e6, limit=1e8, mean=st.Goodman(510e6)
     ),
 }
 for name, curve in curves.items():
@@ -191,7 +192,7 @@ welds.savefig(output / "fatigue_welds.png")
 # close upper bound.
 
 # %%
-slope_3 = ub.SNCurve(range=71e6, cycles=2e6, slope=3.0)
+slope_3 = st.SNCurve(range=71e6, cycles=2e6, slope=3.0)
 foot = spots["windward foot"]
 moments = storm.section_forces_at(left.start)
 stress = foot.stress(moments[:, 0], moments[:, 1], moments[:, 2])

@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 output = Path("output")
 output.mkdir(exist_ok=True)
@@ -92,7 +93,7 @@ def vibrate(bar, record=(), periods=1.2 * (PERIODS + 1), steps=100, scheme=None)
 
 def fibres(τ, number=400, softening=None):
     """Return the section with yield stresses of deviation τ; MPa."""
-    law = ub.ElastoPlastic(ub.Normal(mean, τ * 1e6, seed=1), kinematic=4 * E)
+    law = ub.ElastoPlastic(ub.distributions.Normal(mean, τ * 1e6, seed=1), kinematic=4 * E)
     layers = ub.Fibres(law, number=number, softening=softening)
     return ub.Section.rectangle(b=side, h=side, E=E, nu=0.2, fibres=layers)
 
@@ -113,9 +114,9 @@ ub.print_once(f"τ = {deviations[-1]} MPa\n{runs[deviations[-1]]}\n")
 def decay_of(solution, bends=False):
     """Return the decay of the swings of the mass."""
     t, u = solution.times, solution.displacement(solution.scene.beams[0].end)[:, int(bends)]
-    (times, highest), (_, lowest) = (ub.peaks(t, x, prominence=0.02) for x in (u, -u))
+    (times, highest), (_, lowest) = (st.peaks(t, x, prominence=0.02) for x in (u, -u))
     n = PERIODS + 1
-    return ub.fit_decay(times[:n], (highest[:n] + lowest[:n]) / 2)
+    return st.fit_decay(times[:n], (highest[:n] + lowest[:n]) / 2)
 
 
 def table(decays):
@@ -365,5 +366,5 @@ ub.print_once("linear and exponential decay told apart")
 #
 # * `mean = 1e6`: the homogeneous bar yields in a few periods, then vibrates elastically,
 # * a tenth of the speed: only the weakest fibres yield, and the damping is much smaller,
-# * `ub.TruncatedNormal` instead of `ub.Normal`: no fibre has the yield stress zero,
+# * `TruncatedNormal` instead of `Normal`: no fibre has the yield stress zero,
 # * `seed=2`: by how much do the damping ratios of the three lengths change?

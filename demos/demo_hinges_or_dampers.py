@@ -26,6 +26,7 @@ import numpy as np
 from scipy.signal import lsim
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 output = Path("output")
 output.mkdir(exist_ok=True)
@@ -43,7 +44,7 @@ output.mkdir(exist_ok=True)
 
 # %%
 span, H, mass = 6.0, 4.0, 30e3  # m, m, kg
-column, girder = ub.Section.steel("HEB 200"), ub.Section.steel("IPE 300")
+column, girder = st.steel("HEB 200"), st.steel("IPE 300")
 M_p = 60e3  # N m, less than half the plastic moment of the girder
 in_shear = H / (2 * column.GA)  # m/N
 ρ = girder.EI / span / (1 + 12 * girder.EI / (girder.GA * span**2)) / (column.EI / H)
@@ -138,7 +139,7 @@ def kanai_tajimi(seed, dt=0.02, frequency=15.0, damping=0.6):
     numerator = [2 * damping * frequency, frequency**2]
     filtered = lsim((numerator, [1.0, *numerator]), noise, t)[1]
     envelope = np.minimum(1.0, (t / 3.0) ** 2) * np.exp(-np.maximum(0.0, t - 9.0) / 3.0)
-    return ub.GroundMotion(dt, filtered * envelope, f"seed {seed}").corrected()
+    return st.GroundMotion(dt, filtered * envelope, f"seed {seed}").corrected()
 
 
 record, peaks = kanai_tajimi(4), np.array([0.5, 1.0, 2.0, 3.0, 4.0])  # m/s²
@@ -154,7 +155,7 @@ def shake(kind, peak):
 
 runs = {(kind, peak): shake(kind, peak) for kind in cycles for peak in peaks}
 storeys = {
-    key: run.storeys([run.scene.beams[0].start, run.scene.beams[0].end])
+    key: st.storeys(run, [run.scene.beams[0].start, run.scene.beams[0].end])
     for key, run in runs.items()
 }
 drifts = {key: storey.ratio[:, 0] for key, storey in storeys.items()}

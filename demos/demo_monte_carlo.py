@@ -23,6 +23,7 @@ import numpy as np
 from scipy import stats
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 output = Path("output")
 output.mkdir(exist_ok=True)
@@ -73,11 +74,11 @@ def portal(strength):
 # %%
 def struck(seed, record=()):
     """Simulate one frame; without a seed all fibres have the mean strength."""
-    random = ub.TruncatedNormal(mean, deviation, seed=seed or 0)
+    random = ub.distributions.TruncatedNormal(mean, deviation, seed=seed or 0)
     scene, corner = portal(mean if seed is None else random)
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, end), dt=dt, record=record)
     t, u = solution.times, solution.displacement(corner)[:, 0]
-    highest, _ = ub.peaks(t, u, prominence=0.2)
+    highest, _ = st.peaks(t, u, prominence=0.2)
     last = (t > highest[-4]) & (t <= highest[-1])
     return {
         "displacement": u,  # m
@@ -242,5 +243,5 @@ ub.print_once("drift uncertain, dissipated energy larger than in the frame of me
 # * without `anew=True`: interrupt the study and restart it, or change 49 to 97; only missing
 #   members are computed,
 # * `ub.Fibres(law, number=40)`: do frames with more fibres differ less from each other?
-# * `ub.Lognormal` instead of `ub.TruncatedNormal`,
+# * `ub.distributions.Lognormal` instead of `ub.distributions.TruncatedNormal`,
 # * a blow of 400 kN, under which the frame of mean strength stays elastic.

@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 output = Path("output")
 output.mkdir(exist_ok=True)
@@ -34,8 +35,8 @@ output.mkdir(exist_ok=True)
 
 # %%
 steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0}  # Pa, -, kg/m³
-heb200 = ub.Section.i_shape(h=0.20, b=0.20, tw=0.009, tf=0.015, **steel)  # m
-ipe300 = ub.Section.i_shape(h=0.30, b=0.15, tw=0.0071, tf=0.0107, **steel)
+heb200 = st.i_shape(h=0.20, b=0.20, tw=0.009, tf=0.015, **steel)  # m
+ipe300 = st.i_shape(h=0.30, b=0.15, tw=0.0071, tf=0.0107, **steel)
 hinge = ub.LinearSoftening(limit=148e3, fracture_energy=30e3)  # N m, J
 
 left = ub.Beam((0, 0), (0, 8), heb200, hinges={0: hinge}, name="left column")  # m

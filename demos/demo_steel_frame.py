@@ -7,7 +7,7 @@
 #
 # This demo shows
 #
-# * rolled sections by their designation, `Section.steel("IPE 400")`,
+# * rolled sections by their designation, `st.steel("IPE 400")`,
 # * hinges of zero length at any place of a beam, `hinges={s: law}`, rigid until they yield,
 # * `pushover` with the sequence of hinges, and the target displacement of EN 1998-1,
 # * a synthetic `GroundMotion`, drifts and shears of storeys, and the table of hinges,
@@ -26,6 +26,7 @@ import numpy as np
 from scipy.signal import lsim
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 output = Path("output")
 output.mkdir(exist_ok=True)
@@ -40,9 +41,9 @@ output.mkdir(exist_ok=True)
 # %%
 bay, storey, cut, g = 7.0, 3.6, 0.4, 9.81  # m, m, m, m/s²
 f_y, weight = 355e6, 40e3  # Pa, N/m
-column = ub.Section.steel("HEB 300")
-bare = ub.Section.steel("IPE 400")
-girder = ub.Section.steel("IPE 400", rho=weight / g / bare.shape.A)  # kg/m³, with the floor
+column = st.steel("HEB 300")
+bare = st.steel("IPE 400")
+girder = st.steel("IPE 400", rho=weight / g / bare.shape.A)  # kg/m³, with the floor
 b, h, t_f = 0.180, 0.400, 0.0135  # m, of the IPE 400
 M_g = f_y * (bare.shape.Wpl - b / 2 * t_f * (h - t_f))  # N m
 M_c = f_y * column.shape.Wpl
@@ -80,7 +81,7 @@ roof = columns[0].end
 # The moments of the mechanism itself are M_p + H θ, and its displacements h θ.
 
 # %%
-capacity = ub.pushover(frame, roof, 0.45, pattern="triangular", steps=90)  # m
+capacity = st.pushover(frame, roof, 0.45, pattern="triangular", steps=90)  # m
 ub.print_once(f"\n{capacity}")
 
 height = storey * np.arange(1, 4)  # m
@@ -141,12 +142,12 @@ def kanai_tajimi(seed, dt=0.02, frequency=15.0, damping=0.6):
     numerator = [2 * damping * frequency, frequency**2]
     filtered = lsim((numerator, [1.0, *numerator]), noise, t)[1]
     envelope = np.minimum(1.0, (t / 3.0) ** 2) * np.exp(-np.maximum(0.0, t - 9.0) / 3.0)
-    return ub.GroundMotion(dt, filtered * envelope, f"seed {seed}").corrected()
+    return st.GroundMotion(dt, filtered * envelope, f"seed {seed}").corrected()
 
 
 motion = kanai_tajimi(4).scaled(peak=6.0)  # m/s²
 periods = np.linspace(0.05, 4.0, 200)  # s
-spectrum = ub.response_spectrum(motion, periods, damping=0.02)
+spectrum = st.response_spectrum(motion, periods, damping=0.02)
 target = capacity.n2((periods, spectrum.pseudo_acceleration), corner=2 * np.pi / 15.0)
 ub.print_once(f"\n{target}")
 
@@ -159,7 +160,10 @@ run = ub.simulate(shaken, ub.EnergyMomentum(), t=(0, 30), dt=0.01, start=statics
 ub.print_once(f"\n{run}")
 
 limits = {"IO": 0.01, "LS": 0.02, "CP": 0.03}  # rad
-storeys, table = run.storeys([columns[0].at(s) for s in (0, *levels)]), run.hinges(limits)
+storeys, table = (
+    st.storeys(run, [columns[0].at(s) for s in (0, *levels)]),
+    st.hinge_table(run, limits),
+)
 ub.print_once(f"\n{storeys}\n\n{table}")
 sway = run.displacement(roof)[:, 0]  # m
 residual = sway[run.times > 25.0].mean()

@@ -155,7 +155,7 @@ try:
     ub.tradeoff(
         scene, {"steps": len}, scheme=ub.EnergyMomentum(), t=(0.0, end), dt=0.04, tolerance=0.01
     )
-except ub.TradeoffError as error:
+except ub.errors.TradeoffError as error:
     ub.print_once("\nrefused:", error)
 else:
     raise AssertionError("the number of steps has no limit")

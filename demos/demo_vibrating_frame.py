@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 output = Path("output")
 output.mkdir(exist_ok=True)
@@ -134,12 +135,12 @@ def decays(run):
     solution, corner, _ = run
     free = solution.times > impulse.times[-1]
     t, (u, v, _) = solution.times[free], solution.displacement(corner)[free].T
-    (times, highest), (_, lowest) = (ub.peaks(t, x, prominence=0.2) for x in (u, -u))
+    (times, highest), (_, lowest) = (st.peaks(t, x, prominence=0.2) for x in (u, -u))
     n = min(PERIODS + 1, len(highest), len(lowest))
-    horizontal = ub.fit_decay(times[:n], (highest[:n] + lowest[:n]) / 2)
-    times, sinking = ub.peaks(t, -v, prominence=0.1)
+    horizontal = st.fit_decay(times[:n], (highest[:n] + lowest[:n]) / 2)
+    times, sinking = st.peaks(t, -v, prominence=0.1)
     n = min(2 * PERIODS + 1, len(sinking) - 1)
-    vertical = ub.fit_decay(times[:n], (sinking[:n] + sinking[1 : n + 1]) / 2)
+    vertical = st.fit_decay(times[:n], (sinking[:n] + sinking[1 : n + 1]) / 2)
     return horizontal, vertical
 
 

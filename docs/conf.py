@@ -19,6 +19,7 @@ from sphinx.addnodes import pending_xref
 from sphinx.transforms import SphinxTransform
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))  # for "conf.read_demo"
@@ -147,8 +148,15 @@ def rewrite(app, docname, source):
 # -- reference ------------------------------------------------------------------------------------
 
 
-NAMES = {*ub.__all__, *ub.RESULTS}
-"""Public names, and classes of results."""
+NAMES = {
+    name: module
+    for module in (ub, ub.extend, ub.distributions, st)
+    for name in [*module.__all__, *getattr(module, "RESULTS", [])]
+    if module is not ub or name not in ("extend", "distributions")
+}
+"""Modules of the public names, and of classes of results."""
+
+PREFIX = r"(?:ub\.extend|ub\.distributions|ub|st)"
 
 
 def pages_of_names(app):
@@ -158,13 +166,13 @@ def pages_of_names(app):
     for old in folder.glob("*.rst"):
         if old.stem not in NAMES:
             old.unlink()
-    for name in NAMES:
-        thing = getattr(ub, name)
+    for name, owner in NAMES.items():
+        thing = getattr(owner, name)
         kind = "class" if isinstance(thing, type) else "function" if callable(thing) else "data"
         if kind == "class" and issubclass(thing, BaseException):
             kind = "exception"
         kind = "module" if type(thing) is type(os) else kind
-        module = "ufl_beam" if kind != "module" else thing.__name__.rpartition(".")[0]
+        module = owner.__name__ if kind != "module" else thing.__name__.rpartition(".")[0]
         lines = [name, "=" * len(name), "", f".. currentmodule:: {module}", ""]
         lines += [f".. auto{kind}:: {name if kind != 'module' else thing.__name__}"]
         lines += ["   :members:"] * (kind in ("class", "exception", "module"))
@@ -172,8 +180,8 @@ def pages_of_names(app):
         if not page.exists() or page.read_text(encoding="utf-8") != text:
             page.write_text(text, encoding="utf-8")
     for page in sorted([*DOCS.glob("*.md"), *(DOCS / "demos").glob("*.py")]):
-        words = set(re.findall(r"\bub\.(\w+)", page.read_text(encoding="utf-8")))
-        for name in words & NAMES:
+        words = set(re.findall(rf"\b{PREFIX}\.(\w+)", page.read_text(encoding="utf-8")))
+        for name in words & NAMES.keys():
             used[name].append(page)
 
 
@@ -183,7 +191,7 @@ used = defaultdict(list)
 
 def where_used(app, what, name, obj, options, lines):
     """Append links to the pages and demos that use a name."""
-    pages = used.get(name.removeprefix("ufl_beam."), [])
+    pages = used.get(name.rpartition(".")[2] if what != "method" else "", [])
     if pages:
         references = (f":doc:`/{page.relative_to(DOCS).with_suffix('')}`" for page in pages)
         lines += ["", ".. rubric:: Used in", "", ", ".join(references), ""]
@@ -233,12 +241,13 @@ class CrossReferences(SphinxTransform):
     def apply(self, **kwargs):
         """Wrap literals such as ``Beam`` and ``ub.simulate(...)``."""
         for literal in list(self.document.findall(nodes.literal)):
-            match = re.match(r"(?:ub\.)?(\w+)(?:$|\()", literal.astext())
+            match = re.match(rf"(?:{PREFIX}\.)?(\w+)(?:$|\()", literal.astext())
             inside = (nodes.reference, pending_xref, nodes.title)
             if not match or match[1] not in NAMES or isinstance(literal.parent, inside):
                 continue
             options = {"refdomain": "py", "reftype": "obj", "refexplicit": True}
-            target = pending_xref("", reftarget=f"ufl_beam.{match[1]}", refwarn=False, **options)
+            name = f"{NAMES[match[1]].__name__}.{match[1]}"
+            target = pending_xref("", reftarget=name, refwarn=False, **options)
             target["refdoc"] = self.env.docname
             literal.replace_self(target)
             target += literal

@@ -14,6 +14,18 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
+import ufl_beam.structures as st
+
+NAMESPACES = {"ub": ub, "ub.extend": ub.extend, "ub.distributions": ub.distributions, "st": st}
+"""Modules with public names, by the name that scripts give to them."""
+
+PUBLIC = {name: getattr(x, name) for x in NAMESPACES.values() for name in x.__all__}
+"""Public names and their objects, without results."""
+
+RESULTS = {name: getattr(x, name) for x in (ub, st) for name in x.RESULTS}
+"""Classes of results and of places."""
+
+ALL = PUBLIC | RESULTS
 
 
 def run(scene, scheme=None, t=(0, 1), dt=0.1, **options):
@@ -39,7 +51,7 @@ def raises(*parts, kind=ub.ArgumentError):
 def law_of(fields=None, **members):
     """A connector law of a user, with numbers as `fields`, and other members."""
     names = dict.fromkeys(fields or {}, float)
-    kind = type("Mine", (ub.ConnectorLaw,), {"__annotations__": names, **members})
+    kind = type("Mine", (ub.extend.ConnectorLaw,), {"__annotations__": names, **members})
     return dataclass(frozen=True)(kind)(**(fields or {}))
 
 
@@ -77,7 +89,7 @@ def require_restart(run, scene, connectors, scheme, folder, until):
     return whole
 
 
-class AfterEachStep(ub.Recorder):
+class AfterEachStep(ub.extend.Recorder):
     """Calls a function with the state after each step, also in a run that goes on."""
 
     def __init__(self, function):

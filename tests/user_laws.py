@@ -7,12 +7,13 @@ from typing import ClassVar
 import ufl
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
-f = ub.law_functions
+f = ub.extend.law_functions
 
 
 @dataclass(frozen=True)
-class PowerLaw(ub.MaterialLaw):
+class PowerLaw(ub.extend.MaterialLaw):
     """Plastic strain k0 (|stress|/M0)^n under growing stresses; by residuals."""
 
     M0: float
@@ -34,7 +35,7 @@ class PowerLaw(ub.MaterialLaw):
 
 
 @dataclass(frozen=True)
-class Dashpot(ub.MaterialLaw):
+class Dashpot(ub.extend.MaterialLaw):
     """A spring and a dashpot in a row (Maxwell); in closed form."""
 
     eta: float
@@ -51,7 +52,7 @@ class Dashpot(ub.MaterialLaw):
 
 
 @dataclass(frozen=True)
-class SameHardening(ub.MaterialLaw):
+class SameHardening(ub.extend.MaterialLaw):
     """What `ElastoPlastic` is, stated by residuals."""
 
     limit: float
@@ -82,7 +83,7 @@ class SameHardening(ub.MaterialLaw):
 
 
 @dataclass(frozen=True)
-class Stiffening(ub.MaterialLaw):
+class Stiffening(ub.extend.MaterialLaw):
     """Elastic, with a stress that grows with the cube of the strain; no variables."""
 
     cubic: float
@@ -95,7 +96,7 @@ class Stiffening(ub.MaterialLaw):
 
 
 @dataclass(frozen=True)
-class TwoRoots(ub.AxialBending):
+class TwoRoots(st.AxialBending):
     """AxialBending by equations that hold on the far side of the surface, too."""
 
     def residuals(self, strain, old, new, dt):
@@ -111,7 +112,7 @@ class TwoRoots(ub.AxialBending):
 
 
 @dataclass(frozen=True)
-class GivesEnergy(ub.MaterialLaw):
+class GivesEnergy(ub.extend.MaterialLaw):
     """Plastic strain against the stress, beyond a limit; no material does so."""
 
     limit: float
@@ -130,7 +131,7 @@ class GivesEnergy(ub.MaterialLaw):
 
 
 @dataclass(frozen=True)
-class Swelling(ub.MaterialLaw):
+class Swelling(ub.extend.MaterialLaw):
     """Elastic about a strain that grows in time; it gives energy where it is held in tension."""
 
     rate: float
@@ -148,7 +149,7 @@ class Swelling(ub.MaterialLaw):
 
 
 @dataclass(frozen=True)
-class Eigenstrain(ub.MaterialLaw):
+class Eigenstrain(ub.extend.MaterialLaw):
     """Elastic about a strain e0, as of temperature, shrinkage or prestress."""
 
     e0: float
@@ -193,7 +194,7 @@ class YieldingEigenstrain(SameHardening):
 
 
 @dataclass(frozen=True)
-class Exponential(ub.SofteningLaw):
+class Exponential(ub.extend.SofteningLaw):
     """The traction of `Softening`; its energy by quadrature."""
 
     limit: float
@@ -204,7 +205,7 @@ class Exponential(ub.SofteningLaw):
 
 
 @dataclass(frozen=True)
-class Petersson(ub.SofteningLaw):
+class Petersson(ub.extend.SofteningLaw):
     """Concrete: down to a third at 0.8 G/t, to zero at 3.6 G/t; two straight lines and a sum."""
 
     t: float
@@ -233,7 +234,7 @@ class Kinked(Petersson):
 
 
 @dataclass(frozen=True)
-class Fading(ub.SofteningLaw):
+class Fading(ub.extend.SofteningLaw):
     """Down by a power, never to zero."""
 
     t: float
@@ -245,7 +246,7 @@ class Fading(ub.SofteningLaw):
 
 
 @dataclass(frozen=True)
-class Rising(ub.SofteningLaw):
+class Rising(ub.extend.SofteningLaw):
     """Up to a peak at width/4 first; its integral is 3/2 t width."""
 
     t: float
@@ -257,7 +258,7 @@ class Rising(ub.SofteningLaw):
 
 
 @dataclass(frozen=True)
-class HardeningSpring(ub.Statement):
+class HardeningSpring(ub.extend.Statement):
     """Spring along y between two places, k/2 e² + h/4 e⁴."""
 
     nodes = 2
@@ -272,7 +273,7 @@ class HardeningSpring(ub.Statement):
 
 
 @dataclass(frozen=True)
-class AirDrag(ub.Statement):
+class AirDrag(ub.extend.Statement):
     """Drag in proportion to the square of the velocity."""
 
     numbers = ("c",)
@@ -281,11 +282,11 @@ class AirDrag(ub.Statement):
         x, y, _ = at.v[0]
         size = ufl.sqrt(x**2 + y**2 + 1e-12)
         force = [[at["c"] * size * x, at["c"] * size * y, 0.0]]
-        return ub.Equations(force, lost={"drag": at.work(force)})
+        return ub.extend.Equations(force, lost={"drag": at.work(force)})
 
 
 @dataclass(frozen=True)
-class MaxwellElement(ub.Statement):
+class MaxwellElement(ub.extend.Statement):
     """Spring and dashpot in a row along y between two places; the dashpot has grown by ``flow``.
 
     The force k (e - flow) and the growth of the dashpot belong to the same time.
@@ -307,7 +308,7 @@ class MaxwellElement(ub.Statement):
         stored = k / 2 * (e1 - flow) ** 2
         before = k / 2 * (e0 - at["flow"]) ** 2
         lost = at.work(force) - (stored - before)
-        return ub.Equations(
+        return ub.extend.Equations(
             force, {"flow": flow}, {"stored": stored}, {"damping": lost},
             before={"stored": before},
         )  # fmt: skip

@@ -25,37 +25,20 @@ from ufl_beam import dolfinx_compat  # noqa: F401 - first: its errors explain mi
 
 # isort: split
 
-from ufl_beam.analysis.calibration import calibrate
-from ufl_beam.analysis.calibration_result import Calibration as Calibration
-from ufl_beam.analysis.calibration_result import Measurement
+from ufl_beam import extend
 from ufl_beam.analysis.critical_points import Branch as Branch
 from ufl_beam.analysis.critical_points import CriticalPoint as CriticalPoint
 from ufl_beam.analysis.derivatives import Derivatives as Derivatives
 from ufl_beam.analysis.derivatives import Range as Range
 from ufl_beam.analysis.derivatives import differentiate
-from ufl_beam.analysis.free_decay import Decay as Decay
-from ufl_beam.analysis.free_decay import Envelope as Envelope
-from ufl_beam.analysis.free_decay import (
-    damping,
-    damping_ratio,
-    fit_decay,
-    logarithmic_decrement,
-    peaks,
-)
 from ufl_beam.analysis.gradient import gradient as gradient
-from ufl_beam.analysis.imperfections import imperfect
-from ufl_beam.analysis.incremental_dynamics import incremental_dynamic_analysis
-from ufl_beam.analysis.incremental_dynamics_result import DemandCurves as DemandCurves
-from ufl_beam.analysis.incremental_dynamics_result import Fragility as Fragility
 from ufl_beam.analysis.linear_model import LinearModel as LinearModel
 from ufl_beam.analysis.linear_model import linearize
-from ufl_beam.analysis.load_combinations import load_combinations
-from ufl_beam.analysis.load_combinations_result import Governing as Governing
-from ufl_beam.analysis.load_combinations_result import LoadCombinations as LoadCombinations
 from ufl_beam.analysis.modes import Buckling as Buckling
 from ufl_beam.analysis.modes import Modes as Modes
 from ufl_beam.analysis.modes import buckling, modes
-from ufl_beam.analysis.parameter_study import Study, study
+from ufl_beam.analysis.parameter_study import Study as Study
+from ufl_beam.analysis.parameter_study import study
 from ufl_beam.analysis.path_controls import (
     ArcLength,
     DisplacementControl,
@@ -64,48 +47,24 @@ from ufl_beam.analysis.path_controls import (
 )
 from ufl_beam.analysis.path_following import Path as Path
 from ufl_beam.analysis.path_following import follow
-from ufl_beam.analysis.pushover import pushover
-from ufl_beam.analysis.pushover_result import HingeFormation as HingeFormation
-from ufl_beam.analysis.pushover_result import Pushover as Pushover
-from ufl_beam.analysis.pushover_result import TargetDisplacement as TargetDisplacement
-from ufl_beam.analysis.response_spectra import ResponseSpectrum as ResponseSpectrum
-from ufl_beam.analysis.response_spectra import response_spectrum
-from ufl_beam.analysis.response_spectrum import SpectralResponse as SpectralResponse
-from ufl_beam.analysis.response_spectrum import response_spectrum_analysis
-from ufl_beam.analysis.section_analysis import InteractionDiagram as InteractionDiagram
-from ufl_beam.analysis.section_analysis import MomentCurvature as MomentCurvature
-from ufl_beam.analysis.section_analysis import interaction_diagram, moment_curvature
 from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff as Tradeoff
-from ufl_beam.blocks.statement import Equations, Statement
-from ufl_beam.errors import (
-    ArgumentError,
-    ArgumentTypeError,
-    ConvergenceError,
-    ModelError,
-    ModelWarning,
-    ProcessesDiffer,
-    TradeoffError,
-)
-from ufl_beam.mechanics.time_scheme import Coefficients, DynamicScheme, Scheme, Step
+from ufl_beam.errors import ArgumentError, ConvergenceError, ModelError, ModelWarning
 from ufl_beam.mechanics.time_schemes import (
     EnergyMomentum,
-    EnergyMomentumBase,
     EnergyMomentumDecaying,
     EnergyMomentumPrinted,
     EnergyMomentumStatic,
     GeneralizedAlpha,
-    MidpointDynamics,
     Newmark,
     Static,
 )
-from ufl_beam.model import law_functions
+from ufl_beam.model import distributions
 from ufl_beam.model.beams import Beam, Mesh
 from ufl_beam.model.bodies import Body, PointMass, Velocity, ground
 from ufl_beam.model.bodies import BodyPoint as BodyPoint
 from ufl_beam.model.bodies import Place as Place
-from ufl_beam.model.concrete_laws import KentPark, Mander
-from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
+from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import (
     Clearance,
     Controller,
@@ -118,10 +77,8 @@ from ufl_beam.model.connector_laws import (
     Stop,
 )
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
-from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
+from ufl_beam.model.fibres import Fibres
 from ufl_beam.model.functions import Spline, Table, ramp
-from ufl_beam.model.ground_motion import GroundMotion
-from ufl_beam.model.hinge_laws import AxialBendingHinge, Backbone, IbarraKrawinkler, PinchingHinge
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import (
     Guided,
@@ -144,35 +101,19 @@ from ufl_beam.model.loads import (
     Rayleigh,
     RotatingFrame,
 )
-from ufl_beam.model.material_law import MaterialLaw
-from ufl_beam.model.material_laws import (
-    ArmstrongFrederick,
-    AxialBending,
-    BoucWen,
-    DuvautLions,
-    ElastoPlastic,
-    Perzyna,
-    RambergOsgood,
-)
+from ufl_beam.model.material_laws import DuvautLions, ElastoPlastic, Perzyna
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.sections import Section
-from ufl_beam.model.shapes import Shape
-from ufl_beam.model.softening_laws import LinearSoftening, Softening, SofteningLaw
-from ufl_beam.model.steel_laws import MenegottoPinto
+from ufl_beam.model.softening_laws import LinearSoftening, Softening
 from ufl_beam.model.supports import Clamped, Pinned, PrescribedDisplacement, Roller, Support
 from ufl_beam.model.works import Effect, Potential, VirtualWork
 from ufl_beam.output.dolfinx_view import DolfinxView as DolfinxView
-from ufl_beam.output.engineering_results import HingeTable as HingeTable
-from ufl_beam.output.engineering_results import Storeys as Storeys
 from ufl_beam.output.extremes import Extent as Extent
 from ufl_beam.output.extremes import Extremes
-from ufl_beam.output.fatigue import Cycles as Cycles
-from ufl_beam.output.fatigue import Fatigue, Gerber, Goodman, HotSpot, SNCurve, rainflow
 from ufl_beam.output.history import Event as Event
 from ufl_beam.output.history import Events, History
 from ufl_beam.output.output_files import version
 from ufl_beam.output.paraview_files import VTKHDF, XDMF
-from ufl_beam.output.recorder import Recorder
 from ufl_beam.output.section_forces import Diagram as Diagram
 from ufl_beam.parallel import print_once
 from ufl_beam.plotting.films import Film as Film
@@ -195,22 +136,14 @@ __all__ = [
     "Adaptive",
     "ArcLength",
     "ArgumentError",
-    "ArgumentTypeError",
-    "ArmstrongFrederick",
-    "AxialBending",
-    "AxialBendingHinge",
-    "Backbone",
     "Beam",
     "Body",
-    "BoucWen",
     "Bushing",
     "Camera",
     "Checkpoint",
     "Clamped",
     "Clearance",
-    "Coefficients",
     "Connector",
-    "ConnectorLaw",
     "Controller",
     "ConvergenceError",
     "Coulomb",
@@ -218,53 +151,35 @@ __all__ = [
     "DisplacementControl",
     "DissipationControl",
     "DuvautLions",
-    "DynamicScheme",
     "Effect",
     "ElastoPlastic",
     "EnergyMomentum",
-    "EnergyMomentumBase",
     "EnergyMomentumDecaying",
     "EnergyMomentumPrinted",
     "EnergyMomentumStatic",
-    "Equations",
     "Events",
     "Extremes",
-    "Fatigue",
     "Fibres",
     "FollowerLoad",
     "ForceLaw",
     "GeneralizedAlpha",
-    "Gerber",
-    "Goodman",
     "Gravity",
-    "GroundMotion",
     "Guided",
     "History",
-    "HotSpot",
-    "IbarraKrawinkler",
     "ImposedStrain",
     "Joint",
     "KelvinVoigt",
-    "KentPark",
     "LineLoad",
     "LinearSoftening",
     "Link",
     "LoadControl",
-    "Lognormal",
-    "Mander",
-    "MaterialLaw",
-    "Measurement",
-    "MenegottoPinto",
     "Mesh",
-    "MidpointDynamics",
     "ModelError",
     "ModelWarning",
     "MovingLoad",
     "Newmark",
     "Newton",
-    "Normal",
     "Perzyna",
-    "PinchingHinge",
     "Pinned",
     "PointLoad",
     "PointMass",
@@ -274,10 +189,7 @@ __all__ = [
     "PrescribedMotion",
     "Pressure",
     "Prismatic",
-    "ProcessesDiffer",
-    "RambergOsgood",
     "Rayleigh",
-    "Recorder",
     "Release",
     "Revolute",
     "Rigid",
@@ -285,85 +197,73 @@ __all__ = [
     "RigidPlastic",
     "Roller",
     "RotatingFrame",
-    "SNCurve",
     "Scene",
-    "Scheme",
     "Section",
-    "Shape",
     "Simulation",
     "Slide",
     "Softening",
-    "SofteningLaw",
     "Solution",
     "Spline",
     "Spring",
-    "Statement",
     "Static",
-    "Step",
     "Stop",
     "Stretch",
-    "Study",
     "Support",
     "Table",
-    "TradeoffError",
-    "TruncatedNormal",
     "Turn",
     "Velocity",
     "VirtualWork",
-    "Weibull",
     "animate",
     "buckling",
-    "calibrate",
-    "damping",
-    "damping_ratio",
     "differentiate",
-    "fit_decay",
+    "distributions",
+    "extend",
     "follow",
     "gradient",
     "ground",
-    "imperfect",
-    "incremental_dynamic_analysis",
-    "interaction_diagram",
-    "law_functions",
     "linearize",
-    "load_combinations",
-    "logarithmic_decrement",
     "modes",
-    "moment_curvature",
-    "peaks",
     "picture",
     "plot",
     "print_once",
-    "pushover",
-    "rainflow",
     "ramp",
     "render",
-    "response_spectrum",
-    "response_spectrum_analysis",
     "simulate",
     "study",
     "tradeoff",
 ]  # fmt: skip
 
 RESULTS = [
-    "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "DemandCurves",
-    "Derivatives", "Diagram", "DolfinxView", "Energy", "Envelope", "Event", "Extent", "Film",
-    "Fragility", "Governing", "HingeFormation", "HingeTable", "InteractionDiagram", "LinearModel",
-    "LoadCombinations", "Modes", "MomentCurvature", "Path", "Place", "Pushover", "Range",
-    "ResponseSpectrum", "SpectralResponse", "Storeys", "TargetDisplacement", "Tradeoff",
+    "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Derivatives", "Diagram", "DolfinxView",
+    "Energy", "Event", "Extent", "Film", "LinearModel", "Modes", "Path", "Place", "Range",
+    "Study", "Tradeoff",
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
+
+STRUCTURES = [
+    "ArmstrongFrederick", "AxialBending", "AxialBendingHinge", "Backbone", "BoucWen",
+    "Calibration", "Cycles", "Decay", "DemandCurves", "Envelope", "Fatigue", "Fragility",
+    "Gerber", "Goodman", "Governing", "GroundMotion", "HingeFormation", "HingeTable", "HotSpot",
+    "IbarraKrawinkler", "InteractionDiagram", "KentPark", "LoadCombinations", "Mander",
+    "Measurement", "MenegottoPinto", "MomentCurvature", "PinchingHinge", "Pushover",
+    "RambergOsgood", "ResponseSpectrum", "SNCurve", "Shape", "SpectralResponse", "Storeys",
+    "TargetDisplacement", "calibrate", "damping", "damping_ratio", "fit_decay", "imperfect",
+    "incremental_dynamic_analysis", "interaction_diagram", "load_combinations",
+    "logarithmic_decrement", "moment_curvature", "peaks", "pushover", "rainflow",
+    "response_spectrum", "response_spectrum_analysis",
+]  # fmt: skip
+"""Names that have moved to ``ufl_beam.structures``."""
 
 OLD_NAMES = {
     "Actuator": "PrescribedForce",
     "DecayingMidpoint": "EnergyMomentumDecaying",
     "ExactStatic": "EnergyMomentumStatic",
-    "CopiesDiffer": "ProcessesDiffer",
-    "ExactStep": "EnergyMomentumBase",
+    "CopiesDiffer": "errors.ProcessesDiffer",
+    "ExactStep": "extend.EnergyMomentumBase",
     "Hardening": "ElastoPlastic",
     "Midpoint": "EnergyMomentum",
-    "MidpointLoads": "MidpointDynamics",
-    "Midway": "MidpointDynamics",
+    "MidpointLoads": "extend.MidpointDynamics",
+    "Midway": "extend.MidpointDynamics",
     "Motor": "PrescribedMotion",
     "Prescribed": "PrescribedDisplacement",
     "PrintedMidpoint": "EnergyMomentumPrinted",
@@ -383,10 +283,17 @@ OLD_NAMES = {
     "plot_tradeoff": "plot(tradeoff)",
     "say": "print_once",
 }
-"""Public names before version 0.1.0, and the names that replace them."""
+OLD_NAMES |= {name: f"structures.{name}" for name in STRUCTURES}
+OLD_NAMES |= {name: f"extend.{name}" for name in extend.__all__}
+OLD_NAMES |= {name: f"distributions.{name}" for name in distributions.__all__}
+OLD_NAMES |= {
+    name: f"errors.{name}" for name in ("ArgumentTypeError", "ProcessesDiffer", "TradeoffError")
+}
+"""Former public names, and the names that replace them."""
 
 
 def __getattr__(name: str) -> NoReturn:
     """Raise :class:`AttributeError`; for an old name, the message has the new name."""
     new = f"; it is ufl_beam.{OLD_NAMES[name]} now" if name in OLD_NAMES else ""
+    new += "; import ufl_beam.structures first" * (name == "structures")
     raise AttributeError(f"module 'ufl_beam' has no attribute {name!r}{new}")

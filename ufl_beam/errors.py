@@ -12,7 +12,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -218,7 +218,7 @@ def calling(what: str, remedy: str = "") -> Iterator[None]:
         with np.errstate(all="ignore"):
             yield
     except Exception as error:
-        library = (PACKAGE, functools.__file__)  # functools calls functions of ub.law_functions
+        library = PACKAGE, functools.__file__  # functools calls law_functions
         frames = traceback.extract_tb(error.__traceback__)
         own = [frame for frame in frames if not frame.filename.startswith(library)]
         at = f" ({own[0].filename}, line {own[0].lineno})" if own else ""
@@ -328,6 +328,19 @@ def require_all(value: Any, what: str, kind: type | tuple[type, ...]) -> tuple[A
     for i, record in enumerate(records):
         require_kind(record, kind, f"{what}[{i}]")
     return records
+
+
+class Moved:
+    """Attribute of a class that is elsewhere now; reading it raises :class:`AttributeError`."""
+
+    def __init__(self, new: str) -> None:
+        self._new = new
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = f"{owner.__name__}.{name}"
+
+    def __get__(self, instance: object, owner: type | None = None) -> NoReturn:
+        raise AttributeError(f"{self._name} is {self._new} now")
 
 
 def closed(instead: str) -> Callable[[type[T]], type[T]]:

@@ -8,6 +8,7 @@ from models import Case, model
 from statics import PLASTIC, SECTION, STEEL, frame
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 
 @cache
@@ -16,7 +17,7 @@ def earthquake(peak, seconds=10.0, seed=3):
     random, t = np.random.default_rng(seed), np.arange(0.0, seconds, 0.01)
     noise = np.convolve(random.standard_normal(t.size), np.hanning(31), mode="same")
     shape = np.minimum(t / 2, 1) * np.exp(-np.maximum(t - 5, 0) / 2)
-    return ub.GroundMotion(0.01, noise * shape).scaled(peak=peak).corrected()
+    return st.GroundMotion(0.01, noise * shape).scaled(peak=peak).corrected()
 
 
 def shaken(beams, peak, watched, *, seconds=10.0, dt=0.01, **parts):
@@ -46,8 +47,8 @@ def shaken_frame(storeys, bays, peak, section, ends=None, *, mass=20e3, inertia=
 )
 def ten_storeys():
     """Three bays of HEB 400; 20 fibres of Menegotto and Pinto in 280 cells; peak 6 m/s²."""
-    steel = ub.Fibres(ub.MenegottoPinto(355e6, 0.01, 20.0), number=20)
-    section = ub.Section.steel("HEB 400", fibres=steel)
+    steel = ub.Fibres(st.MenegottoPinto(355e6, 0.01, 20.0), number=20)
+    section = st.steel("HEB 400", fibres=steel)
     return shaken_frame(10, 3, 6.0, section, cells=4)
 
 
@@ -101,10 +102,10 @@ def deteriorating():
     left = ub.Beam((0, 0), (0, 4), SECTION, cells=3, name="left")
     right = ub.Beam((6, 0), (6, 4), SECTION, cells=3, name="right")
     girder = ub.Beam((0, 4), (6, 4), SECTION, cells=4, name="girder")
-    backbone = ub.Backbone(
+    backbone = st.Backbone(
         PLASTIC, capping=0.02, post_capping=0.05, overstrength=1.075, residual=0.02, ultimate=0.12
     )
-    law = ub.IbarraKrawinkler(6e8, backbone, strength=0.3, softening=0.5, unloading=0.5)
+    law = st.IbarraKrawinkler(6e8, backbone, strength=0.3, softening=0.5, unloading=0.5)
     pairs = [(ub.ground(0, 0), left.start), (ub.ground(6, 0), right.start)]
     pairs += [(left.end, girder.start), (right.end, girder.end)]
     return shaken(
@@ -209,8 +210,8 @@ def isolator():
 )
 def removed_column():
     """Two girders of 6 m, HEB 300 of fibres with 600 kN at the lost support; damped."""
-    steel = ub.Fibres(ub.MenegottoPinto(355e6, 0.01, 20.0), number=20)
-    section = ub.Section.steel("HEB 300", fibres=steel)
+    steel = ub.Fibres(st.MenegottoPinto(355e6, 0.01, 20.0), number=20)
+    section = st.steel("HEB 300", fibres=steel)
     girder = ub.Beam((0, 0), (12, 0), section, cells=24)
     middle = girder.at(0.5)
     weight = 600e3

@@ -12,7 +12,7 @@ import numpy as np
 import ufl_beam as ub
 
 
-class CutSteps(ub.Recorder):
+class CutSteps(ub.extend.Recorder):
     """Recorder that counts the steps that were divided into substeps."""
 
     def __init__(self) -> None:

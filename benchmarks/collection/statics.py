@@ -9,6 +9,7 @@ from models import Case, model
 from scipy.optimize import brentq
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
 """Pa, -, kg/m³."""
@@ -18,7 +19,7 @@ PLASTIC = 100e3
 
 SECTION = ub.Section(EA=4e9, GA=1.5e9, EI=4e7, rhoA=60.0, rhoI=0.5)
 
-BARS = ub.Fibres(ub.MenegottoPinto(450e6, 0.01, 15.0))
+BARS = ub.Fibres(st.MenegottoPinto(450e6, 0.01, 15.0))
 """Steel02 of OpenSees issue 1625."""
 
 
@@ -32,7 +33,7 @@ def cycles(*sizes):
 
 def deteriorating_hinge(*sizes):
     """The hinge of OpenSees 688 at the foot of a cantilever ten times as stiff, in cycles."""
-    backbone = ub.Backbone(
+    backbone = st.Backbone(
         923.6e3,
         capping=0.0173,
         post_capping=0.0401,
@@ -40,7 +41,7 @@ def deteriorating_hinge(*sizes):
         residual=0.02,
         ultimate=0.095,
     )
-    law = ub.IbarraKrawinkler(80e6, backbone, strength=0.3, softening=1.0, unloading=1.0)
+    law = st.IbarraKrawinkler(80e6, backbone, strength=0.3, softening=1.0, unloading=1.0)
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e10, GA=1e10, EI=3e8), cells=2)
     turn = ub.Turn(ub.ground(0, 0), beam.start, law)
     drive, end = cycles(*sizes)
@@ -317,7 +318,7 @@ def leaning_column_pushed():
 
 def concrete_half(ultimate):
     """Half of a simply supported beam of 6 m with 1.2 % and 0.6 % of steel; Kent-Park."""
-    law = ub.KentPark(25e6, 5e6, ultimate)
+    law = st.KentPark(25e6, 5e6, ultimate)
     section = reinforced(0.3, 0.5, law, [-0.21, 0.21], [3.6e-3, 0.6e-3], number=30)
     return ub.Beam((0, 0), (3, 0), section, cells=10)
 
@@ -368,7 +369,7 @@ def brittle_concrete_beam():
 )
 def concrete_frame():
     """Columns of 0.6 m by 0.4 m under 6 kN/m on girders, then pushed by 0.12 m; 8 bars of 12 mm."""
-    bar, law = 0.000113097, ub.KentPark(25e6, 5e6, 0.0035)
+    bar, law = 0.000113097, st.KentPark(25e6, 5e6, 0.0035)
     section = reinforced(0.4, 0.6, law, [-0.255, -0.085, 0.085, 0.255], [2 * bar] * 4)
     columns, girders, parts = frame(2, 1, section, height=3.0, bay=5.0, cells=(6, 8))
     push = ub.PrescribedDisplacement(columns[0, 1].end, u=ub.Table([0, 1, 3], [0, 0, 0.12]))
@@ -386,7 +387,7 @@ def concrete_frame():
 )
 def no_tension():
     """Mander's concrete, which is the backbone of Concrete07, with steel; cracked by the sway."""
-    law = ub.Mander(30e6, 0.002)
+    law = st.Mander(30e6, 0.002)
     section = reinforced(0.4, 0.4, law, [-0.16, 0.16], [1e-3, 1e-3], number=30, E=27e9)
     column = ub.Beam((0, 0), (0, 3), section, cells=8)
     return weighed_then_pushed(column, 0.8e6, ub.Table([0, 1, 2], [0, 0, 0.06]), 120, 2.0)
@@ -401,7 +402,7 @@ def no_tension():
 def concrete_cycles():
     """0.4 m square, 3 m high, 30 % of its strength in compression, drifts up to 3 %."""
     hoops = {"ratio": 0.012, "yield_limit": 400e6, "width": 0.32, "spacing": 0.1}
-    cover, core = ub.KentPark.confined(30e6), ub.KentPark.confined(30e6, **hoops)
+    cover, core = st.KentPark.confined(30e6), st.KentPark.confined(30e6, **hoops)
     y, A = [-0.15, 0.0, 0.15], [1e-3, 0.6e-3, 1e-3]
     section = reinforced(0.4, 0.4, cover, y, A, E=30e9, core=ub.Fibres(core), cover=0.04)
     column = ub.Beam((0, 0), (0, 3), section, cells=8)
@@ -418,7 +419,7 @@ def concrete_cycles():
 )
 def brace():
     """A tube of 4 m, slenderness 85, bow of L/500; fibres of Menegotto and Pinto."""
-    steel = ub.Fibres(ub.MenegottoPinto(355e6, 0.01, 20.0), number=20)
+    steel = ub.Fibres(st.MenegottoPinto(355e6, 0.01, 20.0), number=20)
     section = ub.Section.tube(d=0.14, t=0.006, fibres=steel, **STEEL)
     points = np.linspace(0, 1, 13)
     bow = [(4 * s, 0.008 * math.sin(math.pi * s)) for s in points]

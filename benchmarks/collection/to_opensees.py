@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 LONGEST = 600
 """Time after which a run of OpenSees is stopped; s."""
@@ -127,15 +128,15 @@ class Translation:
         match law:
             case ub.ElastoPlastic():
                 return self.material("ElasticPP", E, law.yield_limit / E)
-            case ub.MenegottoPinto():
+            case st.MenegottoPinto():
                 curve = law.R0, law.cR1, law.cR2
                 return self.material("Steel02", law.yield_limit, E, law.hardening, *curve)
-            case ub.KentPark():
+            case st.KentPark():
                 peak = law.strength, 2 * law.strength / E
                 return self.material(
                     "Concrete01", *(-x for x in (*peak, law.residual, law.ultimate))
                 )
-            case ub.Mander():
+            case st.Mander():
                 r = E / (E - law.strength / law.strain)
                 peak = -law.strength, -law.strain
                 return self.material("Concrete07", *peak, E, 1.0, 1e-6, 2.0, 2.3, r)
@@ -143,7 +144,7 @@ class Translation:
                 rate = law.limit / law.fracture_energy
                 decay = 0.0, 1.0, law.limit, rate
                 return self.material("UVCuniaxial", E, law.limit, *decay, 1, 1.0, 1.0)
-            case ub.IbarraKrawinkler():
+            case st.IbarraKrawinkler():
                 b = law.backbone
                 rotations = b.capping, b.post_capping, b.ultimate
                 branch = *rotations, b.yield_limit, b.overstrength, b.residual

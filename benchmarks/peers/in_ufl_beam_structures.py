@@ -8,6 +8,7 @@ from stopwatch import Stopwatch
 from structures import CURVATURES, SECTIONS, Column, Frame, Hinge
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.dolfinx_compat import dolfinx
 
 VERSION = f"DOLFINx {dolfinx.__version__}"
@@ -15,11 +16,11 @@ VERSION = f"DOLFINx {dolfinx.__version__}"
 
 def section_of(p):
     """Return a section without shear strains, as the elements of OpenSees have."""
-    laws = {"steel": ub.Fibres(ub.MenegottoPinto(**p.steel))}
+    laws = {"steel": ub.Fibres(st.MenegottoPinto(**p.steel))}
     E = {"steel": p.bars}
     for name in ("cover", "core"):
         if hasattr(p, name):
-            laws[name], E[name] = ub.Fibres(ub.KentPark(**getattr(p, name))), p.concrete
+            laws[name], E[name] = ub.Fibres(st.KentPark(**getattr(p, name))), p.concrete
     y, A, material = zip(*p.fibres(), strict=True)
     return ub.Section.of_fibres(
         y, A, E=[E[m] for m in material], fibres=[laws[m] for m in material], nu=0.2,
@@ -31,7 +32,7 @@ def section(kind):
     p, stopwatch = SECTIONS[kind], Stopwatch()
     own = section_of(p)
     with stopwatch:
-        result = ub.moment_curvature(own, CURVATURES, p.N)
+        result = st.moment_curvature(own, CURVATURES, p.N)
     return {"values": {"moment": result.moment.tolist()}, **stopwatch.read()}
 
 
@@ -53,17 +54,17 @@ def column(cells, degree):
 
 def hinge(kind, largest, lost):
     h, rotations = Hinge, Hinge.rotations(largest)
-    backbone = ub.Backbone(
+    backbone = st.Backbone(
         h.limit, capping=h.capping, post_capping=h.post_capping, overstrength=h.overstrength,
         residual=h.residual, ultimate=h.ultimate,
     )  # fmt: skip
     names = "strength", "softening", "reloading", "unloading"
     modes = {name: x for name, x in zip(names, lost, strict=True) if x}
     if kind == "IMKBilin":
-        law = ub.IbarraKrawinkler(h.stiffness, backbone, **modes)
+        law = st.IbarraKrawinkler(h.stiffness, backbone, **modes)
     else:
         pinching = {"kappa_F": h.kappa_F, "kappa_D": h.kappa_D} if kind == "IMKPinching" else {}
-        law = ub.PinchingHinge(h.stiffness, backbone, **modes, **pinching)
+        law = st.PinchingHinge(h.stiffness, backbone, **modes, **pinching)
     arm = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e9, GA=1e9, EI=1e8, rhoA=1.0), cells=1)
     spring = ub.Turn(ub.ground(0, 0), arm.start, law)
     n = len(rotations) - 1

@@ -7,6 +7,7 @@ from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from pathlib import Path
 
+import helpers
 import pytest
 
 import ufl_beam as ub
@@ -234,14 +235,18 @@ WITHOUT: set[str] = set()
 """Effects without such a test; the set must not grow."""
 
 
+FOLDERS = "model.", "mechanics.", "simulation.step_lengths", "analysis.path_controls"
+LAWS = "concrete_laws", "steel_laws", "hinge_laws", "hysteresis_laws", "ground_motion"
+MODULES = *FOLDERS, *(f"structures.{name}" for name in LAWS)
+
+
 def public_effects():
     """Public classes of models, schemes, steps and path controls, by name."""
-    folders = ("model.", "mechanics.", "simulation.step_lengths", "analysis.path_controls")
     return {
         name: kind
-        for name in ub.__all__
-        if inspect.isclass(kind := getattr(ub, name))
-        and kind.__module__.startswith(tuple(f"ufl_beam.{folder}" for folder in folders))
+        for name, kind in helpers.PUBLIC.items()
+        if inspect.isclass(kind)
+        and kind.__module__.startswith(tuple(f"ufl_beam.{module}" for module in MODULES))
         and name not in OTHERS
     }
 

@@ -9,18 +9,20 @@ from pathlib import Path
 
 import pytest
 
+import ufl_beam as ub
+
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "ufl_beam"
 FILES = {
     ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path
     for path in sorted(PACKAGE.rglob("*.py"))
-    if path.name != "__init__.py"
+    if path.name not in ("__init__.py", "extend.py")
 }
 """Files of the modules of the package, by names such as ``model.beams``."""
 
 SUBPACKAGES = [
     *("", "model", "compiled", "mechanics", "discretization", "terms", "blocks"),
-    *("solvers", "output", "reference", "simulation", "analysis", "plotting"),
+    *("solvers", "output", "reference", "simulation", "analysis", "plotting", "structures"),
 ]
 """From the lowest to the highest; the first one is the package itself.
 
@@ -33,7 +35,7 @@ C_FILES = {
     "blocks": "blocks inelastic_cells energy_ledger",
     "solvers": "beam_elimination fronts newton",
     "simulation": "steps derivatives adjoint block_derivatives point_derivatives",
-    "analysis": "oscillators",
+    "structures": "oscillators",
 }
 """C files of ``compiled/c`` by the subpackage that they belong to."""
 
@@ -55,10 +57,12 @@ C_FUNCTION = re.compile(
 )
 """Definition of a function in C: its name, and its body in the same line or in several."""
 
-MOST_DEPTH = 22
+MOST_DEPTH = 23
 """Longest chain of imports at most."""
 
 FINITE_ELEMENTS = {"basix", "cffi", "dolfinx", "ffcx", "mpi4py", "petsc4py", "ufl"}
+
+DRAWING = "plotting.", "structures.pictures"
 
 PETSC = {"compiled", "solvers", "reference", "dolfinx_compat"}
 """Where PETSc is used; `dolfinx_compat` explains what is not installed."""
@@ -250,6 +254,30 @@ def test_few_subpackages_import_petsc():
         assert "petsc4py" not in outside(module) or {module, subpackage(module)} & PETSC, module
 
 
-@pytest.mark.parametrize("module", [m for m in FILES if subpackage(m) != "plotting"])
+@pytest.mark.parametrize("module", [m for m in FILES if not m.startswith(DRAWING)])
 def test_only_plotting_imports_matplotlib_and_pyvista(module):
     assert not outside(module) & {"matplotlib", "pyvista", "PIL"}
+
+
+SEAMS = {
+    "analysis.constant_loads", "analysis.linearization", "analysis.modes", "analysis.derivatives",
+    "analysis.parameter_study", "blocks.material_points", "compiled.c_library",
+    "discretization.dof_numbering", "discretization.function_spaces", "mechanics.time_scheme",
+    "output.hinge_histories", "output.recorder", "output.section_forces", "output.states",
+    "simulation.initial_state", "simulation.run",
+}  # fmt: skip
+"""Modules beside the model of which structures use names that are not public; pictures use more."""
+
+
+def test_structures_use_public_names_and_few_others():
+    public = {*ub.__all__, *ub.RESULTS, *ub.extend.__all__, *ub.distributions.__all__}
+    used = {
+        node.module.removeprefix("ufl_beam.")
+        for file in FILES
+        if subpackage(file) == "structures" and file != "structures.pictures"
+        for node in ast.walk(ast.parse(FILES[file].read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("ufl_beam.")
+        if {alias.name for alias in node.names} - public
+    }
+    inside = {module for module in used if subpackage(module) in ("", "model", "structures")}
+    assert used - inside == SEAMS

@@ -23,6 +23,7 @@ from helpers import stop_after
 from user_classes import CONNECTOR_LAWS, LAWS, SOFTENING, LargestCurvature
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam import parallel
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.reference_run import require_scope
@@ -212,7 +213,7 @@ def engineering(case):
     The sums are taken in another order.  Drifts are differences of displacements.
     """
     solution, scene = case.whole.solution, case.whole.names["scene"]
-    rows, (_, lost) = solution.hinges(only=scene.beams).rows, solution.damage()
+    rows, (_, lost) = st.hinge_table(solution, only=scene.beams).rows, solution.damage()
     assert difference(sum(row.dissipated for row in rows), lost.sum(), lost.sum() or 1.0) < 1e-12
     assert all(row.n < 0 or row.time == solution.times[row.n] for row in rows)
     for beam in scene.beams if len(solution.v) else ():
@@ -222,7 +223,7 @@ def engineering(case):
     low, high = sorted((scene.beams[0].start, scene.beams[0].end), key=lambda x: x.point[1])
     only(high.point[1] - low.point[1] > 0.1, "the first beam is horizontal")
     only(not scene.bodies, "a level may cut a body")
-    storeys = solution.storeys([low, high])
+    storeys = st.storeys(solution, [low, high])
     moved = solution.displacement(high) - solution.displacement(low)
     assert (storeys.drift[:, 0] == moved[:, 0]).all()
     assert np.isfinite(storeys.shear).all()
@@ -232,13 +233,13 @@ def recorders_of(case, names, folder):
     """New recorders of all kinds, which write to a folder of the case."""
     path, seed = case.folder / folder, case.combination.seed
     path.mkdir(exist_ok=True)
-    mean = (ub.Goodman(4e8), ub.Gerber(4e8))[seed % 2]
-    curve = ub.SNCurve(range=1e6, mean=mean) if seed % 3 else ub.SNCurve.eurocode(71e6)
-    spot = ub.HotSpot.fibre(names["b0"].at(0.3), y=0.05, E=1.2e8)
+    mean = (st.Goodman(4e8), st.Gerber(4e8))[seed % 2]
+    curve = st.SNCurve(range=1e6, mean=mean) if seed % 3 else st.SNCurve.eurocode(71e6)
+    spot = st.HotSpot.fibre(names["b0"].at(0.3), y=0.05, E=1.2e8)
     series = ub.XDMF(path / "run.xdmf") if seed % 2 else ub.VTKHDF(path / "run.vtkhdf", every=2)
     history = ub.History(path / "run.csv", [names["b0"].end], names["scene"].connectors)
     return [
-        history, ub.Extremes(), ub.Events(), ub.Fatigue(spot, curve), LargestCurvature(), series
+        history, ub.Extremes(), ub.Events(), st.Fatigue(spot, curve), LargestCurvature(), series
     ]  # fmt: skip
 
 

@@ -54,6 +54,7 @@ STIFF = "EA=1e6, GA=1e6, EI=100.0, rhoA=1.0, rhoI=0.01"
 
 HEAD = """import math
 import ufl_beam as ub
+import ufl_beam.structures as st
 from user_classes import *
 """
 
@@ -244,7 +245,7 @@ class Combination:
     @property
     def names(self):
         """Public names that the script uses."""
-        found = set(re.findall(r"ub\.(\w+)", self.source))
+        found = set(re.findall(r"\b(?:ub|st)\.(?:extend\.|distributions\.)?(\w+)", self.source))
         found |= {"ground"} if self.has("ub.ground") else set()
         found |= {"law_functions", "MaterialLaw"} if self.has(*LAWS) else set()
         found |= {"law_functions", "SofteningLaw"} if self.has(*SOFTENING) else set()

@@ -77,13 +77,13 @@ def shape(d):
         f"ub.Section.rectangle(0.01, 0.1, E={E}, nu=0.3, rho={rho / 12:.6g})",
         f"ub.Section.circle(0.05, E={3 * E}, nu=0.3, rho={rho / 24:.6g})",
         f"ub.Section.tube(0.08, 0.005, E={E / 2}, nu=0.3, rho={rho / 15:.6g})",
-        f"ub.Section.i_shape(0.08, 0.05, 0.004, 0.006, E={E / 4}, nu=0.3, rho={rho / 12:.6g})",
-        f"ub.Section.box(0.06, 0.08, 0.003, 0.006, E={E}, nu=0.3, rho={rho / 9:.6g})",
-        f"ub.Section.channel(0.1, 0.06, 0.004, 0.006, 0.005, E={3 * E}, nu=0.3, "
+        f"st.i_shape(0.08, 0.05, 0.004, 0.006, E={E / 4}, nu=0.3, rho={rho / 12:.6g})",
+        f"st.box(0.06, 0.08, 0.003, 0.006, E={E}, nu=0.3, rho={rho / 9:.6g})",
+        f"st.channel(0.1, 0.06, 0.004, 0.006, 0.005, E={3 * E}, nu=0.3, "
         f"rho={rho / 12:.6g}, axis='weak')",
-        f"ub.Section.t_shape(0.08, 0.05, 0.004, 0.006, E={2 * E}, nu=0.3, rho={rho / 7:.6g})",
-        f"ub.Section.steel('IPE 80', E={E}, rho={rho / 9:.6g})",
-        "ub.Section.of_shape(ub.Shape([(-0.01, 0), (0.01, 0), (0.005, 0.1), (-0.005, 0.1)]), "
+        f"st.t_shape(0.08, 0.05, 0.004, 0.006, E={2 * E}, nu=0.3, rho={rho / 7:.6g})",
+        f"st.steel('IPE 80', E={E}, rho={rho / 9:.6g})",
+        "ub.Section.of_shape(st.Shape([(-0.01, 0), (0.01, 0), (0.005, 0.1), (-0.005, 0.1)]), "
         f"shear_factor=0.8, E={E}, nu=0.3, rho={rho / 18:.6g})",
     ]))  # fmt: skip
 
@@ -116,9 +116,9 @@ def hysteresis(d):
     # with or without an axial law of another class
     axial = f"axial=ub.ElastoPlastic({4 * M:.4g}, isotropic={EA / 20:.4g}), "
     d.yields(0, d.one(["", axial]) + "bending=" + d.one([
-        f"ub.RambergOsgood({M:.4g}, {d.some(0.02, 0.1):.4g}, {d.some(2, 6):.3g})",
-        f"ub.ArmstrongFrederick({M:.4g}, {d.some(5, 20):.4g}, {d.some(0.5, 4):.4g})",
-        f"ub.BoucWen({M:.4g}, {d.some(0.02, 0.3):.3g}, {d.some(1, 4):.3g})",
+        f"st.RambergOsgood({M:.4g}, {d.some(0.02, 0.1):.4g}, {d.some(2, 6):.3g})",
+        f"st.ArmstrongFrederick({M:.4g}, {d.some(5, 20):.4g}, {d.some(0.5, 4):.4g})",
+        f"st.BoucWen({M:.4g}, {d.some(0.02, 0.3):.3g}, {d.some(1, 4):.3g})",
     ]))  # fmt: skip
 
 
@@ -132,7 +132,7 @@ def own_law(d):
 
 @feature("section", "any section", elastic=False)
 def interaction(d):
-    d.yields(0, f"interaction=ub.AxialBending({d.some(15, 60):.4g}, {d.some(4, 10):.4g})")
+    d.yields(0, f"interaction=st.AxialBending({d.some(15, 60):.4g}, {d.some(4, 10):.4g})")
 
 
 @feature("section", "any section", elastic=False)
@@ -151,10 +151,10 @@ def own_hinge_in_cells(d):
 def fibres(d):
     mean = d.some(4e4, 1e5)
     limit = d.one([
-        f"ub.Normal({mean:.5g}, {mean / 8:.5g}, seed=1)",
-        f"ub.TruncatedNormal({mean:.5g}, {mean / 5:.5g}, seed=2)",
-        f"ub.Lognormal({mean:.5g}, {mean / 5:.5g}, seed=3)",
-        f"ub.Weibull({mean:.5g}, 6.0, seed=4)",
+        f"ub.distributions.Normal({mean:.5g}, {mean / 8:.5g}, seed=1)",
+        f"ub.distributions.TruncatedNormal({mean:.5g}, {mean / 5:.5g}, seed=2)",
+        f"ub.distributions.Lognormal({mean:.5g}, {mean / 5:.5g}, seed=3)",
+        f"ub.distributions.Weibull({mean:.5g}, 6.0, seed=4)",
     ])  # fmt: skip
     crack = d.one(["", f", softening=ub.Softening({1.5 * mean:.5g}, {mean / 500:.5g})"])
     law = f"ub.Fibres(ub.ElastoPlastic({limit}, isotropic=6e6), number=4{crack})"
@@ -164,12 +164,12 @@ def fibres(d):
         f"nu=0.3, rho=1e3, fibres={law.replace(', number=4', '')})",
         # laws of several classes: two with cracks at different limits, and bars
         f"ub.Section.rectangle(0.01, 0.1, E=1.2e8, nu=0.3, rho=1e3, fibres={law}, cover=0.002, "
-        f"core=ub.Fibres(ub.RambergOsgood({mean:.5g}, 1e-4, 3.0), softening=ub.LinearSoftening("
+        f"core=ub.Fibres(st.RambergOsgood({mean:.5g}, 1e-4, 3.0), softening=ub.LinearSoftening("
         f"{2 * mean:.5g}, {mean / 300:.5g}))).reinforced([-0.04, 0.04], [1e-5, 2e-5], E=8e8, "
-        f"fibres=ub.Fibres(ub.ArmstrongFrederick({3 * mean:.5g}, 1e8, 100.0)))",
-        f"ub.Section.t_shape(0.1, 0.03, 0.008, 0.02, E=1.2e8, nu=0.3, rho=1e3, fibres={law}, "
+        f"fibres=ub.Fibres(st.ArmstrongFrederick({3 * mean:.5g}, 1e8, 100.0)))",
+        f"st.t_shape(0.1, 0.03, 0.008, 0.02, E=1.2e8, nu=0.3, rho=1e3, fibres={law}, "
         f"cover=0.002, core=ub.Fibres(ub.ElastoPlastic({2 * mean:.5g}))).reinforced([-0.04], "
-        f"[1e-5], E=8e8, fibres=ub.Fibres(ub.RambergOsgood({3 * mean:.5g}, 1e-4, 3.0)))",
+        f"[1e-5], E=8e8, fibres=ub.Fibres(st.RambergOsgood({3 * mean:.5g}, 1e-4, 3.0)))",
     ]
     d.section(0, d.one(shapes))
 
@@ -180,9 +180,9 @@ def fibres_of_steel_or_concrete(d):
     kind, energy = d.one(["Softening", "LinearSoftening"]), d.some(300, 900)
     tension = f"tension=ub.{kind}({limit:.5g}, {energy:.4g})"
     law = d.one([
-        f"ub.MenegottoPinto({limit / 2:.5g}, {d.some(0.02, 0.2):.3g}, a1=0.1, a3=0.05)",
-        f"ub.KentPark({strength:.5g}, {strength / 3:.5g}, {strength / 2e7:.4g}, {tension})",
-        f"ub.Mander({strength:.5g}, {strength / 6e7:.4g}, {tension})",
+        f"st.MenegottoPinto({limit / 2:.5g}, {d.some(0.02, 0.2):.3g}, a1=0.1, a3=0.05)",
+        f"st.KentPark({strength:.5g}, {strength / 3:.5g}, {strength / 2e7:.4g}, {tension})",
+        f"st.Mander({strength:.5g}, {strength / 6e7:.4g}, {tension})",
     ])  # fmt: skip
     fibres = f"ub.Fibres({law}, number=4)"
     d.section(0, f"ub.Section.rectangle(0.01, 0.1, E=1.2e8, nu=0.3, rho=1e3, fibres={fibres})")
@@ -312,7 +312,7 @@ def shaken(d):
     motion = f"lambda t: 0.03 * (1.0 - math.cos({ω:.4g} * t))"
     if d.one([True, False]):
         values = ", ".join(f"{d.some(-0.3, 0.3) / d.end**2:.3f}" for _ in range(8))
-        d.lines.append(f"quake = ub.GroundMotion({d.end / 10:.4g}, [0.0, {values}, 0.0])")
+        d.lines.append(f"quake = st.GroundMotion({d.end / 10:.4g}, [0.0, {values}, 0.0])")
         motion = "quake.displacement"
     d.root = f"ub.PrescribedDisplacement({{place}}, {d.one(['u', 'v', 'psi'])}={motion}, {{rest}})"
 

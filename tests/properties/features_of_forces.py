@@ -170,7 +170,7 @@ def rigid_plastic(d):
 @feature(elastic=False)
 def axial_bending_hinge(d):
     N, M = d.some(2, 20), d.some(0.5, 3)
-    law = f"ub.AxialBendingHinge({N:.4g}, {M:.4g}, {d.some(300, 900):.4g}, 500.0, 100.0)"
+    law = f"st.AxialBendingHinge({N:.4g}, {M:.4g}, {d.some(300, 900):.4g}, 500.0, 100.0)"
     d.connectors.append(f"ub.Bushing(ub.ground(0.2, 0.7), {d.last}.end, {law}, axis=(0.3, 1.0))")
 
 
@@ -178,7 +178,7 @@ def axial_bending_hinge(d):
 def deteriorating(d):
     M, k, n = d.some(1, 4), 200.0, d.one([1, 1.3, 2])
     plus, minus = (
-        f"ub.Backbone({M * f:.4g}, {d.some(1, 4) * M / k:.4g}, {d.some(4, 30) * M / k:.4g}, "
+        f"st.Backbone({M * f:.4g}, {d.some(1, 4) * M / k:.4g}, {d.some(4, 30) * M / k:.4g}, "
         f"{d.some(1, 1.2):.3g}, {d.some(0, 0.5):.3g}, {d.some(20, 60) * M / k:.4g})"
         for f in (1, d.some(0.7, 1))
     )
@@ -186,7 +186,7 @@ def deteriorating(d):
     kind, more = "IbarraKrawinkler", ""
     if d.one([True, False]):
         kind, more = "PinchingHinge", f", {d.some(0.2, 1):.3g}, {d.some(0, 1):.3g}, {E[1]}"
-    _connect(d, f"ub.{kind}({k}, {plus}, {minus}, {', '.join(E)}, {n}{more})", "SLT")
+    _connect(d, f"st.{kind}({k}, {plus}, {minus}, {', '.join(E)}, {n}{more})", "SLT")
 
 
 # -- loads, works, masses, damping -------------------------------------------------------------

@@ -75,9 +75,9 @@ class Laws(Draws):
         smooth = f"{hardens:.2f}, {exponent:.2f}, {shape:.2f}, {strength:.1f}"
         return {
             "ElastoPlastic": hardening,
-            "RambergOsgood": f"ub.RambergOsgood({limit}, {offset}, {exponent:.2f})",
-            "ArmstrongFrederick": f"ub.ArmstrongFrederick({limit}, {kinematic}, {recovery})",
-            "BoucWen": f"ub.BoucWen({limit}, {smooth})",
+            "RambergOsgood": f"st.RambergOsgood({limit}, {offset}, {exponent:.2f})",
+            "ArmstrongFrederick": f"st.ArmstrongFrederick({limit}, {kinematic}, {recovery})",
+            "BoucWen": f"st.BoucWen({limit}, {smooth})",
         }[name]
 
     def _softening(self, limit, energy, dimensions):
@@ -126,7 +126,7 @@ class Laws(Draws):
             laws += [f"shear={law}"] if self._chance(0.3) else []
             if kind == "resultants" and self._others.random() < 0.2:
                 both = f"{say.number(force, 'N')}, {say.number(limit, 'N m')}"
-                laws = [f"interaction=ub.AxialBending({both})"]
+                laws = [f"interaction=st.AxialBending({both})"]
             more += laws
         if kind in ("hinge", "both"):
             size = limit * self._size(0, 0.5)
@@ -146,11 +146,12 @@ class Laws(Draws):
         wall = say.number(h / 10, "m")
         h = say.number(h, "m")
         shape = self._one([
-            f"rectangle({h}, {h}", f"circle({h}", f"tube({h}, {wall}",
-            f"i_shape({h}, {h}, {wall}, {wall}",
+            f"ub.Section.rectangle({h}, {h}", f"ub.Section.circle({h}",
+            f"ub.Section.tube({h}, {wall}",
+            f"st.i_shape({h}, {h}, {wall}, {wall}",
         ])  # fmt: skip
         self._lines.append(
-            f"section{i} = ub.Section.{shape}, E={say.number(E, 'Pa')}, nu=0.3, "
+            f"section{i} = {shape}, E={say.number(E, 'Pa')}, nu=0.3, "
             f"rho={say.number(rho, 'kg/m3')})"
         )
 
@@ -160,9 +161,10 @@ class Laws(Draws):
         E, strength = EA / h**2, 6 * limit / h**3
         mean, scatter = say.number(strength, "Pa"), say.number(strength / 4, "Pa")
         drawn = self._one([
-            f"ub.Normal({mean}, {scatter}, seed={i})", f"ub.Lognormal({mean}, {scatter}, seed={i})",
-            f"ub.TruncatedNormal({mean}, {scatter}, seed={i})",
-            f"ub.Weibull({mean}, 3.0, seed={i})",
+            f"ub.distributions.Normal({mean}, {scatter}, seed={i})",
+            f"ub.distributions.Lognormal({mean}, {scatter}, seed={i})",
+            f"ub.distributions.TruncatedNormal({mean}, {scatter}, seed={i})",
+            f"ub.distributions.Weibull({mean}, 3.0, seed={i})",
         ])  # fmt: skip
         limit = drawn if self._scattered else mean
         law = self._yielding(self._others.choice(CLASSES), limit, strength, E, ("Pa", "Pa s"))

@@ -33,7 +33,8 @@ class _Writer(Draws):
 
     def __init__(self, seed):
         self._random = np.random.default_rng(seed)
-        self.lines = [f"# seed {seed}", "import math", "import ufl_beam as ub", ""]
+        self.lines = [f"# seed {seed}", "import math", "import ufl_beam as ub"]
+        self.lines += ["import ufl_beam.structures as st", ""]
         self._static = self._chance(0.3)
         self._anchors, self._beams, self._bodies, self._velocities = [], [], [], []
         self._joints, self._supports, self._loads, self._masses = [], [], [], []
@@ -116,9 +117,9 @@ class _Writer(Draws):
             E, strength = EA / h**2, limit / h**3
             drawn = [
                 _number(strength),
-                f"ub.Normal({strength:.6g}, {strength / 5:.6g}, seed={i})",
-                f"ub.Lognormal({strength:.6g}, {strength / 3:.6g}, seed={i})",
-                f"ub.Weibull({strength:.6g}, 3.0, seed={i})",
+                f"ub.distributions.Normal({strength:.6g}, {strength / 5:.6g}, seed={i})",
+                f"ub.distributions.Lognormal({strength:.6g}, {strength / 3:.6g}, seed={i})",
+                f"ub.distributions.Weibull({strength:.6g}, 3.0, seed={i})",
             ]
             law = self._hardening(E, self._one(drawn))
             crack = ""

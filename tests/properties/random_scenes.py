@@ -63,6 +63,7 @@ class _Writer(Laws):
             f"# {'scattered, ' * self._scattered}seed {seed}, {statement.name}",
             "import math",
             "import ufl_beam as ub",
+            "import ufl_beam.structures as st",
             "",
         ]
         self._statement, self._parts, self._anchors = statement, [], []

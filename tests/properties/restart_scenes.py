@@ -39,7 +39,7 @@ def machine(dynamic=True):
     fibres = ub.Section.rectangle(
         b=0.02, h=0.05, E=1e8, nu=0.3, rho=500.0,
         fibres=ub.Fibres(
-            ub.ElastoPlastic(ub.TruncatedNormal(1e5, 2e4, seed=7)), number=6
+            ub.ElastoPlastic(ub.distributions.TruncatedNormal(1e5, 2e4, seed=7)), number=6
         ),
     )  # fmt: skip
     a = ub.Body((0, 0), mass=2.0, inertia=0.3, name="a")

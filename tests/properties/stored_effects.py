@@ -35,6 +35,7 @@ from user_classes import (
 )
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 PLAIN = {"EA": 1e4, "GA": 4e3, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.01}
 
@@ -186,11 +187,11 @@ def table(d):
     d.add("loads", ub.PointLoad(beam.end, (5.0, 12.0), amplitude=ub.Table(times, values)))
 
 
-@effect(ub.GroundMotion)
+@effect(st.GroundMotion)
 def ground_motion(d):
     beam = arm(d)
     values = [d.either_sign(10.0, 40.0) for _ in range(6)]
-    quake = ub.GroundMotion(d.acts(0.02, 0.03), values)
+    quake = st.GroundMotion(d.acts(0.02, 0.03), values)
     d.further.append(quake)
     if d.static or d.one(True, False):
         d.add("loads", ub.Gravity((-1, 0.5), amplitude=quake.acceleration))
@@ -534,24 +535,24 @@ def force_law_with_state(d):
     connected(d, ub.ForceLaw(Maxwell(d.acts(100, 300), d.acts(0.02, 0.1)), state=[0.0]))
 
 
-@effect(ub.ConnectorLaw)
+@effect(ub.extend.ConnectorLaw)
 def own_connector_law(d):
     connected(d, Stiffening(d.acts(50, 200), d.acts(3e4, 9e4)))
 
 
-@effect(ub.ConnectorLaw, schemes=DYNAMIC)
+@effect(ub.extend.ConnectorLaw, schemes=DYNAMIC)
 def own_connector_law_with_state(d):
     connected(d, Relaxing(d.acts(100, 300), d.acts(0.02, 0.1), d.acts(2, 10)))
 
 
-@effect(ub.ConnectorLaw, schemes=OVER_STEP)
+@effect(ub.extend.ConnectorLaw, schemes=OVER_STEP)
 def own_connector_law_that_holds(d):
     rest = d.acts(4, 8)
     connected(d, Brake(rest, rest * d.acts(0.5, 0.8), d.acts(0.02, 0.1)))
 
 
 def backbone(d, M, k):
-    return ub.Backbone(
+    return st.Backbone(
         d.acts(0.8 * M, 1.2 * M), capping=d.acts(0.8, 1.5) * M / k,
         post_capping=d.acts(4, 8) * M / k, overstrength=1 + d.acts(0.05, 0.15),
         residual=d.acts(0.2, 0.4), ultimate=d.some(40, 60) * M / k,
@@ -572,22 +573,22 @@ def deteriorating(d, kind, *more, **numbers):
     d.add("connectors", ub.Turn(ub.ground(0, 0), beam.start, law))
 
 
-@effect(ub.IbarraKrawinkler, ub.Backbone)
+@effect(st.IbarraKrawinkler, st.Backbone)
 def ibarra_krawinkler(d):
-    deteriorating(d, ub.IbarraKrawinkler)
+    deteriorating(d, st.IbarraKrawinkler)
 
 
-@effect(ub.PinchingHinge, ub.Backbone)
+@effect(st.PinchingHinge, st.Backbone)
 def pinching_hinge(d):
     deteriorating(
-        d, ub.PinchingHinge, "reloading", kappa_F=d.acts(0.3, 0.7), kappa_D=d.acts(0.2, 0.7)
+        d, st.PinchingHinge, "reloading", kappa_F=d.acts(0.3, 0.7), kappa_D=d.acts(0.2, 0.7)
     )
 
 
-@effect(ub.AxialBendingHinge)
+@effect(st.AxialBendingHinge)
 def axial_bending_hinge(d):
     beam, other = joined(d)
-    law = ub.AxialBendingHinge(
+    law = st.AxialBendingHinge(
         d.acts(3, 6), d.acts(0.5, 1.5), d.acts(500, 900), d.acts(500, 900), d.acts(100, 300)
     )
     d.add("connectors", ub.Bushing(beam.end, other.start, law, axis=(1.0, 0.3)))
@@ -628,32 +629,32 @@ def duvaut_lions(d):
     bent(d, ub.ElastoPlastic(d.acts(3, 6), isotropic=d.acts(3, 10), viscosity=viscosity))
 
 
-@effect(ub.RambergOsgood)
+@effect(st.RambergOsgood)
 def ramberg_osgood(d):
-    bent(d, ub.RambergOsgood(d.acts(4, 8), d.acts(0.02, 0.08), d.acts(2, 6)))
+    bent(d, st.RambergOsgood(d.acts(4, 8), d.acts(0.02, 0.08), d.acts(2, 6)))
 
 
-@effect(ub.ArmstrongFrederick)
+@effect(st.ArmstrongFrederick)
 def armstrong_frederick(d):
-    bent(d, ub.ArmstrongFrederick(d.acts(4, 8), d.acts(10, 30), d.acts(2, 8)))
+    bent(d, st.ArmstrongFrederick(d.acts(4, 8), d.acts(10, 30), d.acts(2, 8)))
 
 
-@effect(ub.BoucWen)
+@effect(st.BoucWen)
 def bouc_wen(d):
-    bent(d, ub.BoucWen(
+    bent(d, st.BoucWen(
         d.acts(4, 8), d.acts(0.05, 0.2), d.acts(1, 3), d.acts(0.55, 0.8), d.acts(0.1, 0.3)
     ))  # fmt: skip
 
 
-@effect(ub.AxialBending)
+@effect(st.AxialBending)
 def axial_bending(d):
-    law = ub.AxialBending(d.acts(15, 30), d.acts(4, 7), d.acts(0.01, 0.05))
+    law = st.AxialBending(d.acts(15, 30), d.acts(4, 7), d.acts(0.01, 0.05))
     beam = driven(d, ub.Section(**PLAIN, interaction=law))
     pull = d.sign() * d.some(4, 8), 0.0
     d.add("loads", ub.PointLoad(beam.end, force=pull, amplitude=d.wave()))
 
 
-@effect(ub.MaterialLaw)
+@effect(ub.extend.MaterialLaw)
 def own_material_law(d):
     bent(d, d.choose(
         lambda: Dashpot(d.acts(0.5, 2)), lambda: PowerLaw(d.acts(4, 8), 0.05, d.acts(2, 5))
@@ -673,8 +674,8 @@ def fibres(d):
     crack = d.one(ub.Softening, ub.LinearSoftening)(d.acts(1.1e5, 1.3e5), d.acts(400, 800))
     number = d.instead(4, 6)
     cover = ub.Fibres(law, number=number, softening=crack)
-    core = ub.Fibres(ub.RambergOsgood(d.some(1e5, 2e5), 1e-4, 3.0))
-    bars = ub.Fibres(ub.ArmstrongFrederick(d.acts(3e5, 5e5), 1e8, 100.0))
+    core = ub.Fibres(st.RambergOsgood(d.some(1e5, 2e5), 1e-4, 3.0))
+    bars = ub.Fibres(st.ArmstrongFrederick(d.acts(3e5, 5e5), 1e8, 100.0))
     section = d.one(layered(d, cover), layered(d, cover, cover=0.002, core=core))
     driven(d, section.reinforced([-0.04, 0.04], [1e-5, 2e-5], E=8e8, fibres=bars))
 
@@ -690,29 +691,34 @@ def scattered(d, limit):
     driven(d, layered(d, ub.Fibres(ub.ElastoPlastic(limit, isotropic=6e6), number=4)))
 
 
-@effect(ub.Normal)
+@effect(ub.distributions.Normal)
 def normal(d):
-    scattered(d, ub.Normal(d.acts(1e5, 2e5), d.acts(1e4, 2e4), seed=d.instead(1, 5)))
+    scattered(d, ub.distributions.Normal(d.acts(1e5, 2e5), d.acts(1e4, 2e4), seed=d.instead(1, 5)))
 
 
-@effect(ub.TruncatedNormal)
+@effect(ub.distributions.TruncatedNormal)
 def truncated_normal(d):
-    scattered(d, ub.TruncatedNormal(d.acts(1e5, 2e5), d.acts(2e4, 4e4), seed=d.instead(2, 6)))
+    scattered(
+        d,
+        ub.distributions.TruncatedNormal(d.acts(1e5, 2e5), d.acts(2e4, 4e4), seed=d.instead(2, 6)),
+    )
 
 
-@effect(ub.Lognormal)
+@effect(ub.distributions.Lognormal)
 def lognormal(d):
-    scattered(d, ub.Lognormal(d.acts(1e5, 2e5), d.acts(2e4, 4e4), seed=d.instead(3, 7)))
+    scattered(
+        d, ub.distributions.Lognormal(d.acts(1e5, 2e5), d.acts(2e4, 4e4), seed=d.instead(3, 7))
+    )
 
 
-@effect(ub.Weibull)
+@effect(ub.distributions.Weibull)
 def weibull(d):
-    scattered(d, ub.Weibull(d.acts(1e5, 2e5), d.acts(4, 8), seed=d.instead(4, 8)))
+    scattered(d, ub.distributions.Weibull(d.acts(1e5, 2e5), d.acts(4, 8), seed=d.instead(4, 8)))
 
 
-@effect(ub.MenegottoPinto)
+@effect(st.MenegottoPinto)
 def menegotto_pinto(d):
-    law = ub.MenegottoPinto(
+    law = st.MenegottoPinto(
         d.acts(1e5, 2e5), d.acts(0.02, 0.1), R0=d.acts(10, 20), cR1=d.acts(0.6, 0.8),
         cR2=d.acts(0.1, 0.3), a1=d.acts(0.05, 0.2), a2=d.acts(0.8, 1.5), a3=d.acts(0.05, 0.2),
         a4=d.acts(0.8, 1.5),
@@ -727,19 +733,19 @@ def concrete(d, law):
     driven(d, section.reinforced([-0.04, 0.04], [5e-5, 5e-5], E=8e8, fibres=bars), size=0.12)
 
 
-@effect(ub.KentPark, seeds={4: 14})
+@effect(st.KentPark, seeds={4: 14})
 def kent_park(d):
     strength, tension = d.acts(1e5, 2e5), ub.Softening(d.acts(6e4, 1e5), d.acts(400, 900))
     ultimate = d.acts(1.4, 1.8) * 2.4e5 * 2 / 1.2e8
-    concrete(d, ub.KentPark(strength, d.acts(3e4, 6e4), ultimate, tension))
+    concrete(d, st.KentPark(strength, d.acts(3e4, 6e4), ultimate, tension))
 
 
-@effect(ub.Mander, seeds={4: 11})
+@effect(st.Mander, seeds={4: 11})
 def mander(d):
     strength, tension = d.acts(1e5, 2e5), ub.LinearSoftening(d.acts(6e4, 1e5), d.acts(400, 900))
     strain = d.acts(1.2, 1.5) * 2.4e5 / 1.2e8
     spalling = d.choose(lambda: math.inf, lambda: d.acts(2.1, 2.5) * strain)
-    concrete(d, ub.Mander(strength, strain, spalling, tension))
+    concrete(d, st.Mander(strength, strain, spalling, tension))
 
 
 # -- hinges ------------------------------------------------------------------------------------
@@ -778,13 +784,13 @@ def linear_softening_at_a_place(d):
     hinge_at_a_place(d, ub.LinearSoftening(*numbers_of_softening(d)))
 
 
-@effect(ub.SofteningLaw, ub.Section)
+@effect(ub.extend.SofteningLaw, ub.Section)
 def own_softening_in_cells(d):
     limit, energy = numbers_of_softening(d)
     hinge_in_cells(d, d.one(Petersson(limit, energy), Rising(limit, energy / (1.5 * limit))))
 
 
-@effect(ub.SofteningLaw, ub.Beam, schemes=OVER_ANY_STEP)
+@effect(ub.extend.SofteningLaw, ub.Beam, schemes=OVER_ANY_STEP)
 def own_softening_at_a_place(d):
     limit, energy = numbers_of_softening(d)
     hinge_at_a_place(d, d.one(Petersson(limit, energy), Rising(limit, energy / (1.5 * limit))))
@@ -970,7 +976,7 @@ def generalized_alpha(d):
     of_scheme(d, ub.GeneralizedAlpha(rho), ub.GeneralizedAlpha(1.0))
 
 
-@effect(ub.EnergyMomentumBase, ub.MidpointDynamics)
+@effect(ub.extend.EnergyMomentumBase, ub.extend.MidpointDynamics)
 def own_scheme(d):
     weight = d.some(0.52, 0.58)
     of_scheme(d, Weighted(weight), Weighted(0.5))

@@ -49,7 +49,7 @@ class Draft:
     """
 
     random: np.random.Generator
-    scheme: ub.Scheme
+    scheme: ub.extend.Scheme
     changed: int = -1
     count: int = 0
     end: float = 0.2
@@ -141,7 +141,7 @@ class Effect:
     name: str
     kinds: tuple[type, ...]
     write: Callable[[Draft], None]
-    schemes: tuple[ub.Scheme, ...]
+    schemes: tuple[ub.extend.Scheme, ...]
     seeds: dict[int, int] = field(default_factory=dict)
 
     def draft(self, scene, changed=-1):

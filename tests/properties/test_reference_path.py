@@ -163,7 +163,7 @@ def test_tangents(seed):
     random = np.random.default_rng(5)
     to = simulation.q + 1e-3 * scene.size * random.uniform(-1, 1, numbering.size)
     simulation.controllers.evaluate(simulation)
-    equation.begin(ub.Step.create(scheme, t0 + dt, t0 + 2 * dt, t0 + 2 * dt, simulation.q))
+    equation.begin(ub.extend.Step.create(scheme, t0 + dt, t0 + 2 * dt, t0 + 2 * dt, simulation.q))
     x = supports.in_axes(to)
     free = np.setdiff1d(np.arange(len(x)), supports.dofs)
 

@@ -25,7 +25,7 @@ from user_laws import (  # noqa: F401
     Rising,
 )
 
-f = ub.law_functions
+f = ub.extend.law_functions
 
 
 # -- works, N/m and J/m ------------------------------------------------------------------------
@@ -102,7 +102,7 @@ class Cubic:
 
 
 @dataclass(frozen=True)
-class Stiffening(ub.ConnectorLaw):
+class Stiffening(ub.extend.ConnectorLaw):
     """Spring of a quartic energy."""
 
     k: float
@@ -113,7 +113,7 @@ class Stiffening(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Relaxing(ub.ConnectorLaw):
+class Relaxing(ub.extend.ConnectorLaw):
     """Spring and damper in series, beside a quadratic damper."""
 
     k: float
@@ -132,7 +132,7 @@ class Relaxing(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Cushion(ub.ConnectorLaw):
+class Cushion(ub.extend.ConnectorLaw):
     """Two components that stiffen each other, with a damper."""
 
     k: float
@@ -149,7 +149,7 @@ class Cushion(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Brake(ub.ConnectorLaw):
+class Brake(ub.extend.ConnectorLaw):
     """It breaks loose at a limit, which grows with the way of sliding, and slides below it."""
 
     rest: float
@@ -188,7 +188,7 @@ class Integral:
 
 
 @dataclass(frozen=True)
-class Weighted(ub.EnergyMomentumBase, ub.MidpointDynamics):
+class Weighted(ub.extend.EnergyMomentumBase, ub.extend.MidpointDynamics):
     """Midpoint rule with one weight for resultants and velocities, as in docs/extending.md."""
 
     weight: float = 0.55
@@ -199,7 +199,7 @@ class Weighted(ub.EnergyMomentumBase, ub.MidpointDynamics):
 
     def coefficients(self, dt, last_dt, known):  # of the step s, the velocity v0, the one before v0
         w = self.weight
-        return ub.Coefficients(
+        return ub.extend.Coefficients(
             inertia=(1 / (w * dt**2), -1 / (w * dt), 0.0),  # (v1 - v0) / dt
             velocity=(1 / dt, 0.0, 0.0),  # s / dt
             rates=((1 / (w * dt), -(1 - w) / w, 0.0),),  # v1 of s/dt = (1 - w) v0 + w v1
@@ -214,7 +214,7 @@ class Weighted(ub.EnergyMomentumBase, ub.MidpointDynamics):
         return self.alpha, 1 / 12 + self.alpha
 
 
-class LargestCurvature(ub.Recorder):
+class LargestCurvature(ub.extend.Recorder):
     """Largest size of the curvature in any cell, by DOLFINx."""
 
     def open(self, simulation):

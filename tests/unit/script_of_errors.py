@@ -30,7 +30,7 @@ class Unportable(Exception):
         super().__init__(f"{text} {number}")
 
 
-class Watch(ub.Recorder):
+class Watch(ub.extend.Recorder):
     def __init__(self, at, action):
         self.at, self.action = at, action
 

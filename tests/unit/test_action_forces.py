@@ -8,6 +8,7 @@ import pytest
 from helpers import run
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=3.0, rhoI=0.1)
 
@@ -34,7 +35,7 @@ def hinged(action):
         supports=[ub.Clamped(a.start), end],
         loads=loads,
     )
-    return ub.imperfect(scene, sway=0.01, bow={a: 0.05, b: -0.1}) if action == "bow" else scene
+    return st.imperfect(scene, sway=0.01, bow={a: 0.05, b: -0.1}) if action == "bow" else scene
 
 
 @pytest.mark.parametrize("action", ["pressure", "moving", "settlement", "bow"])

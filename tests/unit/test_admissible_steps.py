@@ -8,6 +8,7 @@ from uniaxial_points import Bars
 from user_laws import Dashpot, GivesEnergy, PowerLaw, SameHardening, Swelling, TwoRoots
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.blocks.material_points import Points
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.model.fibres import SectionPoints
@@ -29,7 +30,7 @@ def shaken(law):
 @pytest.mark.parametrize(
     ("law", "scheme", "dt"),
     [
-        (ub.AxialBending(NP, MP), ub.EnergyMomentum(), 0.02),
+        (st.AxialBending(NP, MP), ub.EnergyMomentum(), 0.02),
         (TwoRoots(NP, MP), ub.EnergyMomentumDecaying(), 0.02),
         (TwoRoots(NP, MP), ub.GeneralizedAlpha(), 0.0125),
     ],
@@ -45,17 +46,17 @@ def test_dissipation_never_falls(law, scheme, dt, as_by_reference):
 
 
 LAWS = {
-    "RambergOsgood": ub.RambergOsgood(3.0, 0.01, 5.0),
-    "sharp": ub.RambergOsgood(3.0, 0.002, 15.0),
-    "ArmstrongFrederick": ub.ArmstrongFrederick(3.0, 100.0, 300.0),
-    "BoucWen": ub.BoucWen(3.0, 0.05, 2.0, 0.5, 0.01),
-    "BoucWen, other shape": ub.BoucWen(3.0, 0.0, 1.0, 0.7),
+    "RambergOsgood": st.RambergOsgood(3.0, 0.01, 5.0),
+    "sharp": st.RambergOsgood(3.0, 0.002, 15.0),
+    "ArmstrongFrederick": st.ArmstrongFrederick(3.0, 100.0, 300.0),
+    "BoucWen": st.BoucWen(3.0, 0.05, 2.0, 0.5, 0.01),
+    "BoucWen, other shape": st.BoucWen(3.0, 0.0, 1.0, 0.7),
     "ElastoPlastic": ub.ElastoPlastic(3.0, 20.0, 10.0),
     "Perzyna": ub.ElastoPlastic(3.0, 20.0, viscosity=ub.Perzyna(0.5)),
     "power law": PowerLaw(3.0, 0.01, 5.0),
     "by residuals": SameHardening(2.0, 20.0, 10.0, 0.5),
     "dashpot": Dashpot(20.0),
-    "axial force and moment": ub.AxialBending(NP, MP),
+    "axial force and moment": st.AxialBending(NP, MP),
     "two roots": TwoRoots(NP, MP),
 }
 

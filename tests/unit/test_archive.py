@@ -282,7 +282,7 @@ def test_numbers_are_exact():
     assert from_data(json.loads(json.dumps(to_data(spring)))) == spring
     stop = ub.Stop(2, low=-math.inf, high=0.0)
     assert from_data(json.loads(json.dumps(to_data(stop)))) == stop
-    random = ub.TruncatedNormal(1.0, 0.1, seed=7)
+    random = ub.distributions.TruncatedNormal(1.0, 0.1, seed=7)
     assert from_data(to_data(random)) == random
 
 

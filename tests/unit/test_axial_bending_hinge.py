@@ -13,10 +13,11 @@ from helpers import raises, require_restart
 from scipy.optimize import minimize
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.model.material_law import State, initial_state
 
 NP, MP = 400.0, 20.0
-LAW = ub.AxialBendingHinge(NP, MP, along=2e5, across=1e5, turning=3e3)
+LAW = st.AxialBendingHinge(NP, MP, along=2e5, across=1e5, turning=3e3)
 
 
 def projected(N, M):
@@ -120,21 +121,21 @@ def test_dynamics_close_the_ledger(tmp_path, as_by_reference):
 
 def test_numbers_must_be_positive():
     with raises("AxialBendingHinge: turning = 0", kind=ub.ModelError):
-        ub.AxialBendingHinge(1.0, 1.0, 1.0, 1.0, 0.0)
+        st.AxialBendingHinge(1.0, 1.0, 1.0, 1.0, 0.0)
 
 
 # -- results for engineers -------------------------------------------------------------------------
 
 LAWS = {
     "spring": ub.Spring(3e3, law=ub.ElastoPlastic(MP)),
-    "axial and bending": ub.AxialBendingHinge(1e9, MP, along=2e5, across=1e5, turning=3e3),
-    "deteriorating": ub.IbarraKrawinkler(3e3, ub.Backbone(MP, capping=1.0)),
-    "pinching": ub.PinchingHinge(3e3, ub.Backbone(MP, capping=1.0)),
+    "axial and bending": st.AxialBendingHinge(1e9, MP, along=2e5, across=1e5, turning=3e3),
+    "deteriorating": st.IbarraKrawinkler(3e3, st.Backbone(MP, capping=1.0)),
+    "pinching": st.PinchingHinge(3e3, st.Backbone(MP, capping=1.0)),
 }
 
 
 @dataclass(frozen=True)
-class Mine(ub.ConnectorLaw):
+class Mine(ub.extend.ConnectorLaw):
     """A perfectly plastic hinge with three components, the first two elastic."""
 
     stiffness: float
@@ -148,7 +149,7 @@ class Mine(ub.ConnectorLaw):
         return self.stiffness * (x**2 + y**2 + (turn - state.plastic) ** 2) / 2
 
     def increments(self, motion, rate, state, dt):
-        elastic, f = motion[2] - state.plastic, ub.law_functions
+        elastic, f = motion[2] - state.plastic, ub.extend.law_functions
         size = f.positive(f.absolute(elastic) - self.limit_moment / self.stiffness)
         return {"plastic": f.sign(elastic) * size}
 
@@ -180,7 +181,7 @@ def test_hinge_laws_have_the_results_of_a_spring_that_yields(scheme):
     # The loss of a law is seen from a thousandth of its work on, within a step
     assert {event.what for event in events.found} == {"yields"}
     assert np.ptp([event.time for event in events.found]) < 0.021
-    rows = {row.where: row for row in run.hinges({"IO": 0.05, "CP": 0.2}).rows}
+    rows = {row.where: row for row in st.hinge_table(run, {"IO": 0.05, "CP": 0.2}).rows}
     spring = rows[feet[0]]
     for foot in feet:
         # Round-off of Newton's method, 1e-9 of the forces
@@ -194,7 +195,7 @@ def test_hinge_laws_have_the_results_of_a_spring_that_yields(scheme):
     assert {*run.energy.lost} - {"numerical"} == {"plastic"}
     total = sum(row.dissipated for row in rows.values())
     assert run.energy.lost["plastic"][-1] == pytest.approx(total, rel=1e-12)
-    assert [row.where for row in run.hinges(only=[feet[1]]).rows] == [feet[1]]
+    assert [row.where for row in st.hinge_table(run, only=[feet[1]]).rows] == [feet[1]]
 
 
 def test_hinges_of_users_with_several_components_are_listed():
@@ -204,7 +205,7 @@ def test_hinges_of_users_with_several_components_are_listed():
     run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.02, record=events)
     assert {event.where for event in events.found} == {*feet[:2]}
     assert run.connector(feet[2]).dissipated[-1] > 1e-3 * run.connector(feet[2]).work[-1] > 0
-    first, second = run.hinges().rows
+    first, second = st.hinge_table(run).rows
     assert {first.where, second.where} == {*feet[:2]}
     assert first.rotation == pytest.approx(second.rotation, rel=1e-6)
     assert run.energy.lost["plastic"][-1] == pytest.approx(first.dissipated + second.dissipated)
@@ -221,7 +222,7 @@ def test_events_of_bushings_continue_after_a_restart(tmp_path):
     for events, end in zip(parts, (0.5, 1.0), strict=True):
         last = simulate(t=(0, end), record=events, checkpoint=kept)
     assert [*map(str, parts[1].found)] == [*map(str, whole.found)]
-    assert str(last.hinges()) == str(run.hinges())
+    assert str(st.hinge_table(last)) == str(st.hinge_table(run))
 
 
 def test_pictures_show_hinges_of_connectors():

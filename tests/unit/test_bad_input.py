@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 STEEL = {"E": 210e9, "nu": 0.3}
@@ -93,8 +94,8 @@ PARTS = [
     (lambda: ub.XDMF("a.xdmf", every=0), "XDMF a.xdmf: every = 0 must be a whole number"),
     # sections
     (lambda: ub.Section.tube(0.1, 0.06, **STEEL), "tube: wall t = 0.06 m is thicker than the"),
-    (lambda: ub.Section.i_shape(0.1, 0.1, 0.01, 0.05, **STEEL), "i_shape: ...do not fit"),
-    (lambda: ub.Section.i_shape(0.1, 0.1, 0.2, 0.01, **STEEL), "i_shape: ...do not fit"),
+    (lambda: st.i_shape(0.1, 0.1, 0.01, 0.05, **STEEL), "i_shape: ...do not fit"),
+    (lambda: st.i_shape(0.1, 0.1, 0.2, 0.01, **STEEL), "i_shape: ...do not fit"),
     (lambda: ub.Section.circle(0.1, E=1.0, nu=0.6), "nu = 0.6 must lie in (-1, 0.5]"),
     # laws
     (lambda: ub.ElastoPlastic(1.0, isotropic=-2.0), "isotropic = -2 must not...use Softening("),

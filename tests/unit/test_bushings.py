@@ -16,12 +16,12 @@ from scenes import clamped
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
 
-f = ub.law_functions
+f = ub.extend.law_functions
 SECTION = ub.Section(EA=1e5, GA=1e5, EI=3.0, rhoA=1.0, rhoI=1e-2)
 
 
 @dataclass(frozen=True)
-class Linear(ub.ConnectorLaw):
+class Linear(ub.extend.ConnectorLaw):
     k: float
 
     def energy(self, motion, state):
@@ -29,7 +29,7 @@ class Linear(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Springs(ub.ConnectorLaw):
+class Springs(ub.extend.ConnectorLaw):
     """Three springs that know nothing of each other."""
 
     along: float
@@ -43,7 +43,7 @@ class Springs(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Cushion(ub.ConnectorLaw):
+class Cushion(ub.extend.ConnectorLaw):
     """A spring that stiffens with the distance, and a damper that it stiffens."""
 
     k: float
@@ -61,7 +61,7 @@ class Cushion(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Creeping(ub.ConnectorLaw):
+class Creeping(ub.extend.ConnectorLaw):
     """A mount whose stiffness against turning grows with the pull, and that creeps along."""
 
     k: float
@@ -167,7 +167,7 @@ def test_the_reference_finds_the_same(name, scheme, as_by_reference):
 
 
 @pytest.mark.parametrize(
-    "scheme", [s for s in SCHEMES if isinstance(s, ub.EnergyMomentumBase)], ids=str
+    "scheme", [s for s in SCHEMES if isinstance(s, ub.extend.EnergyMomentumBase)], ids=str
 )
 @pytest.mark.parametrize("name", LAWS)
 def test_the_ledger_closes(name, scheme):
@@ -237,7 +237,7 @@ def test_buckling_and_modes():
     """The bends of the law, against a spring that is the same in one component."""
 
     @dataclass(frozen=True)
-    class Stiffening(ub.ConnectorLaw):
+    class Stiffening(ub.extend.ConnectorLaw):
         k: float
         cubic: float
 

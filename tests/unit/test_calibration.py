@@ -16,7 +16,8 @@ from helpers import raises
 from scipy.stats import norm, t
 
 import ufl_beam as ub
-from ufl_beam.analysis.calibration_result import _interpolate
+import ufl_beam.structures as st
+from ufl_beam.structures.calibration_result import _interpolate
 
 STEEL = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
 TIMES = np.linspace(0.0, 1.0, 41)
@@ -49,15 +50,15 @@ def measurement(values=None, *, times=TIMES, seed=0, **options):
         values = truth(factor=options.get("arguments", {}).get("factor", 1.0), times=times)
         values = values + SIGMA * noise
     options = {"quantity": force, "scheme": ub.Static(), "t": (0, 1), "dt": 0.025, **options}
-    return ub.Measurement(times, values, **options)
+    return st.Measurement(times, values, **options)
 
 
 WITHIN = {"a": (1.0, -10.0, 10.0), "b": (1.0, -10.0, 10.0)}
 
 
 def fit(measured, parameters=WITHIN, model=pushed, **options):
-    several = [measured] if isinstance(measured, ub.Measurement) else measured
-    return ub.calibrate(model, parameters, several, progress=False, **options)
+    several = [measured] if isinstance(measured, st.Measurement) else measured
+    return st.calibrate(model, parameters, several, progress=False, **options)
 
 
 def warned(pattern):
@@ -299,7 +300,7 @@ def test_a_search_goes_on_where_computed_values_jump(start):
     values = np.interp(times, run.times, tip(run))
     values += 0.002 * np.abs(values).max() * random.normal(size=len(times))
     with warned("hardly distinguish limit and hardening"):
-        found = fit([ub.Measurement(times, values, tip, **options)], start, model=rubbing)
+        found = fit([st.Measurement(times, values, tip, **options)], start, model=rubbing)
     low, high = found.intervals["limit"]
     assert low < 300.0 < high
     assert np.sum(found.residuals[0] ** 2) < 9.5e-6

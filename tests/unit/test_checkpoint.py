@@ -15,6 +15,7 @@ import pytest
 from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.output import output_files
 from ufl_beam.output.serialization import Description, difference
@@ -291,7 +292,7 @@ def test_a_state_must_be_plain(path):
         run(path, steered(Odd()))
 
 
-class Deaf(ub.Recorder):
+class Deaf(ub.extend.Recorder):
     def open(self, simulation):
         pass
 
@@ -453,7 +454,7 @@ def test_events_of_connector_laws_go_on(path):
     """A spring with a law of its own unloads before the restart and yields after it."""
     section = ub.Section.rectangle(0.05, 0.1, E=210e9, nu=0.3, rho=7850.0)
     beam = ub.Beam((0, 0), (1, 0), section, cells=2)
-    law = ub.IbarraKrawinkler(1e5, ub.Backbone(2e3, capping=0.05, overstrength=1.5))
+    law = st.IbarraKrawinkler(1e5, st.Backbone(2e3, capping=0.05, overstrength=1.5))
     foot = ub.Turn(ub.ground(0, 0), beam.start, law)
     table = ub.Table((0.0, 0.5, 1.0, 2.0), (0.0, 1.9e3, 0.0, 2.1e3))
     push = ub.PointLoad(beam.end, moment=1.0, amplitude=table)
@@ -467,5 +468,5 @@ def test_events_of_connector_laws_go_on(path):
     whole, expected = events(2.0)
     _, before = events(1.0, checkpoint=ub.Checkpoint(path, every=1))
     _, after = events(2.0, checkpoint=ub.Checkpoint(path, every=1))
-    (row,) = whole.hinges().rows
+    (row,) = st.hinge_table(whole).rows
     assert (before, after) == ([], expected) == ([], [(row.time, foot, "yields")])

@@ -11,7 +11,7 @@ from ufl_beam.model.connector_laws import Law
 from ufl_beam.model.loads import LOADS, Damping
 
 CLOSED = [
-    *(law for law in Law.__args__ if law is not ub.ConnectorLaw), *Damping.__args__,
+    *(law for law in Law.__args__ if law is not ub.extend.ConnectorLaw), *Damping.__args__,
     *LOADS,
     *(ub.Softening, ub.LinearSoftening, ub.VirtualWork, ub.Potential, ub.Perzyna),
     *(ub.DuvautLions, ub.Table),
@@ -32,7 +32,7 @@ class Saturating(ub.ElastoPlastic):
     more: float = 0.0
 
     def increments(self, strain, state, dt):
-        f = ub.law_functions
+        f = ub.extend.law_functions
         trial = self.stress(strain, state)
         over = f.positive(f.absolute(trial) - self.yield_limit - self.more * state.accumulated)
         γ = over / (self.C + self.more)

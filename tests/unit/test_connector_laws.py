@@ -25,12 +25,12 @@ from scipy.integrate import solve_ivp
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
 
-f = ub.law_functions
+f = ub.extend.law_functions
 SECTION = ub.Section(EA=1e5, GA=1e5, EI=3.0, rhoA=1.0, rhoI=1e-2)
 
 
 @dataclass(frozen=True)
-class Cubic(ub.ConnectorLaw):
+class Cubic(ub.extend.ConnectorLaw):
     """Nonlinear spring."""
 
     k: float
@@ -41,7 +41,7 @@ class Cubic(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Bump(ub.ConnectorLaw):
+class Bump(ub.extend.ConnectorLaw):
     """Energy that is no polynomial, and not convex; a constant of it does not matter."""
 
     k: float
@@ -52,7 +52,7 @@ class Bump(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Drag(ub.ConnectorLaw):
+class Drag(ub.extend.ConnectorLaw):
     """Quadratic damper beside a spring."""
 
     k: float
@@ -66,7 +66,7 @@ class Drag(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Maxwell(ub.ConnectorLaw):
+class Maxwell(ub.extend.ConnectorLaw):
     """Spring and damper in series."""
 
     k: float
@@ -81,7 +81,7 @@ class Maxwell(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Drive(ub.ConnectorLaw):
+class Drive(ub.extend.ConnectorLaw):
     """It pushes in the direction of the motion."""
 
     c: float
@@ -93,7 +93,7 @@ class Drive(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Bad(ub.ConnectorLaw):
+class Bad(ub.extend.ConnectorLaw):
     """The same, without saying so."""
 
     c: float
@@ -199,9 +199,11 @@ def test_the_reference_finds_the_same(name, scheme, as_by_reference):
     mine = found.connector(connector)
     lost = found.energy.lost.get(LAWS[name].entry, 0.0)
     np.testing.assert_allclose(lost, mine.dissipated, rtol=0, atol=1e-15)
-    if isinstance(scheme, ub.EnergyMomentumBase):
+    if isinstance(scheme, ub.extend.EnergyMomentumBase):
         assert found.energy.worst < 1e-12
-    if name in ("drag", "maxwell", "damped stop") and isinstance(scheme, ub.EnergyMomentumBase):
+    if name in ("drag", "maxwell", "damped stop") and isinstance(
+        scheme, ub.extend.EnergyMomentumBase
+    ):
         loss = np.diff(mine.dissipated)
         assert mine.dissipated[-1] > 0
         assert loss.min() > -1e-16 or (name, scheme.theta) == ("maxwell", 0.6)
@@ -490,7 +492,10 @@ ONE = {"variables": {"z": 0.0}, "energy": quadratic}
     ("make", "message"),
     [
         (lambda: law_of(), "Mine has neither energy nor resistance, nor a limit; define one"),
-        (lambda: type("Plain", (ub.ConnectorLaw,), {"energy": quadratic})(), "must be a dataclass"),
+        (
+            lambda: type("Plain", (ub.extend.ConnectorLaw,), {"energy": quadratic})(),
+            "must be a dataclass",
+        ),
         (lambda: law_of(energy=quadratic, fields={"k": math.nan}), "Mine: k = nan is not finite"),
         (lambda: law_of(energy=quadratic, fields={"k": "x"}), "Mine: k = 'x' is not a number"),
         (lambda: law_of(energy=quadratic, fields={"parameters": 1.0}), "have the name parameters"),
@@ -522,7 +527,7 @@ def test_incomplete_laws_are_refused(make, message):
 
 
 @dataclass(frozen=True)
-class Untraceable(ub.ConnectorLaw):
+class Untraceable(ub.extend.ConnectorLaw):
     """A law that looks at numbers."""
 
     k: float

@@ -304,7 +304,7 @@ def test_wrong_content_is_refused(wrong, path):
     refused(KINDS[what], path, message)
 
 
-class Notes(ub.Recorder):
+class Notes(ub.extend.Recorder):
     """A recorder of a user, with a state of one array."""
 
     def open(self, simulation):

@@ -177,7 +177,7 @@ def test_hinges_of_zero_length():
 
 
 @dataclass(frozen=True)
-class Pulling(ub.ConnectorLaw):
+class Pulling(ub.extend.ConnectorLaw):
     """A spring that stiffens, beside a damper and a spring that creeps."""
 
     k: float

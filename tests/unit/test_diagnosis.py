@@ -10,6 +10,7 @@ from scenes import clamped, rigid_chain
 from scipy.sparse import csc_array, diags_array
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.solvers import null_vectors
 
 CODES = ("DIVERGED", "SNES", "dt = 0 s")
@@ -142,7 +143,7 @@ def test_perfectly_plastic_cells_in_a_row():
     """The seed is one of 1600 in which two of them flow in the same step; hardening mends it."""
 
     def rod(**more):
-        strength = ub.Normal(300e6, 60e6, seed=1558)
+        strength = ub.distributions.Normal(300e6, 60e6, seed=1558)
         fibres = ub.Fibres(ub.ElastoPlastic(strength, **more), number=4)
         section = ub.Section.rectangle(b=0.02, h=0.02, E=200e9, nu=0.3, fibres=fibres)
         beam = ub.Beam((0, 0), (1, 0), section, cells=4)
@@ -187,10 +188,10 @@ def test_collapse_by_its_weight_is_a_limit_load():
 
 def test_the_largest_moment_of_a_hinge_is_a_limit_load():
     """105 % of 4 N m at 0.04 + 0.1 rad; there the lever arm is 1 m times the cosine of 0.14 rad."""
-    backbone = ub.Backbone(4.0, capping=0.1, post_capping=0.2, overstrength=1.05)
+    backbone = st.Backbone(4.0, capping=0.1, post_capping=0.2, overstrength=1.05)
     column = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e7, GA=1e7, EI=1e3), cells=4)
     foot = ub.ground(0, 0)
-    turn = ub.Turn(foot, column.start, ub.IbarraKrawinkler(100.0, backbone))
+    turn = ub.Turn(foot, column.start, st.IbarraKrawinkler(100.0, backbone))
     push = ub.PointLoad(column.end, force=(8, 0), amplitude=lambda t: t)
     scene = ub.Scene(
         [column], joints=[ub.Revolute(foot, column.start)], loads=[push], connectors=[turn]

@@ -14,10 +14,10 @@ from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.partition import Subdomain
 
 MEAN, DEVIATION, SEED = 250e6, 50e6, 7
-NORMALS = [ub.Normal, ub.TruncatedNormal, ub.Lognormal]
+NORMALS = [ub.distributions.Normal, ub.distributions.TruncatedNormal, ub.distributions.Lognormal]
 ALL = [
     *(kind(MEAN, DEVIATION, seed=SEED) for kind in NORMALS),
-    ub.Weibull(MEAN, 5.0, seed=SEED),
+    ub.distributions.Weibull(MEAN, 5.0, seed=SEED),
 ]
 MANY = 20_000
 
@@ -31,10 +31,10 @@ def sample(distribution, n=MANY, key=(0, 0)):
 
 def expected(distribution):
     """[closed] Mean and deviation."""
-    if isinstance(distribution, ub.Weibull):
+    if isinstance(distribution, ub.distributions.Weibull):
         one, two = (math.gamma(1 + k / distribution.shape) for k in (1, 2))
         return MEAN * one, MEAN * math.sqrt(two - one**2)
-    if type(distribution) is ub.TruncatedNormal:
+    if type(distribution) is ub.distributions.TruncatedNormal:
         # Cut at five deviations: what lies beyond is 3e-7 of all
         β = MEAN / DEVIATION
         λ = stats.norm.pdf(β) / stats.norm.cdf(β)
@@ -56,10 +56,10 @@ def test_samples_have_the_mean_and_deviation(distribution):
 def test_samples_have_the_distribution(distribution):
     """The distribution of Kolmogorov and Smirnov's test: a chance of 1e-3 of a false alarm."""
     law = {
-        ub.Normal: stats.norm(MEAN, DEVIATION),
-        ub.TruncatedNormal: stats.norm(MEAN, DEVIATION),
-        ub.Weibull: stats.weibull_min(5.0, scale=MEAN),
-        ub.Lognormal: stats.lognorm(
+        ub.distributions.Normal: stats.norm(MEAN, DEVIATION),
+        ub.distributions.TruncatedNormal: stats.norm(MEAN, DEVIATION),
+        ub.distributions.Weibull: stats.weibull_min(5.0, scale=MEAN),
+        ub.distributions.Lognormal: stats.lognorm(
             math.sqrt(math.log(1.04)), scale=MEAN / math.sqrt(1.04)
         ),
     }[type(distribution)]  # fmt: skip
@@ -68,7 +68,7 @@ def test_samples_have_the_distribution(distribution):
 
 def test_scale_of_weibull():
     """[closed] A part exp(-1) exceeds it; three standard errors of a part."""
-    part = (sample(ub.Weibull(MEAN, 3.0, seed=1)) > MEAN).mean()
+    part = (sample(ub.distributions.Weibull(MEAN, 3.0, seed=1)) > MEAN).mean()
     assert abs(part - math.exp(-1)) < 3 * math.sqrt(math.exp(-1) * (1 - math.exp(-1)) / MANY)
 
 
@@ -79,7 +79,7 @@ def test_none_is_negative(kind):
     assert (values >= 0).all()
     # [closed] What lies below zero: Φ(-1/2) = 0.3085
     zeros = (values == 0).mean()
-    assert zeros == (pytest.approx(0.3085, abs=0.01) if kind is ub.Normal else 0)
+    assert zeros == (pytest.approx(0.3085, abs=0.01) if kind is ub.distributions.Normal else 0)
 
 
 # -- seeds and streams -------------------------------------------------------------------------
@@ -99,7 +99,7 @@ def test_each_place_has_its_own_sample(distribution):
 
 def test_streams_are_independent():
     """Correlation of 2000 pairs of streams of neighbouring cells: four standard errors."""
-    normal = ub.Normal(10.0, 1.0, seed=0)
+    normal = ub.distributions.Normal(10.0, 1.0, seed=0)
     values = np.array([normal.draw(1, (0, k))[0] for k in range(2001)])
     correlation = np.corrcoef(values[1:], values[:-1])[0, 1]
     assert abs(correlation) < 4 / math.sqrt(2000)
@@ -107,7 +107,7 @@ def test_streams_are_independent():
 
 # -- in scenes ---------------------------------------------------------------------------------
 
-LAW = ub.ElastoPlastic(ub.Lognormal(MEAN, DEVIATION, seed=SEED))
+LAW = ub.ElastoPlastic(ub.distributions.Lognormal(MEAN, DEVIATION, seed=SEED))
 
 
 def limits(beams, comm=MPI.COMM_SELF, joints=()):
@@ -156,7 +156,7 @@ def springs(order):
     feet, tops, scenes = [], [], []
     for k in range(3):
         column = ub.Beam((k, 0), (k, 1), section, cells=2)
-        law = ub.ElastoPlastic(ub.Normal(10e3, 2e3, seed=SEED), kinematic=1e5)
+        law = ub.ElastoPlastic(ub.distributions.Normal(10e3, 2e3, seed=SEED), kinematic=1e5)
         feet.append(ub.Turn(ub.ground(k, 0), column.start, ub.Spring(1e6, law=law)))
         tops.append(ub.PointLoad(column.end, force=(12e3, 0.0), amplitude=lambda t: t))
         scenes.append(column)
@@ -195,7 +195,10 @@ def test_number_of_processes_does_not_matter():
 
 def test_resultants_may_be_random_too():
     section = ub.Section(
-        EA=1.0, GA=1.0, EI=1.0, bending=ub.ElastoPlastic(ub.Weibull(10.0, 5.0, seed=2))
+        EA=1.0,
+        GA=1.0,
+        EI=1.0,
+        bending=ub.ElastoPlastic(ub.distributions.Weibull(10.0, 5.0, seed=2)),
     )
     limit = section.section_points(None)[0].parameters([(0, k) for k in range(50)])["yield_limit"]
     assert limit.shape == (50, 1)

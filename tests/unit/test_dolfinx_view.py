@@ -120,7 +120,7 @@ def test_forms_are_those_of_the_terms(scheme):
     np.add.at(tangent, (dofs[K.row], dofs[K.col]), K.data)
 
     t = simulation.t + 0.01
-    simulation.equation.begin(ub.Step.create(scheme, simulation.t, t, t, q), beams)
+    simulation.equation.begin(ub.extend.Step.create(scheme, simulation.t, t, t, q), beams)
     r, A = np.zeros(len(q)), simulation.equation.A
     A.data.fill(0.0)
     for term in beams:
@@ -295,7 +295,7 @@ def test_the_matrix_of_snes():
     simulation.close()
 
 
-class Monitored(ub.Recorder):
+class Monitored(ub.extend.Recorder):
     """Iterations of a path."""
 
     def open(self, simulation):

@@ -12,6 +12,7 @@ from uniaxial_points import LENGTH, Bars, C, histories
 from user_laws import Eigenstrain, YieldingEigenstrain
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 L, EI, E0 = 8.0, 1e8, 1e-4
 STIFF = {"EA": 1e9, "GA": 1e9, "EI": EI, "rhoA": 100.0, "rhoI": 1.0}
@@ -85,7 +86,7 @@ def test_a_spring_that_is_too_long():
 
 
 @dataclass(frozen=True)
-class Both(ub.MaterialLaw):
+class Both(ub.extend.MaterialLaw):
     """Axial strain and curvature that are free."""
 
     axial: float
@@ -191,7 +192,7 @@ def test_work_is_stored_or_dissipated_or_lost(scheme, law):
             stored = now
 
 
-@pytest.mark.parametrize("law", [ub.ArmstrongFrederick(1e12, 1.0, 1.0), Eigenstrain(0.0)], ids=repr)
+@pytest.mark.parametrize("law", [st.ArmstrongFrederick(1e12, 1.0, 1.0), Eigenstrain(0.0)], ids=repr)
 def test_round_off_of_dissipation_turns_no_path(law):
     """A path on which nothing yields is that of the elastic beam."""
     paths = []

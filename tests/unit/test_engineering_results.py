@@ -10,6 +10,7 @@ import pytest
 from helpers import raises, stop_after
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 LIMITS = {"IO": 0.01, "LS": 0.02, "CP": 0.05}
 STEEL = {"b": 0.1, "h": 0.2, "E": 210e9, "nu": 0.3, "rho": 7850.0}
@@ -77,18 +78,18 @@ def test_results_of_a_resumed_run_are_those_of_the_whole(shared_path):
     assert table.files[0].read_bytes() == (shared_path / "floors.csv").read_bytes()
     for name, values in extremes.state().items():
         np.testing.assert_array_equal(later.state()[name], values)
-    assert str(resumed.hinges(LIMITS)) == str(whole.hinges(LIMITS))
+    assert str(st.hinge_table(resumed, LIMITS)) == str(st.hinge_table(whole, LIMITS))
     levels = lambda run: [run.scene["mast"].start, run.scene["mast"].end]  # noqa: E731
-    assert str(resumed.storeys(levels(resumed))) == str(whole.storeys(levels(whole)))
+    assert str(st.storeys(resumed, levels(resumed))) == str(st.storeys(whole, levels(whole)))
 
 
 def test_results_of_a_file_are_those_of_the_run(shared_path):
     run = ub.simulate(shaken(), ub.EnergyMomentum(), t=(0, 0.3), dt=0.01)
     run.save(shared_path / "run.solution")
     loaded = ub.Solution.load(shared_path / "run.solution")
-    assert str(loaded.hinges(LIMITS)) == str(run.hinges(LIMITS))
+    assert str(st.hinge_table(loaded, LIMITS)) == str(st.hinge_table(run, LIMITS))
     (one, other) = (
-        solution.storeys([solution.scene["mast"].start, solution.scene["mast"].end])
+        st.storeys(solution, [solution.scene["mast"].start, solution.scene["mast"].end])
         for solution in (run, loaded)
     )
     for name in ("drift", "shear", "heights", "times"):
@@ -102,8 +103,8 @@ def test_results_of_several_processes_are_those_of_one():
     for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
         run = ub.simulate(shaken(), ub.EnergyMomentum(), t=(0, 0.3), dt=0.01, comm=comm)
         mast = run.scene["mast"]
-        storeys = run.storeys([mast.start, mast.end])
-        rows = run.hinges(LIMITS).rows
+        storeys = st.storeys(run, [mast.start, mast.end])
+        rows = st.hinge_table(run, LIMITS).rows
         numbers = [row[2:7] for row in rows]
         tables.append((storeys.shear[1:], run.acceleration(mast.end)[1:], numbers))
         assert len(rows) == 2
@@ -151,7 +152,7 @@ def everything():
 
 def test_energies_of_all_kinds_of_hinges_add_up_to_the_ledger(everything):
     """A sum in another order."""
-    table, energy = everything.hinges(LIMITS), everything.energy
+    table, energy = st.hinge_table(everything, LIMITS), everything.energy
     total = sum(row.dissipated for row in table.rows)
     assert total == pytest.approx(energy["plastic"][-1] + energy["hinges"][-1], rel=1e-12)
     assert len(table.rows) == 7
@@ -170,14 +171,14 @@ def test_energies_of_a_run_with_a_start_include_those_before(everything):
         runs.append(ub.simulate(everything.scene, scheme, t=ends, dt=0.02, start=start))
         energy = runs[-1].energy
         total += energy["plastic"][-1] + energy["hinges"][-1]
-        rows = runs[-1].hinges().rows
+        rows = st.hinge_table(runs[-1]).rows
         assert sum(row.dissipated for row in rows) == pytest.approx(total, rel=1e-12)
     assert {row.time for row in rows} == {0.6}
 
 
 def test_rows_are_those_of_other_results(everything):
     """Of connectors, and of the material at the place of a hinge."""
-    for row in everything.hinges().rows:
+    for row in st.hinge_table(everything).rows:
         if np.isnan(row.rotation):
             continue
         if isinstance(row.where, ub.Place):
@@ -193,9 +194,9 @@ def test_rows_are_those_of_other_results(everything):
 def test_hinges_of_some_beams_and_connectors(everything):
     scene = everything.scene
     chosen = scene["hinge"], scene.connectors[2]
-    rows = everything.hinges(LIMITS, only=chosen).rows
+    rows = st.hinge_table(everything, LIMITS, only=chosen).rows
     assert {str(row.where).split()[0] for row in rows} == {"hinge.at(0.5)", "Turn(ground"}
-    assert everything.hinges(only=[scene["elastic"]]).rows == ()
+    assert st.hinge_table(everything, only=[scene["elastic"]]).rows == ()
 
 
 @pytest.mark.parametrize(
@@ -203,14 +204,14 @@ def test_hinges_of_some_beams_and_connectors(everything):
 )  # fmt: skip
 def test_states_of_acceptance(everything, limit, state):
     limits = {} if limit is None else {"IO": limit}
-    rows = everything.hinges(limits, only=[everything.scene["hinge"]]).rows
+    rows = st.hinge_table(everything, limits, only=[everything.scene["hinge"]]).rows
     assert [row.state for row in rows] == [state]
 
 
 def test_a_hinge_below_its_limit_is_elastic():
     beam = ub.Beam((0, 0), (2, 0), PLAIN, hinges={0.0: ub.ElastoPlastic(1e6)}, name="beam")
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
-    table = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0).hinges(LIMITS)
+    table = st.hinge_table(ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0), LIMITS)
     (row,) = table.rows
     assert (row.n, row.state, row.rotation, row.dissipated) == (-1, "elastic", 0.0, 0.0)
     assert str(table).splitlines()[1].split()[3:] == ["-", "0", "0", "-", "0", "elastic"]
@@ -222,15 +223,15 @@ def test_a_hinge_below_its_limit_is_elastic():
     [
         ({"limits": {"IO": 0.0}}, ["limits['IO']", "must be positive"]),
         ({"limits": {"IO": 0.02, "LS": 0.01}}, ["limits['LS'] = 0.01 rad", "increasing order"]),
-        ({"limits": [0.1]}, ["hinges: limits", "is not a Mapping"]),
-        ({"limits": {1: 0.1}}, ["hinges: limits", "must be text"]),
-        ({"only": [PLAIN]}, ["hinges: only[0]", "is not a Beam or Connector"]),
+        ({"limits": [0.1]}, ["hinge_table: limits", "is not a Mapping"]),
+        ({"limits": {1: 0.1}}, ["hinge_table: limits", "must be text"]),
+        ({"only": [PLAIN]}, ["hinge_table: only[0]", "is not a Beam or Connector"]),
         ({"only": [ub.Beam((0, 0), (1, 0), PLAIN)]}, ["only[0]", "is not in the scene"]),
     ],
 )
 def test_wrong_arguments_of_hinges(everything, arguments, words):
     with raises(*words):
-        everything.hinges(**arguments)
+        st.hinge_table(everything, **arguments)
 
 
 # -- storeys -----------------------------------------------------------------------------------
@@ -267,13 +268,13 @@ def towers():
 )
 def test_wrong_levels(towers, levels, words):
     with raises(*words):
-        towers.storeys(levels(towers.scene["mast"], towers.scene["low"]))
+        st.storeys(towers, levels(towers.scene["mast"], towers.scene["low"]))
 
 
 def test_levels_may_be_anywhere(towers):
     """Between vertices, at bodies and at the ground; the mast has the only force."""
     mast, block = towers.scene["mast"], towers.scene["block"]
-    storeys = towers.storeys([mast.start, mast.at(0.1), block.at(5, 2.0), ub.ground(0, 4)])
+    storeys = st.storeys(towers, [mast.start, mast.at(0.1), block.at(5, 2.0), ub.ground(0, 4)])
     np.testing.assert_allclose(storeys.shear[-1], 3e3, rtol=1e-9)
     np.testing.assert_allclose(storeys.heights, [0.3, 1.7, 2.0])
     assert repr(storeys) == "<Storeys: 3, 2 states>"
@@ -284,7 +285,7 @@ def test_levels_may_be_anywhere(towers):
 
 def test_tables_are_texts_with_aligned_columns(towers):
     mast = towers.scene["mast"]
-    storeys = towers.storeys([mast.start, mast.at(0.2), mast.end])
+    storeys = st.storeys(towers, [mast.start, mast.at(0.2), mast.end])
     lines = str(storeys).splitlines()
     assert len({len(line) for line in lines}) == 1
     assert lines[0].split("  ")[0] == "storey"
@@ -296,7 +297,7 @@ def test_tables_are_texts_with_aligned_columns(towers):
 def test_tables_are_frames_of_pandas(towers):
     pandas = pytest.importorskip("pandas")
     mast = towers.scene["mast"]
-    frame = towers.storeys([mast.start, mast.at(0.2), mast.end]).frame()
+    frame = st.storeys(towers, [mast.start, mast.at(0.2), mast.end]).frame()
     assert isinstance(frame, pandas.DataFrame)
     np.testing.assert_allclose(frame["shear [N]"], 3e3, rtol=1e-9)
 
@@ -304,7 +305,7 @@ def test_tables_are_frames_of_pandas(towers):
 def test_missing_pandas_is_named(towers, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     mast = towers.scene["mast"]
-    storeys = towers.storeys([mast.start, mast.end])
+    storeys = st.storeys(towers, [mast.start, mast.end])
     with pytest.raises(ImportError, match=r"needs pandas, .* pip install pandas"):
         storeys.frame()
 
@@ -312,7 +313,7 @@ def test_missing_pandas_is_named(towers, monkeypatch):
 @pytest.mark.serial
 def test_profiles_of_storeys_are_drawn(towers):
     mast = towers.scene["mast"]
-    storeys = towers.storeys([mast.start, mast.at(0.2), mast.end])
+    storeys = st.storeys(towers, [mast.start, mast.at(0.2), mast.end])
     for quantity, values in (("drift", 100 * storeys.ratio[-1]), ("shear", [3.0, 3.0])):
         (axes,) = ub.plot(storeys, quantity).axes
         _, largest, least = axes.lines

@@ -60,7 +60,7 @@ def test_a_scene_is_in_one_frame():
 
 
 @dataclass(frozen=True)
-class Stiffening(ub.MaterialLaw):
+class Stiffening(ub.extend.MaterialLaw):
     """Elastic, with a cubic part; it also flows slowly if ``rate`` is not zero."""
 
     k: float
@@ -85,14 +85,14 @@ class OneSided(Stiffening):
 
     def stress(self, strain, state):
         return (
-            ub.law_functions.where(ub.law_functions.below(strain, 0.1), 0.1, 1.0)
+            ub.extend.law_functions.where(ub.extend.law_functions.below(strain, 0.1), 0.1, 1.0)
             * (self.C * (strain - 0.1))
             + 0.01 * self.C
         )
 
     def elastic_energy(self, strain, state):
         e = strain - 0.1
-        part = ub.law_functions.where(ub.law_functions.below(e, 0.0), 0.1, 1.0)
+        part = ub.extend.law_functions.where(ub.extend.law_functions.below(e, 0.0), 0.1, 1.0)
         return self.C * (part * e**2 / 2 + 0.01 * strain)
 
 

@@ -6,8 +6,10 @@ import inspect
 import re
 
 import pytest
+from helpers import ALL
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 pytestmark = pytest.mark.serial  # files, and lines that all ranks print
 
@@ -22,22 +24,35 @@ def run(name, thing, names):
     runner = doctest.DocTestRunner(verbose=False, optionflags=FLAGS)
     runner.run(test, out=report.append, clear_globs=False)
     said = "\n".join(report)
-    if missing := re.search(r"^ *ImportError: .*", said, re.MULTILINE):  # of an optional package
+    if missing := re.search(r"^ *(?:Import|ModuleNotFound)Error: .*", said, re.MULTILINE):
         pytest.skip(missing[0].strip())
     assert not report, said
     return test.globs
 
 
 @pytest.fixture(scope="module")
-def names():
+def core():
     """The names that examples may use: those of the package's own example."""
     return run("ufl_beam", ub, {})
 
 
-@pytest.mark.parametrize("name", [*ub.__all__, *ub.RESULTS])
+@pytest.fixture
+def names(core, request):
+    """The names of the package, and for examples of structures also these."""
+    thing = getattr(request.node, "callspec", None)
+    of = ALL.get(thing.params.get("name", thing.params.get("owner"))) if thing else None
+    of_structures = getattr(of, "__module__", "").startswith("ufl_beam.structures")
+    return core | ({"st": st} if of_structures or of is st.Shape else {})
+
+
+def test_example_of_structures(core):
+    run("ufl_beam.structures", st, dict(core))
+
+
+@pytest.mark.parametrize("name", ALL)
 def test_example(name, names, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    made = run(name, getattr(ub, name), dict(names))
+    made = run(name, ALL[name], dict(names))
     require_lines({key: made[key] for key in made.keys() - names.keys()})
 
 
@@ -59,9 +74,9 @@ def test_the_common_objects_are_shown_in_one_line(names):
 
 MEMBERS = [
     (name, member)
-    for name in [*ub.__all__, *ub.RESULTS]
-    for member, thing in inspect.getmembers_static(getattr(ub, name))
-    if inspect.isclass(getattr(ub, name)) and member[0] != "_" and ">>>" in (thing.__doc__ or "")
+    for name in ALL
+    for member, thing in inspect.getmembers_static(ALL[name])
+    if inspect.isclass(ALL[name]) and member[0] != "_" and ">>>" in (thing.__doc__ or "")
 ]
 """Members of public classes whose docstrings have examples of their own."""
 
@@ -70,10 +85,10 @@ MEMBERS = [
 def test_examples_of_members(owner, names, tmp_path, monkeypatch):
     """One after the other, with the names of the example of the class."""
     monkeypatch.chdir(tmp_path)
-    known = run(owner, getattr(ub, owner), dict(names))
+    known = run(owner, ALL[owner], dict(names))
     for name, member in MEMBERS:
         if name == owner:
-            thing = inspect.getattr_static(getattr(ub, owner), member)
+            thing = inspect.getattr_static(ALL[owner], member)
             known = run(f"{owner}.{member}", thing, known)
 
 

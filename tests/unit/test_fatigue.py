@@ -6,17 +6,17 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies
 from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.output import fatigue
-from ufl_beam.output.fatigue import RainflowCounter
+import ufl_beam.structures as st
+from ufl_beam.structures import fatigue
+from ufl_beam.structures.fatigue import RainflowCounter
 
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, **STEEL)
-CURVE = ub.SNCurve.eurocode(71e6)
+CURVE = st.SNCurve.eurocode(71e6)
 
 
 def by_range(found):
@@ -34,21 +34,24 @@ ASTM = [-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0]
 
 
 def test_the_example_of_astm_e1049():
-    found = ub.rainflow(ASTM)
+    found = st.rainflow(ASTM)
     assert by_range(found) == {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
     (whole,) = np.flatnonzero(found.count == 1.0)
     assert (found.range[whole], found.mean[whole]) == (4.0, 1.0)  # from -1 to 3
     # 3³/2 + 4³·3/2 + 6³/2 + 8³ + 9³/2 = 1094, if a range of 1 is borne for 1000 cycles
-    curve = ub.SNCurve(range=1.0, cycles=1000.0)
+    curve = st.SNCurve(range=1.0, cycles=1000.0)
     assert found.damage(curve) == pytest.approx(1.094, rel=1e-14)
     assert found.equivalent(curve) == pytest.approx((1094 / 4) ** (1 / 3), rel=1e-14)
 
 
-whole_numbers = st.lists(st.integers(-8, 8), min_size=1, max_size=80)
+whole_numbers = strategies.lists(strategies.integers(-8, 8), min_size=1, max_size=80)
 
 
 @settings(max_examples=300, deadline=None)
-@given(series=whole_numbers, pieces=st.lists(st.integers(1, 12), min_size=1, max_size=80))
+@given(
+    series=whole_numbers,
+    pieces=strategies.lists(strategies.integers(1, 12), min_size=1, max_size=80),
+)
 def test_pieces_are_counted_as_the_whole(series, pieces):
     """And as the package rainflow counts."""
     library = pytest.importorskip("rainflow")
@@ -63,7 +66,7 @@ def test_pieces_are_counted_as_the_whole(series, pieces):
         # Ranges from 16 to 0 that shrink
         assert len(counter._waiting) <= 18
     assert by_range(counter.cycles()) == expected
-    assert by_range(ub.rainflow(series)) == expected
+    assert by_range(st.rainflow(series)) == expected
 
 
 def test_what_waits_does_not_grow():
@@ -81,14 +84,14 @@ def test_means_survive_the_pieces():
     counter = RainflowCounter(1.0)
     for piece in np.array_split(series, 37):
         counter.add(piece)
-    one, other = counter.cycles(), ub.rainflow(series)
+    one, other = counter.cycles(), st.rainflow(series)
     for name in ("range", "mean", "count"):
         assert np.array_equal(getattr(one, name), getattr(other, name))
 
 
 @pytest.mark.parametrize("series", [[], [3.0], [3.0, 3.0, 3.0]])
 def test_what_never_turns_has_no_cycles(series):
-    found = ub.rainflow(series)
+    found = st.rainflow(series)
     assert len(found.range) == 0
     assert found.damage(CURVE) == found.equivalent(CURVE) == 0.0
 
@@ -102,7 +105,7 @@ def test_what_never_turns_has_no_cycles(series):
 )
 def test_what_is_no_series(series, says):
     with pytest.raises(ub.ArgumentError, match=says):
-        ub.rainflow(series)
+        st.rainflow(series)
 
 
 # -- curves ------------------------------------------------------------------------------------
@@ -122,18 +125,18 @@ def test_the_curve_of_the_eurocode():
 
 
 def test_a_curve_of_one_slope_is_a_power():
-    curve = ub.SNCurve(range=100e6, cycles=1e6, slope=4.0)
+    curve = st.SNCurve(range=100e6, cycles=1e6, slope=4.0)
     assert curve.endurance([10e6, 200e6]) == pytest.approx([1e10, 62500.0], rel=1e-12)
 
 
 def test_mean_stresses_enlarge_ranges():
     sizes, means = np.array([100e6] * 4), np.array([0.0, 250e6, -250e6, 500e6])
-    goodman, gerber = ub.Goodman(500e6), ub.Gerber(500e6)
+    goodman, gerber = st.Goodman(500e6), st.Gerber(500e6)
     assert goodman(sizes, means).tolist() == [100e6, 200e6, 100e6, math.inf]
     assert gerber(sizes, means) == pytest.approx([100e6, 100e6 / 0.75, 100e6, math.inf])
-    curve = ub.SNCurve(range=100e6, cycles=1e6, mean=goodman)
+    curve = st.SNCurve(range=100e6, cycles=1e6, mean=goodman)
     assert curve.endurance(sizes, means) == pytest.approx([1e6, 1.25e5, 1e6, 0.0])
-    at_once = ub.Cycles(sizes[3:], means[3:], np.array([0.5]))
+    at_once = st.Cycles(sizes[3:], means[3:], np.array([0.5]))
     assert at_once.damage(curve) == math.inf
 
 
@@ -156,9 +159,9 @@ def test_stress_is_in_balance_with_the_load():
     beam, scene = mast(lambda b: ub.PointLoad(b.end, force=(F, axial), amplitude=ub.ramp(1.0)))
     y, A, W = 0.1, 0.02, 0.1 * 0.2**2 / 6
     places = {beam.start: 4.0, beam.at(0.3): 2.8, beam.at(0.5): 2.0, beam.end: 0.0}
-    spots = [ub.HotSpot.fibre(place, y=y, E=210e9, factor=2.0) for place in places]
-    own = ub.HotSpot(beam.start, stress=lambda N, V, M: -M / W)
-    fatigue = ub.Fatigue([*spots, own], CURVE, resolution=1.0)
+    spots = [st.HotSpot.fibre(place, y=y, E=210e9, factor=2.0) for place in places]
+    own = st.HotSpot(beam.start, stress=lambda N, V, M: -M / W)
+    fatigue = st.Fatigue([*spots, own], CURVE, resolution=1.0)
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, record=fatigue)
     u, _, turn = np.abs(solution.displacement(beam.end)[-1])
     # What the formula leaves out is less: the lever of the axial force, the part of the other that
@@ -178,11 +181,11 @@ def test_stress_is_in_balance_with_the_load():
 def test_a_run_is_counted_as_its_solution(monkeypatch):
     monkeypatch.setattr(fatigue, "BLOCK", 7)  # a part of 41 rows
     beam, scene = mast(to_and_fro)
-    spot = ub.HotSpot.fibre(beam.at(0.375), y=-0.1, E=210e9)  # in the middle of a cell
-    recorder = ub.Fatigue(spot, CURVE, resolution=1e5)
+    spot = st.HotSpot.fibre(beam.at(0.375), y=-0.1, E=210e9)  # in the middle of a cell
+    recorder = st.Fatigue(spot, CURVE, resolution=1e5)
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.4), dt=0.01, record=recorder)
     N, _, M = solution.section_forces_at(spot.place).T
-    expected = ub.rainflow(np.rint((N / 0.02 + M * 0.1 * 12 / (0.1 * 0.2**3)) / 1e5))
+    expected = st.rainflow(np.rint((N / 0.02 + M * 0.1 * 12 / (0.1 * 0.2**3)) / 1e5))
     found = recorder.cycles(spot)
     assert found.count.sum() >= 3
     assert found.range == pytest.approx(1e5 * expected.range, rel=1e-12)
@@ -227,8 +230,8 @@ def test_what_a_run_that_fails_has_counted_is_kept():
         return math.sin(40 * t)
 
     beam, scene = mast(lambda b: ub.PointLoad(b.end, force=(8e3, 0.0), amplitude=force))
-    spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
-    recorder, extremes = ub.Fatigue(spot, CURVE), ub.Extremes()
+    spot = st.HotSpot.fibre(beam.start, y=0.1, E=210e9)
+    recorder, extremes = st.Fatigue(spot, CURVE), ub.Extremes()
     with pytest.raises(RuntimeError, match="enough"):
         ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, record=[recorder, extremes])
     assert recorder.duration == pytest.approx(0.2)
@@ -238,10 +241,10 @@ def test_what_a_run_that_fails_has_counted_is_kept():
 
 def test_counts_and_extremes_go_on_from_a_checkpoint(shared_path):
     beam, scene = mast(to_and_fro)
-    spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
+    spot = st.HotSpot.fibre(beam.start, y=0.1, E=210e9)
 
     def run(end, **more):
-        recorders = ub.Fatigue(spot, CURVE), ub.Extremes()
+        recorders = st.Fatigue(spot, CURVE), ub.Extremes()
         run = {"t": (0, end), "dt": 0.01, "record": recorders}
         ub.simulate(scene, ub.EnergyMomentum(), **run, **more)
         return recorders
@@ -320,24 +323,24 @@ PLACE = ub.Beam((0, 0), (1, 0), SECTION, name="arm").end
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: ub.SNCurve(range=0.0), "SNCurve: range = 0 must be positive"),
-        (lambda: ub.SNCurve(range=1.0, cycles=-1.0), "cycles = -1 must be positive"),
-        (lambda: ub.SNCurve(range=1.0, slope=0.0), "slope = 0 must be positive"),
-        (lambda: ub.SNCurve(range=1.0, knee=0.0), "knee = 0 must be positive"),
-        (lambda: ub.SNCurve(range=1.0, limit=math.nan), "limit = nan is not finite"),
-        (lambda: ub.SNCurve(range=1.0, knee=5e6, limit=1e6), "limit = 1e[+]06 cycles lies before"),
-        (lambda: ub.SNCurve(range=1.0, mean=3.0), r"mean = 3\.0 must be a function"),
-        (lambda: ub.SNCurve.eurocode(-71e6), "must be positive"),
-        (lambda: ub.Goodman(0.0), "Goodman: ultimate = 0 must be positive"),
-        (lambda: ub.Gerber(math.inf), "Gerber: ultimate = inf is not finite"),
-        (lambda: ub.HotSpot.fibre(3, y=0.1, E=1.0), "HotSpot: place = 3 is not a Place"),
-        (lambda: ub.HotSpot.fibre(PLACE, y=math.nan, E=1.0), "arm.end .*: y = nan is not finite"),
-        (lambda: ub.HotSpot.fibre(PLACE, y=0.1, E=0.0), "E = 0 must be positive"),
-        (lambda: ub.HotSpot(PLACE, stress=1.0), r"stress = 1\.0 must be a function of \(N, V, M\)"),
-        (lambda: ub.Fatigue([PLACE], CURVE), r"spots\[0\] = .* is not a HotSpot"),
-        (lambda: ub.Fatigue(3, CURVE), "spots = 3 must be a list"),
-        (lambda: ub.Fatigue([], 71e6), r"curve = .* is not a SNCurve"),
-        (lambda: ub.Fatigue([], CURVE, resolution=-1.0), "resolution = -1 must be at least 0"),
+        (lambda: st.SNCurve(range=0.0), "SNCurve: range = 0 must be positive"),
+        (lambda: st.SNCurve(range=1.0, cycles=-1.0), "cycles = -1 must be positive"),
+        (lambda: st.SNCurve(range=1.0, slope=0.0), "slope = 0 must be positive"),
+        (lambda: st.SNCurve(range=1.0, knee=0.0), "knee = 0 must be positive"),
+        (lambda: st.SNCurve(range=1.0, limit=math.nan), "limit = nan is not finite"),
+        (lambda: st.SNCurve(range=1.0, knee=5e6, limit=1e6), "limit = 1e[+]06 cycles lies before"),
+        (lambda: st.SNCurve(range=1.0, mean=3.0), r"mean = 3\.0 must be a function"),
+        (lambda: st.SNCurve.eurocode(-71e6), "must be positive"),
+        (lambda: st.Goodman(0.0), "Goodman: ultimate = 0 must be positive"),
+        (lambda: st.Gerber(math.inf), "Gerber: ultimate = inf is not finite"),
+        (lambda: st.HotSpot.fibre(3, y=0.1, E=1.0), "HotSpot: place = 3 is not a Place"),
+        (lambda: st.HotSpot.fibre(PLACE, y=math.nan, E=1.0), "arm.end .*: y = nan is not finite"),
+        (lambda: st.HotSpot.fibre(PLACE, y=0.1, E=0.0), "E = 0 must be positive"),
+        (lambda: st.HotSpot(PLACE, stress=1.0), r"stress = 1\.0 must be a function of \(N, V, M\)"),
+        (lambda: st.Fatigue([PLACE], CURVE), r"spots\[0\] = .* is not a HotSpot"),
+        (lambda: st.Fatigue(3, CURVE), "spots = 3 must be a list"),
+        (lambda: st.Fatigue([], 71e6), r"curve = .* is not a SNCurve"),
+        (lambda: st.Fatigue([], CURVE, resolution=-1.0), "resolution = -1 must be at least 0"),
         (lambda: ub.History("h.csv", every=0), "History h.csv: every = 0 must be a whole number"),
         (lambda: ub.History("h.csv", max_rows=1.5), r"max_rows = 1\.5 must be a whole number"),
         (lambda: ub.Extremes().section_forces(PLACE.beam), "Extremes: nothing was run"),
@@ -353,15 +356,15 @@ def test_bad_input_of_a_run():
     run = {"t": (0, 1), "dt": 0.1}
     with pytest.raises(ub.ArgumentError, match="simulate: max_states = 0 must be a whole number"):
         ub.simulate(scene, ub.EnergyMomentum(), max_states=0, **run)
-    elsewhere = ub.Fatigue(ub.HotSpot(PLACE, stress=lambda N, V, M: M), CURVE)
+    elsewhere = st.Fatigue(st.HotSpot(PLACE, stress=lambda N, V, M: M), CURVE)
     with pytest.raises(ub.ArgumentError, match="arm is not in the scene"):
         ub.simulate(scene, ub.EnergyMomentum(), record=elsewhere, **run)
-    spot = ub.HotSpot(beam.start, stress=lambda N, V, M: M[0])  # one number
-    single = ub.Fatigue(spot, CURVE)
+    spot = st.HotSpot(beam.start, stress=lambda N, V, M: M[0])  # one number
+    single = st.Fatigue(spot, CURVE)
     with pytest.raises(ub.ArgumentError, match=r"mast\.start .* a finite number for each"):
         ub.simulate(scene, ub.EnergyMomentum(), record=single, **run)
     with pytest.raises(ub.ArgumentError, match=r"nothing was counted at arm\.end"):
-        single.cycles(ub.HotSpot(PLACE, stress=lambda N, V, M: M))
+        single.cycles(st.HotSpot(PLACE, stress=lambda N, V, M: M))
 
 
 # -- pictures ----------------------------------------------------------------------------------
@@ -369,8 +372,8 @@ def test_bad_input_of_a_run():
 
 def test_fatigue_and_extremes_have_pictures():
     beam, scene = mast(to_and_fro)
-    spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
-    recorder, extremes = ub.Fatigue(spot, CURVE), ub.Extremes()
+    spot = st.HotSpot.fibre(beam.start, y=0.1, E=210e9)
+    recorder, extremes = st.Fatigue(spot, CURVE), ub.Extremes()
     ub.simulate(
         scene, ub.EnergyMomentum(), t=(0, 0.4), dt=0.01, record=[recorder, extremes], max_states=4
     )
@@ -392,9 +395,9 @@ def test_fatigue_and_extremes_have_pictures():
 def test_a_spot_given_twice_is_counted_once():
     section = ub.Section.rectangle(E=2e11, b=0.1, h=0.2, nu=0.3, rho=7850.0)
     beam = ub.Beam((0, 0), (2, 0), section, cells=4)
-    spot = ub.HotSpot.fibre(beam.start, y=0.1, E=2e11)
+    spot = st.HotSpot.fibre(beam.start, y=0.1, E=2e11)
     load = ub.PointLoad(beam.end, force=(0, -1e4), amplitude=lambda t: np.sin(20 * t))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    once, twice = (ub.Fatigue(spots, ub.SNCurve.eurocode(71e6)) for spots in (spot, [spot] * 2))
+    once, twice = (st.Fatigue(spots, st.SNCurve.eurocode(71e6)) for spots in (spot, [spot] * 2))
     ub.simulate(scene, ub.Static(), t=(0, 3), dt=0.02, record=[once, twice], progress=False)
     assert once.life(spot) == twice.life(spot)

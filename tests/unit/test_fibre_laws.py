@@ -11,6 +11,7 @@ from scenes import clamped
 from uniaxial_points import LENGTH, Bars, C, histories
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 SCHEMES = [ub.Static(), ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic(0.8)]
 each_scheme = pytest.mark.parametrize("scheme", SCHEMES, ids=str)
@@ -74,7 +75,7 @@ def test_menegotto_pinto_over_random_paths(steel, scheme):
     They depend on the strains at the ends of steps, not on the scheme.
     """
     parameters, strains = STEELS[steel], histories(100, steps=60)
-    found, bars = followed(ub.MenegottoPinto(*parameters), strains, scheme)
+    found, bars = followed(st.MenegottoPinto(*parameters), strains, scheme)
     expected = np.column_stack([steel02(path, C, *parameters) for path in strains.T])
     assert found == pytest.approx(expected, abs=1e-12 * C)
     lost = work_by_means(strains, expected) - expected[-1] ** 2 / (2 * C)
@@ -89,7 +90,7 @@ def test_menegotto_pinto_in_small_steps_dissipates_the_area_of_its_loops():
         return 0.05 * np.interp(np.arange(1, 4 * n + 1) / n, range(5), [0, 1, -0.4, 0.7, 0.6])
 
     def lost(n):
-        return followed(ub.MenegottoPinto(3.0, 0.02), turned(n)[:, None])[1].dissipated()[0][0]
+        return followed(st.MenegottoPinto(3.0, 0.02), turned(n)[:, None])[1].dissipated()[0][0]
 
     coarse, middle, fine = (lost(n) for n in (400, 800, 1600))
     strains = turned(6400)
@@ -101,7 +102,7 @@ def test_menegotto_pinto_in_small_steps_dissipates_the_area_of_its_loops():
 
 def test_errors_of_equilibrium_are_no_reversals():
     """Steps of 1e-9 yield strains to and fro leave the branch of yielding steel."""
-    law, far = ub.MenegottoPinto(3.0, 0.02), 0.05
+    law, far = st.MenegottoPinto(3.0, 0.02), 0.05
     noise = 1e-9 * 3.0 / C * (-1.0) ** np.arange(20)
     strains = np.concatenate([[far], far + noise, [0.055]])[:, None]
     found, _ = followed(law, strains)
@@ -173,18 +174,18 @@ def exponential(e):
 
 
 CONCRETES = {
-    "Kent-Park": (ub.KentPark(3.0, 0.6, 0.08), kent_park, (3.0, 0.6, 0.08), 0.08, None),
+    "Kent-Park": (st.KentPark(3.0, 0.6, 0.08), kent_park, (3.0, 0.6, 0.08), 0.08, None),
     "Kent-Park, linear": (
-        ub.KentPark(3.0, 0.6, 0.08, tension=ub.LinearSoftening(t, G)),
+        st.KentPark(3.0, 0.6, 0.08, tension=ub.LinearSoftening(t, G)),
         kent_park, (3.0, 0.6, 0.08), 0.08, linear,
     ),
     "Kent-Park, exponential": (
-        ub.KentPark(3.0, 0.0, 0.05, tension=ub.Softening(t, G)),
+        st.KentPark(3.0, 0.0, 0.05, tension=ub.Softening(t, G)),
         kent_park, (3.0, 0.0, 0.05), 0.05, exponential,
     ),
-    "Mander": (ub.Mander(3.0, 0.04), mander, (3.0, 0.04), np.inf, None),
+    "Mander": (st.Mander(3.0, 0.04), mander, (3.0, 0.04), np.inf, None),
     "Mander, spalling, linear": (
-        ub.Mander(3.0, 0.025, 0.08, tension=ub.LinearSoftening(t, G)),
+        st.Mander(3.0, 0.025, 0.08, tension=ub.LinearSoftening(t, G)),
         mander, (3.0, 0.025, 0.08), np.inf, linear,
     ),
 }  # fmt: skip
@@ -230,7 +231,7 @@ def test_a_broken_bar_dissipates_the_fracture_energy(law, cells):
     t, G, L = 2.5e6, 100.0, 0.4  # Pa, J/m², m; a bar of G E/t² = 0.48 m would snap back
 
     def part(a, b, strength, number):
-        concrete = ub.KentPark(30e6, 6e6, 0.006, law(strength * t, G))
+        concrete = st.KentPark(30e6, 6e6, 0.006, law(strength * t, G))
         fibres = ub.Fibres(concrete, number=2)
         section = ub.Section.rectangle(0.02, 0.02, E=30e9, nu=0.2, fibres=fibres)
         return ub.Beam((a, 0), (b, 0), section, cells=number)
@@ -249,9 +250,9 @@ def test_a_broken_bar_dissipates_the_fracture_energy(law, cells):
 # -- in scenes -----------------------------------------------------------------------------------
 
 LAWS = {
-    "steel": ub.MenegottoPinto(12e6, 0.02, a1=0.1, a3=0.1),
-    "Kent-Park": ub.KentPark(30e6, 6e6, 0.01, ub.Softening(2e6, 200.0)),
-    "Mander": ub.Mander(30e6, 0.003, 0.01, ub.LinearSoftening(2e6, 200.0)),
+    "steel": st.MenegottoPinto(12e6, 0.02, a1=0.1, a3=0.1),
+    "Kent-Park": st.KentPark(30e6, 6e6, 0.01, ub.Softening(2e6, 200.0)),
+    "Mander": st.Mander(30e6, 0.003, 0.01, ub.LinearSoftening(2e6, 200.0)),
 }
 each_law = pytest.mark.parametrize("law", LAWS)
 
@@ -309,24 +310,24 @@ def section_of(law, E=30e9):
 @pytest.mark.parametrize(
     ("make", "parts"),
     [
-        (lambda: ub.MenegottoPinto(5e8, 1.0), ["MenegottoPinto: hardening = 1 must lie"]),
-        (lambda: ub.MenegottoPinto(5e8, 0.01, cR1=1.0), ["MenegottoPinto: cR1 = 1 must lie"]),
-        (lambda: ub.MenegottoPinto(5e8, 0.01, a2=0.0), ["MenegottoPinto: a2 = 0 must be positive"]),
-        (lambda: ub.KentPark(-3e7, 0.0, 0.01), ["KentPark: strength", "must be positive"]),
-        (lambda: ub.KentPark(3e7, 4e7, 0.01), ["residual = 4e+07", "exceed the strength"]),
-        (lambda: ub.KentPark(3e7, 6e6, 0.01, 2e6), ["KentPark: tension", "2000000"]),
+        (lambda: st.MenegottoPinto(5e8, 1.0), ["MenegottoPinto: hardening = 1 must lie"]),
+        (lambda: st.MenegottoPinto(5e8, 0.01, cR1=1.0), ["MenegottoPinto: cR1 = 1 must lie"]),
+        (lambda: st.MenegottoPinto(5e8, 0.01, a2=0.0), ["MenegottoPinto: a2 = 0 must be positive"]),
+        (lambda: st.KentPark(-3e7, 0.0, 0.01), ["KentPark: strength", "must be positive"]),
+        (lambda: st.KentPark(3e7, 4e7, 0.01), ["residual = 4e+07", "exceed the strength"]),
+        (lambda: st.KentPark(3e7, 6e6, 0.01, 2e6), ["KentPark: tension", "2000000"]),
         (
-            lambda: section_of(ub.KentPark(3e7, 6e6, 0.0015)),
+            lambda: section_of(st.KentPark(3e7, 6e6, 0.0015)),
             ["KentPark: ultimate = 0.0015", "2 strength/E = 0.002", "turn back"],
         ),
-        (lambda: ub.KentPark(3e7, 6e6, 0.01, ub.Softening(2e6, -1.0)), ["fracture_energy"]),
-        (lambda: ub.KentPark.confined(30.0), ["KentPark.confined: strength = 30"]),
-        (lambda: ub.Mander(3e7, 0.004, 0.007), ["spalling = 0.007", "exceed 2 strain = 0.008"]),
+        (lambda: st.KentPark(3e7, 6e6, 0.01, ub.Softening(2e6, -1.0)), ["fracture_energy"]),
+        (lambda: st.KentPark.confined(30.0), ["KentPark.confined: strength = 30"]),
+        (lambda: st.Mander(3e7, 0.004, 0.007), ["spalling = 0.007", "exceed 2 strain = 0.008"]),
         (
-            lambda: section_of(ub.Mander(3e7, 0.002), E=15e9),
+            lambda: section_of(st.Mander(3e7, 0.002), E=15e9),
             ["Mander: E = 1.5e+10", "1.02 strength/strain = 1.53e+10", "turns back"],
         ),
-        (lambda: ub.Mander.confined(30e6, -1.0), ["Mander.confined: pressure"]),
+        (lambda: st.Mander.confined(30e6, -1.0), ["Mander.confined: pressure"]),
     ],
 )
 def test_laws_that_turn_back_are_refused(make, parts):
@@ -336,7 +337,7 @@ def test_laws_that_turn_back_are_refused(make, parts):
 
 def test_a_cell_that_is_too_long_for_the_fracture_energy_is_refused():
     """[closed] Longest cell: 2 G E/t² = 0.96 m; the message names the place."""
-    law = ub.KentPark(30e6, 6e6, 0.01, ub.Softening(2.5e6, 100.0))
+    law = st.KentPark(30e6, 6e6, 0.01, ub.Softening(2.5e6, 100.0))
     beam = ub.Beam((0, 0), (0, 2), section_of(law), cells=2, name="column")
     with raises("column at (0, 0.5): KentPark: tension", "1 m", "0.96 m", "above 104"):
         ub.simulate(clamped(beam), ub.Static(), t=(0, 1), dt=0.5)
@@ -345,11 +346,11 @@ def test_a_cell_that_is_too_long_for_the_fracture_energy_is_refused():
 
 def test_confined_strengths():
     """[calc] Equations of both papers by hand, for f = 30 MPa."""
-    law = ub.Mander.confined(30e6, 3e6)
+    law = st.Mander.confined(30e6, 3e6)
     K = -1.254 + 2.254 * 1.794**0.5 - 0.2
     assert law.strength == pytest.approx(30e6 * K, rel=1e-12)
     assert law.strain == pytest.approx(0.002 * (1 + 5 * (K - 1)), rel=1e-12)
-    law = ub.KentPark.confined(30e6, ratio=0.02, yield_limit=300e6, width=0.4, spacing=0.1)
+    law = st.KentPark.confined(30e6, ratio=0.02, yield_limit=300e6, width=0.4, spacing=0.1)
     Z = 0.5 / (11.7 / 3350 + 0.75 * 0.02 * 2 - 0.002 * 1.2)
     assert law.strength == pytest.approx(36e6, rel=1e-12)
     assert law.residual == pytest.approx(7.2e6, rel=1e-12)

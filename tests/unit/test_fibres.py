@@ -8,6 +8,7 @@ import pytest
 from scenes import clamped
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 # Cells of 1 mm stand for cross-sections; no beam is meant.
 pytestmark = pytest.mark.filterwarnings("ignore:beam. its section is:ufl_beam.ModelWarning")
@@ -19,13 +20,11 @@ SHAPES = {
     "circle": lambda **more: ub.Section.circle(d=0.30, **STEEL, **more),
     "tube": lambda **more: ub.Section.tube(d=0.30, t=0.02, **STEEL, **more),
     "full tube": lambda **more: ub.Section.tube(d=0.30, t=0.15, **STEEL, **more),
-    "i_shape": lambda **more: ub.Section.i_shape(
-        h=0.30, b=0.15, tw=0.008, tf=0.012, **STEEL, **more
-    ),
-    "fillets": lambda **more: ub.Section.steel("HEB 200", **STEEL, **more),
-    "channel": lambda **more: ub.Section.steel("UPE 200", **STEEL, **more),
-    "box": lambda **more: ub.Section.box(0.10, 0.20, 0.01, 0.02, **STEEL, **more),
-    "weak": lambda **more: ub.Section.steel("HEB 200", axis="weak", **STEEL, **more),
+    "i_shape": lambda **more: st.i_shape(h=0.30, b=0.15, tw=0.008, tf=0.012, **STEEL, **more),
+    "fillets": lambda **more: st.steel("HEB 200", **STEEL, **more),
+    "channel": lambda **more: st.steel("UPE 200", **STEEL, **more),
+    "box": lambda **more: st.box(0.10, 0.20, 0.01, 0.02, **STEEL, **more),
+    "weak": lambda **more: st.steel("HEB 200", axis="weak", **STEEL, **more),
 }
 NUMBERS = [7, 20, 80]
 
@@ -103,7 +102,7 @@ def test_layers_end_where_the_shape_changes(shape, edge):
 
 def test_edges_that_coincide_make_no_layer_of_nothing():
     """Flanges of a tenth of the depth, ten layers."""
-    section = ub.Section.i_shape(
+    section = st.i_shape(
         h=0.3, b=0.15, tw=0.01, tf=0.03, **STEEL, fibres=ub.Fibres(ELASTIC, number=10)
     )
     assert len(section.fibres.y) == 10
@@ -239,7 +238,9 @@ def test_fibres_that_crack_bear_nothing_in_the_end():
 def test_random_limits_blur_the_first_yield():
     """[calc] A scatter of 10 %: weaker than the fibres of the mean at first yield, alike far on."""
     same, _ = moment([0.95, 30.0], number=160)
-    random, _ = moment([0.95, 30.0], number=160, limit=ub.Normal(LIMIT, 0.1 * LIMIT, seed=3))
+    random, _ = moment(
+        [0.95, 30.0], number=160, limit=ub.distributions.Normal(LIMIT, 0.1 * LIMIT, seed=3)
+    )
     assert random[0] < same[0] * (1 - 1e-4)
     # 0.1/sqrt(160) of the whole moment is one deviation of the sum; three of them
     assert random[1] == pytest.approx(same[1], rel=3 * 0.1 / math.sqrt(160))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers import raises
 
-from ufl_beam.analysis.free_decay import (
+from ufl_beam.structures.free_decay import (
     damping,
     damping_ratio,
     fit_decay,

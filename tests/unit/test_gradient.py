@@ -125,7 +125,7 @@ def heated_and_yielding(strain=2e-3, EI=100.0, rate=40.0, length=3.0, limit=1.0)
 
 
 @dataclass(frozen=True)
-class Wearing(ub.ConnectorLaw):
+class Wearing(ub.extend.ConnectorLaw):
     """Holds below a limit that falls with the way of sliding."""
 
     new: float
@@ -134,13 +134,15 @@ class Wearing(ub.ConnectorLaw):
     variables: ClassVar = {"slipped": 0.0}
 
     def limit(self, state):
-        return self.worn + (self.new - self.worn) * ub.law_functions.exp(-state.slipped / self.way)
+        return self.worn + (self.new - self.worn) * ub.extend.law_functions.exp(
+            -state.slipped / self.way
+        )
 
     def sliding(self, motion, rate, state, dt):
-        return self.limit(state) + 0.3 * ub.law_functions.absolute(rate)
+        return self.limit(state) + 0.3 * ub.extend.law_functions.absolute(rate)
 
     def increments(self, motion, rate, state, dt):
-        return {"slipped": ub.law_functions.absolute(rate) * dt}
+        return {"slipped": ub.extend.law_functions.absolute(rate) * dt}
 
 
 def rubbing(limit=12e3, EI=9.0e6, load=35e3, mass=400.0, worn=9e3, strength=60e3, tau=1e-3):

@@ -8,6 +8,7 @@ import pytest
 import scipy
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 NEW = """PEER NGA STRONG MOTION DATABASE RECORD
 Somewhere, 5/19/1940, Station 9, 180
@@ -24,7 +25,7 @@ VALUES = np.array([0.1, -0.2, 0.3, 0.4, 0.0, -0.1, 0.0])
 G = 9.80665
 """Standard acceleration of gravity; m/s² (CGPM 1901)."""
 
-RECORD = ub.GroundMotion(0.02, np.random.default_rng(3).standard_normal(400), "noise")
+RECORD = st.GroundMotion(0.02, np.random.default_rng(3).standard_normal(400), "noise")
 
 
 @pytest.fixture
@@ -54,7 +55,7 @@ def written(tmp_path):
     ],
 )
 def test_a_file_is_read(written, text, options, unit):
-    motion = ub.GroundMotion.read(written(text), **options)
+    motion = st.GroundMotion.read(written(text), **options)
     # Steps of times with two decimals have the round-off of a sum.
     assert motion.dt == pytest.approx(0.01, rel=1e-12)
     np.testing.assert_array_equal(motion.values, unit * VALUES)
@@ -119,23 +120,23 @@ TIMED = "0.00 1\n0.01 2\n0.02 3\n0.03 4\n0.04 5\n"
 def test_a_wrong_file_is_refused_with_its_line(written, text, options, message):
     path = written(text)
     with pytest.raises(ub.ModelError, match=re.escape(f"{path}{message}")):
-        ub.GroundMotion.read(path, **options)
+        st.GroundMotion.read(path, **options)
 
 
 def test_a_missing_file_is_refused():
     with pytest.raises(ub.ModelError, match=r"GroundMotion.read: no/such.AT2: No such file"):
-        ub.GroundMotion.read("no/such.AT2")
+        st.GroundMotion.read("no/such.AT2")
 
 
 @pytest.mark.serial  # files
 def test_times_with_few_digits_are_equal_steps(written):
     """Steps of 1/256 s, written with four decimals; the mean step has half of the last digit."""
     lines = (f"{k / 256:.4f} {a}" for k, a in enumerate(RECORD.values))
-    motion = ub.GroundMotion.read(written("\n".join(lines)), unit="g")
+    motion = st.GroundMotion.read(written("\n".join(lines)), unit="g")
     assert motion.dt == pytest.approx(1 / 256, abs=1e-4 / len(motion.values))
 
 
-HISTORY = ub.GroundMotion.from_history
+HISTORY = st.GroundMotion.from_history
 
 
 @pytest.mark.parametrize(
@@ -151,7 +152,7 @@ HISTORY = ub.GroundMotion.from_history
         (lambda: ub.Rayleigh.with_ratios(0.03, (5.0, 5.0)), "omega = (5, 5) must be two"),
         # a0 = 2 ω1 ω2 (ζ1 ω2 - ζ2 ω1)/(ω2² - ω1²)
         (lambda: ub.Rayleigh.with_ratios((0.01, 0.05), (5.0, 6.0)), "need...mass = -1.04"),
-        (lambda: ub.response_spectrum(RECORD.scaled(0.0), [1.0], ductility=2.0), "noise is zero"),
+        (lambda: st.response_spectrum(RECORD.scaled(0.0), [1.0], ductility=2.0), "noise is zero"),
     ],
 )
 def test_a_wrong_call_is_refused(make, message):
@@ -161,7 +162,7 @@ def test_a_wrong_call_is_refused(make, message):
 
 def test_the_integrals_are_exact():
     """[closed] Acceleration 6 t until 1 s, which falls to zero in a further step of 0.1 s."""
-    motion = ub.GroundMotion(0.1, np.linspace(0.0, 6.0, 11))
+    motion = st.GroundMotion(0.1, np.linspace(0.0, 6.0, 11))
     for t in (-1.0, 0.0, 0.25, 0.7, 1.0):
         after = max(t, 0.0)
         assert motion.acceleration(t) == pytest.approx(6 * after, rel=1e-14)
@@ -183,7 +184,7 @@ def test_the_correction_finds_the_drift():
     """[closed] A polynomial is found but for the record, whose velocity has a small polynomial."""
     t = RECORD.dt * np.arange(len(RECORD.values))
     drift = 0.3 - 0.2 * t
-    moved = ub.GroundMotion(RECORD.dt, np.array(RECORD.values) + drift)
+    moved = st.GroundMotion(RECORD.dt, np.array(RECORD.values) + drift)
     np.testing.assert_allclose(moved.corrected().values, RECORD.corrected().values, atol=1e-12)
     # Berg and Housner's condition: no further line makes the mean square of the velocity smaller.
     v = scipy.integrate.cumulative_trapezoid(moved.corrected().values, dx=RECORD.dt, initial=0)
@@ -201,7 +202,7 @@ def test_the_filter_removes_long_waves():
     t = np.arange(0.0, 60.0, 0.02)
     short = np.sin(10 * np.pi * t) * np.sin(np.pi * t / 60) ** 2
     long = np.sin(0.1 * np.pi * t) * np.sin(np.pi * t / 60) ** 2
-    kept = np.array(ub.GroundMotion(0.02, short + long).corrected(highpass=0.5).values)
+    kept = np.array(st.GroundMotion(0.02, short + long).corrected(highpass=0.5).values)
     assert abs(kept - short).max() < 1e-3  # less than the sidebands of the window
 
 
@@ -217,16 +218,16 @@ def test_longer_steps_keep_slow_waves_and_remove_fast_ones():
     t = np.arange(0.0, 12.0, 0.01)
     window = np.sin(np.pi * t / 12) ** 2
     slow, fast = window * np.sin(4 * np.pi * t), window * np.sin(40 * np.pi * t)
-    kept = ub.GroundMotion(0.01, slow + fast).resampled(0.03)
+    kept = st.GroundMotion(0.01, slow + fast).resampled(0.03)
     assert len(kept.values) == 400
     # Half of the amplitude of SciPy's filter in its pass band, 60 dB, is 1e-3.
     np.testing.assert_allclose(kept.values, slow[::3], atol=5e-3)
 
 
 def test_a_history_with_uneven_times_is_interpolated():
-    floor = ub.GroundMotion.from_history([2.0, 3.0, 5.0], [0.0, 2.0, 0.0], dt=0.5, name="floor")
-    assert floor == ub.GroundMotion(0.5, [0.0, 1.0, 2.0, 1.5, 1.0, 0.5, 0.0], "floor")
-    even = ub.GroundMotion.from_history(0.1 * np.arange(5), np.arange(5))
+    floor = st.GroundMotion.from_history([2.0, 3.0, 5.0], [0.0, 2.0, 0.0], dt=0.5, name="floor")
+    assert floor == st.GroundMotion(0.5, [0.0, 1.0, 2.0, 1.5, 1.0, 0.5, 0.0], "floor")
+    even = st.GroundMotion.from_history(0.1 * np.arange(5), np.arange(5))
     assert even.dt == pytest.approx(0.1, rel=1e-15)
 
 
@@ -241,17 +242,17 @@ def test_rayleigh_damping_has_the_ratios():
 def test_exponents_may_begin_with_d(written):
     """As Fortran writes them."""
     text = NEW.replace("   .0100 SEC", " 0.5D-02 SEC").replace(".3000000E+00", ".3000000D+00")
-    expected = ub.GroundMotion.read(written(NEW))
-    found = ub.GroundMotion.read(written(text))
+    expected = st.GroundMotion.read(written(NEW))
+    found = st.GroundMotion.read(written(text))
     assert found.dt == 0.005
     assert found.values == expected.values
 
 
 def test_lines_may_all_end_with_a_comma(written):
     file = written("1,2,\n3,4,\n")
-    assert ub.GroundMotion.read(file, unit="m/s2", dt=0.1).values == (1.0, 2.0, 3.0, 4.0)
+    assert st.GroundMotion.read(file, unit="m/s2", dt=0.1).values == (1.0, 2.0, 3.0, 4.0)
 
 
 def test_a_record_too_short_for_the_filter_is_refused():
     with pytest.raises(ub.ModelError, match="has 4 values; a filter needs more than 15"):
-        ub.GroundMotion(0.01, [0, 1, 2, 1.0]).corrected(highpass=1.0)
+        st.GroundMotion(0.01, [0, 1, 2, 1.0]).corrected(highpass=1.0)

@@ -14,17 +14,18 @@ from helpers import needs_mpirun, on_two_processes, raises, require_restart
 from hinge_machine import Machine
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.model.material_law import State, initial_state
 
 K = 1e4
-STEEL = ub.Backbone(
+STEEL = st.Backbone(
     100.0, capping=0.03, post_capping=0.1, overstrength=1.1, residual=0.3, ultimate=0.25
 )
-SLAB = ub.Backbone(
+SLAB = st.Backbone(
     80.0, capping=0.02, post_capping=0.15, overstrength=1.2, residual=0.2, ultimate=0.3
 )
-LAW = ub.IbarraKrawinkler(K, STEEL, SLAB, strength=1.0, softening=1.5, unloading=0.8)
-PINCHED = ub.PinchingHinge(K, STEEL, SLAB, 1.0, 1.5, 0.8, 1.0, 0.4, 0.3, reloading=1.2)
+LAW = st.IbarraKrawinkler(K, STEEL, SLAB, strength=1.0, softening=1.5, unloading=0.8)
+PINCHED = st.PinchingHinge(K, STEEL, SLAB, 1.0, 1.5, 0.8, 1.0, 0.4, 0.3, reloading=1.2)
 
 
 def follow(law, motions):
@@ -42,7 +43,7 @@ def follow(law, motions):
 def machine(law):
     backbones = law.backbone, law.negative or law.backbone
     more = ()
-    if isinstance(law, ub.PinchingHinge):
+    if isinstance(law, st.PinchingHinge):
         more = (law.kappa_F, law.kappa_D), law.reloading
     capacities = law.strength, law.softening, law.unloading
     return Machine(law.stiffness, backbones, *capacities, law.exponent, *more)
@@ -53,7 +54,7 @@ def test_the_monotone_backbone_is_a_polygon():
     residual = 0.04 + (110 - 30) * 0.1 / 110
     zero = 0.25 + 30 / (2 * 1100)  # twice as steep as after capping
     corners = [0, 0.01, 0.04, residual, 0.25, zero, 1.0], [0, 100, 110, 30, 30, 0, 0]
-    law = ub.IbarraKrawinkler(K, STEEL)
+    law = st.IbarraKrawinkler(K, STEEL)
     for n in (5, 60):  # a step may pass several corners
         x = np.linspace(0, 0.3, n)
         for way in (1, -1):
@@ -73,12 +74,12 @@ def test_deterioration_follows_the_published_rules(seed, pinches):
     """
     random = np.random.default_rng(seed)
     capacities = random.choice([0.3, 1.0, 3.0, math.inf], 3)
-    law = ub.IbarraKrawinkler(
-        K, STEEL if seed % 4 else ub.Backbone(100.0, 0.03), (SLAB, None)[seed % 2], *capacities,
+    law = st.IbarraKrawinkler(
+        K, STEEL if seed % 4 else st.Backbone(100.0, 0.03), (SLAB, None)[seed % 2], *capacities,
         exponent=random.choice([1.0, 1.5, 2.0]),
     )  # fmt: skip
     if pinches:
-        law = ub.PinchingHinge(
+        law = st.PinchingHinge(
             **{field.name: getattr(law, field.name) for field in fields(law)},
             kappa_F=random.choice([0.2, 0.6, 1.0]), kappa_D=random.choice([0.0, 0.3, 1.0]),
             reloading=random.choice([0.5, 3.0, math.inf]),
@@ -102,8 +103,8 @@ def test_one_excursion_by_hand():
     The unloading stiffness falls by 90/510.  The elastic energy that unloading returns is then
     larger, and so the excursion dissipates slightly less than 90 J.
     """
-    backbone = ub.Backbone(100.0, capping=2.0)
-    law = ub.IbarraKrawinkler(K, backbone, strength=3.0, unloading=6.0)
+    backbone = st.Backbone(100.0, capping=2.0)
+    law = st.IbarraKrawinkler(K, backbone, strength=3.0, unloading=6.0)
     soft = K * (1 - 90 / 510)
     energy = 90 + 100**2 / (2 * K) - 100**2 / (2 * soft)
     moments, dissipated = follow(law, [0.91, 0.91 - 50 / soft, 0.6])
@@ -118,14 +119,14 @@ def test_two_pinched_excursions_by_hand():
     rotation; the second one from -0.02 rad by 0.75 · 0.04 rad and 0.4 · 100 · 5/7 to the peak.
     The energies are areas of triangles and trapezoids.
     """
-    law = ub.PinchingHinge(K, ub.Backbone(100.0, 2.0), kappa_F=0.4, kappa_D=0.25)
+    law = st.PinchingHinge(K, st.Backbone(100.0, 2.0), kappa_F=0.4, kappa_D=0.25)
     ways = [0.05, 0.02, 0.0, -0.005, -0.01, -0.03, 0.005, 0.03, 0.04, 0.05, 0.06]
     moments, dissipated = follow(law, ways)
     middle = 40 * 5 / 7
     expected = [100, -16, -32, -66, -100, -100, middle / 2, middle, middle / 2 + 50, 100, 100]
     assert moments == pytest.approx(expected, rel=1e-12)
     assert dissipated[[0, 5, 9]] == pytest.approx([4.0, 4.0 + 2.8, 6.8 + 1.5], rel=1e-12)
-    straight = ub.PinchingHinge(K, ub.Backbone(100.0, 2.0))  # aims at peaks without pinching
+    straight = st.PinchingHinge(K, st.Backbone(100.0, 2.0))  # aims at peaks without pinching
     moments, _ = follow(straight, ways)
     assert moments[[1, 2, 6, 7]] == pytest.approx([-40, -80, 250 / 7, 500 / 7], rel=1e-12)
 
@@ -262,7 +263,7 @@ def test_a_path_passes_the_cap(EI, control):
     The stiffness of the softer beam, 3 EI/L = 600 N m/rad, is below the fall after capping of
     1100 N m/rad, so that the deflection snaps back.
     """
-    law = ub.IbarraKrawinkler(K, ub.Backbone(100.0, 0.03, 0.1, 1.1, 0.3))
+    law = st.IbarraKrawinkler(K, st.Backbone(100.0, 0.03, 0.1, 1.1, 0.3))
     end, hinge, scene = cantilever(law, EI)
     path = ub.follow(scene, control, steps=22)
     history = path.connector(hinge)
@@ -277,7 +278,7 @@ def test_a_path_passes_the_cap(EI, control):
 
 def test_displacement_control_passes_the_cap():
     """[closed] The same hinge in statics with a prescribed deflection, against its backbone."""
-    law = ub.IbarraKrawinkler(K, ub.Backbone(100.0, 0.03, 0.1, 1.1, 0.3))
+    law = st.IbarraKrawinkler(K, st.Backbone(100.0, 0.03, 0.1, 1.1, 0.3))
     end, hinge, scene = cantilever(law)
     pull = ub.PrescribedDisplacement(end, v=lambda t: 0.25 * t)
     scene = ub.Scene(scene.beams, supports=[*scene.supports, pull], connectors=[hinge])
@@ -291,7 +292,7 @@ def test_displacement_control_passes_the_cap():
 
 def test_modes_use_the_unloading_stiffness():
     """[closed] Frequency sqrt(k/J) of a body on a hinge whose stiffness k one excursion reduced."""
-    law = ub.IbarraKrawinkler(K, ub.Backbone(100.0, 0.5, overstrength=1.5), unloading=6.0)
+    law = st.IbarraKrawinkler(K, st.Backbone(100.0, 0.5, overstrength=1.5), unloading=6.0)
     hinge, scene = turned(law, None)
     load = ub.PointLoad(
         scene.bodies[0].middle, moment=1.0, amplitude=ub.Table([0, 1, 2], [0, 140, 0])
@@ -309,24 +310,24 @@ def test_modes_use_the_unloading_stiffness():
 @pytest.mark.parametrize(
     ("make", "parts"),
     [
-        (lambda: ub.Backbone(1.0, -0.01), ("Backbone: capping = -0.01", "turn back at the yield")),
-        (lambda: ub.Backbone(1.0, 0.01, overstrength=0.9), ("overstrength = 0.9", "at least")),
-        (lambda: ub.Backbone(1.0, 0.01, residual=1.2), ("residual = 1.2", "rise again")),
-        (lambda: ub.Backbone(1.0, 0.01, ultimate=0.005), ("ultimate rotation 0.005 rad", "0.01")),
-        (lambda: ub.Backbone(1.0, 0.01, post_capping=0.0), ("post_capping = 0", "positive")),
+        (lambda: st.Backbone(1.0, -0.01), ("Backbone: capping = -0.01", "turn back at the yield")),
+        (lambda: st.Backbone(1.0, 0.01, overstrength=0.9), ("overstrength = 0.9", "at least")),
+        (lambda: st.Backbone(1.0, 0.01, residual=1.2), ("residual = 1.2", "rise again")),
+        (lambda: st.Backbone(1.0, 0.01, ultimate=0.005), ("ultimate rotation 0.005 rad", "0.01")),
+        (lambda: st.Backbone(1.0, 0.01, post_capping=0.0), ("post_capping = 0", "positive")),
         (
-            lambda: ub.IbarraKrawinkler(100.0, ub.Backbone(1.0, 0.01, ultimate=0.015)),
+            lambda: st.IbarraKrawinkler(100.0, st.Backbone(1.0, 0.01, ultimate=0.015)),
             ("ultimate rotation 0.015 rad", "capping rotation 0.02 rad"),
         ),
         (
-            lambda: ub.IbarraKrawinkler(100.0, ub.Backbone(1.0, 0.01, overstrength=2.0)),
+            lambda: st.IbarraKrawinkler(100.0, st.Backbone(1.0, 0.01, overstrength=2.0)),
             ("yield rotation 0.01 rad", "slope is 100", "half the elastic stiffness"),
         ),
-        (lambda: ub.IbarraKrawinkler(1.0, 2.0), ("IbarraKrawinkler: backbone", "Backbone")),
-        (lambda: ub.IbarraKrawinkler(K, STEEL, strength=0.0), ("strength = 0", "positive")),
-        (lambda: ub.PinchingHinge(K, STEEL, kappa_F=0.0), ("PinchingHinge: kappa_F", "positive")),
-        (lambda: ub.PinchingHinge(K, STEEL, kappa_D=1.2), ("PinchingHinge: kappa_D", "at most 1")),
-        (lambda: ub.IbarraKrawinkler(K, STEEL, exponent=0.5), ("exponent = 0.5", "at least 1")),
+        (lambda: st.IbarraKrawinkler(1.0, 2.0), ("IbarraKrawinkler: backbone", "Backbone")),
+        (lambda: st.IbarraKrawinkler(K, STEEL, strength=0.0), ("strength = 0", "positive")),
+        (lambda: st.PinchingHinge(K, STEEL, kappa_F=0.0), ("PinchingHinge: kappa_F", "positive")),
+        (lambda: st.PinchingHinge(K, STEEL, kappa_D=1.2), ("PinchingHinge: kappa_D", "at most 1")),
+        (lambda: st.IbarraKrawinkler(K, STEEL, exponent=0.5), ("exponent = 0.5", "at least 1")),
     ],
 )
 def test_a_backbone_that_turns_back_is_refused(make, parts):
@@ -390,14 +391,14 @@ def test_two_processes_share_a_frame():
 
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.GeneralizedAlpha(0.8)], ids=str)
-@pytest.mark.parametrize("law", [ub.IbarraKrawinkler, ub.PinchingHinge])
+@pytest.mark.parametrize("law", [st.IbarraKrawinkler, st.PinchingHinge])
 def test_the_dissipation_does_not_depend_on_the_steps(law, scheme):
     """[closed] The area of the parallelogram of a steady cycle, to 1e-6 (the rule stops at 1e-7).
 
     The paths of `PinchingHinge` without pinching go to the peaks: there steps of a 40th compare.
     """
     K, My, size = 3e7, 3e5, 0.03
-    stiff = law(K, ub.Backbone(My, capping=0.025, post_capping=0.17, overstrength=1.1))
+    stiff = law(K, st.Backbone(My, capping=0.025, post_capping=0.17, overstrength=1.1))
     slope = 0.1 * My / 0.025
     area = 4 * (My - slope * My / K) * (size - My / K)
     found = []
@@ -414,5 +415,5 @@ def test_the_dissipation_does_not_depend_on_the_steps(law, scheme):
         found.append(lost[-1] - lost[n])
         if n == 2:  # works of supports are trapezoidal: steps with open ledgers are divided
             assert run.energy.worst < 0.05 or isinstance(scheme, ub.GeneralizedAlpha)
-    expected = area if law is ub.IbarraKrawinkler else found[-1]
+    expected = area if law is st.IbarraKrawinkler else found[-1]
     assert found == pytest.approx([expected] * 4, rel=1e-6)

@@ -10,13 +10,14 @@ from scipy.integrate import solve_ivp
 from uniaxial_points import LENGTH, Bars, C
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 MIDDLE = ub.EnergyMomentumStatic(0.5)
 LAWS = {
-    "Ramberg-Osgood": ub.RambergOsgood(yield_limit=2.0, offset=0.01, exponent=6),
-    "Armstrong-Frederick": ub.ArmstrongFrederick(yield_limit=1.0, kinematic=150.0, recovery=60.0),
-    "Bouc-Wen": ub.BoucWen(yield_limit=2.0, hardening=0.05, exponent=2),
-    "degrading": ub.BoucWen(2.0, 0.05, 1.5, shape=0.7, strength=0.05),
+    "Ramberg-Osgood": st.RambergOsgood(yield_limit=2.0, offset=0.01, exponent=6),
+    "Armstrong-Frederick": st.ArmstrongFrederick(yield_limit=1.0, kinematic=150.0, recovery=60.0),
+    "Bouc-Wen": st.BoucWen(yield_limit=2.0, hardening=0.05, exponent=2),
+    "degrading": st.BoucWen(2.0, 0.05, 1.5, shape=0.7, strength=0.05),
 }
 SCHEMES = [ub.Static(), MIDDLE, ub.EnergyMomentumStatic(0.8), ub.EnergyMomentumStatic(1.0)]
 each_law = pytest.mark.parametrize("law", LAWS)
@@ -65,7 +66,7 @@ def test_armstrong_frederick_ratchets():
     high, low = 2.2, -1.6
     X1, X0 = high - limit, low + limit
     exact = math.log((B - r * X0) / (B - r * X1)) / r - math.log((B + r * X1) / (B + r * X0)) / r
-    law = ub.ArmstrongFrederick(limit, B, r)
+    law = st.ArmstrongFrederick(limit, B, r)
     section = ub.Section(EA=200.0, GA=1.0, EI=1.0, axial=law)
     beam = ub.Beam((0, 0), (1, 0), section, cells=1)
 
@@ -135,12 +136,12 @@ def test_work_is_stored_or_dissipated(law, scheme):
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: ub.RambergOsgood(0.0, 0.002, 5), "RambergOsgood: yield_limit"),
-        (lambda: ub.RambergOsgood(1.0, 0.002, 0.5), "RambergOsgood: exponent"),
-        (lambda: ub.ArmstrongFrederick(1.0, 1.0, 0.0), "ArmstrongFrederick: recovery"),
-        (lambda: ub.BoucWen(1.0, hardening=1.0), "BoucWen: hardening = 1 must lie between"),
-        (lambda: ub.BoucWen(1.0, shape=0.2), "BoucWen: shape"),
-        (lambda: ub.BoucWen(1.0, strength=-1.0), "BoucWen: strength"),
+        (lambda: st.RambergOsgood(0.0, 0.002, 5), "RambergOsgood: yield_limit"),
+        (lambda: st.RambergOsgood(1.0, 0.002, 0.5), "RambergOsgood: exponent"),
+        (lambda: st.ArmstrongFrederick(1.0, 1.0, 0.0), "ArmstrongFrederick: recovery"),
+        (lambda: st.BoucWen(1.0, hardening=1.0), "BoucWen: hardening = 1 must lie between"),
+        (lambda: st.BoucWen(1.0, shape=0.2), "BoucWen: shape"),
+        (lambda: st.BoucWen(1.0, strength=-1.0), "BoucWen: strength"),
     ],
 )
 def test_numbers_out_of_range_are_refused(make, says):

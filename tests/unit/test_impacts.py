@@ -14,13 +14,13 @@ EXACT = 1e-9
 
 
 @dataclass(frozen=True)
-class Own(ub.EnergyMomentumBase, ub.MidpointDynamics):
+class Own(ub.extend.EnergyMomentumBase, ub.extend.MidpointDynamics):
     """A scheme of a user: the midpoint rule."""
 
     alpha = 0.0
 
     def coefficients(self, dt, last_dt, known):
-        return ub.Coefficients(
+        return ub.extend.Coefficients(
             inertia=(2 / dt**2, -2 / dt, 0.0), velocity=(1 / dt, 0.0, 0.0),
             rates=((2 / dt, -1.0, 0.0),),
         )  # fmt: skip

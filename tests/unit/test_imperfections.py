@@ -10,6 +10,7 @@ from helpers import raises, run
 from scenes import clamped, portal
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 L, EI = 2.0, 100.0
 SECTION = ub.Section(EA=1e8, GA=1e8, EI=EI, rhoA=1.0)
@@ -36,9 +37,9 @@ def test_a_bow_is_amplified(ratio, by_mode):
     scene = pinned_column(ratio * buckled.factors[0])
     e = L / 2000
     if by_mode:
-        crooked = ub.imperfect(scene, mode=ub.buckling(scene, 1), amplitude=e)
+        crooked = st.imperfect(scene, mode=ub.buckling(scene, 1), amplitude=e)
     else:
-        crooked = ub.imperfect(scene, bow={scene["column"]: 1 / 2000})
+        crooked = st.imperfect(scene, bow={scene["column"]: 1 / 2000})
     column = crooked["column"]
     assert abs(column.curve(0.5)[0]) == pytest.approx(e, rel=1e-9)
     found = run(crooked, ub.Static(), dt=0.5, newton=ub.Newton(rtol=1e-12))
@@ -54,7 +55,7 @@ def test_sway_of_a_cantilever():
     load, φ = 0.15 * EULER, 1e-4
     column = ub.Beam((3, 1), (3, 1 + L), SECTION, cells=20, name="column")
     scene = clamped(column, loads=[ub.PointLoad(column.end, (0, -load))])
-    leaning = ub.imperfect(scene, sway=φ)
+    leaning = st.imperfect(scene, sway=φ)
     assert leaning["column"].start.point == (3, 1)
     assert leaning["column"].end.point == pytest.approx((3 + φ * L, 1 + L), abs=1e-15)
     moment = run(leaning, ub.Static(), dt=1.0).reaction(leaning.supports[0])[-1, 2]
@@ -66,7 +67,7 @@ def test_nothing_moves_without_loads():
     """An imperfect frame is free of stress, and its sway is that of all of its points."""
     scene = portal(H=0.0, V=0.0)
     left = scene.beams[0]
-    crooked = ub.imperfect(scene, sway=0.01, bow={left: 0.02})
+    crooked = st.imperfect(scene, sway=0.01, bow={left: 0.02})
     found = run(crooked, ub.EnergyMomentum(), dt=0.5)
     assert not found.q.any()
     for old, new in zip(scene.beams, crooked.beams, strict=True):
@@ -108,7 +109,7 @@ def test_a_scene_with_everything_keeps_its_objects():
         ],
     )
     for mode in (None, ub.modes(replace(scene, loads=[], damping=[]), 1)):
-        new = ub.imperfect(scene, sway=1e-6, mode=mode, amplitude=1e-6)
+        new = st.imperfect(scene, sway=1e-6, mode=mode, amplitude=1e-6)
         assert new.joints[1].places[1].body is new["weight"] is new.bodies[0]
         assert new.works[0].beams[0] is new["column"]
         assert new.connectors[0].b.beam is new["girder"]
@@ -124,15 +125,15 @@ def test_wrong_imperfections():
     tee = ub.Beam((0, 1), (1, 1), SECTION, name="tee")
     joined = ub.Scene([column, tee], joints=[ub.Rigid(column.at(0.5), tee.start)])
     for make, message in [
-        (lambda: ub.imperfect(scene), "nothing changes the geometry"),
-        (lambda: ub.imperfect(scene, mode=ub.modes(scene, 1)), "nothing changes the geometry"),
-        (lambda: ub.imperfect(scene, bow={stray: 0.1}), "is not in the scene"),
-        (lambda: ub.imperfect(joined, bow={column: 0.1}), "is between its ends; divide the beam"),
+        (lambda: st.imperfect(scene), "nothing changes the geometry"),
+        (lambda: st.imperfect(scene, mode=ub.modes(scene, 1)), "nothing changes the geometry"),
+        (lambda: st.imperfect(scene, bow={stray: 0.1}), "is not in the scene"),
+        (lambda: st.imperfect(joined, bow={column: 0.1}), "is between its ends; divide the beam"),
         (
-            lambda: ub.imperfect(joined, mode=ub.modes(scene, 1), amplitude=1.0),
+            lambda: st.imperfect(joined, mode=ub.modes(scene, 1), amplitude=1.0),
             "mode is of other beams",
         ),
-        (lambda: ub.imperfect(scene, mode=ub.modes(scene, 1), k=1, amplitude=1.0), "no shape 1"),
+        (lambda: st.imperfect(scene, mode=ub.modes(scene, 1), k=1, amplitude=1.0), "no shape 1"),
     ]:
         with raises(message):
             make()

@@ -8,6 +8,7 @@ import pytest
 from helpers import raises
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 L, EA, EI = 8.0, 1e9, 1e7
 STIFF = {"EA": EA, "GA": 4e8, "EI": EI, "rhoA": 100.0, "rhoI": 1.0}
@@ -168,9 +169,9 @@ SECTIONS = {
     "bars": ub.Section.rectangle(
         b=0.1, h=0.3, E=30e9, nu=0.2, rho=2500.0, fibres=ub.Fibres(ub.ElastoPlastic(9e6), number=6)
     ).reinforced(
-        y=[-0.1, 0.1], A=[3e-4, 2e-4], E=200e9, fibres=ub.Fibres(ub.MenegottoPinto(4e7, 0.02))
+        y=[-0.1, 0.1], A=[3e-4, 2e-4], E=200e9, fibres=ub.Fibres(st.MenegottoPinto(4e7, 0.02))
     ),
-    "both": ub.Section(**STIFF, interaction=ub.AxialBending(axial=8e5, bending=9e3)),
+    "both": ub.Section(**STIFF, interaction=st.AxialBending(axial=8e5, bending=9e3)),
 }
 SCHEMES = [
     ub.Static(), ub.EnergyMomentumStatic(0.75), ub.EnergyMomentum(alpha=0.05),
@@ -249,7 +250,7 @@ BEAM = ub.Beam((0, 0), (4, 0), ub.Section.rectangle(b=0.2, h=0.4, E=30e9, nu=0.2
 )
 def test_a_tendon_stays_in_an_unsymmetric_section(fibres):
     """A T of 0.8 m with a flange of 1 m x 0.2 m at the top: the web reaches farther down."""
-    section = ub.Section.t_shape(0.8, 1.0, 0.2, 0.2, E=30e9, nu=0.2, rho=2500.0, fibres=fibres)
+    section = st.t_shape(0.8, 1.0, 0.2, 0.2, E=30e9, nu=0.2, rho=2500.0, fibres=fibres)
     beam = ub.Beam((0, 0), (10, 0), section)
     y = np.average([0.3, 0.7], weights=[0.6 * 0.2, 1.0 * 0.2])  # of the centroid, from the bottom
     ub.ImposedStrain.tendon(beam, 1e6, 0.01 - y)

@@ -70,7 +70,7 @@ def test_a_run_in_two_parts_is_the_run():
 
 
 @dataclass(frozen=True)
-class DampedVelocities(ub.EnergyMomentumBase, ub.MidpointDynamics):
+class DampedVelocities(ub.extend.EnergyMomentumBase, ub.extend.MidpointDynamics):
     """Δu/dt = (v0 + v1)/2 + c (Δv - r Δv'), with the change Δv' of velocities in the last step."""
 
     c: float = 0.05
@@ -80,7 +80,7 @@ class DampedVelocities(ub.EnergyMomentumBase, ub.MidpointDynamics):
 
     def coefficients(self, dt, last_dt, known):
         c, r, after = self.c, self.c * min(1.0, dt / last_dt), 0.5 + self.c
-        return ub.Coefficients(
+        return ub.extend.Coefficients(
             inertia=(1 / (dt**2 * after), (r - 1) / (dt * after), -r / (dt * after)),
             velocity=(1 / dt, 0.0, 0.0),
             rates=((1 / (dt * after), (c + r - 0.5) / after, -r / after),),

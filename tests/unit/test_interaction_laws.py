@@ -6,11 +6,12 @@ import pytest
 from scenes import clamped
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.blocks.material_points import Points
 from ufl_beam.model.fibres import SectionPoints
 
 EA, EI, NP, MP = 1000.0, 50.0, 10.0, 2.0
-LAW = ub.AxialBending(NP, MP)
+LAW = st.AxialBending(NP, MP)
 SCHEMES = [ub.Static(), ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic(1.0)]
 
 
@@ -125,7 +126,7 @@ def test_the_ledger_closes():
         (lambda: section(interaction=LAW, hinge=ub.Softening(1.0, 1.0)), "hinge beside interact"),
         (lambda: ub.Spring(1.0, law=LAW), "Spring: law = .* couples the resultants NM"),
         (lambda: ub.Fibres(LAW), "Fibres: law = .* couples the resultants NM"),
-        (lambda: ub.AxialBending(0.0, 1.0), "AxialBending: axial"),
+        (lambda: st.AxialBending(0.0, 1.0), "AxialBending: axial"),
     ],
 )
 def test_bad_interaction_laws_are_refused(make, says):

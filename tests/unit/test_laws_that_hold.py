@@ -14,11 +14,11 @@ from helpers import law_of, require_restart
 import ufl_beam as ub
 from ufl_beam.model.material_law import initial_state
 
-f = ub.law_functions
+f = ub.extend.law_functions
 
 
 @dataclass(frozen=True)
-class Dry(ub.ConnectorLaw):
+class Dry(ub.extend.ConnectorLaw):
     """Coulomb's law."""
 
     force: float
@@ -29,7 +29,7 @@ class Dry(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Breakaway(ub.ConnectorLaw):
+class Breakaway(ub.extend.ConnectorLaw):
     """More to break loose than to slide, with Stribeck's curve and a viscous part."""
 
     rest: float
@@ -47,7 +47,7 @@ class Breakaway(ub.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Wearing(ub.ConnectorLaw):
+class Wearing(ub.extend.ConnectorLaw):
     """A limit that falls with the way of sliding."""
 
     new: float

@@ -38,7 +38,7 @@ def petsc_objects():
         probe.destroy()
 
 
-class Watch(ub.Recorder):
+class Watch(ub.extend.Recorder):
     """Measures at some steps."""
 
     def __init__(self, at):

@@ -14,6 +14,7 @@ from scenes import clamped
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.discretization.cell_functions import mass_matrix
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
@@ -245,18 +246,19 @@ def test_lumped_is_yes_or_no():
 
 
 STIFF = {"EA": 100.0, "GA": 100.0, "EI": 1.0, "rhoA": 0.01, "rhoI": 1e-5}
+RANDOM = ub.distributions.Normal(50.0, 5.0, seed=1)
 INELASTIC = {
     "yields": {
         "section": ub.Section(
             **STIFF, bending=ub.ElastoPlastic(0.5, isotropic=0.1),
-            axial=ub.RambergOsgood(1.0, 0.02, 3.0),
+            axial=st.RambergOsgood(1.0, 0.02, 3.0),
         )
     },
     "softens": {"section": ub.Section(**STIFF, hinge=ub.Softening(0.5, 0.5))},
     "fibres": {
         "section": ub.Section.rectangle(
             b=1, h=0.2, E=1e3, nu=0, rho=0.05,
-            fibres=ub.Fibres(ub.ElastoPlastic(ub.Normal(50.0, 5.0, seed=1), 50.0), number=4),
+            fibres=ub.Fibres(ub.ElastoPlastic(RANDOM, 50.0), number=4),
         )
     },
 }  # fmt: skip
@@ -372,7 +374,7 @@ def test_everything_takes_a_higher_degree(mesh, shared_path, on_first_rank):
     records = [
         ub.XDMF(shared_path / "b.xdmf"), ub.History(shared_path / "b.csv", [arm.at(0.3)]),
         ub.Extremes(),
-        ub.Fatigue(ub.HotSpot.fibre(arm.at(0.3), y=0.1, E=1e9), ub.SNCurve(range=1e8)),
+        st.Fatigue(st.HotSpot.fibre(arm.at(0.3), y=0.1, E=1e9), st.SNCurve(range=1e8)),
     ]  # fmt: skip
     solution = ub.simulate(
         scene, ub.EnergyMomentum(0.05), t=(0, 0.1), dt=0.01, mesh=mesh, record=records

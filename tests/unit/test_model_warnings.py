@@ -16,6 +16,7 @@ from helpers import raises
 from scenes import clamped
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 HEAVY = ub.Section(EA=1e6, GA=3e5, EI=1e2, rhoA=1.0, rhoI=1e-3)
 LIGHT = {"EA": 1e6, "GA": 3e5, "EI": 1e2}
@@ -191,12 +192,12 @@ def test_beams_that_touch_without_a_joint(shift, names):
         ),
         lambda x, end: ub.modes(x, 1),
         lambda x, end: ub.buckling(x, 1),
-        lambda x, end: ub.pushover(x, end, 1e-3, pattern=x.loads),
+        lambda x, end: st.pushover(x, end, 1e-3, pattern=x.loads),
         lambda x, end: ub.follow(x, ub.LoadControl(0.5), steps=2),
-        lambda x, end: ub.load_combinations(
+        lambda x, end: st.load_combinations(
             replace(x, loads=[]), {"Q": x.loads}, {"1": {"Q": 1.0}, "2": {"Q": 1.5}}
         ),
-        lambda x, end: ub.response_spectrum_analysis(
+        lambda x, end: st.response_spectrum_analysis(
             replace(x, loads=[]), lambda T: 1.0, n=2, direction=(1, 0)
         ),
         lambda x, end: ub.linearize(
@@ -443,12 +444,12 @@ def test_sections_in_millimetres(unit):
     """Whatever the unit of the scene is, a section is smaller than its beam is long."""
     steel = {"E": 210e9, "nu": 0.3}
     with warns("girder: its section is", "m long", "in mm?"):
-        beam(b=(6 * unit, 0), section=ub.Section.i_shape(
+        beam(b=(6 * unit, 0), section=st.i_shape(
             300 * unit, 150 * unit, 7 * unit, 11 * unit, **steel
         ))  # fmt: skip
     with warns("girder: its section is"):
         beam(b=(6 * unit, 0), section=ub.Section(EA=1.0, GA=1.0, EI=(87 * unit) ** 2))
-    beam(b=(6 * unit, 0), section=ub.Section.i_shape(
+    beam(b=(6 * unit, 0), section=st.i_shape(
         0.3 * unit, 0.15 * unit, 0.007 * unit, 0.011 * unit, **steel
     ))  # fmt: skip
     # Rigid in bending on purpose
@@ -513,10 +514,10 @@ def still(*loads):
         (lambda: square(fibres=ub.Fibres(ub.ElastoPlastic(355.0))), "yield strain 1.69e-09"),
         (lambda: square(fibres=ub.Fibres(ub.ElastoPlastic(0.355))), "yield strain 1.69e-12"),
         (
-            lambda: square(E=27e9, rho=2400.0, fibres=ub.Fibres(ub.Mander(30e6, 0.2))),
+            lambda: square(E=27e9, rho=2400.0, fibres=ub.Fibres(st.Mander(30e6, 0.2))),
             "strain over strength / E 180; 0.002 is 0.2 %",
         ),
-        (lambda: ub.SNCurve(range=71.0), "stress range 71; it is in Pa"),
+        (lambda: st.SNCurve(range=71.0), "stress range 71; it is in Pa"),
         (
             lambda: ub.ImposedStrain.tendon(beam(), 1e3, ub.Table([0, 10], [0.0, 0.01])),
             "end of a table along the beam 10; s is from 0 to 1",
@@ -532,9 +533,9 @@ def still(*loads):
             "curvature times depth",
         ),
         (lambda: ub.ImposedStrain.tendon(beam(), 1e12), "imposed strain -1e+06|strain 1e+06"),
-        (lambda: ub.imperfect(ub.Scene([beam()]), sway=5.0), "inclination 5"),
-        (lambda: ub.imperfect(ub.Scene([b := beam()]), bow={b: 6.7}), "bow 6.7"),
-        (lambda: ub.HotSpot.fibre(beam(section=square()).start, y=100.0, E=210e9), "y is in m"),
+        (lambda: st.imperfect(ub.Scene([beam()]), sway=5.0), "inclination 5"),
+        (lambda: st.imperfect(ub.Scene([b := beam()]), bow={b: 6.7}), "bow 6.7"),
+        (lambda: st.HotSpot.fibre(beam(section=square()).start, y=100.0, E=210e9), "y is in m"),
         (lambda: still(lambda b: ub.MovingLoad(b, lambda t: 100 + t, (0, -1))), "does not act"),
         (
             lambda: still(lambda b: ub.Gravity(), lambda b: ub.MovingLoad(b, lambda t: t, mass=1)),
@@ -551,7 +552,7 @@ def test_a_target_of_a_pushover_beyond_the_scene():
     bar = beam((0, 0), (2, 0), square())
     scene = ub.Scene([bar], supports=[ub.Clamped(bar.start)])
     with warns("target over the size of the scene -25"), pytest.raises(ub.ArgumentError):
-        ub.pushover(scene, bar.end, -50.0, component="v", pattern="none")
+        st.pushover(scene, bar.end, -50.0, component="v", pattern="none")
 
 
 @pytest.mark.parametrize(

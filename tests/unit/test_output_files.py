@@ -38,7 +38,7 @@ def run(*record, steps=5, dt=0.1, **more):
 # -- files that two outputs would write ------------------------------------------------------------
 
 
-class Notes(ub.Recorder):
+class Notes(ub.extend.Recorder):
     """A recorder of a user that states its file."""
 
     def __init__(self, path):

@@ -10,6 +10,7 @@ from uniaxial_points import LENGTH, Bars, C, histories
 from user_laws import Dashpot, PowerLaw, SameHardening, Stiffening
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 SOFTENS = ub.Softening(3.0, 0.3)
 LAWS = {
@@ -31,10 +32,10 @@ LAWS = {
     "by residuals": (SameHardening(2.0, 20.0, 10.0, 0.5), None),
     "by residuals, softening": (SameHardening(2.0, 20.0, 10.0, 0.5), SOFTENS),
     "stiffening": (Stiffening(1e4), None),
-    "Menegotto-Pinto": (ub.MenegottoPinto(3.0, 0.05, 5.0, a1=0.1, a3=0.2), None),
-    "Kent-Park": (ub.KentPark(3.0, 0.6, 0.08, tension=ub.Softening(0.4, 0.02)), None),
-    "Mander": (ub.Mander(3.0, 0.02, 0.06, tension=ub.LinearSoftening(0.4, 0.02)), None),
-    "Menegotto-Pinto, softening": (ub.MenegottoPinto(3.0, 0.05), SOFTENS),
+    "Menegotto-Pinto": (st.MenegottoPinto(3.0, 0.05, 5.0, a1=0.1, a3=0.2), None),
+    "Kent-Park": (st.KentPark(3.0, 0.6, 0.08, tension=ub.Softening(0.4, 0.02)), None),
+    "Mander": (st.Mander(3.0, 0.02, 0.06, tension=ub.LinearSoftening(0.4, 0.02)), None),
+    "Menegotto-Pinto, softening": (st.MenegottoPinto(3.0, 0.05), SOFTENS),
 }
 """Bulk and discontinuity of a point of stiffness C, at strains up to 0.06."""
 

@@ -135,7 +135,7 @@ def test_change_of_the_tangent_of_loads_is_its_derivative(degree):
     scene, scheme = clamped(beam, loads=loads), ub.Static()
     equation = ub.Simulation(scene, scheme, mesh=ub.Mesh(degree=degree)).equation
     q, u = np.random.default_rng(degree).uniform(-0.3, 0.3, (2, equation.A.size))
-    equation.begin(ub.Step.create(scheme, 0.0, 1.0, 1.0, np.zeros(len(q))))
+    equation.begin(ub.extend.Step.create(scheme, 0.0, 1.0, 1.0, np.zeros(len(q))))
 
     def tangent(q):
         equation.A.data.fill(0.0)

@@ -51,7 +51,7 @@ def test_each_member_counts(name):
 
 def test_a_scheme_with_inertia_that_lacks_something():
     @dataclass(frozen=True)
-    class Mine(ub.EnergyMomentumBase, ub.MidpointDynamics):
+    class Mine(ub.extend.EnergyMomentumBase, ub.extend.MidpointDynamics):
         alpha = 0.0
 
     refused("lacks coefficients, error_weights", Mine())
@@ -104,11 +104,11 @@ def test_a_recorder_without_its_base_class():
         def write(self, simulation): ...
 
     refused("simulate: record[0] = <", record=[Mine()])
-    refused("is not a Recorder; derive your own classes from ub.Recorder", record=[Mine()])
+    refused("is not a Recorder; derive your own classes from ub.extend.Recorder", record=[Mine()])
 
 
 def test_a_recorder_that_lacks_a_method():
-    class Mine(ub.Recorder):
+    class Mine(ub.extend.Recorder):
         def open(self, simulation): ...
 
     with pytest.raises(TypeError, match=r"Mine .*write"):
@@ -116,7 +116,7 @@ def test_a_recorder_that_lacks_a_method():
 
 
 def test_a_recorder_with_other_arguments():
-    class Mine(ub.Recorder):
+    class Mine(ub.extend.Recorder):
         def open(self, simulation): ...
         def write(self, simulation, t): ...
 

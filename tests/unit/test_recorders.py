@@ -358,7 +358,7 @@ def lengths(folder):
     )
 
 
-class Count(ub.Recorder):
+class Count(ub.extend.Recorder):
     """A recorder of a user."""
 
     def __init__(self, fail_at=None):

@@ -96,7 +96,7 @@ class Between:
 
     def gradient(self):
         """Virtual work of a unit force: the residual is linear in it."""
-        step = ub.Step.create(self.scheme, 0.0, 0.1, 0.1, self.q0)
+        step = ub.extend.Step.create(self.scheme, 0.0, 0.1, 0.1, self.q0)
         self.simulation.equation.begin(step, [self.zero_matrix])
         r = np.zeros((2, len(self.q0)))
         for force, row in zip((0.0, 1.0), r, strict=True):

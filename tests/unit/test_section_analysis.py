@@ -11,12 +11,13 @@ from scenes import clamped
 from user_laws import Dashpot
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
-f = ub.law_functions
+f = ub.extend.law_functions
 
 
 @dataclass(frozen=True)
-class NoTension(ub.MaterialLaw):
+class NoTension(ub.extend.MaterialLaw):
     """Linear in compression; bears no tension."""
 
     def stress(self, strain, state):
@@ -54,7 +55,7 @@ def test_plastic_rectangle():
         κ > K_YIELD, 1 - (K_YIELD / np.maximum(κ, K_YIELD)) ** 2 / 3, κ / K_YIELD / 1.5
     )
     for n in (10, 40, 160):
-        result = ub.moment_curvature(rectangle(n), κ)
+        result = st.moment_curvature(rectangle(n), κ)
         # A layer has one stress: the yielded depth errs by half a layer at most
         assert np.abs(result.moment / M_PLASTIC - exact).max() < 1.5 / n**2
         assert np.abs(result.strain).max() < 1e-15
@@ -65,7 +66,7 @@ def test_plastic_rectangle():
 def test_plastic_moment_under_axial_force(N):
     """[closed] M = Mp (1 - (N/Np)²); the dissipated energy is the work that is not stored."""
     κ = K_YIELD * np.linspace(0, 40, 81)
-    result = ub.moment_curvature(rectangle(160), κ, N=N * N_PLASTIC)
+    result = st.moment_curvature(rectangle(160), κ, N=N * N_PLASTIC)
     # At 40 κy the elastic core, 1/40 of the depth, and half a layer lower the moment
     error = (1 / 40) ** 2 / 3 + 1.5 / 160
     assert result.moment[-1] / M_PLASTIC == pytest.approx(1 - N**2, abs=error / 4)
@@ -83,7 +84,7 @@ def test_cyclic_loops_dissipate_their_area():
     errors = []
     for steps in (40, 160):
         κ = 6 * K_YIELD * np.sin(2 * np.pi * np.arange(3 * steps + 1) / steps)
-        result = ub.moment_curvature(section, κ)
+        result = st.moment_curvature(section, κ)
         last = slice(2 * steps, None)
         area = np.trapezoid(result.moment[last], κ[last])
         errors.append(abs(1 - np.ptp(result.dissipated[[2 * steps, -1]]) / area))
@@ -100,7 +101,7 @@ def test_cracked_concrete():
     for number in (50, 200):
         # Concrete in tension, which the bar displaces, bears nothing
         section = concrete(number, (-0.2, As))
-        result = ub.moment_curvature(section, κ)
+        result = st.moment_curvature(section, κ)
         # One layer contains the neutral axis
         assert result.moment == pytest.approx(EI * κ, rel=1 / number**2 / (x / 0.5) ** 2)
         neutral = (section.fibres.axis + result.strain / np.maximum(κ, 1e-9))[1:]
@@ -110,7 +111,7 @@ def test_cracked_concrete():
 
 def test_a_beam_in_pure_bending():
     """A cell of a run, given its curvatures, has the same M, axial strain and losses."""
-    steel = ub.ArmstrongFrederick(400e6, 20e9, 100.0)
+    steel = st.ArmstrongFrederick(400e6, 20e9, 100.0)
     section = concrete(20, (-0.2, 1.5e-3), (0.2, 1.5e-3), steel=steel)
     member = ub.Beam((0, 0), (1, 0), section, cells=1)
     turns = 0.02 * np.sin(np.linspace(0, 2 * np.pi, 41))
@@ -119,7 +120,7 @@ def test_a_beam_in_pure_bending():
     assert "in 40 steps" in repr(solution)  # none is divided
     ε, κ = solution.strains_at(member.at(0.5))[:, [0, 2]].T
     cell = solution.material_at(member.at(0.5))
-    result = ub.moment_curvature(section, κ, N=cell.forces[:, 0])
+    result = st.moment_curvature(section, κ, N=cell.forces[:, 0])
     M = cell.forces[:, 2]
     assert np.abs(M).max() > 1e5
     assert np.abs(result.moment - M).max() < 1e-10 * np.abs(M).max()
@@ -131,35 +132,35 @@ def test_other_sections():
     """[closed] Elastic: M = EI κ.  A hinge takes the curvature of its cell; Maxwell creeps."""
     plain = {"EA": 4e9, "GA": 1e9, "EI": 1.4e7}
     κ = np.array([0.0, 1e-3, 2e-3])
-    result = ub.moment_curvature(ub.Section(**plain), κ, N=[0.0, 1e6, -1e6])
+    result = st.moment_curvature(ub.Section(**plain), κ, N=[0.0, 1e6, -1e6])
     assert result.moment.tolist() == (1.4e7 * κ).tolist()
     assert result.strain == pytest.approx([0.0, 2.5e-4, -2.5e-4])
     hinge = ub.Section(**plain, hinge=ub.LinearSoftening(2e4, 400.0))
-    opened = ub.moment_curvature(hinge, [0.0, 1.0], length=0.1)
+    opened = st.moment_curvature(hinge, [0.0, 1.0], length=0.1)
     # All of the fracture energy; in a cell of 0.1 m
     assert (opened.moment[-1], opened.dissipated[-1]) == pytest.approx((0.0, 400.0 / 0.1))
     creeps = ub.Section(**plain, bending=Dashpot(1.4e9))
-    slow = ub.moment_curvature(creeps, [1e-3, 1e-3], dt=10.0)
+    slow = st.moment_curvature(creeps, [1e-3, 1e-3], dt=10.0)
     # Backward Euler: M1 = EI κ / (1 + dt EI/η), M2 = M1 / (1 + dt EI/η)
     assert slow.moment == pytest.approx([1.4e4 / 1.1, 1.4e4 / 1.1**2])
 
 
 def test_sections_that_cannot_bear_n():
     with raises("cannot bear N = 5e+06 N at the curvature 0 1/m"):
-        ub.moment_curvature(rectangle(), [0.0, 1e-3], N=1.001 * N_PLASTIC)
+        st.moment_curvature(rectangle(), [0.0, 1e-3], N=1.001 * N_PLASTIC)
     with raises("the section has cracks or a hinge", "length= (m)"):
-        ub.moment_curvature(rectangle(softening=ub.Softening(1e8, 1e3)), [0.0, 1e-3])
+        st.moment_curvature(rectangle(softening=ub.Softening(1e8, 1e3)), [0.0, 1e-3])
     # Layers crack one after the other, until too few are left for the tension
     cracks = rectangle(10, ub.ElastoPlastic(math.inf), softening=ub.Softening(1e8, 1e3))
     with pytest.warns(ub.ModelWarning, match="cannot bear N = 1e.06 N at the curvature"):
-        result = ub.moment_curvature(cracks, np.linspace(0, 0.05, 51), N=1e6, length=0.01)
+        result = st.moment_curvature(cracks, np.linspace(0, 0.05, 51), N=1e6, length=0.01)
     assert 0 < len(result.moment) < 51
     assert np.isfinite(result.moment).all()
 
 
 def test_pictures_show_the_results():
-    result = ub.moment_curvature(rectangle(10), K_YIELD * np.linspace(0, 3, 7), N=-1e6)
-    diagram = ub.interaction_diagram(rectangle(10), (0.01, 0.01), points=16)
+    result = st.moment_curvature(rectangle(10), K_YIELD * np.linspace(0, 3, 7), N=-1e6)
+    diagram = st.interaction_diagram(rectangle(10), (0.01, 0.01), points=16)
     for shown, x, y in ((result, "curvature", "moment"), (diagram, "M", "N")):
         (axes,) = ub.plot(shown).axes
         lines = [line.get_xydata() for line in axes.lines if len(line.get_xydata()) > 2]
@@ -174,7 +175,7 @@ def test_pictures_show_the_results():
 def test_interaction_of_a_rectangle():
     """[closed] |M|/Mp = 1 - (N/Np)², as limit strains grow; layers err by 1/n²."""
     for n in (10, 40):
-        diagram = ub.interaction_diagram(rectangle(n), (1.0, 1.0))
+        diagram = st.interaction_diagram(rectangle(n), (1.0, 1.0))
         exact = 1 - (diagram.N / N_PLASTIC) ** 2
         assert np.abs(np.abs(diagram.M) / M_PLASTIC - exact).max() < 1.5 / n**2
         assert (diagram.M[0], diagram.N[0]) == pytest.approx((0.0, N_PLASTIC), abs=1e-9 * N_PLASTIC)
@@ -193,7 +194,7 @@ def test_interaction_of_reinforced_concrete():
     section = concrete(100, (-0.2, As), (0.2, As))
     steel, plain = section.fibres.fibres
     limits = {plain: (0.001, math.inf), steel: (0.02, 0.0025)}
-    diagram = ub.interaction_diagram(section, limits)
+    diagram = st.interaction_diagram(section, limits)
     # Concrete at 0.001 has 30 MPa, steel 200 MPa; in tension steel has 500 MPa
     assert diagram.N.min() == pytest.approx(-30e6 * (0.15 - 2 * As) - 200e6 * 2 * As, rel=1e-9)
     assert diagram.N.max() == pytest.approx(500e6 * 2 * As, rel=1e-9)
@@ -210,8 +211,8 @@ def test_interaction_of_reinforced_concrete():
 
 def test_paths_of_laws_with_curved_branches():
     """Strains grow in steps: fewer of them give other stresses, by the first order of the step."""
-    section = rectangle(10, ub.ArmstrongFrederick(LIMIT, 40e9, 300.0))
-    M = [ub.interaction_diagram(section, (0.01, 0.01), steps=n).M.max() for n in (20, 40, 80)]
+    section = rectangle(10, st.ArmstrongFrederick(LIMIT, 40e9, 300.0))
+    M = [st.interaction_diagram(section, (0.01, 0.01), steps=n).M.max() for n in (20, 40, 80)]
     assert (M[1] - M[0]) / (M[2] - M[1]) == pytest.approx(2.0, rel=0.15)
 
 
@@ -223,10 +224,10 @@ def test_interaction_of_concrete_that_softens(limit):
     Peaks of the moment are between steps: their error, in the second order, is less than 1 %.
     """
     steel = ub.Fibres(ub.ElastoPlastic(500e6))
-    law = ub.KentPark(30e6, residual=6e6, ultimate=0.006)
+    law = st.KentPark(30e6, residual=6e6, ultimate=0.006)
     plain = ub.Section.rectangle(0.4, 0.5, E=30e9, nu=0.2, fibres=ub.Fibres(law, number=40))
     section = plain.reinforced([-0.2, 0.2], [1.5e-3] * 2, E=200e9, fibres=steel)
-    diagram = ub.interaction_diagram(section, (limit, 0.05))
+    diagram = st.interaction_diagram(section, (limit, 0.05))
     # [closed] All concrete is at its strength, and steel at 400 MPa
     assert diagram.N.min() == pytest.approx(-30e6 * (0.2 - 3e-3) - 400e6 * 3e-3, rel=1e-9)
     y = np.append((np.arange(40) - 19.5) / 80, [-0.2, 0.2])  # layers and bars
@@ -253,19 +254,19 @@ def test_limits_that_are_missing():
     section = concrete(10, (0.2, 1e-3))
     steel, plain = section.fibres.fibres
     with raises("no fibre limits the strain in tension"):
-        ub.interaction_diagram(section, {plain: (0.0035, math.inf)})
+        st.interaction_diagram(section, {plain: (0.0035, math.inf)})
     with raises("no fibre limits the strain in compression"):
-        ub.interaction_diagram(section, (math.inf, 0.01))
+        st.interaction_diagram(section, (math.inf, 0.01))
     with raises("limits of Fibres(", "which is not in the section"):
-        ub.interaction_diagram(rectangle(), {steel: (0.01, 0.01)})
+        st.interaction_diagram(rectangle(), {steel: (0.01, 0.01)})
     with raises("the section has no fibres"):
-        ub.interaction_diagram(ub.Section(EA=1.0, GA=1.0, EI=1.0), (0.01, 0.01))
+        st.interaction_diagram(ub.Section(EA=1.0, GA=1.0, EI=1.0), (0.01, 0.01))
 
 
 def test_moments_at_both_ends_of_an_interaction_diagram():
     section = ub.Section.rectangle(
         b=0.1, h=0.2, E=210e9, nu=0.3, fibres=ub.Fibres(ub.ElastoPlastic(250e6), number=8)
     )
-    diagram = ub.interaction_diagram(section, (0.01, 0.01))
+    diagram = st.interaction_diagram(section, (0.01, 0.01))
     for N in (diagram.N.min(), diagram.N.max()):
         assert np.allclose(diagram.moments(N), 0.0, atol=1e-6 * diagram.M.max())

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 STEEL = {"E": 210e9, "nu": 0.25, "rho": 7850.0}
 G = 84e9  # E / 2.5
@@ -62,7 +63,7 @@ def test_an_i_shape_has_its_stiffnesses():
     # By flanges and web: 2 (b tf^3 / 12 + b tf d^2) + tw hw^3 / 12, d = (h - tf) / 2
     h, b, tw, tf = 0.3, 0.15, 0.01, 0.02
     web, d = 0.26, 0.14
-    section = ub.Section.i_shape(h, b, tw, tf, **STEEL)
+    section = st.i_shape(h, b, tw, tf, **STEEL)
     A = 2 * 0.15 * 0.02 + 0.01 * 0.26
     I = 2 * (b * tf**3 / 12 + b * tf * d**2) + tw * web**3 / 12
     assert pytest.approx(210e9 * A, rel=1e-13) == section.EA
@@ -72,7 +73,7 @@ def test_an_i_shape_has_its_stiffnesses():
 
 def test_i_shape_without_web_opening_is_a_rectangle():
     # A web as wide as the flanges fills the rectangle; only the shear area is another.
-    i_shape = ub.Section.i_shape(0.3, 0.1, 0.1, 0.05, **STEEL)
+    i_shape = st.i_shape(0.3, 0.1, 0.1, 0.05, **STEEL)
     rectangle = ub.Section.rectangle(0.1, 0.3, **STEEL)
     assert pytest.approx(rectangle.EA, rel=CLOSE) == i_shape.EA
     assert pytest.approx(rectangle.EI, rel=CLOSE) == i_shape.EI

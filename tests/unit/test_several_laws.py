@@ -11,6 +11,7 @@ from scenes import clamped
 from user_laws import SameHardening
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 YIELD, H, B, CRACK = 6e4, 2e6, 1e6, ub.Softening(9e4, 300.0)
 
@@ -146,7 +147,7 @@ def test_cells_that_give_way_are_named():
 
 def test_resultants_of_two_classes():
     """N of a bar under tension and M of a beam in bending, from one section with both laws."""
-    axial, bending = ub.ElastoPlastic(20.0, isotropic=500.0), ub.RambergOsgood(5.0, 0.05, 4.0)
+    axial, bending = ub.ElastoPlastic(20.0, isotropic=500.0), st.RambergOsgood(5.0, 0.05, 4.0)
     plain = {"EA": 1e4, "GA": 4e3, "EI": 100.0}
     both = ub.Section(**plain, axial=axial, bending=bending, hinge=ub.Softening(7.0, 2.0))
     stretch, turns = np.linspace(0, 0.01, 11), np.linspace(0, 0.5, 11)
@@ -222,7 +223,7 @@ def test_large_bars_displace_several_layers():
 def test_bars_are_added_again():
     """Bars of a second law displace concrete, never the first bars; y is measured as before."""
     once = rectangle().reinforced([-0.15], [2e-3], E=200e9, fibres=STEEL)
-    strand = ub.Fibres(ub.RambergOsgood(1.5e9, 0.002, 5.0))
+    strand = ub.Fibres(st.RambergOsgood(1.5e9, 0.002, 5.0))
     twice = once.reinforced([-0.15], [1e-3], E=195e9, fibres=strand)
     placed = twice.fibres
     assert placed.fibres == (strand, STEEL, COVER)
@@ -273,7 +274,7 @@ def test_points_of_one_class_stay_together():
     cracked, also = (
         ub.Fibres(ub.ElastoPlastic(3e7), softening=ub.Softening(limit, 1e2)) for limit in (1e6, 2e6)
     )
-    curved = ub.Fibres(ub.RambergOsgood(4e8, 0.002, 5.0))
+    curved = ub.Fibres(st.RambergOsgood(4e8, 0.002, 5.0))
     section = rectangle(core=cracked, cover=0.03)
     assert len(section.section_points(None)) == 1
     number = [len(section.fibres.y)]

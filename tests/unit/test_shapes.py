@@ -8,6 +8,7 @@ import pytest
 from helpers import raises
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 STEEL = {"E": 210e9, "nu": 0.25, "rho": 7850.0}
 PLASTIC = ub.Fibres(ub.ElastoPlastic(235e6), number=40)
@@ -31,7 +32,7 @@ def moments(shape):
 def test_triangle():
     """[closed] b h/2, h/3, b h³/36; the parallel at half of the area halves it at h (1 - 1/√2)."""
     b, h = 0.3, 0.2
-    shape = ub.Shape([(0, 1.0), (b, 1.0), (0.1, 1.0 + h)])
+    shape = st.Shape([(0, 1.0), (b, 1.0), (0.1, 1.0 + h)])
     Wpl = b * h**2 * (2 - math.sqrt(2)) / 6  # a triangle above the parallel, a trapezoid below
     expected = b * h / 2, 1.0 + h / 3, b * h**3 / 36, Wpl
     assert moments(shape) == pytest.approx(expected, rel=CLOSE)
@@ -41,7 +42,7 @@ def test_triangle():
 def test_half_a_circle():
     """[closed] π r²/2, 4 r/(3 π), (π/8 - 8/(9 π)) r⁴."""
     r = 0.25
-    shape = ub.Shape([(-r, 0), (r, 0), (r, r, r), (-r, r, r)])
+    shape = st.Shape([(-r, 0), (r, 0), (r, r, r), (-r, r, r)])
     assert pytest.approx(math.pi * r**2 / 2, rel=CLOSE) == shape.A
     assert shape.y == pytest.approx(4 * r / (3 * math.pi), rel=CLOSE)
     assert pytest.approx((math.pi / 8 - 8 / (9 * math.pi)) * r**4, rel=CLOSE) == shape.I
@@ -53,12 +54,12 @@ def test_half_a_circle():
 def test_order_place_and_direction_of_corners_do_not_matter():
     corners = [(0, 0), (0.3, 0, 0.02), (0.3, 0.1), (0.1, 0.1, 0.05), (0.1, 0.4, 0.01), (0, 0.4)]
     hole = [(0.02, 0.02), (0.08, 0.02), (0.05, 0.08)]
-    A, y, I, Wpl = moments(ub.Shape(corners, [hole]))
+    A, y, I, Wpl = moments(st.Shape(corners, [hole]))
     far = [(x + 40, y - 30, *r) for x, y, *r in corners[2:] + corners[:2]]
     far_hole = [(x + 40, y - 30) for x, y in hole[::-1]]
     # Coordinates near 40 m have an error of 4e-15 m, of depths of 0.4 m
     expected = A, y - 30, I, Wpl
-    assert moments(ub.Shape(far[::-1], [far_hole])) == pytest.approx(expected, rel=1e-12)
+    assert moments(st.Shape(far[::-1], [far_hole])) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -74,16 +75,16 @@ def test_order_place_and_direction_of_corners_do_not_matter():
 )
 def test_impossible_shapes_are_refused(corners, holes, said):
     with raises(f"Shape: {said}" if said[0] in "ilt" else said):
-        ub.Shape(corners, holes)
+        st.Shape(corners, holes)
 
 
 def test_shapes_that_bend_sideways_are_refused():
-    angle = ub.Shape([(0, 0), (0.1, 0), (0.1, 0.01), (0.01, 0.01), (0.01, 0.1), (0, 0.1)])
+    angle = st.Shape([(0, 0), (0.1, 0), (0.1, 0.01), (0.01, 0.01), (0.01, 0.1), (0, 0.1)])
     with raises("bending would move the beam out of the plane"):
         ub.Section.of_shape(angle, shear_factor=0.4, **STEEL)
     # Turned by 45°, equal legs are symmetric
     turned = [((x - y) / math.sqrt(2), (x + y) / math.sqrt(2)) for x, y, _ in angle.corners]
-    section = ub.Section.of_shape(ub.Shape(turned), shear_factor=0.4, **STEEL)
+    section = ub.Section.of_shape(st.Shape(turned), shear_factor=0.4, **STEEL)
     assert pytest.approx(210e9 * 0.0019, rel=CLOSE) == section.EA
 
 
@@ -99,9 +100,9 @@ def test_box_with_rounded_corners():
         A += sign * (w * d - area)
         I += sign * (w * d**3 / 12 - area * at**2 - 4 * SPANDREL_I * radius**4)
         Wpl += sign * (w * d**2 / 4 - area * at)
-    shape = ub.Section.box(b, h, t, r, **STEEL).shape
+    shape = st.box(b, h, t, r, **STEEL).shape
     assert moments(shape) == pytest.approx((A, 0.0, I, Wpl), rel=CLOSE, abs=1e-16)
-    assert ub.Section.box(b, h, t, r, **STEEL).depth == pytest.approx(h, rel=1e-15)
+    assert st.box(b, h, t, r, **STEEL).depth == pytest.approx(h, rel=1e-15)
 
 
 def test_i_shape_with_fillets():
@@ -111,22 +112,22 @@ def test_i_shape_with_fillets():
     at, web = h / 2 - tf - SPANDREL_Y * r, h - 2 * tf
     I = (b * h**3 - (b - tw) * web**3) / 12 + 4 * r**2 * (SPANDREL_A * at**2 + SPANDREL_I * r**2)
     Wpl = (b * h**2 - (b - tw) * web**2) / 4 + 4 * SPANDREL_A * r**2 * at
-    section = ub.Section.i_shape(h, b, tw, tf, r, **STEEL)
+    section = st.i_shape(h, b, tw, tf, r, **STEEL)
     assert moments(section.shape) == pytest.approx((A, 0.0, I, Wpl), rel=CLOSE, abs=1e-16)
     assert pytest.approx(84e9 * tw * (h - tf), rel=CLOSE) == section.GA
     at = tw / 2 + SPANDREL_Y * r
     I = (2 * tf * b**3 + web * tw**3) / 12 + 4 * r**2 * (SPANDREL_A * at**2 + SPANDREL_I * r**2)
-    weak = ub.Section.i_shape(h, b, tw, tf, r, axis="weak", **STEEL)
+    weak = st.i_shape(h, b, tw, tf, r, axis="weak", **STEEL)
     assert pytest.approx(210e9 * I, rel=CLOSE) == weak.EI
     assert weak.depth == pytest.approx(b, rel=1e-15)
     assert pytest.approx(84e9 * 5 / 3 * b * tf, rel=CLOSE) == weak.GA
 
 
-@pytest.mark.parametrize("make", [ub.Section.channel, ub.Section.t_shape])
+@pytest.mark.parametrize("make", [st.channel, st.t_shape])
 def test_channel_and_t(make):
     """[closed] The T, and the channel about its weak axis: web and flanges."""
-    h, b, tw, tf = 0.2, 0.12, 0.01, 0.016 if make == ub.Section.t_shape else 0.008
-    if make == ub.Section.t_shape:
+    h, b, tw, tf = 0.2, 0.12, 0.01, 0.016 if make == st.t_shape else 0.008
+    if make == st.t_shape:
         (w1, d1, y1), (w2, d2, y2) = (tw, h - tf, -tf / 2), (b, tf, (h - tf) / 2)
         section = make(h, b, tw, tf, **STEEL)
     else:
@@ -155,21 +156,21 @@ def test_shear_areas_of_thin_walls():
     """[pub] Cowper: box, T; m is the area of flanges over that of webs, n is width over depth."""
     h, b, t = 1.0, 0.6, 1e-8  # dimensions of middle lines; walls are so thin that 1e-7 is met
     m, n = b / h, b / h
-    box = ub.Section.box(b + t, h + t, t, **STEEL)
+    box = st.box(b + t, h + t, t, **STEEL)
     assert pytest.approx(cowper(m, 30 * n**2), rel=1e-7) == box.GA / 84e9 / box.shape.A
-    tee = ub.Section.t_shape(h + t / 2, b, t, t, **STEEL)
+    tee = st.t_shape(h + t / 2, b, t, t, **STEEL)
     factor = 10 * (1 + 4 * m) ** 2
     factor /= 12 + 96 * m + 276 * m**2 + 192 * m**3 + 30 * n**2 * (m + m**2)
     assert pytest.approx(factor, rel=1e-7) == tee.GA / 84e9 / tee.shape.A
     # Flanges on one side have four times the energy of shear flow of an I, 30 n² (m + m²)
     m = 2 * m
-    channel = ub.Section.channel(h + t, b + t / 2, t, t, **STEEL)
+    channel = st.channel(h + t, b + t / 2, t, t, **STEEL)
     assert pytest.approx(cowper(m, 120 * n**2), rel=1e-7) == channel.GA / 84e9 / channel.shape.A
 
 
 def test_axes_of_a_section():
     """The weak axis of a rectangle and of a box: width and depth exchanged."""
-    for make, more in ((ub.Section.rectangle, ()), (ub.Section.box, (0.01, 0.02))):
+    for make, more in ((ub.Section.rectangle, ()), (st.box, (0.01, 0.02))):
         weak, turned = make(0.1, 0.3, *more, axis="weak", **STEEL), make(0.3, 0.1, *more, **STEEL)
         for name in ("EA", "GA", "EI", "rhoA", "rhoI", "depth"):
             assert getattr(weak, name) == pytest.approx(getattr(turned, name), rel=CLOSE)
@@ -217,7 +218,7 @@ def test_steel_tables(designation):
     The width of W sections is rounded to 0.1 in: 12.0 for 11.95 in has 1.3 % more in its cube.
     """
     unit = 0.0254 if designation.startswith(("W", "HSS")) else 0.01
-    shapes = [ub.Section.steel(designation, axis=axis).shape for axis in ("strong", "weak")]
+    shapes = [st.steel(designation, axis=axis).shape for axis in ("strong", "weak")]
     strong, weak = ((s.A / unit**2, s.I / unit**4, s.Wpl / unit**3) for s in shapes)
     digits = 0.015 if designation.startswith("W") else 0.005
     for found, published in zip((*strong, *weak[1:]), PUBLISHED[designation], strict=True):
@@ -225,13 +226,13 @@ def test_steel_tables(designation):
 
 
 def test_defaults_of_steel():
-    ipe = ub.Section.steel("IPE 300")
+    ipe = st.steel("IPE 300")
     assert ipe.rhoA == pytest.approx(42.2, rel=0.005)  # kg/m, of the table
     assert pytest.approx(210e9, rel=1e-15) == ipe.EA / ipe.shape.A
-    other = ub.Section.steel("ipe300", E=200e9, fibres=PLASTIC)
+    other = st.steel("ipe300", E=200e9, fibres=PLASTIC)
     assert pytest.approx(200e9 * ipe.shape.A, rel=CLOSE) == other.EA
     with raises("'IPE 310' is not in the table of IPE, HEA", "similar designations are IPE300"):
-        ub.Section.steel("IPE 310")
+        st.steel("IPE 310")
 
 
 # -- fibres ----------------------------------------------------------------------------------------
@@ -243,11 +244,9 @@ COVER, CORE = (ub.Fibres(ub.ElastoPlastic(limit)) for limit in (3e7, 4e7))
 def test_cores_of_all_shapes():
     """[closed] Areas at a distance c from the surface; reentrant corners become arcs."""
     c = 0.03
-    tee = ub.Section.t_shape(0.6, 1.0, 0.3, 0.15, **CONCRETE, fibres=COVER, core=CORE, cover=c)
-    box = ub.Section.box(0.6, 0.6, 0.1, **CONCRETE, fibres=COVER, core=CORE, cover=c)
-    girder = ub.Section.i_shape(
-        0.6, 0.4, 0.1, 0.1, 0.02, **CONCRETE, fibres=COVER, core=CORE, cover=c
-    )
+    tee = st.t_shape(0.6, 1.0, 0.3, 0.15, **CONCRETE, fibres=COVER, core=CORE, cover=c)
+    box = st.box(0.6, 0.6, 0.1, **CONCRETE, fibres=COVER, core=CORE, cover=c)
+    girder = st.i_shape(0.6, 0.4, 0.1, 0.1, 0.02, **CONCRETE, fibres=COVER, core=CORE, cover=c)
     inner = {
         # less a strip along the perimeter, in which corners count twice and fillets not wholly
         tee: tee.shape.A - 3.2 * c + 6 * c**2 - 2 * math.pi / 4 * c**2,
@@ -259,13 +258,13 @@ def test_cores_of_all_shapes():
         assert placed.A[placed.material == 1].sum() == pytest.approx(area, rel=CLOSE)
         assert placed.A.sum() == pytest.approx(section.shape.A, rel=CLOSE)
         assert abs(placed.A @ placed.y) < 1e-15
-    weak = ub.Section.t_shape(
+    weak = st.t_shape(
         0.6, 1.0, 0.3, 0.15, **CONCRETE, fibres=COVER, core=CORE, cover=c, axis="weak"
     )
     assert weak.fibres.A[weak.fibres.material == 1].sum() == pytest.approx(inner[tee], rel=CLOSE)
     for make, sizes in (
-        (ub.Section.box, (0.6, 0.6, 0.05)),
-        (ub.Section.t_shape, (1, 1, 0.05, 0.1)),
+        (st.box, (0.6, 0.6, 0.05)),
+        (st.t_shape, (1, 1, 0.05, 0.1)),
     ):
         with raises("cover = 0.03 m leaves no core"):
             make(*sizes, **CONCRETE, fibres=COVER, core=CORE, cover=c)
@@ -274,7 +273,7 @@ def test_cores_of_all_shapes():
 def test_bars_of_a_t():
     """[closed] Transformed section; y of bars is measured from mid-depth, not from the centroid."""
     steel = ub.Fibres(ub.ElastoPlastic(5e8))
-    plain = ub.Section.t_shape(0.6, 1.0, 0.3, 0.15, **CONCRETE, fibres=COVER)
+    plain = st.t_shape(0.6, 1.0, 0.3, 0.15, **CONCRETE, fibres=COVER)
     section = plain.reinforced([-0.25], [2e-3], E=200e9, fibres=steel)
     more, A, y = 170e9 * 2e-3, plain.shape.A, plain.shape.y
     EA = 30e9 * A + more
@@ -287,9 +286,9 @@ def test_bars_of_a_t():
 @pytest.mark.parametrize(
     "section",
     [
-        ub.Section.t_shape(0.2, 0.12, 0.01, 0.016, 0.01, **STEEL, fibres=PLASTIC),
-        ub.Section.steel("UPE 200", axis="weak", fibres=PLASTIC),
-        ub.Section.steel("HSS6.625X0.280", fibres=PLASTIC),
+        st.t_shape(0.2, 0.12, 0.01, 0.016, 0.01, **STEEL, fibres=PLASTIC),
+        st.steel("UPE 200", axis="weak", fibres=PLASTIC),
+        st.steel("HSS6.625X0.280", fibres=PLASTIC),
     ],
     ids=["T", "channel", "tube"],
 )
@@ -302,13 +301,13 @@ def test_plastic_moments(section):
     shape = section.shape
     curvature = 30 * 235e6 / 210e9 / (shape.top - shape.bottom)
     for sign in (1, -1):
-        result = ub.moment_curvature(section, sign * curvature * np.linspace(0.1, 1, 10))
+        result = st.moment_curvature(section, sign * curvature * np.linspace(0.1, 1, 10))
         assert sign * result.moment[-1] == pytest.approx(235e6 * shape.Wpl, rel=5e-3)
 
 
 def test_a_beam_of_a_t_bears_its_plastic_moment():
     """[closed] A cantilever turned at its end by an angle far beyond yield."""
-    section = ub.Section.t_shape(0.2, 0.12, 0.01, 0.016, **STEEL, fibres=PLASTIC)
+    section = st.t_shape(0.2, 0.12, 0.01, 0.016, **STEEL, fibres=PLASTIC)
     beam = ub.Beam((0, 0), (0.5, 0), section, cells=1)
     turn = ub.PrescribedDisplacement(beam.end, psi=ub.Table([0, 1], [0, 0.1]))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
@@ -350,13 +349,13 @@ class Analysed:
 
 def test_sections_of_sectionproperties():
     analysed = Analysed()
-    x, y = (ub.Section.of_sectionproperties(analysed, axis=axis) for axis in "xy")
+    x, y = (st.of_sectionproperties(analysed, axis=axis) for axis in "xy")
     assert (x.EA, x.EI, x.GA, x.depth) == pytest.approx((4e9, 3e8, 1e9 / 2.5, 0.6))
     assert (y.EA, y.EI, y.GA, y.depth) == pytest.approx((4e9, 1e8, 2e9 / 2.5, 0.4))
     assert (x.rhoA, x.rhoI) == pytest.approx((400.0, 400.0 * 3e8 / 4e9))
     analysed.product = 1e6
     with raises("x and y are not principal axes"):
-        ub.Section.of_sectionproperties(analysed)
+        st.of_sectionproperties(analysed)
 
 
 def test_the_package_sectionproperties():
@@ -365,16 +364,16 @@ def test_the_package_sectionproperties():
     from sectionproperties.analysis import Section
     from shapely import Polygon
 
-    ipe = ub.Section.steel("IPE 300")
+    ipe = st.steel("IPE 300")
     steel = pre.Material("S235", 210e9, 0.3, 235e6, 7850.0, "grey")
     outline = ipe.shape.outlines()[0]
     geometry = pre.Geometry(Polygon(np.column_stack([outline.real, outline.imag])), steel)
     with raises("calculate geometric and warping properties"):
-        ub.Section.of_sectionproperties(Section(geometry.create_mesh([1e-4])))
+        st.of_sectionproperties(Section(geometry.create_mesh([1e-4])))
     analysed = Section(geometry)
     analysed.calculate_geometric_properties()
     analysed.calculate_warping_properties()
-    section = ub.Section.of_sectionproperties(analysed)
+    section = st.of_sectionproperties(analysed)
     for name in ("EA", "EI", "rhoA", "rhoI"):  # arcs are 24 chords
         assert getattr(section, name) == pytest.approx(getattr(ipe, name), rel=1e-3)
     assert pytest.approx(ipe.GA, rel=0.05) == section.GA

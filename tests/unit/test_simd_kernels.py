@@ -10,6 +10,7 @@ from compiled_law import ask
 from scenes import SECTION, clamped
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.blocks.beams import BeamCells
 from ufl_beam.compiled import code_cache, jit, simd_kernels
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
@@ -397,9 +398,9 @@ def test_kernels_of_the_hot_loop(run):
 
 CRACKING = ub.Softening(2.5e6, 200.0)
 LAWS = {
-    "MenegottoPinto": (200e9, ub.MenegottoPinto(400e6, 0.01, a1=0.05, a3=0.05)),
-    "KentPark": (30e9, ub.KentPark(30e6, residual=6e6, ultimate=0.006, tension=CRACKING)),
-    "Mander": (30e9, ub.Mander(30e6, strain=0.0021, tension=CRACKING)),
+    "MenegottoPinto": (200e9, st.MenegottoPinto(400e6, 0.01, a1=0.05, a3=0.05)),
+    "KentPark": (30e9, st.KentPark(30e6, residual=6e6, ultimate=0.006, tension=CRACKING)),
+    "Mander": (30e9, st.Mander(30e6, strain=0.0021, tension=CRACKING)),
 }
 
 

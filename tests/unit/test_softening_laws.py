@@ -16,7 +16,7 @@ from user_laws import Exponential, Fading, Kinked, Petersson, Rising
 import ufl_beam as ub
 from ufl_beam.model.softening_laws import SMALL_GROWTH
 
-f = ub.law_functions
+f = ub.extend.law_functions
 
 T, G, EI = 100.0, 30.0, 1e3
 """Limit, energy and bending stiffness of hinges; no law of LAWS snaps back in a metre of it."""
@@ -353,7 +353,7 @@ def test_jumps_where_the_traction_falls_most():
 
 
 @dataclass(frozen=True)
-class Mine(ub.SofteningLaw):
+class Mine(ub.extend.SofteningLaw):
     t: float = 1.0
 
     def traction(self, opening):
@@ -436,7 +436,7 @@ class Taken(Mine):
 
 
 @dataclass
-class Thawed(ub.SofteningLaw):
+class Thawed(ub.extend.SofteningLaw):
     t: float = 1.0
 
     def traction(self, opening):
@@ -463,7 +463,7 @@ REFUSED = [
     (WrongTotal(), "fracture_energy = 2, but the integral of the traction is 1"),
     (Taken(), "field cannot have the name bounded"),
     (Thawed(), "must be a dataclass: @dataclass"),
-    (Mine(ub.Normal(1.0, 0.1, seed=1)), r"t = Normal\(.*\) is a distribution"),
+    (Mine(ub.distributions.Normal(1.0, 0.1, seed=1)), r"t = Normal\(.*\) is a distribution"),
     (Mine("1"), "t = '1' is no number"),
     (5.0, "= 5.0 is not a Softening or .*LinearSoftening or SofteningLaw"),
 ]

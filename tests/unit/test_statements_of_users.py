@@ -16,6 +16,7 @@ from scenes import clamped
 from user_laws import AirDrag, HardeningSpring, MaxwellElement
 
 import ufl_beam as ub
+from ufl_beam import extend
 from ufl_beam.blocks.beams import BeamCell
 from ufl_beam.blocks.statement import Kernels
 from ufl_beam.plotting.model import model_notes
@@ -29,7 +30,7 @@ run = partial(run, t=(0, 0.5), dt=0.025, newton=ub.Newton(rtol=1e-12))
 
 
 @dataclass(frozen=True)
-class Quartic(ub.ConnectorLaw):
+class Quartic(extend.ConnectorLaw):
     """The same energy as a law of a connector."""
 
     k: float
@@ -274,7 +275,7 @@ def test_frequency_of_a_mass_on_a_spring():
 
 
 @dataclass(frozen=True)
-class Power(ub.Statement):
+class Power(extend.Statement):
     """Force by a power of the motion, which is a number in the compiled function."""
 
     power: float
@@ -366,7 +367,9 @@ def test_a_saved_solution_has_its_effects(tmp_path):
 
 def statement(equations, **members):
     """A statement of a user with a function of ``at`` as equations."""
-    kind = type("Mine", (ub.Statement,), {"equations": lambda self, at: equations(at), **members})
+    kind = type(
+        "Mine", (extend.Statement,), {"equations": lambda self, at: equations(at), **members}
+    )
     return dataclass(frozen=True)(kind)()
 
 
@@ -378,45 +381,45 @@ def force(x=0.0, y=0.0, m=0.0):
     ("equations", "members", "says"),
     [
         (
-            lambda at: ub.Equations(force(at["stiff"])), {},
+            lambda at: extend.Equations(force(at["stiff"])), {},
             ("Mine.equations fails", "'stiff' is no input; the inputs are dt"),
         ),
-        (lambda at: ub.Equations([[0.0, 0.0]]), {}, ("Mine: forces = ", "for each of 1 places")),
-        (lambda at: ub.Equations(force() * 2), {}, ("Mine: forces = ", "for each of 1 places")),
-        (lambda at: 3.0, {}, ("Mine: equations returned 3.0; it must return ub.Equations",)),
+        (lambda at: extend.Equations([[0.0, 0.0]]), {}, ("Mine: forces = ", "each of 1 places")),
+        (lambda at: extend.Equations(force() * 2), {}, ("Mine: forces = ", "each of 1 places")),
+        (lambda at: 3.0, {}, ("Mine: equations returned 3.0; it must return ub.extend.Equations",)),
         (lambda at: math.sin(at.q1[0][1]), {}, ("Mine.equations fails",)),
         (
-            lambda at: ub.Equations(force()), {"state": ("a", "b")},
+            lambda at: extend.Equations(force()), {"state": ("a", "b")},
             ("Mine: equations returned the state nothing, and must return each of a, b once",),
         ),
         (
-            lambda at: ub.Equations(force(), {"c": at["a"]}), {"state": ("a",)},
+            lambda at: extend.Equations(force(), {"c": at["a"]}), {"state": ("a",)},
             ("Mine: equations returned the state c, and must return each of a",),
         ),
         (
-            lambda at: ub.Equations(force(), stored={"own": at.q1[0]}), {},
+            lambda at: extend.Equations(force(), stored={"own": at.q1[0]}), {},
             ("Mine: the energy 'own' in stored is", "must be a scalar"),
         ),
         (
-            lambda at: ub.Equations(force(), lost={"kinetic": at.q1[0][0]}), {},
+            lambda at: extend.Equations(force(), lost={"kinetic": at.q1[0][0]}), {},
             ("Mine: 'kinetic' in lost is an entry of the package",),
         ),
         (
-            lambda at: ub.Equations(force(at.v[0][0])), {},
+            lambda at: extend.Equations(force(at.v[0][0])), {},
             ("Mine: the forces do work that is neither stored, lost nor supplied", " J of "),
         ),
         (
-            lambda at: ub.Equations(
+            lambda at: extend.Equations(
                 force(3 * at.q1[0][0]), stored={"own": 3 * at.q1[0][0] ** 2 / 2}
             ),
             {}, ("Mine: the forces do work that is neither stored, lost nor supplied",),
         ),
         (
-            lambda at: ub.Equations(force(ufl.sqrt(-1.0 - at.q1[0][0] ** 2))), {},
+            lambda at: extend.Equations(force(ufl.sqrt(-1.0 - at.q1[0][0] ** 2))), {},
             ("Mine: the forces are [nan",),
         ),
         (
-            lambda at: ub.Equations(force(1.0), {"z": 2 * at["z"]}, {"own": at["z"]}),
+            lambda at: extend.Equations(force(1.0), {"z": 2 * at["z"]}, {"own": at["z"]}),
             {"state": {"z": 1.0}}, ("Mine: a step without motion changes the stored energy",),
         ),
         (
@@ -424,11 +427,12 @@ def force(x=0.0, y=0.0, m=0.0):
             ("Mine.equations fails", "must depend on the configuration"),
         ),
         (
-            lambda at: ub.Equations(force(1), lost={"a": at.work(force(1)) + at.work(force())}), {},
+            lambda at: extend.Equations(force(1), lost={"a": at.work(force(1)) + at.work(force())}),
+            {},
             ("Mine.equations fails", "call work() once"),
         ),
         (
-            lambda at: ub.Equations(force(), lost={"own": at.work([])}), {},
+            lambda at: extend.Equations(force(), lost={"own": at.work([])}), {},
             ("Mine.equations fails", "a force for each of 1 places"),
         ),
         (lambda at: None, {"modes": ("slip",)}, ("Effect Mine: modes is for statements of the",)),
@@ -444,7 +448,7 @@ def test_wrong_statements_are_refused_before_the_run(equations, members, says):
 
 def test_the_largest_unexplained_work_is_found_in_all_schemes():
     """Also where the ledger has the trapezoidal rule, whose error is of second order."""
-    scene = clamped(BEAM, works=[ub.Effect(statement(lambda at: ub.Equations(
+    scene = clamped(BEAM, works=[ub.Effect(statement(lambda at: extend.Equations(
         force(3 * at.q[0][0]), stored={"own": at.q1[0][0] ** 2}
     )), places=[BEAM.end])])  # fmt: skip
     for scheme in (*SCHEMES, *STATIC):
@@ -455,11 +459,11 @@ def test_the_largest_unexplained_work_is_found_in_all_schemes():
 BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
 
 
-class Loose(ub.Statement):
+class Loose(extend.Statement):
     """A class that is no dataclass."""
 
     def equations(self, at):
-        return ub.Equations(force())
+        return extend.Equations(force())
 
 
 @pytest.mark.parametrize(
@@ -520,7 +524,7 @@ def test_combinations_that_are_refused():
 
 
 @dataclass(frozen=True)
-class Brake(ub.Statement):
+class Brake(extend.Statement):
     """Forces by motions, rates, a state and numbers, in operations that Python and UFL share."""
 
     nodes = 2
@@ -532,7 +536,7 @@ class Brake(ub.Statement):
         force = at["k"] * (1 + apart**2 + at["way"] ** 2) * (at.v[1][1] - at.v[0][1])
         forces = [[0.0, -force, at["c"] * at.v[0][2]], [0.0, force, 0.0]]
         way = at["way"] + (at.q1[1][1] - at.q0[1][1])
-        return ub.Equations(forces, {"way": way}, lost={"brake": at.work(forces)})
+        return extend.Equations(forces, {"way": way}, lost={"brake": at.work(forces)})
 
 
 @dataclass(frozen=True)
@@ -541,14 +545,14 @@ class BrakeInPython(Brake):
 
 
 @dataclass(frozen=True)
-class Net(ub.Statement):
+class Net(extend.Statement):
     """Drag along beams."""
 
     numbers = ("c",)
 
     def equations(self, at):
         force = [[at["c"] * at.v[0][0], at["c"] * at.v[0][1] * (1 + at.q[0][1] ** 2), 0.0]]
-        return ub.Equations(force, lost={"net": at.work(force)})
+        return extend.Equations(force, lost={"net": at.work(force)})
 
 
 @dataclass(frozen=True)
@@ -585,7 +589,7 @@ def test_equations_in_python_continue(scheme, tmp_path):
 
 
 @dataclass(frozen=True)
-class Table(ub.Statement):
+class Table(extend.Statement):
     """Force by a table, as an energy that is stored."""
 
     in_python = True
@@ -595,7 +599,9 @@ class Table(ub.Statement):
         x = at.q1[0][1]
         grid = np.r_[at_points[(at_points > 0) & (at_points < x)], x]
         energy = np.trapezoid(np.r_[0.0, np.interp(grid, at_points, forces)], np.r_[0.0, grid])
-        return ub.Equations([[0.0, np.interp(x, at_points, forces), 0.0]], stored={"own": energy})
+        return extend.Equations(
+            [[0.0, np.interp(x, at_points, forces), 0.0]], stored={"own": energy}
+        )
 
 
 def test_a_force_by_a_table_bears_a_load_in_statics():
@@ -614,11 +620,14 @@ def test_a_force_by_a_table_bears_a_load_in_statics():
 @pytest.mark.parametrize(
     ("equations", "says"),
     [
-        (lambda at: ub.Equations([[0.0, 1.0]]), ("must be a vector (x, y, moment)",)),
+        (lambda at: extend.Equations([[0.0, 1.0]]), ("must be a vector (x, y, moment)",)),
         (lambda at: None, ("equations returned None",)),
-        (lambda at: ub.Equations([[math.nan, 0.0, 0.0]]), ("numbers that are not finite",)),
-        (lambda at: ub.Equations([[1 / 0.0, 0.0, 0.0]]), ("Mine.equations fails", "division")),
-        (lambda at: ub.Equations([[at.v[0][0], 0.0, 0.0]]), ("neither stored, lost nor",)),
+        (lambda at: extend.Equations([[math.nan, 0.0, 0.0]]), ("numbers that are not finite",)),
+        (
+            lambda at: extend.Equations([[1 / 0.0, 0.0, 0.0]]),
+            ("Mine.equations fails", "division"),
+        ),
+        (lambda at: extend.Equations([[at.v[0][0], 0.0, 0.0]]), ("neither stored, lost nor",)),
         (lambda at: at.potential("own", None), ("Mine.equations fails", "potential")),
     ],
 )
@@ -646,7 +655,7 @@ def test_work_is_asked_once_with_all_forces(in_python):
     for work, says in works:
 
         def equations(at, work=work):
-            return ub.Equations(force(1), lost={"a": work(at)})
+            return extend.Equations(force(1), lost={"a": work(at)})
 
         own = statement(equations, in_python=in_python)
         with raises("Mine.equations fails", says, kind=ub.ModelError):

@@ -7,6 +7,7 @@ from helpers import raises, stop_after
 from scenes import clamped
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 SLENDER = ub.Section(EA=1e5, GA=1e5, EI=3.0, rhoA=0.1, rhoI=1e-5)
 BEAM = ub.Beam((0, 0), (2, 0), SLENDER, cells=4, name="arm")
@@ -84,14 +85,14 @@ YIELDS = ub.Section(EA=1e5, GA=1e5, EI=3.0, rhoA=1.0, bending=ub.ElastoPlastic(1
         (YIELDS, None, "arm"),
         (SLENDER, ub.Spring(1e3, law=ub.ElastoPlastic(1.0)), "Turn(ground"),
         (SLENDER, ub.Coulomb(1.0), "Turn(ground"),
-        (SLENDER, ub.AxialBendingHinge(1e9, 1.0, 1e5, 1e5, 1e3), "Bushing(ground"),
+        (SLENDER, st.AxialBendingHinge(1e9, 1.0, 1e5, 1e5, 1e3), "Bushing(ground"),
         (SLENDER, ub.ForceLaw(lambda e, de, state: (e, [e]), state=[0.0]), "Turn(ground"),
     ],
 )
 def test_states_without_their_internal_variables_are_refused(section, law, named):
     """The last state is known, any other one is not."""
     beam = ub.Beam((0, 0), (2, 0), section, cells=2, name="arm")
-    kind = ub.Bushing if isinstance(law, ub.ConnectorLaw) else ub.Turn
+    kind = ub.Bushing if isinstance(law, ub.extend.ConnectorLaw) else ub.Turn
     more = [] if law is None else [kind(ub.ground(2, 0), beam.end, law)]
     scene = clamped(beam, connectors=more)
     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=0.1)

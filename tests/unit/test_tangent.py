@@ -94,7 +94,7 @@ class Probe:
         simulation.controllers.evaluate(simulation)
         for term in simulation.terms:
             term.start(simulation.q)
-        simulation.equation.begin(ub.Step.create(scheme, 0.0, 0.3, 0.3, simulation.q))
+        simulation.equation.begin(ub.extend.Step.create(scheme, 0.0, 0.3, 0.3, simulation.q))
         self.x = simulation.supports.in_axes(simulation.q + random.uniform(-turn, turn, size))
         self.free = np.setdiff1d(np.arange(size), simulation.supports.dofs)
 

@@ -12,6 +12,7 @@ import scenes
 from helpers import raises
 
 import ufl_beam as ub
+from ufl_beam import errors
 from ufl_beam.analysis import tradeoff
 
 COMM = MPI.COMM_WORLD
@@ -309,21 +310,23 @@ def test_dials_that_a_scene_cannot_have_leave_the_others(law):
 @pytest.mark.parametrize("goal", [{"tolerance": 1e-3}, {"budget": 2.0}])
 def test_chaos_is_refused(law, goal):
     law(lambda h, dt, scheme, newton: math.sin(1e4 / dt + 1e4 / h))
-    with raises("self-convergence is not seen", "steps: changes by", kind=ub.TradeoffError) as info:
+    with raises(
+        "self-convergence is not seen", "steps: changes by", kind=errors.TradeoffError
+    ) as info:
         ask(**goal)
     assert len(info.value.runs) > 6
 
 
 def test_divergence_is_refused(law):
     law(lambda h, dt, scheme, newton: 1e-3 / dt)
-    with raises("self-convergence is not seen", "order -1.00", kind=ub.TradeoffError):
+    with raises("self-convergence is not seen", "order -1.00", kind=errors.TradeoffError):
         ask(tolerance=1e-3)
 
 
 def test_what_would_take_too_long_is_refused(law):
     law(smooth)
     with raises(
-        "runs would take about", "more than max_seconds = 5 s", kind=ub.TradeoffError
+        "runs would take about", "more than max_seconds = 5 s", kind=errors.TradeoffError
     ) as info:
         ask(tolerance=1e-8, max_seconds=5.0)
     assert info.value.runs
@@ -341,7 +344,7 @@ def test_what_there_is_no_time_for_is_left_out(law):
 
 def test_a_budget_below_the_coarsest_run_is_refused(law):
     law(smooth)
-    with raises("no setting serves", "the nearest takes", kind=ub.TradeoffError):
+    with raises("no setting serves", "the nearest takes", kind=errors.TradeoffError):
         ask(budget=0.05)
 
 

@@ -13,7 +13,7 @@ from user_laws import Dashpot, PowerLaw, SameHardening, Stiffening
 import ufl_beam as ub
 from ufl_beam.model.fibres import Fibres
 
-f = ub.law_functions
+f = ub.extend.law_functions
 
 LAW = PowerLaw(M0=100.0, k0=0.05, n=5.0)
 
@@ -171,7 +171,7 @@ def test_modes_are_those_of_elastic_unloading():
 
 
 @dataclass(frozen=True)
-class Half(ub.MaterialLaw):
+class Half(ub.extend.MaterialLaw):
     """Neither increments nor residuals."""
 
     k: float = 1.0
@@ -279,7 +279,7 @@ def test_missing_methods_are_named():
     """By Python, as a class without them is abstract."""
 
     @dataclass(frozen=True)
-    class Empty(ub.MaterialLaw):
+    class Empty(ub.extend.MaterialLaw):
         k: float
 
     with pytest.raises(TypeError, match=r"elastic_energy.*stress"):
@@ -288,7 +288,7 @@ def test_missing_methods_are_named():
 
 def test_what_ufl_cannot_trace_is_refused():
     scene = bent(OfNumPy())
-    with pytest.raises(ub.ArgumentError, match=r"OfNumPy: .* symbols of UFL.*ub\.law_functions"):
+    with pytest.raises(ub.ArgumentError, match=r"OfNumPy: .* symbols of UFL.*\.law_functions"):
         ub.Simulation(scene, ub.Static())
 
 
@@ -302,7 +302,7 @@ def test_hinges_of_zero_length_have_no_elastic_stiffness():
 
 
 @dataclass(frozen=True)
-class Quarter(ub.MaterialLaw):
+class Quarter(ub.extend.MaterialLaw):
     """A quarter of the stiffness, half in tension, by whole numbers or by others."""
 
     whole: ClassVar[type] = int

@@ -13,6 +13,7 @@ from scenes import clamped
 from user_laws import Dashpot, PowerLaw
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.model.material_law import dissipation_must_grow, has_quadratic_energies
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC
 from ufl_beam.simulation.solution import Solution
@@ -21,7 +22,7 @@ STEEL = {"EA": 4e8, "GA": 1e8, "EI": 1.4e6, "rhoA": 40.0}
 
 
 @dataclass(frozen=True)
-class Elastic(ub.MaterialLaw):
+class Elastic(ub.extend.MaterialLaw):
     """Elastic with a cubic term, a stress at no strain, and a sign of the energy."""
 
     cubic: float = 0.0
@@ -138,8 +139,8 @@ def test_friction_that_drives():
 
 def test_a_law_is_judged_where_its_dissipation_is_its_own():
     """Laws of the package and quadratic ones are; others have an error of the quadrature."""
-    own = ub.ElastoPlastic(1.0), ub.AxialBending(1.0, 1.0), PowerLaw(1.0, 1.0, 5.0), Dashpot(1.0)
-    curved = ub.RambergOsgood(1.0, 0.002, 8), ub.ArmstrongFrederick(1.0, 1.0, 1.0), ub.BoucWen(1.0)
+    own = ub.ElastoPlastic(1.0), st.AxialBending(1.0, 1.0), PowerLaw(1.0, 1.0, 5.0), Dashpot(1.0)
+    curved = st.RambergOsgood(1.0, 0.002, 8), st.ArmstrongFrederick(1.0, 1.0, 1.0), st.BoucWen(1.0)
     for law in (*own, *curved):
         assert dissipation_must_grow(law), law
         assert has_quadratic_energies(law), law

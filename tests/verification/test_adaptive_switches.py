@@ -16,11 +16,11 @@ from scenes import flying_beam, swing
 
 import ufl_beam as ub
 
-f = ub.law_functions
+f = ub.extend.law_functions
 
 
 @dataclass(frozen=True)
-class Breakaway(ub.ConnectorLaw):
+class Breakaway(ub.extend.ConnectorLaw):
     """More force to break loose than to slide."""
 
     rest: float

@@ -13,6 +13,7 @@ import ufl
 from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 CONTROLS = [ub.LoadControl(0.3), ub.ArcLength(0.05, factor=4), ub.ArcLength(0.2)]
 
@@ -112,7 +113,7 @@ def a_ring(section):
 def a_column_on_a_hinge(section):
     """The stiffness of the foot is 20 EI/L; hinges of this kind are as stiff in shear as GA."""
     beam = ub.Beam((0, 0), (0, 1), section, cells=8)
-    law = ub.AxialBendingHinge(1e9, 1e9, along=section.EA, across=section.GA, turning=20.0)
+    law = st.AxialBendingHinge(1e9, 1e9, along=section.EA, across=section.GA, turning=20.0)
     foot = ub.Bushing(ub.ground(0, 0), beam.start, law, axis=(0, 1))
     load = ub.PointLoad(beam.end, force=(0, -1), amplitude=growing)
     return ub.Scene([beam], connectors=[foot], loads=[load])

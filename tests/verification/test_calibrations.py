@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 SECTION = ub.Section(EA=2.1e9, GA=6.7e8, EI=9e6, rhoA=78.5, rhoI=0.065)
 TRUTH = {"limit": 60e3, "energy": 6e3, "stiffness": 3e6}  # N m, J, N m/rad
@@ -58,7 +59,7 @@ def exact():
         scene = column(**TRUTH, pushed=name == "pushover")
         solution = ub.simulate(scene, run["scheme"], t=run["t"], dt=run["dt"], progress=False)
         times = np.linspace(*run["t"], 61)[1:]
-        any_sigma = ub.Measurement(times, 0 * times, **run)
+        any_sigma = st.Measurement(times, 0 * times, **run)
         found[name] = times, any_sigma.computed(solution)
     return found
 
@@ -70,13 +71,13 @@ def measured(exact, seed, given=True):
         sigma = NOISE * np.abs(values).max()
         noisy = values + sigma * rng.normal(size=len(values))
         options = {"arguments": {"pushed": name == "pushover"}, "name": name, **RUNS[name]}
-        several.append(ub.Measurement(times, noisy, sigma=sigma if given else None, **options))
+        several.append(st.Measurement(times, noisy, sigma=sigma if given else None, **options))
     return several
 
 
 def test_each_test_identifies_its_parameters(exact):
     """The hinge stays closed in the free decay, which knows the stiffness only, but best."""
-    fit = ub.calibrate(column, BOUNDS, measured(exact, 0), progress=False)
+    fit = st.calibrate(column, BOUNDS, measured(exact, 0), progress=False)
     assert fit.identified_by == {
         "limit": "pushover", "energy": "pushover", "stiffness": "free decay"
     }  # fmt: skip
@@ -93,7 +94,7 @@ def test_each_test_identifies_its_parameters(exact):
 @pytest.mark.slow
 def test_random_starts_end_at_the_same_minimum(exact):
     """Bounds are factors of 2 to 4 apart; within them the free decay has no other minimum."""
-    fit = ub.calibrate(column, BOUNDS, measured(exact, 0), starts=20, progress=False)
+    fit = st.calibrate(column, BOUNDS, measured(exact, 0), starts=20, progress=False)
     least = np.nanmin(fit.end_costs)
     assert (np.abs(fit.end_costs - least) <= 1e-8 * least).sum() >= 18
 
@@ -105,7 +106,7 @@ def test_intervals_cover_the_truth_in_95_of_100_data_sets(exact, given):
     """The number is binomial with mean 95 and standard deviation 2.2."""
     covered = np.zeros(3)
     for seed in range(100):
-        fit = ub.calibrate(column, TRUTH, measured(exact, seed, given), progress=False)
+        fit = st.calibrate(column, TRUTH, measured(exact, seed, given), progress=False)
         ends = np.array([*fit.intervals.values()]).T
         true = np.array([*TRUTH.values()])
         covered += (ends[0] <= true) & (true <= ends[1])
@@ -133,8 +134,8 @@ def test_random_starts_with_a_hinge_in_a_beam_end_at_the_same_minimum():
     noise = np.random.default_rng(0).normal(size=len(solution))
     values = sway(solution) + 0.01 * np.abs(sway(solution)).max() * noise
     bounds = {name: (1.2 * p, 0.5 * p, 1.5 * p) for name, p in true.items()}
-    data = [ub.Measurement(solution.times, values, sway, **run)]
-    fit = ub.calibrate(cantilever, bounds, data, starts=20, progress=False)
+    data = [st.Measurement(solution.times, values, sway, **run)]
+    fit = st.calibrate(cantilever, bounds, data, starts=20, progress=False)
     least = np.nanmin(fit.end_costs)
     assert (np.abs(fit.end_costs - least) <= 1e-8 * least).sum() >= 18
     for name, (low, high) in fit.intervals.items():

@@ -8,6 +8,7 @@ import pytest
 from scenes import clamped
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 BETA = 1.875104068711961  # first root of 1 + cos x cosh x = 0, S18 [closed]
 SECTION = ub.Section.rectangle(b=0.02, h=0.02, E=200e9, nu=0.3, rho=7850.0)
@@ -47,7 +48,7 @@ def test_damping_ratio_of_the_first_mode(kind):
     to 3 %, and the fit over 5 of them by about 3 %/(5 · 2π ζ).
     """
     beam, solution = released(KINDS[kind])
-    found = ub.damping(solution.times, solution.displacement(beam.end)[:, 1])
+    found = st.damping(solution.times, solution.displacement(beam.end)[:, 1])
     assert found.better == "exponential"
     tolerance = 0.05 if kind == "mass" else 0.01
     assert found.fitted_ratio == pytest.approx(RATIO, rel=tolerance)

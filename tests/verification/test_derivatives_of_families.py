@@ -15,6 +15,7 @@ from run_differences import TIGHT, errors, relative_error
 from scenes import clamped
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 pytestmark = pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 
@@ -93,7 +94,7 @@ def fibres(limit=235e6, isotropic=2e9, E=210e9, height=0.2, load=60e3):
 
 
 def steel(limit=235e6, hardening=0.01, R0=20.0, load=60e3):
-    law = ub.Fibres(ub.MenegottoPinto(limit, hardening, R0), number=8)
+    law = ub.Fibres(st.MenegottoPinto(limit, hardening, R0), number=8)
     section = ub.Section.rectangle(0.1, 0.2, E=210e9, nu=0.3, rho=7850.0, fibres=law)
     return column(section, load, amplitude=to_and_fro, cells=4)
 
@@ -190,7 +191,7 @@ def residual_displacement(s):
 def decay_ratio(s):
     """Damping ratio of the swings after the pulse."""
     u = s.displacement(s.scene.beams[0].end)[75:, 0]  # after 0.3 s
-    return ub.damping(s.times[75:], u - u.mean()).ratio
+    return st.damping(s.times[75:], u - u.mean()).ratio
 
 
 def limit_load(s):

@@ -10,7 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
 import ufl_beam as ub
-from ufl_beam.analysis import response_spectra
+import ufl_beam.structures as st
+from ufl_beam.structures import response_spectra
 
 # Motions of supports on several processes are in properties/test_combinations.py.
 pytestmark = pytest.mark.serial
@@ -20,7 +21,7 @@ def made_motion(seed=7, duration=6.0, dt=0.02):
     """A record of filtered noise that begins and ends with zero; m/s²."""
     t = np.arange(0.0, duration, dt)
     noise = np.convolve(np.random.default_rng(seed).standard_normal(t.size), np.hanning(9), "same")
-    return ub.GroundMotion(dt, noise * np.sin(np.pi * t / t[-1])).scaled(peak=3.0)
+    return st.GroundMotion(dt, noise * np.sin(np.pi * t / t[-1])).scaled(peak=3.0)
 
 
 MOTION = made_motion()
@@ -67,7 +68,7 @@ def test_elastic_spectra_are_those_of_nigam_and_jennings(period, damping):
     h, t = MOTION.dt / n, np.arange((len(a) - 1) * n + 1) / n
     u, v = nigam_jennings(np.interp(t, np.arange(len(a)), a), h, w, damping)
     peaks = [abs(x).max() for x in (u, v, 2 * damping * w * v + w**2 * u)]
-    spectrum = ub.response_spectrum(MOTION, [period], damping)
+    spectrum = st.response_spectrum(MOTION, [period], damping)
     found = spectrum.displacement, spectrum.velocity, spectrum.acceleration
     np.testing.assert_allclose(np.ravel(found), peaks, rtol=4e-5)
     assert spectrum.pseudo_acceleration == pytest.approx(w**2 * spectrum.displacement, rel=1e-14)
@@ -79,8 +80,8 @@ def test_a_sudden_load_overshoots():
 
     The peak between two points has a relative error of (2 π/100)⁴/384, or 4e-8.
     """
-    push, ζ = ub.GroundMotion(0.1, np.full(30, 2.0)), 0.1
-    spectrum = ub.response_spectrum(push, [0.7, 1.3], ζ)
+    push, ζ = st.GroundMotion(0.1, np.full(30, 2.0)), 0.1
+    spectrum = st.response_spectrum(push, [0.7, 1.3], ζ)
     overshoot = 1 + math.exp(-math.pi * ζ / math.sqrt(1 - ζ**2))
     np.testing.assert_allclose(spectrum.pseudo_acceleration, 2.0 * overshoot, rtol=4e-8)
 
@@ -111,7 +112,7 @@ def integrated(motion, w, z, hardening, strength):
 def test_yielding_oscillators_are_those_of_another_integration(period, hardening, monkeypatch):
     """Errors are of second order: less than (ω h)²/4 with steps h, down to 2e-5."""
     w = 2 * math.pi / period
-    strength = ub.response_spectrum(MOTION, [period]).pseudo_acceleration[0] / 3
+    strength = st.response_spectrum(MOTION, [period]).pseudo_acceleration[0] / 3
     expected = integrated(MOTION, w, 0.05, hardening, strength)
     for points in (100, 800):
         monkeypatch.setattr(response_spectra, "POINTS", points)
@@ -127,7 +128,7 @@ def test_a_run_with_the_strength_of_a_spectrum_has_its_ductility(hardening):
     2 π (ω h)²/12 in each of the 7.5 periods of the motion; this is the relative error at most.
     """
     period, target, h, mass = 0.8, 4.0, 0.0025, 2.0
-    spectrum = ub.response_spectrum(MOTION, [period], 0.05, ductility=target, hardening=hardening)
+    spectrum = st.response_spectrum(MOTION, [period], 0.05, ductility=target, hardening=hardening)
     assert spectrum.ductility[0] == pytest.approx(target, rel=1e-6)
     w, strength = 2 * math.pi / period, spectrum.pseudo_acceleration[0]
     k = mass * w**2
@@ -159,8 +160,8 @@ def test_the_strength_is_the_largest_with_the_ductility():
     target, again = 3.0, 0
     for period in np.linspace(0.2, 2.0, 16):
         w = 2 * math.pi / period
-        elastic = ub.response_spectrum(MOTION, [period]).pseudo_acceleration[0]
-        found = ub.response_spectrum(MOTION, [period], ductility=target).pseudo_acceleration[0]
+        elastic = st.response_spectrum(MOTION, [period]).pseudo_acceleration[0]
+        found = st.response_spectrum(MOTION, [period], ductility=target).pseudo_acceleration[0]
         peaks = response_spectra._oscillator(MOTION, w, 0.05, 0.0, target)
 
         def ductility(strength, peaks=peaks, w=w):

@@ -20,6 +20,7 @@ from scipy.signal import lsim
 from scipy.stats import binom, lognorm, norm
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3)
 H, MASS = 3.0, 5e3  # m, kg
@@ -36,7 +37,7 @@ def motion(seed, dt=0.02, duration=10.0):
     noise = np.random.default_rng(seed).standard_normal(len(t))
     a = lsim(([18.0, 225.0], [1.0, 18.0, 225.0]), noise, t)[1]
     envelope = np.minimum(1.0, (t / 2.0) ** 2) * np.exp(-np.maximum(0.0, t - 6.0) / 2.0)
-    return ub.GroundMotion(dt, a * envelope, f"seed {seed}")
+    return st.GroundMotion(dt, a * envelope, f"seed {seed}")
 
 
 def shaken(column, record, *loads):
@@ -57,7 +58,7 @@ def drift(run):
 def analysis(motions, intensities, build=None, measure=drift, limit=0.1, **options):
     """Of the weak column, without a bar."""
     build = build or (lambda record: shaken(WEAK, record, ub.Gravity()))
-    return ub.incremental_dynamic_analysis(
+    return st.incremental_dynamic_analysis(
         build, motions, intensities, measure, limit=limit, progress=False, **options
     )
 
@@ -73,7 +74,7 @@ def test_elastic_demands_are_the_displacement_spectrum():
     dt = 0.056 / omega
 
     def spectral(record):
-        return ub.response_spectrum(record, [2 * np.pi / omega], damping=0.05).pseudo_acceleration[
+        return st.response_spectrum(record, [2 * np.pi / omega], damping=0.05).pseudo_acceleration[
             0
         ]
 
@@ -145,7 +146,7 @@ def test_an_analysis_goes_on(shared_path):
     more, number = runs([one, other], [1.0, 2.0, 3.0])
     assert number == 4
     assert (more.demand[:1, :2] == first.demand).all()
-    changed = ub.GroundMotion(one.dt, (*one.values[:-1], 0.5), one.name)
+    changed = st.GroundMotion(one.dt, (*one.values[:-1], 0.5), one.name)
     assert runs([changed], [1.0, 2.0])[1] == 2
 
 
@@ -162,7 +163,7 @@ def test_fractiles_are_demands_of_motions():
 
 def test_a_fragility_through_two_fractions():
     """[closed] Two parameters meet two fractions: the normal quantiles are linear in ln(x)."""
-    fit = ub.Fragility.fit([2.0, 5.0], [3, 16], [20, 20])
+    fit = st.Fragility.fit([2.0, 5.0], [3, 16], [20, 20])
     assert fit([2.0, 5.0]) == pytest.approx([0.15, 0.8], rel=1e-8)
     low, high = norm.ppf([0.15, 0.8])
     beta = np.log(2.5) / (high - low)
@@ -177,7 +178,7 @@ def test_a_fragility_has_the_largest_likelihood():
     def loss(x):
         return -binom.logpmf(z, n, lognorm(s=x[1], scale=x[0]).cdf(im)).sum()
 
-    fit = ub.Fragility.fit(im, z, n)
+    fit = st.Fragility.fit(im, z, n)
     by_scipy = minimize(
         loss, (4.0, 0.5), method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-12}
     )
@@ -189,7 +190,7 @@ def test_a_known_fragility_is_found():
     """[estimate] 10^5 motions at each intensity: the error of a fraction is at most 0.0016."""
     im, n = np.linspace(2.0, 8.0, 7), 100_000
     z = np.random.default_rng(0).binomial(n, lognorm(s=0.4, scale=4.0).cdf(im))
-    fit = ub.Fragility.fit(im, z, np.full(7, n))
+    fit = st.Fragility.fit(im, z, np.full(7, n))
     assert fit.median == pytest.approx(4.0, rel=0.0016 * 0.4 * np.sqrt(2 * np.pi) * 3)
     assert fit.dispersion == pytest.approx(0.4, rel=3 * 0.0016 * np.sqrt(2 * np.pi))
 
@@ -206,7 +207,7 @@ def test_a_known_fragility_is_found():
 )
 def test_counts_without_a_fit_are_refused(counts, words):
     with raises(words):
-        ub.Fragility.fit([1.0, 2.0, 3.0], counts, [9, 9, 9])
+        st.Fragility.fit([1.0, 2.0, 3.0], counts, [9, 9, 9])
 
 
 def test_a_limit_below_collapse():

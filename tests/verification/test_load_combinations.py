@@ -9,6 +9,7 @@ import pytest
 from helpers import raises, run
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
 L = 2.0  # m
@@ -35,7 +36,7 @@ def by_hand(x, dead, live=0.0, wind=0.0):
 
 def test_the_envelope_of_a_cantilever():
     """[closed] Deflections are 1e-7 of the length, so forces agree to 1e-6 of the largest, 15."""
-    found = ub.load_combinations(SCENE, CASES, COMBINATIONS, progress=False)
+    found = st.load_combinations(SCENE, CASES, COMBINATIONS, progress=False)
     assert ([*found.solutions], found.failed) == ([*COMBINATIONS], {})
     names, reached = np.array([*COMBINATIONS]), found.section_forces(BEAM, points=3)
     for row, x in ((0, 0.0), (1, L / 4), (5, L)):  # two cells with three points each
@@ -60,7 +61,7 @@ def test_combinations_are_runs_of_the_scene():
     hinged = ub.Beam((0, 0), (L, 0), SECTION, hinges={0.0: ub.ElastoPlastic(1e5, isotropic=1e6)})
     tip = [ub.PointLoad(hinged.end, force=(0, -6e4))]
     scene = ub.Scene([hinged], supports=[ub.Clamped(hinged.start)], loads=[ub.Gravity()])
-    found = ub.load_combinations(
+    found = st.load_combinations(
         scene, {"tip": tip}, {"half": {"tip": 0.5}, "all": {"tip": 1.0}}, steps=5, progress=False
     )
     for name, factor in (("half", 0.5), ("all", 1.0)):
@@ -84,7 +85,7 @@ def test_loads_between_vertices_are_in_the_envelope(place):
         "q": [ub.LineLoad(BEAM, force=(0, -1.0), span=(0.0, 0.7))],
     }
     combinations = {"1": {"P": 1.0}, "2": {"q": 1.0}}
-    found = ub.load_combinations(SCENE, cases, combinations, progress=False)
+    found = st.load_combinations(SCENE, cases, combinations, progress=False)
     (s,) = {tuple(one.diagram(BEAM).s) for one in found.solutions.values()}
     arms = [np.maximum(end * L - np.array(s) * L, 0) for end in (place, 0.7)]
     moments = -2.0 * arms[0], -(arms[1] ** 2) / 2  # N m
@@ -102,21 +103,21 @@ def test_a_combination_without_equilibrium_is_named_and_left_out():
     with pytest.warns(
         ub.ModelWarning, match=r"load_combinations: much: no equilibrium beyond 0\.5"
     ):
-        found = ub.load_combinations(
+        found = st.load_combinations(
             scene, cases, {"much": {"P": 1.0}, "little": {"P": 0.4}}, progress=False
         )
     assert ([*found.solutions], [*found.failed]) == (["little"], ["much"])
     assert found.failed["much"].startswith("no equilibrium beyond 0.5")
     assert "\n  much: no equilibrium beyond 0.5" in str(found)
     with raises("much: no equilibrium", kind=ub.ConvergenceError):
-        ub.load_combinations(scene, cases, {"much": {"P": 1.0}}, progress=False)
+        st.load_combinations(scene, cases, {"much": {"P": 1.0}}, progress=False)
 
 
 def test_mistakes_are_named():
     with raises("combinations['A']: 'wnd' is not a case; cases: dead, live, wind"):
-        ub.load_combinations(SCENE, CASES, {"A": {"wnd": 1.0}})
+        st.load_combinations(SCENE, CASES, {"A": {"wnd": 1.0}})
     with raises("cases['spin']: forces of a RotatingFrame have no factor"):
-        ub.load_combinations(SCENE, {"spin": [ub.RotatingFrame(rate=1.0)]}, {"A": {"spin": 1.0}})
+        st.load_combinations(SCENE, {"spin": [ub.RotatingFrame(rate=1.0)]}, {"A": {"spin": 1.0}})
 
 
 def test_loads_that_act_twice_or_not_at_all_are_named():
@@ -126,9 +127,9 @@ def test_loads_that_act_twice_or_not_at_all_are_named():
     loaded = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
     row = {"1": {"G": 1.0}}
     with pytest.raises(ub.ArgumentError, match=r"Gravity of cases\['G'\].*replace\(scene, loads"):
-        ub.load_combinations(loaded, {"G": loaded.loads}, row)
+        st.load_combinations(loaded, {"G": loaded.loads}, row)
     bare = replace(loaded, loads=[])
-    quake = ub.GroundMotion(0.01, [0, 1, 2, -1, 0]).acceleration
+    quake = st.GroundMotion(0.01, [0, 1, 2, -1, 0]).acceleration
     for amplitude, said in (
         (quake, "no force at t = 1 s"),
         (lambda t: math.sin(math.pi * t), "no force at t = 1 s"),
@@ -136,16 +137,16 @@ def test_loads_that_act_twice_or_not_at_all_are_named():
     ):
         case = [ub.Gravity((0, -1), amplitude=amplitude)]
         with pytest.warns(ub.ModelWarning, match=said):
-            ub.load_combinations(bare, {"G": case}, row)
+            st.load_combinations(bare, {"G": case}, row)
     gone = ub.MovingLoad(beam, lambda t: 3.0 * t, (0, -1.0))
     with (
         pytest.warns(ub.ModelWarning, match="not on its beam at t = 1 s"),
         pytest.warns(ub.ModelWarning, match="never on its route"),
     ):
-        ub.load_combinations(bare, {"G": [gone]}, row)
+        st.load_combinations(bare, {"G": [gone]}, row)
     for amplitude in (lambda t: t, lambda t: 2.0, ub.ramp(1.0)):
         point = ub.PointLoad(beam.end, force=(0, -1e3), amplitude=amplitude)
-        ub.load_combinations(bare, {"G": [point]}, row)  # no warning is issued
+        st.load_combinations(bare, {"G": [point]}, row)  # no warning is issued
 
 
 def test_dampers_and_damping_bear_nothing():
@@ -156,15 +157,15 @@ def test_dampers_and_damping_bear_nothing():
     brake = ub.Stretch(BEAM.start, BEAM.end, ub.Damper(1e9))
     for more in ({"connectors": [brake]}, {"damping": [ub.KelvinVoigt(retardation_time=9.0)]}):
         scene = replace(SCENE, loads=[], **more)
-        found = ub.load_combinations(scene, cases, combinations, progress=False)
+        found = st.load_combinations(scene, cases, combinations, progress=False)
         reaction = found.solutions["all"].reaction(CLAMPED)[-1]
         np.testing.assert_allclose(reaction, (-0.5, 2.0, L), rtol=1e-6)
-        still = ub.load_combinations(replace(SCENE, loads=[]), cases, combinations, progress=False)
+        still = st.load_combinations(replace(SCENE, loads=[]), cases, combinations, progress=False)
         ends = (one.solutions["all"].displacement(BEAM.end)[-1] for one in (found, still))
         np.testing.assert_allclose(*ends, rtol=1e-8, atol=1e-15)
 
 
 def test_envelopes_of_something_else_are_refused():
-    found = ub.load_combinations(SCENE, CASES, COMBINATIONS, progress=False)
+    found = st.load_combinations(SCENE, CASES, COMBINATIONS, progress=False)
     with pytest.raises(ub.ArgumentError, match="combination 'ULS 1' = None must be numbers"):
         found.envelope(lambda run: None)

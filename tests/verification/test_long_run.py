@@ -12,6 +12,7 @@ import pytest
 from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 from test_memory import MEBIBYTE, Watch
@@ -27,9 +28,9 @@ def test_damage_of_cycles_of_one_size():
     F, W, n = 20e3, 0.1 * 0.2**2 / 6, 20
     push = ub.PointLoad(beam.end, force=(0, F), amplitude=lambda t: math.sin(2 * math.pi * t))
     scene = clamped(beam, loads=[push])
-    spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
-    curve = ub.SNCurve(range=71e6, cycles=2e6, slope=3.0)
-    fatigue = ub.Fatigue(spot, curve, resolution=1e3)
+    spot = st.HotSpot.fibre(beam.start, y=0.1, E=210e9)
+    curve = st.SNCurve(range=71e6, cycles=2e6, slope=3.0)
+    fatigue = st.Fatigue(spot, curve, resolution=1e3)
     ub.simulate(scene, ub.Static(), t=(0, n), dt=0.125, record=fatigue)
     S = 2 * F * 2 / W  # 120 MPa
     # From zero to the first peak and from the last one to zero are halves of half the range
@@ -62,8 +63,8 @@ def test_very_many_steps(tmp_path):
     """Constant memory, bounded files, a ledger that closes."""
     scene = softening_portal()
     left, roof, _ = scene.beams
-    spots = [ub.HotSpot.fibre(place, y=0.1, E=210e9) for place in (left.start, roof.start)]
-    fatigue, extremes = ub.Fatigue(spots, ub.SNCurve.eurocode(71e6)), ub.Extremes()
+    spots = [st.HotSpot.fibre(place, y=0.1, E=210e9) for place in (left.start, roof.start)]
+    fatigue, extremes = st.Fatigue(spots, st.SNCurve.eurocode(71e6)), ub.Extremes()
     table, watch = tmp_path / "long.csv", Watch({1000, STEPS})
     solution = ub.simulate(
         scene,

@@ -9,6 +9,7 @@ import pytest
 from scenes import clamped
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 EI, LENGTH, LIMIT = 1000.0, 2.0, 10.0  # N m², m, N m
 ELASTIC = ub.Section(EA=1e8, GA=1e8, EI=EI)
@@ -46,8 +47,8 @@ def test_collapse_of_a_portal(by, cells):
     height, width = 4.0, 6.0
     law = ub.Softening(limit=150e3, fracture_energy=1e9)  # perfectly plastic to six digits
     everywhere, ends = (law, {}) if by == "section" else (None, {0.0: law, 1.0: law})
-    column = ub.Section.i_shape(0.2, 0.2, 0.009, 0.015, **steel, hinge=everywhere)
-    girder = ub.Section.i_shape(0.5, 0.3, 0.02, 0.03, **steel)
+    column = st.i_shape(0.2, 0.2, 0.009, 0.015, **steel, hinge=everywhere)
+    girder = st.i_shape(0.5, 0.3, 0.02, 0.03, **steel)
     left = ub.Beam((0, 0), (0, height), column, cells=cells, name="left", hinges=ends)
     roof = ub.Beam((0, height), (width, height), girder, cells=8, name="roof")
     right = ub.Beam((width, height), (width, 0), column, cells=cells, name="right", hinges=ends)

@@ -15,6 +15,7 @@ import pytest
 from scipy.integrate import trapezoid
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 EI, H, L, M_P, MASS, P = 2e7, 4.0, 6.0, 148e3, 10e3, 200e3  # N m², m, m, N m, kg, N
 RIGID = 1e5  # stiffness of the girder over the stiffness of columns: an error of EI/RIGID
@@ -42,7 +43,7 @@ def portal(weight=0.0, law=PLASTIC, loads=(), rhoA=0.0):
 
 def pushed(scene, target=0.1, steps=25, **options):
     place = scene["left"].end
-    return ub.pushover(scene, place, target, steps=steps, mesh=CUBIC, progress=False, **options)
+    return st.pushover(scene, place, target, steps=steps, mesh=CUBIC, progress=False, **options)
 
 
 @pytest.fixture(scope="module")
@@ -107,11 +108,11 @@ def test_participation_of_a_cantilever_with_distributed_mass():
     section = ub.Section(EA=1e10, GA=1e10, EI=EI, rhoA=100.0)
     column = ub.Beam((0, 0), (0, H), section, cells=2, name="column")
     scene = ub.Scene([column], supports=[ub.Clamped(column.start)])
-    curve = ub.pushover(scene, column.end, 0.01, pattern="triangular", steps=2, progress=False)
+    curve = st.pushover(scene, column.end, 0.01, pattern="triangular", steps=2, progress=False)
     assert curve.mass == pytest.approx(100 * H, rel=1e-12)
     assert curve.equivalent_mass == pytest.approx(50 * H, rel=1e-12)
     assert curve.gamma == pytest.approx(1.5, rel=1e-12)
-    modal = ub.pushover(scene, column.end, 0.01, steps=2, progress=False, mesh=CUBIC)
+    modal = st.pushover(scene, column.end, 0.01, steps=2, progress=False, mesh=CUBIC)
     assert modal.gamma == pytest.approx(1.5660, rel=1e-3)  # of a cantilever; EA, GA are finite
     assert modal.period == pytest.approx(2 * math.pi / 3.5160 * math.sqrt(100 * H**4 / EI), 1e-2)
 
@@ -193,7 +194,7 @@ def test_asce_41_by_hand(plain):
 
 
 def test_two_lines_have_the_energy_of_the_curve():
-    from ufl_beam.analysis.pushover_result import bilinear
+    from ufl_beam.structures.pushover_result import bilinear
 
     d = np.linspace(0, 0.1, 400)
     V = 1e5 * np.tanh(d / 0.02)
@@ -216,7 +217,7 @@ def test_a_target_beyond_the_reach_is_reported_with_the_hinge():
         [column], supports=[ub.Clamped(column.start)], masses=[ub.PointMass(column.end, MASS)]
     )
     with pytest.warns(ub.ModelWarning, match=r"ends at u = .* of 0.3 m.*column.start \(0, 0\)"):
-        curve = ub.pushover(scene, column.end, 0.3, progress=False)
+        curve = st.pushover(scene, column.end, 0.3, progress=False)
     # M_p h²/(3 EI) is the sway at the limit of the hinge; cells of h/4: (1/4)²/4 of it stiffer
     assert curve.displacement[-1] == pytest.approx(M_P * H**2 / (3 * EI), rel=0.02)
     assert "snap" not in str(curve.hinges)
@@ -236,7 +237,7 @@ def test_a_pattern_that_does_not_push_the_place_is_refused(options, words):
     scene = portal()
     place = getattr(scene["left"], options.pop("place", "end"))
     with pytest.raises(ub.ArgumentError, match=words):
-        ub.pushover(scene, place, 0.1, progress=False, **options)
+        st.pushover(scene, place, 0.1, progress=False, **options)
 
 
 def test_masses_and_periods_are_required(plain):
@@ -326,7 +327,7 @@ def test_springs_that_yield_or_break_are_in_the_sequence_of_hinges():
     """The sequence and the table of hinges have the same connectors and states."""
     laws = [
         ub.Spring(5e7, law=ub.ElastoPlastic(M_P, isotropic=1e6)),
-        ub.IbarraKrawinkler(5e7, ub.Backbone(1.2 * M_P, capping=0.03)),
+        st.IbarraKrawinkler(5e7, st.Backbone(1.2 * M_P, capping=0.03)),
         ub.Spring(5e7, softening=ub.Softening(1.4 * M_P, 1e5)),
     ]
     column = ub.Section(EA=1e12, GA=1e12, EI=EI, rhoA=0.0)
@@ -339,8 +340,8 @@ def test_springs_that_yield_or_break_are_in_the_sequence_of_hinges():
         beams, joints=tops, supports=[ub.Pinned(beam.start) for beam in beams], connectors=feet,
         masses=[ub.PointMass(beam.end, MASS) for beam in beams],
     )  # fmt: skip
-    result = ub.pushover(scene, beams[0].end, 0.1, pattern="uniform", mesh=CUBIC, progress=False)
+    result = st.pushover(scene, beams[0].end, 0.1, pattern="uniform", mesh=CUBIC, progress=False)
     assert [hinge.what for hinge in result.hinges] == ["yields", "yields", "opens"]
     first = {hinge.where: hinge.n for hinge in reversed(result.hinges)}
-    assert first == {row.where: row.n for row in result.path.hinges().rows}
+    assert first == {row.where: row.n for row in st.hinge_table(result.path).rows}
     assert list(first) == feet[::-1]

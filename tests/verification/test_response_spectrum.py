@@ -13,7 +13,8 @@ import pytest
 from scipy.linalg import eigh
 
 import ufl_beam as ub
-from ufl_beam.analysis.response_spectrum import cqc
+import ufl_beam.structures as st
+from ufl_beam.structures.spectral_analysis import cqc
 
 EI, H, L, M1, M2 = 2e6, 3.0, 5.0, 12e3, 8e3  # N m², m, m, kg, kg
 CUBIC = ub.Mesh(degree=3)
@@ -55,7 +56,7 @@ SCENE = frame()
 
 
 def analysed(rule="CQC", n=2, **options):
-    return ub.response_spectrum_analysis(SCENE, spectrum, n=n, rule=rule, mesh=CUBIC, **options)
+    return st.response_spectrum_analysis(SCENE, spectrum, n=n, rule=rule, mesh=CUBIC, **options)
 
 
 def by_hand():
@@ -103,7 +104,7 @@ def test_effective_masses_add_up_to_the_mass_that_moves():
     beam = ub.Beam((0, 0), (0, 2), section, cells=4, name="beam")
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
     for mesh, moving in ((ub.Mesh(lumped=True), 7 / 8), (None, None)):
-        response = ub.response_spectrum_analysis(scene, lambda T: 1.0, n=12, mesh=mesh)
+        response = st.response_spectrum_analysis(scene, lambda T: 1.0, n=12, mesh=mesh)
         # sums of squares of 12 products of eigenvectors, which are accurate to 1e-8
         assert response.missing_mass == pytest.approx(0.0, abs=1e-7)
         if moving:  # half of the first cell is at the clamp
@@ -112,7 +113,7 @@ def test_effective_masses_add_up_to_the_mass_that_moves():
     joint = ub.Rigid(beam.end, other.start, multipliers=True)
     angled = ub.Scene([beam, other], joints=[joint], supports=[ub.Clamped(beam.start)])
     shared = replace(angled, joints=[ub.Rigid(beam.end, other.start)])
-    held, equal = (ub.response_spectrum_analysis(x, lambda T: 1.0, n=18) for x in (angled, shared))
+    held, equal = (st.response_spectrum_analysis(x, lambda T: 1.0, n=18) for x in (angled, shared))
     assert held.missing_mass == pytest.approx(0.0, abs=1e-7)
     assert held.mass == pytest.approx(equal.mass, rel=1e-9)
     assert held.base_shear == pytest.approx(equal.base_shear, rel=1e-6)
@@ -158,7 +159,7 @@ def test_section_forces_of_a_mode_are_those_of_a_static_run(degree):
     )  # fmt: skip
     mesh, small = ub.Mesh(degree=degree), 1e-5
     with pytest.warns(ub.ModelWarning, match="of the mass"):
-        response = ub.response_spectrum_analysis(scene, lambda T: small, n=1, mesh=mesh)
+        response = st.response_spectrum_analysis(scene, lambda T: small, n=1, mesh=mesh)
     size = response.participation[0] * small  # times ω²/ω²
     loads = [ub.PointLoad(arm.end, tuple(300.0 * size * response.modes.shape(0, arm.end)[:2].real))]
     for beam in scene.beams:
@@ -218,7 +219,7 @@ def test_section_forces_about_a_state_are_in_equilibrium_with_reactions(state, d
     mesh = ub.Mesh(degree=degree)
     at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.05, mesh=mesh, progress=False)
     with pytest.warns(ub.ModelWarning, match="of the mass"):
-        response = ub.response_spectrum_analysis(
+        response = st.response_spectrum_analysis(
             scene, lambda T: 1.0, n=1, direction=(0, 1), at=at, mesh=mesh
         )
     diagram = response.diagram(beam)
@@ -238,7 +239,7 @@ def test_a_loaded_state_softens_the_frame():
     loads = [ub.PointLoad(SCENE[name].end, (0, -weight)) for name in ("left 1", "right 1")]
     loaded = replace(SCENE, loads=loads)
     state = ub.simulate(loaded, ub.Static(), t=(0, 1), dt=1.0, mesh=CUBIC, progress=False)
-    response = ub.response_spectrum_analysis(loaded, spectrum, n=2, at=state)
+    response = st.response_spectrum_analysis(loaded, spectrum, n=2, at=state)
     k = STOREY - 2 * 1.2 * weight / H
     K = k * np.array([[2.0, -1.0], [-1.0, 1.0]])
     squares = eigh(K, np.diag([M1, M2]), eigvals_only=True)
@@ -251,16 +252,16 @@ def test_what_cannot_be_analysed_is_refused():
     scene = ub.Scene([mast], supports=[ub.Clamped(mast.start)])
     damper = ub.Stretch(ub.ground(1, 3), mast.end, ub.Damper(1e4))
     with pytest.raises(ub.ArgumentError, match="move without strain"):
-        ub.response_spectrum_analysis(free, spectrum)
+        st.response_spectrum_analysis(free, spectrum)
     with pytest.raises(ub.ArgumentError, match=r"covers periods from 1 to 2 s, but not 0\.\d+"):
-        ub.response_spectrum_analysis(scene, ([1.0, 2.0], [3.0, 2.0]), n=1)
+        st.response_spectrum_analysis(scene, ([1.0, 2.0], [3.0, 2.0]), n=1)
     with pytest.raises(ub.ArgumentError, match="must be positive"):
-        ub.response_spectrum_analysis(scene, lambda T: 0.0, n=1)
+        st.response_spectrum_analysis(scene, lambda T: 0.0, n=1)
     with pytest.raises(ub.ArgumentError, match="dampers"):
-        ub.response_spectrum_analysis(replace(scene, connectors=[damper]), spectrum, n=1)
+        st.response_spectrum_analysis(replace(scene, connectors=[damper]), spectrum, n=1)
     light = ub.Beam((0, 0), (0, 3), ub.Section(1e8, 1e8, 1e6, rhoA=0.0), cells=2)
     with pytest.raises(ub.ArgumentError, match="nothing that can move has mass"):
-        ub.response_spectrum_analysis(
+        st.response_spectrum_analysis(
             ub.Scene([light], supports=[ub.Clamped(light.start)]), spectrum
         )
 
@@ -275,4 +276,4 @@ def test_loads_that_follow_the_motion_are_refused(load):
     scene = replace(SCENE, loads=[loads[load]])
     at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, mesh=CUBIC, progress=False)
     with pytest.raises(ub.ArgumentError, match=f"{load}.*the force follows the motion"):
-        ub.response_spectrum_analysis(scene, spectrum, n=1, at=at, mesh=CUBIC)
+        st.response_spectrum_analysis(scene, spectrum, n=1, at=at, mesh=CUBIC)

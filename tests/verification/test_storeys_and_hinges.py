@@ -12,6 +12,7 @@ import pytest
 from helpers import raises
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 DIGITS = 1e-9
 """Of a number that Newton's method, with its tolerance of 1e-9, finds in another way."""
@@ -71,7 +72,7 @@ def test_storey_shears_are_the_sums_of_the_forces_above(connectors, scheme):
     )
     scene, levels, _ = two_storeys(connectors, loads)
     run = ub.simulate(scene, scheme, t=(0, 1), dt=0.25)
-    storeys = run.storeys(levels)
+    storeys = st.storeys(run, levels)
     assert np.abs(storeys.ratio[-1]).max() > 0.05 or connectors
     assert_near(storeys.shear[-1], [3e6 + 2e6 + 6 * 2e5, 2e6])
     assert_near(storeys.shear[1:, 0], base_shear(run)[1:], 1e-12)  # the same forces of cells
@@ -87,7 +88,7 @@ def test_storey_shears_are_loads_less_inertia(connectors):
     scene, levels, floors = two_storeys(connectors, [push], masses=True)
     newton = ub.Newton(rtol=1e-11)
     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, newton=newton)
-    storeys = run.storeys(levels)
+    storeys = st.storeys(run, levels)
     first_left, first_right, second_left, second_right = (
         mass * run.acceleration(place)[1:, 0] for place in floors
     )
@@ -116,7 +117,7 @@ def test_drift_of_a_portal_with_a_rigid_girder():
         loads=[ub.PointLoad(left.end, force=(F, 0))],
     )
     run = ub.simulate(portal, ub.Static(), t=(0, 1), dt=1.0, mesh=ub.Mesh(degree=3))
-    storeys = run.storeys([left.start, left.end])
+    storeys = st.storeys(run, [left.start, left.end])
     assert_near(storeys.drift[-1], [F * h**3 / (24 * EI) + F * h / (2 * GA)], 1e-4)
     assert_near(storeys.ratio, storeys.drift / h, 1e-15)
     halves = [run.section_forces_at(column.start)[-1, 1] for column in (left, right)]
@@ -161,7 +162,7 @@ def test_cuts_through_joints_and_connectors(joint, scheme):
         [low, high], supports=[foot], loads=[push], masses=masses if scheme.dynamic else (), **parts
     )
     run = ub.simulate(scene, scheme, t=(0, 1), dt=0.05)
-    storeys = run.storeys([low.start, low.end, high.start])
+    storeys = st.storeys(run, [low.start, low.end, high.start])
     assert np.abs(storeys.drift[-1, 1]) > 0.05
     assert_near(storeys.shear[1:], np.column_stack([base_shear(run)[1:]] * 2))
 
@@ -199,9 +200,9 @@ def test_rotations_of_a_mechanism(mechanism):
     """
     path, _, h, M = mechanism
     left = path.scene["left"]
-    drift = path.storeys([left.start, left.end]).drift[-1, 0]
+    drift = st.storeys(path, [left.start, left.end]).drift[-1, 0]
     rotation = math.asin(drift / h)
-    table = path.hinges({"IO": 0.1, "LS": 0.2, "CP": 0.5})
+    table = st.hinge_table(path, {"IO": 0.1, "LS": 0.2, "CP": 0.5})
     assert drift > 0.9
     assert len(table.rows) == 4
     for row in table.rows:
@@ -216,16 +217,18 @@ def test_rotations_of_a_mechanism(mechanism):
 
 def test_the_sequence_of_hinges_is_that_of_events(mechanism):
     path, events, *_ = mechanism
-    found = {(str(row.where), row.time) for row in path.hinges().rows}
+    found = {(str(row.where), row.time) for row in st.hinge_table(path).rows}
     assert found == {(str(event.where), event.time) for event in events.found}
-    assert [row.n for row in path.hinges().rows] == sorted(row.n for row in path.hinges().rows)
+    assert [row.n for row in st.hinge_table(path).rows] == sorted(
+        row.n for row in st.hinge_table(path).rows
+    )
 
 
 def test_a_storey_of_a_path_bears_its_load(mechanism):
     """To round-off of stresses with GA = 1e12 N, 1e-4 N."""
     path, *_ = mechanism
     left = path.scene["left"]
-    storeys = path.storeys([left.start, left.end])
+    storeys = st.storeys(path, [left.start, left.end])
     assert_near(storeys.shear[:, 0], 1e3 * path.factor, 1e-8)
     assert "drift at load factor [-]" in storeys.columns()
 
@@ -241,7 +244,7 @@ def test_ductility_and_plastic_rotation_of_a_spring():
     turned = ub.PrescribedDisplacement(beam.start, u=0.0, v=0.0, psi=lambda t: φ * math.sin(t))
     scene = ub.Scene([beam], supports=[turned], connectors=[spring])
     run = ub.simulate(scene, ub.Static(), t=(0, math.pi / 2), dt=math.pi / 80)
-    (row,) = run.hinges({"IO": 0.02, "CP": 0.03}).rows
+    (row,) = st.hinge_table(run, {"IO": 0.02, "CP": 0.03}).rows
     plastic = (φ - My / k) * k / (k + H)
     assert row.where == spring
     assert row.time == pytest.approx(math.asin(My / k / φ), abs=math.pi / 80)

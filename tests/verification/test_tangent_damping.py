@@ -11,6 +11,7 @@ from scenes import clamped
 from scipy.integrate import solve_ivp
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*it resists rigid turning and flow")
 
@@ -149,7 +150,7 @@ YIELDING = {
     "hardening": {"bending": ub.ElastoPlastic(3.0, kinematic=5.0)},
     "perfect": {"bending": ub.ElastoPlastic(3.0)},
     "hinge": {"hinge": ub.Softening(3.0, 5.0)},
-    "interaction": {"interaction": ub.AxialBending(15.0, 4.0)},
+    "interaction": {"interaction": st.AxialBending(15.0, 4.0)},
 }
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 E, A, I = 1e9, 10e-4, 1e-8  # Pa, m², m⁴
 H = np.sqrt(12 * I / A)  # m
@@ -66,8 +67,8 @@ def decrement(solution, corner):
     """Mean over the eight periods after the impulse, of halves of a maximum and a minimum."""
     free = solution.times > IMPULSE.times[-1]
     t, u = solution.times[free], solution.displacement(corner)[free, 0]
-    (times, highest), (_, lowest) = (ub.peaks(t, x, prominence=0.2) for x in (u, -u))
-    return ub.fit_decay(times[:9], (highest[:9] + lowest[:9]) / 2).decrement
+    (times, highest), (_, lowest) = (st.peaks(t, x, prominence=0.2) for x in (u, -u))
+    return st.fit_decay(times[:9], (highest[:9] + lowest[:9]) / 2).decrement
 
 
 def test_the_first_decrement_of_table_2():

@@ -299,7 +299,7 @@ class PathCorrector:
         if not math.isfinite(size) or not self.size(motion) > 0:
             raise StepFailed(
                 "nothing moves with the load factor here. If forces change without motion, as in "
-                "a straight heated beam between fixed ends, give an imperfection, ub.imperfect, or "
+                "a straight heated beam between fixed ends, give an imperfection, st.imperfect, or "
                 "use simulate(scene, Static(), ...). Otherwise let a load or a motion continue to "
                 "change, as with amplitude=lambda t: t"
             )

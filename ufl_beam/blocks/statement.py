@@ -66,7 +66,7 @@ class Equations(NamedTuple):
         predicted: Strains that the latest tangent of a static step predicts.
 
     Example:
-        >>> ub.Equations([[0.0, 9.81, 0.0]]).stored  # N, on one place
+        >>> ub.extend.Equations([[0.0, 9.81, 0.0]]).stored  # N, on one place
         {}
     """
 
@@ -203,7 +203,7 @@ class Statement(ABC):
     Example:
         >>> from dataclasses import dataclass
         >>> @dataclass(frozen=True)
-        ... class Tether(ub.Statement):
+        ... class Tether(ub.extend.Statement):
         ...     nodes = 2
         ...     numbers = "k", "length"  # N/m, m
         ...

@@ -73,7 +73,7 @@ def _require_of_user(effect: Effect) -> None:
     """Raise :class:`ModelError` if a statement has members that users cannot have."""
     statement, kind = effect.statement, type(effect.statement)
     if not isinstance(statement, Statement):
-        raise ModelError(f"{effect}: {kind.__name__} must be a class derived from ub.Statement")
+        raise ModelError(f"{effect}: {kind.__name__} must be derived from ub.extend.Statement")
     for name in sorted(vars(Statement).keys() - {*OF_USERS}):
         if not name.startswith("_") and getattr(kind, name) is not getattr(Statement, name):
             raise ModelError(

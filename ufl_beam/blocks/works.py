@@ -250,7 +250,7 @@ class OfUser(Statement):
         if not isinstance(made, Sequence) or not all(isinstance(x, Equations) for x in made):
             raise ModelError(
                 f"{self.label}: equations returned {shorten(returned)}; it must return "
-                "ub.Equations, or several of them"
+                "ub.extend.Equations, or several of them"
             )
         number, states = self.inner.nodes, [name for one in made for name in one.state]
         for one in made:

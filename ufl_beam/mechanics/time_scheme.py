@@ -29,7 +29,7 @@ class Step(NamedTuple):
     """Time step of a scheme: its ends, and the times of loads and prescribed motions.
 
     Example:
-        >>> step = ub.Step.create(ub.EnergyMomentum(), 0.0, 0.1, 0.1, np.zeros(3))
+        >>> step = ub.extend.Step.create(ub.EnergyMomentum(), 0.0, 0.1, 0.1, np.zeros(3))
         >>> step.load_time, step.motion_time, step.dt  # s
         (0.05, 0.1, 0.1)
     """
@@ -187,7 +187,7 @@ class DynamicScheme(Scheme, Protocol):
     Example:
         >>> from dataclasses import dataclass
         >>> @dataclass(frozen=True)
-        ... class Mine(ub.EnergyMomentumBase, ub.MidpointDynamics):
+        ... class Mine(ub.extend.EnergyMomentumBase, ub.extend.MidpointDynamics):
         ...     alpha = 0.0
         >>> ub.simulate(scene, Mine(), t=(0, 1), dt=0.1)
         Traceback (most recent call last):

@@ -319,7 +319,7 @@ class EnergyMomentumBase(_ForcesOverStep):
 
     Example:
         >>> schemes = ub.EnergyMomentum, ub.EnergyMomentumStatic
-        >>> [issubclass(scheme, ub.EnergyMomentumBase) for scheme in schemes]
+        >>> [issubclass(scheme, ub.extend.EnergyMomentumBase) for scheme in schemes]
         [True, True]
     """
 
@@ -393,7 +393,7 @@ class MidpointDynamics:
 
     Example:
         >>> schemes = ub.EnergyMomentumDecaying, ub.Newmark
-        >>> [issubclass(scheme, ub.MidpointDynamics) for scheme in schemes]
+        >>> [issubclass(scheme, ub.extend.MidpointDynamics) for scheme in schemes]
         [True, False]
     """
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 import inspect
+import math
 from abc import ABC
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -43,7 +44,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
     """Base of connector laws; a user's law is a frozen dataclass derived from it.
 
     The fields of the dataclass are the parameters of the law.  The methods use the functions of
-    ``ub.law_functions``.  A law defines an energy, a resistance, or both.  The force is the
+    ``ub.extend.law_functions``.  A law defines an energy, a resistance, or both.  The force is the
     derivative of the energy with respect to the motion, plus the resistance.  A positive force
     resists growth of the motion.  Work that is not stored is lost.  A friction law defines a limit
     instead, and optionally a sliding force: a constraint holds the motion until the constraint
@@ -63,14 +64,14 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
     Example:
         >>> from dataclasses import dataclass
         >>> @dataclass(frozen=True)
-        ... class Buffer(ub.ConnectorLaw):
+        ... class Buffer(ub.extend.ConnectorLaw):
         ...     stiffness: float  # N/m
         ...     cubic: float  # N/m³
         ...     damping: float  # N s²/m²
         ...     def energy(self, motion, state):
         ...         return self.stiffness * motion**2 / 2 + self.cubic * motion**4 / 4
         ...     def resistance(self, motion, rate, state, dt):
-        ...         return self.damping * ub.law_functions.absolute(rate) * rate
+        ...         return self.damping * ub.extend.law_functions.absolute(rate) * rate
         >>> buffer = ub.Slide(ub.ground(2, 0), beam.end, Buffer(1e6, 1e9, 1e4), axis=(0, 1))
         >>> caught = ub.Scene(
         ...     [beam], supports=scene.supports, loads=scene.loads, connectors=[buffer]
@@ -122,6 +123,14 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
         The arguments are the same as for :meth:`resistance`.
         """
         return self.limit(state)
+
+    @property
+    def elastic_rotation(self) -> tuple[float, float]:
+        """Elastic stiffness of a rotation (N m/rad), and its first limit (N m); NaN if unknown.
+
+        Tables of hinges compute plastic rotations and ductilities with them.
+        """
+        return math.nan, math.nan
 
     def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
         """Return increments of the variables over a backward-Euler step, in closed form.

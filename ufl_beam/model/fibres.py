@@ -5,17 +5,14 @@ from __future__ import annotations
 
 import math
 import struct
-from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
-from functools import cached_property, partial
-from typing import Annotated, Any, NamedTuple
+from functools import cached_property
+from typing import Annotated, NamedTuple
 from zlib import crc32
 
 import numpy as np
-import numpy.typing as npt
-import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import ModelError
@@ -24,7 +21,7 @@ from ufl_beam.model.checks import require_count, require_kind, require_number
 from ufl_beam.model.functions import Point
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import MaterialLaw, require_law, uniform
-from ufl_beam.model.records import Positive, Record
+from ufl_beam.model.records import Record
 from ufl_beam.model.shapes import Shape
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
@@ -320,30 +317,6 @@ class PlacedFibres:
 # -- distributions of yield stresses ------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Distribution(Record, ABC):
-    """Base of the distributions of a random quantity that is not negative.
-
-    Each cell and each spring draws from a random stream of its own.  The key of the stream is a
-    checksum of the ends of the beam and the number of the cell in the beam, or a checksum of the
-    places of the spring.  So values depend on neither the number of processes nor the order of
-    beams and springs, except of those between the same two points.
-    """
-
-    _: KW_ONLY
-    # The same seed gives the same values again.
-    seed: Annotated[int, partial(require_count, at_least=0)]
-
-    @abstractmethod
-    def _law(self) -> Any:
-        """Return the distribution of SciPy."""
-
-    def draw(self, n: int, key: tuple[int, ...]) -> npt.NDArray[np.float64]:
-        """Draw ``n`` independent values from the stream ``key``; negative values become 0; (n,)."""
-        stream = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
-        return np.asarray(np.maximum(self._law().rvs(n, random_state=stream), 0.0))
-
-
 def stream_keys(segments: Iterable[tuple[Point, Point]]) -> list[tuple[int, int]]:
     """Return a key for each pair of points: a checksum, and the number of earlier equal pairs."""
     seen: Counter[int] = Counter()
@@ -353,84 +326,3 @@ def stream_keys(segments: Iterable[tuple[Point, Point]]) -> list[tuple[int, int]
         keys.append((checksum, seen[checksum]))
         seen[checksum] += 1
     return keys
-
-
-@dataclass(frozen=True)
-class _ByMoments(Distribution):
-    """Base of the distributions with a mean and a standard deviation."""
-
-    mean: Positive
-    deviation: Positive
-
-
-class Normal(_ByMoments):
-    """Normal distribution; negative values become zero: such points yield at once.
-
-    Args:
-        mean: Mean; Pa for fibres, N or N m for resultants.
-        deviation: Standard deviation; same unit.
-        seed: Seed of the random streams; the same seed gives the same values again.
-
-    Raises:
-        ModelError: Mean or deviation is not positive, or the seed is not a whole number from 0.
-
-    Example:
-        >>> limit = ub.Normal(mean=355e6, deviation=25e6, seed=1)
-        >>> scattered = ub.Fibres(ub.ElastoPlastic(limit), number=16)
-    """
-
-    def _law(self) -> Any:
-        return scipy.stats.norm(self.mean, self.deviation)
-
-
-class TruncatedNormal(_ByMoments):
-    """Normal distribution with the arguments of :class:`Normal`, truncated to positive values.
-
-    By truncation the mean exceeds ``mean``, and the deviation is less than ``deviation``.
-
-    Example:
-        >>> limit = ub.TruncatedNormal(mean=30e6, deviation=20e6, seed=1)
-        >>> bool((limit.draw(100, (0, 0)) > 0).all())
-        True
-    """
-
-    def _law(self) -> Any:
-        return scipy.stats.truncnorm(-self.mean / self.deviation, np.inf, self.mean, self.deviation)
-
-
-class Lognormal(_ByMoments):
-    """Lognormal distribution with the arguments of :class:`Normal`.
-
-    Example:
-        >>> limit = ub.Lognormal(mean=355e6, deviation=25e6, seed=1)
-        >>> scattered = ub.Fibres(ub.ElastoPlastic(limit), number=16)
-    """
-
-    def _law(self) -> Any:
-        spread = np.sqrt(np.log1p((self.deviation / self.mean) ** 2))
-        return scipy.stats.lognorm(spread, scale=self.mean * np.exp(-(spread**2) / 2))
-
-
-@dataclass(frozen=True)
-class Weibull(Distribution):
-    """Weibull distribution of positive values, for strengths.
-
-    Args:
-        scale: Value that is exceeded with the probability exp(-1); Pa for fibres, N or N m for
-            resultants.
-        shape: Weibull modulus; a larger modulus means less scatter.
-        seed: Seed of the random streams; the same seed gives the same values again.
-
-    Raises:
-        ModelError: Scale or shape is not positive, or the seed is not a whole number from 0.
-
-    Example:
-        >>> limit = ub.Weibull(scale=355e6, shape=20.0, seed=1)
-        >>> scattered = ub.Fibres(ub.ElastoPlastic(limit), number=16)
-    """
-
-    scale: Positive
-    shape: Positive
-
-    def _law(self) -> Any:
-        return scipy.stats.weibull_min(self.shape, scale=self.scale)

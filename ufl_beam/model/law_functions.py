@@ -6,7 +6,7 @@ Arrays may be complex, because some derivatives are computed by complex steps: u
 operators ``+ - * /`` and ``**``.
 
 Example:
-    >>> f = ub.law_functions
+    >>> f = ub.extend.law_functions
     >>> print(f.positive(np.array([-1.0, 2.0])), f.absolute(np.array([-1.0, 2.0])))
     [0. 2.] [1. 2.]
 """

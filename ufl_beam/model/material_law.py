@@ -36,8 +36,8 @@ class MaterialLaw(ABC):
     """Base of the laws of material points; a user's law is a frozen dataclass derived from it.
 
     The fields of the dataclass are the parameters of the law.  The methods are called with arrays
-    and with UFL expressions; therefore they use the functions of ``ub.law_functions``.  Methods
-    read the elastic stiffness at the point from ``self.C``: EA, GA or EI of a resultant in a
+    and with UFL expressions; therefore they use ``ub.extend.law_functions``.  Methods read the
+    elastic stiffness at the point from ``self.C``: EA, GA or EI of a resultant in a
     :class:`Section`, Young's modulus of a fibre, or the stiffness of a :class:`Spring`.  A law with
     internal variables defines either :meth:`increments` or :meth:`residuals`.  Energies are per
     volume for fibres, per length for resultants, total for springs.  See docs/extending_laws.md.
@@ -58,7 +58,7 @@ class MaterialLaw(ABC):
     Example:
         >>> from dataclasses import dataclass
         >>> @dataclass(frozen=True)
-        ... class Dashpot(ub.MaterialLaw):
+        ... class Dashpot(ub.extend.MaterialLaw):
         ...     eta: float  # N m² s
         ...     variables = {"creep": 0.0}  # 1/m
         ...     def stress(self, strain, state):
@@ -302,7 +302,7 @@ def traced(law: object) -> AbstractContextManager[None]:
     return calling(f"{type(law).__name__}: it cannot be called with symbols of UFL", WRITTEN)
 
 
-WRITTEN = ". Laws are written with + - * / ** and the functions of ub.law_functions"
+WRITTEN = ". Laws are written with + - * / ** and the functions of ub.extend.law_functions"
 """Advice in the errors of laws that cannot be called."""
 
 

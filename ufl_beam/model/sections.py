@@ -7,26 +7,22 @@ Units are SI: N, N m², kg/m, kg m.
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import KW_ONLY, dataclass, field, replace
-from difflib import get_close_matches
-from functools import cache, partial
-from pathlib import Path
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ModelError, shorten
+from ufl_beam.errors import ModelError, Moved
 from ufl_beam.model import plausibility
 from ufl_beam.model.checks import (
     require_all,
     require_array,
     require_kind,
     require_number,
-    require_text,
 )
 from ufl_beam.model.fibres import Fibres, PlacedFibres, SectionPoints, by_class
 from ufl_beam.model.material_law import MaterialLaw, require_law
@@ -34,11 +30,7 @@ from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 from ufl_beam.model.shapes import (
     Shape,
-    Walls,
-    box_walls,
-    flanged,
     rounded_rectangle,
-    thin_walled_shear_area,
 )
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
@@ -66,7 +58,7 @@ class Section(Record):
         fibres: Fibres with their positions, instead of laws of resultants and of the hinge.  They
             come from :meth:`of_fibres`, or from shapes such as :meth:`rectangle`.
         shape: Shape of a homogeneous section, with its area and moduli, such as ``shape.Wpl``.  It
-            comes from constructors such as :meth:`steel`.
+            comes from constructors such as :meth:`rectangle`, or :func:`structures.steel`.
         interaction: Law of N and M together, such as :class:`AxialBending`, instead of laws of
             single resultants, the hinge and fibres.
 
@@ -78,9 +70,8 @@ class Section(Record):
         >>> plate = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
         >>> pipe = ub.Section.tube(d=0.2, t=0.01, E=210e9, nu=0.3, rho=7850.0)
         >>> own = ub.Section(EA=4.2e9, GA=1.3e9, EI=1.4e7, rhoA=157.0, rhoI=0.5)
-        >>> column = ub.Section.steel("HEB 200")
-        >>> print(f"{plate.EI:.3g} {pipe.EI:.3g} {own.EI:.3g} {column.EI:.3g}")  # N m²
-        1.4e+07 5.67e+06 1.4e+07 1.2e+07
+        >>> print(f"{plate.EI:.3g} {pipe.EI:.3g} {own.EI:.3g}")  # N m²
+        1.4e+07 5.67e+06 1.4e+07
     """
 
     EA: Positive
@@ -98,6 +89,13 @@ class Section(Record):
     interaction: Annotated[MaterialLaw | None, partial(require_law, interaction=True)] = None
     shape: Instance[Shape | None] = None
     massless_by_default: bool = field(init=False, repr=False)
+
+    steel = Moved("ufl_beam.structures.steel")
+    box = Moved("ufl_beam.structures.box")
+    i_shape = Moved("ufl_beam.structures.i_shape")
+    channel = Moved("ufl_beam.structures.channel")
+    t_shape = Moved("ufl_beam.structures.t_shape")
+    of_sectionproperties = Moved("ufl_beam.structures.of_sectionproperties")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -322,7 +320,7 @@ class Section(Record):
 
         ``material`` are arguments of :meth:`of_shape`; the shear factor is 5/6 by default.
         """
-        _require_positive("Section.rectangle", b=b, h=h)
+        require_positive("Section.rectangle", b=b, h=h)
         return cls.of_shape(rounded_rectangle(b, h, 0.0), **{"shear_factor": 5 / 6} | material)
 
     @classmethod
@@ -331,7 +329,7 @@ class Section(Record):
 
         ``material`` are arguments of :meth:`of_shape`; the shear factor is 9/10 by default.
         """
-        _require_positive("Section.circle", d=d)
+        require_positive("Section.circle", d=d)
         return cls.of_shape(rounded_rectangle(d, d, d / 2), **{"shear_factor": 9 / 10} | material)
 
     @classmethod
@@ -341,204 +339,16 @@ class Section(Record):
         ``material`` are arguments of :meth:`of_shape`; the shear factor is 1/2 by default, by
         Cowper (1966) for thin walls and Poisson's ratio 0.
         """
-        _require_positive("Section.tube", d=d, t=t)
+        require_positive("Section.tube", d=d, t=t)
         if 2 * t > d:
             raise ModelError(
                 f"Section.tube: wall t = {t} m is thicker than the radius of d = {d} m"
             )
         return cls.of_shape(rounded_rectangle(d, d, d / 2, t), **{"shear_factor": 1 / 2} | material)
 
-    @classmethod
-    def box(cls, b: float, h: float, t: float, r: float = 0.0, **material: Any) -> Section:
-        """Create a rectangular hollow section: width b, depth h, wall t, outer corner radius r; m.
 
-        The inner radius is r - t, or 0.  ``material`` are arguments of :meth:`of_shape`; the shear
-        factor is by default that of Cowper (1966) for thin walls and Poisson's ratio 0.
-        """
-        _require_positive("Section.box", b=b, h=h, t=t)
-        require_number(r, "Section.box: r", at_least=0.0)
-        if material.get("axis") == "weak":
-            b, h, material = h, b, material | {"axis": "strong"}
-        if 2 * t >= min(b, h):
-            raise ModelError(f"Section.box: two walls do not fit: b = {b}, h = {h}, t = {t} m")
-        if 2 * r > min(b, h):
-            raise ModelError(f"Section.box: r = {r} m does not fit: b = {b}, h = {h} m")
-        return cls._thin_walled(rounded_rectangle(b, h, r, t), box_walls(b, h, t), material)
-
-    @classmethod
-    def i_shape(
-        cls, h: float, b: float, tw: float, tf: float, r: float = 0.0, **material: Any
-    ) -> Section:
-        """Create a symmetric I: depth h, width b, thickness tw of the web and tf of the flanges; m.
-
-        ``r`` is the radius of the fillets between web and flanges; m.  ``material`` are arguments
-        of :meth:`of_shape`.  By default the shear area is ``tw (h - tf)``, the web, or
-        ``5/3 b tf``, the flanges, about the weak axis.
-        """
-        shape, _ = cls._flanged("I", h, b, tw, tf, r)
-        area = 5 / 3 * b * tf if material.get("axis") == "weak" else tw * (h - tf)
-        return cls.of_shape(shape, **{"shear_factor": area / shape.A} | material)
-
-    @classmethod
-    def channel(
-        cls, h: float, b: float, tw: float, tf: float, r: float = 0.0, **material: Any
-    ) -> Section:
-        """Create a channel with parallel flanges, with the dimensions of :meth:`i_shape`.
-
-        About the weak axis, the web is to the right of the direction of the beam.  ``material`` are
-        arguments of :meth:`of_shape`; the shear factor is by default that of Cowper (1966) for thin
-        walls and Poisson's ratio 0.
-        """
-        return cls._thin_walled(*cls._flanged("C", h, b, tw, tf, r), material)
-
-    @classmethod
-    def t_shape(
-        cls, h: float, b: float, tw: float, tf: float, r: float = 0.0, **material: Any
-    ) -> Section:
-        """Create a T: depth h with the flange of width b and thickness tf, thickness tw of the web.
-
-        The flange is to the left of the direction of the beam; ``r`` is the radius of the fillets;
-        m.  ``material`` are arguments of :meth:`of_shape`; the shear factor is by default that of
-        Cowper (1966) for thin walls and Poisson's ratio 0.
-        """
-        return cls._thin_walled(*cls._flanged("T", h, b, tw, tf, r), material)
-
-    @classmethod
-    def _flanged(
-        cls, kind: str, h: float, b: float, tw: float, tf: float, r: float
-    ) -> tuple[Shape, Walls]:
-        name = {"I": "i_shape", "C": "channel", "T": "t_shape"}[kind]
-        _require_positive(f"Section.{name}", h=h, b=b, tw=tw, tf=tf)
-        require_number(r, f"Section.{name}: r", at_least=0.0)
-        if (2 * tf if kind != "T" else tf) >= h or tw > b:
-            raise ModelError(
-                f"Section.{name}: web and flanges do not fit: h = {h}, b = {b}, tw = {tw}, "
-                f"tf = {tf} m"
-            )
-        across = b - tw if kind == "C" else (b - tw) / 2
-        along = h - tf if kind == "T" else h / 2 - tf
-        if r > min(across, along):
-            raise ModelError(
-                f"Section.{name}: r = {r} m; the fillets have room for {min(across, along):.4g} m"
-            )
-        return flanged(kind, h, b, tw, tf, r)
-
-    @classmethod
-    def _thin_walled(cls, shape: Shape, walls: Walls, material: dict[str, Any]) -> Section:
-        if material.get("axis") == "weak":
-            walls = [(1j * start, 1j * end, t) for start, end, t in walls]
-        factor = thin_walled_shear_area(walls) / shape.A
-        return cls.of_shape(shape, **{"shear_factor": factor} | material)
-
-    @classmethod
-    def steel(cls, designation: str, **material: Any) -> Section:
-        """Create a rolled or hollow steel section of a standard series from its designation.
-
-        The series are IPE, HEA, HEB, HEM, UPE and the American W and HSS; upper or lower case and
-        spaces do not matter, and "HE 200 B" is "HEB 200".  The constructor is :meth:`i_shape`,
-        :meth:`channel`, :meth:`box` or :meth:`tube`, with root and corner radii.
-
-        Args:
-            designation: Designation, such as "IPE 300", "W14X90" or "HSS8X4X1/4".
-            material: Arguments of :meth:`of_shape`.  By default E = 210e9 Pa and nu = 0.3 (EN
-                1993-1-1, 3.2.6), and rho = 7850 kg/m³.
-
-        Raises:
-            ModelError: The designation is unknown; the message lists similar ones.
-
-        Example:
-            >>> ipe = ub.Section.steel("IPE 300").shape
-            >>> print(f"{1e4 * ipe.A:.2f} cm², {1e8 * ipe.I:.0f} cm⁴, {1e6 * ipe.Wpl:.1f} cm³")
-            53.81 cm², 8356 cm⁴, 628.4 cm³
-            >>> girder = ub.Section.steel("W14X90", axis="weak", E=200e9)
-        """
-        require_text(designation, "Section.steel: designation")
-        name = "".join(designation.upper().replace("×", "X").split())
-        name = re.sub(r"^HE(\d+)([ABM])$", r"HE\2\1", name)
-        table = _steel_table()
-        if name not in table:
-            similar = ", ".join(_similar(name, table))
-            raise ModelError(
-                f"Section.steel: designation {designation!r} is not in the table of IPE, HEA, HEB, "
-                f"HEM, UPE, W and HSS; similar designations are {similar}"
-            )
-        kind, sizes = table[name]
-        material = {"E": 210e9, "nu": 0.3, "rho": 7850.0} | material
-        if kind == "box":
-            return cls.box(*sizes, **material)
-        if kind == "tube":
-            return cls.tube(*sizes, **material)
-        return (cls.i_shape if kind == "I" else cls.channel)(*sizes, **material)
-
-    @classmethod
-    def of_sectionproperties(cls, analysed: Any, *, axis: str = "x", **laws: Any) -> Section:
-        """Create a section from a cross-section of any shape, analysed by sectionproperties.
-
-        Its results give EA, EI, GA and the mass.  GA is E A_s / (2 (1 + ν)), with the mean ν of
-        several materials; the rotary inertia is the mass times EI/EA.
-
-        Args:
-            analysed: ``Section`` of the package sectionproperties with materials, after
-                ``calculate_geometric_properties`` and ``calculate_warping_properties``.  Its
-                coordinates are in m, moduli in Pa, densities in kg/m³.
-            axis: Axis of bending: "x" for a plane of motion along its y, "y" for one along its x.
-            laws: ``axial``, ``shear``, ``bending``, ``hinge``, ``interaction`` of :class:`Section`.
-
-        Raises:
-            ModelError: The cross-section is not analysed or has no materials, or its x and y are
-                not principal axes.
-        """
-        what = "Section.of_sectionproperties"
-        if not type(analysed).__module__.startswith("sectionproperties."):
-            raise ModelError(
-                f"{what}: analysed = {shorten(analysed)} must be a Section of the package "
-                "sectionproperties (pip install sectionproperties)"
-            )
-        if axis not in ("x", "y"):
-            raise ModelError(f'{what}: axis = {axis!r} must be "x" or "y"')
-        try:
-            EA, EI, mass = analysed.get_ea(), analysed.get_eic(), analysed.get_mass()
-            EA_s, nu = analysed.get_eas(), analysed.get_nu_eff()
-        except (AttributeError, RuntimeError) as error:
-            raise ModelError(
-                f"{what}: give the geometry materials, and calculate geometric and warping "
-                f"properties: {error}"
-            ) from None
-        if abs(EI[2]) > 1e-6 * max(EI[:2]):
-            raise ModelError(f"{what}: x and y are not principal axes; rotate the geometry to them")
-        x0, x1, y0, y1 = analysed.geometry.calculate_extents()
-        own, depth, shear = (EI[0], y1 - y0, EA_s[1]) if axis == "x" else (EI[1], x1 - x0, EA_s[0])
-        return cls(
-            EA=EA, GA=shear / (2 * (1 + nu)), EI=own, rhoA=mass, rhoI=mass * own / EA,
-            depth=depth, **laws,
-        )  # fmt: skip
-
-
-def _similar(name: str, table: Iterable[str]) -> list[str]:
-    """Return five designations of the same series, with the nearest sizes."""
-
-    def series_and_size(name: str) -> tuple[str, float]:
-        series, size = re.match(r"([A-Z]*)(\d*)", name).groups()  # type: ignore[union-attr]
-        return series, float(size or 0)
-
-    series, size = series_and_size(name)
-    others = [other for other in table if series_and_size(other)[0] == series]
-    nearest = sorted(others, key=lambda other: abs(series_and_size(other)[1] - size))[:5]
-    return nearest or get_close_matches(name, table, n=5, cutoff=0.0)
-
-
-@cache
-def _steel_table() -> dict[str, tuple[str, tuple[float, ...]]]:
-    """Return the kind and the dimensions (m) of each designation."""
-    rows = [
-        line.split(",")
-        for line in Path(__file__).with_name("steel_shapes.csv").read_text("utf-8").splitlines()
-        if not line.startswith("#")
-    ]
-    return {name: (kind, tuple(float(mm) / 1000 for mm in sizes)) for name, kind, *sizes in rows}
-
-
-def _require_positive(owner: str, **sizes: float) -> None:
+def require_positive(owner: str, **sizes: float) -> None:
+    """Raise :class:`ModelError` unless all sizes are positive."""
     for name, value in sizes.items():
         require_number(value, f"{owner}: {name}", positive=True)
 

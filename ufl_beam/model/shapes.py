@@ -20,7 +20,6 @@ from ufl_beam.arrays import Array, Complex
 from ufl_beam.errors import ModelError
 from ufl_beam.model.checks import require_array, require_sequence
 from ufl_beam.model.records import Record
-from ufl_beam.quadrature import gauss_rule
 
 Loop = tuple[tuple[float, float, float], ...]
 """Corners (x, y, radius) of a closed polygon before they are rounded; m."""
@@ -74,7 +73,7 @@ class Shape(Record):
             lines cross each other, or a hole is outside of the shape.
 
     Example:
-        >>> girder = ub.Shape(  # welded, with a wide flange below
+        >>> girder = st.Shape(  # welded, with a wide flange below
         ...     [(-0.2, 0), (0.2, 0), (0.2, 0.03), (0.006, 0.03), (0.006, 0.6), (0.15, 0.6),
         ...      (0.15, 0.62), (-0.15, 0.62), (-0.15, 0.6), (-0.006, 0.6), (-0.006, 0.03),
         ...      (-0.2, 0.03)]
@@ -318,12 +317,6 @@ def _pieces(loop: Sequence[Sequence[float]]) -> list[Piece]:
 
 # -- shapes of rolled and welded steel ----------------------------------------------------------
 
-Walls = list[tuple[complex, complex, float]]
-"""Middle lines of thin walls: start x + iy, end and thickness; m.  A wall begins where others end.
-
-The shear flow is zero where nothing ends, and at the ends of the last walls by symmetry.
-"""
-
 
 @lru_cache(maxsize=256)
 def rounded_rectangle(b: float, h: float, r: float, t: float = 0.0) -> Shape:
@@ -334,59 +327,3 @@ def rounded_rectangle(b: float, h: float, r: float, t: float = 0.0) -> Shape:
 
     hollow = 0.0 < 2 * t < min(b, h)
     return Shape(corners(b, h, r), [corners(b - 2 * t, h - 2 * t, max(r - t, 0))] if hollow else ())
-
-
-@lru_cache(maxsize=256)
-def flanged(kind: str, h: float, b: float, tw: float, tf: float, r: float) -> tuple[Shape, Walls]:
-    """Create an "I", a "T" with its flange above, or a channel "C" with its web on the left.
-
-    ``r`` (m) is the radius of the fillets between web and flanges.
-    """
-    left, web, right = (-b / 2, -tw / 2, b / 2) if kind != "C" else (-b / 2, -b / 2, b / 2)
-    face, rim = h / 2 - tf, h / 2
-    half = [(web + tw, face, r), (right, face, 0.0), (right, rim, 0.0)]
-    half += [(left, rim, 0.0), (left, face, 0.0), (web, face, r)][: 1 if kind == "C" else 3]
-    foot = [(x, -y, radius) for x, y, radius in half[::-1]]
-    if kind == "T":
-        foot = [(web, -rim, 0.0), (web + tw, -rim, 0.0)]
-    middle, top = complex(web + tw / 2), complex(web + tw / 2, (face + rim) / 2)
-    tips = (left, right) if kind != "C" else (right,)
-    flange: Walls = [(complex(x, top.imag), top, tf) for x in tips]
-    if kind == "T":
-        return Shape(foot + half), [*flange, (complex(0, -rim), top, tw)]
-    below = [(start.conjugate(), end.conjugate(), t) for start, end, t in flange]
-    return Shape(foot + half), [*flange, *below, (top, middle, tw), (top.conjugate(), middle, tw)]
-
-
-def box_walls(b: float, h: float, t: float) -> Walls:
-    """Return the walls of a rectangular hollow section that bends in the plane of ``h``; m."""
-    x, y = (b - t) / 2, (h - t) / 2
-    return [
-        wall
-        for i in (-1, 1)
-        for j in (-1, 1)
-        for wall in (
-            (complex(0, j * y), complex(i * x, j * y), t),
-            (complex(i * x, j * y), complex(i * x, 0), t),
-        )
-    ]
-
-
-def thin_walled_shear_area(walls: Walls) -> float:
-    """Return the shear area A_s = I² / ∫ (S²/t) ds, with the first moment S of the shear flow; m².
-
-    This is the shear coefficient of Cowper (J. Appl. Mech. 33, 1966, p. 335) for thin walls and
-    Poisson's ratio 0.
-    """
-    area = sum(abs(end - start) * t for start, end, t in walls)
-    centre = sum(abs(end - start) * t * (start + end).imag / 2 for start, end, t in walls) / area
-    nodes, weights = gauss_rule(3)
-    inflow: dict[complex, float] = {}
-    energy = I = 0.0
-    for start, end, t in walls:
-        length, y0, y1 = abs(end - start), start.imag - centre, end.imag - centre
-        S = inflow.get(start, 0.0) + t * length * (y0 * nodes + (y1 - y0) * nodes**2 / 2)
-        energy += length * float(weights @ S**2) / t
-        I += length * t * (y0**2 + y0 * y1 + y1**2) / 3
-        inflow[end] = inflow.get(end, 0.0) + inflow.get(start, 0.0) + t * length * (y0 + y1) / 2
-    return I**2 / energy

@@ -48,7 +48,7 @@ class SofteningLaw(ABC):
     """Base of the softening laws of hinges, cracks and springs.
 
     A user's law is a frozen dataclass, whose fields are its parameters.  Its methods are called
-    with arrays and with UFL expressions; therefore they use the functions of ``ub.law_functions``.
+    with arrays and with UFL expressions; therefore they use ``ub.extend.law_functions``.
     The traction must be positive at zero opening and vanish at large openings.  It may rise before
     it falls.  Tractions are in N m, N or Pa, openings in rad or m.  See docs/extending_laws.md.
 
@@ -60,7 +60,7 @@ class SofteningLaw(ABC):
     Example:
         >>> from dataclasses import dataclass
         >>> @dataclass(frozen=True)
-        ... class PowerLaw(ub.SofteningLaw):
+        ... class PowerLaw(ub.extend.SofteningLaw):
         ...     limit: float  # N m
         ...     width: float  # rad
         ...     n: float
@@ -299,7 +299,7 @@ def _require_not_negative(kind: str, jumps: Array, t: Array) -> None:
         raise ModelError(
             f"{kind}: its traction is {t[negative][0]:.6g} at the opening "
             f"{jumps[negative][0]:.6g}, where it would drive the opening; let the traction end "
-            "at zero, for example by ub.law_functions.positive"
+            "at zero, for example by ub.extend.law_functions.positive"
         )
 
 

@@ -207,7 +207,8 @@ def _require_statement(statement: Any, what: str) -> None:
     kind = type(statement)
     if isinstance(statement, type) or not callable(getattr(statement, "equations", None)):
         raise ModelError(
-            f"{what} = {shorten(statement)} must be an object of a class derived from ub.Statement"
+            f"{what} = {shorten(statement)} must be an object of a class derived from "
+            "ub.extend.Statement"
         )
     if not is_dataclass(statement) or "__hash__" not in vars(kind) or kind.__hash__ is None:
         raise ModelError(
@@ -240,12 +241,12 @@ class Effect(Record):
     Example:
         >>> from dataclasses import dataclass
         >>> @dataclass(frozen=True)
-        ... class Drag(ub.Statement):
+        ... class Drag(ub.extend.Statement):
         ...     numbers = ("c",)  # N s/m, or N s/m² along beams
         ...
         ...     def equations(self, at):
         ...         force = [at["c"] * at.v[0][0], at["c"] * at.v[0][1], 0.0]
-        ...         return ub.Equations([force], lost={"drag": at.work([force])})
+        ...         return ub.extend.Equations([force], lost={"drag": at.work([force])})
         >>> air = ub.Effect(Drag(), beams=[beam], numbers={"c": 2.0})
         >>> sail = ub.Effect(Drag(), places=[beam.end], numbers={"c": 5.0})
         >>> kick = ub.Velocity((beam,), linear=(0.0, 30.0))  # m/s

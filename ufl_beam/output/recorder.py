@@ -200,7 +200,7 @@ class Recorder(ABC):
         by_itself: True if an open recorder needs no calls of :meth:`write`.
 
     Example:
-        >>> class Speed(ub.Recorder):
+        >>> class Speed(ub.extend.Recorder):
         ...     def open(self, simulation):
         ...         self.largest = 0.0
         ...     def write(self, simulation):
@@ -276,7 +276,7 @@ def checked_recorders(
     for i, recorder in enumerate(recorders):
         name = f"record[{i}]"
         if not isinstance(recorder, Recorder):
-            remedy = "derive your own classes from ub.Recorder"
+            remedy = "derive your own classes from ub.extend.Recorder"
             if isinstance(recorder, type):
                 remedy = f"create one, recorder = {recorder.__name__}(...), before the run"
             raise ArgumentError(f"{call}: {name} = {shorten(recorder)} is not a Recorder; {remedy}")

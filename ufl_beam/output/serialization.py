@@ -16,7 +16,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from pkgutil import iter_modules
 from types import CodeType, FunctionType, MethodType, ModuleType
@@ -28,6 +28,7 @@ from ufl_beam.errors import ArgumentError, ModelWarning, require_vector
 from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.functions import Spline, steady, still
+from ufl_beam.model.records import Record
 from ufl_beam.output.output_files import WrongReader
 
 Data = Any  # JSON data
@@ -112,8 +113,28 @@ RECORDS: dict[str, type] = {
     if isinstance(kind, type) and dataclasses.is_dataclass(kind)
 }
 RECORDS |= {kind.__name__: kind for kind in (SavedFunction, SavedCurve, LostFunction)}
+STRUCTURES = "ufl_beam.structures"
 # Objects that all scenes share
 KNOWN: dict[str, Any] = {"GROUND": GROUND, "HELD": RIGID, "steady": steady, "still": still}
+
+
+def is_record(kind: type) -> bool:
+    """Return whether files have objects of a class: dataclasses of the model, and further laws."""
+    further = kind.__module__.startswith(f"{STRUCTURES}.") and issubclass(kind, Record)
+    return further or RECORDS.get(kind.__name__) is kind
+
+
+def record_class(name: str) -> type:
+    """Return the class of objects in files; a law of ``ufl_beam.structures`` is imported."""
+    return RECORDS[name] if name in RECORDS else _further_records()[name]
+
+
+@cache
+def _further_records() -> dict[str, type]:
+    places = import_module(STRUCTURES).__path__
+    modules = [import_module(x.name) for x in iter_modules(places, f"{STRUCTURES}.")]
+    kinds = (kind for module in modules for kind in vars(module).values())
+    return {x.__name__: x for x in kinds if isinstance(x, type) and is_record(x)}
 
 
 def to_data(value: Any, sampling: Sampling | None = None) -> Data:
@@ -144,7 +165,7 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
                 return {"known": name}
         if id(value) not in indices:
             record = value
-            if RECORDS.get(type(value).__name__) is not type(value):
+            if not is_record(type(value)):
                 if callable(value):
                     known = sampling(owner, field, value) if sampling else None
                     record = LostFunction(function_name(value)) if known is None else known
@@ -160,7 +181,7 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
             }
             indices[id(value)] = len(records), value
             kind = type(record)
-            if RECORDS.get(kind.__name__) is not kind:
+            if not is_record(kind):
                 content["from"] = kind.__module__
             records.append({"is": kind.__qualname__, **content})
         return {"record": indices[id(value)][0]}
@@ -183,7 +204,7 @@ def require_no_code(data: Data) -> None:
 def add_new_fields(data: Data) -> Data:
     """Add the fields of the package's classes that are newer than the data, with their defaults."""
     for record in data["records"]:
-        kind = None if "from" in record else RECORDS.get(record["is"])
+        kind = None if "from" in record else record_class(record["is"])
         for field in dataclasses.fields(kind) if kind else ():
             made, missing = field.default_factory, dataclasses.MISSING
             value = field.default if made is missing else made()
@@ -214,7 +235,7 @@ def from_data(data: Data) -> Any:
         warnings.simplefilter("ignore", ModelWarning)
         for record in add_new_fields(data)["records"]:
             fields = {name: make(value) for name, value in record.items() if name != "is"}
-            kind = RECORDS[record["is"]]
+            kind = record_class(record["is"])
             known = {field.name for field in dataclasses.fields(kind) if field.init}
             if others := fields.keys() ^ known:
                 unlike = ", ".join(sorted(others))

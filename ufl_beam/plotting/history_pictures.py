@@ -5,23 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from itertools import cycle, product
 from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ufl_beam.analysis.modes import Shapes
-from ufl_beam.analysis.parameter_study import Study
-from ufl_beam.analysis.response_spectra import ResponseSpectrum
-from ufl_beam.analysis.tradeoff_result import Tradeoff
-from ufl_beam.display import TIME, html_page
+from ufl_beam.display import html_page
 from ufl_beam.errors import ArgumentError, require_all, require_number, require_row
 from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Place
-from ufl_beam.model.ground_motion import GroundMotion
-from ufl_beam.output.engineering_results import Storeys
 from ufl_beam.output.extremes import Extremes
-from ufl_beam.output.fatigue import Fatigue, HotSpot
 from ufl_beam.plotting import notebook, style, symbols
 from ufl_beam.plotting.frame_pictures import (
     MOST,
@@ -32,7 +25,7 @@ from ufl_beam.plotting.frame_pictures import (
     plane_canvas,
 )
 from ufl_beam.plotting.positions import evenly
-from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture, shade
+from ufl_beam.plotting.style import BLUE, GREY, INK, RED, SKY, picture, shade
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
 
@@ -51,13 +44,6 @@ COMPONENTS = {
 MOST_MODES, NUM_SHAPES = 6, 5  # numbers of modes, and of shapes of a solution, in a notebook
 VISIBLE = 0.1  # largest magnified displacement in a notebook, as a fraction of the scene's size
 FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # magnifications; more would show round-off
-LEAST_ERROR = 1e-12  # ratio of error to tolerance at which all smaller ratios are drawn
-SPECTRA = {
-    "pseudo_acceleration": " (m/s²)", "acceleration": " (m/s²)", "velocity": " (m/s)",
-    "displacement": " (m)", "ductility": "",
-}  # fmt: skip
-"""Units of the quantities of a response spectrum."""
-CLASSES = 40  # number of bins of stress ranges, and of mean stresses, in pictures of cycles
 
 
 def draw_shapes(
@@ -229,53 +215,6 @@ def shapes_page(shapes: Shapes) -> str:
     )
 
 
-def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
-    """Draw errors of all runs over their wall times, with a ring around the recommended run.
-
-    Each family of settings has a colour and a marker.  The line joins the runs that no other run
-    beats in both time and error.  Errors are divided by the tolerance, or by the largest magnitude
-    of the quantity if there is a budget.
-    """
-    errors = {run: max(tradeoff.ratio(run), LEAST_ERROR) for run in tradeoff.runs}
-    with style.panel(ax, (9.0, 6.0)) as axes:
-        looks = cycle(product("os^", (BLUE, RED, GREEN, ORANGE, PINK, SKY)))
-        for family, (name, look) in enumerate(zip(tradeoff.families, looks, strict=False)):
-            marker, color = look
-            runs = [run for run in tradeoff.runs if run.refinement.family == family]
-            axes.scatter(
-                [run.seconds for run in runs], [errors[run] for run in runs],
-                s=[30 + 12 * np.log2(run.cells) for run in runs],
-                marker=marker, color=color, alpha=0.75, lw=0, label=f"from {name}", zorder=3,
-            )  # fmt: skip
-        front, best = tradeoff.front, tradeoff.best
-        line = [run.seconds for run in front], [errors[run] for run in front]
-        axes.plot(*line, color=shade(INK), lw=1.2, zorder=2)
-        axes.plot(
-            best.seconds, errors[best], "o", ms=18, mfc="none", mec=shade(INK), mew=1.8, zorder=4
-        )
-        axes.set(xscale="log", yscale="log", xlabel="wall time of a run (s)")
-        axes.set_ylabel(f"error ({tradeoff.target.measure})")
-        axes.set_title(f"recommended: {best.setting}", loc="left", fontsize=style.font_size(11.0))
-        budget = tradeoff.target.budget
-        draw, bound = (axes.axvline, budget) if np.isfinite(budget) else (axes.axhline, 1.0)
-        draw(bound, color=GREY, ls="--", lw=1.2, zorder=1)
-        small = style.font_size(9.0)
-        style.draw_legend(
-            axes, ax, loc="outside lower center", ncols=2, fontsize=small, title="size: cells",
-            title_fontsize=small,
-        )  # fmt: skip
-    return style.parent_figure(axes)
-
-
-@html_page.register
-def tradeoff_page(result: Tradeoff) -> str:
-    """Write a trade-off as HTML: the runs that no other run beats, remarks, and a picture."""
-    head, *rows = result.table()
-    text = notebook.lines(result.title()) + notebook.table(head, rows)
-    text += notebook.lines(*result.remarks())
-    return text + notebook.image("errors over wall times", partial(draw_tradeoff, result))
-
-
 def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = None) -> Figure:
     """Draw maxima and minima of a section force on the undeformed frame, as two diagrams.
 
@@ -290,120 +229,3 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
     title = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}", until
     shape = plane_canvas(solution, [], 1.0, ax, MOST)[0].undeformed
     return draw_frame(ax, solution, -1, shape, title, quantity, diagrams)
-
-
-def draw_storeys(storeys: Storeys, *, quantity: str = "drift", ax: Axes | None = None) -> Figure:
-    """Draw the largest and least drift ratio or shear of each storey over the height."""
-    factor, prefix = style.decimal_prefix(float(np.nanmax(np.abs(storeys.shear))))
-    drift = quantity == "drift"
-    values = np.asarray(100 * storeys.ratio if drift else storeys.shear / factor)
-    label = "drift ratio (%)" if drift else f"storey shear ({prefix}N)"
-    edges = [place.point[1] for place in storeys.levels]
-    with style.panel(ax, (5.0, 6.0)) as axes:
-        axes.axvline(0.0, color=GREY, linewidth=1.0, zorder=1)
-        for name, extreme, color in (("largest", np.nanmax, RED), ("least", np.nanmin, BLUE)):
-            profile = np.repeat(extreme(values, axis=0), 2)
-            axes.plot(profile, np.repeat(edges, 2)[1:-1], color=color, label=name)
-        axes.set_yticks(edges)
-        axes.grid(axis="y", linewidth=0.8)
-        axes.set(xlabel=label, ylabel="y (m)")
-        style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
-    return style.parent_figure(axes)
-
-
-def draw_study(study: Study) -> Figure:
-    """Draw each result of a study over each number that its cases vary.
-
-    The largest magnitude of an array result is drawn; failed cases are omitted.
-    """
-    varied = {
-        name: np.array([case[name] for case in study.cases], dtype=float)
-        for name, value in (study.cases[0] if len(study) else {}).items()
-        if isinstance(value, int | float)
-    }
-    varied = {n: x for n, x in varied.items() if np.ptp(x) > 0 or len(varied) == 1}
-    if not varied or not study.results:
-        raise ArgumentError("plot: the study has no results over numbers of its cases")
-    rows, columns = len(study.results), len(varied)
-    with picture((max(6.0, 4.0 * columns), max(4.0, 2.6 * rows))) as figure:
-        panels_of = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
-        for panels, (result, values) in zip(panels_of, study.results.items(), strict=True):
-            sizes = np.abs(values.reshape(len(study), -1)).max(axis=1)
-            panels[0].set_ylabel(result)
-            for axes, x in zip(panels, varied.values(), strict=True):
-                axes.plot(x, sizes if values.ndim > 1 else values, "o", color=BLUE, ms=5.0)
-        for axes, name in zip(panels_of[-1], varied, strict=True):
-            axes.set_xlabel(name)
-    return figure
-
-
-def draw_motion(motion: GroundMotion) -> Figure:
-    """Draw acceleration, velocity and displacement of a ground motion over time."""
-    times, *histories = motion.histories
-    with picture((8.0, 6.0)) as figure:
-        panels = figure.subplots(3, 1, sharex=True)
-        names = "acceleration\n(m/s²)", "velocity\n(m/s)", "displacement\n(m)"
-        for axes, values, name in zip(panels, histories, names, strict=True):
-            style.time_axes(axes).plot(times, values, linewidth=1.2)
-            axes.set_ylabel(name)
-        panels[0].set_title(motion.name, loc="left")
-        panels[-1].set_xlabel(TIME.name)
-        figure.align_ylabels()
-    return figure
-
-
-def draw_spectrum(spectrum: ResponseSpectrum, quantity: str, ax: Axes | None = None) -> Figure:
-    """Draw one quantity of a response spectrum over the period."""
-    with style.panel(ax, (7.0, 4.2)) as axes:
-        axes.plot(spectrum.periods, getattr(spectrum, quantity))
-        axes.set_xlabel("period (s)")
-        axes.set_ylabel(f"{quantity.replace('_', '-')}{SPECTRA[quantity]}")
-        axes.set_ylim(bottom=0.0)
-        axes.grid(visible=True, linewidth=0.8)
-        axes.set_axisbelow(True)
-    return style.parent_figure(axes)
-
-
-def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
-    """Draw rainflow matrix, spectrum and damage of the stress cycles at a hot spot.
-
-    On the left is the rainflow matrix.  In the middle is the number of cycles above each range,
-    with the S-N curve.  On the right is the percentage of the damage by each bin of ranges.
-    """
-    from matplotlib.colors import LogNorm
-
-    cycles, curve = fatigue.cycles(place), fatigue.curve
-    if not len(cycles.range):
-        raise ArgumentError(f"plot: the stress at {place} never turned")
-    ranges, means = 1e-6 * cycles.range, 1e-6 * cycles.mean
-    done = cycles.count / curve.endurance(cycles.range, cycles.mean)
-    edges = np.linspace(0.0, ranges[-1] * (1 + 1e-9), CLASSES + 1)
-    with picture((13.0, 5.0)) as figure:
-        matrix, spectrum, damage = figure.subplots(1, 3, sharey=True, width_ratios=(1.25, 1, 0.8))
-        middle, half = (means.max() + means.min()) / 2, 0.6 * max(np.ptp(means), edges[-1] / 4)
-        columns = np.linspace(middle - half, middle + half, CLASSES + 1)
-        counts, _, _ = np.histogram2d(means, ranges, (columns, edges), weights=cycles.count)
-        colors = matrix.pcolormesh(
-            columns, edges, np.where(counts > 0, counts, np.nan).T,  # empty bins are white
-            norm=LogNorm(0.5, max(10.0, counts.max())), cmap="viridis_r", rasterized=True,
-        )  # fmt: skip
-        style.draw_bar(matrix, colors, "number")
-        matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)")
-        more = np.cumsum(cycles.count[::-1])[::-1]
-        reached = np.append(more[0], more), np.append(0.0, ranges)
-        spectrum.plot(*reached, color=BLUE, drawstyle="steps-post", label="reached")
-        some = np.linspace(edges[1] / 10, 1.1 * edges[-1], 1000)
-        spectrum.plot(
-            curve.endurance(1e6 * some), some, color=shade(INK), lw=1.4, ls="--", label="borne"
-        )
-        spectrum.set(xscale="log", xlabel="number of cycles")
-        spectrum.legend(loc="best")
-        total = done.sum()
-        fractions, _ = np.histogram(ranges, edges, weights=done / (total or 1.0))
-        damage.barh(edges[:-1], 100 * fractions, np.diff(edges), align="edge", color=RED, alpha=0.6)
-        damage.set(xlabel="part of the damage (%)")
-        matrix.set_ylim(0.0, 1.1 * edges[-1])
-        titles = "cycles", "spectrum and S-N curve", f"damage {total:.3g}"
-        for axes, title in zip((matrix, spectrum, damage), titles, strict=True):
-            axes.set_title(title, loc="left")
-    return figure

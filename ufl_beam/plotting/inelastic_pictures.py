@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ufl_beam.analysis.section_analysis import InteractionDiagram, MomentCurvature
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError
 from ufl_beam.model.bodies import AttachmentPoint, Place
 from ufl_beam.model.connector_laws import HingeLaw
 from ufl_beam.model.connectors import Connector, can_yield, law_of
-from ufl_beam.output.engineering_results import hinges_of, rotation_of
+from ufl_beam.output.hinge_histories import hinge_histories, require_limits, rotation_of
 from ufl_beam.output.history import breaking_law
 from ufl_beam.output.state_rows import HINGE, JUMP
 from ufl_beam.plotting import style
@@ -27,7 +26,6 @@ from ufl_beam.simulation.solution import Solution
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
     from ufl_beam.plotting.positions import DeformedShape
@@ -55,18 +53,22 @@ def open_hinges(
     ``at`` returns the drawn position of a place (m).  ``limits`` are acceptance limits of the
     plastic rotation by name (rad).
     """
+    require_limits(limits, "plot: limits")
     states, found = solution.subset(0, solution.index(n) + 1), []
-    for row in hinges_of(states, limits, None, solution.parameter).rows:
-        joint = isinstance(row.where, Place) and row.rotation != 0.0  # may have no strength
-        if math.isnan(row.rotation) or not (row.n >= 0 or joint):
+    for hinge in hinge_histories(states):
+        rotation = hinge.largest_rotation
+        joint = isinstance(hinge.where, Place) and rotation != 0.0  # may have no strength
+        if math.isnan(rotation) or not (hinge.first_yield >= 0 or joint):
             continue
-        law, fraction = _law(solution, row.where), math.nan
+        law, fraction = _law(solution, hinge.where), math.nan
         if law is not None and (law.limit == 0.0 or math.isfinite(law.fracture_energy)):
             # A hinge without strength is a joint.
-            fraction = min(row.dissipated / law.fracture_energy, 1.0) if law.limit else 1.0
-        place = row.where.b if isinstance(row.where, Connector) else row.where
-        rotation = abs(row.rotation if math.isnan(row.plastic) else row.plastic)
-        found.append(OpenHinge(place, np.array(at(place)), fraction, rotation, row.state))
+            lost = float(hinge.dissipated[-1])
+            fraction = min(lost / law.fracture_energy, 1.0) if law.limit else 1.0
+        place = hinge.where.b if isinstance(hinge.where, Connector) else hinge.where
+        plastic = hinge.largest_plastic
+        rotation = abs(rotation if math.isnan(plastic) else plastic)
+        found.append(OpenHinge(place, np.array(at(place)), fraction, rotation, hinge.state(limits)))
     return found
 
 
@@ -135,35 +137,6 @@ def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
     return style.parent_figure(axes)
 
 
-def draw_section_moments(result: MomentCurvature, *, ax: Axes | None = None) -> Figure:
-    """Draw moments (N m) of a section against curvatures (1/m); a dot marks the last state."""
-    with style.panel(ax, (8.0, 5.4)) as axes:
-        for at_zero in (axes.axhline, axes.axvline):
-            at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
-        axes.plot(result.curvature, result.moment, color=BLUE)
-        axes.plot(result.curvature[-1], result.moment[-1], "o", color=BLUE)
-        axes.set_xlabel("curvature K (1/m)")
-        _label_axis(axes.yaxis, result.moment, "bending moment M", "N m")
-        forces = [with_unit(N, "N") for N in (result.N.min(), result.N.max())]
-        axes.set_title(f"axial force {' to '.join(dict.fromkeys(forces))}", loc="left")
-    return style.parent_figure(axes)
-
-
-def draw_interaction(diagram: InteractionDiagram, *, ax: Axes | None = None) -> Figure:
-    """Draw axial forces (N) against moments (N m) at limit strains; compression is at the top."""
-    with style.panel(ax, (7.0, 6.0)) as axes:
-        for at_zero in (axes.axhline, axes.axvline):
-            at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
-        axes.plot(diagram.M, diagram.N, color=BLUE)
-        axes.fill(diagram.M, diagram.N, facecolor=(BLUE, 0.08), linewidth=0.0, zorder=0)
-        axes.yaxis.set_inverted(True)
-        _label_axis(axes.xaxis, diagram.M, "bending moment M", "N m")
-        _label_axis(axes.yaxis, diagram.N, "axial force N", "N")
-        ends = (with_unit(N, "N") for N in (diagram.N.min(), diagram.N.max()))
-        axes.set_title(f"axial force from {' to '.join(ends)}", loc="left")
-    return style.parent_figure(axes)
-
-
 def draw_hinge(solution: Solution, place: Place | Connector, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a hinge against its jump (rad), coloured by time.
 
@@ -199,7 +172,7 @@ def draw_hinge(solution: Solution, place: Place | Connector, *, ax: Axes | None 
             )
         _draw_path(axes, ax, solution, jump, M)
         rotation = "rotation" if isinstance(place, Connector) else "jump of rotation"
-        _label_axis(axes.xaxis, jump, rotation, "rad")
+        style.label_axis(axes.xaxis, jump, rotation, "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
         if law is not None and math.isfinite(law.fracture_energy):
             whole = law.fracture_energy
@@ -233,7 +206,7 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         label = "at the start, and supplied" if start else "supplied"
         axes.plot(t, supplied, color=shade(INK), label=label)
         axes.plot(t, inside, color=BLUE, label="in the scene")
-        _label_axis(axes.yaxis, np.concatenate([supplied, inside]), "energy", "J")
+        style.label_axis(axes.yaxis, np.concatenate([supplied, inside]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
         digits, power = f"{energy.worst:.1e}".split("e")
         worst = rf"${digits}\times10^{{{int(power)}}}$"
@@ -241,13 +214,6 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         axes.set_title(f"worst imbalance {worst} of {through} transferred", loc="left")
         style.draw_legend(axes, ax, loc="outside upper left", ncols=3)
     return style.parent_figure(axes)
-
-
-def _label_axis(axis: Axis, values: Array, quantity: str, unit: str) -> None:
-    """Label an axis in a unit with a prefix that suits the values; data stay in SI units."""
-    factor, prefix = style.decimal_prefix(float(np.max(np.abs(values))))
-    axis.set_major_formatter(lambda x, _: f"{x / factor:.6g}".replace("-", "−"))
-    axis.set_label_text(f"{quantity} ({prefix}{unit})")
 
 
 def _draw_path(axes: Axes, ax: Axes | None, solution: Solution, x: Array, M: Array) -> None:
@@ -269,6 +235,6 @@ def _draw_path(axes: Axes, ax: Axes | None, solution: Solution, x: Array, M: Arr
     for i, inside in ((0, WHITE), (-1, INK)):
         axes.plot(*path[i], "o", mfc=shade(inside), label=named.at(solution.times[i]), **ring)
     axes.autoscale_view()
-    _label_axis(axes.yaxis, M, "bending moment M", "N m")
+    style.label_axis(axes.yaxis, M, "bending moment M", "N m")
     style.draw_bar(axes, colors, named.progress)
     style.draw_legend(axes, ax, loc="outside upper left", ncols=2)

@@ -8,51 +8,26 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from ufl_beam.analysis.calibration_result import Calibration
-from ufl_beam.analysis.incremental_dynamics_result import DemandCurves
-from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
-from ufl_beam.analysis.pushover_result import Pushover
-from ufl_beam.analysis.response_spectra import ResponseSpectrum
-from ufl_beam.analysis.response_spectrum import SpectralResponse
-from ufl_beam.analysis.section_analysis import InteractionDiagram, MomentCurvature
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ArgumentError, shorten
-from ufl_beam.model.ground_motion import GroundMotion
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.sections import Section
-from ufl_beam.output.engineering_results import Storeys
 from ufl_beam.output.extremes import Extremes
-from ufl_beam.output.fatigue import Fatigue
-from ufl_beam.plotting.analysis_pictures import (
-    draw_calibration,
-    draw_combinations,
-    draw_dynamics,
-    draw_pushover,
-    draw_response,
-)
+from ufl_beam.plotting.analysis_pictures import draw_study, draw_tradeoff
 from ufl_beam.plotting.frame_pictures import draw_damage_state, draw_shape
 from ufl_beam.plotting.history_pictures import (
-    SPECTRA,
-    draw_cycles,
     draw_energy,
     draw_extremes,
     draw_history,
     draw_modes,
-    draw_motion,
     draw_shapes,
-    draw_spectrum,
-    draw_storeys,
-    draw_study,
-    draw_tradeoff,
 )
 from ufl_beam.plotting.inelastic_pictures import (
     draw_dissipation,
     draw_hinge,
-    draw_interaction,
     draw_moment_curvature,
-    draw_section_moments,
 )
 from ufl_beam.plotting.model import draw_model
 from ufl_beam.plotting.section_pictures import draw_section
@@ -78,21 +53,13 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     },
     Shapes: {"modes": draw_modes},
     Extremes: {name: partial(draw_extremes, quantity=name) for name in ("M", "N", "V")},
-    Storeys: {name: partial(draw_storeys, quantity=name) for name in ("drift", "shear")},
-    Fatigue: {"cycles": draw_cycles},
     Study: {"results": draw_study},
     Tradeoff: {"errors": draw_tradeoff},
-    MomentCurvature: {"moment-curvature": draw_section_moments},
-    InteractionDiagram: {"interaction": draw_interaction},
-    Pushover: {"curve": draw_pushover},
-    SpectralResponse: {name: partial(draw_response, quantity=name) for name in ("M", "N", "V")},
-    LoadCombinations: {name: partial(draw_combinations, quantity=name) for name in ("M", "N", "V")},
-    DemandCurves: {"curves": draw_dynamics},
-    Calibration: {"fit": draw_calibration},
-    GroundMotion: {"motion": draw_motion},
-    ResponseSpectrum: {name: partial(draw_spectrum, quantity=name) for name in SPECTRA},
 }
-"""Pictures by class and quantity; the first one of a class is drawn by default."""
+"""Pictures by class and quantity; the first one of a class is drawn by default.
+
+Modules that define further results add their pictures; see ``structures/pictures.py``.
+"""
 
 
 def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure:
@@ -116,19 +83,8 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Solution            "moment-curvature"  moment of a cell; a place, ``ax``
     Modes, Buckling     "modes"             shapes side by side; ``numbers``, ``amplitude``
     Extremes            "M", "N", "V"       envelope of a section force; ``ax``
-    Storeys             "drift", "shear"    extremes over the height; ``ax``
-    Fatigue             "cycles"            rainflow matrix and spectrum; a hot spot
     Study               "results"           results over the cases
     Tradeoff            "errors"            errors over wall times; ``ax``
-    MomentCurvature     "moment-curvature"  moment of a section over its curvature; ``ax``
-    InteractionDiagram  "interaction"       axial force over moment of a section; ``ax``
-    GroundMotion        "motion"            acceleration, velocity, displacement over time
-    ResponseSpectrum    any of its arrays   over the period; "pseudo_acceleration" by default
-    Pushover            "curve"             capacity curve with its hinges; ``targets``, ``ax``
-    SpectralResponse    "M", "N", "V"       combined section force, with both signs; ``ax``
-    DemandCurves        "curves"            intensity over demand, fragility; ``labels``
-    LoadCombinations    "M", "N", "V"       envelope over the combinations; ``ax``
-    Calibration         "fit"               measured and computed values, and the residuals
     ==================  ==================  ========================================================
 
     Args:

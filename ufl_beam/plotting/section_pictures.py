@@ -29,7 +29,7 @@ def draw_section(section: Section, *, ax: Axes | None = None) -> Figure:
     if shape is None and fibres is None:
         raise ArgumentError(
             "plot: this Section has stiffnesses only; sections with a picture come from "
-            "constructors of shapes such as Section.steel, or from Section.of_fibres"
+            "constructors of shapes such as Section.rectangle, or from Section.of_fibres"
         )
     from matplotlib.patches import Circle, PathPatch
     from matplotlib.path import Path

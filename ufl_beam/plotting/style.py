@@ -22,6 +22,7 @@ from ufl_beam.parallel import active_comm
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 # Okabe and Ito's palette, which colour-blind readers can distinguish.
@@ -287,3 +288,10 @@ def half_size(axes: Axes, text: str, size: float, **style: Any) -> Array:
     box = probe.get_window_extent()
     probe.remove()
     return np.asarray(np.array([box.width, box.height]) / 2 * POINTS / parent_figure(axes).dpi)
+
+
+def label_axis(axis: Axis, values: Array, quantity: str, unit: str) -> None:
+    """Label an axis in a unit with a prefix that suits the values; data stay in SI units."""
+    factor, prefix = decimal_prefix(float(np.max(np.abs(values))))
+    axis.set_major_formatter(lambda x, _: f"{x / factor:.6g}".replace("-", "−"))
+    axis.set_label_text(f"{quantity} ({prefix}{unit})")

@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,20 +14,18 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import OtherVersion, State
 from ufl_beam.display import TIME, Rich
-from ufl_beam.errors import ArgumentError, require_kind, warn
+from ufl_beam.errors import ArgumentError, Moved, require_kind, warn
 from ufl_beam.file_system import require_path
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.bodies import AttachmentPoint, Member, Place
 from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide
-from ufl_beam.model.connectors import Connector
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import Table
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import Guided
 from ufl_beam.model.loads import LoadAlongBeam, profile_at
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.engineering_results import HingeTable, Storeys, hinges_of, storeys_of
 from ufl_beam.output.output_files import (
     Content,
     WrongReader,
@@ -247,58 +243,8 @@ class Solution(States, Rich):
         change = np.diff(self.velocity(place), axis=0) / np.diff(self.times)[:, None]
         return np.concatenate([np.full((1, 3), math.nan), change])
 
-    def storeys(self, levels: Sequence[AttachmentPoint]) -> Storeys:
-        """Return drifts and shears of the storeys between levels; y points upwards.
-
-        The drift of a storey is the difference of the horizontal displacements of its two levels.
-        Its shear is the sum of the horizontal forces in beams, links and connectors that a
-        horizontal cut just above its lower level meets.  A cut through the feet of all columns
-        bears the base shear.
-
-        Args:
-            levels: A place at each level, from the feet of the columns to the roof.
-
-        Raises:
-            ArgumentError: A level is not above the one before it, nothing is cut above a level, or
-                a body is cut.
-
-        Example:
-            >>> mast = ub.Beam((0, 0), (0, 3), section)
-            >>> wind = ub.LineLoad(mast, force=(500, 0))  # N/m
-            >>> tower = ub.Scene([mast], supports=[ub.Clamped(mast.start)], loads=[wind])
-            >>> run = ub.simulate(tower, ub.Static(), t=(0, 1), dt=1.0)
-            >>> print(run.storeys([mast.start, mast.at(0.5), mast.end]).shear[-1].round(6))  # N
-            [1500.  750.]
-        """
-        return storeys_of(self, levels, self.parameter)
-
-    def hinges(
-        self,
-        limits: Mapping[str, float] = MappingProxyType({}),
-        *,
-        only: Sequence[Member | Connector] | None = None,
-    ) -> HingeTable:
-        """Return rotations, ductility and dissipated energy of all hinges, as a table.
-
-        The rows are in the order of first yielding.  They are all hinges of zero length, open
-        hinges of cells, connectors whose rotation may yield or soften, and beams with yielding or
-        cracking cells, of which only the energy is known.  See docs/results.md.
-
-        Args:
-            limits: Acceptance limits of the plastic rotation by name, in increasing order, as in
-                ``{"IO": 0.01, "LS": 0.025, "CP": 0.04}``; rad.
-            only: Beams and connectors whose hinges are listed; all by default.
-
-        Raises:
-            ArgumentError: A limit is not positive or not above the limit before it, or a beam or
-                connector is not in the scene.
-
-        Example:
-            >>> (row,) = broken.hinges({"IO": 0.01, "LS": 0.1}).rows
-            >>> print(row.where, row.state)
-            beam.start (0, 0) LS
-        """
-        return hinges_of(self, limits, only, self.parameter)
+    storeys = Moved("ufl_beam.structures.storeys(solution, levels)")
+    hinges = Moved("ufl_beam.structures.hinge_table(solution, limits)")
 
     def hinge_place_error(self) -> dict[Member, float]:
         """Return the largest relative error of the hinge limit, by beam with open embedded hinges.

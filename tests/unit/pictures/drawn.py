@@ -83,7 +83,7 @@ def storeys(bays, floors):
 
 
 @dataclass(frozen=True)
-class Quadratic(ub.ConnectorLaw):
+class Quadratic(ub.extend.ConnectorLaw):
     """A law of a user."""
 
     k: float

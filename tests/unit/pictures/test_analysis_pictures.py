@@ -9,6 +9,7 @@ from drawn import boxes_of, circles, outlines, require_apart, texts
 from matplotlib.figure import Figure
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.plotting.style import BLUE, RED
 
 
@@ -19,7 +20,7 @@ def test_a_capacity_curve_shows_hinges_and_targets():
     scene = ub.Scene(
         [column], supports=[ub.Clamped(column.start)], masses=[ub.PointMass(column.end, 5e3)]
     )
-    curve = ub.pushover(scene, column.end, -0.05, steps=10, progress=False)
+    curve = st.pushover(scene, column.end, -0.05, steps=10, progress=False)
     targets = curve.n2(lambda T: 8.0, 0.5), curve.asce41(lambda T: 8.0)
     figure = ub.plot(curve, targets=targets)
     axes = figure.axes[0]
@@ -49,7 +50,7 @@ def test_a_response_to_a_spectrum_has_both_signs():
     section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
     column = ub.Beam((0, 0), (0, 2), section, cells=4, name="column")
     scene = ub.Scene([column], supports=[ub.Clamped(column.start)])
-    response = ub.response_spectrum_analysis(scene, lambda T: 3.0, n=6)
+    response = st.response_spectrum_analysis(scene, lambda T: 3.0, n=6)
     axes = ub.plot(response, "V").axes[0]
     assert len(outlines(axes.figure, RED)) == len(outlines(axes.figure, BLUE)) == 1
     assert axes.get_title(loc="left").endswith("by response spectrum")
@@ -60,7 +61,7 @@ def test_an_envelope_of_combinations_has_both_extremes():
     column = ub.Beam((0, 0), (0, 2), section, cells=2, name="column")
     scene = ub.Scene([column], supports=[ub.Clamped(column.start)])
     cases = {"W": [ub.PointLoad(column.end, force=(1e3, -1e3))]}
-    found = ub.load_combinations(
+    found = st.load_combinations(
         scene, cases, {"left": {"W": 1.5}, "right": {"W": -1.5}}, progress=False
     )
     axes = ub.plot(found, "V").axes[0]
@@ -73,7 +74,7 @@ def test_demand_curves_end_at_collapse():
     study = ub.Study("none", (), {}, {}, np.zeros(0))
     demand = np.array([[0.1, 0.2, 0.5], [0.1, 0.6, 0.3], [0.2, 0.3, 0.7]])
     outcome = (demand > 0.4).astype(float)
-    curves = ub.DemandCurves(
+    curves = st.DemandCurves(
         ("a", "b", "c"), np.array([1.0, 2.0, 3.0]), 0.4, demand, np.ones((3, 3)), outcome, study
     )
     left, right = ub.plot(curves).axes
@@ -83,7 +84,7 @@ def test_demand_curves_end_at_collapse():
     fit = curves.fragility()
     curve = right.lines[0].get_xydata()
     np.testing.assert_allclose(curve[:, 0], fit(curve[:, 1]))
-    certain = ub.DemandCurves(
+    certain = st.DemandCurves(
         curves.motions, curves.intensities, 0.4, demand, curves.end, 0 * outcome, study
     )
     assert len(ub.plot(certain).axes) == 1  # nothing collapses

@@ -12,6 +12,7 @@ from matplotlib.colors import same_color
 from matplotlib.path import Path
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.plotting.style import GREEN, RED
 
 
@@ -241,7 +242,7 @@ def test_a_section_is_drawn_to_scale():
     """Outline and hole, core, layers and bars; mm from the axis of the beam."""
     cover, core, steel = (ub.Fibres(ub.ElastoPlastic(x), number=8) for x in (3e7, 4e7, 5e8))
     concrete = {"E": 30e9, "nu": 0.2, "fibres": cover, "core": core, "cover": 0.02}
-    plain = ub.Section.box(0.4, 0.6, 0.1, **concrete)
+    plain = st.box(0.4, 0.6, 0.1, **concrete)
     section = plain.reinforced([-0.25, 0.25], [2e-3, 1e-3], E=200e9, fibres=steel)
     axes = ub.plot(section).axes[0]
     outline, inset, *bars = axes.patches
@@ -258,7 +259,7 @@ def test_a_section_is_drawn_to_scale():
     assert axes.get_aspect() == 1.0
     discs = ub.Section.of_fibres([0, 0.1], [1e-4, 2e-4], E=1e9, nu=0.3, fibres=steel)
     assert len(ub.plot(discs).axes[0].patches) == 2
-    ipe = ub.plot(ub.Section.steel("IPE 300")).axes[0]
+    ipe = ub.plot(st.steel("IPE 300")).axes[0]
     assert ipe.get_title(loc="left") == "A = 53.81 cm², I = 8356 cm⁴,\nWpl = 628.4 cm³"
     with pytest.raises(ub.ArgumentError, match="this Section has stiffnesses only"):
         ub.plot(ub.Section(EA=1.0, GA=1.0, EI=1.0))

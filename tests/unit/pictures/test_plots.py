@@ -11,6 +11,7 @@ from drawn import FIRST, boxes_of, middles, outlines, require_apart, static, sto
 from matplotlib.path import Path
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 from ufl_beam.plotting.style import BLUE, RED, WHITE, decimal_prefix, number, with_unit
 
 UNIT = {"N": "N", "V": "N", "M": "N m"}
@@ -340,7 +341,7 @@ def test_the_ledger_is_drawn_with_its_error(swing):
 
 
 def test_a_ground_motion_is_drawn_with_its_integrals():
-    motion = ub.GroundMotion(0.5, [0.0, 2.0, -1.0], "quake")
+    motion = st.GroundMotion(0.5, [0.0, 2.0, -1.0], "quake")
     figure = ub.plot(motion)
     for axes, values in zip(figure.axes, motion.histories[1:], strict=True):
         np.testing.assert_array_equal(axes.lines[-1].get_ydata(), values)
@@ -350,10 +351,10 @@ def test_a_ground_motion_is_drawn_with_its_integrals():
 
 
 def test_spectra_share_axes():
-    motion = ub.GroundMotion(0.5, [0.0, 2.0, -1.0])
-    elastic = ub.response_spectrum(motion, [0.5, 1.0])
+    motion = st.GroundMotion(0.5, [0.0, 2.0, -1.0])
+    elastic = st.response_spectrum(motion, [0.5, 1.0])
     figure = ub.plot(elastic)
-    ub.plot(ub.response_spectrum(motion, [0.5, 1.0], ductility=2.0), ax=figure.axes[0])
+    ub.plot(st.response_spectrum(motion, [0.5, 1.0], ductility=2.0), ax=figure.axes[0])
     first, _ = figure.axes[0].lines
     np.testing.assert_array_equal(first.get_ydata(), elastic.pseudo_acceleration)
     assert figure.axes[0].get_ylabel() == "pseudo-acceleration (m/s²)"

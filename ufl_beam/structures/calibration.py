@@ -17,7 +17,6 @@ from mpi4py import MPI
 import numpy as np
 import scipy  # its subpackages are loaded when they are used
 
-from ufl_beam.analysis.calibration_result import Calibration, Measurement
 from ufl_beam.analysis.derivatives import checked_case
 from ufl_beam.analysis.parameter_study import study
 from ufl_beam.arrays import Array, Index
@@ -40,6 +39,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import communicator
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.solution import Solution
+from ufl_beam.structures.calibration_result import Calibration, Measurement
 
 WHAT = "calibrate"
 
@@ -150,10 +150,10 @@ def calibrate(
         ...     arm = ub.Beam((0, 0), (2, 0), steel, cells=4, name="arm")
         ...     force = ub.PointLoad(arm.end, force=(0, -1e3), amplitude=lambda t: t)
         ...     return ub.Scene([arm], supports=[ub.Clamped(arm.start)], loads=[force])
-        >>> bent = ub.Measurement([0.5, 1.0], [-0.095e-3, -0.192e-3],
+        >>> bent = st.Measurement([0.5, 1.0], [-0.095e-3, -0.192e-3],
         ...     lambda run: run.displacement(run.scene["arm"].end)[:, 1],
         ...     scheme=ub.Static(), t=(0, 1), dt=0.5, sigma=1e-6)
-        >>> fit = ub.calibrate(cantilever, {"E": (100e9, 50e9, 500e9)}, [bent], starts=3)
+        >>> fit = st.calibrate(cantilever, {"E": (100e9, 50e9, 500e9)}, [bent], starts=3)
         >>> print(f"{fit.parameters['E'] / 1e9:.0f} GPa, {fit.same_minimum} of 3 starts")
         207 GPa, 3 of 3 starts
     """

@@ -66,7 +66,7 @@ class Backbone(Record):
         ModelError: A number is out of range, or the backbone turns back.
 
     Example:
-        >>> steel = ub.Backbone(  # N m; rad
+        >>> steel = st.Backbone(  # N m; rad
         ...     3e5, capping=0.025, post_capping=0.2, overstrength=1.1, residual=0.4, ultimate=0.3
         ... )
     """
@@ -307,6 +307,12 @@ class _DeterioratingHinge(Record, ConnectorLaw):
         """Return the numbers of the lines of both backbones, and the reference energies."""
         return dict(vars(self)["_numbers"])
 
+    @property
+    def elastic_rotation(self) -> tuple[float, float]:
+        """Elastic stiffness (N m/rad), and the lower of the two yield limits (N m)."""
+        backbones = self.backbone, self.negative or self.backbone
+        return self.stiffness, min(x.yield_limit for x in backbones)
+
     def energy(self, motion: Values, state: State) -> Values:
         """Return the elastic energy; J."""
         return state.rest * self.stiffness * (motion - state.plastic) ** 2 / 2
@@ -437,8 +443,8 @@ class IbarraKrawinkler(_DeterioratingHinge):
             ultimate rotation does not exceed the capping rotation.
 
     Example:
-        >>> backbone = ub.Backbone(3e5, capping=0.025, post_capping=0.2, overstrength=1.1)
-        >>> law = ub.IbarraKrawinkler(3e7, backbone, strength=1.0, softening=1.0, unloading=2.0)
+        >>> backbone = st.Backbone(3e5, capping=0.025, post_capping=0.2, overstrength=1.1)
+        >>> law = st.IbarraKrawinkler(3e7, backbone, strength=1.0, softening=1.0, unloading=2.0)
         >>> base = ub.Turn(ub.ground(0, 0), beam.start, law)
         >>> arm = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[base])
     """
@@ -478,8 +484,8 @@ class PinchingHinge(_DeterioratingHinge):
             ultimate rotation does not exceed the capping rotation.
 
     Example:
-        >>> backbone = ub.Backbone(3e5, capping=0.025, post_capping=0.2, overstrength=1.1)
-        >>> law = ub.PinchingHinge(3e7, backbone, strength=1.0, kappa_F=0.4, kappa_D=0.3)
+        >>> backbone = st.Backbone(3e5, capping=0.025, post_capping=0.2, overstrength=1.1)
+        >>> law = st.PinchingHinge(3e7, backbone, strength=1.0, kappa_F=0.4, kappa_D=0.3)
         >>> base = ub.Turn(ub.ground(0, 0), beam.start, law)
         >>> arm = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[base])
     """
@@ -564,7 +570,7 @@ class AxialBendingHinge(Record, ConnectorLaw):
         ModelError: A number is not positive.
 
     Example:
-        >>> law = ub.AxialBendingHinge(  # N, N m; N/m, N/m, N m/rad
+        >>> law = st.AxialBendingHinge(  # N, N m; N/m, N/m, N m/rad
         ...     axial=5e6, bending=2.5e5, along=1e10, across=1e10, turning=1e9
         ... )
         >>> foot = ub.Bushing(ub.ground(0, 0), beam.start, law, axis=(1, 0))
@@ -580,6 +586,11 @@ class AxialBendingHinge(Record, ConnectorLaw):
     entry = "plastic"
     components: ClassVar[int] = 3
     variables: ClassVar[Mapping[str, float]] = {"stretch": 0.0, "rotation": 0.0}
+
+    @property
+    def elastic_rotation(self) -> tuple[float, float]:
+        """Elastic stiffness of the rotation (N m/rad), and the moment at which it yields (N m)."""
+        return self.turning, self.bending
 
     def energy(self, motion: Any, state: State) -> Values:
         """Return the elastic energy; J."""

@@ -22,7 +22,7 @@ from ufl_beam.model.law_functions import (
     where,
 )
 from ufl_beam.model.material_law import State
-from ufl_beam.model.material_laws import Limit, _Plastic
+from ufl_beam.model.material_laws import Limit, PlasticLaw
 from ufl_beam.model.records import NotNegative, Positive
 
 STANDSTILL = 1e-8
@@ -34,7 +34,7 @@ would restore the elastic stiffness of yielding fibres.
 
 
 @dataclass(frozen=True)
-class MenegottoPinto(_Plastic):
+class MenegottoPinto(PlasticLaw):
     """Steel of Menegotto and Pinto, with the isotropic hardening of Filippou, Popov and Bertero.
 
     A branch begins at each reversal (εr, σr) with the stiffness C and approaches the hardening
@@ -65,7 +65,7 @@ class MenegottoPinto(_Plastic):
         ModelError: A parameter is out of range.
 
     Example:
-        >>> law = ub.MenegottoPinto(yield_limit=500e6, hardening=0.01)  # Pa, 1
+        >>> law = st.MenegottoPinto(yield_limit=500e6, hardening=0.01)  # Pa, 1
         >>> bars = ub.Section.of_fibres(
         ...     y=[-0.2, 0.2], A=[1e-3, 1e-3], E=200e9, nu=0.3, fibres=ub.Fibres(law)
         ... )

@@ -143,7 +143,7 @@ class MomentCurvature:
     Example:
         >>> steel = ub.Fibres(ub.ElastoPlastic(235e6), number=40)
         >>> section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=steel)
-        >>> result = ub.moment_curvature(section, np.linspace(0, 0.1, 21))
+        >>> result = st.moment_curvature(section, np.linspace(0, 0.1, 21))
         >>> print(f"{result.moment[-1] / (235e6 * 0.1 * 0.2**2 / 4):.3f}")  # of the plastic moment
         0.996
         >>> ub.plot(result).savefig("moment_curvature.png")
@@ -186,7 +186,7 @@ def moment_curvature(
         >>> steel = ub.Fibres(ub.ElastoPlastic(235e6, kinematic=2e9), number=40)
         >>> section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=steel)
         >>> cycle = 0.05 * np.sin(np.linspace(0, 2.5 * np.pi, 101))
-        >>> loop = ub.moment_curvature(section, cycle, N=-1e6)
+        >>> loop = st.moment_curvature(section, cycle, N=-1e6)
         >>> print(f"{loop.moment[-1]:.4g} N m, {loop.dissipated[-1]:.4g} J/m")
         2.298e+05 N m, 3.767e+04 J/m
     """
@@ -246,7 +246,7 @@ class InteractionDiagram:
     Example:
         >>> steel = ub.Fibres(ub.ElastoPlastic(235e6), number=40)
         >>> section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=steel)
-        >>> diagram = ub.interaction_diagram(section, (0.05, 0.05))
+        >>> diagram = st.interaction_diagram(section, (0.05, 0.05))
         >>> low, high = diagram.moments(-0.5 * 235e6 * 0.02)  # at half of the squash load
         >>> print(f"{high / (235e6 * 0.1 * 0.2**2 / 4):.3f}")  # of the plastic moment
         0.749
@@ -315,7 +315,7 @@ def interaction_diagram(
         ...     b=0.3, h=0.4, E=30e9, nu=0.2, fibres=concrete
         ... ).reinforced([-0.15, 0.15], [1e-3, 1e-3], E=200e9, fibres=steel)
         >>> limits = {concrete: (0.0035, np.inf), steel: (0.02, 0.02)}
-        >>> diagram = ub.interaction_diagram(column, limits)
+        >>> diagram = st.interaction_diagram(column, limits)
         >>> print(f"{diagram.N.min():.4g}")  # 30e6 (0.12 - 0.002) + 500e6 * 0.002 N
         -4.54e+06
     """

@@ -32,7 +32,7 @@ class Fragility(NamedTuple):
         number: Number of motions at each intensity; (m,).
 
     Example:
-        >>> fragility = ub.Fragility.fit([2.0, 4.0, 8.0], [1, 10, 18], [20, 20, 20])
+        >>> fragility = st.Fragility.fit([2.0, 4.0, 8.0], [1, 10, 18], [20, 20, 20])
         >>> print(f"median {fragility.median:.2f}, dispersion {fragility.dispersion:.2f}")
         median 4.17, dispersion 0.48
         >>> print(f"{fragility(2.0):.3f}")
@@ -141,11 +141,11 @@ class DemandCurves(Rich):
             ``intensity``, if they have names.
 
     Example:
-        >>> pulse = ub.GroundMotion(0.02, np.sin(10 * np.arange(0, 1, 0.02)))
+        >>> pulse = st.GroundMotion(0.02, np.sin(10 * np.arange(0, 1, 0.02)))
         >>> def build(motion):
         ...     shaking = ub.Gravity((0, -1), amplitude=motion.acceleration)
         ...     return ub.Scene([beam], supports=scene.supports, loads=[shaking])
-        >>> dynamics = ub.incremental_dynamic_analysis(build, [pulse], [5.0, 10.0],
+        >>> dynamics = st.incremental_dynamic_analysis(build, [pulse], [5.0, 10.0],
         ...     measure=lambda run: run.displacement(beam.end)[:, 1], limit=2e-4)
         >>> print(dynamics.collapsed)
         [[False  True]]

@@ -68,7 +68,7 @@ class GroundMotion(Record):
         ModelError: The step is not positive, or the values are not at least two finite numbers.
 
     Example:
-        >>> motion = ub.GroundMotion(0.01, 3.0 * np.sin(0.06 * np.arange(400)))
+        >>> motion = st.GroundMotion(0.01, 3.0 * np.sin(0.06 * np.arange(400)))
         >>> shaken = ub.Scene([beam], supports=scene.supports,
         ...     loads=[ub.Gravity((-1, 0), amplitude=motion.acceleration)])  # relative
         >>> moving = ub.PrescribedDisplacement(beam.start, u=motion.displacement, v=0.0, psi=0.0)
@@ -104,7 +104,7 @@ class GroundMotion(Record):
             ModelError: Times do not increase, are uneven without ``dt``, or numbers are missing.
 
         Example:
-            >>> floor = ub.GroundMotion.from_history([0, 1, 3], [0, 2, 0], dt=0.5)
+            >>> floor = st.GroundMotion.from_history([0, 1, 3], [0, 2, 0], dt=0.5)
             >>> floor.values
             (0.0, 1.0, 2.0, 1.5, 1.0, 0.5, 0.0)
         """
@@ -146,7 +146,7 @@ class GroundMotion(Record):
 
         Example:
             >>> np.savetxt("record.txt", [[0.00, 0.0], [0.01, 0.5], [0.02, 0.0]])
-            >>> ub.GroundMotion.read("record.txt", unit="g").values
+            >>> st.GroundMotion.read("record.txt", unit="g").values
             (0.0, 4.903325, 0.0)
         """
         file = raising_model_errors(require_path)(path, "GroundMotion.read")

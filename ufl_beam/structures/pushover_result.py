@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy  # its subpackages are loaded when they are used
 
-from ufl_beam.analysis.spectra import Spectrum, spectral_accelerations
 from ufl_beam.arrays import Array
 from ufl_beam.display import Rich, bracketed, in_one_line
 from ufl_beam.errors import ArgumentError, require_number, shorten, warn
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connectors import Connector
 from ufl_beam.output.states import States
+from ufl_beam.structures.spectra import Spectrum, spectral_accelerations
 
 SAME = 1e-9  # relative change of the target that ends its iterations
 MOST_ITERATIONS = 100  # for the target that bounds the two lines of ASCE 41
@@ -39,7 +39,7 @@ class HingeFormation(NamedTuple):
     Example:
         >>> mass = ub.PointMass(weak.end, 5e3)
         >>> pile = ub.Scene([weak], supports=[ub.Clamped(weak.start)], masses=[mass])
-        >>> print(ub.pushover(pile, weak.end, -0.05, component="v").hinges[0])
+        >>> print(st.pushover(pile, weak.end, -0.05, component="v").hinges[0])
          -0.0053 m    -24.80 kN  beam.start (0, 0) opens
     """
 
@@ -73,7 +73,7 @@ class TargetDisplacement(NamedTuple):
     Example:
         >>> mass = ub.PointMass(weak.end, 5e3)
         >>> pile = ub.Scene([weak], supports=[ub.Clamped(weak.start)], masses=[mass])
-        >>> capacity = ub.pushover(pile, weak.end, -0.05, component="v")
+        >>> capacity = st.pushover(pile, weak.end, -0.05, component="v")
         >>> demand = capacity.asce41(([0.01, 0.5, 4.0], [8.0, 8.0, 1.0]), site="C")
         >>> print(f"{1e3 * demand.displacement:.2f} mm, ductility {demand.ductility:.2f}")
         9.35 mm, ductility 1.96
@@ -128,7 +128,7 @@ class Pushover(Rich):
     Example:
         >>> mass = ub.PointMass(weak.end, 5e3)
         >>> pile = ub.Scene([weak], supports=[ub.Clamped(weak.start)], masses=[mass])
-        >>> capacity = ub.pushover(pile, weak.end, -0.05, component="v")
+        >>> capacity = st.pushover(pile, weak.end, -0.05, component="v")
         >>> print(f"{1e-3 * abs(capacity.base_shear).max():.1f} kN")
         25.2 kN
         >>> demand = capacity.n2(lambda T: 8.0 * min(1.0, 0.5 / T), corner=0.5)

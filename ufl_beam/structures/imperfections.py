@@ -49,7 +49,7 @@ def imperfect(
     Example:
         >>> load = ub.PointLoad(beam.end, force=(-1e6, 0))
         >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-        >>> crooked = ub.imperfect(column, mode=ub.buckling(column, 1), amplitude=2 / 500)
+        >>> crooked = st.imperfect(column, mode=ub.buckling(column, 1), amplitude=2 / 500)
         >>> run = ub.simulate(crooked, ub.Static(), t=(0, 1), dt=0.5)
         >>> tip = run.displacement(crooked["beam"].end)[-1, 1]
         >>> print(round(abs(tip) / (2 / 500), 3))  # 1 / (8.84 - 1), the load is 1/8.84 of Euler's

@@ -28,7 +28,7 @@ class Envelope:
 
     Example:
         >>> t = np.arange(5.0)
-        >>> fit = ub.fit_decay(t, 1.0 - 0.1 * t).linear
+        >>> fit = st.fit_decay(t, 1.0 - 0.1 * t).linear
         >>> print(f"{fit.initial:.2f} - {fit.rate:.2f} t")
         1.00 - 0.10 t
     """
@@ -62,7 +62,7 @@ class Decay:
 
     Example:
         >>> t = np.arange(0, 5, 0.01)
-        >>> decay = ub.damping(t, np.exp(-0.1 * t) * np.cos(2 * np.pi * t))
+        >>> decay = st.damping(t, np.exp(-0.1 * t) * np.cos(2 * np.pi * t))
         >>> print(f"{decay.period:.2f} s, ratio {decay.ratio:.4f}, {decay.better}")
         1.00 s, ratio 0.0159, exponential
     """
@@ -140,7 +140,7 @@ def damping(
 
     Example:
         >>> t = np.arange(0, 5, 0.01)
-        >>> decay = ub.damping(t, np.exp(-0.1 * t) * np.cos(2 * np.pi * t))
+        >>> decay = st.damping(t, np.exp(-0.1 * t) * np.cos(2 * np.pi * t))
         >>> print(f"{decay.decrement:.3f} {decay.ratio:.4f}")
         0.100 0.0159
     """
@@ -177,7 +177,7 @@ def peaks(
 
     Example:
         >>> t = np.arange(0, 3, 0.01)
-        >>> times, amplitudes = ub.peaks(t, np.cos(2 * np.pi * t))
+        >>> times, amplitudes = st.peaks(t, np.cos(2 * np.pi * t))
         >>> print(times.round(3), amplitudes.round(3))
         [1. 2.] [1. 1.]
     """
@@ -208,7 +208,7 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
         ArgumentError: There are fewer than two amplitudes, or an amplitude is not positive.
 
     Example:
-        >>> mean, each = ub.logarithmic_decrement([1.0, 0.9, 0.81])
+        >>> mean, each = st.logarithmic_decrement([1.0, 0.9, 0.81])
         >>> print(round(mean, 4), each.round(4))
         0.1054 [0.1054 0.1054]
     """
@@ -229,7 +229,7 @@ def damping_ratio(decrement: npt.ArrayLike) -> Array:
     """Compute damping ratios ζ = δ/√(δ² + 4π²) of decrements δ; an array of the same shape.
 
     Example:
-        >>> print(f"{ub.damping_ratio(0.1):.4f}")
+        >>> print(f"{st.damping_ratio(0.1):.4f}")
         0.0159
     """
     δ = require_array(decrement, "damping_ratio: decrement")
@@ -252,7 +252,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
 
     Example:
         >>> t = np.arange(6.0)
-        >>> decay = ub.fit_decay(t, 2.0 * np.exp(-0.1 * t))
+        >>> decay = st.fit_decay(t, 2.0 * np.exp(-0.1 * t))
         >>> print(decay.better, f"{decay.exponential.rate:.3f}")
         exponential 0.100
     """

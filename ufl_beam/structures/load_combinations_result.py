@@ -34,7 +34,7 @@ class Governing(NamedTuple):
     Example:
         >>> free = ub.Scene([beam], supports=scene.supports)
         >>> cases = {"G": [ub.Gravity()], "Q": [ub.PointLoad(beam.end, force=(0, -1e4))]}
-        >>> both = ub.load_combinations(free, cases, {"1": {"G": 1.35, "Q": 1.5}, "2": {"G": 1}})
+        >>> both = st.load_combinations(free, cases, {"1": {"G": 1.35, "Q": 1.5}, "2": {"G": 1}})
         >>> forces = both.section_forces(beam)
         >>> print(forces.high[0, 1].round(), forces.high_by[0, 1])  # V at the start; N
         -3080.0 2
@@ -59,7 +59,7 @@ class LoadCombinations(Rich):
     Example:
         >>> free = ub.Scene([beam], supports=scene.supports)
         >>> cases = {"G": [ub.Gravity()], "Q": [ub.PointLoad(beam.end, force=(0, -1e4))]}
-        >>> both = ub.load_combinations(free, cases, {"1": {"G": 1.35, "Q": 1.5}, "2": {"G": 1}})
+        >>> both = st.load_combinations(free, cases, {"1": {"G": 1.35, "Q": 1.5}, "2": {"G": 1}})
         >>> M = both.section_forces(beam)
         >>> print(M.low[0, 2].round(-2), M.low_by[0, 2])  # N m
         -34200.0 1
@@ -76,7 +76,7 @@ class LoadCombinations(Rich):
         Example:
             >>> free = ub.Scene([beam], supports=scene.supports)
             >>> cases = {"Q": [ub.PointLoad(beam.end, force=(0, -1e4))]}
-            >>> both = ub.load_combinations(free, cases, {"A": {"Q": 1.5}, "B": {"Q": -1.0}})
+            >>> both = st.load_combinations(free, cases, {"A": {"Q": 1.5}, "B": {"Q": -1.0}})
             >>> both.envelope(lambda run: run.displacement(beam.end)[-1, 1]).low_by
             'A'
         """

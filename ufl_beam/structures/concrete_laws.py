@@ -170,7 +170,7 @@ class KentPark(_Concrete):
             begins: a cell is so long that its stress in tension would turn back.
 
     Example:
-        >>> law = ub.KentPark(  # Pa, Pa, 1, then Pa and J/m²
+        >>> law = st.KentPark(  # Pa, Pa, 1, then Pa and J/m²
         ...     30e6, residual=6e6, ultimate=0.006, tension=ub.Softening(2.5e6, 80.0)
         ... )
         >>> column = ub.Section.rectangle(b=0.3, h=0.3, E=30e9, nu=0.2, fibres=ub.Fibres(law))
@@ -218,7 +218,7 @@ class KentPark(_Concrete):
             ModelError: A number is out of range.
 
         Example:
-            >>> law = ub.KentPark.confined(
+            >>> law = st.KentPark.confined(
             ...     30e6, ratio=0.01, yield_limit=400e6, width=0.25, spacing=0.1
             ... )
             >>> print(f"{law.strength / 1e6:.1f} MPa, {law.ultimate:.4f}")
@@ -295,7 +295,7 @@ class Mander(_Concrete):
             so long that its stress in tension would turn back.
 
     Example:
-        >>> core = ub.Mander.confined(30e6, pressure=2e6)  # Pa
+        >>> core = st.Mander.confined(30e6, pressure=2e6)  # Pa
         >>> print(f"{core.strength / 1e6:.1f} MPa at {core.strain:.4f}")
         42.0 MPa at 0.0060
         >>> column = ub.Section.rectangle(b=0.3, h=0.3, E=27e9, nu=0.2, fibres=ub.Fibres(core))
@@ -334,7 +334,7 @@ class Mander(_Concrete):
             ModelError: A number is out of range.
 
         Example:
-            >>> print(f"{ub.Mander.confined(30e6, 0.0).strength:.3g}")
+            >>> print(f"{st.Mander.confined(30e6, 0.0).strength:.3g}")
             3e+07
         """
         require_number(strength, "Mander.confined: strength", positive=True)

@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from ufl_beam.analysis.linearization import Linearization, linear_forces_of_cells
 from ufl_beam.analysis.modes import Modes, modes
-from ufl_beam.analysis.spectra import Spectrum, spectral_accelerations
 from ufl_beam.arrays import Array
 from ufl_beam.display import Rich
 from ufl_beam.errors import (
@@ -31,6 +30,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.section_forces import Diagram, ForcesAlongCells
 from ufl_beam.simulation.initial_state import StateOf, chosen_state
+from ufl_beam.structures.spectra import Spectrum, spectral_accelerations
 
 RULES = "CQC", "SRSS"
 LEAST_MASS = 0.9  # fraction of the mass that modes should have; EN 1998-1:2004, 4.3.3.3.1
@@ -56,7 +56,7 @@ class SpectralResponse(Rich):
         reactions: Peak force (x, y) and moment of each support in each mode; (n, num_supports, 3).
 
     Example:
-        >>> response = ub.response_spectrum_analysis(scene, lambda T: 3.0, n=4, direction=(0, 1))
+        >>> response = st.response_spectrum_analysis(scene, lambda T: 3.0, n=4, direction=(0, 1))
         >>> print(f"{response.base_shear:.0f} N, {response.missing_mass:.1%} of the mass missing")
         620 N, 3.7% of the mass missing
         >>> print(response.reaction(scene.supports[0])[1:].round())  # N, N m
@@ -200,7 +200,7 @@ def response_spectrum_analysis(
         ModelWarning: The modes have less than 90 % of the mass.
 
     Example:
-        >>> response = ub.response_spectrum_analysis(scene, ([1e-4, 4.0], [3.0, 3.0]), n=6)
+        >>> response = st.response_spectrum_analysis(scene, ([1e-4, 4.0], [3.0, 3.0]), n=6)
         >>> print(response.displacement(beam.end).shape, response.diagram(beam).M.shape)
         (3,) (36,)
     """

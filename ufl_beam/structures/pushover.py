@@ -22,7 +22,6 @@ from ufl_beam.analysis.linearization import Linearization
 from ufl_beam.analysis.modes import computed_modes
 from ufl_beam.analysis.path_controls import DisplacementControl
 from ufl_beam.analysis.path_following import Path, follow
-from ufl_beam.analysis.pushover_result import HingeFormation, Pushover
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering, values_at
 from ufl_beam.discretization.function_spaces import point_masses
@@ -51,6 +50,7 @@ from ufl_beam.quadrature import gauss_rule
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.structures.pushover_result import HingeFormation, Pushover
 
 PATTERNS = "mode", "uniform", "triangular"
 TIMES = -1.0, 0.0, 0.5, 2.0, 5.0, *(10.0**k for k in range(1, 7))
@@ -124,7 +124,7 @@ def pushover(
     Example:
         >>> mass = ub.PointMass(weak.end, 5e3)
         >>> pile = ub.Scene([weak], supports=[ub.Clamped(weak.start)], masses=[mass])
-        >>> capacity = ub.pushover(pile, weak.end, -0.05, component="v", pattern="uniform")
+        >>> capacity = st.pushover(pile, weak.end, -0.05, component="v", pattern="uniform")
         >>> print(capacity.hinges[0].where, capacity.hinges[0].what)
         beam.start (0, 0) opens
     """

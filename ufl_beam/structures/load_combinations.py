@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 from ufl_beam.analysis.constant_loads import AT, duration, effect_at, grown, require_options
-from ufl_beam.analysis.load_combinations_result import LoadCombinations
 from ufl_beam.errors import (
     ArgumentError,
     ArgumentTypeError,
@@ -29,6 +28,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.structures.load_combinations_result import LoadCombinations
 
 
 @each_warning_once()
@@ -73,7 +73,7 @@ def load_combinations(
     Example:
         >>> free = ub.Scene([beam], supports=scene.supports)
         >>> cases = {"G": [ub.Gravity()], "Q": [ub.PointLoad(beam.end, force=(0, -1e4))]}
-        >>> both = ub.load_combinations(free, cases, {"1": {"G": 1.35, "Q": 1.5}, "2": {"G": 1}})
+        >>> both = st.load_combinations(free, cases, {"1": {"G": 1.35, "Q": 1.5}, "2": {"G": 1}})
         >>> reaction = both.reaction(scene.supports[0])
         >>> print(reaction.high[1].round(), reaction.high_by[1])  # N
         19158.0 1

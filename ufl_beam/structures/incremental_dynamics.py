@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,12 +15,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.analysis.constant_loads import require_options
-from ufl_beam.analysis.incremental_dynamics_result import (
-    BEYOND_LIMIT,
-    COMPLETED,
-    NO_EQUILIBRIUM,
-    DemandCurves,
-)
 from ufl_beam.analysis.parameter_study import WrongResult, study
 from ufl_beam.errors import (
     ArgumentError,
@@ -38,15 +31,19 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.mechanics.time_schemes import EnergyMomentum
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.ground_motion import GroundMotion
 from ufl_beam.model.scene import Scene
-from ufl_beam.parallel import progress_bar
 from ufl_beam.simulation.initial_state import StateOf, chosen_state, require_scheme
-from ufl_beam.simulation.run import running, take_steps
+from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_lengths import EqualSteps, step_count
 from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.structures.ground_motion import GroundMotion
+from ufl_beam.structures.incremental_dynamics_result import (
+    BEYOND_LIMIT,
+    COMPLETED,
+    NO_EQUILIBRIUM,
+    DemandCurves,
+)
 
 CHECKS = 10  # number of times in a run at which the demand is compared with the limit
 PROPORTIONAL = 1e-9  # relative round-off of the intensity of a doubled motion
@@ -118,11 +115,11 @@ def incremental_dynamic_analysis(
         ModelWarning: The demands of each motion are equal at all intensities.
 
     Example:
-        >>> pulse = ub.GroundMotion(0.02, np.sin(10 * np.arange(0, 1, 0.02)))
+        >>> pulse = st.GroundMotion(0.02, np.sin(10 * np.arange(0, 1, 0.02)))
         >>> def build(motion):
         ...     shaking = ub.Gravity((0, -1), amplitude=motion.acceleration)
         ...     return ub.Scene([beam], supports=scene.supports, loads=[shaking])
-        >>> dynamics = ub.incremental_dynamic_analysis(build, [pulse], [5.0, 10.0],
+        >>> dynamics = st.incremental_dynamic_analysis(build, [pulse], [5.0, 10.0],
         ...     measure=lambda run: run.displacement(beam.end)[:, 1], limit=0.1)
         >>> print((1e3 * dynamics.demand).round(2))  # mm
         [[0.12 0.23]]
@@ -169,19 +166,27 @@ def incremental_dynamic_analysis(
 
     def member(motion: str, intensity: float) -> dict[str, float]:
         scaled = known[motion].scaled(intensity / unit[motion])
-        begin = time.perf_counter()
-        simulation = Simulation(build(scaled), chosen, start=start, newton=newton, mesh=mesh)
-        steps = StepsToLimit(simulation, scaled.duration, dt or scaled.dt, measure, limit)
-        outcome = COMPLETED
+        step, outcome, taken, demand = dt or scaled.dt, COMPLETED, 0, 0.0
+        between = math.ceil(scaled.duration / step / CHECKS)
+
+        def beyond_limit(now: Simulation) -> bool:
+            nonlocal taken, demand
+            taken += 1
+            if taken % between == 0:
+                demand = _demand(measure, now.solution)
+            return demand > limit
+
         try:
-            with running(simulation, [], [], begin):
-                take_steps(simulation, steps, [], progress_bar(False, simulation.comm, total=1.0))
-        except ConvergenceError:
-            steps.compare()
-            outcome = NO_EQUILIBRIUM
-        if steps.demand > limit:
+            run = simulate(
+                build(scaled), chosen, t=(0.0, scaled.duration), dt=step, start=start,
+                until=beyond_limit, newton=newton, mesh=mesh, progress=False,
+            )  # fmt: skip
+        except ConvergenceError as error:
+            run, outcome = error.solution, NO_EQUILIBRIUM
+        demand = _demand(measure, run)
+        if demand > limit:
             outcome = BEYOND_LIMIT
-        return {"demand": steps.demand, "end": simulation.t, "outcome": float(outcome)}
+        return {"demand": demand, "end": float(run.times[-1]), "outcome": float(outcome)}
 
     member.__name__ = WHAT
     cases = [{"motion": key, "intensity": float(level)} for key in known for level in levels]
@@ -209,58 +214,21 @@ def _key(motion: GroundMotion) -> str:
     return f"{motion.name} {hashlib.sha256(values.tobytes()).hexdigest()[:12]}"
 
 
-class StepsToLimit:
-    """Equal steps to the end of a motion, or until the demand exceeds a limit.
+def _demand(measure: Measure, solution: Solution) -> float:
+    """Return the largest magnitude of the measure of a solution so far.
 
-    Attributes:
-        demand: Largest magnitude of the measure when it was last compared with the limit.
+    Raises:
+        ArgumentError: The measure returns no numbers.
     """
-
-    def __init__(
-        self, simulation: Simulation, t1: float, dt: float, measure: Measure, limit: float
-    ) -> None:
-        self._steps, self._solution = EqualSteps(simulation, t1, dt), simulation.solution
-        self._measure, self._limit = measure, limit
-        self._between = -(-step_count(t1 - simulation.t, dt) // CHECKS)
-        self.demand, self.error = 0.0, math.nan
-
-    @property
-    def steps(self) -> int:
-        """Number of steps so far."""
-        return self._steps.steps
-
-    @property
-    def finished(self) -> bool:
-        """True after the last step, or if the demand exceeds the limit."""
-        return self._steps.finished or self.demand > self._limit
-
-    @property
-    def progress(self) -> float:
-        """Fraction of the steps that have been taken."""
-        return self._steps.progress
-
-    def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take up to ``most`` steps, at most until the next comparison with the limit."""
-        left = self._between - self.steps % self._between
-        self._steps.advance(min(most, left), keep=keep)
-        if self._steps.finished or self.steps % self._between == 0:
-            self.compare()
-
-    def compare(self) -> None:
-        """Update the demand.
-
-        Raises:
-            ArgumentError: The measure returns no numbers.
-        """
-        value = self._measure(self._solution)
-        try:
-            sizes = np.abs(np.asarray(value, dtype=float))
-        except (TypeError, ValueError):
-            sizes = np.empty(0)
-        sizes = sizes[~np.isnan(sizes)]  # the first row of many results is NaN
-        if not len(sizes) or not np.isfinite(sizes).all():
-            raise WrongResult(
-                f"{WHAT}: measure returned {shorten(value)}, not finite numbers, of the states up "
-                f"to t = {self._solution.times[-1]:g} s; no run can be judged"
-            )
-        self.demand = float(sizes.max())
+    value = measure(solution)
+    try:
+        sizes = np.abs(np.asarray(value, dtype=float))
+    except (TypeError, ValueError):
+        sizes = np.empty(0)
+    sizes = sizes[~np.isnan(sizes)]  # the first row of many results is NaN
+    if not len(sizes) or not np.isfinite(sizes).all():
+        raise WrongResult(
+            f"{WHAT}: measure returned {shorten(value)}, not finite numbers, of the states up to "
+            f"t = {solution.times[-1]:g} s; no run can be judged"
+        )
+    return float(sizes.max())

@@ -15,7 +15,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, lib, struct
 from ufl_beam.display import in_one_line
 from ufl_beam.errors import ArgumentError, require_kind, require_number, require_row
-from ufl_beam.model.ground_motion import GroundMotion
+from ufl_beam.structures.ground_motion import GroundMotion
 
 POINTS = 100
 """Smallest number of steps in the elastic period of an oscillator.
@@ -41,8 +41,8 @@ class ResponseSpectrum(NamedTuple):
         ductility: Largest displacement divided by the displacement at first yield; 1 if elastic.
 
     Example:
-        >>> motion = ub.GroundMotion(0.01, np.ones(200))
-        >>> spectrum = ub.response_spectrum(motion, [0.5, 1.0], damping=0.0)
+        >>> motion = st.GroundMotion(0.01, np.ones(200))
+        >>> spectrum = st.response_spectrum(motion, [0.5, 1.0], damping=0.0)
         >>> print(spectrum.pseudo_acceleration.round(2))  # twice the acceleration: a sudden load
         [2. 2.]
     """
@@ -85,9 +85,9 @@ def response_spectrum(
         ArgumentError: An argument is out of range, or a motion that is zero has a ductility.
 
     Example:
-        >>> motion = ub.GroundMotion(0.01, 3.0 * np.sin(0.06 * np.arange(400)))
-        >>> elastic = ub.response_spectrum(motion, [1.0])
-        >>> yielding = ub.response_spectrum(motion, [1.0], ductility=4.0, hardening=0.05)
+        >>> motion = st.GroundMotion(0.01, 3.0 * np.sin(0.06 * np.arange(400)))
+        >>> elastic = st.response_spectrum(motion, [1.0])
+        >>> yielding = st.response_spectrum(motion, [1.0], ductility=4.0, hardening=0.05)
         >>> bool(yielding.pseudo_acceleration < elastic.pseudo_acceleration / 2)
         True
     """

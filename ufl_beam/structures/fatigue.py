@@ -45,7 +45,7 @@ class Goodman(Record):
         ultimate: Ultimate stress; Pa.
 
     Example:
-        >>> curve = ub.SNCurve(range=71e6, mean=ub.Goodman(ultimate=500e6))
+        >>> curve = st.SNCurve(range=71e6, mean=st.Goodman(ultimate=500e6))
         >>> print(curve.endurance(71e6, mean=0.0), curve.endurance(71e6, mean=250e6))
         2000000.0 250000.0
     """
@@ -70,7 +70,7 @@ class Gerber(Goodman):
         ultimate: Ultimate stress; Pa.
 
     Example:
-        >>> welded, machined = ub.SNCurve(range=71e6), ub.SNCurve(range=71e6, mean=ub.Gerber(500e6))
+        >>> welded, machined = st.SNCurve(range=71e6), st.SNCurve(range=71e6, mean=st.Gerber(500e6))
         >>> bool(machined.endurance(100e6, mean=200e6) < welded.endurance(100e6, mean=200e6))
         True
     """
@@ -110,7 +110,7 @@ class SNCurve(Record):
             ``mean`` is no function.
 
     Example:
-        >>> curve = ub.SNCurve.eurocode(71e6)
+        >>> curve = st.SNCurve.eurocode(71e6)
         >>> print(curve.endurance([142e6, 71e6, 10e6]))  # cycles to failure
         [ 250000. 2000000.      inf]
     """
@@ -171,10 +171,10 @@ class Cycles:
         count: Numbers of cycles; a half cycle counts as 0.5; (n,).
 
     Example:
-        >>> cycles = ub.rainflow([0, 100e6, -50e6, 80e6, 0])  # Pa
+        >>> cycles = st.rainflow([0, 100e6, -50e6, 80e6, 0])  # Pa
         >>> print(cycles.range / 1e6, cycles.count)
         [ 80. 100. 130. 150.] [0.5 0.5 0.5 0.5]
-        >>> print(f"{cycles.damage(ub.SNCurve.eurocode(71e6)):.2e}")
+        >>> print(f"{cycles.damage(st.SNCurve.eurocode(71e6)):.2e}")
         4.95e-06
     """
 
@@ -209,7 +209,7 @@ def rainflow(series: npt.ArrayLike) -> Cycles:
         ArgumentError: The series is not one row of finite numbers.
 
     Example:
-        >>> cycles = ub.rainflow([0, 3, 1, 2, 0])
+        >>> cycles = st.rainflow([0, 3, 1, 2, 0])
         >>> print(cycles.range, cycles.mean, cycles.count)
         [1. 3.] [1.5 1.5] [1. 1.]
     """
@@ -283,8 +283,8 @@ class HotSpot(Record):
         ArgumentError: ``place`` is no place, or ``stress`` is no function.
 
     Example:
-        >>> nominal = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9, factor=1.5)
-        >>> own = ub.HotSpot(beam.start, lambda N, V, M: N / 0.02 - 0.1 * M / 6.67e-5)
+        >>> nominal = st.HotSpot.fibre(beam.start, y=0.1, E=210e9, factor=1.5)
+        >>> own = st.HotSpot(beam.start, lambda N, V, M: N / 0.02 - 0.1 * M / 6.67e-5)
         >>> np.allclose(nominal.stress(0.0, 0.0, 1e4), 1.5 * own.stress(0.0, 0.0, 1e4), rtol=1e-3)
         True
     """
@@ -336,8 +336,8 @@ class Fatigue(Restartable):
         ArgumentError: A spot or the curve has a wrong type, or the resolution is negative.
 
     Example:
-        >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
-        >>> fatigue = ub.Fatigue(spot, ub.SNCurve.eurocode(71e6))
+        >>> spot = st.HotSpot.fibre(beam.start, y=0.1, E=210e9)
+        >>> fatigue = st.Fatigue(spot, st.SNCurve.eurocode(71e6))
         >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), amplitude=np.sin)
         >>> shaken = ub.Scene([beam], supports=scene.supports, loads=[shake])
         >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)

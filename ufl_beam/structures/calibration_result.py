@@ -105,7 +105,7 @@ class Measurement(Record):
     Example:
         >>> def deflection(run):
         ...     return run.displacement(run.scene["beam"].end)[:, 1]
-        >>> swing = ub.Measurement([0.1, 0.2], [-0.8e-3, -2.4e-3], deflection,
+        >>> swing = st.Measurement([0.1, 0.2], [-0.8e-3, -2.4e-3], deflection,
         ...     scheme=ub.EnergyMomentum(), t=(0, 0.2), dt=0.01, sigma=1e-5,
         ...     labels=("time (s)", "deflection (m)"))
         >>> len(swing)
@@ -265,10 +265,10 @@ class Calibration(Rich):
         ...     arm = ub.Beam((0, 0), (2, 0), steel, cells=4, name="arm")
         ...     force = ub.PointLoad(arm.end, force=(0, -1e3), amplitude=lambda t: t)
         ...     return ub.Scene([arm], supports=[ub.Clamped(arm.start)], loads=[force])
-        >>> bent = ub.Measurement([0.5, 1.0], [-0.095e-3, -0.192e-3],
+        >>> bent = st.Measurement([0.5, 1.0], [-0.095e-3, -0.192e-3],
         ...     lambda run: run.displacement(run.scene["arm"].end)[:, 1],
         ...     scheme=ub.Static(), t=(0, 1), dt=0.5)
-        >>> fit = ub.calibrate(cantilever, {"E": 100e9}, [bent])
+        >>> fit = st.calibrate(cantilever, {"E": 100e9}, [bent])
         >>> print(f"{fit.parameters['E'] / 1e9:.0f} GPa")
         207 GPa
         >>> figure = ub.plot(fit)
