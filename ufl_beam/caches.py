@@ -22,14 +22,14 @@ T = TypeVar("T", bound=tuple[Any, ...])
 P = ParamSpec("P")
 Cached = TypeVar("Cached")
 
-MOST_CACHED = 64  # largest number of cached results of each function
+SMALL, LARGE = 2**16, 2**21
+"""Largest sizes of the arguments of cached results: bytes of arrays plus values of whole numbers.
 
-LARGEST = 2**16
-"""Largest size of the arguments of a cached result: bytes of arrays plus values of whole numbers.
-
-Scenes of more than some 500 cells exceed this size.  A hundred steps of such a scene take longer
-than building the scene.
+Scenes of more than some 500 cells exceed the first size, those of some 14 000 cells the second.
 """
+
+MOST_SMALL, MOST_LARGE = 64, 4
+"""Largest numbers of cached results of each function; several large ones serve derivatives."""
 
 
 def cached_forms(function: Callable[P, Cached]) -> Callable[P, Cached]:
@@ -49,8 +49,7 @@ def cached_by_structure(function: Callable[..., T]) -> Callable[..., T]:
             x.flags.writeable = False
         return result
 
-    @lru_cache(maxsize=MOST_CACHED)
-    def cached(*keys: Any) -> T:
+    def compute(*keys: Any) -> T:
         # The key of an array is its type, shape and bytes, because arrays have no hash.
         arguments = (
             np.frombuffer(key[2], key[0]).reshape(key[1]) if isinstance(key, tuple) else key
@@ -58,16 +57,18 @@ def cached_by_structure(function: Callable[..., T]) -> Callable[..., T]:
         )
         return locked(function(*arguments))
 
+    small, large = (lru_cache(maxsize=most)(compute) for most in (MOST_SMALL, MOST_LARGE))
+
     @wraps(function)
     def call(*arguments: Any) -> T:
         keys, size = list[Any](), 0
         for x in arguments:
             is_array = isinstance(x, np.ndarray)
             size += x.nbytes if is_array else x
-            if size > LARGEST:
+            if size > LARGE:
                 return locked(function(*arguments))
             keys.append((x.dtype, x.shape, x.tobytes()) if is_array else x)
-        return cached(*keys)
+        return (small if size <= SMALL else large)(*keys)
 
     return call
 

@@ -60,7 +60,7 @@ def test_adjoint_is_the_direct_derivative(seed):
     ]
     times = random.normal(size=len(direct))
     dofs = random.choice(direct.shape[1], 3, replace=False)
-    found = ub.gradient(
+    _, found = ub.gradient(
         one.model, {"x": 1.0}, of=lambda s: s.q[:, dofs].sum(axis=1), reduce=times.dot, **run
     )
     parts = times[:, None] * direct[:, dofs]

@@ -28,7 +28,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 @pytest.fixture
 def forgetful(monkeypatch):
     """`forgetful()`: from now on nothing is kept, as in a process that has built nothing yet."""
-    return lambda: monkeypatch.setattr(caches, "LARGEST", -1)
+    return lambda: monkeypatch.setattr(caches, "LARGE", -1)
 
 
 def run(seed, statement=AS_GIVEN):
@@ -159,9 +159,9 @@ def test_a_changed_argument_changes_nothing_that_was_computed(doubled):
 
 
 def test_large_structures_are_not_kept(doubled):
-    large = np.zeros(caches.LARGEST // 8 + 1, dtype=np.int64)
+    large = np.zeros(caches.LARGE // 8 + 1, dtype=np.int64)
     (one,), (other,) = doubled(0, large), doubled(0, large)
     assert one is not other
     assert not one.flags.writeable
-    (one,), (other,) = (doubled(caches.LARGEST, np.arange(3)) for _ in range(2))
+    (one,), (other,) = (doubled(caches.LARGE, np.arange(3)) for _ in range(2))
     assert one is not other  # what has so many numbers may be stated by a few

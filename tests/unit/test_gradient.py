@@ -333,9 +333,9 @@ def test_adjoint_equals_direct_differentiation(name):
     arguments = (model, at, scheme)
     times = {"t": (0, end), "dt": dt}
     direct = ub.differentiate(*arguments, **times, progress=False).of(lambda s: of(s)[-1])
-    found = ub.gradient(*arguments, **times, of=of)
+    _, found = ub.gradient(*arguments, **times, of=of)
     np.testing.assert_allclose(found, direct, rtol=1e-8, atol=1e-10 * np.abs(direct).max())
-    parts = ub.gradient(*arguments, **times, of=of, max_bytes=1e5)
+    _, parts = ub.gradient(*arguments, **times, of=of, max_bytes=1e5)
     np.testing.assert_allclose(parts, found, rtol=1e-10, atol=1e-13 * np.abs(found).max())
 
 
@@ -361,7 +361,7 @@ def test_number_may_depend_on_the_whole_history(name):
         return float(np.max(x[:, 0]) + 0.01 * np.mean(x[:, 3] ** 2))
 
     direct = ub.differentiate(*run, **times, progress=False).of(lambda s: number(both(s)))
-    found = ub.gradient(*run, **times, of=both, reduce=number, max_bytes=1e5)
+    _, found = ub.gradient(*run, **times, of=both, reduce=number, max_bytes=1e5)
     atol = 1e-10 * np.abs(direct).max()
     np.testing.assert_allclose(found, direct, rtol=1e-7, atol=atol)  # of differences of squares
 
@@ -381,7 +381,7 @@ def test_stiffness_of_each_cell():
 
     at = {f"EI{k}": 9e6 for k in range(24)}
     times = {"t": (0, 0.1), "dt": 0.002}
-    found = ub.gradient(pieces, at, ub.EnergyMomentum(), **times, of=tip)
+    _, found = ub.gradient(pieces, at, ub.EnergyMomentum(), **times, of=tip)
     some = ("EI0", "EI11", "EI23")
     direct = ub.differentiate(
         lambda **values: pieces(**(at | values)),
@@ -428,7 +428,7 @@ def test_curved_histories_beside_large_forces_of_joints():
     at, options = parameters(pinned, {"length"}), {"t": (0, 0.3), "dt": 0.01}
     run = ub.differentiate(pinned, at, ub.EnergyMomentum(), progress=False, **options)
     assert np.abs(run.solution.q).max() > 1e7
-    found = ub.gradient(pinned, at, ub.EnergyMomentum(), of=distance, reduce=number, **options)
+    _, found = ub.gradient(pinned, at, ub.EnergyMomentum(), of=distance, reduce=number, **options)
     np.testing.assert_allclose(found, run.of(lambda s: number(distance(s))), rtol=1e-6)
 
 
@@ -463,7 +463,7 @@ def test_histories_of_positions_and_of_points_of_bodies(scheme):
 
     at, options = parameters(balance, {}), {"t": (0, 0.5), "dt": 0.02}
     run = ub.differentiate(balance, at, scheme, progress=False, **options)
-    found = ub.gradient(balance, at, scheme, of=far, reduce=number, **options)
+    _, found = ub.gradient(balance, at, scheme, of=far, reduce=number, **options)
     np.testing.assert_allclose(found, run.of(lambda s: number(far(s))), rtol=1e-8)
 
 
@@ -487,7 +487,7 @@ def test_logarithm_of_the_last_of_many_decaying_swings():
     run = decaying, parameters(decaying, {}), ub.EnergyMomentum()
     times = {"t": (0, 5.0), "dt": 0.01}
     direct = ub.differentiate(*run, **times, progress=False).of(lambda s: decay(motion(s)))
-    found = ub.gradient(*run, **times, of=motion, reduce=decay)
+    _, found = ub.gradient(*run, **times, of=motion, reduce=decay)
     np.testing.assert_allclose(found, direct, rtol=1e-6)
 
 
@@ -510,7 +510,7 @@ def test_history_of_velocities_with_friction_and_laws_of_users():
     for model in (rubbing, asked):
         run = model, parameters(model, {}), ub.EnergyMomentum(0.01)
         direct = ub.differentiate(*run, **times, progress=False).of(lambda s: number(speed(s)))
-        found = ub.gradient(*run, **times, of=speed, reduce=number, max_bytes=1e5)
+        _, found = ub.gradient(*run, **times, of=speed, reduce=number, max_bytes=1e5)
         values = np.array(list(run[1].values()))  # for relative changes; differences of squares
         most = np.abs(values * direct).max()
         np.testing.assert_allclose(values * found, values * direct, rtol=1e-7, atol=1e-8 * most)
@@ -543,3 +543,131 @@ def test_a_derivative_does_not_depend_on_other_parameters(name):
     for k, (key, value) in enumerate(values.items()):
         alone = derivatives({key: value})[:, 0]
         assert np.abs(together[:, k] - alone).max() <= 1e-9 * np.abs(alone).max(), key
+
+
+def counted(model):
+    """A model that counts its calls."""
+
+    def call(**values):
+        call.number += 1
+        return model(**values)
+
+    call.number = 0
+    return call
+
+
+def strip(weak, strong, force):
+    """Two beams in a row, of which one has a compliance as parameter in `softened`."""
+    shape = {"EA": 2e9, "GA": 7e8, "rhoA": 60.0, "rhoI": 0.1}
+    a, b = (
+        ub.Beam((k, 0), (k + 1, 0), ub.Section(EI=EI, **shape), cells=2)
+        for k, EI in enumerate((weak, strong))
+    )
+    push = ub.PointLoad(b.end, force=(0, force), amplitude=lambda t: math.sin(t))
+    return ub.Scene(
+        [a, b], joints=[ub.Rigid(a.end, b.start)], supports=[ub.Clamped(a.start)], loads=[push]
+    )
+
+
+def softened(weak, strong, force):
+    return strip(1 / weak, strong, force)
+
+
+def sway(run):
+    return run.displacement(run.scene.beams[-1].end)[:, 1]
+
+
+@pytest.mark.parametrize("reciprocal", [False, True])
+def test_linear_numbers_need_two_scenes(reciprocal):
+    """Derivatives by a stiffness and by its reciprocal agree; the model is called less often."""
+    at = {"weak": 4e6, "strong": 8e6, "force": 1e4}
+    times = {"t": (0, 0.2), "dt": 0.02, "of": sway}
+    plain = counted(strip)
+    value, by = ub.gradient(plain, at, ub.EnergyMomentum(), **times)
+    assert plain.number == 1 + 2 * len(at)
+    run = ub.simulate(strip(**at), ub.EnergyMomentum(), t=(0, 0.2), dt=0.02)
+    assert value == pytest.approx(sway(run)[-1], rel=1e-12)
+    direct = ub.differentiate(strip, at, ub.EnergyMomentum(), t=(0, 0.2), dt=0.02).of(sway)[-1]
+    assert by == pytest.approx(direct, rel=1e-9)
+    if reciprocal:
+        bent = counted(softened)
+        _, found = ub.gradient(bent, at | {"weak": 1 / 4e6}, ub.EnergyMomentum(), **times)
+        assert bent.number == 1 + 2 + 4 * len(at)  # the first pair is not linear
+        assert found[0] == pytest.approx(-by[0] * 4e6**2, rel=1e-9)
+        assert found[1:] == pytest.approx(by[1:], rel=1e-9)
+
+
+def test_functions_of_time_may_depend_on_parameters():
+    """An amplitude that is linear in its parameter, and one that is not."""
+
+    def pushed(slope, rate):
+        def amplitude(t):
+            return slope * t * math.exp(-rate * t)
+
+        scene = strip(4e6, 8e6, 1e4)
+        push = ub.PointLoad(scene.beams[1].end, force=(0, 1e4), amplitude=amplitude)
+        return dataclasses.replace(scene, loads=[push])
+
+    at, options = {"slope": 2.0, "rate": 3.0}, {"t": (0, 0.2), "dt": 0.02}
+    _, by = ub.gradient(pushed, at, ub.EnergyMomentum(), **options, of=sway)
+    h = 2.0**-10
+    for k, name in enumerate(at):
+        ends = [
+            sway(
+                ub.simulate(
+                    pushed(**at | {name: at[name] * (1 + x * h)}),
+                    ub.EnergyMomentum(),
+                    **options,
+                    newton=ub.Newton(rtol=1e-13),
+                )
+            )[-1]
+            for x in (-2, -1, 1, 2)
+        ]
+        slope = np.dot(ends, (1 / 12, -8 / 12, 8 / 12, -1 / 12)) / (h * at[name])
+        assert by[k] == pytest.approx(slope, rel=1e-8)
+
+
+def test_scipy_minimizes_with_value_and_gradient():
+    """The stiffness at which a cantilever has a given sway, from twice the stiffness."""
+    minimize = pytest.importorskip("scipy.optimize").minimize
+    at, options = {"weak": 4e6, "strong": 8e6, "force": 1e4}, {"t": (0, 1), "dt": 0.25}
+    wanted = sway(ub.simulate(strip(**at), ub.Static(), **options))[-1]
+
+    def error(x):
+        return ub.gradient(
+            strip, at | {"weak": 1e6 * float(x[0])}, ub.Static(), **options, of=sway,
+            reduce=lambda history: 1e6 * (history[-1] - wanted) ** 2,
+        )  # fmt: skip
+
+    def scaled(x):
+        value, by = error(x)
+        return value, 1e6 * by[:1]
+
+    found = minimize(scaled, [8.0], jac=True, tol=1e-12)
+    assert found.x[0] == pytest.approx(4.0, rel=1e-5)
+
+
+def test_areas_of_fibres_are_linear_numbers():
+    """They are weights of points, whose derivatives have tables of their own."""
+
+    def layered(area, limit):
+        some = ub.Fibres(ub.ElastoPlastic(limit, 2e9))
+        y = [-0.1, -0.05, 0.0, 0.05, 0.1]
+        section = ub.Section.of_fibres(y, 5 * [area], E=210e9, nu=0.3, rho=7850.0, fibres=some)
+        return column(section, load=6e4 * area / 4e-3)
+
+    at = {"area": 4e-3, "limit": 235e6}
+    options = {"t": (0, 0.3), "dt": 2e-3}
+    _, found = ub.gradient(layered, at, ub.EnergyMomentum(), **options, of=tip)
+    direct = ub.differentiate(layered, at, ub.EnergyMomentum(), **options).of(tip)[-1]
+    assert found == pytest.approx(direct, rel=1e-8)
+    h = 1e-3 * at["area"]
+    ends = [
+        tip(
+            ub.simulate(
+                layered(**at | {"area": at["area"] + x * h}), ub.EnergyMomentum(), **options
+            )
+        )[-1]
+        for x in (-1, 1)
+    ]
+    assert found[0] == pytest.approx((ends[1] - ends[0]) / (2 * h), rel=1e-4)

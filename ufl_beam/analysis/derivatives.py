@@ -11,8 +11,10 @@ import time
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from functools import partial
 from inspect import signature
+from types import SimpleNamespace
 from typing import Any, NamedTuple, NoReturn
 
 from mpi4py import MPI
@@ -23,6 +25,7 @@ import numpy.typing as npt
 from ufl_beam.arrays import Array, State
 from ufl_beam.compiled.c_library import doubles, ffi, fill, struct
 from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.display import in_one_line
 from ufl_beam.errors import (
@@ -38,16 +41,20 @@ from ufl_beam.errors import (
 )
 from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia, order_of
 from ufl_beam.model.beams import Mesh
+from ufl_beam.model.connector_law import ForceLaw
+from ufl_beam.model.functions import TimeFunction, same_function
+from ufl_beam.model.loads import MovingLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.state_rows import Block, Column, Columns
-from ufl_beam.parallel import progress_bar
-from ufl_beam.simulation.initial_state import mesh_of, require_scheme
+from ufl_beam.parallel import Agreement, progress_bar
+from ufl_beam.simulation.initial_state import initial_state, mesh_of, require_scheme
 from ufl_beam.simulation.run import require_times, running, take_steps
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.simulation.step_lengths import Adaptive, EqualSteps, step_count
 from ufl_beam.solvers.newton_options import Newton, require_plain
-from ufl_beam.terms.derivatives import Neighbours, functions
+from ufl_beam.terms.derivatives import Neighbours, Registered, functions
 
 MODEL_STEP = 2.0**-13
 """Relative change of a parameter for differences of the numbers in a scene.
@@ -75,6 +82,9 @@ STENCILS: dict[tuple[int, ...], tuple[float, ...]] = {
 }
 """Positions and weights of five-point differences: central ones, and one-sided ones at the end of
 the range of a parameter.  The weight of the position 0 makes the sum of the weights zero."""
+
+PAIR = (-1, 1), (-0.5, 0.5)
+"""Positions and weights of central differences, which are exact for linear numbers."""
 
 MOST_SUBSTEPS = 1000
 """Number of substeps of divided steps that are stored; the number of steps if it is larger."""
@@ -246,9 +256,10 @@ class Case:
     def _step(self, name: str, fraction: float) -> float:
         return fraction * (abs(self.at[name]) or 1.0)
 
-    def scenes(self, name: str, fraction: float) -> Iterator[Scene]:
-        """Yield the scenes of a stencil for a parameter, whose steps are a ``fraction`` of it."""
-        for stencil in [self._stencils[name]] if name in self._stencils else STENCILS:
+    def scenes(self, name: str, fraction: float) -> list[Scene]:
+        """Return the scenes of a stencil for a parameter, whose steps are a ``fraction`` of it."""
+        known = self._stencils.get(name)
+        for stencil in STENCILS if known is None else [known]:
             h = self._step(name, fraction)
             try:
                 scenes = [self.scene({name: self.at[name] + k * h}) for k in stencil]
@@ -256,8 +267,7 @@ class Case:
                 refused = error
                 continue
             self._stencils[name] = stencil
-            yield from scenes
-            return
+            return scenes
         where = f"{self._call}: {name} near {self.at[name]:g}"
         raise ArgumentError(f"{where}: {refused}") from refused
 
@@ -265,7 +275,7 @@ class Case:
         """Yield simulations of :meth:`scenes`."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)
-            scenes = [*self.scenes(name, fraction)]
+            scenes = self.scenes(name, fraction)
             starts: Sequence[Solution | None] = [None] * len(scenes)
             if self.start is not None:
                 start, p = self.start, [*self.at].index(name)
@@ -286,9 +296,8 @@ class Case:
         """Simulate until ``t1`` (s) and differentiate each step, see :func:`differentiate`."""
         begin = time.perf_counter()
         run = self.simulation()
-        neighbours, weights = self.neighbours(run)
-        states = step_count(t1 - run.t, dt) + 1
-        steps = StepDerivatives(run, neighbours, weights, states)
+        beside = self.neighbours(run, t1)
+        steps = StepDerivatives(run, beside, step_count(t1 - run.t, dt) + 1)
         fill(run.time_loop, derivatives=steps.c)
         if start is not None and self.start is None:
             run.save_or_restore(Archive(run.subdomain, start.end[0]))
@@ -296,41 +305,224 @@ class Case:
         with running(run, [], [], begin):
             bar = progress_bar(progress, MPI.COMM_WORLD, total=1.0)
             take_steps(run, EqualSteps(run, t1, dt), [], bar)
-        for some in neighbours:
-            for other in some:
-                other.equation.callbacks.synchronize()  # exceptions of functions of the user
-                other.close()
+        beside.close()
         archive = Archive(run.subdomain)
         run.save_or_restore(archive)
         return Derivatives(self, run.solution, steps, archive.state(), start)
 
-    def neighbours(self, run: Simulation) -> tuple[list[list[Simulation]], Array]:
-        """Return simulations at neighbouring values for differences of numbers of the scene.
-
-        Returns:
-            For each parameter, the simulations; and their weights in the derivative, (P, n).
-        """
+    def neighbours(self, run: Simulation, t1: float) -> Beside:
+        """Return scenes at neighbouring values for differences of numbers, in a run to ``t1``."""
         names = [*self.at]
-        neighbours = [[*self.simulations(name, MODEL_STEP)] for name in names]
-        for name, some in zip(names, neighbours, strict=True):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ModelWarning)
+            if self.start is not None or run.begins_with_impact:
+                scenes: list[list[Any]] = [[*self.simulations(x, MODEL_STEP)] for x in names]
+            elif (pairs := self._pairs(run, t1)) is not None:
+                return pairs
+            else:
+                scenes = [
+                    [NeighbouringScene(run, scene) for scene in self.scenes(name, MODEL_STEP)]
+                    for name in names
+                ]
+        for name, some in zip(names, scenes, strict=True):
             if not all(_alike(run, other) for other in some):
                 raise ArgumentError(
                     f"{self._call}: {name} changes the cells, unknowns or parts of the scene, so "
                     "that the run has no derivative; keep beams, cells and attached points on the "
                     "same vertices"
                 )
-        return neighbours, np.array([self.weights(name, MODEL_STEP) for name in names])
+        return Beside(scenes, np.array([self.weights(name, MODEL_STEP) for name in names]))
+
+    def _pairs(self, run: Simulation, t1: float) -> Beside | None:
+        """Return two scenes for each parameter, if all numbers are linear between them."""
+        numbers = Numbers(run, t1)
+        steps = np.array([self._step(name, MODEL_STEP) for name in self.at])
+        pairs = Beside([], np.array([PAIR[1]]) / steps[:, None], [])
+        for (name, value), weights in zip(self.at.items(), pairs.weights, strict=True):
+            changes = (value + k * self._step(name, MODEL_STEP) for k in PAIR[0])
+            try:
+                both = [NeighbouringScene(run, self.scene({name: x})) for x in changes]
+            except ArgumentError:
+                return None
+            if (changed := numbers.linear_changes(both)) is None:
+                return None
+            pairs.scenes.append(both)
+            if pairs.rows is not None and not numbers.moves_alike(both):
+                pairs.rows = None  # C needs the terms of all scenes
+                for some in pairs.scenes[:-1]:
+                    some[:] = [NeighbouringScene(run, other.scene) for other in some]
+            if pairs.rows is not None:
+                slopes = (np.asarray(np.tensordot(weights, x, 1)) for x in changed)
+                pairs.rows.append([x if x.any() else None for x in slopes])
+                for other in both:
+                    other.forget()
+        return pairs
 
 
-def _alike(run: Simulation, other: Simulation) -> bool:
-    """Return whether two simulations have the same unknowns and the same parts of terms."""
-    a, b = run.numbering, other.numbering
+@dataclass
+class Beside:
+    """Scenes at neighbouring values of each parameter.
+
+    Attributes:
+        scenes: The scenes of each parameter.
+        weights: Weights of the scenes in derivatives; (P, n).
+        rows: Derivatives of all :class:`Numbers` by each parameter, None where they are zero, if
+            functions of time are the same in all scenes; the scenes have forgotten their terms.
+            Else None.
+    """
+
+    scenes: list[list[Any]]
+    weights: Array
+    rows: list[list[Array | None]] | None = None
+
+    def derivatives(self) -> Iterator[list[Array | None]] | None:
+        """Return an iterator over the derivatives of each number by all parameters, if known."""
+        return None if self.rows is None else iter([list(x) for x in zip(*self.rows, strict=True)])
+
+    def terms(self, i: int) -> list[list[Any]]:
+        """Return the terms of the scenes with an index; none if the scenes have forgotten them."""
+        known = self.rows is None
+        return [[x.equation.terms[i] for x in some if known] for some in self.scenes]
+
+    def close(self) -> None:
+        """Free memory; raise exceptions of functions of the user."""
+        for other in (x for some in self.scenes for x in some):
+            if self.rows is None:
+                other.equation.callbacks.synchronize()
+            other.close()
+
+
+def same_cells(a: DofNumbering, b: DofNumbering) -> bool:
+    """Return whether two scenes have the same cells and unknowns."""
     names = "cells", "dofs", "dofs_of_bodies", "multipliers"
-    same = all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
+    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
+
+
+def _alike(run: Simulation, other: Any) -> bool:
+    """Return whether two simulations have the same unknowns and the same parts of terms."""
+    if not same_cells(run.numbering, other.numbering):
+        return False
     terms = [[term.parts for term in x.equation.terms] for x in (run, other)]
     angles = [[support.angle for support in x.scene.supports] for x in (run, other)]
     constrained = np.array_equal(run.supports.dofs, other.supports.dofs)
-    return same and terms[0] == terms[1] and angles[0] == angles[1] and constrained
+    return terms[0] == terms[1] and angles[0] == angles[1] and constrained
+
+
+LINEAR = 1e-9
+"""Largest ratio of second and first differences of a number that is a linear function."""
+
+SAMPLES = 7  # times at which functions of time of neighbouring scenes are compared
+
+
+class Numbers:
+    """Numbers in the terms of a run that parameters may change."""
+
+    def __init__(self, run: Simulation, t1: float) -> None:
+        self._run, self._times = run, np.linspace(run.t, t1, SAMPLES)
+        self._values = list[Callable[[Any], Array]]()
+        self._fixed = list[tuple[int, Callable[[Any], Array]]]()
+        for i, term in enumerate(run.equation.terms):
+            register = Registered(term, run.subdomain.size)
+            term.derivatives(register)
+            self._values += [partial(_of_term, i, values) for values in register.values]
+            self._fixed += [(i, values) for values in register.fixed]
+        self._values += [lambda x: x.q, lambda x: x.supports.reactions]
+        if run.equation.inertia is not None:
+            self._values.append(lambda x: x.inertia.rates)
+        self._here = [values(run) for values in self._values]
+        laws = (connector.law for connector in run.scene.all_connectors)
+        # Numbers that are not in arrays, or functions of the time function of a load
+        self._others = bool(run.scene.works) or any(isinstance(x, ForceLaw) for x in laws)
+        self._others |= any(isinstance(x, MovingLoad) for x in run.scene.loads)
+
+    def linear_changes(self, both: Sequence[Any]) -> list[Array] | None:
+        """Return the changes of all numbers in two scenes, if they are linear; (2, ...) each."""
+        if self._others or not all(_alike(self._run, other) for other in both):
+            return None
+        terms = self._run.equation.terms
+        pairs = (pair for x in both for pair in zip(terms, x.equation.terms, strict=True))
+        if not all(a.is_like(b) for a, b in pairs) or not self._moves_linearly(both):
+            return None
+        for i, fixed in self._fixed:
+            if any(not np.array_equal(fixed(terms[i]), fixed(x.equation.terms[i])) for x in both):
+                return None
+        found = list[Array]()
+        for here, values in zip(self._here, self._values, strict=True):
+            with np.errstate(invalid="ignore"):  # infinite numbers do not change
+                change = np.array([np.subtract(values(other), here) for other in both])
+            change[~np.isfinite(change)] = 0.0
+            if not _cancel(change, here):
+                return None
+            found.append(change)
+        return found
+
+    def _functions(self, of: Any) -> list[TimeFunction]:
+        return [function for _, function in of.scene.time_functions()]
+
+    def _moves_linearly(self, both: Sequence[Any]) -> bool:
+        of_three = zip(*map(self._functions, (self._run, *both)), strict=True)
+        for here, *others in of_three:
+            if not all(same_function(here, other) for other in others):
+                values = [[f(float(t)) for t in self._times] for f in (here, *others)]
+                if not _cancel(np.subtract(values[1:], values[0]), np.array(values[0])):
+                    return False
+        return True
+
+    def moves_alike(self, both: Sequence[Any]) -> bool:
+        """Return whether all functions of time and dead loads are the same in two scenes."""
+        mine, *others = map(self._functions, (self._run, *both))
+        same = all(all(map(same_function, mine, other)) for other in others)
+        terms = (zip(self._run.equation.terms, x.equation.terms, strict=True) for x in both)
+        return same and not any(term.differs(other) for pairs in terms for term, other in pairs)
+
+
+def _of_term(i: int, values: Callable[[Any], Array], scene: Any) -> Array:
+    return values(scene.equation.terms[i])
+
+
+def _cancel(changes: Array, values: Array) -> bool:
+    """Return whether two changes of numbers are opposite, apart from round-off."""
+    low, high = changes
+    round_off = 8 * np.finfo(np.float64).eps * np.abs(values)
+    with np.errstate(invalid="ignore"):
+        return not (np.abs(low + high) > LINEAR * np.abs(high) + round_off).any()
+
+
+class NeighbouringScene:
+    """Terms of a scene beside the scene of a run, at the beginning of the run.
+
+    It has those attributes of a :class:`Simulation` that derivatives read, and shares the matrix of
+    the run: it takes no steps.
+    """
+
+    def __init__(self, run: Simulation, scene: Scene) -> None:
+        self.scene, self.numbering = scene, DofNumbering(scene, run.numbering.mesh)
+        if not same_cells(run.numbering, self.numbering):
+            return  # without terms
+        subdomain = Subdomain(self.numbering, run.subdomain.comm)
+        q, v, _, _ = initial_state(self.numbering, None)
+        self.q, together = q[subdomain.dofs], Agreement(run.subdomain.comm)
+        self.equation = equation = StepEquation(
+            subdomain, run.scheme, run.t, v[subdomain.dofs], together, run.equation.A
+        )
+        self.supports, self.inertia = equation.supports, equation.inertia
+        if self.inertia is not None and self.inertia.scheme.further_rates:
+            for load in [*equation.loads, *equation.imposed]:
+                load.carry_on(run.t, self.q, self.inertia.v, None)
+        elif self.inertia is not None:
+            equation.begin_energies(run.t, self.q, self.inertia.v)
+        for term in equation.terms:
+            term.start(self.q)
+        for group in equation.connector_terms:
+            group.put_forces(self.q)
+        self.time_loop = SimpleNamespace(supports=self.supports.in_c(equation.callbacks))
+
+    def forget(self) -> None:
+        """Keep the numbering only."""
+        del self.equation, self.supports, self.inertia, self.time_loop, self.q
+
+    def close(self) -> None:
+        """Do nothing; a :class:`Simulation` frees its memory."""
 
 
 class StepDerivatives:
@@ -338,8 +530,7 @@ class StepDerivatives:
 
     Args:
         simulation: Simulation in its initial state.
-        neighbours: For each parameter, simulations in scenes with neighbouring values of it.
-        weights: Weights of the neighbours in differences; (P, n).
+        beside: Scenes with neighbouring values of the parameters.
         states: Number of states of the run.
 
     Attributes:
@@ -353,20 +544,17 @@ class StepDerivatives:
         c: ``derivatives`` of loops.h.
     """
 
-    def __init__(
-        self, simulation: Simulation, neighbours: list[list[Simulation]], weights: Array,
-        states: int,
-    ) -> None:  # fmt: skip
-        P, size = len(neighbours), simulation.subdomain.size
+    def __init__(self, simulation: Simulation, beside: Beside, states: int) -> None:
+        weights, size = beside.weights, simulation.subdomain.size
+        P, rows = len(weights), beside.derivatives()
         equation, A = simulation.equation, simulation.equation.A
-        scene = Neighbours(simulation, neighbours, weights, size)
+        scene = Neighbours(simulation, beside.scenes, weights, size, rows)
         self.terms, self.states = list[Any](), list[Array]()
         self.places = list[tuple[int, int, Callable[[Any], Array]]]()
-        self._alive = list[Any]([neighbours])  # data of C
+        self._alive = list[Any]([beside])  # data of C
         self.owners = list[Any]()  # terms, by their index in C
         for i, term in enumerate(equation.terms):
-            others = [[x.equation.terms[i] for x in some] for some in neighbours]
-            own = Neighbours(term, others, weights, size)
+            own = Neighbours(term, beside.terms(i), weights, size, rows)
             if (found := term.derivatives(own)) is None:
                 raise ArgumentError(f"differentiate: {term.effect} has no derivatives")
             # Beams use imposed strains, which follow in equation.terms: with the terms in reverse
@@ -387,13 +575,14 @@ class StepDerivatives:
         self.reactions = np.zeros((states, P, constrained))
         q0 = scene.differences(lambda x: x.q)
         reactions = scene.differences(lambda x: x.supports.reactions)
-        motions = [x.time_loop.supports.motion for some in neighbours for x in some]
-        most = max(states, MOST_SUBSTEPS)
+        several = [x for some in beside.scenes for x in some if rows is None]
+        motions = [x.time_loop.supports.motion for x in several]
+        most = max(states, MOST_SUBSTEPS) if states > 1 else 0  # the adjoint divides no steps
         substeps = self._substeps = [np.zeros((most, *n)) for n in ((3,), (size,), (P, size))]
         c = self.c = struct(
             "derivatives", parameters=P, size=size, terms=len(in_c),
             term=ffi.new("term_derivative[]", in_c), q0=q0, q1=np.zeros((P, size)),
-            reactions=reactions, neighbours=weights.shape[1], weight=weights,
+            reactions=reactions, neighbours=len(several) // P, weight=weights,
             motion=ffi.new("time_function *[]", motions), indices=A.indices,
             tangent=np.zeros(len(A.data)), r=np.zeros(size), v=np.zeros(size), s=np.zeros(size),
             space=np.zeros(size), range=self._change, range_time=self._time,
@@ -410,6 +599,8 @@ class StepDerivatives:
             fill(c, new_rates=np.zeros(rates.shape), inertia=equation.inertia.step_product)
         self.states += [reactions, q0, rates]
         self.restore(self.states)
+        if beside.rows:
+            beside.rows.clear()
 
     def enters(self) -> list[bool]:
         """Return, after the run, whether a number in it depends on each parameter."""
@@ -591,7 +782,9 @@ class Derivatives:
                 made = [DofNumbering(scene, mesh_of(None, self._case.mesh)) for scene in scenes]
                 changes = self._case.positions(name, QUANTITY_STEP)
                 pairs = zip(made, changes, strict=True)
-                self._shifted.append([MotionOnly(n, self._states(p, x)) for n, x in pairs])
+                self._shifted.append(
+                    [MotionOnly.of_states(n, self._states(p, x)) for n, x in pairs]
+                )
         return self._shifted
 
     def _fraction(self, name: str) -> float:
@@ -709,17 +902,24 @@ class Unknown(Exception):
 
 
 class MotionOnly(Solution):
-    """Motions and reactions of a run; other results are unknown."""
+    """States in a scene, of which only some columns are known."""
 
-    def __init__(self, numbering: DofNumbering, states: State) -> None:
+    def __init__(
+        self, numbering: DofNumbering, blocks: Sequence[Block], known: Collection[str]
+    ) -> None:
         super().__init__(numbering.scene, numbering)
+        self._blocks, self._known = [*blocks], known
+
+    @classmethod
+    def of_states(cls, numbering: DofNumbering, states: State) -> MotionOnly:
+        """Return the states in a scene from their columns."""
         columns = Columns({name: x.shape[1:] for name, x in states.items()})
         rows = np.column_stack([x.reshape(len(x), -1) for x in states.values()])
-        self._blocks = [Block(columns, rows, len(rows))]
+        return cls(numbering, [Block(columns, rows, len(rows))], {*states, "v"})
 
     def column(self, name: str) -> Column:
         """Return a column of the states."""
-        if name not in self._blocks[0].columns.at and name != "v":
+        if name not in self._known:
             raise Unknown
         return super().column(name)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import closing
+from functools import partial
 from operator import itemgetter
 from typing import Any
 
@@ -47,6 +48,9 @@ SMALL = 2.0**-17
 
 ALIKE = 1e-9  # relative difference of slopes by small and large steps that counts as round-off
 
+MOTION = "t", "q", "v"
+"""Columns of states on which histories may depend."""
+
 FINER = 2.0**-6
 """Ratio of steps of differences of histories and numbers, see :func:`_slope`."""
 
@@ -66,14 +70,14 @@ def gradient(
     newton: Newton | None = None,
     mesh: Mesh | None = None,
     max_bytes: float = MAX_BYTES,
-) -> Array:
-    """Differentiate one number of a run by many parameters of the scene.
+) -> tuple[float, Array]:
+    """Compute one number of a run, and differentiate it by many parameters of the scene.
 
     The adjoint of the run goes back through its steps once, at a cost that hardly depends on the
-    number of parameters.  But four simulations are made for each parameter, to difference the
-    numbers of the scene: with 48 parameters, of 250 steps, the whole costs 20 to 88 plain runs, the
-    more the fewer cells.  :func:`differentiate` has derivatives of any quantity, and continues a
-    preload with ``start``, which this function does not: its run begins with the undeformed scene.
+    number of parameters.  Besides, the model is called twice for each parameter if all numbers of
+    the scene are linear functions of the parameters, as a stiffness is of EI, else four times.
+    :func:`differentiate` has derivatives of any quantity, and continues a preload with ``start``,
+    which this function does not: its run begins with the undeformed scene.
 
     The steps are recorded in parts of the run that fit into the given memory.  Each segment is
     computed twice.
@@ -93,8 +97,9 @@ def gradient(
         max_bytes: Memory for recorded steps; bytes.
 
     Returns:
-        Derivatives of the number; (P,), in the order of ``at``.  The derivative by a parameter on
-        which the run does not depend is round-off.
+        The number and its derivatives; (P,), in the order of ``at``.  ``scipy.optimize.minimize``
+        takes both with ``jac=True``.  The derivative by a parameter on which the run does not
+        depend is round-off.
 
     Raises:
         ArgumentError: As in :func:`differentiate`; the history depends on something else than the
@@ -109,7 +114,7 @@ def gradient(
         ...     return ub.Scene([a, b], joints=joints, supports=supports, loads=[ub.Gravity()])
         >>> tip = lambda s: s.displacement(s.scene.beams[-1].end)[:, 1]
         >>> at = {"EI_0": 4e6, "EI_1": 4e6}
-        >>> sag = ub.gradient(frame, at, ub.EnergyMomentum(), t=(0, 0.1), dt=2e-3, of=tip)
+        >>> value, sag = ub.gradient(frame, at, ub.EnergyMomentum(), t=(0, 0.1), dt=2e-3, of=tip)
         >>> print((sag * 4e6 * 1e6).round(2))  # by relative changes; micrometres
         [1707.16  124.12]
     """
@@ -121,8 +126,8 @@ def gradient(
     if not has_inertia(scheme) and scheme.load_weight != 1.0:
         raise ArgumentError(f"gradient: scheme = {scheme} has no adjoint; use Static()")
     with closing(case.simulation()) as run:
-        neighbours, weights = case.neighbours(run)
-        steps = StepDerivatives(run, neighbours, weights, 1)
+        beside = case.neighbours(run, t1)
+        steps = StepDerivatives(run, beside, 1)
         number = step_count(t1 - t0, dt)
         ends = t0 + (t1 - t0) * np.arange(1, number + 1) / number
         ends[-1] = t1
@@ -130,12 +135,10 @@ def gradient(
         starts = adjoint.run(ends)
         history = _History(run.solution, of, reduce)
         found = adjoint.reverse(ends, starts, *history.derivatives_by_motion())
-        for p, (some, row) in enumerate(zip(neighbours, weights, strict=True)):
+        for p, (some, row) in enumerate(zip(beside.scenes, beside.weights, strict=True)):
             found[p] += np.dot(row, [history.change_in(other.numbering) for other in some])
-        for some in neighbours:
-            for other in some:
-                other.close()
-    return found
+        beside.close()
+    return history.value, found
 
 
 class _Adjoint:
@@ -198,8 +201,10 @@ class _Adjoint:
         while len(ends):
             ends = ends[self._simulation.steps_to(ends, keep=keep) :]
 
-    def reverse(self, ends: Array, starts: list[Any], q: Array, v: Array) -> Array:
-        """Return the derivatives by the parameters, from those by the states; (n+1, size) each."""
+    def reverse(
+        self, ends: Array, starts: list[Any], q: tuple[Index, Array], v: tuple[Index, Array]
+    ) -> Array:
+        """Return the derivatives by the parameters, from those by q and v, see ``_History``."""
         simulation, c = self._simulation, self.c
         # With a step for initial accelerations
         number = min(self.most, len(ends)) * self._stages + 1
@@ -212,19 +217,22 @@ class _Adjoint:
             self._step_to(some, keep=False)
             simulation.time_loop.adjoint = ffi.NULL
             for n in reversed(range(first + 1, first + 1 + len(some))):
-                self._q1 += q[n]
-                self._rates[1] += v[n]
+                self._add(n, q, v)
                 with simulation.equation.callbacks.raising():
                     for _ in range(self._stages):
                         if not lib.go_back(c, simulation.time_loop):
                             raise StepFailed(f"the tangent is singular at t = {ends[n - 1]:g} s")
-        self._q1 += q[0]
-        self._rates[1] += v[0]
+        self._add(0, q, v)
         if c.recorded:  # the step from which the initial accelerations were taken
             with simulation.equation.callbacks.raising():
                 lib.go_back(c, simulation.time_loop)
         lib.finish_adjoint(c, simulation.time_loop)
         return self.gradient.copy()
+
+    def _add(self, n: int, q: tuple[Index, Array], v: tuple[Index, Array]) -> None:
+        """Add the derivatives by a state."""
+        for x, (dofs, values) in ((self._q1, q), (self._rates[1], v)):
+            x[dofs] += values[n]
 
 
 class _History:
@@ -235,9 +243,7 @@ class _History:
         reduce: Callable[[Array], float],
     ) -> None:  # fmt: skip
         self._numbering, self._quantity, self._reduce = solution.numbering, of, reduce
-        self._states = {"t": solution.times, "q": solution.q, "v": solution.v}
-        if not len(self._states["v"]):
-            self._states["v"] = np.zeros_like(self._states["q"])
+        self._blocks = solution.blocks
         reference = self._reference = self._in(self._numbering)
         if reference.shape[:1] != (len(solution),):
             raise ArgumentError(
@@ -251,13 +257,12 @@ class _History:
                 f"gradient: the history is not finite at t = {solution.times[n]:g} s; return "
                 "finite values, and leave out those that reduce does not need"
             )
-        self._number(reference)  # raises if it is none
+        self.value = self._number(reference)
 
-    def _in(self, numbering: DofNumbering, **changes: Array) -> Array:
-        """Return the history in a scene, for changes of the motion."""
-        shifted = self._states | {name: self._states[name] + x for name, x in changes.items()}
+    def _in(self, numbering: DofNumbering) -> Array:
+        """Return the history in a scene."""
         try:
-            values = in_scene(self._quantity, MotionOnly(numbering, shifted))
+            values = in_scene(self._quantity, MotionOnly(numbering, self._blocks, MOTION))
         except Unknown:
             raise ArgumentError(
                 "gradient: the history needs more than displacements and velocities, such as "
@@ -301,38 +306,60 @@ class _History:
             by_rows[n, k] = _slope(number, float(np.abs(rows[:, k]).max()))
         return by_rows
 
-    def derivatives_by_motion(self) -> tuple[Array, Array]:
-        """Return the derivatives of the number by q and v of each state; (n+1, size) each."""
-        reference, by_rows, found = self._reference, self._by_values(), []
+    def derivatives_by_motion(self) -> list[tuple[Index, Array]]:
+        """Return the derivatives of the number by q and by v of each state.
+
+        Both are the degrees of freedom on which the history depends, (k,), and the derivatives by
+        them, (n+1, k).
+        """
+        reference, by_rows = self._reference, self._by_values()
+        n, size = len(reference), self._numbering.size
+        some_rows, both = np.arange(n)[:, None] % 2, list[tuple[Index, Array]]()
         for name in ("q", "v"):
-            x = self._states[name]
-            scale, bar = float(np.abs(x).max()) or 1.0, np.zeros_like(x)
-            pending = [np.arange(x.shape[1])]
-            while pending:  # bisection for the degrees of freedom that the history depends on
+            found, pending = dict[int, Array](), [slice(0, size)]
+            scale = self._largest(name)
+            while pending and scale is not None:  # bisection for those on which it depends
                 dofs = pending.pop()
-                change = np.zeros_like(x)
-                change[:, dofs] = SMALL * scale * (1 + np.arange(len(dofs)) / x.shape[1])
-                if np.array_equal(self._in(self._numbering, **{name: change}), reference):
+                number = dofs.stop - dofs.start
+                change = SMALL * scale * (1 + np.arange(number) / size)
+                if np.array_equal(self._shifted(name, dofs, change), reference):
                     continue
-                if len(dofs) > 1:
-                    pending += np.array_split(dofs, 2)
+                if number > 1:
+                    middle = dofs.start + number // 2
+                    pending += slice(dofs.start, middle), slice(middle, dofs.stop)
                     continue
-                change[::2] = 0.0
-                if np.any(self._in(self._numbering, **{name: change})[::2] != reference[::2]):
+                changed = self._shifted(name, dofs, change * some_rows)
+                if np.any(changed[::2] != reference[::2]):
                     raise ArgumentError(
                         "gradient: values of the history depend on motions at other times; put the "
                         "part that combines times into reduce"
                     )
+                shifted = partial(self._shifted, name, dofs)
+                slope = np.asarray(_slope(shifted, scale)).reshape(n, -1)
+                found[dofs.start] = np.sum(by_rows * slope, axis=1)
+            values = np.reshape([*found.values()], (-1, n)).T
+            both.append((np.array([*found], dtype=np.intp), values))
+        return both
 
-                def shifted(shift: float, name: str = name, dofs: Index = dofs) -> Array:
-                    change = np.zeros_like(self._states["q"])
-                    change[:, dofs] = shift
-                    return self._in(self._numbering, **{name: change})
+    def _largest(self, name: str) -> float | None:
+        """Return the largest number of a column, 1 if all are zero, None without the column."""
+        pieces = [x.columns.column_of(name, x.rows) for x in self._blocks if name in x.columns.at]
+        return max(float(np.abs(x).max()) for x in pieces) or 1.0 if pieces else None
 
-                slope = np.asarray(_slope(shifted, scale)).reshape(len(x), -1)
-                bar[:, dofs[0]] = np.sum(by_rows * slope, axis=1)
-            found.append(bar)
-        return found[0], found[1]
+    def _shifted(self, name: str, dofs: slice, change: Array | float) -> Array:
+        """Return the history if some degrees of freedom of a column change; (n+1, ...) or less."""
+        change = np.broadcast_to(change, (len(self._reference), dofs.stop - dofs.start))
+        pieces, first, kept = list[Array](), 0, list[Array]()
+        for block in self._blocks:
+            piece = block.columns.column_of(name, block.rows)[:, dofs]
+            pieces.append(piece)
+            kept.append(piece.copy())
+            piece += change[first : (first := first + len(piece))]
+        try:
+            return self._in(self._numbering)
+        finally:
+            for piece, before in zip(pieces, kept, strict=True):
+                piece[:] = before
 
 
 def _slope(function: Callable[[float], Any], scale: float) -> Array:

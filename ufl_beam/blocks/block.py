@@ -422,7 +422,7 @@ class Block(LoadTerm):
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
-        P, others = neighbours.weights.shape
+        P, others = len(neighbours), neighbours.number
         terms, found = [term for some in neighbours.terms for term in some], list[Each]()
         if all(map(self.is_like, terms)):
             by_number = neighbours.differences(lambda term: term._numbers)

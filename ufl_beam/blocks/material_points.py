@@ -368,7 +368,7 @@ class Points:
             return np.hstack([np.reshape(of.strains, (per_cell, -1)), of.weights[:, None]])
 
         shape = shape_of(neighbours.term)
-        shapes = bool(neighbours.differences(shape_of).any())
+        shapes = neighbours.change(shape_of)
         function, inputs, (states, numbers, unknowns, conditions) = self._forms.table(shapes)
         n, columns = cells * per_cell, 6 + states + numbers
         place = {name: k for k, name in enumerate(self.names)}

@@ -108,8 +108,14 @@ class Fields:
         vertices = numbering.cells.take(self.subdomain.cells[self.order], axis=0)
         return np.asarray(numbering.points.take(vertices, axis=0))
 
-    def matrix(self) -> Csr:
-        """Create a zero matrix for the degrees of freedom of this process."""
+    def matrix(self, A: Csr | None = None) -> Csr:
+        """Return a zero matrix for the degrees of freedom of this process, or ``A`` if it is given.
+
+        All matrices share the pattern of the first one.
+        """
+        if A is not None:
+            self._matrix = A
+            return A
         if self._matrix is None:
             subdomain = self.subdomain
             connectors = subdomain.numbering.scene.all_connectors

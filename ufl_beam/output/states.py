@@ -118,6 +118,11 @@ class States:
 
     # -- rows ----------------------------------------------------------------------------------
 
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """Rows of the states."""
+        return tuple(self._blocks)
+
     def free_rows(self, columns: Columns, number: int = 1) -> Array:
         """Return up to ``number`` free rows after the last state; :meth:`grow` makes them states.
 

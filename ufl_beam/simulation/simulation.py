@@ -79,6 +79,7 @@ class Simulation(Stepper):
         t: Time; s.
         solution: States stored by :meth:`keep`, or ``steps_to(..., keep=True)``; empty at first.
         substeps: Number of substeps so far; an undivided step counts as one substep.
+        begins_with_impact: True if velocities at the beginning meet constraints.
         comparison: Comparison of the processes if each of them computes a small scene as a whole.
 
     Example:
@@ -131,6 +132,7 @@ class Simulation(Stepper):
         whole = equation if subdomain.alone else None
         impacts, impact = together(impacts_of, numbering, scheme, t0, start, same, state, whole)
         self._impacts: Any = impacts
+        self.begins_with_impact = impact is not None
         if moves := impacts is not None and impacts.moves:
             equation.ledger.lost["impacts"] += 0.0
         self._meet(equation, impact)

@@ -51,7 +51,8 @@ class StepEquation:
     """Equation of a step: forces and tangent of all terms at the local degrees of freedom.
 
     The terms are made on the subdomain of one process, for a run that begins at ``t0`` (s).  The
-    initial local velocities ``v`` are set to zero, in place, where supports do not move.
+    initial local velocities ``v`` are set to zero, in place, where supports do not move.  An
+    equation with the unknowns of another one may share its matrix ``A``.
 
     Attributes:
         A: Tangent matrix.
@@ -76,13 +77,14 @@ class StepEquation:
     """
 
     def __init__(
-        self, subdomain: Subdomain, scheme: Scheme, t0: float, v: Array, together: Agreement
-    ) -> None:
+        self, subdomain: Subdomain, scheme: Scheme, t0: float, v: Array, together: Agreement,
+        A: Csr | None = None,
+    ) -> None:  # fmt: skip
         self.subdomain, self.scheme, self.weights = subdomain, scheme, subdomain.weights()
         scene = subdomain.numbering.scene
         search, switched = np.zeros(lib.SEARCH_FLAGS, np.int32), np.zeros(1, np.int32)
         self.ledger, self.fields = ledger, fields = Ledger(), Fields(subdomain)
-        self.A = A = fields.matrix()
+        self.A = A = fields.matrix(A)
         setting = (scheme, A, ledger)
         inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
         self.inertia = inertia

@@ -16,7 +16,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.bodies import moves_with_node
-from ufl_beam.model.functions import value_at
+from ufl_beam.model.functions import same_function, value_at
 from ufl_beam.model.loads import Gravity, LineLoad, Load, LoadAlongBeam, MovingLoad, PointLoad
 from ufl_beam.terms.derivatives import Each, Neighbours, in_c
 from ufl_beam.terms.energy_ledger import Ledger
@@ -97,16 +97,26 @@ class DeadLoads(LoadTerm):
 
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
-        parameters, number = neighbours.weights.shape
+        parameters, number = len(neighbours), neighbours.number
         now, end = np.zeros((2, parameters, self._size))
         before = neighbours.state(lambda term: term._whole(term._forces[1]))
         loads = ffi.new("dead_loads *[]", [x._c for some in neighbours.terms for x in some])
+        changes = np.array(
+            [any(map(self.differs, some)) for some in neighbours.terms], dtype=np.int32
+        )
         c = struct(
             "load_derivatives", parameters=parameters, size=self._size, neighbours=number,
             loads=self._c, own=np.zeros(self._size), neighbour=loads, weight=neighbours.weights,
-            now=now, end=end, before=before,
+            now=now, end=end, before=before, changes=changes,
         )  # fmt: skip
         return [in_c("load", c)]
+
+    def differs(self, term: DeadLoads) -> bool:
+        """Return whether the loads of another scene may differ."""
+        same = np.array_equal(self.dofs, term.dofs)
+        same = same and np.array_equal(self._vectors, term._vectors)
+        pairs = zip(self._in_time, term._in_time, strict=True)
+        return not (same and all(same_function(a, b) for (a, _), (b, _) in pairs))
 
     def _whole(self, forces: Array) -> Array:
         """Return forces at all local degrees of freedom from forces at the loaded ones."""

@@ -8,7 +8,7 @@ derivatives.c for the derivatives of a step.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,9 @@ class Neighbours:
 
     Attributes:
         term: The term in the scene itself.
-        terms: The same term in the neighbouring scenes; for each parameter a list.
+        terms: The same term in the neighbouring scenes; for each parameter a list, which is empty
+            if the derivatives are known already.
+        number: Number of these scenes; 0 if the derivatives are known.
         weights: Weights of the neighbours in the derivative by a parameter, (parameters, n).  The
             weight of the scene itself makes their sum zero.
         size: Number of degrees of freedom.
@@ -47,8 +49,10 @@ class Neighbours:
     """
 
     def __init__(
-        self, term: Any, terms: Sequence[Sequence[Any]], weights: Array, size: int
-    ) -> None:
+        self, term: Any, terms: Sequence[Sequence[Any]], weights: Array, size: int,
+        rows: Iterator[list[Array | None]] | None = None,
+    ) -> None:  # fmt: skip
+        self._rows, self.number = rows, 0 if rows is not None else weights.shape[1]
         self.term, self.terms, self.weights, self.size = term, terms, weights, size
         self.alive, self.states = list[Any](), list[Array]()
         self.places: dict[int, Callable[[Any], Array]] = {}
@@ -64,10 +68,19 @@ class Neighbours:
         self.states.append(self.differences(values))
         return self.states[-1]
 
+    def change(self, values: Callable[[Any], Array]) -> bool:
+        """Return whether parameters change an array on which the form of derivatives depends."""
+        return self._rows is None and bool(self.differences(values).any())
+
     def differences(self, values: Callable[[Any], Array]) -> Array:
         """Return the derivatives of an array of the term; (parameters, *shape of the array)."""
         reference = values(self.term)
         derivatives = np.zeros((len(self), *np.shape(reference)))
+        if self._rows is not None:
+            for p, row in enumerate(next(self._rows)):
+                if row is not None:
+                    derivatives[p], self.enters[p] = row, True
+            return derivatives
         for p, some in enumerate(self.terms):
             for k, term in enumerate(some):
                 with np.errstate(invalid="ignore"):  # infinite numbers do not change
@@ -75,6 +88,29 @@ class Neighbours:
                 derivatives[p] += self.weights[p, k] * np.where(np.isfinite(change), change, 0.0)
         self.enters |= derivatives.reshape(len(self), -1).any(axis=1)
         return derivatives
+
+
+class Registered(Neighbours):
+    """Functions that return the numbers of a term, in the place of neighbouring scenes.
+
+    Attributes:
+        values: The functions.
+        fixed: Functions that return numbers on which the form of derivatives depends.
+    """
+
+    def __init__(self, term: Any, size: int) -> None:
+        super().__init__(term, [], np.zeros((0, 4)), size)
+        self.values, self.fixed = list[Callable[[Any], Array]](), list[Callable[[Any], Array]]()
+
+    def change(self, values: Callable[[Any], Array]) -> bool:
+        """Keep the function; nothing changes."""
+        self.fixed.append(values)
+        return False
+
+    def differences(self, values: Callable[[Any], Array]) -> Array:
+        """Keep the function; there are no differences."""
+        self.values.append(values)
+        return np.zeros((0, *np.shape(values(self.term))))
 
 
 Branches = dict[int, tuple[Expr, bool]]
@@ -178,7 +214,7 @@ def differences(
         neighbours.alive += [calls, first]
         both = [(len(some), call) for some, call in zip(phases, calls, strict=True)]
         made.append((*both, term.loops[0]))
-    parameters, number = neighbours.weights.shape
+    parameters, number = len(neighbours), neighbours.number
     size = neighbours.size
     c = struct(
         "term_differences", parameters=parameters, neighbours=number, size=size,

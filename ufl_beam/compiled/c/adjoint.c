@@ -70,7 +70,8 @@ void transpose_loads(void *self, adjoint *a, const double *λ)
 {
   const load_derivatives *l = self;
   differentiate_loads(self, a->step, 0);
-  for (int p = 0; p < a->parameters; ++p) a->gradient[p] -= dot(l->size, l->now + (size_t)p * l->size, λ);
+  for (int p = 0; p < a->parameters; ++p)
+    if (l->changes[p]) a->gradient[p] -= dot(l->size, l->now + (size_t)p * l->size, λ);
 }
 
 /* Terms of loads by differences between scenes; only their explicit derivatives are differenced. */

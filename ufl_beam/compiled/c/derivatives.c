@@ -95,6 +95,7 @@ void differentiate_loads(void *self, const time_step *step, const double *q1)
   for (int p = 0; p < l->parameters; ++p) {
     double *end = l->end + (size_t)p * l->size, *now = l->now + (size_t)p * l->size;
     const double *before = l->before + (size_t)p * l->size;
+    if (!l->changes[p]) continue;
     memset(end, 0, l->size * sizeof *end);
     for (int k = 0; k < l->neighbours; ++k) {
       find_loads_at(l->neighbour[p * l->neighbours + k], step->load_time, l->size, now);
@@ -110,7 +111,7 @@ void differentiate_loads(void *self, const time_step *step, const double *q1)
 void add_load_derivative(void *self, const derivatives *d, int p, double *r)
 {
   const load_derivatives *l = self;
-  for (int i = 0; i < l->size; ++i) r[i] -= l->now[(size_t)p * l->size + i];
+  for (int i = 0; l->changes[p] && i < l->size; ++i) r[i] -= l->now[(size_t)p * l->size + i];
 }
 
 void accept_load_derivative(void *self, const derivatives *d)

@@ -968,6 +968,7 @@ typedef struct {
   int parameters, size, neighbours;
   const dead_loads *loads, *const *neighbour;
   const double *weight;
+  const int32_t *changes;     /* whether a parameter changes the loads */
   double *own;                /* the loads at the end of this step */
   double *now, *end, *before; /* in the equation, at the end of this step, at the end of the last step */
 } load_derivatives;
