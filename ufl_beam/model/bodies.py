@@ -355,6 +355,10 @@ class Velocity(Record):
     angular: Number = 0.0
     about: Annotated[Point | None, require_vector] = None
 
+    def attached_to(self) -> Iterable[AttachmentPoint]:
+        """See the base class."""
+        return (x.middle if isinstance(x, Body) else x.start for x in self.beams)
+
     def at(self, x: float, y: float) -> tuple[float, float, float]:
         """Return (du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""
         about_x, about_y = self.about or (0.0, 0.0)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from numbers import Real
@@ -14,7 +14,7 @@ from ufl_beam.errors import ModelError, closed
 from ufl_beam.model.checks import require_function, require_kind, require_number, require_returned
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_law import ForceLaw as ForceLaw
-from ufl_beam.model.functions import Constant, GuideCurve, Timed
+from ufl_beam.model.functions import Constant, GuideCurve, Timed, TimeFunction
 from ufl_beam.model.law_functions import Values, larger, positive, smaller, sqrt
 from ufl_beam.model.material_law import MaterialLaw, State, require_law
 from ufl_beam.model.material_laws import DuvautLions, ElastoPlastic
@@ -50,6 +50,10 @@ class PrescribedMotion(Record):
 
     motion: Timed
 
+    def functions_of_time(self) -> Iterable[TimeFunction]:
+        """See the base class."""
+        return (self.motion,)
+
 
 @closed(OWN_LAW)
 @dataclass(frozen=True, repr=False)
@@ -70,6 +74,10 @@ class PrescribedForce(Record):
     """
 
     force: Timed
+
+    def functions_of_time(self) -> Iterable[TimeFunction]:
+        """See the base class."""
+        return (self.force,)
 
 
 class Bearing:

@@ -26,7 +26,7 @@ from ufl_beam.model.bodies import (
 from ufl_beam.model.checks import require_kind, require_vector
 from ufl_beam.model.connector_law import ConnectorLaw, require_connector_law
 from ufl_beam.model.connector_laws import HingeLaw, Law, RigidPlastic, Spring
-from ufl_beam.model.functions import Point
+from ufl_beam.model.functions import Point, TimeFunction
 from ufl_beam.model.records import Record, Text, Vector
 
 
@@ -96,6 +96,14 @@ class Connector(Record, ABC):
 
     def _label(self) -> str:
         return f"{self.kind}({self.a}, {self.b})"
+
+    def attached_to(self) -> Iterable[AttachmentPoint]:
+        """See the base class."""
+        return self.a, self.b
+
+    def functions_of_time(self) -> Iterable[TimeFunction]:
+        """See the base class."""
+        return self.law.functions_of_time() if isinstance(self.law, Record) else ()
 
     @property
     def kind(self) -> str:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import KW_ONLY, dataclass
 from numbers import Real
 from typing import Annotated, ClassVar
@@ -14,7 +14,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, closed
 from ufl_beam.model import plausibility
 from ufl_beam.model.beams import Beam
-from ufl_beam.model.bodies import Member
+from ufl_beam.model.bodies import AttachmentPoint, Member
 from ufl_beam.model.checks import require_kind, require_number
 from ufl_beam.model.functions import Timed, TimeFunction, steady
 from ufl_beam.model.loads import Load, Profile, profile_at, require_profile, require_span
@@ -92,6 +92,10 @@ class ImposedStrain(Load):
         return f"ImposedStrain of {self.beam.name}"
 
     _label = __str__
+
+    def attached_to(self) -> Iterable[AttachmentPoint]:
+        """See the base class."""
+        return (self.beam.at(s) for s in self.span)
 
     def strains(self, s: Array) -> Array:
         """Return (axial, shear, curvature) at parameters ``s``; (..., 3); zero out of the span."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC
+from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from typing import Annotated, ClassVar
@@ -61,6 +62,10 @@ class Joint(Bearing, Record, ABC):
     is_rod: ClassVar[bool] = False
 
     __repr__ = bracketed
+
+    def attached_to(self) -> Iterable[AttachmentPoint]:
+        """See the base class."""
+        return self.places
 
     def __post_init__(self) -> None:
         places = (x for x in vars(self).values() if isinstance(x, Place | BodyPoint))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from itertools import pairwise
 from typing import Annotated, ClassVar
@@ -24,7 +24,14 @@ from ufl_beam.errors import (
     shorten,
 )
 from ufl_beam.model import checks, plausibility
-from ufl_beam.model.bodies import Beams, Member, PlaceField, ground, moves_with_node
+from ufl_beam.model.bodies import (
+    AttachmentPoint,
+    Beams,
+    Member,
+    PlaceField,
+    ground,
+    moves_with_node,
+)
 from ufl_beam.model.connector_laws import PrescribedForce
 from ufl_beam.model.connectors import Component, Connector
 from ufl_beam.model.functions import Table, Timed, TimeFunction, steady, value_at
@@ -36,6 +43,10 @@ class Load(Record, ABC):
 
     amplitude: TimeFunction  # factor on the load, a function of time t (s)
     dead: ClassVar[bool] = True  # False if the forces depend on the motion
+
+    def functions_of_time(self) -> Iterable[TimeFunction]:
+        """See the base class."""
+        return (self.amplitude,)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -183,6 +194,10 @@ class LoadAlongBeam(Load):
         return f"{type(self).__name__} on {self.beam.name}"
 
     _label = __str__
+
+    def attached_to(self) -> Iterable[AttachmentPoint]:
+        """See the base class."""
+        return (self.beam.at(s) for s in self.span)
 
     def factors(self, s: Array) -> Array:
         """Return the factors of the profile at parameters ``s``; they are zero outside of the span.
@@ -339,6 +354,14 @@ class MovingLoad(Load):
         return f"MovingLoad on {', '.join(beam.name for beam in self.route)}"
 
     _label = __str__
+
+    def attached_to(self) -> Iterable[AttachmentPoint]:
+        """See the base class."""
+        return (beam.start for beam in self.route)
+
+    def functions_of_time(self) -> Iterable[TimeFunction]:
+        """See the base class."""
+        return self.amplitude, self.position
 
     @property
     def route(self) -> tuple[Member, ...]:
@@ -538,6 +561,10 @@ class KelvinVoigt(Record):
 
     retardation_time: Positive
     beams: Beams = None
+
+    def attached_to(self) -> Iterable[AttachmentPoint]:
+        """See the base class."""
+        return (beam.start for beam in self.beams or ())
 
 
 Damping = Rayleigh | KelvinVoigt

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
 from functools import cache, lru_cache, partial
 from typing import (
@@ -104,6 +104,20 @@ class Record:
     def _label(self) -> str:
         """Return the name of the record in messages."""
         return type(self).__name__
+
+    @property
+    def label(self) -> str:
+        """Text of the record, or its name if it has none."""
+        return self._label() if type(self).__str__ is object.__str__ else str(self)
+
+    def attached_to(self) -> Iterable[Any]:
+        """Return the places to which the record is attached, by default its ``place``."""
+        place = getattr(self, "place", None)
+        return () if place is None else (place,)
+
+    def functions_of_time(self) -> Iterable[Callable[[float], float]]:
+        """Return the functions of time of the record."""
+        return ()
 
 
 @cache

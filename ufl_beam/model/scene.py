@@ -33,8 +33,6 @@ from ufl_beam.model.checks import require_all
 from ufl_beam.model.connector_laws import (
     Bearing,
     Coulomb,
-    PrescribedForce,
-    PrescribedMotion,
     RigidPlastic,
 )
 from ufl_beam.model.connectors import Component, Connector, plastic_hinges
@@ -46,7 +44,6 @@ from ufl_beam.model.loads import (
     LOADS,
     Damping,
     Load,
-    LoadAlongBeam,
     LoadAtPlace,
     MovingLoad,
     PointLoad,
@@ -119,7 +116,9 @@ class Scene(Record, Rich):
             member = place.beam if isinstance(place, Place) else place.body
             if member not in known:
                 field = "beams" if isinstance(member, Beam) else "bodies"
-                raise ModelError(f"{owner}: {member.name} is not in the scene; add it to {field}")
+                raise ModelError(
+                    f"{owner.label}: {member.name} is not in the scene; add it to {field}"
+                )
         for joint in self.joints:
             for i, place in enumerate(joint.places[1:], start=1):
                 if place in joint.places[:i]:
@@ -227,45 +226,16 @@ class Scene(Record, Rich):
         keys = stream_keys((c.corner or c.a.point, c.b.point) for c in connectors)
         return dict(zip(connectors, keys, strict=True))
 
-    def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
-        """Iterate over (owner, function of time) for loads, supports, connectors and works."""
-        yield from ((load, load.amplitude) for load in self.loads)
-        yield from ((load, load.position) for load in self.loads if isinstance(load, MovingLoad))
-        yield from ((x, motion) for x in self.supports for motion in x.held.values())
-        for connector in self.all_connectors:
-            if isinstance(connector.law, PrescribedMotion):
-                yield connector, connector.law.motion
-            if isinstance(connector.law, PrescribedForce):
-                yield connector, connector.law.force
-        for work in self.works:
-            yield from ((work, number) for number in work.numbers.values() if callable(number))
+    def time_functions(self) -> Iterator[tuple[Record, TimeFunction]]:
+        """Iterate over (record, function of time) for loads, supports, connectors and works."""
+        for record in (*self.loads, *self.supports, *self.all_connectors, *self.works):
+            yield from ((record, function) for function in record.functions_of_time())
 
-    def attachments(self) -> Iterator[tuple[object, AttachmentPoint]]:
-        """Iterate over (object or its class name, place) for all places of objects in the scene."""
-        yield from ((joint, place) for joint in self.joints for place in joint.places)
-        yield from (
-            (connector, place)
-            for connector in self.connectors
-            for place in (connector.a, connector.b)
-        )
-        yield from ((support, support.place) for support in self.supports)
-        yield from (("PointMass", mass.place) for mass in self.masses)
-        for load in self.loads:
-            if isinstance(load, LoadAtPlace):
-                yield load, load.place
-            elif isinstance(load, LoadAlongBeam | ImposedStrain):
-                yield from ((load, load.beam.at(s)) for s in load.span)
-            elif isinstance(load, MovingLoad):
-                yield from ((load, beam.start) for beam in load.route)
-        for velocity in self.initial:
-            for member in velocity.beams:
-                yield "Velocity", member.middle if isinstance(member, Body) else member.start
-        for damping in self.damping:
-            for beam in damping.beams or ():
-                yield type(damping).__name__, beam.start
-        for work in self.works:
-            yield from ((work, beam.start) for beam in work.beams or ())
-            yield from ((work, place) for place in work.places)
+    def attachments(self) -> Iterator[tuple[Record, AttachmentPoint]]:
+        """Iterate over (record, place) for all places of records in the scene."""
+        bound = *self.joints, *self.connectors, *self.supports, *self.masses, *self.loads
+        for record in (*bound, *self.initial, *self.damping, *self.works):
+            yield from ((record, place) for place in record.attached_to())
 
     @cached_property
     def attached(self) -> dict[Member, list[float]]:
@@ -373,13 +343,11 @@ class Scene(Record, Rich):
 
 def attachment_points(scene: Scene) -> dict[Body, list[BodyPoint]]:
     """Return the different attachment points of each body and of the ground."""
-    anchors = [place for joint in scene.joints for place in joint.places]
-    anchors += [place for connector in scene.connectors for place in (connector.a, connector.b)]
-    anchors += [x.place for x in scene.loads if isinstance(x, LoadAtPlace)]
     points: dict[Body, dict[BodyPoint, None]] = {body: {} for body in (*scene.bodies, GROUND)}
-    for attached in anchors:
-        if isinstance(attached, BodyPoint):
-            points[attached.body][attached] = None
+    for record in (*scene.joints, *scene.connectors, *scene.loads):
+        for place in record.attached_to():
+            if isinstance(place, BodyPoint):
+                points[place.body][place] = None
     return {body: list(spots) for body, spots in points.items()}
 
 

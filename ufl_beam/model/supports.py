@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -44,6 +45,10 @@ class Support(Bearing, Record, ABC):
     angle: ClassVar[float] = 0.0
 
     __repr__ = bracketed
+
+    def functions_of_time(self) -> Iterable[TimeFunction]:
+        """See the base class."""
+        return self.held.values()
 
     @property
     @abstractmethod

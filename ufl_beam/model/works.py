@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, is_dataclass
 from functools import partial
 from typing import Annotated, Any, ClassVar
@@ -49,8 +49,20 @@ def _require_numbers(owner: Work | Effect) -> None:
             require_number(value, what)
 
 
+class _WithNumbers(Record):
+    """Base of effects at places or along beams, with numbers that may be functions of time."""
+
+    def attached_to(self: Any) -> Iterable[AttachmentPoint]:
+        """See the base class."""
+        return *(beam.start for beam in self.beams or ()), *self.places
+
+    def functions_of_time(self: Any) -> Iterable[TimeFunction]:
+        """See the base class."""
+        return (number for number in self.numbers.values() if callable(number))
+
+
 @dataclass(frozen=True, eq=False)
-class Work(Record):
+class Work(_WithNumbers):
     """Base of effects along beams, defined by a function that returns a work or energy per length.
 
     Attributes:
@@ -219,7 +231,7 @@ def _require_statement(statement: Any, what: str) -> None:
 
 @closed("give it a statement of your own")
 @dataclass(frozen=True, eq=False)
-class Effect(Record):
+class Effect(_WithNumbers):
     """Effect of a user, by a :class:`Statement`: at places, or along beams.
 
     A statement of one place may also act along beams.  Its forces and energies are then those per
