@@ -284,11 +284,16 @@ class Case:
 
     def positions(self, name: str, fraction: float) -> Array:
         """Return the changes of a parameter in the scenes of :meth:`scenes`."""
-        return self._step(name, fraction) * np.array(self._stencils[name])
+        return self._step(name, fraction) * np.array(self._stencil(name))
 
     def weights(self, name: str, fraction: float) -> Array:
         """Return the weights of the scenes of :meth:`scenes` in a derivative."""
-        return np.array(STENCILS[self._stencils[name]]) / self._step(name, fraction)
+        return np.array(STENCILS[self._stencil(name)]) / self._step(name, fraction)
+
+    def _stencil(self, name: str) -> tuple[int, ...]:
+        if name not in self._stencils:
+            self.scenes(name, MODEL_STEP)
+        return self._stencils[name]
 
     def run(
         self, t1: float, dt: float, start: Derivatives | None = None, *, progress: bool = False
