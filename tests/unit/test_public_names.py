@@ -3,6 +3,7 @@
 
 import math
 from operator import attrgetter
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -80,6 +81,28 @@ def test_old_names_lead_to_new_ones():
     with pytest.raises(AttributeError, match=r"has no attribute 'Nothing'$"):
         ub.Nothing  # noqa: B018
     assert not hasattr(ub, "Hardening")
+
+
+BEFORE = (Path(__file__).parents[1] / "data" / "names_of_33c323e1.txt").read_text().split()
+"""Public names of the last commit with all names in one module."""
+
+
+@pytest.mark.parametrize("name", BEFORE)
+def test_names_of_an_earlier_commit_exist_or_lead_to_new_ones(name):
+    if name in ub.__all__ or name in ub.RESULTS:
+        assert hasattr(ub, name)
+        return
+    with pytest.raises(AttributeError, match=f"'{name}'; it is ufl_beam") as error:
+        getattr(ub, name)
+    new = str(error.value).split("it is ufl_beam.")[1].split()[0]
+    assert attrgetter(new)(ub)
+
+
+@pytest.mark.parametrize("name", ["steel", "box", "i_shape", "channel", "t_shape"])
+def test_methods_that_moved_lead_to_functions(name):
+    with pytest.raises(AttributeError, match=f"Section.{name} is ufl_beam.structures.{name} now"):
+        getattr(ub.Section, name)
+    assert attrgetter(f"structures.{name}")(ub)
 
 
 def test_results_are_not_exported():
