@@ -65,7 +65,8 @@ Modules that define further results add their pictures; see ``structures/picture
 def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure:
     """Draw a model, a solution, or the result of an analysis.
 
-    By default, the first quantity of the class is drawn.  A ``Path`` is a ``Solution``.
+    By default, the first quantity of the class is drawn.  A ``Path`` is a ``Solution``.  For the
+    results of ``ufl_beam.structures`` see the docstring of ``ufl_beam.structures``.
 
     ==================  ==================  ========================================================
     shown               quantity            picture and further arguments
@@ -91,17 +92,14 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
         shown: Object to draw.
         quantity: Quantity to draw.
         places: Place of "hinge" and "moment-curvature", or connector of "hinge"; one or a sequence
-            of places of "history"; hot spot of "cycles".
+            of places of "history"; hot spot of "cycles" of a ``Fatigue``.
         options: ``n`` is the index of a recorded time, negative from the end.  ``magnify`` is a
             factor on displacements.  ``times`` (s) are replaced by the nearest recorded times;
             ``count`` is a number of shapes.  ``component`` is "u", "v" or "psi", or a rate of one
             of them, such as "du/dt" or "d2u/dt2".  ``numbers`` are indices of modes, all by
             default.  ``amplitude`` is their largest displacement, as a fraction of the size of the
             scene.  ``limits`` are acceptance limits that colour hinges, as in
-            :meth:`Solution.hinges`.  ``targets`` is one or several of the target displacements of a
-            pushover.  ``labels`` are texts for demand and intensity, such as
-            ``("drift (1)", "spectral acceleration (m/s²)")``; by default they are the names of the
-            functions of the analysis.  ``ax`` are axes to draw in, instead of a new figure.
+            ``structures.hinge_table``.  ``ax`` are axes to draw in, instead of a new figure.
 
     Raises:
         ArgumentError: There is no such picture, or one of its arguments is wrong; the message says

@@ -2,7 +2,23 @@
 """What structural engineers need: pushover, spectra, combinations, concrete, steel, fatigue, decay.
 
 This package is built on the public interface of ``ufl_beam``, which does not import it.  Units are
-SI.  Examples use the names of the example of ``ufl_beam``.
+SI.  Examples use the names of the example of ``ufl_beam``.  ``ub.plot`` draws the results:
+
+==================  ==================  ============================================================
+shown               quantity            picture and further arguments
+==================  ==================  ============================================================
+Storeys             "drift", "shear"    extremes over the height; ``ax``
+Fatigue             "cycles"            rainflow matrix and spectrum; a hot spot
+MomentCurvature     "moment-curvature"  moment of a section over its curvature; ``ax``
+InteractionDiagram  "interaction"       axial force over moment of a section; ``ax``
+GroundMotion        "motion"            acceleration, velocity, displacement over time
+ResponseSpectrum    any of its arrays   over the period; "pseudo_acceleration" by default; ``ax``
+Pushover            "curve"             capacity curve with its hinges; one or several ``targets``
+SpectralResponse    "M", "N", "V"       combined section force, with both signs; ``ax``
+LoadCombinations    "M", "N", "V"       envelope over the combinations; ``ax``
+DemandCurves        "curves"            intensity over demand, fragility; ``labels`` of both axes
+Calibration         "fit"               measured and computed values, and the residuals
+==================  ==================  ============================================================
 
 Example:
     >>> import ufl_beam.structures as st
