@@ -315,7 +315,7 @@ def draw_damage_state(
     cells with fibres, the energy of cracks is added.  Opened hinges are circles, which grow with
     the dissipated fraction of the fracture energy; from 99 % on they are hollow, as joints are.
     Hinges that harden are coloured by their largest plastic rotation so far.  With acceptance
-    ``limits`` as of ``structures.hinge_table``, all hinges are coloured by the limit that they meet.
+    ``limits``, see ``structures.hinge_table``, all hinges are coloured by the limit that they meet.
     """
     from matplotlib.collections import LineCollection
 
