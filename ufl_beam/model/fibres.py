@@ -297,7 +297,12 @@ class PlacedFibres:
         return float(self.E * self.A @ self.y**2)
 
     def section_points(self, GA: float) -> tuple[SectionPoints, ...]:
-        """Return one material point for each fibre, with the elastic shear stiffness ``GA`` (N)."""
+        """Return one material point for each fibre, with the elastic shear stiffness ``GA`` (N).
+
+        The result for the latest ``GA`` is kept.
+        """
+        if (known := vars(self).get("_latest")) is not None and known[0] == GA:
+            return known[1]  # type: ignore[no-any-return]
         points = []
         for number, (law, softening) in enumerate((f.law, f.softening) for f in self.fibres):
             at = np.flatnonzero(self.material == number)
@@ -311,7 +316,9 @@ class PlacedFibres:
                     softening=softening if softening is not None and softening.opens else None,
                 )
             )
-        return by_class(points, np.array([0.0, GA, 0.0]))
+        made = by_class(points, np.array([0.0, GA, 0.0]))
+        object.__setattr__(self, "_latest", (GA, made))
+        return made
 
 
 # -- distributions of yield stresses ------------------------------------------------------------

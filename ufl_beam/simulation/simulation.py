@@ -21,7 +21,7 @@ from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import ArgumentError, ModelError, StepFailed, require_number, shorten
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.connector_laws import RIGID
+from ufl_beam.model.connector_laws import RIGID, PrescribedMotion
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
@@ -184,8 +184,10 @@ class Simulation(Stepper):
         # Whether loads that act from the start are applied in substeps at first, see stepper.py
         self._applies = fresh and inertia is None and solution.equilibrium_fraction != 1.0 and acts
         give_back_memory(len(q_local))
-        if inertia is not None and (scene.all_connectors or scene.supports):
-            motions = self.connections()[:, 0] if scene.all_connectors else np.zeros(0)
+        laws = [connector.law for connector in scene.all_connectors]
+        driven = any(isinstance(x, PrescribedMotion) and x is not RIGID for x in laws)
+        if inertia is not None and (driven or scene.supports):
+            motions = self.connections()[:, 0] if driven else np.zeros(len(laws))
             together(warn_of_jumps, numbering, t0, q, motions)
 
     # -- impacts -------------------------------------------------------------------------------
