@@ -11,10 +11,8 @@ import time
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from functools import partial
 from inspect import signature
-from types import SimpleNamespace
 from typing import Any, NamedTuple, NoReturn
 
 from mpi4py import MPI
@@ -22,10 +20,10 @@ from mpi4py import MPI
 import numpy as np
 import numpy.typing as npt
 
+from ufl_beam.analysis.neighbouring_scenes import Beside, NeighbouringScene, Numbers, alike
 from ufl_beam.arrays import Array, State
 from ufl_beam.compiled.c_library import doubles, ffi, fill, struct
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.display import in_one_line
 from ufl_beam.errors import (
@@ -41,20 +39,16 @@ from ufl_beam.errors import (
 )
 from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia, order_of
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.connector_law import ForceLaw
-from ufl_beam.model.functions import TimeFunction, same_function
-from ufl_beam.model.loads import MovingLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.state_rows import Block, Column, Columns
-from ufl_beam.parallel import Agreement, progress_bar
-from ufl_beam.simulation.initial_state import initial_state, mesh_of, require_scheme
+from ufl_beam.parallel import progress_bar
+from ufl_beam.simulation.initial_state import mesh_of, require_scheme
 from ufl_beam.simulation.run import require_times, running, take_steps
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.simulation.step_lengths import Adaptive, EqualSteps, step_count
 from ufl_beam.solvers.newton_options import Newton, require_plain
-from ufl_beam.terms.derivatives import Neighbours, Registered, functions
+from ufl_beam.terms.derivatives import Neighbours, functions
 
 MODEL_STEP = 2.0**-13
 """Relative change of a parameter for differences of the numbers in a scene.
@@ -330,7 +324,7 @@ class Case:
                     for name in names
                 ]
         for name, some in zip(names, scenes, strict=True):
-            if not all(_alike(run, other) for other in some):
+            if not all(alike(run, other) for other in some):
                 raise ArgumentError(
                     f"{self._call}: {name} changes the cells, unknowns or parts of the scene, so "
                     "that the run has no derivative; keep beams, cells and attached points on the "
@@ -362,172 +356,6 @@ class Case:
                 for other in both:
                     other.forget()
         return pairs
-
-
-@dataclass
-class Beside:
-    """Scenes at neighbouring values of each parameter.
-
-    Attributes:
-        scenes: The scenes of each parameter.
-        weights: Weights of the scenes in derivatives; (P, n).
-        rows: Derivatives of all :class:`Numbers` by each parameter, None where they are zero, if
-            functions of time are the same in all scenes; the scenes have forgotten their terms.
-            Else None.
-    """
-
-    scenes: list[list[Any]]
-    weights: Array
-    rows: list[list[Array | None]] | None = None
-
-    def derivatives(self) -> Iterator[list[Array | None]] | None:
-        """Return an iterator over the derivatives of each number by all parameters, if known."""
-        return None if self.rows is None else iter([list(x) for x in zip(*self.rows, strict=True)])
-
-    def terms(self, i: int) -> list[list[Any]]:
-        """Return the terms of the scenes with an index; none if the scenes have forgotten them."""
-        known = self.rows is None
-        return [[x.equation.terms[i] for x in some if known] for some in self.scenes]
-
-    def close(self) -> None:
-        """Free memory; raise exceptions of functions of the user."""
-        for other in (x for some in self.scenes for x in some):
-            if self.rows is None:
-                other.equation.callbacks.synchronize()
-            other.close()
-
-
-def same_cells(a: DofNumbering, b: DofNumbering) -> bool:
-    """Return whether two scenes have the same cells and unknowns."""
-    names = "cells", "dofs", "dofs_of_bodies", "multipliers"
-    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in names)
-
-
-def _alike(run: Simulation, other: Any) -> bool:
-    """Return whether two simulations have the same unknowns and the same parts of terms."""
-    if not same_cells(run.numbering, other.numbering):
-        return False
-    terms = [[term.parts for term in x.equation.terms] for x in (run, other)]
-    angles = [[support.angle for support in x.scene.supports] for x in (run, other)]
-    constrained = np.array_equal(run.supports.dofs, other.supports.dofs)
-    return terms[0] == terms[1] and angles[0] == angles[1] and constrained
-
-
-LINEAR = 1e-9
-"""Largest ratio of second and first differences of a number that is a linear function."""
-
-SAMPLES = 7  # times at which functions of time of neighbouring scenes are compared
-
-
-class Numbers:
-    """Numbers in the terms of a run that parameters may change."""
-
-    def __init__(self, run: Simulation, t1: float) -> None:
-        self._run, self._times = run, np.linspace(run.t, t1, SAMPLES)
-        self._values = list[Callable[[Any], Array]]()
-        self._fixed = list[tuple[int, Callable[[Any], Array]]]()
-        for i, term in enumerate(run.equation.terms):
-            register = Registered(term, run.subdomain.size)
-            term.derivatives(register)
-            self._values += [partial(_of_term, i, values) for values in register.values]
-            self._fixed += [(i, values) for values in register.fixed]
-        self._values += [lambda x: x.q, lambda x: x.supports.reactions]
-        if run.equation.inertia is not None:
-            self._values.append(lambda x: x.inertia.rates)
-        self._here = [values(run) for values in self._values]
-        laws = (connector.law for connector in run.scene.all_connectors)
-        # Numbers that are not in arrays, or functions of the time function of a load
-        self._others = bool(run.scene.works) or any(isinstance(x, ForceLaw) for x in laws)
-        self._others |= any(isinstance(x, MovingLoad) for x in run.scene.loads)
-
-    def linear_changes(self, both: Sequence[Any]) -> list[Array] | None:
-        """Return the changes of all numbers in two scenes, if they are linear; (2, ...) each."""
-        if self._others or not all(_alike(self._run, other) for other in both):
-            return None
-        terms = self._run.equation.terms
-        pairs = (pair for x in both for pair in zip(terms, x.equation.terms, strict=True))
-        if not all(a.is_like(b) for a, b in pairs) or not self._moves_linearly(both):
-            return None
-        for i, fixed in self._fixed:
-            if any(not np.array_equal(fixed(terms[i]), fixed(x.equation.terms[i])) for x in both):
-                return None
-        found = list[Array]()
-        for here, values in zip(self._here, self._values, strict=True):
-            with np.errstate(invalid="ignore"):  # infinite numbers do not change
-                change = np.array([np.subtract(values(other), here) for other in both])
-            change[~np.isfinite(change)] = 0.0
-            if not _cancel(change, here):
-                return None
-            found.append(change)
-        return found
-
-    def _functions(self, of: Any) -> list[TimeFunction]:
-        return [function for _, function in of.scene.time_functions()]
-
-    def _moves_linearly(self, both: Sequence[Any]) -> bool:
-        of_three = zip(*map(self._functions, (self._run, *both)), strict=True)
-        for here, *others in of_three:
-            if not all(same_function(here, other) for other in others):
-                values = [[f(float(t)) for t in self._times] for f in (here, *others)]
-                if not _cancel(np.subtract(values[1:], values[0]), np.array(values[0])):
-                    return False
-        return True
-
-    def moves_alike(self, both: Sequence[Any]) -> bool:
-        """Return whether all functions of time and dead loads are the same in two scenes."""
-        mine, *others = map(self._functions, (self._run, *both))
-        same = all(all(map(same_function, mine, other)) for other in others)
-        terms = (zip(self._run.equation.terms, x.equation.terms, strict=True) for x in both)
-        return same and not any(term.differs(other) for pairs in terms for term, other in pairs)
-
-
-def _of_term(i: int, values: Callable[[Any], Array], scene: Any) -> Array:
-    return values(scene.equation.terms[i])
-
-
-def _cancel(changes: Array, values: Array) -> bool:
-    """Return whether two changes of numbers are opposite, apart from round-off."""
-    low, high = changes
-    round_off = 8 * np.finfo(np.float64).eps * np.abs(values)
-    with np.errstate(invalid="ignore"):
-        return not (np.abs(low + high) > LINEAR * np.abs(high) + round_off).any()
-
-
-class NeighbouringScene:
-    """Terms of a scene beside the scene of a run, at the beginning of the run.
-
-    It has those attributes of a :class:`Simulation` that derivatives read, and shares the matrix of
-    the run: it takes no steps.
-    """
-
-    def __init__(self, run: Simulation, scene: Scene) -> None:
-        self.scene, self.numbering = scene, DofNumbering(scene, run.numbering.mesh)
-        if not same_cells(run.numbering, self.numbering):
-            return  # without terms
-        subdomain = Subdomain(self.numbering, run.subdomain.comm)
-        q, v, _, _ = initial_state(self.numbering, None)
-        self.q, together = q[subdomain.dofs], Agreement(run.subdomain.comm)
-        self.equation = equation = StepEquation(
-            subdomain, run.scheme, run.t, v[subdomain.dofs], together, run.equation.A
-        )
-        self.supports, self.inertia = equation.supports, equation.inertia
-        if self.inertia is not None and self.inertia.scheme.further_rates:
-            for load in [*equation.loads, *equation.imposed]:
-                load.carry_on(run.t, self.q, self.inertia.v, None)
-        elif self.inertia is not None:
-            equation.begin_energies(run.t, self.q, self.inertia.v)
-        for term in equation.terms:
-            term.start(self.q)
-        for group in equation.connector_terms:
-            group.put_forces(self.q)
-        self.time_loop = SimpleNamespace(supports=self.supports.in_c(equation.callbacks))
-
-    def forget(self) -> None:
-        """Keep the numbering only."""
-        del self.equation, self.supports, self.inertia, self.time_loop, self.q
-
-    def close(self) -> None:
-        """Do nothing; a :class:`Simulation` frees its memory."""
 
 
 class StepDerivatives:
