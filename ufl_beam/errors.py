@@ -319,7 +319,11 @@ def require_kind(value: Any, kind: type | tuple[type, ...], what: str) -> None:
     if not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
         names = " or ".join(getattr(k, "called", k.__name__) for k in kinds)
-        raise ArgumentTypeError(f"{what} = {shorten(value)} is not a {names}")
+        own = tuple(k for k in kinds if k.__module__.startswith("ufl_beam"))
+        held = getattr(value, "__dict__", {})
+        inside = [n for n, x in held.items() if isinstance(x, own) and not n.startswith("_")]
+        hint = f"; give its attribute {inside[0]!r}" if len(inside) == 1 else ""
+        raise ArgumentTypeError(f"{what} = {shorten(value)} is not a {names}{hint}")
 
 
 def require_all(value: Any, what: str, kind: type | tuple[type, ...]) -> tuple[Any, ...]:

@@ -121,7 +121,7 @@ PARTS = [
     ),
     (lambda: ub.Beam.along(wave, SECTION, cells=4), "beam: curve(0.5)[1] = inf is not finite"),
     (lambda: beam(hinges={1.5: BREAKS}), "girder: hinge at s = 1.5 must lie between 0 and"),
-    (lambda: beam(hinges={0.5: 3.0}), "girder: hinge at s = 0.5...a Softening or Elasto"),
+    (lambda: beam(hinges={0.5: 3.0}), "girder: hinges[0.5] = 3.0...a Softening or Elasto"),
     (lambda: beam(hinges={0.5: BREAKS, 0.5 + 1e-13: BREAKS}), "two hinges at s = 0.5...give one"),
     (
         lambda: ub.Beam((0, 0), (1, 0), in_fibres(), hinges={0.5: BREAKS}),

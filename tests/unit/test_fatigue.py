@@ -338,7 +338,7 @@ PLACE = ub.Beam((0, 0), (1, 0), SECTION, name="arm").end
         (lambda: st.HotSpot.fibre(PLACE, y=0.1, E=0.0), "E = 0 must be positive"),
         (lambda: st.HotSpot(PLACE, stress=1.0), r"stress = 1\.0 must be a function of \(N, V, M\)"),
         (lambda: st.Fatigue([PLACE], CURVE), r"spots\[0\] = .* is not a HotSpot"),
-        (lambda: st.Fatigue(3, CURVE), "spots = 3 must be a list"),
+        (lambda: st.Fatigue(3, CURVE), r"spots\[0\] = 3 is not a HotSpot"),
         (lambda: st.Fatigue([], 71e6), r"curve = .* is not a SNCurve"),
         (lambda: st.Fatigue([], CURVE, resolution=-1.0), "resolution = -1 must be at least 0"),
         (lambda: ub.History("h.csv", every=0), "History h.csv: every = 0 must be a whole number"),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from helpers import raises
 
+import ufl_beam as ub
 from ufl_beam.structures.free_decay import (
     damping,
     damping_ratio,
@@ -349,6 +350,17 @@ def test_amplitudes_that_have_no_logarithm():
     t = np.linspace(0, 10, 1001)
     with raises("amplitudes[4] = -0.", "must be positive", "about"):
         damping(t, viscous(t, 0.1), about=0.7)  # exp(-0.1 · 3.16) = 0.73, next 0.66
+
+
+def test_a_moved_equilibrium_is_told():
+    """A decay about a residual displacement of half of the first amplitude."""
+    t = np.linspace(0, 10, 1001)
+    x = viscous(t, 0.1) + 0.5
+    with pytest.warns(ub.ModelWarning, match=r"is about 0\.5,.*give about=0\.5"):
+        wrong = damping(t, x)
+    assert wrong.decrement < 0.08
+    found = damping(t, x, about=0.5)  # without a warning
+    assert found.decrement == pytest.approx(0.1, rel=1e-3)
 
 
 def test_bad_amplitudes_are_refused():

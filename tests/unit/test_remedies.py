@@ -46,12 +46,47 @@ def run(**options):
             lambda: st.imperfect(SCENE, sway=0.01) and crooked().displacement(BEAM.end),
             ["C11 is not in the scene", "another object of this name", "scene['C11']"],
         ),
+        (
+            lambda: ub.follow(crooked().scene, ub.DisplacementControl(BEAM.end, "u", step=0.1)),
+            ["DisplacementControl of C11.end", "another object of this name", "scene['C11']"],
+        ),
+        (
+            lambda: st.hinge_table(DemandOf(crooked())),
+            ["is not a Solution; give its attribute 'path'"],
+        ),
+        (
+            lambda: ub.plot(st.hinge_table(crooked())),
+            ["is a HingeTable, which has no picture", "Scene"],
+        ),
+        (
+            lambda: st.Fatigue(BEAM.end, st.SNCurve.eurocode(71e6)),
+            ["Fatigue: spots[0] = <C11.end", "is not a HotSpot"],
+        ),
+        (
+            lambda: st.steel("IPE 300", fy=235e6),
+            ["has no argument 'fy'", "E, nu, rho", "axial, bending"],
+        ),
+        (
+            lambda: st.response_spectrum_analysis(SCENE, [9.0, 9.0], n=1),
+            ["spectrum = [9.0, 9.0]", "a function of the period", "(periods, accelerations)"],
+        ),
+        (
+            lambda: ub.Rigid(BEAM.end, BEAM.start, measured=True),
+            ["Rigid has no argument 'measured'; give multipliers="],
+        ),
         (lambda: crooked().section_forces(BEAM), ["C11 is not in the scene", "scene['C11']"]),
     ],
 )
 def test_a_message_names_the_remedy(use, words):
     with raises(*words):
         use()
+
+
+class DemandOf:
+    """A result that holds the solution, as a pushover does."""
+
+    def __init__(self, path):
+        self.path = path
 
 
 def crooked():

@@ -215,6 +215,16 @@ def test_rotations_of_a_mechanism(mechanism):
     assert total == pytest.approx(path.energy["hinges"][-1], rel=1e-12)
 
 
+def test_rotations_up_to_a_state(mechanism):
+    path, _, h, M = mechanism
+    left, n = path.scene["left"], len(path) // 2
+    drift = st.storeys(path, [left.start, left.end]).drift[n, 0]
+    for row in st.hinge_table(path, n=n).rows:
+        assert abs(row.rotation) == pytest.approx(math.asin(drift / h), abs=1e-6)
+        assert row.dissipated == pytest.approx(M * math.asin(drift / h), rel=1e-5)
+    assert all(row.n < 0 for row in st.hinge_table(path, n=0).rows)
+
+
 def test_the_sequence_of_hinges_is_that_of_events(mechanism):
     path, events, *_ = mechanism
     found = {(str(row.where), row.time) for row in st.hinge_table(path).rows}

@@ -19,7 +19,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, Reversal, StepFailed, require_kind, require_number
 from ufl_beam.mechanics.time_scheme import Step
 from ufl_beam.model.bodies import Place
-from ufl_beam.model.scene import Scene
+from ufl_beam.model.scene import Scene, not_in
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
@@ -495,7 +495,7 @@ class DisplacementControl(Control):
         """Raise :class:`ArgumentError` unless the beam of the place is in the scene."""
         if self.place.beam not in scene.beams:
             raise ArgumentError(
-                f"DisplacementControl of {self.place}: {self.place.beam.name} is not in the scene"
+                f"DisplacementControl of {self.place}: {not_in(scene, self.place.beam)}"
             )
 
     @property

@@ -35,7 +35,7 @@ from ufl_beam.model.checks import require_kind
 from ufl_beam.model.connectors import Connector, place_of
 from ufl_beam.model.fibres import SectionPoints, stream_keys
 from ufl_beam.model.functions import points_along
-from ufl_beam.model.scene import Scene
+from ufl_beam.model.scene import Scene, not_in
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.model.works import Effect
@@ -178,16 +178,6 @@ class DofNumbering:
 
     # -- beams, vertices, cells ------------------------------------------------------------------
 
-    def _lacks(self, member: Member | Body) -> str:
-        """Return the message that a beam or body is not in the scene."""
-        members: tuple[Member | Body, ...] = (*self.scene.beams, *self.scene.bodies)
-        if any(member.name == x.name for x in members):
-            return (
-                "is not in the scene, which has another object of this name, as after imperfect; "
-                f"use scene[{member.name!r}] of this scene"
-            )
-        return "is not in the scene"
-
     def _index(self, beam: Member) -> int:
         """Return the index of a beam of the scene."""
         number = self._beam_indices.get(beam)
@@ -195,7 +185,7 @@ class DofNumbering:
             return number
         if not isinstance(beam, Member):
             raise ModelError(f"beam = {shorten(beam)} is not a Beam")
-        raise ModelError(f"{beam.name} {self._lacks(beam)}")
+        raise ModelError(not_in(self.scene, beam))
 
     def parameters(self, beam: Member) -> Array:
         """Return the parameters s of the vertices of a beam, from 0 (start) to 1 (end)."""
@@ -332,7 +322,7 @@ class DofNumbering:
         """Return the cell at a place, and the position of the place in the cell, from 0 to 1."""
         require_kind(place, Place, "place")
         if place.beam not in self._beam_indices:
-            raise ModelError(f"{place}: {place.beam.name} {self._lacks(place.beam)}")
+            raise ModelError(f"{place}: {not_in(self.scene, place.beam)}")
         i = self._beam_indices[place.beam]
         s = self._parameters[i]
         left = min(max(bisect_left(s, place.s) - 1, 0), len(s) - 2)
@@ -406,7 +396,7 @@ class DofNumbering:
         if not isinstance(carrier, Body):
             return np.asarray(self.dofs[self.vertex(carrier)])
         if carrier not in self.scene.rigid_bodies:
-            raise ModelError(f"{point}: {carrier.name} {self._lacks(carrier)}")
+            raise ModelError(f"{point}: {not_in(self.scene, carrier)}")
         return np.asarray(self.dofs_of_bodies[self.scene.rigid_bodies.index(carrier)])
 
     @cached_property

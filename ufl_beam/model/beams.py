@@ -120,7 +120,7 @@ class Beam(Record, Member):
             if not 0.0 <= s <= 1.0:
                 raise ModelError(f"{self.name}: hinge at s = {s:g} must lie between 0 and 1")
             if law is not None or s not in (0.0, 1.0):
-                require_hinge_law(law, f"{self.name}: hinge at s = {s:g}")
+                require_hinge_law(law, f"{self.name}: hinges[{s:g}]")
         for first, second in pairwise(sorted(self.hinges)):
             if (second - first) * self.cells <= TOGETHER:
                 raise ModelError(

@@ -50,7 +50,10 @@ Instance = Annotated[T, require_kind]
 NAMING = ("name", "place", "beam", "a", "b", "rail", "slider")
 """Fields used in the name of a record; errors in these fields name only the class."""
 
-RENAMED = {"time": "amplitude", "limit": "yield_limit"}
+RENAMED = {
+    "time": "amplitude", "limit": "yield_limit", "energy": "fracture_energy",
+    "measured": "multipliers",
+}  # fmt: skip
 """Present names of arguments, by former names."""
 
 

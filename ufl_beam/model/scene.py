@@ -341,6 +341,18 @@ class Scene(Record, Rich):
                 holders[dof] = str(support)
 
 
+def not_in(scene: Scene, member: Member | Body) -> str:
+    """Return the message that a beam or body is not in the scene."""
+    members: list[Member | Body] = [*scene.beams, *scene.bodies]
+    hint = ""
+    if any(member.name == x.name for x in members):
+        hint = (
+            ", which has another object of this name, as after imperfect or a second call of the "
+            f"model; use scene[{member.name!r}] of this scene"
+        )
+    return f"{member.name} is not in the scene{hint}"
+
+
 def attachment_points(scene: Scene) -> dict[Body, list[BodyPoint]]:
     """Return the different attachment points of each body and of the ground."""
     points: dict[Body, dict[BodyPoint, None]] = {body: {} for body in (*scene.bodies, GROUND)}

@@ -36,6 +36,9 @@ from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
 ResultantLaw = Annotated[MaterialLaw | None, require_law]
 
+LAWS = {"axial", "shear", "bending", "hinge", "interaction"}
+"""Arguments of a section that are laws."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Section(Record):
@@ -206,6 +209,11 @@ class Section(Record):
                 "give Section(EA=, GA=, EI=) of a beam that is held in the plane"
             )
         # Saved models tell a shared object from equal ones, so each section has its own shape.
+        for name in set(laws) - LAWS:
+            raise ModelError(
+                f"Section of a shape has no argument {name!r}; the arguments are E, nu, rho, "
+                f"shear_factor, axis, fibres, core, cover, {', '.join(sorted(LAWS))}"
+            )
         shape = copy(shape) if axis == "strong" else shape.turned()
         return cls._from_material(
             shape.A, shape.I, E, nu, rho, shear_factor, depth=shape.top - shape.bottom,

@@ -92,13 +92,14 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
         shown: Object to draw.
         quantity: Quantity to draw.
         places: Place of "hinge" and "moment-curvature", or connector of "hinge"; one or a sequence
-            of places of "history"; hot spot of "cycles" of a ``Fatigue``.
+            of places of "history"; hot spot of "cycles" of a ``Fatigue``
+            with several.
         options: ``n`` is the index of a recorded time, negative from the end.  ``magnify`` is a
             factor on displacements.  ``times`` (s) are replaced by the nearest recorded times;
-            ``count`` is a number of shapes.  ``component`` is "u", "v" or "psi", or a rate of one
-            of them, such as "du/dt" or "d2u/dt2".  ``numbers`` are indices of modes, all by
-            default.  ``amplitude`` is their largest displacement, as a fraction of the size of the
-            scene.  ``limits`` are acceptance limits that colour hinges, as in
+            ``count`` is a number of shapes.  ``component`` is "v" by default, "u", "psi", or a
+            rate of one of them, such as "du/dt" or "d2u/dt2".  ``numbers`` are indices of modes,
+            all by default.  ``amplitude`` is their largest displacement, as a fraction of the size
+            of the scene.  ``limits`` are acceptance limits that colour hinges, as in
             ``structures.hinge_table``.  ``ax`` are axes to draw in, instead of a new figure.
 
     Raises:
@@ -114,8 +115,8 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     pictures = next((PICTURES[kind] for kind in PICTURES if isinstance(shown, kind)), None)
     if pictures is None:
         raise ArgumentError(
-            f"plot: {shown!r} is a {type(shown).__name__}; give a Scene, a Section, the "
-            "Solution of a run, or the result of an analysis"
+            f"plot: {shorten(shown)} is a {type(shown).__name__}, which has no picture; there are "
+            f"pictures of {', '.join(kind.__name__ for kind in PICTURES)}"
         )
     if quantity and quantity not in pictures:
         hint = "; a scene has none before a run" if isinstance(shown, Scene) else ""

@@ -318,8 +318,10 @@ class Calibration(Rich):
         rows = [["parameter", "value", "95 % interval", *(f"± by {name}" for name in names)]]
         for i, (name, value) in enumerate(self.parameters.items()):
             low, high = self.intervals[name]
+            digits = max(4, _digits(value, high - low))
             alone = (_relative(w, value) for w in self.half_widths_alone[:, i] if several)
-            rows.append([name, f"{value:.5g}", f"{low:.4g} to {high:.4g}", *alone])
+            shown = f"{low:.{digits}g} to {high:.{digits}g}"
+            rows.append([name, f"{value:.{max(5, digits)}g}", shown, *alone])
         return rows
 
     def remarks(self) -> list[str]:
@@ -373,6 +375,12 @@ class Calibration(Rich):
         p, m = len(self.parameters), len(self.measured)
         numbers = counted((p, "parameter", "parameters"), (m, "measurement", "measurements"))
         return f"<Calibration: {numbers}, {self.runs} runs{failed}>"
+
+
+def _digits(value: float, width: float) -> int:
+    """Return the number of digits of a value that show two digits of the width of its interval."""
+    known = value and 0.0 < width < math.inf
+    return min(15, 2 + math.ceil(math.log10(abs(value / width)))) if known else 0
 
 
 def _relative(width: float, value: float) -> str:

@@ -348,7 +348,7 @@ class Fatigue(Restartable):
     def __init__(
         self, spots: Sequence[HotSpot] | HotSpot, curve: SNCurve, *, resolution: float = 0.0
     ) -> None:
-        several = (spots,) if isinstance(spots, HotSpot) else spots
+        several = spots if isinstance(spots, Sequence) else (spots,)
         self.spots: tuple[HotSpot, ...] = tuple(
             dict.fromkeys(require_all(several, "Fatigue: spots", HotSpot))
         )

@@ -11,7 +11,9 @@ import scipy  # imports its modules when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import compact_repr
-from ufl_beam.errors import ArgumentError, require_array, require_number, require_row
+from ufl_beam.errors import ArgumentError, require_array, require_number, require_row, warn
+
+OFF_CENTRE = 0.25  # largest offset of a vibration from its given equilibrium, of the amplitude
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,10 @@ def damping(
         ArgumentError: As in :func:`peaks` and :func:`fit_decay`; or there are fewer than 3 peaks,
             or a peak is not above ``about``.
 
+    Warns:
+        ModelWarning: The last vibration is not about ``about``, as after yielding, which leaves a
+            residual displacement.
+
     Example:
         >>> t = np.arange(0, 5, 0.01)
         >>> decay = st.damping(t, np.exp(-0.1 * t) * np.cos(2 * np.pi * t))
@@ -150,7 +156,9 @@ def damping(
             f"damping: peaks found: {len(times)}, needed: 3; give a longer history, "
             f"or lower prominence = {prominence:g}"
         )
-    return fit_decay(times, amplitudes)
+    decay = fit_decay(times, amplitudes)
+    _require_centre(*_series("damping", t, x, "x"), about, prominence)
+    return decay
 
 
 def peaks(
@@ -199,6 +207,23 @@ def _maxima(
     # Three equal samples have slope and curvature zero; the middle sample is the peak.
     shift = np.divide(-slope, curvature, out=np.zeros(len(i)), where=curvature < 0)
     return t[i] + shift, x[i] + slope * shift / 2 - about
+
+
+def _require_centre(t: Array, x: Array, about: float, prominence: float) -> None:
+    """Warn if the last two minima and the maximum between them are not about ``about``."""
+    high, low = (
+        scipy.signal.find_peaks(sign * x, prominence=prominence * np.ptp(x))[0] for sign in (1, -1)
+    )
+    if len(low) < 2 or not (between := (low[-2] < high) & (high < low[-1])).any():
+        return
+    top, bottom = x[high[between][-1]], (x[low[-2]] + x[low[-1]]) / 2
+    centre, amplitude = (top + bottom) / 2, (top - bottom) / 2
+    if abs(centre - about) > OFF_CENTRE * amplitude:
+        warn(
+            f"damping: the vibration near t = {t[low[-1]]:.4g} s is about {centre:.3g}, with the "
+            f"amplitude {amplitude:.2g}, but amplitudes are measured from about = {about:g}; give "
+            f"about={centre:.3g} if the equilibrium has moved"
+        )
 
 
 def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:

@@ -28,7 +28,7 @@ class HingeState(NamedTuple):
         rotation: Rotation of largest magnitude; rad.
         plastic: Plastic rotation of largest magnitude; rad.
         ductility: Magnitude of ``rotation`` divided by the yield rotation, if there is one.
-        dissipated: Dissipated energy at the end, of runs before ``start=``, too; J.
+        dissipated: Dissipated energy at the last state, of runs before ``start=``, too; J.
         state: Name of the acceptance limit that the hinge satisfies, "elastic", or "beyond ...".
     """
 
@@ -76,6 +76,7 @@ def hinge_table(
     solution: Solution,
     limits: Mapping[str, float] = MappingProxyType({}),
     *,
+    n: int = -1,
     only: Sequence[Member | Connector] | None = None,
 ) -> HingeTable:
     """Return rotations, ductility and dissipated energy of all hinges of a run, as a table.
@@ -88,6 +89,8 @@ def hinge_table(
         solution: Run, or path.
         limits: Acceptance limits of the plastic rotation by name, in increasing order, as in
             ``{"IO": 0.01, "LS": 0.025, "CP": 0.04}``; rad.
+        n: Index of the last state that counts, negative from the end, such as ``target.n`` of a
+            pushover.
         only: Beams and connectors whose hinges are listed; all by default.
 
     Raises:
@@ -107,10 +110,10 @@ def hinge_table(
         if owner not in known:
             raise ArgumentError(f"hinge_table: only[{i}] = {shorten(owner)} is not in the scene")
     rows, times = list[HingeState](), solution.times
-    for hinge in hinge_histories(solution, owners):
-        n, rotation, at_yield = hinge.first_yield, hinge.largest_rotation, hinge.yield_rotation
+    for hinge in hinge_histories(solution.subset(0, solution.index(n) + 1), owners):
+        first, rotation, at_yield = hinge.first_yield, hinge.largest_rotation, hinge.yield_rotation
         rows.append(HingeState(
-            hinge.where, n, float(times[n]) if n >= 0 else math.nan, rotation,
+            hinge.where, first, float(times[first]) if first >= 0 else math.nan, rotation,
             hinge.largest_plastic, abs(rotation) / at_yield if at_yield else math.nan,
             float(hinge.dissipated[-1]), hinge.state(limits),
         ))  # fmt: skip

@@ -74,7 +74,7 @@ def draw_pushover(
                 )
             axes.plot(
                 [0.0, sign * d, sign * far], [0.0, sign * V / unit, sign * end / unit], "--",
-                color=color, linewidth=1.4, zorder=2,
+                color=color, linewidth=1.4, zorder=2, label=f"{target.method}: idealised",
             )  # fmt: skip
             axes.axvline(
                 sign * target.displacement, color=color, linewidth=1.4, linestyle=":", zorder=2,
@@ -236,7 +236,7 @@ def draw_spectrum(spectrum: ResponseSpectrum, quantity: str, ax: Axes | None = N
     return style.parent_figure(axes)
 
 
-def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
+def draw_cycles(fatigue: Fatigue, spot: HotSpot | None = None) -> Figure:
     """Draw rainflow matrix, spectrum and damage of the stress cycles at a hot spot.
 
     On the left is the rainflow matrix.  In the middle is the number of cycles above each range,
@@ -244,9 +244,13 @@ def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
     """
     from matplotlib.colors import LogNorm
 
-    cycles, curve = fatigue.cycles(place), fatigue.curve
+    if spot is None:
+        if len(fatigue.spots) > 1:
+            raise ArgumentError(f"plot: give one of the {len(fatigue.spots)} hot spots")
+        (spot,) = fatigue.spots
+    cycles, curve = fatigue.cycles(spot), fatigue.curve
     if not len(cycles.range):
-        raise ArgumentError(f"plot: the stress at {place} never turned")
+        raise ArgumentError(f"plot: the stress at {spot} never turned")
     ranges, means = 1e-6 * cycles.range, 1e-6 * cycles.mean
     done = cycles.count / curve.endurance(cycles.range, cycles.mean)
     edges = np.linspace(0.0, ranges[-1] * (1 + 1e-9), CLASSES + 1)
@@ -259,7 +263,7 @@ def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
             columns, edges, np.where(counts > 0, counts, np.nan).T,  # empty bins are white
             norm=LogNorm(0.5, max(10.0, counts.max())), cmap="viridis_r", rasterized=True,
         )  # fmt: skip
-        style.draw_bar(matrix, colors, "number")
+        style.draw_bar(matrix, colors, "")
         matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)")
         more = np.cumsum(cycles.count[::-1])[::-1]
         reached = np.append(more[0], more), np.append(0.0, ranges)
@@ -275,7 +279,7 @@ def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
         damage.barh(edges[:-1], 100 * fractions, np.diff(edges), align="edge", color=RED, alpha=0.6)
         damage.set(xlabel="part of the damage (%)")
         matrix.set_ylim(0.0, 1.1 * edges[-1])
-        titles = "cycles", "spectrum and S-N curve", f"damage {total:.3g}"
+        titles = "number of cycles in bins", "spectrum and S-N curve", f"damage {total:.3g}"
         for axes, title in zip((matrix, spectrum, damage), titles, strict=True):
             axes.set_title(title, loc="left")
     return figure

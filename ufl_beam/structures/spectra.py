@@ -32,11 +32,15 @@ def spectral_accelerations(spectrum: Any, periods: Array, what: str) -> Array:
             for T in periods
         ])  # fmt: skip
     else:
-        table = [getattr(spectrum, name, None) for name in ("periods", "pseudo_acceleration")]
+        table: list[Any] = [
+            getattr(spectrum, name, None) for name in ("periods", "pseudo_acceleration")
+        ]
         try:
             if isinstance(spectrum, Mapping):
                 raise TypeError
             T, a = spectrum if table[1] is None else table
+            if np.ndim(T) != 1 or np.ndim(a) != 1:
+                raise TypeError
         except (TypeError, ValueError):
             raise ArgumentError(
                 f"{what}: spectrum = {shorten(spectrum)} must be a function of the period (s) that "

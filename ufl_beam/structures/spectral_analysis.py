@@ -33,6 +33,7 @@ from ufl_beam.simulation.initial_state import StateOf, chosen_state
 from ufl_beam.structures.spectra import Spectrum, spectral_accelerations
 
 RULES = "CQC", "SRSS"
+NO_MASS = 1e-12  # fraction of the mass below which an effective mass is printed as zero
 LEAST_MASS = 0.9  # fraction of the mass that modes should have; EN 1998-1:2004, 4.3.3.3.1
 AT_REST = 1e-6  # frequency below which a mode is a rigid motion, as a fraction of the highest
 
@@ -143,7 +144,8 @@ class SpectralResponse(Rich):
 
     def __str__(self) -> str:
         lines = ["mode     period  acceleration  effective mass"]
-        rows = zip(self.modes.frequencies, self.accelerations, self.effective_masses, strict=True)
+        masses = np.where(self.effective_masses > NO_MASS * self.mass, self.effective_masses, 0.0)
+        rows = zip(self.modes.frequencies, self.accelerations, masses, strict=True)
         lines += [
             f"{k:4d} {1 / f:8.4g} s {a:8.4g} m/s² {m:8.4g} kg  {m / self.mass:.1%}"
             for k, (f, a, m) in enumerate(rows)

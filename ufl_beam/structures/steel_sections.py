@@ -26,9 +26,10 @@ The shear flow is zero where nothing ends, and at the ends of the last walls by 
 def steel(designation: str, **material: Any) -> Section:
     """Create a rolled or hollow steel section of a standard series from its designation.
 
-    The series are IPE, HEA, HEB, HEM, UPE and the American W and HSS; upper or lower case and
-    spaces do not matter, and "HE 200 B" is "HEB 200".  The constructor is :func:`i_shape`,
-    :func:`channel`, :func:`box` or :meth:`Section.tube`, with root and corner radii.
+    The series are IPE, HEA, HEB, HEM, UPE and the American W and HSS; upper or lower case,
+    spaces and hyphens do not matter, and "HE 200 B" is "HEB 200".  The constructor is
+    :func:`i_shape`, :func:`channel`, :func:`box` or :meth:`Section.tube`, with root and corner
+    radii.
 
     Args:
         designation: Designation, such as "IPE 300", "W14X90" or "HSS8X4X1/4".
@@ -45,7 +46,7 @@ def steel(designation: str, **material: Any) -> Section:
         >>> girder = st.steel("W14X90", axis="weak", E=200e9)
     """
     require_text(designation, "steel: designation")
-    name = "".join(designation.upper().replace("×", "X").split())
+    name = "".join(designation.upper().replace("×", "X").replace("-", " ").split())
     name = re.sub(r"^HE(\d+)([ABM])$", r"HE\2\1", name)
     table = _steel_table()
     if name not in table:

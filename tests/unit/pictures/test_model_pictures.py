@@ -270,9 +270,9 @@ def test_a_section_is_drawn_to_scale():
     [
         (
             lambda s: ub.plot(3),
-            "plot: 3 is a int; give a Scene, a Section, the Solution of a",
+            "plot: 3 is a int, which has no picture; there are pictures of Scene, Section, ",
         ),
-        (lambda s: ub.plot([s]), "is a list; give a Scene"),
+        (lambda s: ub.plot([s]), "is a list, which has no picture"),
         (
             lambda s: ub.plot(s, "M"),
             "quantity = 'M' of a Scene is not one of model; a scene has none before a run",
