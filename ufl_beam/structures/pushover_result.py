@@ -30,9 +30,9 @@ class HingeFormation(NamedTuple):
     """Event of a pushover: a hinge or cell yields, opens or becomes free.
 
     Attributes:
-        n: Index of the state at the end of the step.
-        displacement: Displacement of the control place; m.
-        base_shear: Base shear; N.
+        n: Index of the state at the end of the step in which the event occurred.
+        displacement: Displacement of the control place in this state; m.
+        base_shear: Base shear in this state; N.  Shorter steps give those of the event itself.
         where: Place of the hinge, middle of the cell, or connector.
         what: "yields", "opens", "is free" or another event of :class:`Event`.
 
