@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 from ufl_beam.model.bodies import GROUND, Body, BodyPoint
 from ufl_beam.model.connector_laws import Guide, PrescribedMotion
 from ufl_beam.model.functions import still
+from ufl_beam.model.joints import Joint
 
 COUPLES = {
     # kind of a joint -> whether it keeps the point, and the rotation
@@ -63,6 +64,8 @@ def _misses(solution, one):
         yield zero, _turn(solution, a, b) * (2 in one.shared)
     elif kind == "Guided":
         yield _from_curve(solution, one.holders[0]), zero
+    else:
+        assert not isinstance(one, Joint), f"the gap of a {kind} is not written"
 
 
 def _of_support(solution, support):

@@ -39,7 +39,7 @@ from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Reco
 
 
 class Load(Record, ABC):
-    """Base of the loads; terms/dead_loads.py computes their forces."""
+    """Base of the loads; forces in blocks/loads.py, of dead loads in terms/dead_loads.py."""
 
     amplitude: TimeFunction  # factor on the load, a function of time t (s)
     dead: ClassVar[bool] = True  # False if the forces depend on the motion

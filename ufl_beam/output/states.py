@@ -526,10 +526,7 @@ class States:
 
     def _material(self, n: int, cells: Index | int) -> Material:
         if not len(self.numbering.inelastic_cells) and not self.scene.hinges:
-            raise ArgumentError(
-                "material: no beam of the scene yields or breaks; give a section or hinges of a "
-                "beam a law, such as ElastoPlastic or Softening"
-            )
+            raise ArgumentError("material: no beam of the scene yields or breaks; give one a law")
         chosen = self.cells_of(n, self.cell_forces(n)[:, 0])[cells].T
         return Material(chosen[:3].T, *chosen[3:])
 
