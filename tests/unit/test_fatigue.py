@@ -401,3 +401,9 @@ def test_a_spot_given_twice_is_counted_once():
     once, twice = (st.Fatigue(spots, st.SNCurve.eurocode(71e6)) for spots in (spot, [spot] * 2))
     ub.simulate(scene, ub.Static(), t=(0, 3), dt=0.02, record=[once, twice], progress=False)
     assert once.life(spot) == twice.life(spot)
+
+
+def test_equivalent_ranges_take_mean_stresses_into_account():
+    curve = st.SNCurve(range=71e6, mean=st.Goodman(ultimate=500e6))
+    cycles = st.rainflow([0.0, 100e6, 0.0, 100e6, 0.0])
+    assert cycles.equivalent(curve) == pytest.approx(100e6 / (1 - 50e6 / 500e6))

@@ -645,3 +645,14 @@ def test_a_leap_is_no_critical_point(leap):
     assert reached == pytest.approx(0.4, abs=2e-7)
     assert found.passed(before) == (leap == 0)
     assert leap == 0 or path._fraction == (1.0 - reached) / 2
+
+
+def test_progress_sums_root_mean_squares_of_displacements():
+    section = ub.Section(EA=4e9, GA=1e9, EI=1.4e7, rhoA=157.0)
+    beam = ub.Beam((0, 0), (2, 0), section, cells=2)
+    push = ub.PointLoad(beam.end, force=(0, -1e6), amplitude=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    path = ub.follow(scene, ub.LoadControl(0.5), steps=4)
+    moved = np.stack([path.displacement(beam.at(s))[:, :2] for s in (0.0, 0.5, 1.0)])
+    steps = np.sqrt(np.mean(np.sum(np.diff(moved, axis=1) ** 2, axis=2), axis=0))
+    assert path.progress == pytest.approx(np.append(0.0, np.cumsum(steps)))

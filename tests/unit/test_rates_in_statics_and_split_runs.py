@@ -182,3 +182,13 @@ def test_a_pin_with_friction_sticks_in_two_runs_where_it_sticks_in_one():
     force = whole.connector(has_friction).force
     assert np.ptp(force[6:]) > 0.1  # N m; it sticks and slides
     np.testing.assert_allclose(second.connector(has_friction).force, force[6:], atol=1e-8)
+
+
+def test_a_run_goes_on_under_the_loads_of_its_start():
+    section = ub.Section(EA=4e8, GA=1e8, EI=1.4e6, rhoA=10.0)
+    beam = ub.Beam((0, 0), (2, 0), section)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+    first = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
+    then = ub.simulate(scene, ub.EnergyMomentumStatic(0.7), t=(1, 2), dt=0.5, start=first)
+    for q in then.q:
+        assert q == pytest.approx(first.q[-1], rel=1e-6, abs=1e-12)

@@ -307,3 +307,17 @@ def test_friction_at_all_pins_of_a_closed_loop():
     assert np.abs(solution.displacement(coupler.middle)[-1]).max() > 1e-3
     assert solution.energy.worst < 1e-9
     assert (np.diff(solution.energy.lost["friction"]) >= 0).all()
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.1])
+def test_friction_never_reverses_a_velocity(dt):
+    mass = ub.Body((1.0, 0.0), mass=2.0, inertia=1.0)
+    rail = ub.ground(0, 0), mass.middle
+    scene = ub.Scene(
+        bodies=[mass],
+        joints=[ub.Prismatic(*rail)],
+        connectors=[ub.Slide(*rail, ub.Coulomb(3.0))],
+        initial=[ub.Velocity((mass,), linear=(1.0, 0.0))],
+    )
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1.2), dt=dt)
+    assert run.velocity(mass.middle)[:, 0].min() > -1e-12

@@ -264,3 +264,23 @@ def test_moving_supports_and_the_moving_frame_agree(hinges):
     (sway, shear), (sway_of_half, shear_of_half) = differences
     assert sway_of_half == pytest.approx(sway / 4, rel=0.05)
     assert shear_of_half < shear / 2
+
+
+@pytest.mark.parametrize("ductility", [2.0, 9.0])
+def test_a_yielding_oscillator_turns_after_an_impulse(ductility):
+    """[closed] Without damping and hardening: (v0/u_y)²/ω² = 2 μ - 1."""
+    speed, dt, period = 0.1, 1e-4, 1.0
+    motion = st.GroundMotion(dt, [0.0, speed / dt, 0.0])
+    found = st.response_spectrum(motion, [period], 0.0, ductility=ductility)
+    strength = speed * 2 * math.pi / period / math.sqrt(2 * ductility - 1)
+    assert found.pseudo_acceleration == pytest.approx([strength], rel=2e-3)
+
+
+def test_the_largest_acceleration_without_damping_is_that_of_the_spring():
+    """[closed] At the largest displacement the spring yields: a = h ω² u + (1 - h) ω² u_y."""
+    n = np.arange(400)
+    motion = st.GroundMotion(0.02, 3 * np.sin(0.1 * n) + 2 * np.sin(0.22 * n + 1))
+    T, h = np.array([0.3, 0.5, 0.8, 1.0, 1.7]), 0.1
+    found = st.response_spectrum(motion, T, 0.0, ductility=2.0, hardening=h)
+    spring = h * (2 * np.pi / T) ** 2 * found.displacement + (1 - h) * found.pseudo_acceleration
+    assert found.acceleration == pytest.approx(spring, rel=1e-9)

@@ -16,6 +16,7 @@ from scipy.integrate import trapezoid
 
 import ufl_beam as ub
 import ufl_beam.structures as st
+from ufl_beam.structures.pushover_result import bilinear
 
 EI, H, L, M_P, MASS, P = 2e7, 4.0, 6.0, 148e3, 10e3, 200e3  # N m², m, m, N m, kg, N
 RIGID = 1e5  # stiffness of the girder over the stiffness of columns: an error of EI/RIGID
@@ -345,3 +346,50 @@ def test_springs_that_yield_or_break_are_in_the_sequence_of_hinges():
     first = {hinge.where: hinge.n for hinge in reversed(result.hinges)}
     assert first == {row.where: row.n for row in st.hinge_table(result.path).rows}
     assert list(first) == feet[::-1]
+
+
+def curve_of_oscillator(period, strength=2e3, mass=1e4, gamma=1.0, moving=1e4):
+    """Capacity curve of an elastic and perfectly plastic oscillator; N, kg."""
+    stiffness = mass * (2 * math.pi / period) ** 2
+    d = np.array([0.0, strength / stiffness, 0.1])
+    V = np.array([0.0, strength, strength])
+    return st.Pushover(None, None, "u", 0.1, d, V, (), stiffness, moving, mass, gamma, period)
+
+
+def test_n2_of_a_short_period_is_at_most_three_times_the_elastic_displacement():
+    """[pub] EN 1998-1:2004, B.5; the bound is on the displacement of the oscillator."""
+    found = curve_of_oscillator(0.1, gamma=1.3, moving=2e4).n2(lambda T: 5.0, corner=2.0)
+    elastic = 5.0 * (0.1 / (2 * math.pi)) ** 2
+    assert found.displacement == pytest.approx(3 * 1.3 * elastic, rel=1e-3)
+
+
+def test_c1_of_a_period_below_a_fifth_of_a_second_is_that_of_a_fifth():
+    """[pub] ASCE/SEI 41-17, 7.4.3.3.2."""
+    found = curve_of_oscillator(0.1).asce41(lambda T: 0.5, site="D")
+    assert found.period < 0.2
+    assert found.strength_ratio > 1
+    assert found.factors["C1"] == pytest.approx(1 + (found.strength_ratio - 1) / (60 * 0.2**2))
+
+
+def test_all_mass_counts_above_a_period_of_a_second():
+    """[pub] ASCE/SEI 41-17, table 7-4."""
+    curve = curve_of_oscillator(1.2, gamma=1.3, moving=2e4)
+    assert curve.asce41(lambda T: 0.3).factors["Cm"] == 1.0
+
+
+def test_the_first_line_of_a_curve_that_dips_crosses_it_where_it_rises_first():
+    d = np.linspace(0.0, 4.0, 401)
+    V = np.interp(d, [0.0, 1.0, 1.9, 2.1, 2.2, 4.0], [0.0, 1.0, 0.1, 0.1, 0.9, 1.05])
+    strength, stiffness = bilinear(d, V, 4.0)
+    assert 0.6 * strength < 1.0
+    assert stiffness == pytest.approx(1.0)
+
+
+def test_a_mass_at_a_support_does_not_count():
+    section = ub.Section(EA=4e8, GA=1e8, EI=1.4e6)
+    column = ub.Beam((0, 0), (0, 3), section)
+    masses = [ub.PointMass(column.end, 5e3), ub.PointMass(column.start, 2e3)]
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start)], masses=masses)
+    curve = st.pushover(scene, column.end, 0.01, steps=2, progress=False)
+    assert curve.mass == pytest.approx(5e3)
+    assert curve.gamma == pytest.approx(1.0)

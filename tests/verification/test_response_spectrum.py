@@ -277,3 +277,37 @@ def test_loads_that_follow_the_motion_are_refused(load):
     at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, mesh=CUBIC, progress=False)
     with pytest.raises(ub.ArgumentError, match=f"{load}.*the force follows the motion"):
         st.response_spectrum_analysis(scene, spectrum, n=1, at=at, mesh=CUBIC)
+
+
+def test_a_body_beyond_the_end_of_a_beam_moves_with_the_ground():
+    """[closed] The one mode of a massless column has all the mass."""
+    section = ub.Section(EA=4e8, GA=1e8, EI=1.4e6)
+    column = ub.Beam((0, 0), (0, 3), section)
+    body = ub.Body((0, 3.5), mass=5e3, inertia=0.0, name="roof")
+    scene = ub.Scene(
+        [column],
+        supports=[ub.Clamped(column.start)],
+        bodies=[body],
+        joints=[ub.Rigid(column.end, body.at(0, 3))],
+    )
+    found = st.response_spectrum_analysis(scene, lambda T: 3.0, n=1)
+    assert found.effective_masses == pytest.approx([5e3])
+    assert found.mass == pytest.approx(5e3)
+
+
+def test_a_support_bears_the_moment_of_a_spring():
+    section = ub.Section(EA=4e8, GA=1e8, EI=1.4e6, rhoA=1.0)
+    stub = ub.Beam((-1, 0), (0, 0), section)
+    column = ub.Beam((0, 0), (0, 3), section, cells=2)
+    joint = ub.Revolute(stub.end, column.start)
+    spring = ub.Turn(stub.end, column.start, ub.Spring(1e5))
+    base = ub.Clamped(stub.end)
+    scene = ub.Scene(
+        [stub, column],
+        supports=[ub.Clamped(stub.start), base],
+        joints=[joint],
+        connectors=[spring],
+        masses=[ub.PointMass(column.end, 5e3)],
+    )
+    response = st.response_spectrum_analysis(scene, lambda T: 3.0, n=1)
+    assert response.reaction(base)[2] == pytest.approx(response.diagram(column).M[0], rel=1e-6)

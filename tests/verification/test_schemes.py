@@ -397,3 +397,24 @@ def test_parameters_may_be_integers():
         for scheme in (ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0, beta=0))
     ]
     np.testing.assert_array_equal(*runs)
+
+
+def test_decaying_midpoint_with_steps_of_any_length_is_its_formula():
+    """[closed] Strain and velocity of a bar of one cell; r = dt/dt' after a longer step, else 1."""
+    scheme = ub.EnergyMomentumDecaying(0.5)
+    simulation = ub.Simulation(bar(), scheme)
+    place = simulation.scene.beams[0].end
+    k, m, c = EA / LENGTH, DENSITY * LENGTH / 3, scheme.lost_fraction
+    x = np.array([simulation.displacement(place)[0], simulation.velocity(place)[0]])
+    last, change = np.inf, np.zeros(2)
+    for dt in np.array([1.0, 0.5, 0.2, 0.4, 0.1]) / OMEGA:
+        r = min(1.0, dt / last)
+        # Δu/dt = (v0 + v1)/2 + c (Δv - r Δv');  m Δv/dt = -k ((u0 + u1)/2 + c (Δu - r Δu'))
+        A = np.array([[1 / dt, -(0.5 + c)], [k * (0.5 + c), m / dt]])
+        b = np.array([x[1] - c * r * change[1], -k * (x[0] - c * r * change[0])])
+        change, last = np.linalg.solve(A, b), dt
+        x = x + change
+        simulation.step_to(simulation.t + dt)
+        found = simulation.displacement(place)[0], simulation.velocity(place)[0]
+        assert found == pytest.approx(x, rel=1e-9)
+    simulation.close()

@@ -309,3 +309,14 @@ def test_statics_have_no_accelerations():
     run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
     with raises("acceleration: the run was static"):
         run.acceleration(beam.end)
+
+
+def test_a_cut_through_a_column_from_above_is_at_its_height():
+    section = ub.Section(EA=4e8, GA=1e8, EI=1.4e6)
+    mast = ub.Beam((0, 3), (0, 0), section, cells=1)
+    scene = ub.Scene(
+        [mast], supports=[ub.Clamped(mast.end)], loads=[ub.LineLoad(mast, force=(500, 0))]
+    )
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
+    levels = [mast.end, mast.at(0.75), mast.start]
+    assert st.storeys(run, levels).shear[-1] == pytest.approx([1500, 1125])
