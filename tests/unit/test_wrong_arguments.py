@@ -874,6 +874,7 @@ TABLE |= {
         st.hinge_table,
         solution=V(PUSH, OBJECT),
         limits=V({"IO": 0.1}, [*LIST, {1: 0.1}, {"IO": 0.2, "LS": 0.1}, {"IO": 0.0}]),
+        n=V(-1, [None, "a", 0.5, [0], 10**6, -(10**6)]),
         only=V([BEAM], [*optional(LIST), [OTHER]]),
     ),
 }

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ufl_beam.display import Parameter, Tabular
 from ufl_beam.errors import ArgumentError, require_all, require_kind, shorten
 from ufl_beam.model.bodies import Member, Place
@@ -104,6 +106,7 @@ def hinge_table(
     """
     require_kind(solution, Solution, "hinge_table: solution")
     require_limits(limits, "hinge_table: limits")
+    require_kind(n, (int, np.integer), "hinge_table: n")
     known = {*solution.scene.beams, *solution.scene.connectors}
     owners = known if only is None else require_all(only, "hinge_table: only", (Member, Connector))
     for i, owner in enumerate(owners):
