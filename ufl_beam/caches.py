@@ -25,7 +25,7 @@ Cached = TypeVar("Cached")
 SMALL, LARGE = 2**16, 2**21
 """Largest sizes of the arguments of cached results: bytes of arrays plus values of whole numbers.
 
-Scenes of more than some 500 cells exceed the first size, those of some 14 000 cells the second.
+Scenes of about 500 cells exceed the first size, scenes of about 14 000 cells the second.
 """
 
 MOST_SMALL, MOST_LARGE = 64, 4

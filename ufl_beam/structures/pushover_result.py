@@ -32,7 +32,7 @@ class HingeFormation(NamedTuple):
     Attributes:
         n: Index of the state at the end of the step in which the event occurred.
         displacement: Displacement of the control place in this state; m.
-        base_shear: Base shear in this state; N.  Shorter steps give those of the event itself.
+        base_shear: Base shear in this state; N.  Shorter steps are nearer to the event.
         where: Place of the hinge, middle of the cell, or connector.
         what: "yields", "opens", "is free" or another event of :class:`Event`.
 

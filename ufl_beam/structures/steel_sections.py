@@ -83,7 +83,7 @@ def channel(h: float, b: float, tw: float, tf: float, r: float = 0.0, **material
     """Create a channel with parallel flanges, with the dimensions of :func:`i_shape`.
 
     About the weak axis, the web is to the right of the direction of the beam.  ``material`` are
-    arguments of ``Section.of_shape``; the shear factor is by default that of Cowper (1966) for thin
+    arguments of ``Section.of_shape``; the default of the shear factor is Cowper's (1966) for thin
     walls and Poisson's ratio 0.
 
     Example:
@@ -96,8 +96,8 @@ def t_shape(h: float, b: float, tw: float, tf: float, r: float = 0.0, **material
     """Create a T: depth h with the flange of width b and thickness tf, thickness tw of the web.
 
     The flange is to the left of the direction of the beam; ``r`` is the radius of the fillets;
-    m.  ``material`` are arguments of ``Section.of_shape``; the shear factor is by default that of
-    Cowper (1966) for thin walls and Poisson's ratio 0.
+    m.  ``material`` are arguments of ``Section.of_shape``; the default of the shear factor is
+    Cowper's (1966) for thin walls and Poisson's ratio 0.
 
     Example:
         >>> stiffener = st.t_shape(h=0.1, b=0.1, tw=0.01, tf=0.01, E=210e9, nu=0.3, rho=7850.0)
@@ -108,8 +108,8 @@ def t_shape(h: float, b: float, tw: float, tf: float, r: float = 0.0, **material
 def box(b: float, h: float, t: float, r: float = 0.0, **material: Any) -> Section:
     """Create a rectangular hollow section: width b, depth h, wall t, outer corner radius r; m.
 
-    The inner radius is r - t, or 0.  ``material`` are arguments of ``Section.of_shape``; the shear
-    factor is by default that of Cowper (1966) for thin walls and Poisson's ratio 0.
+    The inner radius is r - t, or 0.  ``material`` are arguments of ``Section.of_shape``;
+    the default of the shear factor is Cowper's (1966) for thin walls and Poisson's ratio 0.
 
     Example:
         >>> column = st.box(b=0.2, h=0.3, t=0.01, r=0.02, E=210e9, nu=0.3, rho=7850.0)

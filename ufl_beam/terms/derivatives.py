@@ -91,7 +91,7 @@ class Neighbours:
 
 
 class Registered(Neighbours):
-    """Functions that return the numbers of a term, in the place of neighbouring scenes.
+    """List of the functions that return the numbers of a term; it replaces :class:`Neighbours`.
 
     Attributes:
         values: The functions.
