@@ -578,13 +578,13 @@ def sway(run):
 
 
 @pytest.mark.parametrize("reciprocal", [False, True])
-def test_linear_numbers_need_two_scenes(reciprocal):
+def test_linear_numbers_need_one_scene(reciprocal):
     """Derivatives by a stiffness and by its reciprocal agree; the model is called less often."""
     at = {"weak": 4e6, "strong": 8e6, "force": 1e4}
     times = {"t": (0, 0.2), "dt": 0.02, "of": sway}
     plain = counted(strip)
     value, by = ub.gradient(plain, at, ub.EnergyMomentum(), **times)
-    assert plain.number == 1 + 2 * len(at)
+    assert plain.number == 1 + 2 + len(at)  # two scenes in which all parameters change
     run = ub.simulate(strip(**at), ub.EnergyMomentum(), t=(0, 0.2), dt=0.02)
     assert value == pytest.approx(sway(run)[-1], rel=1e-12)
     direct = ub.differentiate(strip, at, ub.EnergyMomentum(), t=(0, 0.2), dt=0.02).of(sway)[-1]
@@ -592,9 +592,38 @@ def test_linear_numbers_need_two_scenes(reciprocal):
     if reciprocal:
         bent = counted(softened)
         _, found = ub.gradient(bent, at | {"weak": 1 / 4e6}, ub.EnergyMomentum(), **times)
-        assert bent.number == 1 + 2 + 4 * len(at)  # the first pair is not linear
+        assert bent.number == 1 + 2 + 4 * len(at)  # the numbers are not linear
         assert found[0] == pytest.approx(-by[0] * 4e6**2, rel=1e-9)
         assert found[1:] == pytest.approx(by[1:], rel=1e-9)
+
+
+def test_products_of_parameters_are_not_linear():
+    """Numbers that are linear in each parameter alone have five-point differences."""
+
+    def scene(modulus, inertia):
+        return strip(modulus * inertia, 8e6, 1e4)
+
+    at, times = {"modulus": 2e8, "inertia": 0.02}, {"t": (0, 0.2), "dt": 0.02, "of": sway}
+    _, by = ub.gradient(product := counted(scene), at, ub.EnergyMomentum(), **times)
+    _, (by_EI,) = ub.gradient(
+        lambda EI: strip(EI, 8e6, 1e4), {"EI": 4e6}, ub.EnergyMomentum(), **times
+    )
+    assert product.number == 1 + 2 + 4 * len(at)
+    assert by * [*at.values()] == pytest.approx(2 * [by_EI * 4e6], rel=1e-9)
+
+
+def test_history_may_depend_on_parameters_in_another_way():
+    """The numbers of the scene are linear in the force, the history is not."""
+
+    def weighted(run):
+        return run.scene.loads[0].force[1] ** 2 * sway(run)
+
+    at, times = {"weak": 4e6, "strong": 8e6, "force": 1e4}, {"t": (0, 0.2), "dt": 0.02}
+    value, by = ub.gradient(strip, at, ub.EnergyMomentum(), **times, of=weighted)
+    sag, by_sway = ub.gradient(strip, at, ub.EnergyMomentum(), **times, of=sway)
+    assert value == pytest.approx(1e8 * sag, rel=1e-12)
+    expected = 1e8 * by_sway + [0.0, 0.0, 2e4 * sag]
+    assert by == pytest.approx(expected, rel=1e-9)
 
 
 def test_functions_of_time_may_depend_on_parameters():

@@ -77,8 +77,9 @@ STENCILS: dict[tuple[int, ...], tuple[float, ...]] = {
 """Positions and weights of five-point differences: central ones, and one-sided ones at the end of
 the range of a parameter.  The weight of the position 0 makes the sum of the weights zero."""
 
-PAIR = (-1, 1), (-0.5, 0.5)
-"""Positions and weights of central differences, which are exact for linear numbers."""
+TOGETHER = 1.0, 1.5
+"""Least and largest step of a parameter in the scenes where all parameters change, as a multiple
+of the step of :data:`MODEL_STEP`."""
 
 MOST_SUBSTEPS = 1000
 """Number of substeps of divided steps that are stored; the number of steps if it is larger."""
@@ -316,8 +317,8 @@ class Case:
             warnings.simplefilter("ignore", ModelWarning)
             if self.start is not None or run.begins_with_impact:
                 scenes: list[list[Any]] = [[*self.simulations(x, MODEL_STEP)] for x in names]
-            elif (pairs := self._pairs(run, t1)) is not None:
-                return pairs
+            elif (linear := self._linear(run, t1)) is not None:
+                return linear
             else:
                 scenes = [
                     [NeighbouringScene(run, scene) for scene in self.scenes(name, MODEL_STEP)]
@@ -332,30 +333,40 @@ class Case:
                 )
         return Beside(scenes, np.array([self.weights(name, MODEL_STEP) for name in names]))
 
-    def _pairs(self, run: Simulation, t1: float) -> Beside | None:
-        """Return two scenes for each parameter, if all numbers are linear between them."""
-        numbers = Numbers(run, t1)
+    def _linear(self, run: Simulation, t1: float) -> Beside | None:
+        """Return one scene for each parameter, if all numbers are linear in all parameters.
+
+        Two more scenes show this, in which all parameters change in different proportions.  Their
+        changes cancel unless a number depends on a square of a parameter or on a product of two.
+        """
+        numbers, values = Numbers(run, t1), np.array([*self.at.values()])
         steps = np.array([self._step(name, MODEL_STEP) for name in self.at])
-        pairs = Beside([], np.array([PAIR[1]]) / steps[:, None], [])
-        for (name, value), weights in zip(self.at.items(), pairs.weights, strict=True):
-            changes = (value + k * self._step(name, MODEL_STEP) for k in PAIR[0])
-            try:
-                both = [NeighbouringScene(run, self.scene({name: x})) for x in changes]
-            except ArgumentError:
+        far = np.random.default_rng(0).uniform(*TOGETHER, len(steps)) * steps
+        found = Beside([], 1 / steps[:, None], [])
+        try:
+            both = [NeighbouringScene(run, self._at(values + k * far)) for k in (-1, 1)]
+            if not numbers.are_linear(both):
                 return None
-            if (changed := numbers.linear_changes(both)) is None:
-                return None
-            pairs.scenes.append(both)
-            if pairs.rows is not None and not numbers.moves_alike(both):
-                pairs.rows = None  # C needs the terms of all scenes
-                for some in pairs.scenes[:-1]:
-                    some[:] = [NeighbouringScene(run, other.scene) for other in some]
-            if pairs.rows is not None:
-                slopes = (np.asarray(np.tensordot(weights, x, 1)) for x in changed)
-                pairs.rows.append([x if x.any() else None for x in slopes])
-                for other in both:
+            for p, step in enumerate(steps):
+                changed = values.copy()
+                changed[p] += step
+                other = NeighbouringScene(run, self._at(changed))
+                if (changes := numbers.changes(other)) is None:
+                    return None
+                found.scenes.append([other])
+                if found.rows is not None and not numbers.moves_alike(other):
+                    found.rows = None  # C needs the terms of all scenes
+                    for some in found.scenes[:-1]:
+                        some[:] = [NeighbouringScene(run, x.scene) for x in some]
+                if found.rows is not None:
+                    found.rows.append([x / step if x.any() else None for x in changes])
                     other.forget()
-        return pairs
+        except ArgumentError:
+            return None
+        return found
+
+    def _at(self, values: Array) -> Scene:
+        return self.scene(dict(zip(self.at, map(float, values), strict=True)))
 
 
 class StepDerivatives:

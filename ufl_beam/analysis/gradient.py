@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.analysis.derivatives import (
+    MODEL_STEP,
     STENCILS,
     Model,
     MotionOnly,
@@ -74,7 +75,7 @@ def gradient(
     """Compute one number of a run, and differentiate it by many parameters of the scene.
 
     The adjoint of the run goes back through its steps once, at a cost that hardly depends on the
-    number of parameters.  Besides, the model is called twice for each parameter if all numbers of
+    number of parameters.  Besides, the model is called once for each parameter if all numbers of
     the scene are linear functions of the parameters, as a stiffness is of EI, else four times.
     :func:`differentiate` has derivatives of any quantity, and continues a preload with ``start``,
     which this function does not: its run begins with the undeformed scene.
@@ -135,8 +136,12 @@ def gradient(
         starts = adjoint.run(ends)
         history = _History(run.solution, of, reduce)
         found = adjoint.reverse(ends, starts, *history.derivatives_by_motion())
-        for p, (some, row) in enumerate(zip(beside.scenes, beside.weights, strict=True)):
-            found[p] += np.dot(row, [history.change_in(other.numbering) for other in some])
+        for p, (name, some) in enumerate(zip(at, beside.scenes, strict=True)):
+            if any(history.change_in(other.numbering) for other in some):
+                numberings = [
+                    DofNumbering(x, run.numbering.mesh) for x in case.scenes(name, MODEL_STEP)
+                ]
+                found[p] += case.weights(name, MODEL_STEP) @ [*map(history.change_in, numberings)]
         beside.close()
     return history.value, found
 

@@ -137,26 +137,30 @@ class Numbers:
         self._others = bool(run.scene.works) or any(isinstance(x, ForceLaw) for x in laws)
         self._others |= any(isinstance(x, MovingLoad) for x in run.scene.loads)
 
-    def linear_changes(self, both: Sequence[Any]) -> list[Array] | None:
-        """Return the changes of all numbers in two scenes, if they are linear; (2, ...) each."""
-        if self._others or not all(alike(self._run, other) for other in both):
+    def changes(self, other: Any) -> list[Array] | None:
+        """Return the changes of all numbers in a scene; None if its terms differ in more."""
+        if not alike(self._run, other):
             return None
-        terms = self._run.equation.terms
-        pairs = (pair for x in both for pair in zip(terms, x.equation.terms, strict=True))
-        if not all(a.is_like(b) for a, b in pairs) or not self._moves_linearly(both):
+        terms = [*zip(self._run.equation.terms, other.equation.terms, strict=True)]
+        if not all(here.is_like(there) for here, there in terms):
             return None
         for i, fixed in self._fixed:
-            if any(not np.array_equal(fixed(terms[i]), fixed(x.equation.terms[i])) for x in both):
+            if not np.array_equal(fixed(terms[i][0]), fixed(terms[i][1])):
                 return None
         found = list[Array]()
         for here, values in zip(self._here, self._values, strict=True):
             with np.errstate(invalid="ignore"):  # infinite numbers do not change
-                change = np.array([np.subtract(values(other), here) for other in both])
-            change[~np.isfinite(change)] = 0.0
-            if not _cancel(change, here):
-                return None
-            found.append(change)
+                change = np.subtract(values(other), here)
+            found.append(np.where(np.isfinite(change), change, 0.0))
         return found
+
+    def are_linear(self, both: Sequence[Any]) -> bool:
+        """Return whether the changes of all numbers in two opposite scenes cancel."""
+        if self._others or (low := self.changes(both[0])) is None:
+            return False
+        high = self.changes(both[1])
+        cancel = high is not None and all(map(_cancel, low, high, self._here))
+        return cancel and self._moves_linearly(both)
 
     def _functions(self, of: Any) -> list[TimeFunction]:
         return [function for _, function in of.scene.time_functions()]
@@ -165,26 +169,26 @@ class Numbers:
         of_three = zip(*map(self._functions, (self._run, *both)), strict=True)
         for here, *others in of_three:
             if not all(same_function(here, other) for other in others):
-                values = [[f(float(t)) for t in self._times] for f in (here, *others)]
-                if not _cancel(np.subtract(values[1:], values[0]), np.array(values[0])):
+                at, low, high = np.array(
+                    [[f(float(t)) for t in self._times] for f in (here, *others)]
+                )
+                if not _cancel(low - at, high - at, at):
                     return False
         return True
 
-    def moves_alike(self, both: Sequence[Any]) -> bool:
-        """Return whether all functions of time and dead loads are the same in two scenes."""
-        mine, *others = map(self._functions, (self._run, *both))
-        same = all(all(map(same_function, mine, other)) for other in others)
-        terms = (zip(self._run.equation.terms, x.equation.terms, strict=True) for x in both)
-        return same and not any(term.differs(other) for pairs in terms for term, other in pairs)
+    def moves_alike(self, other: Any) -> bool:
+        """Return whether all functions of time and dead loads are the same in a scene."""
+        same = all(map(same_function, self._functions(self._run), self._functions(other)))
+        terms = zip(self._run.equation.terms, other.equation.terms, strict=True)
+        return same and not any(here.differs(there) for here, there in terms)
 
 
 def _of_term(i: int, values: Callable[[Any], Array], scene: Any) -> Array:
     return values(scene.equation.terms[i])
 
 
-def _cancel(changes: Array, values: Array) -> bool:
+def _cancel(low: Array, high: Array, values: Array) -> bool:
     """Return whether two changes of numbers are opposite, apart from round-off."""
-    low, high = changes
     round_off = 8 * np.finfo(np.float64).eps * np.abs(values)
     with np.errstate(invalid="ignore"):
         return not (np.abs(low + high) > LINEAR * np.abs(high) + round_off).any()
