@@ -78,7 +78,7 @@ ACCELERATIONS = {
         "unknowns remain and forces of connectors are among them. The gain grows with the number "
         "of joints: see docs/ranks.md.",
         by.SHIPPED, by.LEFT,
-        ("compiled/c/fronts.c", "solvers/multifrontal.py"),
+        ("compiled/c/multifrontal.c", "solvers/multifrontal.py"),
     ),
     "guess with the acceleration": Acceleration(
         "The initial guess extrapolates with the velocity of the last step and adds a fraction of "

@@ -25,10 +25,10 @@ from ufl_beam.dolfinx_compat import VERSIONS
 T = TypeVar("T")
 
 SOURCES = (
-    "assembly", "loops", "material_laws", "embedded_hinges", "material_points", "blocks",
-    "inelastic_cells", "beam_elimination", "fronts", "newton", "cell_forces",
-    "term_phases", "energy_ledger", "derivatives", "adjoint", "block_derivatives",
-    "point_derivatives", "steps", "oscillators",
+    "assembly", "csr", "dead_loads", "inertia_and_damping", "material_laws", "embedded_hinges",
+    "material_points", "blocks", "inelastic_cells", "energy_changes", "beam_elimination",
+    "multifrontal", "newton", "cell_forces", "derivatives", "adjoint", "block_derivatives",
+    "point_derivatives", "state_rows", "steps", "oscillators",
 )  # fmt: skip
 """C files in the folder c; they form one translation unit."""
 

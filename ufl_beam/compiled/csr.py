@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.caches import cached_by_structure
-from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, loop, struct
+from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, struct
 
 
 class Csr:
@@ -199,37 +199,3 @@ class Product:
         y = np.zeros(len(x))
         lib.add_product(self.c, doubles(x), doubles(y))
         return y
-
-
-class StepProduct:
-    """Forces ``A (factor s - back v)`` with s = (Δu, 2 tan(Δψ/2)), and their derivative.
-
-    ``A`` is constant and has the sparsity pattern of ``tangent``, to which the derivative is added.
-    ``scratch`` is space for one number per row; other code may use it between evaluations.
-
-    Attributes:
-        A: The matrix as :class:`Product`.
-        c: ``step_product`` of loops.h; phases of a step set ``factor``, ``back``, ``v`` and ``q0``.
-        loops: C functions that add the forces and their derivative.
-        rate: Address of the pointer to ``factor s - back v`` of the latest forces.
-    """
-
-    def __init__(self, A: Csr, rotations: Index, tangent: Csr, scratch: Array) -> None:
-        self.A, self._tangent = Product(A), tangent
-        in_row = self.A.places(A)[1]
-        place = {"far": in_row}
-        if A.narrow():
-            place = {"place": ffi.from_buffer("uint8_t[]", in_row.astype(np.uint8))}
-        self.c = struct(
-            "step_product", size=A.size, A=self.A.c, begin=tangent.indptr, **place,
-            rotations=len(rotations), rotation=rotations, space=scratch, rate=np.zeros(A.size),
-            turn=np.full(len(rotations), np.nan), half=np.empty(len(rotations)),
-        )  # fmt: skip
-        self.loops = loop("add_step_force", self.c), loop("add_step_tangent", self.c)
-        self.rate = ffi.addressof(self.c, "rate")
-
-    def matrix(self) -> Csr:
-        """Return the matrix ``A`` in the pattern of the tangent."""
-        A = self._tangent.zeros_like()
-        A.data[self.A.places(A)[0]] = self.A.data
-        return A

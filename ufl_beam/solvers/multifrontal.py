@@ -22,7 +22,7 @@ class Multifrontal:
     """Multifrontal elimination of the unknowns of a system, except those that stay.
 
     The ordering of :data:`ORDERINGS` with the fewest operations is used.  Each front exchanges rows
-    among its pivots only, see fronts.c.  In a system of up to :data:`ONE_FRONT` unknowns, all
+    among its pivots only, see multifrontal.c.  In a system of up to :data:`ONE_FRONT` unknowns, all
     eliminated unknowns are pivots of one front.  The fronts of a larger system have few pivots, so
     its matrix must not have structural zeros on the diagonal.
 

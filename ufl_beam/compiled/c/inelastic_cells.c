@@ -148,3 +148,45 @@ double missed_by_points(void *self, const double *q, const double *r, double sca
   const double largest = fmax(fmax(unlike[0], unlike[1]), unlike[2] / m->scene);
   return largest > 0 ? largest / scale : 0;
 }
+
+/* -- points of cells and of springs ------------------------------------------------------------- */
+
+void begin_points(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const element_block *b = self;
+  points *p = b->inner;
+  inelastic *m = b->sections;
+  for (int k = 0; k < p->cells * p->of_cell && p->w[k * p->width + DT] != step->dt; ++k)
+    p->w[k * p->width + DT] = step->dt;
+  p->tried = p->predicts = 0;
+  if (!m) return;
+  m->latest[0] = NAN; /* compute the next response in any case */
+  m->q0 = step->q0, m->q_before = step->q_before, m->ratio = step->ratio;
+}
+
+/* The points of a block after their response at q. */
+static points *respond_in(const element_block *b, const double *q)
+{
+  if (b->sections) respond_at(b->sections, q);
+  else respond_springs(b, q);
+  return b->inner;
+}
+
+void accept_points(void *self, const time_step *step, const double *q1, const double *s)
+{
+  points *p = respond_in(self, q1);
+  if (p->damped) {
+    accept_block((void *)p->damped, step, q1, s);
+    keep_tangents(p);
+  }
+  end_points(p, p->sum, 1);
+  for (int k = 0; k < POINT_OUTPUTS; ++k)
+    if (p->entry[k] && k != ELASTIC && k != HARDENING) *p->entry[k] += (k == LOST ? 2 * p->alpha : 1) * p->sum[k];
+}
+
+void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const points *p = ((element_block *)self)->inner;
+  for (int k = ELASTIC; k <= HARDENING; ++k)
+    if (p->entry[k]) *p->entry[k] += p->sum[k];
+}

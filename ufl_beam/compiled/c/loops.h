@@ -300,7 +300,7 @@ void reduce(const chains *c, const double *b);
 void expand(const chains *c, const double *left, double *x);
 int all_finite(int size, const double *values);
 
-/* -- multifrontal elimination, see fronts.c ------------------------------------------------------ */
+/* -- multifrontal elimination, see multifrontal.c ------------------------------------------------------ */
 
 enum {
   WIDE = 8,      /* columns of a product that are computed at once */

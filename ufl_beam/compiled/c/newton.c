@@ -41,17 +41,6 @@ static int raised_anywhere(equation *e) { return e->raised = (int)over_processes
 
 /* -- supports at an angle ---------------------------------------------------------------------- */
 
-/* Rotate a vector into the axes of supports (way = 1), or back into the axes of the plane (-1), in
- * place. */
-void turn_axes(int number, const turned_axes *axes, double *x, int way)
-{
-  for (int k = 0; k < number; ++k) {
-    const turned_axes *t = axes + k;
-    const double a = x[t->i], b = x[t->j], s = way * t->s;
-    x[t->i] = t->c * a + s * b, x[t->j] = t->c * b - s * a;
-  }
-}
-
 /* Configuration in the axes of the plane. */
 static const double *in_plane(const equation *e, const double *x)
 {
@@ -97,18 +86,6 @@ static void begin_rows(const equation *e, int first, int last)
   const int32_t begin = e->indptr[first];
   memset(e->tangent + begin, 0, (e->indptr[last] - begin) * sizeof *e->tangent);
   if (e->product) add_rows(e->product, first, last, e->tangent);
-}
-
-/* The cells from `first` on, SOME at most. */
-static cells some_cells(const cells *c, int first)
-{
-  cells some = *c;
-  some.number = c->number - first < SOME ? c->number - first : SOME;
-  some.dofs += (size_t)first * c->of_cell;
-  some.w += (size_t)first * c->width;
-  if (c->row) some.row += (size_t)first * c->rows;
-  if (c->pattern) some.has += first / c->batch_size;
-  return some;
 }
 
 /* Assemble the tangent at q in the axes of the plane. Rows are initialized shortly before cells add

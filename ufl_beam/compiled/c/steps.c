@@ -376,6 +376,18 @@ static int solve_to(time_loop *m, double t1, double end)
   return fails(m, RAISED);
 }
 
+static void accept_supports(time_loop *m)
+{
+  const moving_supports *p = m->supports;
+  const double a = p->weight_of_before;
+  turn_axes(m->equation->turned, m->equation->axes, m->s, 1);
+  if (p->moving)
+    for (int k = 0; k < p->held; ++k)
+      if (p->hold[k] < m->equation->owned)
+        *p->work += (a * p->before[k] + (1 - a) * p->reactions[k]) * m->s[p->hold[k]];
+  memcpy(p->before, p->reactions, p->held * sizeof *p->before);
+}
+
 /* Accept the end of a step, or of a stage of it, as the state of all terms. Returns 0 if a function
  * of a user has raised an exception. The step is accepted nevertheless, because some terms have
  * accepted it already. */
@@ -575,20 +587,6 @@ static double seconds_now(void)
   struct timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-/* Write the state, or the entries of this process, into a row; see state_rows.py. */
-void keep_state(const time_loop *m, double *row)
-{
-  memset(row, 0, m->sums * sizeof *row);
-  for (int k = 0; k < m->num_groups; ++k) {
-    const group_columns *n = m->groups + k;
-    const double *from = *n->from;
-    if (!n->to)
-      memcpy(row + n->first, from, n->number * sizeof *row);
-    else
-      for (int i = 0; i < n->number; ++i) row[n->to[i]] += from[n->at[i]];
-  }
 }
 
 /* Take steps to the times `ends` until one fails, or ends more than `seconds` after the call;
