@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Planar flexible multibody dynamics with geometrically exact beams.  Units are SI.
+"""Plane frames and flexible multibody systems of geometrically exact beams.  Units are SI.
 
-The examples in docstrings are run as tests.  They use the names of the example below: a cantilever
-with its solution, and a cantilever whose plastic hinge at the clamped end softens.
+The examples in docstrings run as tests.  They use the names of the example below: a cantilever with
+its solution, and a cantilever whose plastic hinge at the clamped end softens.
 
 Example:
     >>> import numpy as np

@@ -108,7 +108,7 @@ LARGEST_RIGID_ROTATION = 0.5
 """Largest rotation of a part that a step turns without strain, in statics and if forces work on Δψ.
 
 A linkage has several assemblies, which no energy tells apart.  In longer steps Newton's method may
-find another one than the assembly to which the motion leads; docs/schemes.md has measurements.
+find another one than the assembly to which the motion leads; docs/steps.md has measurements.
 """
 
 LEAST_AT_REST, LEAST_IN_MOTION = 2, 1

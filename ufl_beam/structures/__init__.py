@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What structural engineers need: pushover, spectra, combinations, concrete, steel, fatigue, decay.
+"""Analyses of structures: pushover, spectra, combinations, concrete, steel, fatigue, decay.
 
-This package is built on the public interface of ``ufl_beam``, which does not import it.  Units are
-SI.  Examples use the names of the example of ``ufl_beam``.  ``ub.plot`` draws the results:
+This package uses the public interface of ``ufl_beam``, which does not import it.  Units are SI.
+Examples use the names of the example of ``ufl_beam``.  ``ub.plot`` draws the results:
 
 ==================  ==================  ============================================================
 shown               quantity            picture and further arguments
