@@ -2,14 +2,20 @@
 """Bodies, joints and connectors: what is refused, what is shared, what solutions say."""
 
 import math
+import time
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from helpers import raises, run
+from scenes import rigid_chain
 
 import ufl_beam as ub
+from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.model.constraint_checks import require_no_mechanism
+from ufl_beam.simulation.step_equation import equation_of_scene
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=10.0, rhoA=1.0, rhoI=0.01)
 
@@ -262,6 +268,72 @@ def test_statics_names_what_is_free():
     with raises("loose (body 0) can turn"):
         turn = ub.Turn(ub.ground(0, 0), one.middle, ub.Damper(1.0))
         run(ub.Scene(bodies=[one], joints=hung.joints, connectors=[turn]), ub.Static())
+
+
+def test_free_motions_of_many_beams():
+    """Above 30 beams the matrix of the constraints is sparse."""
+    for n in (30, 31, 60):
+        rods = [beam((i, 0), (i + 1, 0), name=f"rod {i}") for i in range(n)]
+        pinned = rigid_chain(rods, supports=[ub.Pinned(rods[0].start)])
+        said = "in 1 way", "rod 0 (beam 0) can turn about (0, 0)", f"and {n - 4} more"
+        with raises(*said):
+            run(pinned, ub.Static())
+        ub.Simulation(replace(pinned, supports=[ub.Clamped(rods[0].start)]), ub.Static()).close()
+        with raises(f"in {3 * n if n == 30 else 'at least 6'} independent ways"):
+            run(ub.Scene(rods), ub.Static())
+
+
+def test_checks_of_many_hinged_beams_are_fast():
+    rods = [beam((i, 0), (i + 1, 0), cells=1) for i in range(2000)]
+    joints = [ub.Revolute(one.end, other.start) for one, other in pairwise(rods)]
+    supports = [ub.Clamped(rods[0].start), *(ub.Roller(one.end) for one in rods)]
+    scene, begin = ub.Scene(rods, joints=joints, supports=supports), time.process_time()
+    assert require_no_mechanism(scene) == ""
+    assert time.process_time() - begin < 5
+
+
+def test_derivatives_of_undeformed_motions():
+    """[reference] `rigidly` of connectors: differences of the motions that `blocks/` computes."""
+    rod, mast = beam((0, 0), (2, 1), name="rod"), beam((2, 1), (3, 3), name="mast")
+    hub, rim = body(1.0, 2.0, name="hub"), body(-1.0, 1.0, name="rim")
+    spring, hole = ub.Spring(1.0), ub.Clearance(1.0, gap=1.0, friction=0.1, radius=0.1)
+    joints = [
+        ub.Revolute(rod.end, mast.start, multipliers=True),
+        ub.Rigid(hub.at(2, 1), mast.start),
+        ub.Prismatic(rim.at(0, 2), hub.at(1, 3), axis=(1, 2)),
+        ub.RigidLink(mast.end, hub.at(0, 1)),
+        ub.Link(rod.start, rim.at(-1, 2)),
+        ub.Guided(mast.end, lambda s: (3 + s, 3 + s + s**2)),
+        ub.Release(rod.at(0.5), rim.at(1, 0.5), free="V"),
+    ]
+    connectors = [
+        ub.Turn(ub.ground(0, 1), hub.middle, spring),
+        ub.Stretch(ub.ground(3, 0), hub.at(0, 3), spring),
+        ub.Slide(rim.at(0, 3), rod.end, spring, axis=(1, 1)),
+        ub.Slide(ub.ground(0, 3), rod.end, spring),
+        ub.Bushing(hub.at(1, 3), rim.at(2, 2), hole, axis=(3, 1)),
+    ]
+    scene = ub.Scene(
+        [rod, mast], bodies=[hub, rim], joints=joints, connectors=connectors,
+        loads=[ub.PointLoad(rim.at(2, 2), force=(1, 0), moment=1.0)],
+    )  # fmt: skip
+    equation = equation_of_scene(DofNumbering(scene, ub.Mesh()), ub.EnergyMomentum(), 0.0)
+    numbering, seen, ε = equation.subdomain.numbering, 0, 1e-5
+    ground = numbering.node(ub.ground(0, 0))
+    for group in equation.connector_terms:
+        for k, (connector, dofs) in enumerate(
+            zip(group.connectors, numbering.dofs_of_connectors[group.indices], strict=True)
+        ):
+            ends, derivatives = (dofs[:6:2], dofs[1:6:2]), np.zeros(numbering.size)
+            for end, by_end in zip(ends, connector.rigidly(), strict=True):
+                np.add.at(derivatives, end, by_end)  # ends may share a degree of freedom
+            derivatives[ground] = 0.0
+            steps = ε * np.eye(numbering.size)
+            steps[ground] = 0.0  # its motion is zero, and `Guided` does not read it
+            slopes = [(group.motion(q)[k] - group.motion(-q)[k]) / (2 * ε) for q in steps]
+            np.testing.assert_allclose(slopes, derivatives, atol=1e-8, err_msg=str(connector))
+            seen += 1
+    assert seen == len(scene.all_connectors)
 
 
 def test_velocities_must_agree_with_joints():

@@ -261,6 +261,11 @@ def node(place: AttachmentPoint) -> Node:
     return place.body if isinstance(place, BodyPoint) else place
 
 
+def base_of(member: Member | Body) -> AttachmentPoint:
+    """Return the place to which rigid motions refer: start of a beam, or centre of a body."""
+    return member.middle if isinstance(member, Body) else member.start
+
+
 def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
     """Return the vector from the node of a place to a point, by default the place itself; m.
 
@@ -357,7 +362,7 @@ class Velocity(Record):
 
     def attached_to(self) -> Iterable[AttachmentPoint]:
         """See the base class."""
-        return (x.middle if isinstance(x, Body) else x.start for x in self.beams)
+        return map(base_of, self.beams)
 
     def at(self, x: float, y: float) -> tuple[float, float, float]:
         """Return (du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""

@@ -6,15 +6,23 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Protocol
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.linalg import eigsh
+from scipy.sparse import csc_array, csr_array, eye_array
+from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, warn
-from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body, Member, Node, NodeDof, node
+from ufl_beam.model.bodies import (
+    GROUND,
+    AttachmentPoint,
+    Body,
+    Member,
+    Node,
+    NodeDof,
+    base_of,
+    node,
+)
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connector_laws import (
     HOLDING,
@@ -32,7 +40,7 @@ from ufl_beam.model.connector_laws import (
 )
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import Point
-from ufl_beam.model.loads import MovingLoad, RotatingFrame
+from ufl_beam.model.loads import MovingLoad
 from ufl_beam.model.material_law import initial_state
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
@@ -51,6 +59,9 @@ LAST_DIGITS = 1e-12
 """Strain, rotation, or displacement by size of the scene, whose stress counts as round-off."""
 
 DENSE = 90  # largest number of unknowns for which the null space comes from a dense decomposition
+MOST = 6  # largest number of null vectors that are found for more unknowns
+ROUNDS = 8  # number of inverse iterations for them
+SHIFT, ZERO = 1e-14, 1e-13  # shift, and largest eigenvalue of a null vector, as fractions
 
 
 def require_inertia(scene: Scene) -> None:
@@ -59,10 +70,10 @@ def require_inertia(scene: Scene) -> None:
     Rigid motions without inertia need stiffness, damping or constraints.  Otherwise the equations
     of motion are singular.
     """
-    inertias = [(s.rhoA, s.rhoA, s.rhoA or s.rhoI) for s in (beam.section for beam in scene.beams)]
-    inertias += [(body.mass, body.mass, body.inertia) for body in scene.bodies]
-    loose = np.flatnonzero(np.array(inertias) == 0.0)  # columns of the matrix of _constraints
-    if not loose.size:
+    sections = [beam.section for beam in scene.beams]
+    inertias = [x for s in sections for x in (s.rhoA, s.rhoA, s.rhoA or s.rhoI)]
+    inertias += [x for body in scene.bodies for x in (body.mass, body.mass, body.inertia)]
+    if all(inertias):
         return
     masses = [
         (mass.place, component)
@@ -77,12 +88,12 @@ def require_inertia(scene: Scene) -> None:
         return isinstance(connector.law, (*RESISTING, ConnectorLaw, Damper, Coulomb))
 
     rows = _constraints(scene, determines, masses)
-    free = _null_space(rows[:, loose])
+    # Inertia determines a motion as a constraint does.
+    rows += ([(column, 1.0)] for column, inertia in enumerate(inertias) if inertia)
+    free = _null_space(rows, len(inertias))
     if free.shape[1] == 0:
         return
-    mode = np.zeros(rows.shape[1])
-    mode[loose] = free[:, 0]
-    moving = "; ".join(_moving(scene, mode)[:4])
+    moving = "; ".join(_moving(scene, free[:, 0])[:4])
     raise ModelError(
         f"dynamics needs mass or resistance for every motion: {moving}, without mass (rhoA or "
         "mass = 0) or inertia, and nothing determines this motion. Give the part mass (a section "
@@ -99,6 +110,9 @@ def _fixed(scene: Scene) -> set[NodeDof]:
 
 Row = list[tuple[Node, Sequence[float]]]
 """Linear constraint: nodes with their factors of (u, v, size ψ); size of the scene in m."""
+
+Entries = list[tuple[int, float]]
+"""Row of a matrix: (column, value) of its entries; duplicates are added."""
 
 
 def require_independent(scene: Scene) -> None:
@@ -119,10 +133,10 @@ def require_independent(scene: Scene) -> None:
         for owner in {id(owner): owner for owner in owners}.values()
     ]
     rigid = any(isinstance(getattr(owner, "law", None), RigidPlastic) for owner in owners)
-    moves = _null_space(_constraints(scene, lambda x: isinstance(x.law, HOLDING))).shape[1] > 0
+    moves = _free_motions(scene, lambda x: isinstance(x.law, HOLDING)).shape[1] > 0
     raise ModelError(
         "constraints repeat or contradict each other: "
-        f"{combinations.shape[1]} of the constraints of {'; '.join(names)} can be left out. "
+        f"{_number(combinations)} of the constraints of {'; '.join(names)} can be left out. "
         "Remove one, or make it elastic: "
         + (
             "a RigidPlastic connector holds its motion until it yields, and a "
@@ -186,17 +200,12 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
                 rows_at[dof].discard(number)
                 if len(rows_at[dof]) == 1:
                     alone.append(dof)
-    if not left:
-        return [], np.zeros((0, 0))
     indices = sorted(left)
-    columns: dict[NodeDof, int] = {}
-    terms = [
-        (columns.setdefault(dof, len(columns)), column, factor)
-        for column, number in enumerate(indices)
-        for dof, factor in combined[number].items()
-    ]
-    gradients = _matrix(terms, (max(len(columns), 1), len(indices)))
-    return [rows[number] for number in indices], _null_space(gradients)
+    columns: dict[NodeDof, Entries] = defaultdict(list)  # of the gradients that are left
+    for i, number in enumerate(indices):
+        for dof, factor in combined[number].items():
+            columns[dof].append((i, factor))
+    return [rows[number] for number in indices], _null_space([*columns.values()], len(indices))
 
 
 def _gradient(scene: Scene, row: Row, fixed: set[NodeDof]) -> dict[NodeDof, float]:
@@ -217,7 +226,7 @@ def require_no_mechanism(scene: Scene) -> str:
     free motions, otherwise an empty text.  A motion without strain moves each beam as a rigid body.
     Such a motion exists if the constraints on rigid motions have a null space.
     """
-    free = _null_space(_constraints(scene))
+    free = _free_motions(scene, lambda connector: resists(connector.law))
     if free.shape[1] == 0:
         return ""
     description = describe_motions(scene, free)
@@ -232,17 +241,9 @@ def describe_motions(scene: Scene, modes: Array) -> str:
     more = f"; and {len(moving) - 4} more" if len(moving) > 4 else ""
     ways = "way" if number == 1 else "independent ways"
     return (
-        f"the scene is free to move in {number} {ways}, so statics has no unique answer"
+        f"the scene is free to move in {_number(modes)} {ways}, so statics has no unique answer"
         f"{', for example' * (number > 1)}: {'; '.join(moving[:4])}{more}. "
     )
-
-
-def _center(member: Member | Body) -> Point:
-    """Return the reference point: centre of a body, or midpoint between the ends of a beam."""
-    if isinstance(member, Body):
-        return member.center
-    (xa, ya), (xb, yb) = member.start.point, member.end.point
-    return (xa + xb) / 2, (ya + yb) / 2
 
 
 def _rows(
@@ -260,16 +261,20 @@ def _rows(
             yield support, [(node(support.place), turned[component])]
 
 
+def _free_motions(scene: Scene, acts: Callable[[Connector], bool]) -> Array:
+    """Return a basis of the rigid motions that :func:`_constraints` allow, in columns."""
+    return _null_space(_constraints(scene, acts), 3 * len(scene.parts))
+
+
 def _constraints(
     scene: Scene,
-    acts: Callable[[Connector], bool] = lambda connector: resists(connector.law),
+    acts: Callable[[Connector], bool],
     also: Iterable[tuple[AttachmentPoint, int]] = (),
-) -> Array | csr_array:
-    """Assemble the matrix of constraints on rigid motions (u, v, size ψ) of beams and bodies.
+) -> list[Entries]:
+    """Return the constraints on rigid motions (u, v, size ψ) of beams and bodies.
 
-    The n rows are for joints, supports, connectors that ``acts`` selects and degrees of freedom in
-    ``also``, and for beams and places with works, because a work may hold them.  The shape is
-    (n, 3 times the number of beams and bodies).
+    They are of joints, supports, connectors that ``acts`` selects and degrees of freedom in
+    ``also``, and of beams and places with works, because a work may hold them.
     """
     unit = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     rows: list[Row] = [
@@ -282,65 +287,67 @@ def _constraints(
     worked += [beam.start for work in scene.works for beam in work.on(scene.beams)]
     also = (*also, *((place, component) for place in worked for component in range(3)))
     rows += ([(node(place), unit[component])] for place, component in also)
-    moving: dict[object, int] = {
-        member: i for i, member in enumerate((*scene.beams, *scene.bodies))
+    bases: dict[Member | Body, tuple[int, Point]] = {
+        part: (3 * i, base_of(part).point) for i, part in enumerate(scene.parts)
     }
-    terms: list[tuple[int, int, float]] = []
-    for i, row in enumerate(rows):
-        for moved, factors in row:
-            if moved is not GROUND:
-                member, (px, py) = (
-                    (moved, moved.center) if isinstance(moved, Body) else (moved.beam, moved.point)
-                )
-                cx, cy = _center(member)
-                x, y = (px - cx) / scene.size, (py - cy) / scene.size
-                u, v, ψ = factors
-                gradient = u, v, ψ + v * x - u * y
-                terms += ((i, 3 * moving[member] + k, factor) for k, factor in enumerate(gradient))
-    return _matrix(terms, (max(len(rows), 1), 3 * len(moving)))
+
+    def entries(moved: Node, factors: Sequence[float]) -> Entries:
+        if moved is GROUND:
+            return []
+        px, py = moved.center if isinstance(moved, Body) else moved.point
+        first, (cx, cy) = bases[moved if isinstance(moved, Body) else moved.beam]
+        x, y = (px - cx) / scene.size, (py - cy) / scene.size
+        u, v, ψ = factors
+        return [(first, u), (first + 1, v), (first + 2, ψ + v * x - u * y)]
+
+    return [[entry for end in row for entry in entries(*end)] for row in rows]
 
 
-def _matrix(terms: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> Array | csr_array:
-    """Build a matrix from (row, column, value) of its entries; duplicates are added.
-
-    The matrix is sparse if it has more than :data:`DENSE` columns.
-    """
-    rows, columns, values = np.array(terms).reshape(-1, 3).T
-    places = rows.astype(int), columns.astype(int)
-    if shape[1] > DENSE:
-        return csr_array((values, places), shape=shape)
-    matrix = np.zeros(shape)
-    np.add.at(matrix, places, values)
-    return matrix
+def _number(vectors: Array) -> str:
+    """Return the number of null vectors, which are columns, for a message."""
+    unknowns, number = vectors.shape
+    return f"at least {number}" if number == MOST and unknowns > DENSE else str(number)
 
 
-def _null_space(constraints: Array | csr_array) -> Array:
-    """Return a basis of the null space, in columns; above :data:`DENSE` unknowns at most 6."""
-    unknowns = constraints.shape[1]
+def _null_space(rows: Sequence[Entries], unknowns: int) -> Array:
+    """Return a basis of the null space of a matrix, in columns; at most :data:`MOST` if large."""
+    if unknowns == 0:
+        return np.zeros((0, 0))
+    entries = np.array([entry for row in rows for entry in row]).reshape(-1, 2)
+    ends = np.cumsum([0, *map(len, rows)])
+    matrix = csr_array(
+        (entries[:, 1], entries[:, 0].astype(int), ends), shape=(len(rows), unknowns)
+    )
     if unknowns <= DENSE:
-        dense = constraints.toarray() if isinstance(constraints, csr_array) else constraints
-        _, sizes, rows = np.linalg.svd(dense, full_matrices=True)
+        _, sizes, vectors = np.linalg.svd(matrix.toarray(), full_matrices=True)
         rank = int(np.sum(sizes > 1e-10 * max(1.0, sizes.max(initial=0.0))))
-        return np.asarray(rows[rank:].T)
-    gram = csr_array(constraints.T @ constraints).tocsc()
-    values, vectors = eigsh(gram, k=6, sigma=-1e-9, which="LM", v0=np.ones(unknowns))
-    return np.asarray(vectors[:, values < 1e-13 * abs(gram).max()])
+        return np.asarray(vectors[rank:].T)
+    # Inverse iteration with a shift that makes the matrix regular
+    gram = csc_array(matrix.T @ matrix)
+    size = max(1.0, gram.diagonal().max())
+    shifted = csc_array(gram + SHIFT * size * eye_array(unknowns))
+    factors = splu(shifted, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    X = np.random.default_rng(0).normal(size=(unknowns, MOST))
+    for _ in range(ROUNDS):
+        X, _ = np.linalg.qr(factors.solve(X))
+    values, vectors = np.linalg.eigh(X.T @ (gram @ X))
+    return np.asarray(X @ vectors[:, values < ZERO * size])
 
 
 def _moving(scene: Scene, mode: Array) -> list[str]:
     """Describe the rigid motion of each beam and body that moves in a mode."""
-    moving: list[tuple[str, Member | Body]] = [(f"beam {i}", b) for i, b in enumerate(scene.beams)]
-    moving += [(f"body {i}", body) for i, body in enumerate(scene.bodies)]
+    kinds = [f"beam {i}" for i in range(len(scene.beams))]
+    kinds += [f"body {i}" for i in range(len(scene.bodies))]
     texts = []
     motions = (mode / np.abs(mode).max()).reshape(-1, 3)
-    for (kind, member), (u, v, ψ) in zip(moving, motions, strict=True):
+    for kind, part, (u, v, ψ) in zip(kinds, scene.parts, motions, strict=True):
         if abs(ψ) >= 1e-6:
-            cx, cy = _center(member)
+            cx, cy = base_of(part).point
             center = (cx - v / ψ * scene.size, cy + u / ψ * scene.size)
             x, y = (scene.size * round(c / scene.size, 9) + 0.0 for c in center)
-            texts.append(f"{member.name} ({kind}) can turn about ({x:.4g}, {y:.4g})")
+            texts.append(f"{part.name} ({kind}) can turn about ({x:.4g}, {y:.4g})")
         elif max(abs(u), abs(v)) > 1e-6:
-            texts.append(f"{member.name} ({kind}) can shift along ({u:.3g}, {v:.3g})")
+            texts.append(f"{part.name} ({kind}) can shift along ({u:.3g}, {v:.3g})")
     return texts
 
 
@@ -415,41 +422,6 @@ def warn_of_held_motions(scene: Scene) -> None:
                 "that it bears nothing and has no effect. Leave the motion free, with Revolute "
                 "instead of Rigid or Pinned instead of Clamped, or leave out the connector"
             )
-
-
-class Rated(Protocol):
-    """Properties of a time scheme that :func:`require_rates` reads."""
-
-    @property
-    def has_mean_velocity(self) -> bool:
-        """Whether a step has a mean velocity, see :class:`DynamicScheme`."""
-
-    @property
-    def accelerations_oscillate(self) -> bool:
-        """Whether prescribed accelerations oscillate, see :class:`DynamicScheme`."""
-
-
-def require_rates(scene: Scene, scheme: Rated) -> None:
-    """Raise :class:`ModelError` if a scheme lacks a mean velocity or damping that a scene needs."""
-    name = type(scheme).__name__
-    for owner, what in [
-        *((c, c.law) for c in scene.all_connectors),
-        *((x, x) for x in scene.loads),
-    ]:
-        if (isinstance(what, RotatingFrame) or has_friction(what)) and not scheme.has_mean_velocity:
-            raise ModelError(
-                f"{name}: {owner} needs the mean velocity of a step, and this scheme takes all "
-                "forces at the end of the step; use EnergyMomentum() or EnergyMomentumDecaying()"
-            )
-    if not scheme.accelerations_oscillate:
-        return
-    prescribed = [str(c) for c in scene.all_connectors if isinstance(c.law, HOLDING)]
-    prescribed += [f"the support of {s.place}" for s in scene.supports if s.moving]
-    if prescribed:
-        raise ModelError(
-            f"{name}: {prescribed[0]} prescribes a motion, whose accelerations oscillate for ever "
-            "without numerical damping; use GeneralizedAlpha(0.8), or EnergyMomentum()"
-        )
 
 
 def parts_that_switch(scene: Scene) -> Iterator[tuple[str, str]]:

@@ -111,7 +111,7 @@ class Scene(Record, Rich):
             if not isinstance(work, Effect):
                 raise ModelError(f"{work}: there is no beam that it could act on")
         self._require_once()
-        known = {GROUND, *self.beams, *self.bodies}
+        known = {GROUND, *self.parts}
         for owner, place in self.attachments():
             member = place.beam if isinstance(place, Place) else place.body
             if member not in known:
@@ -142,10 +142,9 @@ class Scene(Record, Rich):
         Raises:
             ModelError: No beam or body, or more than one, has this name.
         """
-        everything: tuple[Beam | Body, ...] = (*self.beams, *self.bodies)
-        matches = [x for x in everything if x.name == name]
+        matches = [x for x in self.parts if x.name == name]
         if len(matches) != 1:
-            names = ", ".join(dict.fromkeys(str(x.name) for x in everything))
+            names = ", ".join(dict.fromkeys(str(x.name) for x in self.parts))
             raise ModelError(
                 f"Scene: {len(matches) or 'no'} beams and bodies are called {name!r}; "
                 f"the names are {names}; scene.beams[i] and scene.bodies[i] are found by index"
@@ -163,6 +162,11 @@ class Scene(Record, Rich):
 
     def __repr__(self) -> str:
         return f"<Scene: {self}>"
+
+    @property
+    def parts(self) -> list[Beam | Body]:
+        """The beams, then the bodies."""
+        return [*self.beams, *self.bodies]
 
     @cached_property
     def size(self) -> float:
@@ -343,9 +347,8 @@ class Scene(Record, Rich):
 
 def not_in(scene: Scene, member: Member | Body) -> str:
     """Return the message that a beam or body is not in the scene."""
-    members: list[Member | Body] = [*scene.beams, *scene.bodies]
     hint = ""
-    if any(member.name == x.name for x in members):
+    if any(member.name == x.name for x in scene.parts):
         hint = (
             ", which has another object of this name, as after imperfect or a second call of the "
             f"model; use scene[{member.name!r}] of this scene"

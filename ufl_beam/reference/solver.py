@@ -14,7 +14,6 @@ from ufl_beam.arrays import Array, State
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_scheme import Step, acting, acts_at_end, has_inertia
-from ufl_beam.model.bodies import Body, Member
 from ufl_beam.model.functions import still, value_at
 from ufl_beam.reference.connectors import Hinge
 from ufl_beam.reference.points import Points
@@ -187,12 +186,11 @@ class Solver(StepProblem):
 
     def _require_small_turns(self) -> None:
         """Raise if a step turns a body, or a beam without strain, by more than the limit."""
-        members: list[Member | Body] = [*self.scene.beams, *self.scene.bodies]
-        for member in members:
-            turns = (self.q1 - self.q)[self.numbering.nodes_of(member)[1][:, 2]]
+        for part in self.scene.parts:
+            turns = (self.q1 - self.q)[self.numbering.nodes_of(part)[1][:, 2]]
             largest = float(np.abs(turns).max())
             if np.ptp(turns) <= BENT * largest and largest > LARGEST_RIGID_ROTATION:
-                raise StepFailed(f"{member.name} turns by {largest:.3g} rad in the step")
+                raise StepFailed(f"{part.name} turns by {largest:.3g} rad in the step")
 
     def _require_path(self) -> None:
         """Raise if the work of the internal forces in a step is not the change of the energy."""

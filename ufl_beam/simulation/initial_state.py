@@ -32,17 +32,17 @@ from ufl_beam.discretization.state_transfer import (
 from ufl_beam.errors import ArgumentError, ModelError, require_kind, shorten, warn
 from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import DEFAULT_MESH, Mesh
-from ufl_beam.model.connector_laws import RIGID, Coulomb, Guide
+from ufl_beam.model.connector_laws import HOLDING, RIGID, Coulomb, Guide, has_friction
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import (
     require_independent,
     require_inertia,
     require_no_mechanism,
     require_no_prestress,
-    require_rates,
     require_smooth,
     warn_of_held_motions,
 )
+from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
@@ -88,6 +88,29 @@ def checked_numbering(
     warn_of_touching(numbering)
     warn_of_held_motions(scene)
     return numbering, free_motion
+
+
+def require_rates(scene: Scene, scheme: DynamicScheme) -> None:
+    """Raise :class:`ModelError` if a scheme lacks a mean velocity or damping that a scene needs."""
+    name = type(scheme).__name__
+    for owner, what in [
+        *((c, c.law) for c in scene.all_connectors),
+        *((x, x) for x in scene.loads),
+    ]:
+        if (isinstance(what, RotatingFrame) or has_friction(what)) and not scheme.has_mean_velocity:
+            raise ModelError(
+                f"{name}: {owner} needs the mean velocity of a step, and this scheme takes all "
+                "forces at the end of the step; use EnergyMomentum() or EnergyMomentumDecaying()"
+            )
+    if not scheme.accelerations_oscillate:
+        return
+    prescribed = [str(c) for c in scene.all_connectors if isinstance(c.law, HOLDING)]
+    prescribed += [f"the support of {s.place}" for s in scene.supports if s.moving]
+    if prescribed:
+        raise ModelError(
+            f"{name}: {prescribed[0]} prescribes a motion, whose accelerations oscillate for ever "
+            "without numerical damping; use GeneralizedAlpha(0.8), or EnergyMomentum()"
+        )
 
 
 def require_scheme(scheme: Any, what: str) -> None:

@@ -23,6 +23,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ModelError, StepFailed
 from ufl_beam.mechanics.time_scheme import Step, stages_of, with_half_tangents
+from ufl_beam.model.bodies import base_of
 from ufl_beam.model.connector_laws import PrescribedMotion
 from ufl_beam.model.constraint_checks import INSTEAD, describe_motions
 from ufl_beam.output.recorder import StateView
@@ -358,14 +359,12 @@ class Stepper(StateView):
         self._free_motion = ""
 
     def _of_members(self, vectors: Array, free: Array) -> Array:
-        """Return (u, v, size ψ) of the middles of beams and bodies; ``vectors`` are at ``free``."""
-        scene, numbering = self.scene, self.numbering
-        x = np.zeros((numbering.size, vectors.shape[1]))
+        """Return (u, v, size ψ) at ``base_of`` each beam and body; ``vectors`` are at ``free``."""
+        x = np.zeros((self.numbering.size, vectors.shape[1]))
         x[free] = vectors
-        ends = [[numbering.node(place) for place in (beam.start, beam.end)] for beam in scene.beams]
-        ends += [2 * [numbering.node(body.middle)] for body in scene.bodies]
-        means: Array = x[np.array(ends)].mean(axis=1) * [[1.0], [1.0], [scene.size]]
-        return means.reshape(-1, x.shape[1])
+        dofs = [self.numbering.node(base_of(part)) for part in self.scene.parts]
+        motions: Array = x[np.array(dofs)] * [[1.0], [1.0], [self.scene.size]]
+        return motions.reshape(-1, x.shape[1])
 
     # -- steps ---------------------------------------------------------------------------------
 
