@@ -18,7 +18,7 @@ from ufl_beam.model.connector_laws import Controller, Guide, PrescribedForce, Pr
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import Load, RotatingFrame
-from ufl_beam.model.scene import Scene
+from ufl_beam.model.scene import Scene, index_of
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.output.section_forces import ForcesAlongCells
 from ufl_beam.output.state_rows import connector_indices, signs_on_second_place
@@ -146,8 +146,7 @@ def checked_inputs(scene: Scene, requested: Sequence[Any]) -> list[tuple[Any, li
             )
         components = list[int]()
         if isinstance(x, Load):
-            if x not in scene.loads:
-                raise ArgumentError(f"{what}: {x} is not in the scene")
+            index_of(scene.loads, x, f"{what}: ")
             if isinstance(x, RotatingFrame):
                 raise ArgumentError(f"{what}: forces of a RotatingFrame have no factor")
         elif isinstance(x, Connector):
@@ -158,8 +157,7 @@ def checked_inputs(scene: Scene, requested: Sequence[Any]) -> list[tuple[Any, li
                     "PrescribedForce, a Controller or a PrescribedMotion"
                 )
         elif isinstance(x, Support):
-            if x not in scene.supports:
-                raise ArgumentError(f"{what}: {x} is not in the scene")
+            index_of(scene.supports, x, f"{what}: ")
             if component is not None and component not in [*COMPONENTS]:
                 raise ArgumentError(
                     f"{what}: component {shorten(component)} must be 'u', 'v' or 'psi'"
@@ -400,16 +398,13 @@ def _checked_output(scene: Scene, output: Any, what: str) -> tuple[str, Any, lis
     if not isinstance(x, OBJECTS.get(kind, Place | BodyPoint)):
         name = OBJECTS[kind].__name__ if kind in OBJECTS else "Place or BodyPoint, as beam.end"
         raise ArgumentTypeError(f"{what}: {shorten(x)} must be a {name}")
-    missing = False
-    if isinstance(x, Place):
-        missing = x.beam not in scene.beams
-    elif isinstance(x, BodyPoint):
-        missing = x.body not in scene.rigid_bodies
+    if isinstance(x, Place | BodyPoint):
+        part = x.beam if isinstance(x, Place) else x.body
+        if part not in (*scene.beams, *scene.rigid_bodies):
+            raise ArgumentError(f"{what}: {x} is not in the scene")
     elif isinstance(x, Support):
-        missing = x not in scene.supports
-    if missing:
-        raise ArgumentError(f"{what}: {x} is not in the scene")
-    if isinstance(x, Connector):
+        index_of(scene.supports, x, f"{what}: ")
+    elif isinstance(x, Connector):
         _require_in_scene(scene, x, what)
     elif isinstance(x, Joint):
         _require_known_force(scene, x, rest, what)

@@ -280,7 +280,7 @@ def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
 
 def moves_with_node(place: AttachmentPoint) -> bool:
     """Return whether a place always has the displacement of its node."""
-    return isinstance(place, Place) or math.hypot(*arm(place)) == 0.0
+    return arm(place) == (0.0, 0.0)
 
 
 def require_place(place: Any, what: str) -> None:

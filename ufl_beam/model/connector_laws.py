@@ -504,6 +504,9 @@ Law = (
 HOLDING = (PrescribedMotion, Guide)
 """Laws that always constrain the motion."""
 
+DRIVING = (PrescribedForce, Controller)
+"""Laws whose force in a step does not depend on the motion in the step."""
+
 RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
 """Laws besides :class:`ConnectorLaw` that resist every motion; see :func:`resists`."""
 

@@ -25,13 +25,12 @@ from ufl_beam.model.bodies import (
 )
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connector_laws import (
+    DRIVING,
     HOLDING,
-    RESISTING,
     RIGID,
     Controller,
     Coulomb,
     Damper,
-    PrescribedForce,
     RigidPlastic,
     Spring,
     Stop,
@@ -85,7 +84,7 @@ def require_inertia(scene: Scene) -> None:
     def determines(connector: Connector) -> bool:
         if isinstance(connector.law, Stop):
             return connector.law.low == 0.0 or connector.law.high == 0.0
-        return isinstance(connector.law, (*RESISTING, ConnectorLaw, Damper, Coulomb))
+        return not isinstance(connector.law, DRIVING)
 
     rows = _constraints(scene, determines, masses)
     # Inertia determines a motion as a constraint does.
@@ -101,11 +100,15 @@ def require_inertia(scene: Scene) -> None:
     )
 
 
+def _supports(scene: Scene) -> dict[NodeDof, Support]:
+    """Return the supports with unrotated axes by the degrees of freedom that they hold."""
+    same = scene.representatives
+    return {same[node(s.place), c]: s for s in scene.supports for c in s.held if not s.angle}
+
+
 def _fixed(scene: Scene) -> set[NodeDof]:
     """Return the degrees of freedom of the ground and of supports with unrotated axes."""
-    same = scene.representatives
-    by_supports = {same[node(s.place), c] for s in scene.supports if not s.angle for c in s.held}
-    return {same[GROUND, component] for component in range(3)} | by_supports
+    return {scene.representatives[GROUND, c] for c in range(3)} | _supports(scene).keys()
 
 
 Row = list[tuple[Node, Sequence[float]]]
@@ -151,8 +154,7 @@ def require_independent(scene: Scene) -> None:
 
 def _supports_and_joints_at(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
     """Iterate over supports and joints that act on degrees of freedom of constraints ``rows``."""
-    same = scene.representatives
-    supports = {same[node(s.place), c]: s for s in scene.supports for c in s.held if not s.angle}
+    same, supports = scene.representatives, _supports(scene)
     for row in rows:
         ends = [same[moved, c] for moved, factors in row for c in range(3) if factors[c]]
         yield from (supports[dof] for dof in ends if dof in supports)
@@ -412,7 +414,7 @@ def warn_of_held_motions(scene: Scene) -> None:
             G = np.reshape(others, (len(held), len(dofs))).T
             shares = np.linalg.lstsq(G, own, rcond=None)[0]
             free = np.abs(own - G @ shares).max(initial=0.0) > 1e-9
-            if free or isinstance(part.law, (*HOLDING, RigidPlastic, Controller, PrescribedForce)):
+            if free or isinstance(part.law, (*HOLDING, RigidPlastic, *DRIVING)):
                 break
             names += [str(j) for (_, j), x in zip(held, shares, strict=True) if abs(x) > 1e-9]
             names += map(str, () if own.any() else _supports_and_joints_at(scene, [rows[part]]))

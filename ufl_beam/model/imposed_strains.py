@@ -91,8 +91,6 @@ class ImposedStrain(Load):
     def __str__(self) -> str:
         return f"ImposedStrain of {self.beam.name}"
 
-    _label = __str__
-
     def attached_to(self) -> Iterable[AttachmentPoint]:
         """See the base class."""
         return (self.beam.at(s) for s in self.span)

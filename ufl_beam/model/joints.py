@@ -75,8 +75,6 @@ class Joint(Bearing, Record, ABC):
     def __str__(self) -> str:
         return f"{type(self).__name__}({', '.join(map(str, self.places))})"
 
-    _label = __str__
-
     def equal(self, component: int) -> list[NodeDof]:
         """Return equal degrees of freedom of nodes; displacements only of places that are nodes."""
         places = [place for place in self.places if component == 2 or moves_with_node(place)]
@@ -288,10 +286,8 @@ class Guided(Joint):
         name = f"Guided({self.place}): curve"
         law = Guide(guide_curve(self.curve, name))
         (x, y), slope, _ = law.curve.at(0.0)
-        start, length = (
-            ground(*require_vector((float(x), float(y)), f"{name}(0)")),
-            math.hypot(*slope),
-        )
+        start = ground(*require_vector((float(x), float(y)), f"{name}(0)"))
+        length = math.hypot(*slope)
         if not 0.0 < length < math.inf:
             raise ModelError(f"Guided({self.place}): the curve has no direction at s = 0")
         across = -float(slope[1]) / length, float(slope[0]) / length

@@ -61,8 +61,6 @@ class LoadAtPlace(Load):
     def __str__(self) -> str:
         return f"{type(self).__name__} at {self.place}"
 
-    _label = __str__
-
 
 OWN_LOAD = "state other loads as a VirtualWork, a Potential or a connector with a ForceLaw"
 """Advice in the error that a subclass of a load raises."""
@@ -192,8 +190,6 @@ class LoadAlongBeam(Load):
 
     def __str__(self) -> str:
         return f"{type(self).__name__} on {self.beam.name}"
-
-    _label = __str__
 
     def attached_to(self) -> Iterable[AttachmentPoint]:
         """See the base class."""
@@ -352,8 +348,6 @@ class MovingLoad(Load):
 
     def __str__(self) -> str:
         return f"MovingLoad on {', '.join(beam.name for beam in self.route)}"
-
-    _label = __str__
 
     def attached_to(self) -> Iterable[AttachmentPoint]:
         """See the base class."""

@@ -105,13 +105,8 @@ class Record:
                 object.__setattr__(self, name, value if checked is None else checked)
 
     def _label(self) -> str:
-        """Return the name of the record in messages."""
-        return type(self).__name__
-
-    @property
-    def label(self) -> str:
-        """Text of the record, or its name if it has none."""
-        return self._label() if type(self).__str__ is object.__str__ else str(self)
+        """Return the name of the record in messages: its text, or its class if it has none."""
+        return type(self).__name__ if type(self).__str__ is object.__str__ else str(self)
 
     def attached_to(self) -> Iterable[Any]:
         """Return the places to which the record is attached, by default its ``place``."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from ufl_beam.caches import no_garbage_collection
 from ufl_beam.display import Rich, counted
-from ufl_beam.errors import ModelError, clip
+from ufl_beam.errors import ArgumentError, ModelError, clip
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import (
     GROUND,
@@ -30,11 +30,7 @@ from ufl_beam.model.bodies import (
     node,
 )
 from ufl_beam.model.checks import require_all
-from ufl_beam.model.connector_laws import (
-    Bearing,
-    Coulomb,
-    RigidPlastic,
-)
+from ufl_beam.model.connector_laws import Bearing, Coulomb, RigidPlastic
 from ufl_beam.model.connectors import Component, Connector, plastic_hinges
 from ufl_beam.model.fibres import stream_keys
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along
@@ -116,9 +112,8 @@ class Scene(Record, Rich):
             member = place.beam if isinstance(place, Place) else place.body
             if member not in known:
                 field = "beams" if isinstance(member, Beam) else "bodies"
-                raise ModelError(
-                    f"{owner.label}: {member.name} is not in the scene; add it to {field}"
-                )
+                named = owner if isinstance(owner, Connector) else owner._label()
+                raise ModelError(f"{named}: {member.name} is not in the scene; add it to {field}")
         for joint in self.joints:
             for i, place in enumerate(joint.places[1:], start=1):
                 if place in joint.places[:i]:
@@ -159,6 +154,9 @@ class Scene(Record, Rich):
             (len(self.masses), "mass", "masses"), (len(self.loads), "load", "loads"),
             (len(self.works), "work", "works"),
         )  # fmt: skip
+
+    def _label(self) -> str:
+        return "Scene"
 
     def __repr__(self) -> str:
         return f"<Scene: {self}>"
@@ -354,6 +352,17 @@ def not_in(scene: Scene, member: Member | Body) -> str:
             f"model; use scene[{member.name!r}] of this scene"
         )
     return f"{member.name} is not in the scene{hint}"
+
+
+def index_of(records: Sequence[Any], record: Any, what: str = "") -> int:
+    """Return the index of a record in a list of a scene; ``what`` begins the message of the error.
+
+    Raises:
+        ArgumentError: The record is not in the list.
+    """
+    if record not in records:
+        raise ArgumentError(f"{what}{record} is not in the scene")
+    return records.index(record)
 
 
 def attachment_points(scene: Scene) -> dict[Body, list[BodyPoint]]:

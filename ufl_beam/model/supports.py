@@ -8,19 +8,30 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import NodeField
-from ufl_beam.model.checks import require_number
+from ufl_beam.model.checks import require_number, require_vector
 from ufl_beam.model.connector_laws import Bearing
 from ufl_beam.model.functions import Constant, TimeFunction, require_time_function, still
-from ufl_beam.model.records import Record, Vector
+from ufl_beam.model.records import Record
 
 COMPONENTS = ("u", "v", "psi")
 
 Motion = float | TimeFunction
+
+
+def require_direction(direction: object, what: str) -> tuple[float, float]:
+    """Return ``direction`` as a vector that is not zero, or raise."""
+    x, y = require_vector(direction, what)
+    if x == y == 0.0:
+        raise ModelError(f"{what} = (0, 0) is no direction")
+    return x, y
+
+
+Direction = Annotated[tuple[float, float], require_direction]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,8 +81,6 @@ class Support(Bearing, Record, ABC):
     def __str__(self) -> str:
         return f"{type(self).__name__} at {self.place}"
 
-    _label = __str__
-
 
 class Clamped(Support):
     """Clamped support: holds displacement and rotation.
@@ -113,12 +122,7 @@ class Roller(Support):
     """
 
     _: KW_ONLY
-    along: Vector = (1.0, 0.0)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not any(self.along):
-            raise ModelError(f"{self}: along = (0, 0) is no direction")
+    along: Direction = (1.0, 0.0)
 
     @property
     def held(self) -> dict[int, TimeFunction]:
@@ -162,12 +166,7 @@ class PrescribedDisplacement(Support):
     u: Motion | None = None
     v: Motion | None = None
     psi: Motion | None = None
-    along: Vector = (1.0, 0.0)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not any(self.along):
-            raise ModelError(f"{self}: along = (0, 0) is no direction")
+    along: Direction = (1.0, 0.0)
 
     @property
     def angle(self) -> float:  # type: ignore[override]

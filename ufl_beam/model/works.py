@@ -96,8 +96,6 @@ class Work(_WithNumbers):
     def __str__(self) -> str:
         return f"{type(self).__name__} {self.name!r}"
 
-    _label = __str__
-
     @property
     def used_arguments(self) -> tuple[str, ...]:
         """Names of the parameters of the function; an unknown name raises :class:`ModelError`."""
@@ -298,8 +296,6 @@ class Effect(_WithNumbers):
 
     def __str__(self) -> str:
         return f"Effect {self.name}"
-
-    _label = __str__
 
     @property
     def name(self) -> str:

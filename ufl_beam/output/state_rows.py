@@ -27,7 +27,7 @@ from ufl_beam.mechanics.time_scheme import V
 from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.scene import Scene
+from ufl_beam.model.scene import Scene, index_of
 from ufl_beam.terms.boundary_conditions import Supports
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
@@ -331,12 +331,8 @@ class JointHistory(NamedTuple):
 def connector_indices(scene: Scene, connector: Connector | Joint) -> list[int]:
     """Return the indices in ``scene.all_connectors`` of a connector's or joint's components."""
     if isinstance(connector, Connector):
-        connectors = connector.components or (connector,)
-        if connectors[0] not in scene.all_connectors:
-            raise ArgumentError(f"{connector} is not in the scene")
-        return [scene.all_connectors.index(connector) for connector in connectors]
-    if connector not in scene.joints:
-        raise ArgumentError(f"{connector} is not in the scene")
+        return [index_of(scene.all_connectors, c) for c in connector.components or (connector,)]
+    index_of(scene.joints, connector)
     if not connector.holders:
         raise ArgumentError(
             f"{connector} shares unknowns, so that its force is not known; make it with "

@@ -22,6 +22,7 @@ from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Member, Place, arm
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
+from ufl_beam.model.scene import index_of
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import require_arrays
 from ufl_beam.output.section_forces import MIDDLE, Diagram, ForcesAlongCells, Material
@@ -408,9 +409,8 @@ class States:
         Raises:
             ArgumentError: The support is not in the scene.
         """
-        if support not in self.scene.supports:
-            raise ArgumentError(f"reaction: {support} is not in the scene")
-        forces = self.column("reactions")[:, self.scene.supports.index(support)]
+        index = index_of(self.scene.supports, support, "reaction: ")
+        forces = self.column("reactions")[:, index]
         if support.angle:
             forces[:, :2] = turned(forces[:, :2], np.full(len(forces), support.angle))
         return forces

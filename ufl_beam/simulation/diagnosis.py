@@ -27,6 +27,7 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
 from ufl_beam.model.connector_laws import Coulomb, Damper, ForceLaw, RigidPlastic, Spring, Stop
+from ufl_beam.model.connectors import place_of
 from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.model.loads import Rayleigh
 from ufl_beam.model.material_law import MaterialLaw, dissipation_must_grow, has_quadratic_energies
@@ -314,8 +315,8 @@ def _names(numbering: DofNumbering, connectors: Deformed, cells: Deformed) -> li
     names = []
     for i in connectors.soft:
         connector = numbering.scene.all_connectors[i]
-        place = connector.b if getattr(connector.a, "beyond", False) else connector.a
-        names.append(f"Hinge({place})" if connector.kind == "Hinge" else str(connector))
+        is_hinge = connector.kind == "Hinge"
+        names.append(f"Hinge({place_of(connector)})" if is_hinge else str(connector))
     return names + [numbering.describe_cell(i) for i in cells.soft]
 
 

@@ -339,21 +339,16 @@ class Stepper(StateView):
         If they do, the tangent stays regular without the artificial stiffness that the solver adds
         against zero-energy modes.  All processes call the function together.
         """
-        equation, newton, numbering, free_motion = (
-            self.equation,
-            self.solver,
-            self.numbering,
-            self._free_motion,
-        )
-        if not free_motion:
+        if not self._free_motion:
             return
+        equation, newton = self.equation, self.solver
         newton.forget_zero_modes()
         if equation.evaluate(self._copy(q1)) and (found := soft_motions(equation)) is not None:
             K, free, _, vectors = found
-            x, scales = vectors[:, -1], numbering.scales[free]
+            x, scales = vectors[:, -1], self.numbering.scales[free]
             motion = np.abs(x * scales).max()
             forces = np.linalg.norm((K @ x)[scales > 0] / scales[scales > 0])
-            if forces <= FREE_STIFFNESS * newton.scale() * numbering.scene.size * motion:
+            if forces <= FREE_STIFFNESS * newton.scale() * self.scene.size * motion:
                 said = describe_motions(self.scene, self._of_members(vectors, free))
                 raise ModelError(f"{said}The loads do not hold it either. {INSTEAD}")
         self._free_motion = ""

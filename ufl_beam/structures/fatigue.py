@@ -319,6 +319,9 @@ class HotSpot(Record):
     def __str__(self) -> str:
         return str(self.place)
 
+    def _label(self) -> str:
+        return f"HotSpot {self.place}"
+
 
 class Fatigue(Restartable):
     """Recorder of the rainflow cycles of the stress at hot spots.

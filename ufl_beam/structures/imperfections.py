@@ -17,7 +17,7 @@ from ufl_beam.model import plausibility
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body, BodyPoint, Place
 from ufl_beam.model.functions import Curve, Point
-from ufl_beam.model.scene import Scene
+from ufl_beam.model.scene import Scene, not_in
 from ufl_beam.model.sections import Section
 
 
@@ -68,7 +68,7 @@ def imperfect(
         )
     for beam, size in bows.items():
         if beam not in scene.beams:
-            raise ArgumentError(f"imperfect: bow: {beam} is not in the scene")
+            raise ArgumentError(f"imperfect: bow: {not_in(scene, beam)}")
         require_number(size, f"imperfect: bow of {beam.name}")
         plausibility.check(f"imperfect: {beam.name}", "bow", size)
         for joint in scene.joints:

@@ -26,7 +26,7 @@ from ufl_beam.errors import (
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint, Member
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.model.scene import Scene
+from ufl_beam.model.scene import Scene, index_of
 from ufl_beam.model.supports import Support
 from ufl_beam.output.section_forces import Diagram, ForcesAlongCells
 from ufl_beam.simulation.initial_state import StateOf, chosen_state
@@ -138,9 +138,8 @@ class SpectralResponse(Rich):
         Raises:
             ArgumentError: The support is not in the scene.
         """
-        if support not in self.scene.supports:
-            raise ArgumentError(f"reaction: {support} is not in the scene")
-        return self.combine(self.reactions[:, self.scene.supports.index(support)])
+        index = index_of(self.scene.supports, support, "reaction: ")
+        return self.combine(self.reactions[:, index])
 
     def __str__(self) -> str:
         lines = ["mode     period  acceleration  effective mass"]
