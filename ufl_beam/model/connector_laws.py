@@ -507,13 +507,12 @@ HOLDING = (PrescribedMotion, Guide)
 DRIVING = (PrescribedForce, Controller)
 """Laws whose force in a step does not depend on the motion in the step."""
 
-RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
-"""Laws besides :class:`ConnectorLaw` that resist every motion; see :func:`resists`."""
-
 
 def resists(law: Law) -> bool:
     """Return whether a law resists every motion, by a force or by a constraint."""
-    return law.resists if isinstance(law, ConnectorLaw) else isinstance(law, RESISTING)
+    if isinstance(law, ConnectorLaw):
+        return law.resists
+    return not isinstance(law, (*DRIVING, Damper, Coulomb))
 
 
 def has_friction(law: object) -> bool:

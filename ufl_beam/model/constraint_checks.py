@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checks of constraints and masses by rank analysis; checks of prestress and time schemes."""
+"""Checks of constraints and masses by rank analysis; checks of prestress and of smooth motions."""
 
 from __future__ import annotations
 
@@ -202,6 +202,8 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
                 rows_at[dof].discard(number)
                 if len(rows_at[dof]) == 1:
                     alone.append(dof)
+    if not left:
+        return [], np.zeros((0, 0))
     indices = sorted(left)
     columns: dict[NodeDof, Entries] = defaultdict(list)  # of the gradients that are left
     for i, number in enumerate(indices):
@@ -313,17 +315,17 @@ def _number(vectors: Array) -> str:
 
 def _null_space(rows: Sequence[Entries], unknowns: int) -> Array:
     """Return a basis of the null space of a matrix, in columns; at most :data:`MOST` if large."""
-    if unknowns == 0:
-        return np.zeros((0, 0))
-    entries = np.array([entry for row in rows for entry in row]).reshape(-1, 2)
-    ends = np.cumsum([0, *map(len, rows)])
-    matrix = csr_array(
-        (entries[:, 1], entries[:, 0].astype(int), ends), shape=(len(rows), unknowns)
-    )
     if unknowns <= DENSE:
-        _, sizes, vectors = np.linalg.svd(matrix.toarray(), full_matrices=True)
+        dense = np.zeros((len(rows), unknowns))
+        for line, row in zip(dense, rows, strict=True):
+            for column, value in row:
+                line[column] += value
+        _, sizes, vectors = np.linalg.svd(dense, full_matrices=True)
         rank = int(np.sum(sizes > 1e-10 * max(1.0, sizes.max(initial=0.0))))
         return np.asarray(vectors[rank:].T)
+    columns, values = np.array([entry for row in rows for entry in row]).reshape(-1, 2).T
+    ends = np.cumsum([0, *map(len, rows)])
+    matrix = csr_array((values, columns.astype(int), ends), shape=(len(rows), unknowns))
     # Inverse iteration with a shift that makes the matrix regular
     gram = csc_array(matrix.T @ matrix)
     size = max(1.0, gram.diagonal().max())
