@@ -80,27 +80,22 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
             ) from error
     first = next(frames)
     height, width = first.shape[:2]
-    command = [
-        program, "-y", "-loglevel", "error",
-        "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(fps), "-i", "-",
-        # H.264 needs an even width and height.
-        "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p",
-        str(path.absolute()),
-    ]  # fmt: skip
     # Not through a pipe: PETSc ends the interpreter if a broken pipe sends SIGPIPE.
-    with tempfile.TemporaryFile() as images:
-        for frame in chain([first], frames):
-            images.write(np.ascontiguousarray(frame).data)
-        images.seek(0)
-        try:
-            subprocess.run(command, stdin=images, stderr=subprocess.PIPE, check=True)
-        except subprocess.CalledProcessError as error:
-            path.unlink(missing_ok=True)
-            words = error.stderr.decode(errors="replace").strip()
-            raise RuntimeError(f"{program}: {words}") from None
-        except BaseException:
-            path.unlink(missing_ok=True)
-            raise
+    with tempfile.TemporaryDirectory() as folder:
+        images, film = Path(folder, "images"), Path(folder, "film.mp4")
+        with images.open("wb") as file:
+            for frame in chain([first], frames):
+                file.write(np.ascontiguousarray(frame).data)
+        command = [
+            program, "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
+            "-s", f"{width}x{height}", "-r", str(fps), "-i", str(images),
+            # H.264 needs an even width and height.
+            "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p", str(film),
+        ]  # fmt: skip
+        run = subprocess.run(command, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, check=False)
+        if run.returncode:
+            raise RuntimeError(f"{program}: {run.stderr.decode(errors='replace').strip()}")
+        shutil.move(film, path)
 
 
 WRITERS = {".gif": write_gif, ".mp4": write_mp4}

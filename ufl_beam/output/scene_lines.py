@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""Scenes as lines, with the fields of a state at their points and in their cells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.discretization.dof_numbering import turned
+from ufl_beam.model.bodies import AttachmentPoint, arm
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.scene import Scene, attachment_points
+from ufl_beam.output.recorder import StateView
+
+LineFields = tuple[Mapping[str, Array], Mapping[str, Array]]
+"""Fields at points, (n,) or (n, 3), and in cells, (m,), by name."""
+
+
+BODY, CONNECTOR = 1, 2  # kinds of lines: bodies, and links or connectors
+
+
+class Rod(NamedTuple):
+    """Straight line of a body or a connector, between two places."""
+
+    a: AttachmentPoint
+    b: AttachmentPoint
+    group: int  # BODY or CONNECTOR
+    along: Connector | None = None  # connector whose force acts along the line
+
+
+def scene_rods(scene: Scene) -> list[Rod]:
+    """Return lines from the centre of a body to its points, and along links and connectors."""
+    spots, rods = attachment_points(scene), list[Rod]()
+    for body in scene.bodies:
+        x, y = body.center
+        # A body with attachments at its centre alone also gets a line, which shows its rotation.
+        beside = body.at(x + 0.02 * scene.size, y)
+        others = [s for s in spots[body] if s.point != body.center] or [beside]
+        rods += [Rod(body.middle, place, BODY) for place in others]
+    for joint in scene.joints:
+        if joint.is_rod:
+            a, b = joint.places
+            pulls = next((c for c in joint.holders if c.stretches), None)
+            rods.append(Rod(a, b, CONNECTOR, pulls))
+    rods += [
+        Rod(c.a, c.b, CONNECTOR, c if c.stretches else None)
+        for c in scene.connectors
+        if not c.is_rotation and c.apart != (0.0, 0.0)
+    ]
+    return rods
+
+
+class LineData:
+    """Geometry of beams, bodies and connectors as lines, and the fields of a state on these lines.
+
+    Points and lines of beams come first.  Each line of a body or connector follows, with two points
+    of its own.  There N is the force of a connector along its line, else 0; V and M are zero.
+
+    Attributes:
+        points: Coordinates of points; (n, 3); m.
+        cells: Indices of the points at both ends of each line; (m, 2).
+        kinds: Kind of each line: 0 for beams, or BODY, or CONNECTOR; (m,).
+    """
+
+    def __init__(self, simulation: StateView) -> None:
+        numbering, rods = simulation.numbering, scene_rods(simulation.scene)
+        ends = [end for rod in rods for end in (rod.a, rod.b)]
+        corners = np.reshape([end.point for end in ends], (-1, 2))
+        own = len(numbering.points) + np.arange(len(ends)).reshape(-1, 2)
+        points = np.concatenate([numbering.points, corners])
+        self.points: Array = np.insert(points, 2, 0.0, axis=1)
+        self.cells: Index = np.concatenate([numbering.pieces, own])
+        self.kinds = np.append(np.zeros(len(numbering.pieces)), [rod.group for rod in rods])
+        self._nodes = np.concatenate([numbering.dofs, *(numbering.node(a)[None] for a in ends)])
+        self._ends = slice(len(numbering.points), None)
+        self._arms = np.reshape([arm(end) for end in ends], (-1, 2))
+        connectors = simulation.scene.all_connectors
+        # Connectors whose forces act along lines, by the index of the line in ``rods``
+        self._pulls = {k: connectors.index(rod.along) for k, rod in enumerate(rods) if rod.along}
+        self._pieces_per_cell, self._num_rods = numbering.mesh.degree, len(rods)
+
+    def fields(self, simulation: StateView) -> LineFields:
+        """Compute the fields of the present state, see :class:`XDMF`, on all processes together."""
+        q = simulation.subdomain.gather(simulation.q)[self._nodes]
+        arms = turned(self._arms, q[self._ends, 2])
+        displacement = np.insert(q[:, :2], 2, 0.0, axis=1)
+        displacement[self._ends, :2] += arms - self._arms
+        at_points = {"displacement": displacement, "rotation": q[:, 2]}
+        for velocities in simulation.velocities():
+            v = simulation.subdomain.gather(velocities)[self._nodes]
+            velocity = np.insert(v[:, :2], 2, 0.0, axis=1)
+            velocity[self._ends, :2] += v[self._ends, 2:] * arms[:, ::-1] * (-1.0, 1.0)
+            at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
+        forces = simulation.section_forces()
+        fields: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
+        if simulation.may_break:
+            fields["jump"], fields["dissipated energy"] = simulation.damage()
+        in_cells = {
+            name: np.append(np.repeat(values, self._pieces_per_cell), np.zeros(self._num_rods))
+            for name, values in fields.items()
+        }
+        if self._pulls:
+            rods = in_cells["N"][len(self.cells) - self._num_rods :]
+            rods[[*self._pulls]] = simulation.connections()[[*self._pulls.values()], 1]
+        return at_points, in_cells
