@@ -22,7 +22,6 @@ from ufl_beam.errors import (
     require_function,
     require_sequence,
 )
-from ufl_beam.file_system import require_path
 from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.bodies import AttachmentPoint, Place, require_place
 from ufl_beam.model.connector_law import ConnectorLaw
@@ -30,8 +29,8 @@ from ufl_beam.model.connector_laws import Coulomb, HingeLaw, RigidPlastic, Sprin
 from ufl_beam.model.connectors import Connector, can_yield
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.output_files import OutputFile, beside, changed, require_arrays
-from ufl_beam.output.recorder import Restartable, StateView
+from ufl_beam.output.output_files import OutputFile, beside, require_arrays
+from ufl_beam.output.recorder import FileRecorder, Restartable, StateView
 from ufl_beam.output.state_rows import (
     DISSIPATED,
     FORCE,
@@ -52,7 +51,7 @@ COMPONENTS = ("along", "across", "turn")  # motions of a bushing
 CONNECTOR = ("motion", "force", "work")  # columns of a connector
 
 
-class History(Restartable):
+class History(FileRecorder):
     """Recorder of motions, connectors and energies in a CSV file that is valid after a crash.
 
     The columns are the time or load factor; u, v, psi of each place; accelerations; motion, force,
@@ -92,12 +91,11 @@ class History(Restartable):
         every: int = 1,
         max_rows: int = sys.maxsize,
     ) -> None:
-        require_count(every, f"History {path}: every")
+        super().__init__(path, every)
         require_count(max_rows, f"History {path}: max_rows")
         self._first_every, self._max_rows = every, max_rows
-        self._path = require_path(path, "History")
         self._temporary = beside(self._path)  # replaces the file when rows are deleted
-        self.files = (self._path,) if max_rows == sys.maxsize else (self._path, self._temporary)
+        self.files = (self._path, self._temporary) if self._thins else (self._path,)
         self._places = require_sequence(places, f"History {path}: places")
         self._accelerated = require_sequence(accelerations, f"History {path}: accelerations")
         for what, some in (("places", self._places), ("accelerations", self._accelerated)):
@@ -106,11 +104,9 @@ class History(Restartable):
         self._before: Array = np.zeros((0, 4))  # time and velocity of each in the previous row
         what = f"History {path}: connectors"
         self._connectors = require_all(connectors, what, (Connector, Joint))
-        self._open: list[OutputFile] = []
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Write header and initial row, or cut off the rows that follow a :meth:`state`."""
-        self._comm = simulation.comm
         self._followed = {
             connector: name
             for followed in self._connectors
@@ -135,44 +131,48 @@ class History(Restartable):
         columns = [simulation.parameter.column, *names, *energies]
         # Spreadsheets read such names as formulas, which may run programs
         self._header = _line([f"'{c}" if c.startswith(FORMULA) else c for c in columns])
-        if state is None:
-            self._before = np.full((len(self._accelerated), 4), np.nan)
-            row = self._row(simulation)
-            self._every, self._steps = self._first_every, 0
-            on_first(self._comm, lambda: self._write_anew(self._path, self._header + row))
-        else:
+        self._before = np.full((len(self._accelerated), 4), np.nan)
+        self._every = self._first_every
+        super().begin(simulation, state)
+        if state is not None:
+            self._every = int(state["sizes"][2])
             if self._accelerated:
-                require_arrays(state, {"before": (len(self._accelerated), 4)})
+                require_arrays(state, {"before": self._before.shape})
                 self._before = state["before"].copy()
-            self._every, self._steps, _, length = map(int, state["counts"])
-            content, digest = (state[name].tobytes() for name in ("content", "digest"))
-            on_first(self._comm, lambda: self._go_on(content, digest, length))
 
-    def _write_anew(self, path: Path, content: bytes) -> None:
-        self.close()
-        self._open, self._length = [OutputFile(path)], 0
-        self._append(content)
+    def _start(self, row: bytes, digest: bytes | None) -> OutputFile:
+        header, new = self._header, digest is None
+        self.complete = self.complete or (len(header), self._every)  # bytes, steps between rows
+        if digest is not None and self._thins:
+            self._path.write_bytes(digest)
+        file = self._open(self._path, new=new)
+        if new:
+            file.put(0, header)
+        elif file.read(0, len(header)) != header:
+            raise ValueError("the file has other columns")
+        return file
 
-    def _append(self, line: bytes) -> None:
+    def _append(self, row: bytes) -> None:
         """Write after the last complete line; an interrupted line is overwritten."""
-        self._open[0].put(self._length, line)
-        self._length += len(line)
+        length, every = self.complete
+        self._file.put(length, row)
+        self.complete = length + len(row), every
 
     def write(self, simulation: StateView) -> None:
         """Write a row after every ``every`` steps."""
-        self._steps += 1
-        if self._steps == (self._max_rows + 1) * self._every:
-            on_first(simulation.comm, self._drop_rows)
+        if self._count + 1 == (self._max_rows + 1) * self._every:
             self._every *= 2
-        if self._steps % self._every == 0:
-            row = self._row(simulation)
-            on_first(simulation.comm, lambda: self._append(row))
+            on_first(simulation.comm, self._drop_rows)
+        super().write(simulation)
 
     def _drop_rows(self) -> None:
         """Delete every other row; a complete file exists at any time."""
-        rows = self._open[0].read(len(self._header), self._length).splitlines(keepends=True)
-        self._write_anew(self._temporary, self._header + b"".join(rows[::2]))
-        self._open[0].rename(self._path)
+        rows = self._file.read(len(self._header), self.complete[0]).splitlines(keepends=True)
+        self.close()
+        self._file, self.complete = self._open(self._temporary), (0, self._every)
+        self._closing.callback(self._cut)
+        self._append(self._header + b"".join(rows[::2]))
+        self._file.rename(self._path)
 
     def _row(self, simulation: StateView) -> bytes:
         motion = [simulation.displacement(place) for place in self._places]
@@ -187,51 +187,22 @@ class History(Restartable):
         line = (simulation.t, *np.ravel(motion), *np.ravel(connections), *energies)
         return _line([repr(float(x)) for x in line])
 
+    @property
+    def _thins(self) -> bool:
+        """True if rows may be deleted after a checkpoint, which then has a copy of the file."""
+        return self._max_rows < sys.maxsize
+
     def state(self) -> State:
-        """Return counts and checksum of the file, or its content if rows may be deleted later."""
-        rows = self._steps // self._every
-        counts = np.array([self._every, self._steps, rows, 0], dtype=float)
-        content = digest = b""
+        """Return sizes, and the checksum of the file, or its content if rows may be deleted."""
+        return super().state() | ({"before": self._before.copy()} if self._accelerated else {})
 
-        def sync() -> None:
-            nonlocal content, digest
-            for file in self._open:
-                file.sync()
-                counts[3] = self._length
-                if self._max_rows < sys.maxsize:
-                    content = file.read(0, self._length)
-                else:
-                    digest = file.digest(self._length)
+    def _sync(self) -> bytes:
+        length = self.complete[0]
+        self._file.sync()
+        return self._file.read(0, length) if self._thins else self._file.digest(length)
 
-        on_first(self._comm, sync)
-        texts = {"content": content, "digest": digest}
-        numeric = {"counts": counts}
-        if self._accelerated:
-            numeric["before"] = self._before.copy()
-        return {**numeric, **{n: np.frombuffer(x, dtype=np.uint8) for n, x in texts.items()}}
-
-    def _go_on(self, content: bytes, digest: bytes, length: int) -> None:
-        """Open the file, or write its ``content`` anew, and cut off rows beyond ``length``."""
-        if content:
-            self._path.write_bytes(content)
-        try:
-            file = OutputFile(self._path, new=False)
-        except FileNotFoundError:
-            raise changed(f"History {self._path}") from None
-        if file.read(0, len(self._header)) != self._header or (
-            not content and file.digest(length) != digest
-        ):
-            file.close()
-            raise changed(f"History {self._path}")
-        self._open, self._length = [file], length
-        file.cut(length)
-
-    def close(self) -> None:
-        """Close the file, and cut off an interrupted row after the last complete row."""
-        files, self._open = self._open, []
-        for file in files:
-            file.cut(self._length)
-            file.close()
+    def _cut(self) -> None:
+        self._file.cut(self.complete[0])
 
 
 def _line(cells: Sequence[str]) -> bytes:

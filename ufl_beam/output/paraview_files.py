@@ -6,119 +6,54 @@ from __future__ import annotations
 import hashlib
 import math
 import mmap
-from abc import abstractmethod
-from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import ClassVar
-
-from mpi4py import MPI
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index, State
-from ufl_beam.errors import ArgumentError, require_count
-from ufl_beam.file_system import require_path
-from ufl_beam.output.output_files import OutputFile, beside, changed
-from ufl_beam.output.recorder import Restartable, StateView
+from ufl_beam.errors import ArgumentError
+from ufl_beam.output.output_files import OutputFile, beside
+from ufl_beam.output.recorder import FileRecorder, StateView
 from ufl_beam.output.scene_lines import LineData, LineFields
-from ufl_beam.parallel import on_first
+
+Step = tuple[float, LineFields]  # time, s, or load factor; fields
 
 
-class TimeSeries(Restartable):
+class TimeSeries(FileRecorder):
     """Base of :class:`XDMF` and :class:`VTKHDF`, whose files have one data set of lines.
 
-    Methods with an underscore are called on the first process only.
+    The first of the ``complete`` sizes is the number of steps in the file.
 
     Attributes:
         endings: Suffixes that the name of the file may have.
         second: Suffixes that are added to the name of the file for further files.
         limit: Largest number of points.
-        complete: Sizes of the complete steps in the file; the first size is their number.
     """
 
     endings: ClassVar[tuple[str, ...]]
     second: ClassVar[tuple[str, ...]] = ()
     limit: ClassVar[float] = math.inf
-    complete: Sequence[int] = ()
 
     def __init__(self, path: str | Path, *, every: int = 1) -> None:
-        kind = type(self).__name__
-        self._path = require_path(path, kind)
+        super().__init__(path, every)
         self.files = (self._path, *(beside(self._path, suffix) for suffix in self.second))
-        require_count(every, f"{kind} {path}: every")
-        self._every, self._count = every, 0
         if self._path.suffix not in self.endings:
             endings = " or ".join(self.endings)
-            raise ArgumentError(f"{kind} {path}: the name of the file must end in {endings}")
-        self._closing = ExitStack()  # calls that close the files
+            raise ArgumentError(f"{self._what}: the name of the file must end in {endings}")
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Write mesh and initial state, or delete the steps that follow a :meth:`state`."""
-        self._comm: MPI.Intracomm = simulation.comm
-        self._scene, self._count = LineData(simulation), 0
+        self._scene = LineData(simulation)
         if (points := len(self._scene.points)) > self.limit:
             raise ArgumentError(
-                f"{type(self).__name__} {self._path}: ParaView cannot read fields of {points} "
-                f"points, more than {self.limit:.0f}, as text; write a VTKHDF file"
+                f"{self._what}: ParaView cannot read fields of {points} points, more than "
+                f"{self.limit:.0f}, as text; write a VTKHDF file"
             )
-        fields, complete = self._scene.fields(simulation), list[int]()
-        if state is not None:
-            self._count, *complete = map(int, state["sizes"])
+        super().begin(simulation, state)
 
-        def start() -> None:
-            self.close()
-            self.complete = complete
-            if state is None:
-                self._start(fields)
-                self._append(simulation.t, fields)
-                return
-            try:
-                self._start(fields, state["digest"].tobytes())
-            except (FileNotFoundError, ValueError):
-                self.close()
-                raise changed(f"{type(self).__name__} {self._path}") from None
-
-        on_first(self._comm, start)
-
-    def write(self, simulation: StateView) -> None:
-        """Write the state after every ``every`` steps."""
-        self._count += 1
-        if self._count % self._every == 0:
-            fields = self._scene.fields(simulation)
-            on_first(self._comm, lambda: self._append(simulation.t, fields))
-
-    def state(self) -> State:
-        """Flush to the disk; return numbers of steps, and sizes and a checksum of the files."""
-        digest = bytearray()
-        on_first(self._comm, lambda: digest.extend(self._sync()))
-        return {
-            "sizes": np.array([self._count, *self.complete], dtype=float),
-            "digest": np.frombuffer(digest, dtype=np.uint8),
-        }
-
-    def close(self) -> None:
-        """Close the files, without an incomplete last step."""
-        self._closing.close()
-
-    @abstractmethod
-    def _start(self, fields: LineFields, digest: bytes | None = None) -> None:
-        """Write a file for such fields without steps, or open the file with :attr:`complete` steps.
-
-        If the checksum of these steps differs from ``digest``, :class:`ValueError` is raised.
-        """
-
-    @abstractmethod
-    def _append(self, t: float, fields: LineFields) -> None:
-        """Append a step with its fields."""
-
-    @abstractmethod
-    def _sync(self) -> bytes:
-        """Flush to the disk; return a checksum of all complete steps; each is read once."""
-
-    @abstractmethod
-    def _cut(self) -> None:
-        """Delete all data after the last complete step."""
+    def _row(self, simulation: StateView) -> Step:
+        return simulation.t, self._scene.fields(simulation)
 
 
 # -- XDMF -----------------------------------------------------------------------------------------
@@ -167,7 +102,7 @@ class XDMF(TimeSeries):
     # the file is valid XML after each write of `_append` and `_cut`, and if a write is interrupted.
     # The numbers are text because meshio reads no binary file with the numbers of several fields.
 
-    def _start(self, fields: LineFields, digest: bytes | None = None) -> None:
+    def _start(self, row: Step, digest: bytes | None) -> OutputFile:
         scene = self._scene
         self._mesh = (  # part of the text of each step
             f'<Topology TopologyType="Polyline" NodesPerElement="2" '
@@ -178,18 +113,16 @@ class XDMF(TimeSeries):
         )
         # Number of steps, and position of END; earlier versions stored a further size
         _, end = self.complete = self.complete[:2] or (0, len(HEAD))
-        self._file = OutputFile(self._path, new=digest is None)
-        self._closing.callback(self._file.close)
+        file = self._open(self._path, new=digest is None)
         if digest is None:
-            self._file.put(0, HEAD + END)
-        elif self._file.size < end + len(END) or self._sync() != digest:
-            raise ValueError("not the file that was written up to there")
-        self._cut()
-        self._closing.callback(self._cut)
+            file.put(0, HEAD + END)
+        elif file.size < end + len(END):
+            raise ValueError("the file is too short")
+        return file
 
-    def _append(self, t: float, fields: LineFields) -> None:
+    def _append(self, row: Step) -> None:
         self._cut()  # after an interrupted write
-        steps, end = self.complete
+        (steps, end), (t, fields) = self.complete, row
         text = f'<Grid Name="{steps}" GridType="Uniform"><Time Value="{t!r}"/>{self._mesh}'
         for center, by_name in zip(("Node", "Cell"), fields, strict=True):
             for name, values in by_name.items():
@@ -276,65 +209,54 @@ class VTKHDF(TimeSeries):
     # during its growth.  HDF5 crashes when a disk is full, so the space for a step is allocated
     # first.
 
-    def _start(self, fields: LineFields, digest: bytes | None = None) -> None:
+    def _start(self, row: Step, digest: bytes | None) -> OutputFile:
         import h5py
 
-        rows = _rows(0.0, 0, fields)
-        self.complete = self.complete or (0,)
-        self._output = OutputFile(self.files[digest is not None])
-        self._closing.callback(self._output.close)
-        self._output.put(0, _empty_file(self._scene, rows, fields))
+        rows, self.complete = _rows(row, 0), self.complete or (0,)
+        if digest is not None:  # unless the copy replaces the file
+            self._closing.callback(self.files[1].unlink, missing_ok=True)
+        file = self._open(self.files[digest is not None])
+        file.put(0, _empty_file(self._scene, rows, row[1]))
         # Without a lock, other programs can read the file during the run.
-        self._file = h5py.File(self._output.path, "r+", locking=False)
-        self._closing.callback(self._file.close)
-        self._root = self._file["VTKHDF"]
+        self._h5 = h5py.File(file.path, "r+", locking=False)
+        self._closing.callback(self._h5.close)
+        self._root = self._h5["VTKHDF"]
         self._growing = {name: (self._root[name], len(values)) for name, values in rows.items()}
         self._hashes = [hashlib.sha256() for _ in rows]
         self._hashed = 0  # steps that the checksums include
         chunks = (dataset.chunks for dataset, _ in self._growing.values())
         self._step_size = INDEX + sum(8 * math.prod(chunk) for chunk in chunks)
         if digest is not None:
-            self._copy(digest)
-        self._closing.callback(self._cut)
-
-    def _copy(self, digest: bytes) -> None:
-        """Copy the complete steps of the file, and replace the file if the digest agrees.
-
-        So the run does not append to a damaged file, in which HDF5 may crash.
-        """
-        import h5py
-
-        try:
-            self._output.allocate(self._path.stat().st_size + 2 * self._step_size)
+            file.allocate(self._path.stat().st_size + 2 * self._step_size)
             try:
-                with h5py.File(self._path, "r", locking=False) as file:
-                    for name, (new, rows) in self._growing.items():
-                        old = file["VTKHDF"][name]
-                        new.resize(self.complete[0] * rows, axis=0)
-                        for first in range(0, len(new), BLOCK):
-                            new[first : first + BLOCK] = old[first : min(first + BLOCK, len(new))]
+                self._copy()
             except Exception:  # many kinds, which HDF5 raises for damaged files
                 raise ValueError("the file is damaged") from None
             self._cut()
-            if self._sync() != digest:
-                raise ValueError("not the file that was written up to there")
-        except BaseException:
-            self.close()
-            self._output.path.unlink()
-            raise
-        self._output.rename(self._path)
+        return file
 
-    def _append(self, t: float, fields: LineFields) -> None:
-        self._output.allocate(self._file.id.get_filesize() + self._step_size)
+    def _copy(self) -> None:
+        """Copy the complete steps of the file, because HDF5 may crash in a damaged file."""
+        import h5py
+
+        with h5py.File(self._path, "r", locking=False) as file:
+            for name, (new, rows) in self._growing.items():
+                old = file["VTKHDF"][name]
+                new.resize(self.complete[0] * rows, axis=0)
+                for first in range(0, len(new), BLOCK):
+                    new[first : first + BLOCK] = old[first : min(first + BLOCK, len(new))]
+
+    def _append(self, row: Step) -> None:
+        self._file.allocate(self._h5.id.get_filesize() + self._step_size)
         (steps,) = self.complete
-        (times, time), *others = _rows(t, steps, fields).items()
+        (times, time), *others = _rows(row, steps).items()
         for name, values in others:
             self._put(name, values)
-        self._file.flush()
+        self._h5.flush()
         # The data of the step are in the file.  Its time and the number of steps follow last.
         self._put(times, time)
         self._root["Steps"].attrs.modify("NSteps", np.int64(steps + 1))
-        self._file.flush()
+        self._h5.flush()
         self.complete = (steps + 1,)
 
     def _put(self, name: str, values: Array) -> None:
@@ -352,16 +274,16 @@ class VTKHDF(TimeSeries):
         (steps,) = self.complete
         (times, _), *others = self._growing.values()
         times.resize(steps, axis=0)  # first, as extra times crash VTK 9.3
-        self._file.flush()
+        self._h5.flush()
         self._root["Steps"].attrs.modify("NSteps", np.int64(steps))
-        self._file.flush()
+        self._h5.flush()
         for dataset, rows in others:
             dataset.resize(steps * rows, axis=0)
-        self._file.flush()
+        self._h5.flush()
 
     def _sync(self) -> bytes:
-        self._file.flush()
-        self._output.sync()
+        self._h5.flush()
+        self._file.sync()
         for (dataset, rows), hashed in zip(self._growing.values(), self._hashes, strict=True):
             end = self.complete[0] * rows
             for first in range(self._hashed * rows, end, BLOCK):
@@ -370,10 +292,10 @@ class VTKHDF(TimeSeries):
         return hashlib.sha256(b"".join(hashed.digest() for hashed in self._hashes)).digest()
 
 
-def _rows(t: float, n: int, fields: LineFields) -> dict[str, Array]:
+def _rows(step: Step, n: int) -> dict[str, Array]:
     """Return the rows that the n-th step adds to each growing data set; the time comes first."""
-    rows = {"Steps/Values": np.array([t])}
-    offsets = {}
+    t, fields = step
+    rows, offsets = {"Steps/Values": np.array([t])}, {}
     for kind, by_name in zip(KINDS, fields, strict=True):
         rows |= {f"{kind}/{name}": values for name, values in by_name.items()}
         first, length = next((name, len(values)) for name, values in by_name.items())

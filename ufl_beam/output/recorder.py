@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,8 @@ from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Parameter
-from ufl_beam.errors import ArgumentError, require_sequence, shorten, warn
+from ufl_beam.errors import ArgumentError, require_count, require_sequence, shorten, warn
+from ufl_beam.file_system import require_path
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.connectors import Connector
@@ -26,7 +28,13 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.output.output_files import Output, require_apart, require_writable
+from ufl_beam.output.output_files import (
+    Output,
+    OutputFile,
+    changed,
+    require_apart,
+    require_writable,
+)
 from ufl_beam.output.state_rows import FORCE, Connection, connection, connector_indices
 from ufl_beam.output.states import States
 from ufl_beam.parallel import on_first
@@ -264,6 +272,108 @@ class Restartable(Recorder):
     def resume(self, simulation: StateView, state: State) -> None:
         """Continue from a :meth:`state`; see :meth:`Recorder.resume`."""
         self.begin(simulation, state)
+
+
+class FileRecorder(Restartable):
+    """Base of recorders that append rows to a file, which has all complete rows at any time.
+
+    Only the first process calls the methods with an underscore, except :meth:`_row`.
+
+    Attributes:
+        complete: Sizes of the complete rows in the file, on the first process.
+    """
+
+    complete: Sequence[int] = ()
+
+    def __init__(self, path: str | Path, every: int) -> None:
+        what = f"{type(self).__name__} {path}"
+        self._path, self._what = require_path(path, type(self).__name__), what
+        require_count(every, f"{what}: every")
+        self._every, self._count = every, 0  # steps between rows; steps so far
+        self._closing = ExitStack()  # calls that close the file
+
+    def begin(self, simulation: StateView, state: State | None = None) -> None:
+        """Write the initial row to a new file, or delete the rows that follow a :meth:`state`."""
+        self._comm: MPI.Intracomm = simulation.comm
+        row, complete, digest = self._row(simulation), list[int](), None
+        self._count = 0
+        if state is not None:
+            self._count, *complete = map(int, state["sizes"])
+            digest = state["digest"].tobytes()
+
+        def start() -> None:
+            self._begin(row, complete, digest)
+            if digest is None:
+                self._append(row)
+
+        on_first(self._comm, start)
+
+    def _begin(self, row: Any, complete: Sequence[int], digest: bytes | None) -> None:
+        """Open a new file for such rows, or a file whose ``complete`` rows have this checksum."""
+        self.close()
+        self.complete = complete
+        try:
+            self._file = self._start(row, digest)
+            if digest is not None and self._sync() != digest:
+                raise ValueError("not the file that was written up to there")
+        except (FileNotFoundError, ValueError):
+            if digest is None:
+                raise
+            self.close()
+            raise changed(self._what) from None
+        self._cut()
+        self._closing.callback(self._cut)
+        if self._file.path != self._path:  # a checked copy
+            self._file.rename(self._path)
+
+    def write(self, simulation: StateView) -> None:
+        """Write a row after every ``every`` steps."""
+        self._count += 1
+        if self._count % self._every == 0:
+            row = self._row(simulation)
+            on_first(self._comm, lambda: self._append(row))
+
+    def state(self) -> State:
+        """Flush to the disk; return numbers of steps, and sizes and a checksum of the file."""
+        digest = bytearray()
+        on_first(self._comm, lambda: digest.extend(self._sync()))
+        return {
+            "sizes": np.array([self._count, *self.complete], dtype=float),
+            "digest": np.frombuffer(digest, dtype=np.uint8),
+        }
+
+    def close(self) -> None:
+        """Close the file, without an incomplete last row."""
+        self._closing.close()
+
+    def _open(self, path: Path, *, new: bool = True) -> OutputFile:
+        """Open a file, which :meth:`close` closes."""
+        file = OutputFile(path, new=new)
+        self._closing.callback(file.close)
+        return file
+
+    @abstractmethod
+    def _row(self, simulation: StateView) -> Any:
+        """Compute the row of the present state; all processes call it together."""
+
+    @abstractmethod
+    def _start(self, row: Any, digest: bytes | None) -> OutputFile:
+        """Write a file without rows, or open the file, or a copy, with :attr:`complete` rows.
+
+        If the file with the checksum ``digest`` was changed, :class:`ValueError` may be raised.
+        """
+
+    @abstractmethod
+    def _append(self, row: Any) -> None:
+        """Append a row."""
+
+    @abstractmethod
+    def _sync(self) -> bytes:
+        """Flush to the disk; return a checksum of all complete rows; each is read once."""
+
+    @abstractmethod
+    def _cut(self) -> None:
+        """Delete all data after the last complete row."""
 
 
 def checked_recorders(

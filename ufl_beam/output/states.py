@@ -93,8 +93,8 @@ class States:
     Attributes:
         scene: Model.
         numbering: Vertices, cells and degrees of freedom of the scene.
-        between: Instant of equilibrium in a step, as a fraction of the step.
-        begun: True if forces depend on the configuration at the beginning of the step.
+        equilibrium_fraction: Instant of equilibrium in a step, as a fraction of the step.
+        needs_start: True if forces depend on the configuration at the beginning of the step.
         cells: Objects that compute section forces and strains of all cells.
         forces_from_record: Function that computes :meth:`cell_resultants` from a record, q, and q
             at the beginning of the step.
@@ -417,6 +417,11 @@ class States:
 
     # -- forces of cells -----------------------------------------------------------------------
 
+    def _in_equilibrium(self, n: int) -> Array:
+        """Return the configuration in which the forces of the n-th state are in equilibrium."""
+        e, q = self.equilibrium_fraction, self._row("q", n)
+        return q if e == 1.0 else (1 - e) * self.before(n) + e * q
+
     def cell_forces(self, n: int, pieces: Array = MIDDLE) -> Array:
         """Compute (N, V, M) of :meth:`diagram` in all cells in the n-th state.
 
@@ -429,10 +434,7 @@ class States:
         """
         key = self.index(n), pieces.tobytes()
         if self._computed is None or self._computed[0] != key:
-            q = self._row("q", n)
-            if self.equilibrium_fraction < 1:
-                q = (1 - self.equilibrium_fraction) * self.before(n) + self.equilibrium_fraction * q
-            along = self.cells.along
+            along, q = self.cells.along, self._in_equilibrium(n)
             forces = along(slice(None), pieces, self.cell_resultants(n), q[along.dofs])
             forces.flags.writeable = False
             self._computed = key, forces
@@ -462,10 +464,7 @@ class States:
         """
         n, chosen = range(len(self)), np.array(cells, dtype=np.int64)
         dofs, forces = self.cells.along.dofs[chosen], np.zeros((len(n), len(chosen), 3))
-        q = self.column("q")[:, dofs]
-        if self.equilibrium_fraction < 1:
-            before = np.array([self.before(k)[dofs] for k in n])
-            q = (1 - self.equilibrium_fraction) * before + self.equilibrium_fraction * q
+        q = np.array([self._in_equilibrium(k)[dofs] for k in n])
         resultants = np.array([self.cell_resultants(k)[:, chosen] for k in n])
         for i, (cell, at) in enumerate(zip(cells, fractions, strict=True)):
             forces[:, i] = self.cells.along(
