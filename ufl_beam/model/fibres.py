@@ -51,6 +51,7 @@ class SectionPoints:
     breaking: slice = slice(None)  # points that can break
     hinges: bool = False  # True if the breaking point is a hinge, with a jump of rotation
     number: int = 0  # number of this object in its section
+    at: Sequence[int] | Index = (0,)  # indices of the points in the section; (n,)
 
     def __post_init__(self) -> None:
         if fault := self.fault(0.0):
@@ -120,7 +121,7 @@ def by_class(points: Sequence[SectionPoints], rest: Array) -> tuple[SectionPoint
         SectionPoints(
             **{
                 name: np.concatenate([getattr(p, name) for p in group])
-                for name in ("strains", "weights", "stiffness")
+                for name in ("strains", "weights", "stiffness", "at")
             },
             laws=tuple(law for p in group for law in p.laws),
             rest=rest if number == 0 else np.zeros(3),
@@ -314,6 +315,7 @@ class PlacedFibres:
                     laws=((law, len(at)),),
                     rest=np.zeros(3),
                     softening=softening if softening is not None and softening.opens else None,
+                    at=at,
                 )
             )
         made = by_class(points, np.array([0.0, GA, 0.0]))

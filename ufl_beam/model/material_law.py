@@ -226,6 +226,11 @@ def require_law(law: object, what: str, interaction: bool = False) -> None:
         raise ModelError(
             f"{kind} has records_path = True and residuals; such laws define increments"
         )
+    for name in law.variables:
+        if not name.isidentifier():
+            raise ModelError(
+                f"{kind}.variables: the law cannot read state.{name}; {name!r} is no identifier"
+            )
     parameters = law.parameters(uniform(law, np.ones(1)))
     if "C" in parameters:
         raise ModelError(f"{kind}.parameters has the name C, the name of the elastic stiffness")

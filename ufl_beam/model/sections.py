@@ -146,8 +146,8 @@ class Section(Record):
             chosen = [row == 1.0 for row in np.eye(3)[inelastic]]
             laws = [law for law in resultants if law is not None]
         points = [
-            SectionPoints(np.eye(3)[at], np.ones(1), stiffness[at], ((law, 1),), np.zeros(3))
-            for at, law in zip(chosen, laws, strict=True)
+            SectionPoints(np.eye(3)[x], np.ones(1), stiffness[x], ((law, 1),), np.zeros(3), at=(k,))
+            for k, (x, law) in enumerate(zip(chosen, laws, strict=True))
         ]
         if hinge is not None:
             points[-1] = replace(points[-1], softening=hinge, hinges=True)

@@ -29,6 +29,7 @@ from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.imposed_strains import ImposedStrain
+from ufl_beam.output.internal_variables import in_cells
 
 
 class BeamForms(NamedTuple):
@@ -243,6 +244,15 @@ class DolfinxView:
             )
         return self._function("jump", self._view.damage()[0][self.cells])
 
+    @property
+    def variables(self) -> dict[str, fem.Function]:
+        """Internal variables of the laws by name, constant in each cell; empty without such laws.
+
+        If a cell has several points, the value is the variable of the largest magnitude.
+        """
+        values = in_cells(self._view.subdomain.numbering, self._view.internal())
+        return {name: self._function(f"state.{name}", x[self.cells]) for name, x in values.items()}
+
     def _function(self, name: str, values: Array) -> fem.Function:
         """Return the function with this name after setting its ``values`` in each cell."""
         if name not in self._functions:
@@ -250,7 +260,7 @@ class DolfinxView:
             space = element.stiffness.function_space
             if name in ("configuration", "velocity"):
                 space = element.space
-            elif name == "jump":
+            elif values.ndim == 1:
                 space = fem.functionspace(self.mesh, ("DG", 0))
             self._functions[name] = fem.Function(space, name=name)
         return put_in_cells(self._functions[name], values)

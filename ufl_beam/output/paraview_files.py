@@ -72,9 +72,11 @@ class XDMF(TimeSeries):
 
     Points have ``displacement`` (3 components; m) and ``rotation`` (rad), in dynamics also
     ``velocity`` (m/s) and ``angular velocity`` (rad/s).  Cells have ``N``, ``V`` (N), ``M`` (N m)
-    in their middle; if something may yield or break, also the ``jump`` of the hinge (rad) and the
-    ``dissipated energy`` (J).  ``part`` is 0 in beams; 1 in lines from the centre of each body to
-    its points; 2 along links and connectors, where N is a force along the line.
+    in their middle; if something may yield or break, also the ``jump`` of the hinge (rad), the
+    ``dissipated energy`` (J), and the internal variables of laws, such as ``state.plastic``, with
+    their values of the largest magnitude in a cell.  ``part`` is 0 in beams; 1 in lines from the
+    centre of each body to its points; 2 along links and connectors, where N is a force along the
+    line.
 
     At any moment, also after a kill, the file is valid and has all complete steps.  The cost of a
     step does not grow with the number of steps.  In path following, the time is the load factor.

@@ -22,12 +22,13 @@ from ufl_beam.display import Parameter
 from ufl_beam.errors import ArgumentError, require_count, require_sequence, shorten, warn
 from ufl_beam.file_system import require_path
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
-from ufl_beam.model.bodies import AttachmentPoint
+from ufl_beam.model.bodies import AttachmentPoint, Member
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
+from ufl_beam.output.internal_variables import in_beam
 from ufl_beam.output.output_files import (
     Output,
     OutputFile,
@@ -107,6 +108,14 @@ class PresentState(ABC):
         connectors = self.scene.all_connectors
         values = [n for n in connector_indices(self.scene, joint) if not connectors[n].is_rotation]
         return float(np.linalg.norm(self.connections()[values, FORCE]))
+
+    @abstractmethod
+    def internal(self) -> State:
+        """Return internal variables of cells as tables, see :attr:`Solution.internal`."""
+
+    def variables(self, beam: Member) -> dict[str, Array]:
+        """Return the present internal variables of a beam, see :meth:`Solution.variables`."""
+        return in_beam(self.numbering, self.internal(), beam)
 
     def section_forces(self) -> Array:
         """Return (N, V, M) in the middle of all cells in the last step; (num_cells, 3); N, N, N m.

@@ -13,6 +13,7 @@ from ufl_beam.discretization.dof_numbering import turned
 from ufl_beam.model.bodies import AttachmentPoint, arm
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.scene import Scene, attachment_points
+from ufl_beam.output.internal_variables import in_cells
 from ufl_beam.output.recorder import StateView
 
 LineFields = tuple[Mapping[str, Array], Mapping[str, Array]]
@@ -98,11 +99,13 @@ class LineData:
         fields: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
         if simulation.may_break:
             fields["jump"], fields["dissipated energy"] = simulation.damage()
-        in_cells = {
+            variables = in_cells(simulation.numbering, simulation.internal())
+            fields |= {f"state.{name}": values for name, values in variables.items()}
+        of_lines = {
             name: np.append(np.repeat(values, self._pieces_per_cell), np.zeros(self._num_rods))
             for name, values in fields.items()
         }
         if self._pulls:
-            rods = in_cells["N"][len(self.cells) - self._num_rods :]
+            rods = of_lines["N"][len(self.cells) - self._num_rods :]
             rods[[*self._pulls]] = simulation.connections()[[*self._pulls.values()], 1]
-        return at_points, in_cells
+        return at_points, of_lines

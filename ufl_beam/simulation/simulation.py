@@ -16,7 +16,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, give_back_memory, lib
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Subdomain
-from ufl_beam.discretization.state_io import Archive
+from ufl_beam.discretization.state_io import Archive, State
 from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import ArgumentError, ModelError, StepFailed, require_number, shorten
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
@@ -465,6 +465,13 @@ class Simulation(Stepper):
     def dolfinx(self) -> DolfinxView:
         """Mesh, functions and forms of this simulation, in the types of DOLFINx."""
         return DolfinxView(self)
+
+    def internal(self) -> State:
+        """See the base class."""
+        archive = Archive(self.subdomain)
+        for cells in self.inelastic:
+            cells.save_or_restore(archive, self.q)
+        return archive.state()
 
     def end(self) -> None:
         """Store the last state, and the data for ``start=``, in the solution; gather extremes."""

@@ -26,6 +26,7 @@ from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import Guided
 from ufl_beam.model.loads import LoadAlongBeam, profile_at
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.internal_variables import in_beam
 from ufl_beam.output.output_files import (
     Content,
     WrongReader,
@@ -242,6 +243,19 @@ class Solution(States, Rich):
             raise ArgumentError("acceleration: the run was static; there is none")
         change = np.diff(self.velocity(place), axis=0) / np.diff(self.times)[:, None]
         return np.concatenate([np.full((1, 3), math.nan), change])
+
+    def variables(self, beam: Member) -> dict[str, Array]:
+        """Return the internal variables of a beam at the end of the run, by the names of its laws.
+
+        Each array has the axes cells, Gauss points of a cell, and points of the section.  These are
+        the fibres in the order of ``beam.section.fibres.y``, or the resultants that have a law, in
+        the order N, V, M; a law of several resultants has one point.  If the law at a point has no
+        variable of this name, the value is NaN.
+
+        Raises:
+            ArgumentError: The beam is not in the scene, or its laws have no internal variables.
+        """
+        return in_beam(self.numbering, self.internal, beam)
 
     storeys = Moved("ufl_beam.structures.storeys(solution, levels)")
     hinges = Moved("ufl_beam.structures.hinge_table(solution, limits)")
