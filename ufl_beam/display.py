@@ -74,6 +74,16 @@ def counted(*things: tuple[int, str, str]) -> str:
     return ", ".join(f"{n} {singular if n == 1 else plural}" for n, singular, plural in things if n)
 
 
+def aligned(rows: list[list[str]], left: int | None = None) -> list[str]:
+    """Return rows of texts as lines, with columns to the right, but the column ``left``."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        cells = enumerate(zip(row, widths, strict=True))
+        lines.append("  ".join(x.ljust(w) if i == left else x.rjust(w) for i, (x, w) in cells))
+    return [line.rstrip() for line in lines]
+
+
 # -- notebooks -----------------------------------------------------------------------------------
 
 
@@ -104,10 +114,7 @@ class Tabular(Rich, ABC):
         return [[*columns], *([_cell(value) for value in row] for row in rows)]
 
     def __str__(self) -> str:
-        rows = self.texts()
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = ([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])] for row in rows)
-        return "\n".join("  ".join(line) for line in lines)
+        return "\n".join(aligned(self.texts(), left=0))
 
     def frame(self) -> Any:
         """Return the table as a ``DataFrame`` of pandas, which is an optional package.

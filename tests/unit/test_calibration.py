@@ -17,7 +17,6 @@ from scipy.stats import norm, t
 
 import ufl_beam as ub
 import ufl_beam.structures as st
-from ufl_beam.structures.calibration_result import _interpolate
 
 STEEL = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
 TIMES = np.linspace(0.0, 1.0, 41)
@@ -163,17 +162,35 @@ def test_intervals_of_positive_parameters_are_symmetric_in_their_logarithm():
     assert result.half_widths[0] == pytest.approx(w * a)
 
 
+class Stored:
+    """A run with stored times alone."""
+
+    def __init__(self, times):
+        self.times = times
+
+    def __len__(self):
+        return len(self.times)
+
+
+def interpolated(at, times, values):
+    """Computed values at measured times, from a history at stored times."""
+    options = {"quantity": lambda run: values, "t": (times[0], times[-1])}
+    return measurement(np.zeros(len(at)), times=at, **options).computed(Stored(times))
+
+
 def test_interpolation_is_exact_for_cubics_and_of_fourth_order():
     times = np.array([0.0, 0.1, 0.3, 0.4, 0.7, 1.0])
     at = np.linspace(0, 1, 23)
     cubic = np.poly1d([1.0, -2.0, 0.5, 3.0])
-    np.testing.assert_allclose(_interpolate(at, times, cubic(times)), cubic(at), atol=1e-14)
-    assert np.array_equal(_interpolate(times, times, np.exp(times)), np.exp(times))
-    assert _interpolate(np.array([0.25]), times[:2], times[:2])[0] == 0.25  # two times: a line
+    np.testing.assert_allclose(interpolated(at, times, cubic(times)), cubic(at), atol=1e-14)
+    stored = np.exp(times)
+    np.testing.assert_allclose(interpolated(times, times, stored), stored, rtol=1e-15)
+    two = times[:2]
+    assert interpolated([0.025], two, two) == pytest.approx([0.025])  # two times: a line
     h = np.array([0.02, 0.01])
     at = np.linspace(0, 1, 997)
     errors = [
-        np.abs(_interpolate(at, x, np.sin(9 * x)) - np.sin(9 * at)).max()
+        np.abs(interpolated(at, x, np.sin(9 * x)) - np.sin(9 * at)).max()
         for x in (np.arange(0, 1 + d / 2, d) for d in h)
     ]
     assert np.log2(errors[0] / errors[1]) > 3.9

@@ -7,10 +7,10 @@ import inspect
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from mpi4py import MPI
 
@@ -56,7 +56,7 @@ ASSUMED = 0.01
 """Standard deviation assumed in the search where none is given, as a fraction of the largest
 magnitude of the values."""
 
-ROUND_OFF = 1e-9  # least estimated standard deviation, as a fraction of the largest magnitude
+ROUND_OFF = 1e-7  # least estimated standard deviation, as a fraction of the assumed one
 
 SETTLED, ROUNDS = 1e-3, 20
 """Relative change of estimated standard deviations at which they are final, and the most rounds."""
@@ -72,13 +72,13 @@ WIDE = 1.0
 """Half width of an interval beyond which a warning is issued, in the search variables: a factor of
 e for positive parameters."""
 
-STALLED, LEAST_MOVE = 0.5, 1e-6
-"""Further step of a search that has ended too early, where computed values jump: in standard
-deviations, and in the search variables, in which errors of derivatives move the end."""
+STALLED = 0.5
+"""Further step of a search that has ended too early, where computed values jump; in standard
+deviations."""
 
-RESTARTS = 3  # most further searches from such an end
+NEAR = 1e-4  # distance that counts as zero, in the search variables
+RESTARTS = 3  # most further searches from an end that is too early
 HALVINGS = 8  # most attempts to find a start at which all runs succeed
-AT_BOUND = 1e-4  # distance from a bound that counts as zero, in the search variables
 
 FAILURES = ConvergenceError, ArgumentError  # of runs during a search
 
@@ -168,44 +168,40 @@ def calibrate(
     for measurement in measurements:
         _require_arguments(model, variables, measurement)
     number, p = sum(map(len, measurements)), len(variables.names)
-    least = p + any(m.sigma is None for m in measurements)
-    if number < least:
+    estimated = [m for m in measurements if m.sigma is None]
+    if number < p + bool(estimated):
         raise ArgumentError(
             f"{WHAT}: {number} measured values are too few for {p} parameters"
-            + (" and a standard deviation" if least > p else "")
+            + (" and a standard deviation" if estimated else "")
             + "; leave out parameters, or measure more"
         )
-    for measurement in measurements:
-        if measurement.sigma is None and len(measurement) == 1:
+    for measurement in estimated:
+        if len(measurement) == 1:
             raise _without_estimate(measurement)
     points = _start_points(variables, starts, seed)
 
-    sigma = [_assumed_sigma(m) for m in measurements]
-    problem = Problem(model, variables, measurements, sigma, comm)
-    with _quiet():
+    problem = Problem(model, variables, measurements, comm)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)  # the final runs repeat those that matter
         _require_effects(problem)
-        found = _search_all(problem, points, progress, comm)
-        x = problem.reweight(found[int(np.nanargmin([search.cost for search in found]))].end)
-        computed, jacobian = problem.linearize(x)
+        begins, ends, costs = _search_all(problem, points, progress)
+        x = problem.reweight(ends[np.nanargmin(costs)])
+        jacobian, residuals = problem.jacobian(x), problem.residuals(x)
     values = variables.values(x)
     solutions = tuple(problem.simulate(m, values) for m in measurements)
 
-    stacked = np.concatenate(problem.sigma)
-    residuals = np.concatenate([m.values for m in measurements]) - computed
-    scaled, splits = jacobian / stacked[:, None], problem.splits
-    covariance, undetermined = _covariance(scaled)
-    alone = [_covariance(rows)[0].diagonal() for rows in np.split(scaled, splits)]
+    covariance, undetermined = _covariance(jacobian)
+    alone = [_covariance(rows)[0].diagonal() for rows in problem.split(jacobian)]
     deviations = np.sqrt(covariance.diagonal())
     with np.errstate(invalid="ignore"):
         correlations = covariance / np.outer(deviations, deviations)
     np.fill_diagonal(correlations, 1.0)
-    quantile = scipy.special.ndtri(0.5 + LEVEL / 2)
-    if least > p:
-        quantile = scipy.special.stdtrit(number - p, 0.5 + LEVEL / 2)
+    quantile = scipy.special.stdtrit(number - p if estimated else np.inf, 0.5 + LEVEL / 2)
     slopes, widths = variables.slopes(x), quantile * deviations
     low, high = (variables.values(x + change) for change in (-widths, widths))
-    faults = [*_faults(variables, x, widths, correlations, undetermined)]
-    step, far = further_step(variables, x, scaled, -residuals / stacked)
+    intervals = {name: (low[name], high[name]) for name in values}
+    faults = [*_faults(variables, x, widths, intervals, correlations, undetermined)]
+    step, far = further_step(variables, x, jacobian, residuals)
     if far.any():
         moving = " and ".join(np.array(variables.names)[far])
         most = np.abs(step / deviations)[far].max()
@@ -216,20 +212,20 @@ def calibrate(
         )
     result = Calibration(
         parameters=values,
-        intervals={name: (low[name], high[name]) for name in values},
+        intervals=intervals,
         covariance=covariance * np.outer(slopes, slopes),
         correlations=correlations,
         half_widths=widths * slopes,
         half_widths_alone=quantile * np.sqrt(alone) * slopes,
         measured=measurements,
-        sigma=tuple(problem.sigma),
-        residuals=tuple(np.split(residuals, splits)),
-        cost=0.5 * float(np.sum((residuals / stacked) ** 2)),
-        starts=np.array([[*variables.values(search.start).values()] for search in found]),
-        ends=np.array([[*variables.values(search.end).values()] for search in found]),
-        end_costs=np.array([search.cost for search in found]),
-        runs=problem.runs + sum(search.runs for search in found),
-        failed=problem.failed + sum(search.failed for search in found),
+        sigma=problem.split(problem.sigma),
+        residuals=problem.split(-residuals * problem.sigma),
+        cost=0.5 * float(residuals @ residuals),
+        starts=np.array([[*variables.values(begin).values()] for begin in begins]),
+        ends=np.array([[*variables.values(end).values()] for end in ends]),
+        end_costs=costs,
+        runs=problem.runs,
+        failed=problem.failed,
         solutions=solutions,
         warnings=tuple(faults),
     )
@@ -252,15 +248,14 @@ class Variables:
         names: Names of the parameters; p in number.
         positive: True for positive parameters; (p,).
         start, scale: Numbers of the formulas above; (p,).
-        lower, upper: Bounds of the parameters, which may be infinite; (p,).
+        limits: Lower and upper bounds of the parameters, which may be infinite; (2, p).
     """
 
     names: tuple[str, ...]
     positive: Index
     start: Array
     scale: Array
-    lower: Array
-    upper: Array
+    limits: Array
 
     @classmethod
     def of(cls, parameters: Mapping[str, Entry]) -> Variables:
@@ -279,7 +274,7 @@ class Variables:
                     f"{what} = {shorten(entry)} must be a start, or (start, lower, upper)"
                 ) from None
             start = require_number(start, what)
-            positive = start > 0 if low is None else low > 0
+            positive = low is None and start > 0
             low = -math.inf if low is None else require_number(low, f"{what}: bound")
             high = math.inf if high is None else require_number(high, f"{what}: bound")
             if not low <= start <= high or not low < high:
@@ -289,27 +284,26 @@ class Variables:
             scale = (high - low) / 2 if math.isfinite(high - low) else abs(start)
             if not scale:
                 raise ArgumentError(f"{what} = 0 has no scale; give (start, lower, upper)")
-            rows.append((positive, start, start if positive else scale, low, high))
-        return cls(tuple(parameters), *map(np.array, zip(*rows, strict=True)))
+            rows.append((positive or low > 0, start, scale, 0.0 if positive else low, high))
+        signs, begin, scales, *limits = map(np.array, zip(*rows, strict=True))
+        return cls(tuple(parameters), signs, begin, scales, np.array(limits))
 
     def values(self, x: Array) -> dict[str, float]:
         """Return the parameters by name, within their bounds."""
         with np.errstate(over="ignore"):
             p = np.where(self.positive, self.start * np.exp(x), self.start + self.scale * x)
-        p = np.clip(p, self.lower, self.upper)
-        return dict(zip(self.names, map(float, p), strict=True))
+        return dict(zip(self.names, map(float, np.clip(p, *self.limits)), strict=True))
 
     def slopes(self, x: Array) -> Array:
         """Return the derivatives of the parameters by the search variables; (p,)."""
         return np.where(self.positive, self.start * np.exp(x), self.scale)
 
+    @property
     def bounds(self) -> Array:
-        """Return the bounds of the search variables; (2, p)."""
-        ends = np.array([self.lower, self.upper])
+        """Bounds of the search variables; (2, p)."""
         with np.errstate(all="ignore"):
-            logarithms = np.log(ends / self.start)
-        logarithms[~np.isfinite(ends)] = ends[~np.isfinite(ends)]
-        return np.where(self.positive, logarithms, (ends - self.start) / self.scale)
+            logarithms = np.log(self.limits / self.start)
+        return np.where(self.positive, logarithms, (self.limits - self.start) / self.scale)
 
 
 def _require_arguments(model: Model, variables: Variables, measurement: Measurement) -> None:
@@ -335,70 +329,50 @@ def _start_points(variables: Variables, starts: int, seed: int) -> Array:
     """Return the start given and random starts within the bounds; (starts, p)."""
     points = np.zeros((starts, len(variables.names)))
     if starts > 1:
-        low, high = variables.bounds()
-        for name, finite in zip(variables.names, np.isfinite(high - low), strict=True):
-            if not finite:
-                raise ArgumentError(
-                    f"{WHAT}: {starts} starts need bounds of {name}; give (start, lower, upper)"
-                )
+        low, high = variables.bounds
+        for i in np.flatnonzero(~np.isfinite(high - low)):
+            raise ArgumentError(
+                f"{WHAT}: {starts} starts need bounds of {variables.names[i]}; give (start, "
+                "lower, upper)"
+            )
         random = scipy.stats.qmc.LatinHypercube(len(low), rng=np.random.default_rng(seed))
-        points[1:] = low + (high - low) * random.random(starts - 1)
+        points[1:] = scipy.stats.qmc.scale(random.random(starts - 1), low, high)
     return points
 
 
 # -- search ----------------------------------------------------------------------------------------
 
 
-class Search(NamedTuple):
-    """Start and end of a search, with its numbers of runs; the end is NaN if the search failed."""
-
-    start: Array
-    end: Array
-    cost: float
-    runs: int
-    failed: int
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Ignore warnings of runs in a search; the final runs repeat those that matter."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ModelWarning)
-        yield
-
-
-def _assumed_sigma(measurement: Measurement) -> Array:
-    """Return the standard deviations of a measurement, given or assumed; (m,)."""
-    sigma = measurement.sigma
-    if sigma is None:
-        sigma = ASSUMED * np.abs(measurement.values).max() or 1.0
-    return np.broadcast_to(sigma, len(measurement)).astype(float)
-
-
 @dataclass
 class Problem:
-    """Least squares problem of a calibration.
+    """Least squares problem of a calibration, with N measured values and p parameters.
 
     Attributes:
-        sigma: Standard deviations, by measurement; (m,) each.
         comm: Processes of each run; None for those that are active.
         runs, failed: Number of runs so far, and of those that failed.
+        sigma: Standard deviations, given, assumed or estimated; (N,).
     """
 
     model: Model
     variables: Variables
     measured: tuple[Measurement, ...]
-    sigma: list[Array]
     comm: MPI.Intracomm | None
     runs: int = 0
     failed: int = 0
     _last: tuple[bytes, Array] = (b"", np.empty(0))  # variables and computed values of a run
-    _refused: set[int] = field(default_factory=set)  # measurements whose runs have no derivatives
+    _refused: set[Measurement] = field(default_factory=set)  # whose runs have no derivatives
 
-    @property
-    def splits(self) -> Index:
-        """Index of the first value of each measurement but the first."""
-        return np.cumsum([*map(len, self.measured)])[:-1]
+    def __post_init__(self) -> None:
+        sizes = (np.abs(m.values).max() or 1.0 for m in self.measured)
+        sigma = (
+            np.full(len(m), ASSUMED * size if m.sigma is None else m.sigma)
+            for m, size in zip(self.measured, sizes, strict=True)
+        )
+        self.sigma = np.concatenate([*sigma])
+
+    def split(self, rows: Array) -> tuple[Array, ...]:
+        """Return the rows of each measurement."""
+        return tuple(np.split(rows, np.cumsum([*map(len, self.measured)])[:-1]))
 
     def simulate(self, measurement: Measurement, values: dict[str, float]) -> Solution:
         """Run the model of a measurement."""
@@ -410,32 +384,42 @@ class Problem:
             newton=measurement.newton, progress=False, comm=self.comm,
         )  # fmt: skip
 
-    def computed(self, x: Array) -> Array:
-        """Return the computed values of all measurements; (N,)."""
-        if self._last[0] != x.tobytes():
-            values = self.variables.values(x)
-            rows = [self._computed(m, values) for m in self.measured]
-            self._last = x.tobytes(), np.concatenate(rows)
-        return self._last[1]
+    def residuals(self, x: Array) -> Array:
+        """Return computed minus measured values, divided by standard deviations; (N,).
 
-    def _computed(self, measurement: Measurement, values: dict[str, float]) -> Array:
-        """Return the computed values of a measurement; the same bits on all processes; (m,)."""
-        row = measurement.computed(self.simulate(measurement, values))
-        return row if self.comm is None else self.comm.bcast(row)
+        They are NaN if a run fails, so that the search shortens its step.
+        """
+        measured = np.concatenate([m.values for m in self.measured])
+        try:
+            return np.asarray((self._all_computed(x) - measured) / self.sigma)
+        except FAILURES:
+            self.failed += 1
+            return np.full_like(self.sigma, math.nan)
 
-    def linearize(self, x: Array) -> tuple[Array, Array]:
-        """Return the computed values and their derivatives by the variables; (N,), (N, p)."""
-        base = self.computed(x)
-        pieces = zip(self.measured, np.split(base, self.splits), strict=True)
-        return base, np.concatenate([self._differentiate(m, x, own) for m, own in pieces])
-
-    def _differentiate(self, measurement: Measurement, x: Array, base: Array) -> Array:
-        """Return the derivatives of the values of a measurement, which are ``base`` at x; (m, p).
+    def jacobian(self, x: Array) -> Array:
+        """Return the derivatives of the residuals by the variables; (N, p).
 
         Raises:
             ConvergenceError, ArgumentError: Runs failed.
         """
-        if id(measurement) not in self._refused:
+        pieces = zip(self.measured, self.split(self._all_computed(x)), strict=True)
+        rows = np.concatenate([self._derivatives(m, x, computed) for m, computed in pieces])
+        return np.asarray(rows / self.sigma[:, None])
+
+    def _all_computed(self, x: Array) -> Array:
+        """Return the computed values of all measurements; (N,)."""
+        if self._last[0] != x.tobytes():
+            self._last = x.tobytes(), np.concatenate([self._computed(m, x) for m in self.measured])
+        return self._last[1]
+
+    def _computed(self, measurement: Measurement, x: Array) -> Array:
+        """Return the computed values of a measurement; the same bits on all processes; (m,)."""
+        row = measurement.computed(self.simulate(measurement, self.variables.values(x)))
+        return row if self.comm is None else self.comm.bcast(row)
+
+    def _derivatives(self, measurement: Measurement, x: Array, computed: Array) -> Array:
+        """Return the derivatives of the values of a measurement, which are known at x; (m, p)."""
+        if measurement not in self._refused:
             model = partial(self.model, **measurement.arguments)
             (t0, t1), dt = measurement.t, measurement.dt
             arguments = (measurement.scheme, t0, dt, measurement.newton, measurement.mesh)
@@ -445,44 +429,30 @@ class Problem:
                 self.runs += 1
                 return row if self.comm is None else self.comm.bcast(row)
             except ArgumentError:  # an effect of the scene, or a quantity, has no derivatives
-                self._refused.add(id(measurement))
-        return self._differences(measurement, x, base)
+                self._refused.add(measurement)
+        return self._differences(measurement, x, computed)
 
-    def _differences(self, measurement: Measurement, x: Array, base: Array) -> Array:
-        """Return differences between runs for :meth:`_differentiate`.
+    def _differences(self, measurement: Measurement, x: Array, computed: Array) -> Array:
+        """Return differences between runs for :meth:`_derivatives`.
 
         They are central differences, but one-sided at a bound, and where a run fails.
-
-        Raises:
-            ConvergenceError, ArgumentError: The runs on both sides failed.
         """
-        columns, (low, high) = [], self.variables.bounds()
+        columns, (low, high) = [], self.variables.bounds
         for i in range(len(x)):
-            known: list[tuple[float, Array]] = []
-            errors: list[Exception] = []
+            sides = list[tuple[float, Array]]()
             for end in max(x[i] - STEP, low[i]), min(x[i] + STEP, high[i]):
                 moved = x.copy()
                 moved[i] = end
                 try:
-                    known.append((end, self._computed(measurement, self.variables.values(moved))))
-                except FAILURES as error:
+                    sides.append((end, self._computed(measurement, moved)))
+                except FAILURES:
                     self.failed += 1
-                    errors.append(error)
-            if len(errors) == 2:
-                raise errors[0]
-            if errors:
-                known.append((x[i], base))
-            (a, below), (b, above) = known
+                    if any(known == x[i] for known, _ in sides):
+                        raise
+                    sides.append((x[i], computed))
+            (a, below), (b, above) = sides
             columns.append((above - below) / (b - a))
         return np.stack(columns, axis=1)
-
-    def _or_nan(self, x: Array) -> Array:
-        """Return the computed values, or NaN if a run fails."""
-        try:
-            return self.computed(x)
-        except FAILURES:
-            self.failed += 1
-            return np.full(sum(map(len, self.measured)), math.nan)
 
     def search(self, x: Array) -> tuple[Array, Array, float]:
         """Search for a minimum from x; return the start of the search, its end, and the cost there.
@@ -490,30 +460,28 @@ class Problem:
         A start at which a run fails is moved halfway to zero, the start given, until runs succeed.
         A search ends too early where computed values jump; it goes on from beyond the jump.
         """
-        sigma = np.concatenate(self.sigma)
-        values = np.concatenate([m.values for m in self.measured])
         for _ in range(HALVINGS):
-            if not np.isnan(self._or_nan(x)).any():
+            if not np.isnan(self.residuals(x)).any():
                 break
             x = np.divide(x, 2.0)
         else:
             raise ArgumentError(f"{WHAT}: runs fail at all points between two starts")
-        start, best = x, None
-        for _ in range(1 + RESTARTS):
-            end = scipy.optimize.least_squares(
-                lambda x: (self._or_nan(x) - values) / sigma, x,
-                lambda x: self.linearize(x)[1] / sigma[:, None],
-                bounds=self.variables.bounds(), method="trf", **TOLERANCES,
-            )  # fmt: skip
-            if best is not None and end.cost >= best.cost:
+        best = self._minimum(x)
+        for _ in range(RESTARTS):
+            step, far = further_step(self.variables, best.x, best.jac, best.fun)
+            if not far.any() or np.isnan(self.residuals(best.x + step)).any():
                 break
-            best = end
-            step, far = further_step(self.variables, end.x, end.jac, end.fun)
-            x = np.clip(end.x + step, *self.variables.bounds())
-            if not far.any() or np.isnan(self._or_nan(x)).any():
+            further = self._minimum(best.x + step)
+            if further.cost >= best.cost:
                 break
-        assert best is not None
-        return start, best.x, float(best.cost)
+            best = further
+        return x, best.x, float(best.cost)
+
+    def _minimum(self, x: Array) -> Any:
+        """Return the result of SciPy's search from x."""
+        return scipy.optimize.least_squares(
+            self.residuals, x, self.jacobian, bounds=self.variables.bounds, **TOLERANCES
+        )
 
     def reweight(self, x: Array) -> Array:
         """Return the minimum near x with estimated standard deviations, which become final.
@@ -525,21 +493,15 @@ class Problem:
             ArgumentError: The values of a measurement are too few for an estimate.
         """
         unknown = [k for k, m in enumerate(self.measured) if m.sigma is None]
-        splits, free = self.splits, dict[int, float]()
+        least, free = ROUND_OFF * self.sigma, dict[int, float]()
         for _ in range(ROUNDS if unknown else 0):
-            computed, jacobian = self.linearize(x)
-            orthogonal = np.linalg.qr(jacobian / np.concatenate(self.sigma)[:, None])[0]
-            rows, blocks = np.split(computed, splits), np.split(orthogonal, splits)
-            change = 0.0
+            orthogonal, before = self.split(np.linalg.qr(self.jacobian(x))[0]), self.sigma.copy()
+            rows = self.split(self.residuals(x) * before)
             for k in unknown:
-                values = self.measured[k].values
-                free[k] = len(values) - float(np.sum(blocks[k] ** 2))
-                least = ROUND_OFF * (np.abs(values).max() or 1.0)
-                deviation = math.sqrt(np.sum((values - rows[k]) ** 2) / max(free[k], 1.0))
-                estimate = max(deviation, least)
-                change = max(change, abs(self.sigma[k][0] / estimate - 1.0))
-                self.sigma[k] = np.full(len(values), estimate)
-            if change < SETTLED or len(self.measured) == 1:
+                free[k] = len(rows[k]) - float(np.sum(orthogonal[k] ** 2))
+                self.split(self.sigma)[k][:] = math.sqrt(np.sum(rows[k] ** 2) / max(free[k], 1.0))
+            self.sigma = np.maximum(self.sigma, least)
+            if (np.abs(before / self.sigma - 1.0) < SETTLED).all() or len(self.measured) == 1:
                 break  # the minimum of one measurement does not depend on its deviation
             _, x, _ = self.search(x)
         for k in unknown:
@@ -561,7 +523,7 @@ def _require_effects(problem: Problem) -> None:
     """Raise unless runs at the start succeed, and each parameter has an effect on them."""
     names = problem.variables.names
     try:
-        _, jacobian = problem.linearize(np.zeros(len(names)))
+        jacobian = problem.jacobian(np.zeros(len(names)))
     except ConvergenceError as error:
         error.args = (f"{WHAT}: the run at the start failed; give another start. {error}",)
         raise
@@ -574,34 +536,37 @@ def _require_effects(problem: Problem) -> None:
             )
 
 
-def _search_all(
-    problem: Problem, points: Array, progress: bool, comm: MPI.Intracomm
-) -> list[Search]:
-    """Search from each point; several searches are the members of a study."""
+def _search_all(problem: Problem, points: Array, progress: bool) -> tuple[Array, Array, Array]:
+    """Search from each point; return starts, ends and costs, which are NaN for failed searches.
+
+    Several searches are the members of a study.
+    """
     if len(points) == 1:
-        return [Search(*problem.search(points[0]), 0, 0)]
+        begin, end, cost = problem.search(points[0])
+        return begin[None], end[None], np.array([cost])
 
     def member(start: list[float]) -> dict[str, Any]:
         own = replace(problem, comm=None, runs=0, failed=0)
-        begin: Array = np.array(start)
+        begin = np.array(start)
         end, cost = np.full_like(begin, math.nan), math.nan
-        with _quiet(), suppress(*FAILURES):
+        with suppress(*FAILURES):
             begin, end, cost = own.search(begin)
-        return dict(zip(Search._fields, (begin, end, cost, own.runs, own.failed), strict=True))
+        return {"start": begin, "end": end, "cost": cost, "counts": [own.runs, own.failed]}
 
     member.__name__ = WHAT
     cases = [{"start": [*map(float, point)]} for point in points]
-    found = study(member, cases, progress=progress, comm=comm)
+    found = study(member, cases, progress=progress, comm=problem.comm)
     if np.isnan(found["cost"]).all():
         raise ArgumentError(f"{WHAT}: all searches failed; give narrower bounds around the start")
-    rows = zip(*(found[name] for name in Search._fields), strict=True)
-    return [Search(begin, end, float(c), int(n), int(m)) for begin, end, c, n, m in rows]
+    runs, failed = found["counts"].sum(axis=0).astype(int)
+    problem.runs, problem.failed = problem.runs + int(runs), problem.failed + int(failed)
+    return found["start"], found["end"], found["cost"]
 
 
 # -- what data determine ---------------------------------------------------------------------------
 
 
-def _covariance(jacobian: Array) -> tuple[Array, list[list[int]]]:
+def _covariance(jacobian: Array) -> tuple[Array, list[Index]]:
     """Return the covariance of variables, and the variables in each undetermined direction.
 
     Args:
@@ -613,18 +578,15 @@ def _covariance(jacobian: Array) -> tuple[Array, list[list[int]]]:
     """
     lengths = np.sqrt(np.sum(jacobian**2, axis=0))
     lengths[lengths == 0.0] = 1.0
-    p = len(lengths)
-    triangle = np.zeros((p, p))
-    r = np.linalg.qr(jacobian / lengths, mode="r")
-    triangle[: len(r)] = r
-    _, s, directions = np.linalg.svd(triangle)
-    weak = s <= SINGULAR * s[0]
-    undetermined = [[*np.flatnonzero(row > INVOLVED)] for row in np.abs(directions[weak])]
-    rows = directions[~weak] / s[~weak, None] / lengths
+    unit = jacobian / lengths
+    squares, directions = np.linalg.eigh(unit.T @ unit)
+    weak = squares <= SINGULAR**2 * squares[-1]
+    undetermined = [np.flatnonzero(row > INVOLVED) for row in np.abs(directions[:, weak].T)]
+    rows = directions[:, ~weak].T / np.sqrt(squares[~weak, None]) / lengths
     covariance: Array = rows.T @ rows
-    for i in sorted({i for group in undetermined for i in group}):
-        covariance[i] = covariance[:, i] = math.nan
-        covariance[i, i] = math.inf
+    for group in undetermined:
+        covariance[group] = covariance[:, group] = math.nan
+        covariance[group, group] = math.inf
     return covariance, undetermined
 
 
@@ -633,34 +595,24 @@ def further_step(
 ) -> tuple[Array, Array]:
     """Return the further step of a search that has ended at x, and where it is too long; (p,) each.
 
-    Args:
-        variables: Search variables.
-        x: End of the search.
-        jacobian: Derivatives of ``residuals``; (N, p).
-        residuals: Computed minus measured values, divided by their standard deviations; (N,).
+    It is the minimum of the linearized problem within the bounds, or zero if this is far away,
+    because the data hardly determine a parameter.  ``jacobian`` has the derivatives of
+    ``residuals``; (N, p) and (N,).
     """
-    free = np.abs(x - variables.bounds()).min(axis=0) >= AT_BOUND
-    step, far = np.zeros(len(x)), np.zeros(len(x), dtype=bool)
-    if not free.any():
-        return step, far
-    covariance, undetermined = _covariance(jacobian[:, free])
-    if undetermined:
-        return step, far
-    step[free] = -covariance @ (jacobian[:, free].T @ residuals)
-    if np.abs(step).max() > WIDE:  # the data hardly determine a parameter
-        return np.zeros(len(x)), far
+    step = scipy.optimize.lsq_linear(jacobian, -residuals, variables.bounds - x).x
+    if np.abs(step).max() > WIDE:
+        step = 0.0 * step
     # The residuals tell the sizes of errors if standard deviations are assumed.
-    variance = covariance.diagonal() * np.mean(residuals**2)
-    far[free] = np.abs(step[free]) > np.maximum(STALLED * np.sqrt(variance), LEAST_MOVE)
-    return step, far
+    deviations = np.sqrt(_covariance(jacobian)[0].diagonal() * np.mean(residuals**2))
+    return step, np.abs(step) > np.maximum(STALLED * deviations, NEAR)
 
 
 def _faults(
-    variables: Variables, x: Array, widths: Array, correlations: Array,
-    undetermined: list[list[int]],
+    variables: Variables, x: Array, widths: Array, intervals: dict[str, tuple[float, float]],
+    correlations: Array, undetermined: list[Index],
 ) -> Iterator[str]:  # fmt: skip
     """Yield a sentence for each parameter, or group of them, that the data do not determine."""
-    names, values, (low, high) = variables.names, variables.values(x), variables.bounds()
+    names, values, (low, high) = variables.names, variables.values(x), variables.bounds
     remedy = "fix a parameter, or add a measurement that depends on it in another way"
     for group in undetermined:
         several = " and ".join(names[i] for i in group)
@@ -676,13 +628,13 @@ def _faults(
                     f"{correlations[i, j]:.4f}; {remedy}"
                 )
         if WIDE < widths[i] < math.inf:
-            least, most = (variables.values(x + sign * widths)[name] for sign in (-1, 1))
+            least, most = intervals[name]
             yield (
                 f"the data hardly determine {name}: its 95 % interval is {least:.3g} to "
                 f"{most:.3g}; {remedy}"
             )
         for word, bound in ("lower", low[i]), ("upper", high[i]):
-            if abs(x[i] - bound) < AT_BOUND:
+            if abs(x[i] - bound) < NEAR:
                 yield (
                     f"{name} = {values[name]:.4g} is at its {word} bound, so that its interval and "
                     "those of others do not hold; give wider bounds, or fix it"

@@ -6,14 +6,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+import scipy  # its subpackages are loaded when they are used
 
-from ufl_beam.arrays import Array
-from ufl_beam.display import TIME, Rich, counted
+from ufl_beam.arrays import Array, Index
+from ufl_beam.display import TIME, Rich, aligned, counted
 from ufl_beam.errors import (
     ArgumentError,
     require_all,
@@ -26,7 +28,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.mechanics.time_scheme import Scheme, order_of
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.records import Record, Text
+from ufl_beam.model.records import Instance, Positive, Record, Text
 from ufl_beam.simulation.initial_state import SAME_TIME, require_scheme
 from ufl_beam.simulation.run import require_times
 from ufl_beam.simulation.solution import Solution
@@ -38,13 +40,9 @@ SAME = 1e-8
 """Largest difference of costs that count as one minimum, as a fraction of 1 + cost; a difference
 of the cost by 1/2 is one standard deviation."""
 
-STENCIL = {2: 4, 4: 6}  # number of stored states in an interpolation, by the order of the scheme
-
 
 def _require_sigma(value: Any, what: str) -> Any:
     """Return a standard deviation, or one for each value, as a float or an array; all positive."""
-    if value is None:
-        return None
     array = require_array(value, what)
     if array.ndim == 0:
         return require_number(array, what, positive=True)
@@ -65,11 +63,11 @@ def _require_labels(value: Any, what: str) -> tuple[str, str]:
 class Measurement(Record):
     """Measured values, and the run that computes them; an argument of :func:`calibrate`.
 
-    The computed history is interpolated at the measured times by cubic polynomials through the four
-    nearest stored states.  For smooth motions this error is of fourth order in the step and smaller
-    than the error of the steps, of second order.  Runs with ``EnergyMomentum(order=4)`` have six
-    states and an error of sixth order.  Where a history jumps or has a kink, the interpolation is
-    linear at best; choose steps that end at the measured times.
+    A cubic spline through the stored states interpolates the computed history at the measured
+    times.  For smooth motions this error is of fourth order in the step and smaller than the error
+    of the steps, of second order.  Runs with ``EnergyMomentum(order=4)`` have a quintic spline and
+    an error of sixth order.  Near a jump or kink of a history the interpolation is of first order
+    at best; choose steps that end at the measured times.
 
     Accelerations hold in the middle of the step that ends at the time of their row.  So do
     reactions and section forces in energy-momentum schemes; with ``order=4`` these hold 0.207 dt
@@ -114,35 +112,29 @@ class Measurement(Record):
 
     times: npt.ArrayLike | None
     values: Annotated[Any, require_row]
-    quantity: Quantity
+    quantity: Annotated[Quantity, partial(require_function, arguments="a solution")]
     _: KW_ONLY
-    scheme: Scheme
+    scheme: Annotated[Scheme, require_scheme]
     t: tuple[float, float]
-    dt: float
+    dt: Positive
     sigma: Annotated[Any, _require_sigma] = None
-    arguments: Mapping[str, Any] = MappingProxyType({})
+    arguments: Annotated[Mapping[str, Any], partial(require_kind, kind=Mapping)] = MappingProxyType(
+        {}
+    )
     name: Text = "measurement"
     labels: Annotated[tuple[str, str], _require_labels] = (TIME.name, "value")
-    mesh: Mesh | None = None
-    newton: Newton | None = None
+    mesh: Instance[Mesh | None] = None
+    newton: Instance[Newton | None] = None
 
     _refused: ClassVar[type[ArgumentError]] = ArgumentError
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        what = f"Measurement {self.name}"
-        require_function(self.quantity, f"{what}: quantity", "a solution")
-        require_scheme(self.scheme, f"{what}: scheme")
+        what = self._label()
         t0, t1 = require_times(self.t, what)
-        require_number(self.dt, f"{what}: dt", positive=True)
-        require_kind(self.arguments, Mapping, f"{what}: arguments")
-        if self.mesh is not None:
-            require_kind(self.mesh, Mesh, f"{what}: mesh")
-        if self.newton is not None:
-            require_kind(self.newton, Newton, f"{what}: newton")
         if not len(self):
             raise ArgumentError(f"{what}: values is empty")
-        if self.sigma is not None and np.shape(self.sigma) not in {(), (len(self),)}:
+        if np.shape(self.sigma) not in {(), (len(self),)}:
             raise ArgumentError(
                 f"{what}: sigma has {len(self.sigma)} standard deviations for {len(self)} values"
             )
@@ -154,8 +146,7 @@ class Measurement(Record):
         object.__setattr__(self, "times", times)
         if len(times) != len(self):
             raise ArgumentError(f"{what}: {len(times)} times and {len(self)} values")
-        if (np.diff(times) <= 0).any():
-            k = int(np.argmax(np.diff(times) <= 0))
+        for k in np.flatnonzero(np.diff(times) <= 0):
             raise ArgumentError(
                 f"{what}: times must increase, but {times[k + 1]:g} follows {times[k]:g}"
             )
@@ -164,6 +155,9 @@ class Measurement(Record):
                 f"{what}: times[{k}] = {times[k]:g} is outside the run from {t0:g} to {t1:g}; "
                 "change t=, or leave out the value"
             )
+
+    def _label(self) -> str:
+        return f"Measurement {self.name}"
 
     def __len__(self) -> int:
         return len(self.values)
@@ -177,54 +171,36 @@ class Measurement(Record):
         Raises:
             ArgumentError: The quantity returned another number of values, or no finite numbers.
         """
-        what = f"Measurement {self.name}: quantity"
+        what = f"{self._label()}: quantity"
         with np.errstate(all="ignore"):
             returned = self.quantity(solution)
         try:
             values = np.asarray(returned, dtype=float)
         except (TypeError, ValueError):
             raise ArgumentError(f"{what} returned {shorten(returned)}, not numbers") from None
-        number, of = (len(self), "measured value") if self.times is None else (
-            len(solution), "stored time"
-        )  # fmt: skip
+        number, of = len(solution), "stored time"
         if self.times is None:
-            values = values.reshape(-1)
+            number, of, values = len(self), "measured value", values.reshape(-1)
         if values.shape != (number,):
             raise ArgumentError(
                 f"{what} returned an array of shape {values.shape}; it must return one number for "
                 f"each {of}, of shape ({number},)"
             )
-        finite = np.isfinite(values)
-        first = int(np.argmax(finite))  # the first row of accelerations and reactions may be NaN
-        if not finite[first:].all() or (self.times is None and first):
-            k = first + int(np.argmin(finite[first:])) if first < len(values) else 0
+        # The first rows of accelerations and reactions may be NaN.
+        first = 0 if self.times is None else int(np.argmax(np.isfinite(values)))
+        for k in first + np.flatnonzero(~np.isfinite(values[first:])):
             raise ArgumentError(f"{what} returned {values[k]} at index {k}, not a finite number")
         if self.times is None:
             return values
-        at: Any = self.times
-        stored = solution.times[first:]
+        at, stored = np.asarray(self.times), solution.times[first:]
         if at[0] < stored[0]:
             raise ArgumentError(
                 f"{what} returned {values[0]} at the beginning of the run; leave out the measured "
                 f"values before {stored[0]:g}"
             )
-        return _interpolate(at, stored, values[first:], STENCIL[order_of(self.scheme)])
-
-
-def _interpolate(at: Array, times: Array, values: Array, number: int = STENCIL[2]) -> Array:
-    """Interpolate values by polynomials through a number of nearest times; (len(at),).
-
-    The result at a time of ``times`` is its value, to the last bit.
-    """
-    order = np.arange(min(number, len(times)))
-    first = np.searchsorted(times, at, side="right") - len(order) // 2
-    index = np.clip(first, 0, len(times) - len(order))[:, None] + order
-    nodes, result = times[index], np.zeros(len(at))
-    for k in order:
-        others = np.delete(nodes, k, axis=1)
-        weight = np.prod((at[:, None] - others) / (nodes[:, [k]] - others), axis=1)
-        result += weight * values[index[:, k]]
-    return result
+        degree = min(order_of(self.scheme) + 1, len(stored) - 1)
+        spline = scipy.interpolate.make_interp_spline(stored, values[first:], k=degree)
+        return np.asarray(spline(at))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -260,17 +236,15 @@ class Calibration(Rich):
         warnings: Warnings on parameters that the data do not determine.
 
     Example:
-        >>> def cantilever(E):
-        ...     steel = ub.Section.rectangle(b=0.1, h=0.2, E=E, nu=0.3, rho=7850.0)
-        ...     arm = ub.Beam((0, 0), (2, 0), steel, cells=4, name="arm")
-        ...     force = ub.PointLoad(arm.end, force=(0, -1e3), amplitude=lambda t: t)
-        ...     return ub.Scene([arm], supports=[ub.Clamped(arm.start)], loads=[force])
-        >>> bent = st.Measurement([0.5, 1.0], [-0.095e-3, -0.192e-3],
-        ...     lambda run: run.displacement(run.scene["arm"].end)[:, 1],
+        >>> def pushed(push):
+        ...     load = ub.PointLoad(beam.end, force=(0, push), amplitude=lambda t: t)
+        ...     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+        >>> bent = st.Measurement(
+        ...     None, [-0.99e-3, -2.01e-3], lambda run: run.displacement(beam.end)[1:, 1],
         ...     scheme=ub.Static(), t=(0, 1), dt=0.5)
-        >>> fit = st.calibrate(cantilever, {"E": 100e9}, [bent])
-        >>> print(f"{fit.parameters['E'] / 1e9:.0f} GPa")
-        207 GPa
+        >>> fit = st.calibrate(pushed, {"push": -1e3}, [bent])
+        >>> print(f"{fit.parameters['push']:.0f} N")
+        -10604 N
         >>> figure = ub.plot(fit)
     """
 
@@ -308,8 +282,13 @@ class Calibration(Rich):
     @property
     def same_minimum(self) -> int:
         """Number of starts that ended at the least cost, within 1e-8 of 1 + cost."""
-        least = np.nanmin(self.end_costs)
-        return int((self.end_costs <= least + SAME * (1.0 + least)).sum())
+        return len(self._minima()[0])
+
+    def _minima(self) -> list[Index]:
+        """Return the indices of the starts that ended at each minimum, by increasing cost."""
+        order = np.argsort(self.end_costs)[: np.isfinite(self.end_costs).sum()]
+        costs = self.end_costs[order]
+        return np.split(order, 1 + np.flatnonzero(np.diff(costs) > SAME * (1.0 + costs[:-1])))
 
     def table(self) -> list[list[str]]:
         """Return a header and a row of texts for each parameter."""
@@ -342,33 +321,20 @@ class Calibration(Rich):
                 f"{m.name}: {number}, standard deviation {size} ({origin}), residuals "
                 f"{root:.2f} times as large"
             )
-        if len(self.starts) > 1:
-            lines += self._minima()
+        if (starts := len(self.starts)) > 1:
+            lines.append(f"{self.same_minimum} of {starts} starts end at the least cost")
+            best, *others = self._minima()
+            for group in others:
+                ratio = self.end_costs[group[0]] / self.end_costs[best[0]]
+                ends = zip(names, self.ends[group[0]], strict=True)
+                end = ", ".join(f"{name} = {value:.4g}" for name, value in ends)
+                lines.append(f"  {len(group)} at {ratio:.6g} times this cost, {end}")
+            if lost := int(np.isnan(self.end_costs).sum()):
+                lines.append(f"  {lost} failed")
         return [*lines, *self.warnings]
 
-    def _minima(self) -> list[str]:
-        """Return lines on the minima at which the searches ended, by increasing cost."""
-        known = np.flatnonzero(~np.isnan(self.end_costs))
-        order, lines = known[np.argsort(self.end_costs[known])], []
-        least = self.end_costs[order[0]]
-        lines.append(f"{self.same_minimum} of {len(self.starts)} starts end at the least cost")
-        while len(order := order[self.end_costs[order] > least + SAME * (1.0 + least)]):
-            least = self.end_costs[order[0]]
-            number = int((self.end_costs[order] <= least + SAME * (1.0 + least)).sum())
-            ratio = least / np.nanmin(self.end_costs)
-            end = ", ".join(
-                f"{n} = {x:.4g}" for n, x in zip(self.parameters, self.ends[order[0]], strict=True)
-            )
-            lines.append(f"  {number} at {ratio:.6g} times this cost, {end}")
-        if lost := len(self.starts) - len(known):
-            lines.append(f"  {lost} failed")
-        return lines
-
     def __str__(self) -> str:
-        rows = self.table()
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        text = ["  ".join(map(str.rjust, row, widths)) for row in rows]
-        return "\n".join([repr(self)[1:-1], *text, *self.remarks()])
+        return "\n".join([repr(self)[1:-1], *aligned(self.table()), *self.remarks()])
 
     def __repr__(self) -> str:
         failed = f", {self.failed} failed" if self.failed else ""
