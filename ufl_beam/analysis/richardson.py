@@ -87,10 +87,13 @@ class Convergence:
 
         The result is linear, between levels, in the size of cells or steps to the power ``used``.
         """
-        levels = np.append(np.arange(len(self.changes), -1.0, -1.0), 0.0)
-        s = np.append(0.0, 2.0 ** (-self.used * levels[:-1]))
+        s = np.append(0.0, self.fraction(np.arange(self.finest, self.coarsest - 1.0, -1.0)))
         spline = scipy.interpolate.make_interp_spline(s, self.remaining_errors[::-1], k=1)
-        return np.asarray(spline(2.0 ** (-self.used * (np.asarray(level) - self.coarsest))))
+        return np.asarray(spline(self.fraction(level)))
+
+    def fraction(self, level: npt.ArrayLike) -> Array:
+        """Predict the error on a level as a fraction of the error on the coarsest level."""
+        return np.asarray(2.0 ** (-self.used * (np.asarray(level) - self.coarsest)))
 
     def bound_at(self, level: float) -> float:
         """Bound the error of the limit extrapolated from a run on a level; unit of the quantity.
@@ -134,13 +137,9 @@ class SelfConvergence:
         uncertain.
         """
         limit = np.asarray(value + self.cells.remaining_error(i) + self.steps.remaining_error(j))
-        c, s = (
-            2.0 ** (-x.used * (level - x.coarsest))
-            for x, level in ((self.cells, i), (self.steps, j))
-        )
         moved = size(limit - self.limit)
-        bound = self.cells.bound_at(i) + self.steps.bound_at(j)
-        bound = bound + moved / ((1 - c) * (1 - s)) - moved
+        part = (1 - self.cells.fraction(i)) * (1 - self.steps.fraction(j))
+        bound = self.cells.bound_at(i) + self.steps.bound_at(j) + moved / float(part) - moved
         return replace(self, limit=limit, uncertainty=bound)
 
     def __str__(self) -> str:
@@ -155,8 +154,7 @@ def fit_cost(steps: Array, cells: Array, seconds: Array) -> Array:
 
 def pareto(seconds: Array, errors: Array) -> list[int]:
     """Find indices of runs that no other run beats in time and error, the fastest run first."""
-    front: list[int] = []
-    for k in np.lexsort((errors, seconds)):
-        if not front or errors[k] < errors[front[-1]]:
-            front.append(int(k))
-    return front
+    order = np.lexsort((errors, seconds))
+    least = np.minimum.accumulate(errors[order])
+    better = np.append(True, least[1:] < least[:-1])
+    return [int(k) for k in order[better]]

@@ -9,15 +9,15 @@ from collections.abc import Callable, Mapping, Sequence
 from contextvars import copy_context
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 from itertools import product
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.analysis.parameter_study import study
 from ufl_beam.analysis.richardson import Convergence, SelfConvergence, fit_cost, size
 from ufl_beam.analysis.tradeoff_result import Refinement, Run, Setting, Target, Tradeoff
 from ufl_beam.arrays import Array
@@ -26,7 +26,6 @@ from ufl_beam.errors import (
     ConvergenceError,
     TradeoffError,
     each_warning_once,
-    require_all,
     require_function,
     require_kind,
     require_number,
@@ -46,8 +45,6 @@ from ufl_beam.solvers.newton_options import Newton
 MESHES = Mesh(degree=2), Mesh()  # meshes that are compared by default
 NEWTONS = (Newton(),)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
-WRONG = "ArgumentError: "  # in the message of a failure that no refinement can avoid
-LATE = "TradeoffError: "  # in the message of a run that was ended
 LEAST_USED = 0.3  # least error of the recommended run, as a fraction of a tolerance
 # Largest uncertainty of a limit, as a fraction of a tolerance.  The sum of an error of LEAST_USED
 # and this uncertainty is the tolerance.
@@ -67,7 +64,7 @@ SCATTER = 0.1  # relative scatter of times of equal runs on an idle machine, see
 
 Quantity = Callable[[Solution], npt.ArrayLike]
 
-Value = TypeVar("Value")
+Found = tuple[dict[str, Array], dict[str, float]]  # quantities and cost of a run
 
 
 @each_warning_once()
@@ -139,16 +136,11 @@ def tradeoff(
     require_switch(progress, "tradeoff: progress")
     comm = communicator(comm, "tradeoff: comm")
     t = require_times(t, "tradeoff")
-    meshes = _several(MESHES if mesh is None else mesh, Mesh, "mesh")
-    newtons = _several(NEWTONS if newton is None else newton, Newton, "newton")
-    schemes: tuple[Scheme, ...] = _several(scheme, object, "scheme")
-    for i, x in enumerate(schemes):
-        require_scheme(x, f"tradeoff: scheme[{i}]" if len(schemes) > 1 else "tradeoff: scheme")
-    steps: tuple[float | Adaptive, ...] = _several(dt, object, "dt")
-    for i, step in enumerate(steps):
-        if not isinstance(step, Adaptive):
-            what = f"tradeoff: dt[{i}]" if len(steps) > 1 else "tradeoff: dt"
-            require_number(step, what, positive=True)
+    meshes = _several(MESHES if mesh is None else mesh, "mesh", partial(require_kind, kind=Mesh))
+    newtons = _several(
+        NEWTONS if newton is None else newton, "newton", partial(require_kind, kind=Newton)
+    )
+    schemes, steps = _several(scheme, "scheme", require_scheme), _several(dt, "dt", _require_step)
     families = [Setting(*x, newtons[0]) for x in product(schemes, steps, meshes)]
     with progress_bar(progress, comm, unit="run", bar_format=BAR) as bar:
         runs = _Runs(scene, quantities, families, newtons, t, max_seconds, comm, bar)
@@ -230,14 +222,23 @@ def _checked_target(
     return Target(tolerance, 0.0, math.inf)
 
 
-def _several(values: Value | Sequence[Value], kind: type, what: str) -> tuple[Value, ...]:
-    """Return a value, or a sequence of values, of type ``kind`` as a tuple."""
+def _several(values: Any, argument: str, check: Callable[..., object]) -> tuple[Any, ...]:
+    """Return a value, or a sequence of values, as a tuple of checked values."""
+    what = f"tradeoff: {argument}"
     if not isinstance(values, Sequence) or isinstance(values, str | bytes):
-        require_kind(values, kind, f"tradeoff: {what}")
-        return (values,)  # type: ignore[return-value]
+        check(values, what=what)
+        return (values,)
     if not values:
-        raise ArgumentError(f"tradeoff: {what} is empty")
-    return require_all(values, f"tradeoff: {what}", kind)
+        raise ArgumentError(f"{what} is empty")
+    for i, value in enumerate(values):
+        check(value, what=f"{what}[{i}]")
+    return tuple(values)
+
+
+def _require_step(step: float | Adaptive, what: str) -> None:
+    """Raise :class:`ArgumentError` unless a step is a positive number or :class:`Adaptive`."""
+    if not isinstance(step, Adaptive):
+        require_number(step, what, positive=True)
 
 
 @dataclass(eq=False)
@@ -265,10 +266,12 @@ class _Runs:
         with alone():
             try:
                 self._simulate(until, self.setting(first))
-                self._store(first, self._member(*first))
-                self.bar.update(1)
+                found = self._compute(first)
             except ConvergenceError as error:
                 self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may converge
+                return
+        self._store(first, self.comm.bcast(found))
+        self.bar.update(1)
 
     def run(self, refinements: Sequence[Refinement], *, optional: bool = False) -> None:
         """Do the runs that are missing, several at a time if there are several processes.
@@ -289,24 +292,20 @@ class _Runs:
                 f"finest is {finest}"
             )
         self.bar.set_postfix_str(f"{len(missing)} more up to {finest}")
-        cases = [r._asdict() | {"refine": str(r.refine)} for r in missing]
-        try:
-            done = study(self._member, cases, progress=False, comm=self.comm)
-            failed = done.failed
-        except RuntimeError as error:  # all of them failed
-            failed = dict.fromkeys(range(len(missing)), str(error))
-        finally:
-            self.bar.set_postfix_str("", refresh=False)
-            self.bar.update(len(missing))
+        rank, size = self.comm.rank, self.comm.size
+        done = self.comm.allgather([self._outcome(r) for r in missing[rank::size]])
+        self.bar.set_postfix_str("", refresh=False)
+        self.bar.update(len(missing))
         for k, refinement in enumerate(missing):
-            if k not in failed:
-                self._store(refinement, {name: done[name][k] for name in done.results})
-            elif WRONG in failed[k]:
-                raise ArgumentError(failed[k].partition(WRONG)[2])
-            elif LATE in failed[k] and not optional:
-                raise TradeoffError(failed[k].partition(LATE)[2])
+            found = done[k % size][k // size]
+            if isinstance(found, tuple):
+                self._store(refinement, found)
+            elif isinstance(found, ArgumentError) or (
+                isinstance(found, TradeoffError) and not optional
+            ):
+                raise found
             else:
-                self.failed[refinement] = failed[k]
+                self.failed[refinement] = str(found)
 
     def setting(self, refinement: Refinement) -> Setting:
         """Return the setting of a refinement.
@@ -367,43 +366,46 @@ class _Runs:
         context.run(interrupt.set, require_time)
         return context.run(simulate, self.scene, t=t, progress=False, **vars(setting))
 
-    def _member(
-        self, family: int, refine: str | Fraction, level: float, newton: int
-    ) -> dict[str, Any]:
-        """Compute one run, as a member of a study."""
-        setting = self.setting(Refinement(family, Fraction(refine), level, newton))
-        solution = self._simulate(self.t[1], setting)
-        content: dict[str, Any] = {
+    def _outcome(self, refinement: Refinement) -> Found | Exception:
+        """Return the result of a run on this process alone, or its error."""
+        try:
+            with alone():
+                return self._compute(refinement)
+        except Exception as error:
+            # No refinement can avoid the first kind of error; the second one ends a late run.
+            if type(error) in (ArgumentError, TradeoffError):
+                return error
+            return RuntimeError(f"{type(error).__name__}: {error}")  # any process can receive it
+
+    def _compute(self, refinement: Refinement) -> Found:
+        """Return the quantities and the cost of a run, as in :class:`Run`."""
+        solution = self._simulate(self.t[1], self.setting(refinement))
+        return {name: self._value(name, solution) for name in self.quantities}, {
             "seconds": solution.seconds,
             "building": solution.building,
-            "steps": solution.substeps,
-            "cells": len(solution.numbering.cells),
+            "steps": float(solution.substeps),
+            "cells": float(len(solution.numbering.cells)),
             "iterations": solution.iterations / solution.substeps,
         }
-        known = next(iter(self.runs.values())).values if self.runs else {}
-        for n, (name, quantity) in enumerate(self.quantities.items()):
-            value = np.asarray(quantity(solution), dtype=float)
-            if not np.isfinite(value).all():
-                raise ArgumentError(f"tradeoff: quantity {name!r} is not finite")
-            before = np.shape(known.get(name, value))
-            if before != value.shape:
-                raise ArgumentError(
-                    f"tradeoff: quantity {name!r} has shape {before} in a run and {value.shape} "
-                    "in another with other steps or cells; give a number, or an array at times "
-                    "and places of your own (np.interp)"
-                )
-            content[f"quantity {n}"] = value
-        return content
 
-    def _store(self, refinement: Refinement, content: dict[str, Any]) -> None:
-        """Store a run, with the content on the first process."""
-        content = self.comm.bcast(content)
-        values = {
-            name: np.asarray(content.pop(f"quantity {n}")) for n, name in enumerate(self.quantities)
-        }
-        took = {name: float(measured) for name, measured in content.items()}
-        self.spent += took["seconds"]
-        self.runs[refinement] = Run(refinement, self.setting(refinement), values, **took)
+    def _store(self, refinement: Refinement, found: Found) -> None:
+        values, cost = found
+        self.runs[refinement] = Run(refinement, self.setting(refinement), values, **cost)
+        self.spent += cost["seconds"]
+
+    def _value(self, name: str, solution: Solution) -> Array:
+        """Return a quantity of a run, which must be finite, and of the same shape in all runs."""
+        value = np.asarray(self.quantities[name](solution), dtype=float)
+        if not np.isfinite(value).all():
+            raise ArgumentError(f"tradeoff: quantity {name!r} is not finite")
+        before = next((np.shape(run.values[name]) for run in self.runs.values()), value.shape)
+        if before != value.shape:
+            raise ArgumentError(
+                f"tradeoff: quantity {name!r} has shape {before} in a run and {value.shape} "
+                "in another with other steps or cells; give a number, or an array at times "
+                "and places of your own (np.interp)"
+            )
+        return value
 
 
 class _Candidate(NamedTuple):
@@ -446,21 +448,17 @@ class _Search:
         """Find the setting and its error by runs; raise TradeoffError if no setting is found."""
         while True:
             expected = min(self.uncertainty, NEGLIGIBLE)  # uncertainty after refinement of the base
-            candidate = self._choose(expected)
+            candidate, before = self._choose(expected), self._base.copy()
             levels = math.log2(candidate.refine), candidate.level
-            some, base = next(iter(self.convergence.values())), self._base
-            finest = some.cells.finest, some.steps.finest
-            far = np.greater(levels, finest).any()
+            far = np.greater(levels, self._finest).any()
             if far or self.uncertainty > self._negligible(candidate):
-                base = [int(x) for x in np.clip(np.round(levels) - 1, base, np.add(base, FURTHER))]
-            before = self._base.copy()
-            if base == self._base:
+                further = np.clip(np.round(levels) - 1, before, np.add(before, FURTHER))
+                self._base = [int(x) for x in further]
+            if self._base == before:
                 self._confirm(candidate)
                 if self.uncertainty <= MOST_UNCERTAINTY:
                     break
                 self._base[self._worst()[0]] += 1
-            else:
-                self._base = base
             try:
                 self._refine_base()
             except TradeoffError:
@@ -470,6 +468,12 @@ class _Search:
                 break
         self._choose_newton()
         self._try_settings()
+
+    @property
+    def _finest(self) -> tuple[int, int]:
+        """Finest levels of cells and of steps that show the convergence."""
+        some = next(iter(self.convergence.values()))
+        return some.cells.finest, some.steps.finest
 
     @property
     def uncertainty(self) -> float:
@@ -510,9 +514,10 @@ class _Search:
         """Run two or three levels from the base; refine it while limits are too uncertain."""
         while True:
             i, j = self._base
-            first, *others = wanted = [
-                self._at(2**i, j), self._at(2 ** (i + 1), j), self._at(2**i, j + 1)
-            ]  # fmt: skip
+            # Three levels of cells, and of steps
+            along = [[self._at(2 ** (i + k), j) for k in range(3)]]
+            along.append([self._at(2**i, j + k) for k in range(3)])
+            wanted = [along[0][0], along[0][1], along[1][1]]
             self._runs.run(wanted[:1])  # its time predicts the times of the other runs
             self._runs.run(wanted)
             failed = [self._runs.failed[run] for run in wanted if run in self._runs.failed]
@@ -529,30 +534,20 @@ class _Search:
                         "quantities, and no budget"
                     )
                 self.units[name] = unit
-            thirds = [self._at(2 ** (i + 2), j), self._at(2**i, j + 2)]
-            matter = [self._matters(values[0], finer) for finer in values[1:]]
-            self._runs.run([run for run, needed in zip(thirds, matter, strict=True) if needed])
-            along = [
-                [first, second, third] if needed and third in self._runs.runs else [first, second]
-                for second, third, needed in zip(others, thirds, matter, strict=True)
-            ]
+            for line, finer in zip(along, values[1:], strict=True):
+                if not self._matters(values[0], finer):
+                    line.pop()  # two levels suffice
+            self._runs.run([run for line in along for run in line])
+            along = [[run for run in line if run in self._runs.runs] for line in along]
             family = self._runs.families[self.family]
             orders = 2.0 * family.mesh.degree, float(order_of(family.scheme))
             for name in self.units:
-                cells, steps = (
-                    Convergence.estimate(
-                        [self._runs.runs[run].values[name] for run in line], base, order
-                    )
-                    for line, base, order in zip(along, self._base, orders, strict=True)
-                )
+                levels = ([self._runs.runs[run].values[name] for run in line] for line in along)
+                cells, steps = map(Convergence.estimate, levels, self._base, orders)
                 self.convergence[name] = SelfConvergence.extrapolate(values[0][name], cells, steps)
             if self.uncertainty <= MOST_UNCERTAINTY or self._worst()[1]:
                 return
-            self._move_base(
-                "".join(
-                    f"\n  {name}{convergence}" for name, convergence in self.convergence.items()
-                )
-            )
+            self._move_base("".join(f"\n  {name}{x}" for name, x in self.convergence.items()))
 
     def _matters(self, values: Mapping[str, Array], finer: Mapping[str, Array]) -> bool:
         """Return whether a change between levels is too large to be neglected."""
@@ -636,27 +631,14 @@ class _Search:
 
         ``uncertainty`` of the limit is divided by units, see :class:`_Search`.
         """
-        some, setting = next(iter(self.convergence.values())), self._runs.families[self.family]
-        top = 2 ** (some.cells.finest + REACH), 2 ** (some.steps.finest + REACH)
+        setting, top = self._runs.families[self.family], [2 ** (x + REACH) for x in self._finest]
         # The coarsest mesh of degree p has 1/p of the user's cells: the number of nodes is similar.
         first = math.ceil(self._divisor / setting.mesh.degree)
         refine = [Fraction(k, self._divisor) for k in _geometric(first, self._divisor * top[0])]
         # Numbers of steps are multiples of the user's, so that all runs reach the user's times.
         multiples = np.array(_geometric(1, top[1]), dtype=float)
         cell_levels, step_levels = np.log2(np.array(refine, dtype=float)), np.log2(multiples)
-        likely = bound = np.zeros((len(cell_levels), len(step_levels)))
-        for name, convergence in self.convergence.items():
-            unit = self.units[name] / self._error_ratio
-            cells = (
-                convergence.cells.remaining_error(cell_levels).reshape(len(cell_levels), 1, -1)
-                / unit
-            )
-            steps = (
-                convergence.steps.remaining_error(step_levels).reshape(1, len(step_levels), -1)
-                / unit
-            )
-            likely = np.maximum(likely, np.abs(cells + steps).max(axis=2))
-            bound = np.maximum(bound, np.abs(cells).max(axis=2) + np.abs(steps).max(axis=2))
+        likely, bound = self._errors(cell_levels, step_levels)
         seconds = self._time_ratios[self._newton] * self._seconds(
             2.0 ** cell_levels[:, None], multiples
         )
@@ -684,6 +666,21 @@ class _Search:
         predicted = (float(x.flat[k]) for x in (seconds, likely, bound))
         return _Candidate(refine[row], float(step_levels[column]), *predicted)
 
+    def _errors(self, i: npt.ArrayLike, j: npt.ArrayLike) -> tuple[Array, Array]:
+        """Predict errors, divided by units, on levels i of cells and j of steps; (len(i), len(j)).
+
+        The first result has the largest errors of the quantities, the second one their bounds, as
+        errors by cells and by steps may cancel.
+        """
+        likely, bound = [], []
+        for name, convergence in self.convergence.items():
+            both = (convergence.cells, i), (convergence.steps, j)
+            cells, steps = (x.remaining_error(k).reshape(np.size(k), -1) for x, k in both)
+            unit = self.units[name] / self._error_ratio
+            likely.append(np.abs(cells[:, None] + steps).max(axis=2) / unit)
+            bound.append((np.abs(cells).max(axis=1)[:, None] + np.abs(steps).max(axis=1)) / unit)
+        return np.max(likely, axis=0), np.max(bound, axis=0)
+
     def _seconds(self, refine: npt.ArrayLike, multiples: npt.ArrayLike) -> Array:
         """Predict wall times with the first options of Newton's method; s."""
         runs = [run for run in self._runs.in_family(self.family) if run.refinement.newton == 0]
@@ -707,14 +704,7 @@ class _Search:
         does not count as accurate if only errors that cancel make it so.
         """
         _, refine, level, newton = run.refinement
-        bound = self._error_ratio * max(
-            (
-                size(c.cells.remaining_error(math.log2(refine)))
-                + size(c.steps.remaining_error(level))
-            )
-            / self.units[name]
-            for name, c in self.convergence.items()
-        )
+        bound = self._errors(math.log2(refine), level)[1].item()
         if math.isfinite(self._target.budget):
             slow = run.seconds > self._target.budget
             return slow, False, run.seconds if slow else bound

@@ -13,7 +13,7 @@ import numpy as np
 
 from ufl_beam.analysis.richardson import SelfConvergence, pareto, size
 from ufl_beam.arrays import Array
-from ufl_beam.display import Rich, bracketed, compact_repr
+from ufl_beam.display import Rich, aligned, bracketed, compact_repr
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.beams import Mesh
 from ufl_beam.solvers.newton_options import Newton
@@ -165,7 +165,8 @@ class Tradeoff(Rich):
     def table(self) -> list[list[str]]:
         """Return a header, and cost, errors and setting of each run of ``front`` and ``best``."""
         rows = [["", "seconds", "steps", "cells", "iterations", *self.limit, "setting"]]
-        for run in sorted({*self.front, self.best}, key=lambda run: run.seconds):
+        shown = dict.fromkeys([*self.front, self.best])
+        for run in sorted(shown, key=lambda run: run.seconds):
             rows.append([
                 "=>" if run is self.best else "", f"{run.seconds:.3g}", f"{run.steps:.0f}",
                 f"{run.cells:.0f}", f"{run.iterations:.2f}",
@@ -189,9 +190,7 @@ class Tradeoff(Rich):
 
     def __str__(self) -> str:
         rows = self.table()
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        widths[-1] = 0  # settings begin in one column
-        lines = ["  ".join(map(str.rjust, row, widths)) for row in rows]
+        lines = aligned(rows, left=len(rows[0]) - 1)
         return "\n".join([self.title(), *lines, *self.remarks()])
 
     def __repr__(self) -> str:
