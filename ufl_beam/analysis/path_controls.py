@@ -10,15 +10,16 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field
-from typing import NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
 from ufl_beam.analysis.critical_points import Stiffness
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ArgumentError, Reversal, StepFailed, require_kind, require_number
+from ufl_beam.errors import ArgumentError, Reversal, StepFailed, require_number
 from ufl_beam.mechanics.time_scheme import Step
 from ufl_beam.model.bodies import Place
+from ufl_beam.model.records import Instance, Number, Positive, Record
 from ufl_beam.model.scene import Scene, not_in
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.simulation import Simulation
@@ -306,7 +307,7 @@ class PathCorrector:
         return stiffness, direction / size
 
 
-class Control:
+class Control(Record):
     """Base class of path controls, which determine the lengths of steps.
 
     A step changes the controlled quantity by ``step``, or by a fraction of ``step``.
@@ -317,8 +318,10 @@ class Control:
     quantity = ""  # name of the controlled quantity if it may have an extremum on a path
     least_rest = 0.0  # least rest of a step after a kink, as a fraction of the step
 
+    _refused: ClassVar[type[ArgumentError]] = ArgumentError
+
     def __post_init__(self) -> None:
-        require_number(self.step, f"{type(self).__name__}: step")
+        super().__post_init__()
         if self.step == 0:
             raise ArgumentError(f"{type(self).__name__}: step = 0 leads nowhere")
 
@@ -407,14 +410,10 @@ class ArcLength(Control):
         [0.49, -0.1]
     """
 
-    step: float
+    step: Number
     _: KW_ONLY
-    factor: float = 1.0
+    factor: Positive = 1.0
     least_rest = 1e-3
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_number(self.factor, "ArcLength: factor", positive=True)
 
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return a positive number if the path continues along ``direction``.
@@ -444,7 +443,7 @@ class LoadControl(Control):
         [0.   0.25 0.5  0.75 1.  ]
     """
 
-    step: float
+    step: Number
     quantity = "the load factor"
 
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
@@ -473,23 +472,20 @@ class DisplacementControl(Control):
         [ 0.   -0.05 -0.1  -0.15 -0.2 ]
     """
 
-    place: Place
+    place: Instance[Place]
     component: str
-    step: float
+    step: Number
     _: KW_ONLY
-    end: float | None = None
+    end: Annotated[float | None, require_number] = None
     factor = math.inf
 
     def __post_init__(self) -> None:
-        require_kind(self.place, Place, "DisplacementControl: place")
+        super().__post_init__()
         if self.component not in COMPONENTS:
             raise ArgumentError(
                 f"DisplacementControl: component = {self.component!r} must be one of "
                 f"{', '.join(COMPONENTS)}"
             )
-        if self.end is not None:
-            require_number(self.end, "DisplacementControl: end")
-        super().__post_init__()
 
     def require(self, scene: Scene) -> None:
         """Raise :class:`ArgumentError` unless the beam of the place is in the scene."""
@@ -551,12 +547,8 @@ class DissipationControl(Control):
         0.25
     """
 
-    step: float
-    otherwise: ArcLength = field(default_factory=lambda: ArcLength(0.05))
-
-    def __post_init__(self) -> None:
-        require_number(self.step, "DissipationControl: step", positive=True)
-        require_kind(self.otherwise, ArcLength, "DissipationControl: otherwise")
+    step: Positive
+    otherwise: Instance[ArcLength] = field(default_factory=lambda: ArcLength(0.05))
 
     @property
     def factor(self) -> float:  # type: ignore[override]

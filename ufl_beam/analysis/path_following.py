@@ -111,10 +111,8 @@ class Path(Solution):
         super()._set_content(content)
         critical = []
         for k, entry in enumerate(content["critical"]):
-            state, inside = (
-                Solution(self.scene, self.numbering),
-                remove_prefix(f"critical/{k}/", content),
-            )
+            state = Solution(self.scene, self.numbering)
+            inside = remove_prefix(f"critical/{k}/", content)
             require_arrays(inside, {"mode": (self.numbering.size,)})
             state._set_content(
                 {**{n: content[n] for n in NAMED}, **remove_prefix("state/", inside)}
@@ -423,26 +421,23 @@ class PathStepper:
                 candidate = self._seek(middle)
             except StepFailed:
                 failed += 1
-                if failed < MOST_FAILURES:
-                    weight_high *= 4
-                    continue
-                if low > 0:
-                    self._fraction = (high - low) / 2
-                    return self._seek(low), low
-                break
+                weight_high *= 4
+                if failed == MOST_FAILURES:
+                    break
+                continue
             if candidate.passed(before):
                 weight_low *= 0.5 if side < 0 else 1.0
                 high, last, weight_high, side = middle, candidate, 1.0, -1
             else:
                 weight_high *= 0.5 if side > 0 else 1.0
                 low, first, weight_low, side = middle, candidate, 1.0, 1
-        candidate, start = self._seek(high), self.corrector.start
-        below = start if low == 0.0 else first.end
-        leap, whole = (self.corrector.length(candidate.end - x) for x in (below, start))
-        if low > 0 and leap > LARGEST_GAP * whole:
-            self._fraction = (fraction - low) / 2
+        leap, whole = (
+            self.corrector.length(last.end - x) for x in (first.end, self.corrector.start)
+        )
+        if low > 0 and (failed == MOST_FAILURES or leap > LARGEST_GAP * whole):
+            self._fraction = ((high if failed == MOST_FAILURES else fraction) - low) / 2
             return self._seek(low), low
-        return candidate, high
+        return self._seek(high), high
 
     def _bifurcation_point(
         self,
