@@ -469,9 +469,10 @@ class Problem:
         best = self._minimum(x)
         for _ in range(RESTARTS):
             step, far = further_step(self.variables, best.x, best.jac, best.fun)
-            if not far.any() or np.isnan(self.residuals(best.x + step)).any():
+            beyond = np.clip(best.x + step, *self.variables.bounds)
+            if not far.any() or np.isnan(self.residuals(beyond)).any():
                 break
-            further = self._minimum(best.x + step)
+            further = self._minimum(beyond)
             if further.cost >= best.cost:
                 break
             best = further
