@@ -480,3 +480,13 @@ def test_iterations_of_a_failed_step_count_with_and_without_recorders(most):
 
     assert counts() == counts(ub.Extremes()) == counts(ub.Events())
     assert counts()[1] > 20  # most are of the failed step
+
+
+@pytest.mark.parametrize("kind", ["csv", "xdmf", "hdf"])
+def test_closed_recorders_have_a_state(kind, shared_path):
+    """A user may ask for it after the run; no run continues from it."""
+    path = shared_path / f"run.{kind}"
+    film = {"csv": lambda: ub.History(path, []), "xdmf": lambda: ub.XDMF(path)}
+    record = film.get(kind, lambda: ub.VTKHDF(path))()
+    run(scene(), record)
+    assert record.state()["digest"].size == 0

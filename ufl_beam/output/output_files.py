@@ -127,6 +127,7 @@ class OutputFile:
         flags = os.O_RDWR | os.O_CLOEXEC | (os.O_CREAT | os.O_TRUNC if new else 0)
         with naming(path):
             self._file = os.open(path, flags, 0o666)
+        self.closed = False
         self._regular = stat.S_ISREG(os.fstat(self._file).st_mode)
         self._digest, self._hashed = hashlib.sha256(), 0
 
@@ -203,6 +204,7 @@ class OutputFile:
         """Close the file; warn if it was removed or replaced."""
         in_place = is_at(self._file, self.path)
         os.close(self._file)
+        self.closed = True
         if not in_place:
             warnings.warn(
                 f"output {self.path} was removed or replaced during the run; data written to "

@@ -343,9 +343,12 @@ class FileRecorder(Restartable):
             on_first(self._comm, lambda: self._append(row))
 
     def state(self) -> State:
-        """Flush to the disk; return numbers of steps, and sizes and a checksum of the file."""
+        """Flush to the disk; return numbers of steps, and sizes and a checksum of the file.
+
+        A closed recorder has no checksum, so that no run continues from its state.
+        """
         digest = bytearray()
-        on_first(self._comm, lambda: digest.extend(self._sync()))
+        on_first(self._comm, lambda: digest.extend(b"" if self._file.closed else self._sync()))
         return {
             "sizes": np.array([self._count, *self.complete], dtype=float),
             "digest": np.frombuffer(digest, dtype=np.uint8),
