@@ -17,6 +17,7 @@ import numpy as np
 import ufl
 from ufl.classes import Zero
 from ufl.core.expr import Expr
+from ufl.corealg.traversal import unique_pre_traversal
 
 from ufl_beam.compiled.c_library import ffi, lib, names
 from ufl_beam.discretization.compiled_forms import Pointwise, components, with_shared_nodes
@@ -152,7 +153,7 @@ class Inputs(dict[str, Expr]):
         key, stages, n = tuple(map(id, by)), [stage for stage, *_ in self.stages], len(by)
         if key not in self._known:
             found = self._known[key] = list[list[Expr]]()
-            every = _slopes([alike for _, _, alike, _ in self.stages], [*by, *stages])
+            every = _slopes([x[2] for x in self.stages], [*by, *stages]) if stages else []
             for k in range(len(stages)):
                 row = every[k * (n + len(stages)) : (k + 1) * (n + len(stages))]
                 found.append(_chained(row[:n], row[n : n + k], found))
@@ -523,10 +524,8 @@ class Kernels:
         return made, at, names, [at[x] for x in along]
 
 
-@lru_cache(maxsize=128)
-def kernels(statement: Statement) -> Kernels:
-    """Compile the functions of a statement; equal statements have the same."""
-    return Kernels(statement)
+kernels = lru_cache(maxsize=1024)(Kernels)
+"""Compiled functions of a statement, of which each takes some 0.1 MB; equal ones have the same."""
 
 
 def expanded(outputs: Sequence[Expr]) -> list[Expr]:
@@ -537,10 +536,11 @@ def expanded(outputs: Sequence[Expr]) -> list[Expr]:
 
 def _slopes(outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:
     """Return the derivatives of expanded expressions: of the first one by all variables, ..."""
-    if not outputs:
-        return []
-    every = ufl.as_vector(outputs)  # UFL differentiates a vector at once
-    whole = components(ufl.as_tensor([ufl.diff(every, x) for x in by]))
+    nodes = [{*unique_pre_traversal(one)} for one in outputs]
+    some = [[y if x in z else Zero() for y, z in zip(outputs, nodes, strict=True)] for x in by]
+    # UFL differentiates a vector at once, and a zero in no time: most slopes are zero
+    rows = [ufl.diff(ufl.as_vector(row), x) for row, x in zip(some, by, strict=True)]
+    whole = components(ufl.as_tensor(rows))
     return [x for i in range(len(outputs)) for x in whole[i :: len(outputs)]]
 
 

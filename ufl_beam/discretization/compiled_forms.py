@@ -7,7 +7,7 @@ A function is compiled as a form with one quadrature point.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import islice
+from itertools import islice, product
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -187,12 +187,12 @@ def components(tensor: Expr) -> list[Expr]:
 
     FFCx 0.9 to 0.11 searches all nodes of an expression for each inner tensor.
     """
-    found, whole = _Components(), expand_derivatives(tensor)
+    found, (whole,) = _Components(), with_shared_nodes([expand_derivatives(tensor)])
     for node in unique_post_traversal(whole):  # operands first, which limits the recursion
         if isinstance(node, Operator) and not node.ufl_free_indices:
-            for at in np.ndindex(node.ufl_shape):
+            for at in product(*map(range, node.ufl_shape)):
                 found.of(node, at)
-    return [found.of(whole, at) for at in np.ndindex(whole.ufl_shape)]
+    return [found.of(whole, at) for at in product(*map(range, whole.ufl_shape))]
 
 
 class Pointwise:
