@@ -32,7 +32,7 @@ def history(solution):
 
 
 def differences(model, at, name, of, scheme, changes=CHANGES, **options):
-    """Differences of a quantity of runs by one parameter, for each relative change of it."""
+    """Yield differences of a quantity of runs by one parameter, for each relative change of it."""
 
     def value(x):
         scene = model(**{**at, name: x})
@@ -40,7 +40,8 @@ def differences(model, at, name, of, scheme, changes=CHANGES, **options):
             of(ub.simulate(scene, scheme, newton=TIGHT, comm=MPI.COMM_SELF, **options))
         )
 
-    return [difference(value, at[name], part * (abs(at[name]) or 1.0)) for part in changes]
+    for part in changes:
+        yield difference(value, at[name], part * (abs(at[name]) or 1.0))
 
 
 def relative_error(a, b):
@@ -49,14 +50,16 @@ def relative_error(a, b):
     return float(np.abs(a - b).max() / size) if size > 0 else float(np.abs(a).max())
 
 
-def errors(model, at, scheme, of=history, changes=CHANGES, **options):
-    """Least relative error of the derivative of a quantity by each parameter, by its name."""
+def errors(model, at, scheme, of=history, changes=CHANGES, enough=0.0, **options):
+    """Least relative error of the derivative of a quantity by each parameter, by its name.
+
+    After an error below ``enough`` the other changes of a parameter are left out.
+    """
     run = ub.differentiate(model, at, scheme, newton=TIGHT, progress=False, **options)
-    found = run.of(of)
-    return {
-        name: min(
-            relative_error(found[..., k], fd)
-            for fd in differences(model, at, name, of, scheme, changes, **options)
-        )
-        for k, name in enumerate(at)
-    }
+    found, least = run.of(of), dict.fromkeys(at, np.inf)
+    for k, name in enumerate(at):
+        for fd in differences(model, at, name, of, scheme, changes, **options):
+            least[name] = min(least[name], relative_error(found[..., k], fd))
+            if least[name] < enough:
+                break
+    return least

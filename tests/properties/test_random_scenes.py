@@ -12,14 +12,11 @@ import sys
 
 import pytest
 from constraint_gaps import largest_gap
-from random_scenes import script
+from random_scenes import SAMPLE, script
 from scene_statements import EPS
 from statement_runs import Run, changed_statements, difference, perturbed
 
 import ufl_beam as ub
-
-SAMPLE = range(25)
-"""Seeds of the default run."""
 
 ALL = range(200)
 

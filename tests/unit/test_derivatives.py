@@ -127,7 +127,7 @@ def test_hardening_under_tension(scheme):
     if isinstance(scheme, ub.Static):
         assert found == pytest.approx(expected, rel=EXACT)
     else:  # forces hold within the step, at 0.7 of it
-        best = errors(bar, at, scheme, t=(0, 1), dt=0.25, changes=(1e-4, 1e-5))
+        best = errors(bar, at, scheme, t=(0, 1), dt=0.25, changes=(1e-4, 1e-5), enough=AGREE)
         assert max(best.values()) < AGREE
 
 
@@ -243,7 +243,13 @@ def test_laws_of_users(name):
     """Motions, against differences of runs; the blow yields each law, and unloads it."""
     model, at = LAWS[name]
     best = errors(
-        model, at, ub.EnergyMomentum(0.05), t=(0, 0.6), dt=0.01, changes=(1e-4, 1e-5, 1e-6)
+        model,
+        at,
+        ub.EnergyMomentum(0.05),
+        t=(0, 0.6),
+        dt=0.01,
+        changes=(1e-4, 1e-5, 1e-6),
+        enough=AGREE,
     )
     assert max(best.values()) < AGREE, best
 
@@ -280,7 +286,13 @@ def test_quantities(name):
     """
     at = {"limit": 9.0, "load": 40.0, "length": 1.0}
     best = errors(
-        yielding, at, ub.EnergyMomentum(0.05), QUANTITIES[name], changes=(1e-4, 1e-5), **DYNAMIC
+        yielding,
+        at,
+        ub.EnergyMomentum(0.05),
+        QUANTITIES[name],
+        changes=(1e-4, 1e-5),
+        enough=100 * AGREE,
+        **DYNAMIC,
     )
     assert max(best.values()) < 100 * AGREE, best
 
@@ -317,9 +329,11 @@ def test_the_geometry(shift):
         )  # fmt: skip
 
     at = {"height": 1.0, "span": 0.7}
-    best = errors(bent, at, ub.EnergyMomentum(), t=(0, 0.3), dt=0.01, changes=(1e-3, 1e-4))
-    # Coordinates of 300 m have two digits less
-    assert max(best.values()) < AGREE * (100 if x else 1), best
+    enough = AGREE * (100 if x else 1)  # coordinates of 300 m have two digits less
+    best = errors(
+        bent, at, ub.EnergyMomentum(), t=(0, 0.3), dt=0.01, changes=(1e-3, 1e-4), enough=enough
+    )
+    assert max(best.values()) < enough, best
 
 
 def test_an_infinite_limit_is_an_elastic_law():
@@ -332,7 +346,7 @@ def test_an_infinite_limit_is_an_elastic_law():
     found = run.of(history)
     assert np.isfinite(found).all()
     assert all(one.change == math.inf for one in run.ranges.values())
-    best = errors(elastic, at, ub.EnergyMomentum(), changes=(1e-3, 1e-4), **DYNAMIC)
+    best = errors(elastic, at, ub.EnergyMomentum(), changes=(1e-3, 1e-4), enough=AGREE, **DYNAMIC)
     assert max(best.values()) < AGREE
 
 
