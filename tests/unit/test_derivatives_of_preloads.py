@@ -109,23 +109,36 @@ def values_of(model):
     return dict(zip(names, model.__defaults__, strict=True))
 
 
+TO_THE_DIGITS = {"newton": TIGHT, "progress": False}
+
+
+@cache
+def preloaded(model, scheme, name, x):
+    """Preload with one parameter that differs; the tests of all schemes of the motion share it."""
+    return ub.simulate(model(**{**values_of(model), name: x}), scheme, **PRELOAD, **TO_THE_DIGITS)
+
+
+@cache
+def derivatives_of_preload(model, scheme, unused):
+    at = values_of(model)
+    return ub.differentiate(model, at, scheme, unused=unused, **PRELOAD, **TO_THE_DIGITS)
+
+
 def disagreements(first, second, schemes, quantities, enough, unused=("mass",)):
     """Least errors of the derivatives of quantities by each parameter of two models.
 
     After errors below ``enough`` the other changes of a parameter are left out.
     """
-    at, options = values_of(first), {"newton": TIGHT, "progress": False}
-    before, scheme = schemes
-    unused = [name for name in unused if name in at]
-    start = ub.differentiate(first, at, before, unused=unused, **PRELOAD, **options)
+    at, (before, scheme) = values_of(first), schemes
+    unused = tuple(name for name in unused if name in at)
+    start = derivatives_of_preload(first, before, unused)
     more = {"unused": unused} if not scheme.dynamic else {}
-    run = ub.differentiate(second, at, scheme, **MOTION, start=start, **more, **options)
+    run = ub.differentiate(second, at, scheme, **MOTION, start=start, **more, **TO_THE_DIGITS)
 
     def both(name, x):
-        values = {**at, name: x}
-        one = ub.simulate(first(**values), before, **PRELOAD, **options)
-        scene = one.scene if first is second else second(**values)
-        end = ub.simulate(scene, scheme, **MOTION, start=one, **options)
+        one = preloaded(first, before, name, x)
+        scene = one.scene if first is second else second(**{**at, name: x})
+        end = ub.simulate(scene, scheme, **MOTION, start=one, **TO_THE_DIGITS)
         return np.concatenate([np.ravel(of(end)) for of in quantities])
 
     cuts = np.cumsum([np.size(of(run.solution)) for of in quantities])[:-1]
