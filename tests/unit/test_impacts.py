@@ -8,6 +8,7 @@ import pytest
 from helpers import assert_balanced, in_turn, raises
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 EXACT = 1e-9
 """Relative to the velocities: tolerances of Newton's method, and differences for rates."""
@@ -275,6 +276,24 @@ def test_smooth_motions_have_no_impacts(scheme):
     )
     run = simulate(scene, scheme, (0, 1), 0.01)
     assert not run.energy.lost["impacts"].any()
+
+
+@pytest.mark.parametrize("motion", [
+    lambda t: 0.5 * min(t, 0.5) ** 2 + 0.5 * max(t - 0.5, 0.0),  # acceleration ends
+    lambda t: 0.5 * max(t - 0.5, 0.0) ** 2,  # and begins
+    st.GroundMotion(0.1, [0.0, 3.0, 2.0, -4.0, 6.0, 0.0]).displacement,
+], ids=["ends", "begins", "record"])  # fmt: skip
+@pytest.mark.parametrize("steps", [7, 19, 23, 50])
+def test_accelerations_that_jump_are_no_impacts(motion, steps):
+    """The change of the momentum is the impulse of the support; the velocities have no jump."""
+    block = ub.Body((0, 0), mass=2.0, inertia=1.0)
+    held = ub.PrescribedDisplacement(block.middle, u=motion, v=0.0, psi=0.0)
+    run = simulate(
+        ub.Scene([], bodies=[block], supports=[held]), EXACT_LEDGER[0], (0, 1), 1 / steps
+    )
+    impulses = np.diff(run.times) * run.reaction(held)[1:, 0]
+    sizes = np.abs(run.reaction(held)[1:, 0]).max() / steps
+    assert np.diff(run.momentum()[:, 0]) == pytest.approx(impulses, rel=0, abs=EXACT * sizes)
 
 
 def test_a_run_in_parts_does_not_lose_energy():

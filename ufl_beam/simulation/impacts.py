@@ -89,7 +89,13 @@ def may_jump(f: TimeFunction | None, t0: float, t1: float) -> bool:
         return False
     triples = zip(values, values[1:], values[2:], strict=False)  # each step: faster than NumPy
     second = sorted(abs(x - 2.0 * y + z) for x, y, z in triples)
-    return bool(second[-1] > UNEVEN * second[2] + 16 * math.ulp(max(map(abs, values))))
+    if second[-1] <= UNEVEN * second[2] + 16 * math.ulp(max(map(abs, values))):
+        return False
+    outside = [0.0]  # as large if only an acceleration begins or ends in the step
+    for t in (t0 - h, t1 + h):
+        with suppress(Exception):
+            outside.append(abs(float(f(t - h)) - 2.0 * float(f(t)) + float(f(t + h))))
+    return bool(second[-1] > 2.0 * max(outside))
 
 
 class Impact(NamedTuple):
