@@ -9,7 +9,7 @@ from random_machines import script
 
 import ufl_beam as ub
 from ufl_beam.plotting.model import model_notes, scene_load_caption
-from ufl_beam.plotting.model_drawing import Subject, draw
+from ufl_beam.plotting.model_drawing import Drawing
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*are of no material")
 
@@ -25,7 +25,7 @@ def machine(seed):
 
 def amount(scene):
     """Number of strokes, labels and words of a picture; and whether all numbers are finite."""
-    drawing = draw(Subject(scene), scene.size / 300.0)
+    drawing = Drawing(scene, scene.size / 300.0)
     strokes = [stroke for group in drawing.strokes.values() for stroke in group]
     assert all(np.isfinite(stroke.points).all() for stroke in strokes)
     whole = [load for load in scene.loads if any(scene_load_caption(load))]

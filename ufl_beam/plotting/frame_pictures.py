@@ -7,14 +7,14 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connectors import can_yield
-from ufl_beam.plotting import positions, style, symbols
+from ufl_beam.plotting import style, symbols
 from ufl_beam.plotting.inelastic_pictures import (
     OpenHinge,
     circle,
@@ -22,14 +22,12 @@ from ufl_beam.plotting.inelastic_pictures import (
     draw_damage,
     open_hinges,
 )
+from ufl_beam.plotting.labels import AROUND, MOST, Label, around, arrange
 from ufl_beam.plotting.positions import (
-    Candidate,
     Canvas,
     DeformedShape,
-    Label,
     joined,
     normal,
-    segments,
     unit_vectors,
 )
 from ufl_beam.plotting.style import BLUE, GREY, INK, POINTS, RED, RESULTANTS, font_size, shade
@@ -40,21 +38,12 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.text import Annotation
-    from matplotlib.transforms import Transform
 
 LEAST_STRAIN = 1e-10  # strain up to which section forces count as round-off and are not drawn
 DRAWN_AS_ZERO = 1e-4  # fraction of the largest value below which a value is drawn as zero
 ALIKE = 0.999  # values above this fraction of the peak of an area count as equal to the peak
 LABELLED = 0.15  # peaks above this fraction of the largest value are labelled
 MOST_BEAMS = 60  # number of beams beyond which only extremes are labelled, without directions
-CROWDED = 0.08  # fraction of the axes that labels cover; the largest values are labelled first
-MOST_AREAS = 500  # largest number of areas whose ordinates labels should not cover
-MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
-
-AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
-"""Space for words and numbers around the axes, least size and largest size of a figure; inch."""
-
 SIGNS = {
     "N": ("N > 0: tension", "N < 0: compression"),
     "V": ("V > 0: left of the arrow", "V < 0: right of the arrow"),
@@ -68,23 +57,18 @@ Values = tuple[Member, Array]  # a beam, and values at points of its cells; (num
 def plane_canvas(
     solution: Solution,
     shown: Sequence[int],
-    magnify: float,
+    magnify: float = 1.0,
     ax: Axes | None = None,
-    size: tuple[float, float] | None = None,
-) -> tuple[Canvas, tuple[float, float]]:
-    """Make a canvas whose symbols have a size in points; return it and the size of the figure.
+    size: tuple[float, float] = (MOST[0] - AROUND[0], MOST[1] - AROUND[1]),
+) -> Canvas:
+    """Make a canvas for the user's axes, or new ones, whose symbols have a size in points.
 
-    ``size`` is the largest width and height of the figure; inch.  By default the width is 9 inches,
-    and the height follows from the shape of the frame, between 3.2 and 6.8 inches.
+    ``size`` is the largest width and height of new axes; inch.
     """
     points = Canvas(solution, magnify, 0.02 * solution.scene.size, shown).points()
-    extent = np.ptp(points, axis=0)
-    high = float(np.clip(8.0 * extent[1] / max(extent[0], 1e-12), 3.2, 6.8))
-    size = (9.0, high) if size is None else size
-    # A new figure has numbers and words around the axes.
-    space = np.subtract(size, (0.9, 0.9)) if ax is None else style.lay_out(ax) / POINTS
-    scale = float(np.max((1.12, 1.20) * extent / space)) / POINTS
-    return Canvas.at_scale(solution, magnify, scale, shown), size
+    space = POINTS * np.array(size) if ax is None else style.lay_out(ax)
+    scale = float(np.max(1.12 * np.ptp(points, axis=0) / space))
+    return Canvas.at_scale(solution, magnify, scale, shown)
 
 
 def draw_beams(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
@@ -118,7 +102,7 @@ def draw_shape(
     title; the largest and the least value are bold.  Yielded or cracked cells are orange.  Open
     hinges are circles as in :func:`draw_damage_state`.
     """
-    shape = plane_canvas(solution, [n], magnify, ax, MOST)[0].shape(n)
+    shape = plane_canvas(solution, [n], magnify, ax).shape(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
     if quantity == "shape":
         return draw_frame(ax, solution, n, shape, ("shape", when))
@@ -152,7 +136,7 @@ def draw_frame(
     with style.panel(ax, MOST) as axes:
         style.plane_axes(axes, heading)
         draw_undeformed(axes, solution, shape.canvas)
-        peaks: list[PointLabel] = []
+        peaks: list[Label] = []
         if (sizes > LEAST_STRAIN * np.array(stiffness)).any():  # more than rounding
             rows = _draw_diagrams(axes, solution, shape.nodes, what, diagrams)
             peaks = _peaks(rows, factor, LABELLED if len(beams) <= MOST_BEAMS else 1.0)
@@ -173,7 +157,7 @@ def draw_frame(
                 axes, ax, [*named.values()], loc="outside lower left",
                 ncols=1 if len(named) <= 2 else 2, fontsize=font_size(11.0),
             )  # fmt: skip
-        _arrange(axes, peaks, own=ax is None)
+        arrange(axes, ax, peaks)
     return style.parent_figure(axes)
 
 
@@ -219,17 +203,7 @@ def _draw_diagrams(
     return np.array(rows)
 
 
-class PointLabel(NamedTuple):
-    """Text at a point of a diagram or a curve."""
-
-    text: str
-    color: str
-    tip: Array  # point of the diagram; (2,)
-    outward: Array  # vector to the side where the text should be; (2,)
-    extreme: bool = False  # True for the largest and the least value of all diagrams
-
-
-def _peaks(rows: Array, unit: float, least: float) -> list[PointLabel]:
+def _peaks(rows: Array, unit: float, least: float) -> list[Label]:
     """Choose peaks to label: first the largest and the least value, then the other large peaks.
 
     Large peaks exceed ``least`` times the largest magnitude.  Equal peaks at a point are one peak.
@@ -245,12 +219,14 @@ def _peaks(rows: Array, unit: float, least: float) -> list[PointLabel]:
     for k in [*extremes, *large]:
         chosen.setdefault((labels[k].lstrip("−"), *places[k]), k)
     return [
-        PointLabel(
-            labels[k], RED if values[k] > 0 else BLUE, axis[k] + up[k], unit_vectors(up[k]),
+        Label(
+            labels[k],
+            RED if values[k] > 0 else BLUE,
+            around(axis[k] + up[k], up[k]),
             k in extremes,
         )
         for k in chosen.values()
-    ]  # fmt: skip
+    ]
 
 
 def _along(
@@ -305,6 +281,19 @@ def _areas(
             yield outline, sign * largest, int(places[begin + equal[len(equal) // 2]])
 
 
+def draw_envelope(
+    solution: Solution,
+    title: tuple[str, str],
+    quantity: str,
+    diagrams: Sequence[Values],
+    ax: Axes | None,
+    n: int = 0,
+) -> Figure:
+    """Draw diagrams of a section force, and damage at a time, on the undeformed frame."""
+    shape = plane_canvas(solution, [], ax=ax).undeformed
+    return draw_frame(ax, solution, n, shape, title, quantity, diagrams)
+
+
 def draw_damage_state(
     solution: Solution, *, n: int = -1, magnify: float = 1.0,
     limits: Mapping[str, float] = MappingProxyType({}), ax: Axes | None = None,
@@ -323,15 +312,11 @@ def draw_damage_state(
     if not any(map(can_yield, solution.scene.connectors)):
         for beam in solution.scene.beams[:1]:
             solution.material(beam)  # raises if the scene is elastic
-    canvas, (width, height) = plane_canvas(solution, [n], magnify, ax)
+    canvas = plane_canvas(solution, [n], magnify, ax)
     shape, density = canvas.shape(n), dissipated_per_length(solution, n)
-    length, rise = np.ptp(canvas.points(), axis=0)
-    # Tall frames need less width, with space for the colour bar and the legend.
-    across = height * length / max(rise, 1e-12)
-    with style.panel(ax, (min(width, max(6.0, across + 3.0)), height)) as axes:
+    with style.panel(ax, MOST) as axes:
         time = solution.parameter.at(solution.times[n])
         style.plane_axes(axes, f"damage at {time}{style.magnified(magnify)}")
-        axes.set_adjustable("datalim")  # space for the wide lines of yielded cells
         draw_undeformed(axes, solution, canvas)
         draw_beams(axes, solution, shape.nodes, color=shade(INK), linewidth=2.0, zorder=2)
         draw_strokes(axes, symbols.in_plane(shape))
@@ -351,8 +336,7 @@ def draw_damage_state(
             style.draw_bar(axes, colors, f"{title} ({prefix}J/m)")
         if hinges := open_hinges(solution, n, shape.at, limits):
             _draw_hinges(axes, ax, solution, shape, hinges, limits)
-        style.lay_out(axes)
-        style.fit_texts(axes)
+        arrange(axes, ax)
     return style.parent_figure(axes)
 
 
@@ -390,107 +374,3 @@ def _draw_hinges(
     handles = [axes.plot([], [], **circle(x, color), label=words)[0] for x, words, color in entries]
     if handles:
         style.draw_legend(axes, ax, handles, loc="outside upper left", ncols=3)
-
-
-# -- labels ------------------------------------------------------------------------------------
-
-
-def _arrange(axes: Axes, peaks: Sequence[PointLabel], *, own: bool) -> None:
-    """Fit the limits, and the size of a new figure; put labels where they cover the least."""
-    axes.margins(MARGIN)
-    without_texts = axes.dataLim.frozen()
-    written: list[Annotation] = []
-    # Space for labels changes the scale, which moves the lines that labels should not cover.
-    for _ in range(3):
-        _fit(axes, own)
-        for text in written:
-            text.remove()
-        written = write_labels(axes, peaks)
-        axes.dataLim.set(without_texts)
-        style.fit_texts(axes)
-    _fit(axes, own)
-
-
-def _fit(axes: Axes, own: bool) -> None:
-    """Fit the limits, and the size of a new figure, to the drawing at the largest scale possible.
-
-    A figure of the user keeps its size.
-    """
-    axes.autoscale_view()
-    if not own:
-        return
-    figure = style.parent_figure(axes)
-    wide, high = 0.0, 0.0
-    for legend in figure.legends:
-        wide, high = np.divide(legend.get_window_extent().size, figure.dpi)
-    around = np.array([AROUND[0], AROUND[1] + high])
-    least = np.array([max(LEAST[0], wide + 0.2), LEAST[1] + high])
-    span = np.array([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())])
-    inches = span * np.min((MOST - around) / span)
-    figure.set_size_inches(np.clip(inches + around, np.minimum(least, MOST), MOST))
-
-
-def write_labels(axes: Axes, peaks: Sequence[PointLabel]) -> list[Annotation]:
-    """Write texts at points; a text that would cover another is omitted, unless it is extreme."""
-    from matplotlib.transforms import Affine2D
-
-    size = style.lay_out(axes)
-    looks: tuple[dict[str, Any], ...] = (
-        {"size": font_size(10.0), "weight": "normal"},
-        {"size": font_size(13.0), "weight": "bold"},
-    )
-    halves = [style.half_size(axes, peak.text, **looks[peak.extreme]) for peak in peaks]
-    covered = 4 * np.cumsum([np.prod(half) for half in halves])
-    allowed = covered <= CROWDED * np.prod(size)
-    chosen = [k for k, peak in enumerate(peaks) if peak.extreme or allowed[k]]
-    if not chosen:
-        return []
-    to_points = axes.transData + Affine2D().scale(POINTS / style.parent_figure(axes).dpi)
-    labels = []
-    for k in chosen:
-        # Directions to try: first perpendicular to the axis, then more and more to the side.
-        tilts = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
-        x, y = peaks[k].outward
-        at, ways = to_points.transform(peaks[k].tip), positions.directions(math.atan2(y, x) + tilts)
-        spots = tuple(Candidate(at, direction) for direction in ways)
-        labels.append(Label(peaks[k].text, peaks[k].color, k, spots))
-    written = []
-    for box in positions.place(labels, [halves[k] for k in chosen], _lines(axes, to_points)):
-        text, color, k, _ = box.label
-        (x, y), (right, up), arrow = peaks[k].tip, box.center - box.target, None
-        if len(box.leader):
-            end = (box.leader[1] - box.center + box.half) / (2 * box.half)
-            line = {"arrowstyle": "-", "color": color, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
-            arrow = {**line, "relpos": end, "patchA": None}  # a patch would shorten the line
-        if box.overlap == 0.0 or peaks[k].extreme:
-            mark = axes.annotate(
-                text, (x, y), (right, up), textcoords="offset points", color=color,
-                ha="center", va="center", zorder=6, arrowprops=arrow, **looks[peaks[k].extreme],
-            )  # fmt: skip
-            written.append(mark)
-    return written
-
-
-def _lines(axes: Axes, to_points: Transform) -> Array:
-    """Return segments that labels should not cover, with ordinates of areas; (n, 4); points."""
-    lines = [np.asarray(line.get_xydata()) for line in axes.lines if line.get_linestyle() != "None"]
-    areas = []
-    for collection in axes.collections:
-        outlines = [np.asarray(path.vertices) for path in collection.get_paths()]
-        lines += outlines
-        areas += outlines if collection.get_gid() in (RED, BLUE) else []
-    pieces = segments(to_points.transform(joined(lines)))
-    groups = [pieces[np.isfinite(pieces).all(axis=1)]]
-    for line in axes.lines:
-        half = line.get_markersize() / 2
-        diagonals = np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
-        if line.get_linestyle() == "None":  # markers
-            at = to_points.transform(line.get_xydata())
-            groups += [segments(point + diagonals) for point in at]
-    for outline in map(to_points.transform, areas[:MOST_AREAS]):
-        # Ordinates, from a point of the outline to its opposite point on the axis.
-        for fraction in (0.0, 0.5):
-            between = outline[:-1] + fraction * np.diff(outline, axis=0)
-            feet = (outline[1:] - fraction * np.diff(outline, axis=0))[::-1]
-            groups.append(np.hstack([between, feet])[1 : len(outline) // 2])
-    return np.concatenate(groups)

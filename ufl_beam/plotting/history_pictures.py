@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,13 +17,14 @@ from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Place
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.plotting import notebook, style, symbols
 from ufl_beam.plotting.frame_pictures import (
-    MOST,
+    Values,
     draw_beams,
-    draw_frame,
+    draw_envelope,
     draw_outlines,
     draw_undeformed,
     plane_canvas,
 )
+from ufl_beam.plotting.labels import MOST, arrange
 from ufl_beam.plotting.positions import evenly
 from ufl_beam.plotting.style import BLUE, GREY, INK, RED, SKY, picture, shade
 from ufl_beam.plotting.symbols import draw_strokes
@@ -74,10 +75,10 @@ def draw_shapes(
         if not len(requested):
             raise ArgumentError("plot: times is empty; give times (s), or count=")
         chosen = [int(np.argmin(np.abs(instants - t))) for t in np.sort(requested)]
-    canvas, size = plane_canvas(solution, chosen, magnify, ax)
+    canvas = plane_canvas(solution, chosen, magnify, ax)
     shapes = [canvas.shape(n) for n in chosen]
-    with style.panel(ax, size) as axes:
-        colors = style.scale("viridis", 0.0, 0.88, instants[chosen].min(), instants[chosen].max())
+    with style.panel(ax, MOST) as axes:
+        colors = style.scale("viridis", 0.0, 0.88, *np.sort(instants[chosen])[[0, -1]])
         style.plane_axes(axes, style.magnified(magnify, ""))
         draw_undeformed(axes, solution, canvas)
         for shape, color in zip(shapes, map(to_hex, colors.to_rgba(instants[chosen])), strict=True):
@@ -89,6 +90,7 @@ def draw_shapes(
         still = *symbols.rails(last), *symbols.connectors(last), *symbols.supports(last)
         draw_strokes(axes, {"still": still})
         style.draw_bar(axes, colors, solution.parameter.name)
+        arrange(axes, ax)
     return style.parent_figure(axes)
 
 
@@ -182,7 +184,7 @@ def draw_modes(
     if not chosen:
         raise ArgumentError(f"plot: {'numbers is empty' if len(shapes) else 'there is no shape'}")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
-    stages = [plane_canvas(swing, [0, 1], 1.0, size=(4.0, np.inf))[0] for swing in swings]
+    stages = [plane_canvas(swing, [0, 1], size=(4.0, np.inf)) for swing in swings]
     box = np.concatenate([canvas.points() for canvas in stages])
     # space for the symbols of supports
     margin = 0.08 * np.hypot(*np.ptp(box, axis=0))
@@ -220,12 +222,15 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
 
     Positive values are red, negative values blue.  The values may occur at different times.
     """
-    index, solution = list(style.RESULTANTS).index(quantity), extremes.solution
-    reached = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
-    diagrams = [
-        (beam, values[:, index]) for beam, extent in reached for values in (extent.high, extent.low)
-    ]
+    solution = extremes.solution
     until = f"until {solution.parameter.at(solution.times[-1])}"
     title = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}", until
-    shape = plane_canvas(solution, [], 1.0, ax, MOST)[0].undeformed
-    return draw_frame(ax, solution, -1, shape, title, quantity, diagrams)
+    diagrams = bounds(solution, extremes, quantity)
+    return draw_envelope(solution, title, quantity, diagrams, ax, n=-1)
+
+
+def bounds(solution: Solution, found: Any, quantity: str) -> list[Values]:
+    """Return the largest and the least values of a section force along each beam."""
+    index, beams = list(style.RESULTANTS).index(quantity), solution.scene.beams
+    extents = [(beam, found.section_forces(beam)) for beam in beams]
+    return [(beam, values[:, index]) for beam, x in extents for values in (x.high, x.low)]

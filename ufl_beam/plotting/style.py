@@ -197,11 +197,12 @@ def plane_axes(axes: Axes, title: str) -> None:
     """Set up axes of the plane of motion with one scale for x and y."""
     from matplotlib.ticker import AutoLocator
 
-    axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.06, 0.10)
     for axis in (axes.xaxis, axes.yaxis):  # along the short side there may be space for one label
         if isinstance(locator := axis.get_major_locator(), AutoLocator):
-            locator.set_params(min_n_ticks=1)
+            locator.set_params(min_n_ticks=1, steps=[1, 2, 5, 10])
     axes.set_title(title, loc="left", wrap=True)
 
 
@@ -247,26 +248,12 @@ def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
     return ScalarMappable(Normalize(low, high), colors)
 
 
-def draw_bar(axes: Axes, colors: Any, label: str) -> None:
-    """Draw the colour bar of a :func:`scale`."""
+def draw_bar(axes: Axes, colors: Any, label: str) -> Any:
+    """Draw the colour bar of a :func:`scale`, and return it."""
     bar = axes.figure.colorbar(colors, ax=axes, shrink=0.85, aspect=25, pad=0.02)
     bar.set_label(label)
     bar.ax.spines["outline"].set_visible(False)
-
-
-def fit_texts(axes: Axes) -> None:
-    """Extend the limits so that texts are inside and data are above a legend at the bottom.
-
-    Texts have the places that they had when :func:`lay_out` was called.
-    """
-    for text in axes.texts:
-        box = text.get_window_extent().get_points()
-        axes.update_datalim(axes.transData.inverted().transform(box))
-    if legend := axes.get_legend():
-        x, y = axes.transData.transform(axes.dataLim.min)
-        below = x, y - legend.get_window_extent().height
-        axes.update_datalim([axes.transData.inverted().transform(below)])
-    axes.autoscale_view()
+    return bar
 
 
 def lay_out(axes: Axes) -> Array:
@@ -280,14 +267,6 @@ def lay_out(axes: Axes) -> Array:
     locator: Any = axes.get_axes_locator()
     axes.apply_aspect(locator and locator(axes, None))
     return np.multiply(axes.get_window_extent().size, POINTS / figure.dpi)
-
-
-def half_size(axes: Axes, text: str, size: float, **style: Any) -> Array:
-    """Measure half of the width and height of a text; (2,); points."""
-    probe = axes.text(0.0, 0.0, text, fontsize=size, **style)
-    box = probe.get_window_extent()
-    probe.remove()
-    return np.asarray(np.array([box.width, box.height]) / 2 * POINTS / parent_figure(axes).dpi)
 
 
 def label_axis(axis: Axis, values: Array, quantity: str, unit: str) -> None:

@@ -14,16 +14,11 @@ from ufl_beam.arrays import Array
 from ufl_beam.display import TIME, html_page
 from ufl_beam.errors import ArgumentError, require_all
 from ufl_beam.plotting import notebook, style
-from ufl_beam.plotting.frame_pictures import (
-    MOST,
-    PointLabel,
-    draw_frame,
-    plane_canvas,
-    write_labels,
-)
+from ufl_beam.plotting.frame_pictures import draw_envelope
+from ufl_beam.plotting.history_pictures import bounds
+from ufl_beam.plotting.labels import Label, around, write_labels
 from ufl_beam.plotting.plot import PICTURES
 from ufl_beam.plotting.style import BLUE, COLORS, GREY, INK, ORANGE, RED, picture, shade, with_unit
-from ufl_beam.simulation.solution import Solution
 from ufl_beam.structures.calibration_result import Calibration
 from ufl_beam.structures.fatigue import Fatigue, HotSpot
 from ufl_beam.structures.ground_motion import GroundMotion
@@ -89,7 +84,7 @@ def draw_pushover(
             label = f"{number}: {words}" if len(steps) <= MOST_NAMED else None
             axes.plot(*at, "o", color=shade(ORANGE), ms=6.0, zorder=4, label=label)
             outward = sign * np.array([-0.6, 0.8])
-            numbers.append(PointLabel(str(number), shade(INK), np.array(at), outward))
+            numbers.append(Label(str(number), INK, around(np.array(at), outward)))
         axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
         axes.set_xlabel(f"{pushover.component} of {pushover.place} (m)")
         axes.set_ylabel(f"base shear ({prefix}N)")
@@ -111,24 +106,17 @@ def draw_response(
         for sign in (1.0, -1.0)
     ]
     title = f"{style.RESULTANTS[quantity][0]} {quantity}", "by response spectrum"
-    return _on_frame(response.modes.motion(0), title, quantity, diagrams, ax)
+    return draw_envelope(response.modes.motion(0), title, quantity, diagrams, ax)
 
 
 def draw_combinations(
     combined: LoadCombinations, *, quantity: str = "M", ax: Axes | None = None
 ) -> Figure:
     """Draw the envelope of a section force over load combinations on the undeformed frame."""
-    index, solutions = list(style.RESULTANTS).index(quantity), [*combined.solutions.values()]
-    reached = [(beam, combined.section_forces(beam)) for beam in solutions[0].scene.beams]
-    diagrams = [
-        (beam, values[:, index])
-        for beam, extremes in reached
-        for values in (extremes.high, extremes.low)
-    ]
-    title = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}"
-    return _on_frame(
-        solutions[0], (title, f"of {len(solutions)} load combinations"), quantity, diagrams, ax
-    )
+    solution, number = next(iter(combined.solutions.values())), len(combined.solutions)
+    words = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}"
+    title = words, f"of {number} load combinations"
+    return draw_envelope(solution, title, quantity, bounds(solution, combined, quantity), ax)
 
 
 def draw_dynamics(dynamics: DemandCurves, *, labels: Sequence[str] | None = None) -> Figure:
@@ -176,18 +164,6 @@ def _draw_curve(axes: Axes, demand: Array, im: Array, limit: float, **options: A
     if end < len(demand) and np.isinf(demand[end]):
         x, y = np.append(x, limit), np.append(y, im[end])
     axes.plot(x, y, **options)
-
-
-def _on_frame(
-    solution: Solution,
-    title: tuple[str, str],
-    quantity: str,
-    diagrams: Sequence[tuple[Any, Array]],
-    ax: Axes | None,
-) -> Figure:
-    """Draw diagrams of a section force on the undeformed frame of a solution."""
-    shape = plane_canvas(solution, [], 1.0, ax, MOST)[0].undeformed
-    return draw_frame(ax, solution, 0, shape, title, quantity, diagrams)
 
 
 def draw_storeys(storeys: Storeys, *, quantity: str = "drift", ax: Axes | None = None) -> Figure:

@@ -78,12 +78,13 @@ def test_many_equal_hinges_have_one_note():
     """4 x 5 columns and 3 x 5 girders; the colour of the note is that of its hinges."""
     figure = ub.plot(frame(3, 5, by_kind))
     found = notes(figure)
-    assert [*found] == ["dots: 40 hinges, 40 kN m", "dots: 30 hinges, 30 kN m"]
-    for color, number in zip(found.values(), (40, 30), strict=True):
+    forces = "5 forces: 1 kN × f(t)"
+    assert [*found] == ["dots: 40 hinges, 40 kN m", "dots: 30 hinges, 30 kN m", forces]
+    for color, number in zip(found.values(), (40, 30), strict=False):
         assert len(middles(figure, "hinges", fill=color)) == number
     assert not [text for text in texts(figure) if text.startswith("hinge")]
-    # There is space for the other labels: names of members, and forces
-    assert {"C00", "B42", "1 kN × f(t)"} <= {*texts(figure)}
+    # There is space for the names of members
+    assert {"C00", "B42"} <= {*texts(figure)}
 
 
 def test_many_different_limits_are_three_notes_and_a_range():
@@ -93,8 +94,9 @@ def test_many_different_limits_are_three_notes_and_a_range():
     )
     words = [f"dots: 14 hinges, {limit} kN m" for limit in (10, 20, 30)]
     found = notes(figure)
-    assert [*found] == [*words, "dots: 28 hinges, 40 kN m to 50 kN m"]
-    assert [len(middles(figure, "hinges", fill=x)) for x in found.values()] == [14, 14, 14, 28]
+    assert [*found][:4] == [*words, "dots: 28 hinges, 40 kN m to 50 kN m"]
+    colors = [*found.values()][:4]
+    assert [len(middles(figure, "hinges", fill=x)) for x in colors] == [14, 14, 14, 28]
 
 
 def test_few_equal_hinges_keep_their_labels():

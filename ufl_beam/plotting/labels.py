@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""Labels of pictures of the plane, and sizes of figures that the pictures fill."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.plotting import style
+from ufl_beam.plotting.positions import directions, joined, segments
+from ufl_beam.plotting.style import BLUE, POINTS, RED, WHITE, font_size, shade
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.text import Annotation
+
+AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
+"""Space for words and numbers around the axes, least size and largest size of a figure; inch."""
+
+MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
+GAPS = (4.0, 14.0)  # candidate distances of a label from its point; points
+CLEARANCE = 2.0  # clearance around a label; points
+AREAS = RED, BLUE  # groups of filled areas that labels should not cover
+
+Spot = tuple[Array, Array]  # point, and the direction from there to a label; (2,) each
+
+
+class Label(NamedTuple):
+    """Text of a label with its candidate positions, the best first."""
+
+    text: str
+    color: str
+    spots: Sequence[Spot]
+    bold: bool = False  # bold labels are larger
+
+
+def around(point: Array, outward: Array) -> list[Spot]:
+    """List candidate positions of a label, from a direction more and more to both sides."""
+    angle = np.arctan2(outward[1], outward[0])
+    tilts = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
+    return [(point, direction) for direction in directions(angle + tilts)]
+
+
+def arrange(axes: Axes, ax: Axes | None, labels: Sequence[Label] = (), scale: float = 0.0) -> None:
+    """Write labels of a picture of the plane; fit limits and figure to the drawing and its labels.
+
+    The first labels have the best places.  The drawing is as large as possible, or a point is at
+    least ``scale`` (m) long.  The user's axes ``ax`` keep their size.
+    """
+    axes.margins(MARGIN)
+    drawn, written = axes.dataLim.frozen(), list[Any]()
+    # Space for labels changes the scale, which moves the lines that labels should not cover.
+    for _ in range(2):
+        _fit(axes, ax, scale)
+        for text in written:
+            text.remove()
+        written = write_labels(axes, labels)
+        axes.dataLim.set(drawn)
+        to_data = axes.transData.inverted()
+        for text in written:
+            axes.update_datalim(to_data.transform(text.get_window_extent().get_points()))
+        if legend := axes.get_legend():
+            x, y = axes.transData.transform(axes.dataLim.min)
+            axes.update_datalim([to_data.transform((x, y - legend.get_window_extent().height))])
+    _fit(axes, ax, scale)
+
+
+def _fit(axes: Axes, ax: Axes | None, scale: float) -> None:
+    """Fit the limits to the data, and the size of a new figure to the limits."""
+    axes.autoscale_view()
+    if ax is None:
+        figure = style.parent_figure(axes)
+        bars, legends = len(figure.axes) - 1, [x.get_window_extent() for x in figure.legends]
+        high = sum(legend.height for legend in legends) / figure.dpi
+        wide = max((legend.width for legend in legends), default=0.0) / figure.dpi + 0.2
+        around = np.add(AROUND, (bars, high))
+        span = np.array([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())])
+        inches = np.min((MOST - around) / span)
+        if scale:
+            inches = min(inches, 1.0 / (POINTS * scale))
+        least = np.minimum((max(LEAST[0] + bars, wide), LEAST[1] + high), MOST)
+        figure.set_size_inches(np.clip(inches * span + around, least, MOST))
+    axes.apply_aspect()
+
+
+def write_labels(axes: Axes, labels: Sequence[Label]) -> list[Annotation]:
+    """Write labels at the candidate positions that cover the least of the drawing.
+
+    A label that would cover a label before it is omitted.
+    """
+    from matplotlib.transforms import Affine2D
+
+    if not labels:
+        return []
+    style.lay_out(axes)
+    per_pixel = POINTS / style.parent_figure(axes).dpi
+    to_points = axes.transData + Affine2D().scale(per_pixel)
+    lines, written = np.concatenate([*_obstacles(axes, to_points)]), list[Any]()
+    boxes = np.empty((0, 2, 2))  # lower and upper corners of the written labels
+    for text, color, spots, bold in labels:
+        points, ways = (np.array(x) for x in zip(*spots, strict=True))
+        mark = axes.annotate(
+            text, points[0], (0, 0), textcoords="offset points", color=shade(color), zorder=7,
+            ha="center", va="center", size=font_size(13.0 if bold else 10.5), gid="labels",
+            weight="bold" if bold else "normal",
+            bbox={"facecolor": shade(WHITE), "edgecolor": "none", "alpha": 0.85, "pad": 0.8},
+        )  # fmt: skip
+        half = np.multiply(mark.get_window_extent().size, per_pixel / 2)
+        # The box is beyond the line that is perpendicular to the direction at the point.
+        offsets = np.concatenate([ways * (gap + np.abs(ways) @ half)[:, None] for gap in GAPS])
+        centers = np.tile(to_points.transform(points), (len(GAPS), 1)) + offsets
+        low, high = centers - half - CLEARANCE, centers + half + CLEARANCE
+        covers = ((low[:, None] < boxes[:, 1]) & (high[:, None] > boxes[:, 0])).all(axis=2)
+        cost = lengths_inside(low, high, lines) + 0.1 * np.arange(len(centers))
+        best = int(np.argmin(np.where(covers.any(axis=1), np.inf, cost)))
+        if covers[best].any():
+            mark.remove()
+            continue
+        mark.xy, mark.xyann = points[best % len(points)], offsets[best]
+        corners = centers[best] + [-half, half]
+        boxes, written = np.concatenate([boxes, corners[None]]), [*written, mark]
+    return written
+
+
+def _obstacles(axes: Axes, to_points: Any) -> Iterator[Array]:
+    """Yield segments that labels should not cover; (n, 4); points."""
+    lines = [np.asarray(line.get_xydata()) for line in axes.lines if line.get_linestyle() != "None"]
+    yield np.empty((0, 4))
+    for collection in axes.collections:
+        outlines = [np.asarray(path.vertices) for path in collection.get_paths()]
+        lines += outlines
+        if collection.get_gid() in AREAS:
+            for outline in map(to_points.transform, outlines):
+                # Ordinates at and between the points of a diagram; the axis is the second half,
+                # before the point that closes the outline.
+                half = len(outline) // 2
+                feet = np.vstack([outline[:1], outline[-2:half:-1]])
+                ordinates = np.hstack([feet, outline[1 : half + 1]])
+                yield from (ordinates, (ordinates[1:] + ordinates[:-1]) / 2)
+    pieces = segments(to_points.transform(joined(lines)))
+    yield pieces[np.isfinite(pieces).all(axis=1)]
+    for line in axes.lines:
+        if line.get_linestyle() == "None":  # markers
+            diagonal = line.get_markersize() / 2 * np.array([-1, -1, 1, 1])
+            for ends in (diagonal, diagonal * (1, -1, 1, -1)):
+                yield np.tile(to_points.transform(line.get_xydata()), 2) + ends
+
+
+def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
+    """Sum the lengths of segments, (n, 4), inside boxes with corners ``low`` and ``high``."""
+    ends = np.sort(lines.reshape(-1, 2, 2), axis=1)
+    near = ((ends[:, 0] <= high.max(axis=0)) & (ends[:, 1] >= low.min(axis=0))).all(axis=1)
+    first, step = lines[None, near, :2], (lines[:, 2:] - lines[:, :2])[None, near]
+    lengths = np.linalg.norm(step[0], axis=1)
+    # In a direction perpendicular to it, a segment is either entirely inside or outside.
+    step = np.where(step == 0.0, 1e-99, step)
+    sides = (low[:, None] - first) / step, (high[:, None] - first) / step
+    enter, leave = np.minimum(*sides).max(axis=2), np.maximum(*sides).min(axis=2)
+    return np.asarray(np.maximum(np.minimum(leave, 1.0) - np.maximum(enter, 0.0), 0.0) @ lengths)
