@@ -55,9 +55,10 @@ def draw_shapes(
     magnify: float = 1.0,
     ax: Axes | None = None,
 ) -> Figure:
-    """Draw successive shapes in one picture, coloured by time or load factor.
+    """Draw successive shapes in one picture, coloured by time or along the path.
 
     By default, ``count`` recorded states are drawn, evenly spaced in time or along the path.
+    The colour bar of a path has the load factors, which may repeat.
     """
     from matplotlib.colors import to_hex
 
@@ -75,13 +76,13 @@ def draw_shapes(
         if not len(requested):
             raise ArgumentError("plot: times is empty; give times (s), or count=")
         chosen = [int(np.argmin(np.abs(instants - t))) for t in np.sort(requested)]
-    canvas = plane_canvas(solution, chosen, magnify, ax)
+    canvas, along = plane_canvas(solution, chosen, magnify, ax), solution.progress
     shapes = [canvas.shape(n) for n in chosen]
     with style.panel(ax, MOST) as axes:
-        colors = style.scale("viridis", 0.0, 0.88, *np.sort(instants[chosen])[[0, -1]])
+        colors = style.scale("viridis", 0.0, 0.88, *np.sort(along[chosen])[[0, -1]])
         style.plane_axes(axes, style.magnified(magnify, ""))
         draw_undeformed(axes, solution, canvas)
-        for shape, color in zip(shapes, map(to_hex, colors.to_rgba(instants[chosen])), strict=True):
+        for shape, color in zip(shapes, map(to_hex, colors.to_rgba(along[chosen])), strict=True):
             moving = *symbols.bodies(shape), *symbols.rods(shape)
             draw_strokes(axes, {"moving": moving}, color)
             draw_beams(axes, solution, shape.nodes, color=color, linewidth=2.2, zorder=3)
@@ -89,7 +90,9 @@ def draw_shapes(
         last = shapes[-1]
         still = *symbols.rails(last), *symbols.connectors(last), *symbols.supports(last)
         draw_strokes(axes, {"still": still})
-        style.draw_bar(axes, colors, solution.parameter.name)
+        bar = style.draw_bar(axes, colors, solution.parameter.name)
+        if solution.parameter.progress != solution.parameter.name:
+            bar.formatter = lambda x, _: style.number(np.interp(x, along, instants))
         arrange(axes, ax)
     return style.parent_figure(axes)
 

@@ -289,6 +289,24 @@ def test_shapes_have_a_bar_of_times(swing):
     np.testing.assert_allclose(bar.get_ylim(), (0, 0.1))
 
 
+def test_shapes_of_a_path_on_a_plateau_have_different_colours():
+    """Beyond its limit the hinge turns at a constant load factor; the bar has load factors."""
+    beam = ub.Beam((0, 0), (2, 0), scenes.SECTION, cells=2, hinges={0.0: ub.ElastoPlastic(10.0)})
+    load = ub.PointLoad(beam.end, force=(0, -1), amplitude=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    path = ub.follow(scene, ub.DisplacementControl(beam.end, "v", -0.025), steps=20, progress=False)
+    assert path.times[-1] == pytest.approx(path.times[10], rel=0.05)
+    figure = ub.plot(path, "shapes", count=5)
+    axes, bar = figure.axes
+    colors = {line.get_color() for line in axes.lines if line.get_zorder() == 3}
+    assert len(colors) == 5
+    greens = sorted(int(color[3:5], 16) for color in colors)
+    assert np.diff(greens).min() > 20
+    assert bar.get_ylabel() == "load factor"
+    last = bar.yaxis.get_major_formatter()(path.progress[-1])
+    assert float(last) == pytest.approx(path.times[-1], rel=5e-3)
+
+
 def test_shapes_are_at_the_nearest_kept_times(swing):
     axes = ub.plot(swing, "shapes", [0.0519, 0.0]).axes[0]
     # Undeformed, then t = 0, then t = 0.05, which is step 10
