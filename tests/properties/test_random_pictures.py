@@ -8,8 +8,7 @@ import pytest
 from random_machines import script
 
 import ufl_beam as ub
-from ufl_beam.plotting.model import model_notes, scene_load_caption
-from ufl_beam.plotting.model_drawing import Drawing
+from ufl_beam.plotting.model import Drawing, model_notes, scene_load_caption
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*are of no material")
 
@@ -28,8 +27,9 @@ def amount(scene):
     drawing = Drawing(scene, scene.size / 300.0)
     strokes = [stroke for group in drawing.strokes.values() for stroke in group]
     assert all(np.isfinite(stroke.points).all() for stroke in strokes)
+    labels = sum(map(len, drawing.labels.values()))
     whole = [load for load in scene.loads if any(scene_load_caption(load))]
-    return len(strokes) + len(drawing.labels) + len(whole) + len(model_notes(scene))
+    return len(strokes) + labels + len(whole) + len(model_notes(scene))
 
 
 @pytest.mark.parametrize("seed", range(25))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.model.bodies import Member, Place
+from ufl_beam.model.bodies import Member
 from ufl_beam.model.connectors import can_yield
 from ufl_beam.plotting import style, symbols
 from ufl_beam.plotting.inelastic_pictures import (
@@ -20,6 +20,7 @@ from ufl_beam.plotting.inelastic_pictures import (
     circle,
     dissipated_per_length,
     draw_damage,
+    mark_hinges,
     open_hinges,
 )
 from ufl_beam.plotting.labels import AROUND, MOST, Label, around, arrange
@@ -259,14 +260,15 @@ def _areas(
         Outline (n, 2), m, of an area; its value of the largest magnitude; index of the point with
         this value, the middle one of several.
     """
+    points = np.column_stack([axis, tips, values, diagram, np.arange(len(values))])
     # Where the sign changes, both areas end at a point on the axis.
     first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (diagram[:-1] == diagram[1:]))
     fraction = values[first] / (values[first] - values[first + 1])
-    zeros = axis[first] + fraction[:, None] * (axis[first + 1] - axis[first])
-    places = np.insert(np.arange(len(values)), first + 1, first)
-    axis, tips = (np.insert(points, first + 1, zeros, axis=0) for points in (axis, tips))
-    values = np.insert(values, first + 1, 0.0)
-    diagram = np.insert(diagram, first + 1, diagram[first])
+    zeros = points[first]
+    zeros[:, :2] += fraction[:, None] * (axis[first + 1] - axis[first])
+    zeros[:, 2:4], zeros[:, 4] = zeros[:, :2], 0.0
+    points = np.insert(points, first + 1, zeros, axis=0)
+    axis, tips, (values, diagram, places) = points[:, :2], points[:, 2:4], points[:, 4:].T
     signs = np.where(diagram[:-1] == diagram[1:], np.sign(values[:-1] + values[1:]), 0.0)
     ends = np.flatnonzero(np.diff(signs, append=np.nan))
     for begin, end in zip([0, *(ends[:-1] + 1)], ends, strict=True):
@@ -344,7 +346,7 @@ def _draw_hinges(
     axes: Axes, ax: Axes | None, solution: Solution, shape: DeformedShape,
     hinges: Sequence[OpenHinge], limits: Mapping[str, float],
 ) -> None:  # fmt: skip
-    """Draw open hinges; at joints of several beams they are drawn beside the joint."""
+    """Draw open hinges with a legend or a colour bar."""
     colors: list[Any] = [BLUE] * len(hinges)
     entries: list[tuple[float, str, Any]] = []  # of the legend: fraction, words, colour
     if not all(math.isnan(hinge.fraction) for hinge in hinges):
@@ -363,14 +365,7 @@ def _draw_hinges(
         for k, color in zip(hardened, rule.to_rgba(rotations / unit), strict=True):
             colors[k] = color
         style.draw_bar(axes, rule, f"plastic rotation of hinges ({prefix}rad)")
-    ends = [shape.at(end) for beam in solution.scene.beams for end in (beam.start, beam.end)]
-    for hinge, color in zip(hinges, colors, strict=True):
-        at, place = hinge.at, hinge.place
-        several = sum(math.dist(at, end) < 1e-6 * solution.scene.size for end in ends) > 1
-        if several and isinstance(place, Place) and place.s in (0.0, 1.0):
-            inner = solution.numbering.nodes_along(place.beam)[1 if place.s == 0.0 else -2]
-            at = at + 0.7 * shape.canvas.unit * unit_vectors(shape.nodes[inner] - at)
-        axes.plot(*at, **circle(hinge.fraction, color))
+    mark_hinges(axes, solution, shape, hinges, colors)
     handles = [axes.plot([], [], **circle(x, color), label=words)[0] for x, words, color in entries]
     if handles:
         style.draw_legend(axes, ax, handles, loc="outside upper left", ncols=3)

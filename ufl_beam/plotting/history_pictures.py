@@ -130,7 +130,7 @@ def draw_history(
     quantity, unit = COMPONENTS[component]
     with style.panel(ax, (8.0, 4.2)) as axes:
         style.time_axes(axes)
-        axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
+        style.zero_lines(axes, x=False)
         for place in followed:
             axes.plot(solution.times, motion(place)[:, number % 3], label=str(place))
         axes.set_ylabel(f"{quantity} {component.replace('psi', 'ψ')} ({unit})")

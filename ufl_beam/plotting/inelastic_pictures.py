@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,15 +20,14 @@ from ufl_beam.output.hinge_histories import hinge_histories, require_limits, rot
 from ufl_beam.output.history import breaking_law
 from ufl_beam.output.state_rows import HINGE, JUMP
 from ufl_beam.plotting import style
-from ufl_beam.plotting.style import BLUE, GREY, INK, ORANGE, RED, WHITE, shade, with_unit
+from ufl_beam.plotting.positions import DeformedShape, unit_vectors
+from ufl_beam.plotting.style import BLUE, INK, ORANGE, RED, WHITE, shade, with_unit
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from ufl_beam.plotting.positions import DeformedShape
 
 
 FULLY_OPEN = 0.99  # hinges that dissipated this fraction of their fracture energy look like joints
@@ -114,10 +113,27 @@ def draw_damage(axes: Axes, solution: Solution, n: int, shape: DeformedShape) ->
     for line in shape.nodes[solution.numbering.nodes_along_cells[yielded]]:
         (zone,) = axes.plot(*line.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8)
         named["yielded or cracked"] = zone
-    for hinge in open_hinges(solution, n, shape.at):
-        (mark,) = axes.plot(*hinge.at, **circle(hinge.fraction))
+    hinges = open_hinges(solution, n, shape.at)
+    for hinge, mark in zip(hinges, mark_hinges(axes, solution, shape, hinges), strict=True):
         named["fully open hinge" if hinge.fraction >= FULLY_OPEN else "hinge, open"] = mark
     return named
+
+
+def mark_hinges(
+    axes: Axes, solution: Solution, shape: DeformedShape, hinges: Sequence[OpenHinge],
+    colors: Sequence[Any] = (),
+) -> list[Artist]:  # fmt: skip
+    """Draw open hinges as circles; at joints of several beams they are beside the joint."""
+    ends = [shape.at(end) for beam in solution.scene.beams for end in (beam.start, beam.end)]
+    marks: list[Artist] = []
+    for hinge, color in zip(hinges, colors or [BLUE] * len(hinges), strict=True):
+        at, place = hinge.at, hinge.place
+        several = sum(math.dist(at, end) < 1e-6 * solution.scene.size for end in ends) > 1
+        if several and isinstance(place, Place) and place.s in (0.0, 1.0):
+            inner = solution.numbering.nodes_along(place.beam)[1 if place.s == 0.0 else -2]
+            at = at + 0.7 * shape.canvas.unit * unit_vectors(shape.nodes[inner] - at)
+        marks += axes.plot(*at, **circle(hinge.fraction, color))
+    return marks
 
 
 # -- pictures ----------------------------------------------------------------------------------
@@ -228,8 +244,7 @@ def _draw_path(axes: Axes, ax: Axes | None, solution: Solution, x: Array, M: Arr
         list(np.stack([path[:-1], path[1:]], axis=1)), colors=colors.to_rgba(middle),
         linewidths=2.2, capstyle="round", zorder=3,
     )  # fmt: skip
-    for at_zero in (axes.axhline, axes.axvline):
-        at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
+    style.zero_lines(axes)
     axes.add_collection(pieces)
     ring: dict[str, Any] = {"ms": 8.0, "mec": shade(INK), "mew": 1.6, "zorder": 5, "ls": "none"}
     for i, inside in ((0, WHITE), (-1, INK)):

@@ -37,11 +37,11 @@ class Label(NamedTuple):
     bold: bool = False  # bold labels are larger
 
 
-def around(point: Array, outward: Array) -> list[Spot]:
-    """List candidate positions of a label, from a direction more and more to both sides."""
-    angle = np.arctan2(outward[1], outward[0])
-    tilts = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
-    return [(point, direction) for direction in directions(angle + tilts)]
+def around(point: Any, outward: Any = (1.0, 0.0), radius: float = 0.0) -> list[Spot]:
+    """List positions of a label around a point, from a direction more and more to both sides."""
+    tilts = np.radians((0, 45, -45, 90, -90, 135, -135, 180))
+    ways = directions(np.arctan2(outward[1], outward[0]) + tilts)
+    return [(point + radius * way, way) for way in ways]
 
 
 def arrange(axes: Axes, ax: Axes | None, labels: Sequence[Label] = (), scale: float = 0.0) -> None:

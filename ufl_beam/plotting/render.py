@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import gc
 from collections import defaultdict
-from collections.abc import Collection, Generator, Iterable
+from collections.abc import Collection, Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -32,7 +32,7 @@ from ufl_beam.plotting.positions import (
     unit_vectors,
 )
 from ufl_beam.plotting.style import RESULTANTS
-from ufl_beam.plotting.symbols import FILLED, FRONT, MIDDLE, Pin
+from ufl_beam.plotting.symbols import FILLED, FRONT, MIDDLE, Pin, disc
 from ufl_beam.simulation.solution import Solution
 
 QUANTITIES = {name: (f"{words} {name}", unit) for name, (words, unit) in RESULTANTS.items()}
@@ -371,39 +371,13 @@ class Solids:
         return mesh
 
     def others(self, n: int, shape: DeformedShape) -> dict[str, list[Any]]:
-        """Make meshes of bodies, joints, connectors, masses and supports, by their colours."""
-        from pyvista import Cylinder, PolyData, Sphere
+        """Make meshes of bodies, joints, connectors, masses and supports, by their colours.
 
-        meshes: defaultdict[str, list[Any]] = defaultdict(list)
-        self._add_strokes(meshes, shape)
-        pins = [(pin, PIN) for pin in symbols.pins(shape)]
-        for hinge in open_hinges(self.solution, n, shape.at):
-            pins.append((Pin(hinge.at, True, (hinge.place,)), style.ORANGE))
-        # Joints are cylinders as thick as the joined beams; equal cylinders are in one mesh.
-        alike: defaultdict[tuple[float, float, str], list[Array]] = defaultdict(list)
-        for pin, color in pins:
-            depth, width = self.thickest(pin.places)
-            least = 0.4 * shape.canvas.unit if pin.rotates or not depth else 0.0
-            height = width * (1.25 if pin.rotates else 1.02)
-            alike[max(depth / 2, least), height, color].append(pin.at)
-        solids: list[tuple[Any, str, list[Array]]] = []
-        for (radius, height, color), places in alike.items():
-            axis = {"direction": (0, 0, 1), "radius": radius, "height": height}
-            solids.append((Cylinder(**axis, resolution=32).triangulate(), color, places))
-        if masses := [shape.at(mass.place) for mass in self.solution.scene.masses]:
-            solids.append((Sphere(radius=1.1 * shape.canvas.unit), style.INK, masses))
-        for solid, color, places in solids:
-            points = PolyData(np.insert(np.array(places), 2, 0.0, axis=1))
-            meshes[color].append(points.glyph(geom=solid, orient=False, scale=False))
-        for at, angle, outlines, color, place in symbols.support_symbols(shape):
-            half, ahead = 0.6 * self.thickest([place])[1], shape.canvas.unit * directions(angle)
-            meshes[color] += [_extruded(in_frame(x, at, ahead), -half, half) for x in outlines]
-        return meshes
-
-    def _add_strokes(self, meshes: dict[str, list[Any]], shape: DeformedShape) -> None:
-        """Add bodies as plates, lines as rods, and filled areas as blocks."""
-        beams = self.solution.scene.beams
-        body, front = self.thickest(())[1], 0.7 * self.thickest(beams)[1]
+        Filled areas are blocks, and lines are rods.
+        """
+        scene, unit = self.solution.scene, shape.canvas.unit
+        body, front = self.thickest(())[1], 0.7 * self.thickest(scene.beams)[1]
+        blocks: defaultdict[tuple[str, float, float], list[Array]] = defaultdict(list)
         lines: defaultdict[tuple[str, float], list[Array]] = defaultdict(list)
         for strokes, half in (
             (symbols.bodies(shape), 0.4 * body),
@@ -416,13 +390,30 @@ class Solids:
                 base = front if layer >= FRONT else half
                 low, high = (-half, half) if layer <= MIDDLE else (base, 1.1 * base)
                 if fill is not None:
-                    meshes[fill].append(_extruded(points, low, high))
+                    blocks[fill, low, high].append(points)
                 if fill != FILLED:
                     z = 0.0 if fill is None and layer <= MIDDLE else high
                     lines[color, weight].append(np.insert(points, 2, z, axis=1))
+        pins = [(pin, PIN) for pin in symbols.pins(shape)]
+        for hinge in open_hinges(self.solution, n, shape.at):
+            pins.append((Pin(hinge.at, True, (hinge.place,)), style.ORANGE))
+        for pin, color in pins:  # as thick as the joined beams
+            depth, width = self.thickest(pin.places)
+            radius = max(depth / 2, 0.4 * unit if pin.rotates or not depth else 0.0)
+            half = width * (0.62 if pin.rotates else 0.51)
+            blocks[color, -half, half].append(disc(pin.at, radius, color, color).points)
+        for mass in scene.masses:
+            dot = disc(shape.at(mass.place), 1.1 * unit, style.INK, style.INK).points
+            blocks[style.INK, -front, front].append(dot)
+        for at, angle, symbol, color, place in symbols.support_symbols(shape):
+            half, ahead = 0.6 * self.thickest([place])[1], unit * directions(angle)
+            blocks[color, -half, half] += [in_frame(x, at, ahead) for x in symbol]
+        meshes: defaultdict[str, list[Any]] = defaultdict(list)
+        for (color, low, high), outlines in blocks.items():
+            meshes[color].append(_extruded(outlines, low, high))
         for (color, weight), several in lines.items():
-            tubes = _lines(several).tube(radius=weight * shape.canvas.unit / 20.0, n_sides=12)
-            meshes[color].append(tubes)
+            meshes[color].append(_lines(several).tube(radius=weight * unit / 20.0, n_sides=12))
+        return meshes
 
 
 def _lines(lines: list[Array]) -> Any:
@@ -434,10 +425,12 @@ def _lines(lines: list[Array]) -> Any:
     return line_segments_from_points(np.insert(ends, 2, 0.0, axis=1) if flat else ends)
 
 
-def _extruded(outline: Array, low: float, high: float) -> Any:
-    """Extrude a closed outline to a block between the planes z = ``low`` and ``high``; m."""
+def _extruded(outlines: Sequence[Array], low: float, high: float) -> Any:
+    """Extrude closed outlines to blocks between the planes z = ``low`` and ``high``; m."""
     from pyvista import PolyData
 
-    flat = np.insert(outline[:-1], 2, low, axis=1)
-    face = PolyData(flat, [len(flat), *range(len(flat))])
-    return face.triangulate().extrude((0.0, 0.0, high - low), capping=True)
+    flat = np.insert(np.concatenate([outline[:-1] for outline in outlines]), 2, low, axis=1)
+    ends = np.cumsum([len(outline) - 1 for outline in outlines])
+    faces = np.split(np.arange(len(flat)), ends[:-1])
+    solid = PolyData(flat, np.concatenate([[len(face), *face] for face in faces])).triangulate()
+    return solid.extrude((0.0, 0.0, high - low), capping=True)

@@ -214,6 +214,12 @@ def time_axes(axes: Axes) -> Axes:
     return axes
 
 
+def zero_lines(axes: Axes, *, x: bool = True, y: bool = True) -> None:
+    """Draw thin lines at x = 0 and y = 0, below the curves."""
+    for draw in (axes.axvline,) * x + (axes.axhline,) * y:
+        draw(0.0, color=GREY, linewidth=1.0, zorder=1)
+
+
 def parent_figure(axes: Axes) -> Figure:
     """Return the figure that axes are in."""
     return axes.figure.figure

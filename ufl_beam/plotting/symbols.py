@@ -3,7 +3,7 @@
 
 Symbols of supports are in :data:`SUPPORTS`, of joints in :data:`JOINTS`, of connector laws in
 :data:`LAWS`.  Joints and laws that are not in these tables have a plain symbol.  The unit of
-lengths is half the size of a symbol.  Symbols of loads are in `model_drawing.py`.
+lengths is half the size of a symbol.  Symbols of loads are in `model.py`.
 """
 
 from __future__ import annotations

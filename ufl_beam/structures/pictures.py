@@ -85,7 +85,7 @@ def draw_pushover(
             axes.plot(*at, "o", color=shade(ORANGE), ms=6.0, zorder=4, label=label)
             outward = sign * np.array([-0.6, 0.8])
             numbers.append(Label(str(number), INK, around(np.array(at), outward)))
-        axes.axhline(0.0, color=GREY, linewidth=1.0, zorder=1)
+        style.zero_lines(axes, x=False)
         axes.set_xlabel(f"{pushover.component} of {pushover.place} (m)")
         axes.set_ylabel(f"base shear ({prefix}N)")
         if several or 0 < len(steps) <= MOST_NAMED:
@@ -174,7 +174,7 @@ def draw_storeys(storeys: Storeys, *, quantity: str = "drift", ax: Axes | None =
     label = "drift ratio (%)" if drift else f"storey shear ({prefix}N)"
     edges = [place.point[1] for place in storeys.levels]
     with style.panel(ax, (5.0, 6.0)) as axes:
-        axes.axvline(0.0, color=GREY, linewidth=1.0, zorder=1)
+        style.zero_lines(axes, y=False)
         for name, extreme, color in (("largest", np.nanmax, RED), ("least", np.nanmin, BLUE)):
             profile = np.repeat(extreme(values, axis=0), 2)
             axes.plot(profile, np.repeat(edges, 2)[1:-1], color=color, label=name)
@@ -264,8 +264,7 @@ def draw_cycles(fatigue: Fatigue, spot: HotSpot | None = None) -> Figure:
 def draw_section_moments(result: MomentCurvature, *, ax: Axes | None = None) -> Figure:
     """Draw moments (N m) of a section against curvatures (1/m); a dot marks the last state."""
     with style.panel(ax, (8.0, 5.4)) as axes:
-        for at_zero in (axes.axhline, axes.axvline):
-            at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
+        style.zero_lines(axes)
         axes.plot(result.curvature, result.moment, color=BLUE)
         axes.plot(result.curvature[-1], result.moment[-1], "o", color=BLUE)
         axes.set_xlabel("curvature K (1/m)")
@@ -278,8 +277,7 @@ def draw_section_moments(result: MomentCurvature, *, ax: Axes | None = None) -> 
 def draw_interaction(diagram: InteractionDiagram, *, ax: Axes | None = None) -> Figure:
     """Draw axial forces (N) against moments (N m) at limit strains; compression is at the top."""
     with style.panel(ax, (7.0, 6.0)) as axes:
-        for at_zero in (axes.axhline, axes.axvline):
-            at_zero(0.0, color=GREY, linewidth=1.0, zorder=1)
+        style.zero_lines(axes)
         axes.plot(diagram.M, diagram.N, color=BLUE)
         axes.fill(diagram.M, diagram.N, facecolor=(BLUE, 0.08), linewidth=0.0, zorder=0)
         axes.yaxis.set_inverted(True)
