@@ -9,6 +9,7 @@ from random_machines import script
 
 import ufl_beam as ub
 from ufl_beam.plotting.model import Drawing, model_notes, scene_load_caption
+from ufl_beam.plotting.positions import Canvas
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*are of no material")
 
@@ -24,7 +25,7 @@ def machine(seed):
 
 def amount(scene):
     """Number of strokes, labels and words of a picture; and whether all numbers are finite."""
-    drawing = Drawing(scene, scene.size / 300.0)
+    drawing = Drawing(Canvas.at_scale(scene, 1.0, scene.size / 300.0))
     strokes = [stroke for group in drawing.strokes.values() for stroke in group]
     assert all(np.isfinite(stroke.points).all() for stroke in strokes)
     labels = sum(map(len, drawing.labels.values()))

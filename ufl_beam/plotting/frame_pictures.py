@@ -23,7 +23,7 @@ from ufl_beam.plotting.inelastic_pictures import (
     mark_hinges,
     open_hinges,
 )
-from ufl_beam.plotting.labels import AROUND, MOST, Label, around, arrange
+from ufl_beam.plotting.labels import MOST, Label, around, arrange, plane_canvas
 from ufl_beam.plotting.positions import (
     Canvas,
     DeformedShape,
@@ -31,7 +31,7 @@ from ufl_beam.plotting.positions import (
     normal,
     unit_vectors,
 )
-from ufl_beam.plotting.style import BLUE, GREY, INK, POINTS, RED, RESULTANTS, font_size, shade
+from ufl_beam.plotting.style import BLUE, GREY, INK, RED, RESULTANTS, font_size, shade
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
 
@@ -53,23 +53,6 @@ SIGNS = {
 """Meaning of both signs; the arrow on a beam points from its start to its end."""
 
 Values = tuple[Member, Array]  # a beam, and values at points of its cells; (num_cells points,)
-
-
-def plane_canvas(
-    solution: Solution,
-    shown: Sequence[int],
-    magnify: float = 1.0,
-    ax: Axes | None = None,
-    size: tuple[float, float] = (MOST[0] - AROUND[0], MOST[1] - AROUND[1]),
-) -> Canvas:
-    """Make a canvas for the user's axes, or new ones, whose symbols have a size in points.
-
-    ``size`` is the largest width and height of new axes; inch.
-    """
-    points = Canvas(solution, magnify, 0.02 * solution.scene.size, shown).points()
-    space = POINTS * np.array(size) if ax is None else style.lay_out(ax)
-    scale = float(np.max(1.12 * np.ptp(points, axis=0) / space))
-    return Canvas.at_scale(solution, magnify, scale, shown)
 
 
 def draw_beams(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:

@@ -22,9 +22,8 @@ from ufl_beam.plotting.frame_pictures import (
     draw_envelope,
     draw_outlines,
     draw_undeformed,
-    plane_canvas,
 )
-from ufl_beam.plotting.labels import MOST, arrange
+from ufl_beam.plotting.labels import MOST, arrange, plane_canvas
 from ufl_beam.plotting.positions import evenly
 from ufl_beam.plotting.style import BLUE, GREY, INK, RED, SKY, picture, shade
 from ufl_beam.plotting.symbols import draw_strokes

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.model.scene import Scene
+from ufl_beam.output.states import States
 from ufl_beam.plotting import style
-from ufl_beam.plotting.positions import directions, joined, segments
+from ufl_beam.plotting.positions import Canvas, directions, joined, segments
 from ufl_beam.plotting.style import BLUE, POINTS, RED, WHITE, font_size, shade
 
 if TYPE_CHECKING:
@@ -22,10 +24,33 @@ AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 
 MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
 GAPS = (4.0, 14.0)  # candidate distances of a label from its point; points
+TICKS = 55.0, 26.0  # least distances of ticks along x and y; points
+MOST_TICKS = 8  # largest number of intervals between ticks along an axis
+SPACE = np.array([4.0, 0.0])  # further clearance between labels; points
 CLEARANCE = 2.0  # clearance around a label; points
 AREAS = RED, BLUE  # groups of filled areas that labels should not cover
 
 Spot = tuple[Array, Array]  # point, and the direction from there to a label; (2,) each
+
+
+def plane_canvas(
+    subject: Scene | States,
+    shown: Sequence[int] = (),
+    magnify: float = 1.0,
+    ax: Axes | None = None,
+    size: tuple[float, float] = (MOST[0] - AROUND[0], MOST[1] - AROUND[1]),
+    filled: float = 0.9,
+) -> Canvas:
+    """Make a canvas for the user's axes, or new ones, whose symbols have a size in points.
+
+    ``size`` is the largest width and height of new axes, inch; the frame fills a fraction of them.
+    """
+    scene = subject.scene if isinstance(subject, States) else subject
+    points = Canvas(subject, magnify, 0.02 * scene.size, shown).points()
+    space = POINTS * np.array(size) if ax is None else style.lay_out(ax)
+    # A scene may be a single point.
+    scale = max(*np.ptp(points, axis=0) / (filled * space), 1e-3 * scene.size)
+    return Canvas.at_scale(subject, magnify, scale, shown)
 
 
 class Label(NamedTuple):
@@ -53,7 +78,7 @@ def arrange(axes: Axes, ax: Axes | None, labels: Sequence[Label] = (), scale: fl
     axes.margins(MARGIN)
     drawn, written = axes.dataLim.frozen(), list[Any]()
     # Space for labels changes the scale, which moves the lines that labels should not cover.
-    for _ in range(2):
+    for _ in range(3):
         _fit(axes, ax, scale)
         for text in written:
             text.remove()
@@ -69,7 +94,9 @@ def arrange(axes: Axes, ax: Axes | None, labels: Sequence[Label] = (), scale: fl
 
 
 def _fit(axes: Axes, ax: Axes | None, scale: float) -> None:
-    """Fit the limits to the data, and the size of a new figure to the limits."""
+    """Fit the limits to the data, the size of a new figure to the limits, and numbers of ticks."""
+    from matplotlib.ticker import AutoLocator
+
     axes.autoscale_view()
     if ax is None:
         figure = style.parent_figure(axes)
@@ -84,6 +111,13 @@ def _fit(axes: Axes, ax: Axes | None, scale: float) -> None:
         least = np.minimum((max(LEAST[0] + bars, wide), LEAST[1] + high), MOST)
         figure.set_size_inches(np.clip(inches * span + around, least, MOST))
     axes.apply_aspect()
+    size = axes.get_window_extent().size
+    for axis, length, width in zip((axes.xaxis, axes.yaxis), size, TICKS, strict=True):
+        if isinstance(locator := axis.get_major_locator(), AutoLocator):
+            number = length * POINTS / style.parent_figure(axes).dpi / font_size(width)
+            locator.set_params(
+                nbins=min(max(1, int(number)), MOST_TICKS), steps=[1, 2, 5, 10], min_n_ticks=1
+            )
 
 
 def write_labels(axes: Axes, labels: Sequence[Label]) -> list[Annotation]:
@@ -120,7 +154,7 @@ def write_labels(axes: Axes, labels: Sequence[Label]) -> list[Annotation]:
             mark.remove()
             continue
         mark.xy, mark.xyann = points[best % len(points)], offsets[best]
-        corners = centers[best] + [-half, half]
+        corners = centers[best] + [-half - SPACE, half + SPACE]
         boxes, written = np.concatenate([boxes, corners[None]]), [*written, mark]
     return written
 

@@ -35,17 +35,16 @@ from ufl_beam.model.loads import (
     Rayleigh,
     RotatingFrame,
 )
-from ufl_beam.model.scene import Scene, attachment_points
+from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.model.works import Effect
 from ufl_beam.plotting import notebook, positions, style, symbols
-from ufl_beam.plotting.labels import AROUND, MOST, Label, Spot, around, arrange
+from ufl_beam.plotting.labels import MOST, Label, Spot, around, arrange, plane_canvas
 from ufl_beam.plotting.positions import directions, normal, points_along, unit_vectors
 from ufl_beam.plotting.style import (
     BLUE,
     GREEN,
     INK,
-    POINTS,
     RED,
     TEXT,
     WHITE,
@@ -89,8 +88,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     """
     require_independent(scene)
     with style.panel(ax, MOST) as axes:
-        space = style.lay_out(axes) if ax else POINTS * np.subtract(MOST, AROUND)
-        drawing = _fitted(scene, 0.9 * space)
+        drawing = Drawing(plane_canvas(scene, ax=ax, filled=0.7))  # with space for loads
         labels, repeated = drawing.grouped()
         cells = sum(len(axis) - 1 for axis in drawing.axes.values()), "cell", "cells"
         beams, bodies = (len(scene.beams), "beam", "beams"), (len(scene.bodies), "body", "bodies")
@@ -113,7 +111,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
                 va="center",
             )  # fmt: skip
         draw_strokes(axes, drawing.strokes)
-        arrange(axes, ax, labels, drawing.scale)
+        arrange(axes, ax, labels, 0.7 * drawing.scale)
     return style.parent_figure(axes)
 
 
@@ -164,18 +162,6 @@ def scene_load_caption(load: Load) -> tuple[str, str, float]:
     return "", "", 0.0
 
 
-def _fitted(scene: Scene, space: Array) -> Drawing:
-    """Return a drawing of a scene that fits in a width and height, (2,); points."""
-    scale = scene.size / 500.0
-    drawing = Drawing(scene, scale)
-    points = [body.center for body in scene.bodies]
-    points += [spot.point for spots in attachment_points(scene).values() for spot in spots]
-    extent = np.ptp(np.concatenate([*drawing.axes.values(), np.reshape(points, (-1, 2))]), axis=0)
-    # Symbols have sizes in points.
-    most = np.maximum(space - (drawing.size - extent) / scale, 0.3 * space)
-    return Drawing(scene, float(np.max(extent / most)) or scale)
-
-
 # -- strokes and labels ------------------------------------------------------------------------
 
 
@@ -186,15 +172,12 @@ def _kilograms(mass: float) -> str:
 
 
 class Drawing:
-    """Strokes of a scene by groups, and its labels; lengths in m.
+    """Strokes of a scene by groups, and its labels; lengths in m."""
 
-    ``scale`` is the length of a typographic point; m.
-    """
-
-    def __init__(self, scene: Scene, scale: float) -> None:
-        self.scene, self.scale, attached = scene, scale, scene.attached
-        self.shape = positions.Canvas.at_scale(scene, 1.0, scale).undeformed
-        self.unit, self.outside = self.shape.canvas.unit, self.shape.canvas.outside
+    def __init__(self, canvas: positions.Canvas) -> None:
+        self.scene, self.shape, attached = canvas.scene, canvas.undeformed, canvas.scene.attached
+        self.unit, self.outside, self.scale = canvas.unit, canvas.outside, canvas.scale
+        scene = self.scene
         self.strokes: defaultdict[str, list[Stroke]] = defaultdict(list)
         self.labels: defaultdict[tuple[str, str, str], list[Sequence[Spot]]] = defaultdict(list)
         """Candidate positions of labels by kind, text and colour."""
@@ -223,12 +206,6 @@ class Drawing:
                     draw(self, part)
         if len(scene.bodies) <= symbols.MOST_BODIES:
             _name_bodies(self)
-
-    @property
-    def size(self) -> Array:
-        """Width and height of all strokes; (2,); m."""
-        strokes = chain(*self.strokes.values())
-        return np.asarray(np.ptp(np.concatenate([x.points for x in strokes]), axis=0))
 
     def write(self, text: str, color: str, kind: str, spots: Sequence[Spot]) -> None:
         """Add a label with its candidate positions."""

@@ -99,9 +99,10 @@ class Canvas:
         unit: float,  # half the size of a symbol; m
         shown: Sequence[int] = (),
         outside: float = 0.0,  # half the size of symbols of supports, loads, motions; m
+        scale: float = 0.0,  # length of a typographic point; m
     ) -> None:
         require_number(magnify, "magnify", positive=True)
-        self.magnify, self.unit, self.outside = magnify, unit, outside or unit
+        self.magnify, self.unit, self.outside, self.scale = magnify, unit, outside or unit, scale
         self._solution = subject if isinstance(subject, States) else None
         self.scene = subject.scene if isinstance(subject, States) else subject
         self._shown = shown
@@ -117,12 +118,17 @@ class Canvas:
         typical = float(np.median(lengths)) / scale if lengths else math.inf
         unit = SYMBOL * scale * min(max(typical / SHORT_BEAM, SMALLEST), 1.0)
         few = len(scene.supports) + len(scene.loads) <= FEW
-        return cls(subject, magnify, unit, shown, max(unit, 0.7 * SYMBOL * scale) if few else unit)
+        outside = max(unit, 0.7 * SYMBOL * scale) if few else unit
+        return cls(subject, magnify, unit, shown, outside, scale)
 
     @property
     def undeformed(self) -> DeformedShape:
         """Shape of the undeformed scene."""
-        nodes = np.empty((0, 2)) if self._solution is None else self._solution.numbering.points
+        if self._solution is not None:
+            nodes = self._solution.numbering.points
+        else:
+            vertices = ([b.curve(s) for s in b.vertices(())] for b in self.scene.beams)
+            nodes = np.concatenate([np.empty((0, 2)), *vertices])
         return DeformedShape(self, lambda place: np.zeros(3), nodes)
 
     def shape(self, n: int) -> DeformedShape:

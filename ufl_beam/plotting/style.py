@@ -195,14 +195,9 @@ def shade(color: str) -> str:
 
 def plane_axes(axes: Axes, title: str) -> None:
     """Set up axes of the plane of motion with one scale for x and y."""
-    from matplotlib.ticker import AutoLocator
-
     axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.06, 0.10)
-    for axis in (axes.xaxis, axes.yaxis):  # along the short side there may be space for one label
-        if isinstance(locator := axis.get_major_locator(), AutoLocator):
-            locator.set_params(min_n_ticks=1, steps=[1, 2, 5, 10])
     axes.set_title(title, loc="left", wrap=True)
 
 
