@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from ufl_beam.compiled.c_library import doubles, fill
-from ufl_beam.compiled.csr import Product, StepProduct, zero_matrix
+from ufl_beam.compiled.csr import Product, zero_matrix
 from ufl_beam.compiled.simd_kernels import in_batches
+from ufl_beam.terms.inertia_and_damping import StepProduct
 
 
 @pytest.mark.parametrize("number", [1, 255, 256, 257])
