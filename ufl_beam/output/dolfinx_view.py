@@ -248,7 +248,7 @@ class DolfinxView:
     def variables(self) -> dict[str, fem.Function]:
         """Internal variables of the laws by name, constant in each cell; empty without such laws.
 
-        If a cell has several points, the value is the variable of the largest magnitude.
+        A cell with several points has the value of largest magnitude.
         """
         values = in_cells(self._view.subdomain.numbering, self._view.internal())
         return {name: self._function(f"state.{name}", x[self.cells]) for name, x in values.items()}
