@@ -118,9 +118,14 @@ def _compiled(create: Any, *arguments: Any, directory: Path | None = None) -> An
 
 def form_key(form: ufl.Form) -> str:
     """Return a key of a form; keys differ if FFCx compiles forms to different code."""
+    return f"{form.signature()!r}\0{compiler_key()}"
+
+
+def compiler_key() -> str:
+    """Return a key of the versions and options of the compilers of forms."""
     options = {k: v for k, v in _jit_options().items() if k not in ("cache_dir", "timeout")}
     system = [sysconfig.get_config_var(name) for name in ("CFLAGS", "EXT_SUFFIX")]
-    ours = (form.signature(), ffcx.__version__, dolfinx.__version__, ffcx.get_options(), options)
+    ours = (ffcx.__version__, dolfinx.__version__, ffcx.get_options(), options)
     return "\0".join(map(repr, (*ours, *system)))
 
 

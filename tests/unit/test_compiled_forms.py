@@ -19,7 +19,12 @@ from ufl_beam.compiled.c_library import doubles
 from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.discretization import cell_functions, compiled_forms
 from ufl_beam.discretization.beam_forms import elastic_form, mass_form
-from ufl_beam.discretization.compiled_forms import Pointwise, components
+from ufl_beam.discretization.compiled_forms import (
+    Pointwise,
+    Stated,
+    compiled_functions,
+    components,
+)
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import DolfinxFields, Fields
 from ufl_beam.discretization.partition import Subdomain
@@ -43,6 +48,7 @@ def compiled(monkeypatch):
     found = []
     forget_forms()
     compile_form = compiled_forms.fem.form
+    monkeypatch.setattr(compiled_forms, "remembered", lambda _, make: make())
 
     def note(form, *args, **kwargs):
         found.append(form)
@@ -356,7 +362,7 @@ def test_components_have_no_tensors_inside():
     outputs = components(ufl.as_vector([*v, ufl.diff(a * ufl.sin(b), b)]))
     nodes = [node for output in outputs for node in unique_pre_traversal(output)]
     assert not any(isinstance(node, Operator) and node.ufl_shape for node in nodes)
-    (function,) = pointwise.compile_elements(outputs)
+    ((function,), _) = compiled_functions(None, lambda: Stated(pointwise, [outputs]))
     inputs, answers = np.full((2, BATCH), [[0.3], [0.7]]), np.empty((3, BATCH))
     function.several(1, doubles(inputs), doubles(answers))
     # Round-off: the 40 products converge to a fixed point.

@@ -15,13 +15,14 @@ from ufl_beam.blocks.beams import BeamCells
 from ufl_beam.compiled import code_cache, jit, simd_kernels
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
-from ufl_beam.discretization.compiled_forms import Pointwise
+from ufl_beam.discretization.compiled_forms import Pointwise, Stated, compiled_functions
 
 
 def pointwise(expression):
     """A function of one number, compiled, and its compiler, which keeps it."""
     compiler = Pointwise(["x"])
-    return *compiler.compile_elements([expression(compiler.at["x"])]), compiler
+    stated = Stated(compiler, [[expression(compiler.at["x"])]])
+    return *compiled_functions(None, lambda: stated)[0], compiler
 
 
 def one_by_one(function, values):
@@ -217,8 +218,10 @@ def fresh(tmp_path, monkeypatch):
     """Nothing is compiled or known yet."""
     monkeypatch.setattr(code_cache, "_place", lambda: tmp_path)
     simd_kernels.element_loops.cache_clear()
+    jit.cached_form.cache_clear()
     yield
     simd_kernels.element_loops.cache_clear()
+    jit.cached_form.cache_clear()
 
 
 @pytest.mark.serial
@@ -238,6 +241,7 @@ def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
         assert np.allclose(one_by_one(function, x), np.sin(x), rtol=1e-14)
         caplog.clear()
         simd_kernels.element_loops.cache_clear()
+    jit.cached_form.cache_clear()
 
 
 @pytest.mark.serial
@@ -259,7 +263,8 @@ def of_elements():
     x, y = inputs = np.random.default_rng(3).uniform(-2.0, 2.0, (2, simd_kernels.BATCH))
     stated = [a * b, ufl.sin(a)], [], [a * b, ufl.sin(a)], [ufl.cos(b)]
     meant = [[x * y, np.sin(x)], None, [x * y, np.sin(x)], [np.cos(y)]]
-    return pointwise, pointwise.compile_elements(*stated), inputs, meant
+    functions, _ = compiled_functions(None, lambda: Stated(pointwise, stated))
+    return pointwise, functions, inputs, meant
 
 
 @pytest.mark.serial
@@ -300,6 +305,7 @@ def test_the_check_is_made_once(fresh, monkeypatch):
         function, _compiler = pointwise(ufl.cos)
         assert function.several
         simd_kernels.element_loops.cache_clear()
+    jit.cached_form.cache_clear()
     assert len(calls) == 1
 
 
@@ -312,6 +318,7 @@ def test_what_is_slower_is_said(fresh, caplog, monkeypatch, tmp_path):
     for path in tmp_path.glob("ufl_beam_lanes*"):
         shutil.rmtree(path) if path.is_dir() else path.unlink()
     simd_kernels.element_loops.cache_clear()
+    jit.cached_form.cache_clear()
     monkeypatch.setenv("CC", "no-such-compiler")
     function, _compiler = pointwise(ufl.sin)
     assert not function.several

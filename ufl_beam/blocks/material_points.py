@@ -32,8 +32,15 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.statement import Inputs, expanded
 from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, loop, names, struct
+from ufl_beam.compiled.keys import key_of
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
-from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms, with_shared_nodes
+from ufl_beam.discretization.compiled_forms import (
+    Pointwise,
+    Stated,
+    cached_forms,
+    compiled_functions,
+    with_shared_nodes,
+)
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
 from ufl_beam.mechanics.time_scheme import Scheme
@@ -105,7 +112,7 @@ def create_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger
         getattr(ledger, account)[name] += 0.0
 
 
-PointTable = tuple[Any, list[str], tuple[int, int, int, int]]
+PointTable = tuple[Any, list[str], Sequence[int]]
 
 
 class PointForms:
@@ -124,6 +131,7 @@ class PointForms:
     def __init__(
         self, inputs: tuple[str, ...], kind: Kind, softening: SofteningLaw | None, scheme: Scheme
     ) -> None:
+        self._arguments = inputs, kind, softening, scheme
         self._pointwise = pointwise = Pointwise(inputs)
         self._kind, self._softening = kind, softening
         self._equations = equations = PointEquations(kind, softening, scheme)
@@ -193,51 +201,57 @@ class PointForms:
             An ``element_function`` of loops.h; names of its inputs; numbers of states, numbers,
             unknowns and margins, see ``point_derivatives`` there.
         """
-        equations, law = self._equations, self._kind.law
-        strain, before = (rows(law, name) for name in ("strain", "before"))
-        new = prefixed("new", law.variables) if law.solves else ()
-        softens, of_jump = self._softening is not None, ("traction", "jump", "opening")
-        state = [*of_jump * softens, *prefixed("state", law.variables)]
-        modes = [*FIXED, *strain, *before, *new, *(() if softens else of_jump)]
-        B = [f"B {a}{k}" for a in range(len(strain)) for k in range(3)]
-        numbers = [name for name in self._pointwise.at if name not in (*state, *modes)]
-        numbers += ["rest 0", "rest 1", "rest 2"]
-        (numbers if shapes else modes).extend([*B, "weight"])
-        motions = [f"{e} {k}" for e in ("e1", "e0") for k in range(3)]
-        compiler = Pointwise([*motions, *state, *numbers, *modes])
-        at = Inputs(compiler, {name: ufl.variable(x) for name, x in compiler.at.items()})
-        for e, own in (("e1", strain), ("e0", before)):
-            for a, name in enumerate(own):
-                sums = sum(at[f"B {a}{k}"] * at[f"{e} {k}"] for k in range(3))
-                at[name] = at.stage(at[name], sums)
-        with traced(law):
-            stress = expanded(equations.stress(at))
-            end, variables = self._at_end(at), equations.end(at).variables
-            unknowns = expanded(equations.residuals(at)) if law.solves else []
-        answers, of_opening = [*stress, *expanded(variables), *unknowns], list[Expr]()
-        if self._softening is not None:
-            with traced(self._softening):
-                resistance = equations.resistance(at, at["growth"])
-            answers += expanded([excess := at["direction"] * stress[0] - resistance])
-            opens, distance = ufl.ne(at["direction"], 0.0), absolute(stress[0]) - at["traction"]
-            unknowns[:0] = [ufl.conditional(opens, excess, at["growth"])]
-            of_opening = [ufl.conditional(opens, at["growth"], distance)]
-        conditions = [*margins(with_shared_nodes(answers)), *of_opening]
-        new_state = end[lib.POINT_OUTPUTS : -len(stress)][0 if softens else len(of_jump) :]
-        σ, θ = [at.stage(x) for x in stress], at["theta"]
-        resultants = [
-            at[f"rest {k}"] * ((1 - θ) * at[f"e0 {k}"] + θ * at[f"e1 {k}"])
-            + at["weight"] * sum(x * at[f"B {a}{k}"] for a, x in enumerate(σ))
-            for k in range(3)
-        ]
-        outputs = expanded([*resultants, *new_state, *conditions, *unknowns])
-        inputs = [*motions, *state, *numbers, *["growth"] * softens, *new]
-        (function,) = compiler.compile_elements(
-            [*at.slopes(outputs, inputs), *conditions],
-            instead={symbol: value for _, value, _, symbol in at.stages},
-        )
-        counts = len(state), len(numbers), len(unknowns), len(conditions)
-        return function, list(compiler.at), counts
+
+        def state() -> Stated:
+            equations, law = self._equations, self._kind.law
+            strain, before = (rows(law, name) for name in ("strain", "before"))
+            new = prefixed("new", law.variables) if law.solves else ()
+            softens, of_jump = self._softening is not None, ("traction", "jump", "opening")
+            states = [*of_jump * softens, *prefixed("state", law.variables)]
+            modes = [*FIXED, *strain, *before, *new, *(() if softens else of_jump)]
+            B = [f"B {a}{k}" for a in range(len(strain)) for k in range(3)]
+            numbers = [name for name in self._pointwise.at if name not in (*states, *modes)]
+            numbers += ["rest 0", "rest 1", "rest 2"]
+            (numbers if shapes else modes).extend([*B, "weight"])
+            motions = [f"{e} {k}" for e in ("e1", "e0") for k in range(3)]
+            compiler = Pointwise([*motions, *states, *numbers, *modes])
+            at = Inputs(compiler, {name: ufl.variable(x) for name, x in compiler.at.items()})
+            for e, own in (("e1", strain), ("e0", before)):
+                for a, name in enumerate(own):
+                    sums = sum(at[f"B {a}{k}"] * at[f"{e} {k}"] for k in range(3))
+                    at[name] = at.stage(at[name], sums)
+            with traced(law):
+                stress = expanded(equations.stress(at))
+                end, variables = self._at_end(at), equations.end(at).variables
+                unknowns = expanded(equations.residuals(at)) if law.solves else []
+            answers, of_opening = [*stress, *expanded(variables), *unknowns], list[Expr]()
+            if self._softening is not None:
+                with traced(self._softening):
+                    resistance = equations.resistance(at, at["growth"])
+                answers += expanded([excess := at["direction"] * stress[0] - resistance])
+                opens = ufl.ne(at["direction"], 0.0)
+                unknowns[:0] = [ufl.conditional(opens, excess, at["growth"])]
+                distance = absolute(stress[0]) - at["traction"]
+                of_opening = [ufl.conditional(opens, at["growth"], distance)]
+            conditions = [*margins(with_shared_nodes(answers)), *of_opening]
+            new_state = end[lib.POINT_OUTPUTS : -len(stress)][0 if softens else len(of_jump) :]
+            σ, θ = [at.stage(x) for x in stress], at["theta"]
+            resultants = [
+                at[f"rest {k}"] * ((1 - θ) * at[f"e0 {k}"] + θ * at[f"e1 {k}"])
+                + at["weight"] * sum(x * at[f"B {a}{k}"] for a, x in enumerate(σ))
+                for k in range(3)
+            ]
+            outputs = expanded([*resultants, *new_state, *conditions, *unknowns])
+            inputs = [*motions, *states, *numbers, *["growth"] * softens, *new]
+            counts = len(states), len(numbers), len(unknowns), len(conditions)
+            return Stated(
+                compiler, [[*at.slopes(outputs, inputs), *conditions]],
+                [[*compiler.at], counts], at.values_of_stages,
+            )  # fmt: skip
+
+        key = key_of("points", *self._arguments, shapes)
+        (function,), (names, counts) = compiled_functions(key, state)
+        return function, names, counts
 
     @cached_property
     def elastic(self) -> Any:

@@ -9,7 +9,7 @@ works, section forces and derivatives follow from these functions; see :mod:`ufl
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
@@ -20,7 +20,14 @@ from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_pre_traversal
 
 from ufl_beam.compiled.c_library import ffi, lib, names
-from ufl_beam.discretization.compiled_forms import Pointwise, components, with_shared_nodes
+from ufl_beam.compiled.keys import key_of
+from ufl_beam.discretization.compiled_forms import (
+    Pointwise,
+    Stated,
+    compiled_functions,
+    components,
+    with_shared_nodes,
+)
 from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.terms.derivatives import margins
 
@@ -94,7 +101,8 @@ class Inputs(dict[str, Expr]):
 
     Attributes:
         domain: Mesh of the inputs in UFL.
-        space: Function that returns a space of n values on it.
+        compiler: Compiler of functions of the inputs.
+        space: Function that returns a space of n values on the mesh.
         stages: Intermediate numbers: a variable, its value, a number with the same derivatives, and
             the symbol in the variable.
         in_tangent: Values of intermediate numbers in the tangent, by symbol, if they differ.
@@ -102,7 +110,7 @@ class Inputs(dict[str, Expr]):
 
     def __init__(self, compiler: Pointwise, at: Mapping[str, Expr]) -> None:
         super().__init__(at)
-        self.space = compiler.values
+        self.compiler, self.space = compiler, compiler.values
         self.domain = compiler.values(1).mesh.ufl_domain()
         self.stages: list[tuple[Expr, Expr, Expr, Expr]] = []
         self.in_tangent: dict[Expr, Expr] = {}
@@ -121,6 +129,11 @@ class Inputs(dict[str, Expr]):
         alike = value if slope_of is None else slope_of
         self.stages.append((ufl.variable(symbol), *expanded([value, alike]), symbol))
         return self.stages[-1][0]
+
+    @property
+    def values_of_stages(self) -> dict[Expr, Expr]:
+        """Values of intermediate numbers by symbol."""
+        return {symbol: value for _, value, _, symbol in self.stages}
 
     def motions(self, group: str) -> list[Expr]:
         """Return the motion (x, y, rotation) of each node: "q0" before the step, "q1" after it.
@@ -364,39 +377,16 @@ class Kernels:
     """
 
     def __init__(self, statement: Statement) -> None:
-        self._statement, self._compilers = statement, list[Pointwise]()
-        made, at = self._stated(statement.inputs)
-        names = [f"q1 {name}" for name in statement.unknowns]
-        forces = expanded(made.forces)
-        slopes = at.slopes(forces, names)
-        whole = statement.inserts
-        nonzero = [i for i, x in enumerate(slopes) if whole or not isinstance(x, Zero)]
-        self.entries = [divmod(i, len(names)) for i in nonzero]
-        self.energies = {"state": made.stored, "lost": made.lost, "supplied": made.supplied}
-        self.knows_before = bool(made.before)
-        accounts = *self.energies.values(), {name: made.before[name] for name in made.before}
-        energies = [value for account in accounts for value in account.values()]
-        recorded = [made.recorded[name] for name in statement.recorded]
-        modes = [made.modes[name] for name in statement.modes] if made.modes else []
-        self.strains = len(made.strains)
-        cells = [
-            [*forces, *expanded(self._slopes_of_laws(made, at))],
-            self._in_tangent([slopes[i] for i in nonzero], at),
-            *(expanded(x if whole else []) for x in (made.strains, made.predicted)),
-        ]
+        self._statement = statement
+        functions, facts = self._compiled("steps", self._of_steps)
         self.force, self.tangent, self.strain, self.predicted, self.end, self.power, self.mode = (
-            self._compiled(
-                at,
-                *cells,
-                expanded([*self._states(made), *recorded, *energies]),
-                expanded([made.power] if made.power else []),
-                expanded([*modes, made.excess, made.opened] if modes else []),
-                inserted=sum(map(bool, cells)) if whole else 0,
-            )
+            functions
         )
-
-        functions = self.force, self.tangent, self.end, self.mode
-        self.most = max(function.outputs for function in functions if function is not None)
+        self.entries = [(row, column) for row, column in facts["entries"]]
+        self.energies: dict[str, list[str]] = facts["energies"]
+        self.knows_before, self.strains = facts["knows_before"], facts["strains"]
+        steps = self.force, self.tangent, self.end, self.mode
+        self.most = max(function.outputs for function in steps if function is not None)
         state, last = list(statement.state), [f"last {name}" for name in statement.modes]
         begins = [state.index(name) if name in state else -1 for name in last]
         stored, *entered = map(len, self.energies.values())
@@ -411,9 +401,40 @@ class Kernels:
             "entered": sum(entered), "knows_before": self.knows_before,
             "begins": np.array(begins, dtype=np.int32), "shares": len(statement.shared),
             "kept": len(statement.shared) - len(statement.trial), "laws": statement.laws,
-            "recorded": len(recorded),
+            "recorded": len(statement.recorded),
             "recorded_kind": ffi.new("int[]", [*statement.recorded.values()]),
         }  # fmt: skip
+
+    def _of_steps(self) -> Stated:
+        """Return the functions of steps."""
+        statement = self._statement
+        made, at = self._stated(statement.inputs)
+        names = [f"q1 {name}" for name in statement.unknowns]
+        forces = expanded(made.forces)
+        slopes = at.slopes(forces, names)
+        whole = statement.inserts
+        nonzero = [i for i, x in enumerate(slopes) if whole or not isinstance(x, Zero)]
+        energies = {"state": made.stored, "lost": made.lost, "supplied": made.supplied}
+        values = [x for some in (*energies.values(), made.before) for x in some.values()]
+        recorded = [made.recorded[name] for name in statement.recorded]
+        modes = [made.modes[name] for name in statement.modes] if made.modes else []
+        cells = [
+            [*forces, *expanded(self._slopes_of_laws(made, at))],
+            self._in_tangent([slopes[i] for i in nonzero], at),
+            *(expanded(x if whole else []) for x in (made.strains, made.predicted)),
+        ]
+        functions = [
+            *cells,
+            expanded([*self._states(made), *recorded, *values]),
+            expanded([made.power] if made.power else []),
+            expanded([*modes, made.excess, made.opened] if modes else []),
+        ]
+        facts = {
+            "entries": [divmod(i, len(names)) for i in nonzero],
+            "energies": {account: [*some] for account, some in energies.items()},
+            "knows_before": bool(made.before), "strains": len(made.strains),
+        }  # fmt: skip
+        return self._as_stated(at, functions, facts, inserted=sum(map(bool, cells)) if whole else 0)
 
     def _in_tangent(self, slopes: list[Expr], at: Inputs) -> list[Expr]:
         """Replace intermediate numbers by their values in the tangent, which are numbers, too."""
@@ -426,7 +447,7 @@ class Kernels:
         return [*with_shared_nodes(slopes, others)]
 
     def _inputs(self, names: Sequence[str]) -> Inputs:
-        self._compilers.append(compiler := Pointwise(names))
+        compiler = Pointwise(names)
         return Inputs(compiler, {name: ufl.variable(x) for name, x in compiler.at.items()})
 
     def _stated(self, names: Sequence[str]) -> tuple[Equations, Inputs]:
@@ -447,11 +468,14 @@ class Kernels:
     def _states(self, made: Equations) -> list[Expr]:
         return [made.state[name] for name in (*self._statement.state, *self._statement.shared)]
 
-    def _compiled(self, at: Inputs, *functions: Sequence[Expr], inserted: int = 0) -> list[Any]:
-        instead = {symbol: value for _, value, _, symbol in at.stages}
-        return self._compilers[-1].compile_elements(
-            *functions, instead=instead, inserted=inserted, unknowns=len(self._statement.unknowns)
-        )
+    def _compiled(self, name: str, state: Callable[[], Stated]) -> tuple[list[Any], Any]:
+        return compiled_functions(key_of(name, self._statement), state)
+
+    def _as_stated(
+        self, at: Inputs, functions: Sequence[Sequence[Expr]], facts: Any = None, inserted: int = 0
+    ) -> Stated:
+        unknowns = len(self._statement.unknowns)
+        return Stated(at.compiler, functions, facts, at.values_of_stages, inserted, unknowns)
 
     @cached_property
     def derivative(self) -> tuple[Any, int]:
@@ -460,28 +484,40 @@ class Kernels:
         The rows of a function are the derivatives of one number; the margins follow.  The second
         item is the number of margins.
         """
-        statement = self._statement
-        names = statement.inputs[: len(statement.inputs) - len(statement.all_modes)]
-        made, at = self._stated(statement.inputs)
-        rows = with_shared_nodes(expanded([*made.forces, *self._states(made), *made.strains]))
-        conditions = [*margins(rows), *expanded(made.margins)]
-        every = [*rows, *conditions]
-        table = [*at.slopes(every, names), *conditions]
-        return self._compiled(at, table)[0], len(conditions)
+
+        def state() -> Stated:
+            statement = self._statement
+            names = statement.inputs[: len(statement.inputs) - len(statement.all_modes)]
+            made, at = self._stated(statement.inputs)
+            rows = with_shared_nodes(expanded([*made.forces, *self._states(made), *made.strains]))
+            conditions = [*margins(rows), *expanded(made.margins)]
+            table = [*at.slopes([*rows, *conditions], names), *conditions]
+            return self._as_stated(at, [table], len(conditions))
+
+        (function,), conditions = self._compiled("derivative", state)
+        return function, conditions
 
     @cached_property
     def change(self) -> Any:
         """Derivatives of ``tangent`` along motions, which are further inputs; None if zero."""
-        made, at, names, along = self._stated_along()
-        slopes = at.slopes(expanded(made.forces), names)
-        changes = at.along([slopes[i * len(names) + j] for i, j in self.entries], names, along)
-        return None if all(isinstance(x, Zero) for x in changes) else self._compiled(at, changes)[0]
+
+        def state() -> Stated:
+            made, at, names, along = self._stated_along()
+            slopes = at.slopes(expanded(made.forces), names)
+            changes = at.along([slopes[i * len(names) + j] for i, j in self.entries], names, along)
+            return self._as_stated(at, [without_zeros(changes)])
+
+        return self._compiled("change", state)[0][0]
 
     @cached_property
     def motion_rates(self) -> Any:
         """Derivatives of the motions of laws along motions, which are further inputs."""
-        made, at, names, along = self._stated_along()
-        return self._compiled(at, at.along(made.motions, names, along))[0]
+
+        def state() -> Stated:
+            made, at, names, along = self._stated_along()
+            return self._as_stated(at, [at.along(made.motions, names, along)])
+
+        return self._compiled("motion rates", state)[0][0]
 
     @cached_property
     def tangent_work(self) -> Any:
@@ -499,18 +535,23 @@ class Kernels:
         Motions are q1 + a x + b u, with inputs a and b of zero, by which the work is derived:
         relative motions of x and u are computed before stiffnesses multiply them.
         """
-        parts = [f"part{k}" for k in range(directions - 1)]
-        names, along = self._along(directions)
-        at = self._inputs([*self._statement.inputs, *(x for some in along for x in some), *parts])
-        x, y, *u = ([at[name] for name in some] for some in along)
-        for k, name in enumerate(names):
-            terms = (at[part] * some[k] for part, some in zip(parts, (x, *u), strict=True))
-            at[name] = sum(terms, at[name])
-        forces = self._statement.equations(at).forces
-        work = expanded([sum((f * v for f, v in zip(forces, y, strict=True)), 0)])
-        for part in parts:
-            work = expanded(at.slopes_by(work, [at[part]]))
-        return None if isinstance(work[0], Zero) else self._compiled(at, work)[0]
+
+        def state() -> Stated:
+            parts = [f"part{k}" for k in range(directions - 1)]
+            names, along = self._along(directions)
+            some = [x for direction in along for x in direction]
+            at = self._inputs([*self._statement.inputs, *some, *parts])
+            x, y, *u = ([at[name] for name in direction] for direction in along)
+            for k, name in enumerate(names):
+                terms = (at[part] * one[k] for part, one in zip(parts, (x, *u), strict=True))
+                at[name] = sum(terms, at[name])
+            forces = self._statement.equations(at).forces
+            work = expanded([sum((f * v for f, v in zip(forces, y, strict=True)), 0)])
+            for part in parts:
+                work = expanded(at.slopes_by(work, [at[part]]))
+            return self._as_stated(at, [without_zeros(work)])
+
+        return self._compiled(f"work of {directions} motions", state)[0][0]
 
     def _along(self, directions: int) -> tuple[list[str], list[list[str]]]:
         """Return names of the motions after the step, and of motions in directions."""
@@ -532,6 +573,11 @@ def expanded(outputs: Sequence[Expr]) -> list[Expr]:
     """Return expressions with all derivatives expanded together."""
     shared = with_shared_nodes([*map(ufl.as_ufl, outputs)])
     return components(ufl.as_vector(shared)) if outputs else []
+
+
+def without_zeros(outputs: list[Expr]) -> list[Expr]:
+    """Return expressions, or none if all are zero."""
+    return [] if all(isinstance(x, Zero) for x in outputs) else outputs
 
 
 def _slopes(outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:

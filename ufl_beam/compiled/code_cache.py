@@ -54,12 +54,9 @@ def cached(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> 
     the sources.  An entry that cannot be imported is built again.
     """
     place, foreign = _place(), False
-    if intact(place / name):
+    if found := found_entry(name):
         try:
-            if _age(place / name / CHECKSUMS) > DAY:  # record that the entry is used
-                with suppress(PermissionError):  # the entry belongs to the administrator
-                    os.utime(place / name / CHECKSUMS)
-            return load(place / name), place / name
+            return load(found), found
         except FileNotFoundError:
             pass  # a clean-up has just removed the entry
         except ImportError:
@@ -88,6 +85,17 @@ def cached(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> 
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
     return loaded, entry
+
+
+def found_entry(name: str) -> Path | None:
+    """Return the directory of an entry that is complete, or None."""
+    entry = _place() / name
+    if not intact(entry):
+        return None
+    if _age(entry / CHECKSUMS) > DAY:  # record that the entry is used
+        with suppress(PermissionError):  # the entry belongs to the administrator
+            os.utime(entry / CHECKSUMS)
+    return entry
 
 
 def _remove_incomplete(entry: Path) -> None:

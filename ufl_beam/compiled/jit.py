@@ -13,9 +13,10 @@ import sys
 import sysconfig
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
+from typing import Any, NamedTuple
 
 from petsc4py import PETSc
 
@@ -23,7 +24,7 @@ import cffi
 import numpy as np
 import ufl
 
-from ufl_beam.compiled.code_cache import cached
+from ufl_beam.compiled.code_cache import cached, found_entry
 from ufl_beam.dolfinx_compat import FLAGS, TABULATE, compile_form, fem, form_key
 
 HEADERS = f"""\
@@ -129,6 +130,9 @@ def compiled(
     return module
 
 
+TEXT = "text"
+"""File of a cache entry that is a text."""
+
 REFUSAL = "refused"
 """File of a cache entry whose code must not be used; it contains the reason."""
 
@@ -153,8 +157,49 @@ def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:
 
     key = _digest(form_key(form))
     loaded, directory = cached(f"form_{key}", build, partial(compile_form, form))
-    module = Path(loaded.module.__file__).name
-    return loaded, directory / (module.split(".")[0] + ".c")
+    return loaded, _code(directory, Path(loaded.module.__file__))
+
+
+def _code(directory: Path, library: Path) -> Path:
+    """Return the path of the C code of a library that FFCx has compiled."""
+    return directory / (library.name.split(".")[0] + ".c")
+
+
+class CachedForm(NamedTuple):
+    """A form of FFCx without its expressions in UFL, as attributes of DOLFINx's forms."""
+
+    ufcx_form: Any
+    module: ModuleType
+
+
+def has_form(name: str) -> bool:
+    """Return whether the cache has a form, by the name of its entry."""
+    return found_entry(name) is not None
+
+
+@cache
+def cached_form(name: str) -> tuple[CachedForm, Path]:
+    """Return a form by the name of its entry in the cache, and the path of its C code.
+
+    Its functions are valid until the process ends.
+    """
+    directory = found_entry(name)
+    if directory is None:
+        raise FileNotFoundError(f"the cache of compiled code has no {name}")
+    (library,) = directory.glob("lib*" + str(sysconfig.get_config_var("EXT_SUFFIX")))
+    module = _imported(library.name.split(".")[0], directory)
+    (form,) = (x for x in dir(module.lib) if x.startswith("form_"))
+    return CachedForm(getattr(module.lib, form), module), _code(directory, library)
+
+
+def remembered(name: str, make: Callable[[], str]) -> str:
+    """Return a text from the cache, which is made if it is not there."""
+
+    def build(directory: Path) -> str:
+        (directory / TEXT).write_text(made := make())
+        return made
+
+    return cached(name, build, lambda directory: (directory / TEXT).read_text())[0]
 
 
 def _digest(*texts: str) -> str:

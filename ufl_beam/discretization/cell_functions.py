@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,13 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array
 from ufl_beam.caches import cached_forms
 from ufl_beam.compiled.csr import Csr
+from ufl_beam.compiled.keys import key_of
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.compiled_forms import (
     InsertedForces,
     Pointwise,
+    Stated,
+    compiled_functions,
     components,
     inserted_cells,
     places_in,
@@ -152,29 +156,31 @@ class CellFunction:
         numbers: Names of the numbers.
         outputs: Function that returns the values in UFL; its arguments are the cell, the inputs,
             and the motion of each node.
+        key: What determines the values besides the other arguments.
     """
 
     def __init__(
         self, degree: int, numbers: Sequence[str],
-        outputs: Callable[[Cell, At, list[Expr]], Sequence[Expr]],
+        outputs: Callable[[Cell, At, list[Expr]], Sequence[Expr]], *key: Any,
     ) -> None:  # fmt: skip
-        nodes = range(degree + 1)
-        names = [f"{c}{k}" for c in COMPONENTS for k in nodes]
-        self._compiler, self._unknowns = Pointwise([*names, *numbers]), len(names)
-        at = {name: ufl.variable(x) for name, x in self._compiler.at.items()}
-        motions = [ufl.as_vector([at[f"{c}{k}"] for c in COMPONENTS]) for k in nodes]
-        values = ufl.as_vector(outputs(Cell(degree, at), at, motions))
-        slopes = [ufl.diff(x, at[name]) for x in components(values) for name in names]
-        self._values, self._slopes = (components(x) for x in (values, ufl.as_vector(slopes)))
-        self._functions: dict[bool, Any] = {}
+        self._degree, self._numbers, self._outputs = degree, (*numbers,), outputs
+        self._key = outputs.__qualname__, degree, self._numbers, *key
 
+    @cache  # noqa: B019 - functions are kept in a cache of their own
     def _compiled(self, *, tangent: bool) -> Any:
-        if tangent not in self._functions:
-            stated = self._slopes if tangent else self._values
-            (self._functions[tangent],) = self._compiler.compile_elements(
-                stated, inserted=1, unknowns=self._unknowns
-            )
-        return self._functions[tangent]
+        def state() -> Stated:
+            nodes = range(self._degree + 1)
+            names = [f"{c}{k}" for c in COMPONENTS for k in nodes]
+            compiler = Pointwise([*names, *self._numbers])
+            at = {name: ufl.variable(x) for name, x in compiler.at.items()}
+            motions = [ufl.as_vector([at[f"{c}{k}"] for c in COMPONENTS]) for k in nodes]
+            values = components(ufl.as_vector(self._outputs(Cell(self._degree, at), at, motions)))
+            if tangent:
+                slopes = [ufl.diff(x, at[name]) for x in values for name in names]
+                values = components(ufl.as_vector(slopes))
+            return Stated(compiler, [values], inserted=1, unknowns=len(names))
+
+        return compiled_functions(key_of(self._key, tangent), state)[0][0]
 
     def forces(self, fields: Fields, *numbers: Array) -> InsertedForces:
         """Return the forces on the nodes of cells with ``numbers``; (num_cells,) each."""
@@ -242,7 +248,7 @@ def _momentum(degree: int, lumped: bool) -> CellFunction:
         energy = sum(float(a) * at["length"] * kinetic_energy(x, ρ) for a, x in pairs)
         return [ufl.diff(energy, at[f"{c}{k}"]) for c in COMPONENTS for k in range(len(v))]  # P(67)
 
-    return CellFunction(degree, ("length", "rhoA", "rhoI"), forces)
+    return CellFunction(degree, ("length", "rhoA", "rhoI"), forces, lumped)
 
 
 def _of_mass(fields: Fields) -> tuple[CellFunction, list[Array]]:
@@ -318,7 +324,7 @@ def _stress(degree: int, *, linear: bool) -> CellFunction:
             work += length * virtual_work(b + ufl.dot(D, strain(field, axis)), w_e)
         return [ufl.diff(x, along) if linear else x for x in cell.forces(work)]
 
-    return CellFunction(degree, (*AXIS, *law, *about), forces)
+    return CellFunction(degree, (*AXIS, *law, *about), forces, linear)
 
 
 def stress_forces(

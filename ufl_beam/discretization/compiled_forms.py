@@ -6,11 +6,12 @@ A function is compiled as a form with one quadrature point.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Callable, Mapping, Sequence
 from itertools import islice, product
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import basix.ufl
 import numpy as np
@@ -26,13 +27,13 @@ from ufl_beam.caches import cached_by_structure
 from ufl_beam.caches import cached_forms as cached_forms
 from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib, struct, view_pointer
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.compiled.jit import compiled_form
+from ufl_beam.compiled.jit import cached_form, compiled_form, has_form, remembered
 from ufl_beam.compiled.simd_kernels import BATCH, element_loops, point_loop
 from ufl_beam.dolfinx_compat import fem, line_mesh
 
 
-def tabulators(compiled: fem.Form) -> list[Any]:
-    """Return the C functions of the cell integrals of a form, valid as long as the form exists."""
+def tabulators(compiled: Any) -> list[Any]:
+    """Return the C functions of the cell integrals of a form of DOLFINx or :class:`CachedForm`."""
     form = compiled.ufcx_form
     integrals = [form.form_integrals[i] for i in range(form.form_integral_offsets[1])]
     return [kernel(x.tabulate_tensor_float64, compiled.module.ffi) for x in integrals]
@@ -121,8 +122,11 @@ class InsertedForces:
         return ffi.addressof(self.cells, "each"), second
 
 
+NOTHING: Mapping[Expr, Expr] = MappingProxyType({})
+
+
 def with_shared_nodes(
-    expressions: Sequence[Expr], instead: Mapping[Expr, Expr] = MappingProxyType({})
+    expressions: Sequence[Expr], instead: Mapping[Expr, Expr] = NOTHING
 ) -> tuple[Expr, ...]:
     """Return expressions in which equal nodes are the same object.
 
@@ -212,56 +216,102 @@ class Pointwise:
 
     def compile(self, *outputs: Expr) -> Any:
         """Compile a C function that computes the outputs, valid as long as this object exists."""
-        return self._compiled(outputs)[0][0]
+        return tabulators(self._compiled(outputs)[0])[0]
 
     def compile_loop(self, *outputs: Expr) -> Any:
         """Compile a loop over points that computes the outputs, an ``answer_loop`` of loops.h.
 
         The loop is null if it would not be faster than calls of the function.
         """
-        _, source, ((address, sizes),) = self._compiled(outputs)
+        form, source = self._compiled(outputs)
+        ((address, sizes),) = _addressed(tabulators(form), [(len(outputs), len(self.at))])
         return ffi.cast("answer_loop *", point_loop(source, address, sizes) or 0)
 
-    def compile_elements(
-        self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = MappingProxyType({}),
-        inserted: int = 0, unknowns: int = 0,
-    ) -> list[Any]:  # fmt: skip
-        """Compile functions of elements together, each an ``element_function`` of loops.h.
+    def form_of(self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = NOTHING) -> str:
+        """Compile functions as integrals of one form; return the name of its entry in the cache.
 
-        A function without outputs is None.  Nodes that are keys of ``instead`` are replaced.  For
-        ``inserted`` and ``unknowns`` see :func:`element_loops`.
+        Nodes that are keys of ``instead`` are replaced.
         """
-        compiled, source, kernels = self._compiled(*filter(None, functions), instead=instead)
-        loops = element_loops(source, kernels, inserted, unknowns)
-        kinds = ("inserts", "tabulate_batch *"), ("several", "batch_function *")
-        made = list[Any]()
-        for k, (one, loop, (_, sizes)) in enumerate(zip(compiled, loops, kernels, strict=True)):
-            made.append(struct("element_function", one=one, outputs=sizes[0]))
-            name, kind = kinds[k >= inserted]
-            fill(made[-1], **{name: ffi.cast(kind, loop or 0)})
-        return [made.pop(0) if outputs else None for outputs in functions]
+        return self._compiled(*functions, instead=instead)[1].parent.name
 
     def _compiled(
-        self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = MappingProxyType({})
-    ) -> tuple[list[Any], Path, Any]:
-        """Compile functions as integrals of one form.
-
-        Returns:
-            C functions, the C file that FFCx wrote, and addresses and sizes of the functions.
-        """
+        self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = NOTHING
+    ) -> tuple[fem.Form, Path]:
+        """Return a form with the functions as integrals, and the C file that FFCx wrote."""
         every = [x for outputs in functions for x in outputs]
-        shared = iter(with_shared_nodes(every, instead))
-        sizes = [(len(outputs), len(self.at)) for outputs in functions]
-        z = ufl.TestFunction(self.values(most := max(sizes)[0]))
+        shared, sizes = iter(with_shared_nodes(every, instead)), [*map(len, functions)]
+        z = ufl.TestFunction(self.values(most := max(sizes)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
-        values = ([*islice(shared, n), *[0] * (most - n)] for n, _ in sizes)
+        values = ([*islice(shared, n), *[0] * (most - n)] for n in sizes)
         parts = (ufl.dot(ufl.as_vector(x), z) * dx(k) for k, x in enumerate(values))
         form, source = compiled_form(sum(parts))
         self._alive.append(form)
-        addresses = [int(ffi.cast("intptr_t", x)) for x in tabulators(form)]
-        return tabulators(form), source, tuple(zip(addresses, sizes, strict=True))
+        return form, source
 
     def values(self, n: int) -> fem.FunctionSpace:
         """Return a space of n values at the point."""
         element = basix.ufl.quadrature_element("interval", value_shape=(n,), degree=1)
         return fem.functionspace(self._cell, element)
+
+
+class Stated(NamedTuple):
+    """Functions of elements in UFL.
+
+    Attributes:
+        compiler: Their compiler.
+        functions: Outputs of each function; it may have none.
+        facts: What else their owner needs to know, as JSON can store it.
+        instead: Nodes that are replaced, and their values.
+        inserted: Number of the first functions that add to a vector or a matrix.
+        unknowns: Number of the first inputs of these that are unknowns.
+    """
+
+    compiler: Pointwise
+    functions: Sequence[Sequence[Expr]]
+    facts: Any = None
+    instead: Mapping[Expr, Expr] = NOTHING
+    inserted: int = 0
+    unknowns: int = 0
+
+
+def compiled_functions(key: str | None, state: Callable[[], Stated]) -> tuple[list[Any], Any]:
+    """Compile functions of elements together, each an ``element_function`` of loops.h.
+
+    ``state`` is called if the cache has no functions with this key, or if the key is None.
+
+    Returns:
+        The functions, None for one without outputs; and the facts.
+    """
+
+    def compile_now() -> str:
+        made = state()
+        some = [*filter(None, made.functions)]
+        return json.dumps(
+            [
+                made.compiler.form_of(*some, instead=made.instead) if some else "",
+                [(len(outputs), len(made.compiler.at)) for outputs in made.functions],
+                made.facts, made.inserted, made.unknowns,
+            ]
+        )  # fmt: skip
+
+    text = remembered(f"functions_{key}", compile_now) if key else compile_now()
+    name, sizes, facts, inserted, unknowns = json.loads(text)
+    if not name:
+        return [None] * len(sizes), facts
+    if not has_form(name):  # a clean-up has removed it
+        compile_now()
+    form, source = cached_form(name)
+    kernels = _addressed(compiled := tabulators(form), [(m, n) for m, n in sizes if m])
+    loops = element_loops(source, kernels, inserted, unknowns)
+    kinds, made = (("inserts", "tabulate_batch *"), ("several", "batch_function *")), list[Any]()
+    for k, (one, loop, (_, (outputs, _))) in enumerate(zip(compiled, loops, kernels, strict=True)):
+        made.append(struct("element_function", one=one, outputs=outputs))
+        field, kind = kinds[k >= inserted]
+        fill(made[-1], **{field: ffi.cast(kind, loop or 0)})
+    return [made.pop(0) if outputs else None for outputs, _ in sizes], facts
+
+
+def _addressed(functions: Sequence[Any], sizes: Sequence[tuple[int, int]]) -> Any:
+    """Return addresses of functions with their numbers of outputs and inputs."""
+    addresses = (int(ffi.cast("intptr_t", x)) for x in functions)
+    return tuple(zip(addresses, sizes, strict=True))

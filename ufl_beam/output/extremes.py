@@ -14,8 +14,15 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.caches import cached_forms
 from ufl_beam.compiled.c_library import doubles, fill, lib, struct
+from ufl_beam.compiled.keys import key_of
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
-from ufl_beam.discretization.compiled_forms import InsertedForces, Pointwise, inserted_cells
+from ufl_beam.discretization.compiled_forms import (
+    InsertedForces,
+    Pointwise,
+    Stated,
+    compiled_functions,
+    inserted_cells,
+)
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.display import in_one_line
@@ -69,38 +76,41 @@ def along_cells(degree: int, fractions: tuple[float, ...], works: bool) -> tuple
     Returns:
         The function, compiled, of unknowns, of resultants (``cell_number`` of loops.h), of the
         directions of the axis at both ends of a cell, and of the vector between the ends; the
-        numbers of unknowns, all of a cell or only rotations, and of resultants; the compiler, which
-        keeps the code.
+        numbers of unknowns, all of a cell or only rotations, and of resultants.
     """
     mesh, between = Mesh(degree=degree), set(fractions) > {0.0, 1.0}
     n = len(mesh.nodes)
     first, moves = (lib.CELL_NUMBERS, 3 * n) if between else (lib.COUPLE, n)
-    names = [*(f"motion {k}" for k in range(moves)), *(f"force {k}" for k in range(first))]
-    compiler = Pointwise([*names, "angle 0", "angle 1", "x", "y"])
-    motions, at = [*compiler.at.values()][:moves], compiler.at
-    order = [0, *range(2, n), 1]  # order of nodes along a cell
-    *displacements, rotations = ([motions[k + i] for i in order] for k in range(0, moves, n))
 
-    def weighted(weights: Array, values: list[Expr]) -> Expr:
-        return sum(float(a) * x for a, x in zip(weights, values, strict=True))
+    def state() -> Stated:
+        names = [*(f"motion {k}" for k in range(moves)), *(f"force {k}" for k in range(first))]
+        compiler = Pointwise([*names, "angle 0", "angle 1", "x", "y"])
+        motions, at = [*compiler.at.values()][:moves], compiler.at
+        order = [0, *range(2, n), 1]  # order of nodes along a cell
+        *displacements, rotations = ([motions[k + i] for i in order] for k in range(0, moves, n))
 
-    def tangent(fraction: float) -> tuple[Any, Any]:
-        if not between:
-            return at["x"], at["y"]
-        u, v = (weighted(mesh.slopes(fraction), nodes) for nodes in displacements)
-        return at["x"] + u, at["y"] + v
+        def weighted(weights: Array, values: list[Expr]) -> Expr:
+            return sum(float(a) * x for a, x in zip(weights, values, strict=True))
 
-    known = [at[f"force {k}"] for k in range(first)] + [0.0] * (lib.CELL_NUMBERS - first)
-    at_fraction = section_force(known, tangent, works=works)
-    at_end = known[lib.END_X : lib.END_M + 1]
-    rows = list[Expr]()
-    for fraction in fractions:
-        rotation = weighted(mesh.weights(fraction), rotations)
-        angle = (1 - fraction) * at["angle 0"] + fraction * at["angle 1"] + rotation
-        plane = at_fraction(fraction) if fraction < 1 else tuple(at_end)
-        rows += in_section(plane, ufl.cos(angle), ufl.sin(angle))
-    (function,) = compiler.compile_elements(rows, inserted=1, unknowns=moves)
-    return function, moves, first, compiler
+        def tangent(fraction: float) -> tuple[Any, Any]:
+            if not between:
+                return at["x"], at["y"]
+            u, v = (weighted(mesh.slopes(fraction), nodes) for nodes in displacements)
+            return at["x"] + u, at["y"] + v
+
+        known = [at[f"force {k}"] for k in range(first)] + [0.0] * (lib.CELL_NUMBERS - first)
+        at_fraction = section_force(known, tangent, works=works)
+        at_end = known[lib.END_X : lib.END_M + 1]
+        rows = list[Expr]()
+        for fraction in fractions:
+            rotation = weighted(mesh.weights(fraction), rotations)
+            angle = (1 - fraction) * at["angle 0"] + fraction * at["angle 1"] + rotation
+            plane = at_fraction(fraction) if fraction < 1 else tuple(at_end)
+            rows += in_section(plane, ufl.cos(angle), ufl.sin(angle))
+        return Stated(compiler, [rows], inserted=1, unknowns=moves)
+
+    key = key_of("section forces", degree, fractions, works)
+    return compiled_functions(key, state)[0][0], moves, first
 
 
 class ExtremesInC:
@@ -119,7 +129,7 @@ class ExtremesInC:
         self._subdomain = subdomain = fields.subdomain
         size, works = subdomain.size, bool(subdomain.numbering.scene.works)
         kept = tuple(map(float, fractions))
-        function, moves, first, self._compiler = along_cells(fields.degree, kept, works)
+        function, moves, first = along_cells(fields.degree, kept, works)
         space = np.empty((1, first + 4, BATCH))  # C has the numbers of cells elsewhere
         cells = inserted_cells(function, space, fields.cell_dofs[:, -moves:])
         self._along = InsertedForces(cells)
