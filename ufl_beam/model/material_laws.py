@@ -186,9 +186,3 @@ class ElastoPlastic(PlasticLaw):
         """True if the stress never exceeds the limit."""
         viscous = bool(np.any(self.viscosity.coefficient(np.ones(1)) > 0.0))
         return self.isotropic == self.kinematic == 0.0 and not viscous
-
-
-# -- curved branches: power law, ratcheting, smooth hysteresis ----------------------------------
-
-
-# -- interaction of resultants ------------------------------------------------------------------
