@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Ground motions: files and their errors, integrals, scaling, correction, other time steps."""
 
-import re
-
 import numpy as np
 import pytest
 import scipy
+from helpers import raises
 
 import ufl_beam as ub
 import ufl_beam.structures as st
@@ -29,15 +28,15 @@ RECORD = st.GroundMotion(0.02, np.random.default_rng(3).standard_normal(400), "n
 
 
 @pytest.fixture
-def written(tmp_path):
-    """Write a text to a file, and return its path."""
+def read(tmp_path):
+    """Read a text from a file."""
 
-    def write(text, name="quake.txt"):
-        path = tmp_path / name
+    def read_text(text, **options):
+        path = tmp_path / "quake.txt"
         path.write_text(text)
-        return path
+        return st.GroundMotion.read(path, **options)
 
-    return write
+    return read_text
 
 
 @pytest.mark.serial  # files
@@ -46,23 +45,33 @@ def written(tmp_path):
     [
         (NEW, {}, G),
         (NEW, {"unit": "g", "dt": 0.01}, G),
+        (NEW.replace(" .0100 SEC", " 1.0D-02 SEC").replace("E+00", "D+00"), {}, G),  # Fortran
         (OLD, {}, 0.01),
         (OLD, {"unit": "gal"}, 0.01),
         (NEW.replace("OF G", "OF CM"), {"unit": "m/s2"}, 1.0),
         ("# t, a\n" + "\n".join(f"{k}e-2,{a}" for k, a in enumerate(VALUES)), {"unit": "g"}, G),
         ("\n".join(f" {k + 300}e-2\t{a} " for k, a in enumerate(VALUES)), {"unit": "gal"}, 0.01),
         ("0.1 -0.2 0.3\n\n0.4 0; -0.1; 0\n", {"unit": "m/s^2", "dt": 0.01}, 1.0),
+        ("0.1,-0.2,0.3,\n0.4,0,-0.1,0,\n", {"unit": "m/s^2", "dt": 0.01}, 1.0),
     ],
 )
-def test_a_file_is_read(written, text, options, unit):
-    motion = st.GroundMotion.read(written(text), **options)
+def test_a_file_is_read(read, text, options, unit):
+    motion = read(text, **options)
     # Steps of times with two decimals have the round-off of a sum.
     assert motion.dt == pytest.approx(0.01, rel=1e-12)
     np.testing.assert_array_equal(motion.values, unit * VALUES)
     assert motion.name == "quake"
 
 
+@pytest.mark.serial  # files
+def test_times_with_few_digits_are_equal_steps(read):
+    """Steps of 1/256 s, written with four decimals; the mean step has half of the last digit."""
+    motion = read("\n".join(f"{k / 256:.4f} {a}" for k, a in enumerate(RECORD.values)), unit="g")
+    assert motion.dt == pytest.approx(1 / 256, abs=1e-4 / len(motion.values))
+
+
 IN_G = {"unit": "g"}
+LINES = {"unit": "g", "dt": 0.1}
 TIMED = "0.00 1\n0.01 2\n0.02 3\n0.03 4\n0.04 5\n"
 
 
@@ -73,40 +82,15 @@ TIMED = "0.00 1\n0.01 2\n0.02 3\n0.03 4\n0.04 5\n"
         (TIMED, {}, ": the record has no unit; give unit= one of m/s2, g, cm/s2, gal, mm/s2"),
         (TIMED, {"unit": "ft/s2"}, ": unit = 'ft/s2' is unknown; give"),
         (NEW.replace("OF G", "OF CM"), {}, ": unit = 'CM' is unknown; give"),
-        (
-            TIMED.replace("0.02 3\n", ""),
-            {"unit": "g"},
-            ", line 3: the step from t = 0.01 s to 0.03",
-        ),
-        (
-            TIMED.replace("0.02", "0.01"),
-            {"unit": "g"},
-            ", line 3: the step from t = 0.01 s to 0.01",
-        ),
+        (TIMED.replace("0.02 3\n", ""), IN_G, ", line 3: the step from t = 0.01 s to 0.03"),
         ("#\n1 0\n0 0\n", IN_G, ", line 3: the step from t = 1 s to 0"),
-        (
-            TIMED.replace("3", "NaN", 1),
-            {"unit": "g"},
-            ", line 3: a number is not finite: '0.02 NaN'",
-        ),
-        (
-            TIMED.replace("2\n", "2 *\n", 1),
-            {"unit": "g"},
-            ", line 2: no numbers: '0.01 2 *'; comments",
-        ),
-        (
-            "time acc\n" + TIMED,
-            {"unit": "g"},
-            ", line 1: no numbers: 'time acc'; comments begin with #",
-        ),
-        (
-            TIMED + "0.05\n",
-            {"unit": "g"},
-            ", line 6: a time and an acceleration are expected",
-        ),
-        ("1,,2\n", {"unit": "g", "dt": 0.1}, ", line 1: no numbers: '1,,2'"),
-        ("1,2\n3,\n", {"unit": "g", "dt": 0.1}, ", line 2: a value is missing here"),
-        (",1\n", {"unit": "g", "dt": 0.1}, ", line 1: no numbers"),
+        (TIMED.replace("3", "NaN", 1), IN_G, ", line 3: a number is not finite: '0.02 NaN'"),
+        (TIMED.replace("2\n", "2 *\n", 1), IN_G, ", line 2: no numbers: '0.01 2 *'; comments"),
+        ("time acc\n" + TIMED, IN_G, ", line 1: no numbers: 'time acc'; comments begin with #"),
+        (TIMED + "0.05\n", IN_G, ", line 6: a time and an acceleration are expected"),
+        ("1,,2\n", LINES, ", line 1: no numbers: '1,,2'"),
+        ("1,2\n3,\n", LINES, ", line 2: a value is missing here"),
+        (",1\n", LINES, ", line 1: no numbers"),
         (TIMED, {"unit": "g", "dt": 0.01}, ": the first column has times with this step; omit dt="),
         ("0 1\n", IN_G, ": a record has at least two lines"),
         ("# nothing\n", IN_G, ": the file has no numbers"),
@@ -117,46 +101,37 @@ TIMED = "0.00 1\n0.01 2\n0.02 3\n0.03 4\n0.04 5\n"
         (OLD, {"unit": "g"}, ": unit = 'g', but the file has CM/S/S; omit unit"),
     ],
 )
-def test_a_wrong_file_is_refused_with_its_line(written, text, options, message):
-    path = written(text)
-    with pytest.raises(ub.ModelError, match=re.escape(f"{path}{message}")):
-        st.GroundMotion.read(path, **options)
-
-
-def test_a_missing_file_is_refused():
-    with pytest.raises(ub.ModelError, match=r"GroundMotion.read: no/such.AT2: No such file"):
-        st.GroundMotion.read("no/such.AT2")
-
-
-@pytest.mark.serial  # files
-def test_times_with_few_digits_are_equal_steps(written):
-    """Steps of 1/256 s, written with four decimals; the mean step has half of the last digit."""
-    lines = (f"{k / 256:.4f} {a}" for k, a in enumerate(RECORD.values))
-    motion = st.GroundMotion.read(written("\n".join(lines)), unit="g")
-    assert motion.dt == pytest.approx(1 / 256, abs=1e-4 / len(motion.values))
+def test_a_wrong_file_is_refused_with_its_line(read, text, options, message):
+    with raises("quake.txt" + message, kind=ub.ModelError):
+        read(text, **options)
 
 
 HISTORY = st.GroundMotion.from_history
 
 
 @pytest.mark.parametrize(
-    ("make", "message"),
+    ("make", "parts"),
     [
-        (lambda: HISTORY([0, 1, 2, 5], [0, 1, 2, 3]), "times[3]: the step...or give dt="),
-        (lambda: HISTORY([0, 1], [0, 1, 2]), "2 times and 3 values"),
-        (lambda: HISTORY([0, 1, 1], [0, 1, 2], 0.1), "must increase, but 1 follows 1"),
-        (RECORD.scaled, "GroundMotion.scaled: give either factor or peak"),
-        (lambda: RECORD.scaled(0.0).scaled(peak=1.0), "GroundMotion.scaled: noise is zero"),
-        (lambda: RECORD.corrected(highpass=25.0), "highpass = 25 Hz must be below...25 Hz"),
-        (lambda: RECORD.resampled(0.0234567891), "not in the ratio of small whole numbers"),
-        (lambda: ub.Rayleigh.with_ratios(0.03, (5.0, 5.0)), "omega = (5, 5) must be two"),
+        (lambda: st.GroundMotion.read("no/such.AT2"), ["read: no/such.AT2: No such file"]),
+        (lambda: HISTORY([0, 1, 2, 5], [0, 1, 2, 3]), ["times[3]: the step", "or give dt="]),
+        (lambda: HISTORY([0, 1], [0, 1, 2]), ["2 times and 3 values"]),
+        (lambda: HISTORY([0, 1, 1], [0, 1, 2], 0.1), ["must increase, but 1 follows 1"]),
+        (RECORD.scaled, ["GroundMotion.scaled: give either factor or peak"]),
+        (lambda: RECORD.scaled(0.0).scaled(peak=1.0), ["GroundMotion.scaled: noise is zero"]),
+        (lambda: RECORD.corrected(highpass=25.0), ["highpass = 25 Hz must be below", "25 Hz"]),
+        (
+            lambda: st.GroundMotion(0.01, [0, 1, 2, 1.0]).corrected(highpass=1.0),
+            ["has 4 values; a filter needs more than 15"],
+        ),
+        (lambda: RECORD.resampled(0.0234567891), ["not in the ratio of small whole numbers"]),
+        (lambda: ub.Rayleigh.with_ratios(0.03, (5.0, 5.0)), ["omega = (5, 5) must be two"]),
         # a0 = 2 ω1 ω2 (ζ1 ω2 - ζ2 ω1)/(ω2² - ω1²)
-        (lambda: ub.Rayleigh.with_ratios((0.01, 0.05), (5.0, 6.0)), "need...mass = -1.04"),
-        (lambda: st.response_spectrum(RECORD.scaled(0.0), [1.0], ductility=2.0), "noise is zero"),
+        (lambda: ub.Rayleigh.with_ratios((0.01, 0.05), (5.0, 6.0)), ["need", "mass = -1.04"]),
+        (lambda: st.response_spectrum(RECORD.scaled(0.0), [1.0], ductility=2.0), ["noise is zero"]),
     ],
 )
-def test_a_wrong_call_is_refused(make, message):
-    with pytest.raises(ub.ArgumentError, match=re.escape(message).replace(r"\.\.\.", ".*")):
+def test_a_wrong_call_is_refused(make, parts):
+    with raises(*parts):
         make()
 
 
@@ -183,8 +158,7 @@ def test_a_record_is_scaled():
 def test_the_correction_finds_the_drift():
     """[closed] A polynomial is found but for the record, whose velocity has a small polynomial."""
     t = RECORD.dt * np.arange(len(RECORD.values))
-    drift = 0.3 - 0.2 * t
-    moved = st.GroundMotion(RECORD.dt, np.array(RECORD.values) + drift)
+    moved = st.GroundMotion(RECORD.dt, np.array(RECORD.values) + 0.3 - 0.2 * t)
     np.testing.assert_allclose(moved.corrected().values, RECORD.corrected().values, atol=1e-12)
     # Berg and Housner's condition: no further line makes the mean square of the velocity smaller.
     v = scipy.integrate.cumulative_trapezoid(moved.corrected().values, dx=RECORD.dt, initial=0)
@@ -200,8 +174,8 @@ def test_the_filter_removes_long_waves():
     [closed] A Butterworth filter of order 4, used twice, has the gain 1/(1 + (f0/f)⁸).
     """
     t = np.arange(0.0, 60.0, 0.02)
-    short = np.sin(10 * np.pi * t) * np.sin(np.pi * t / 60) ** 2
-    long = np.sin(0.1 * np.pi * t) * np.sin(np.pi * t / 60) ** 2
+    window = np.sin(np.pi * t / 60) ** 2
+    short, long = window * np.sin(10 * np.pi * t), window * np.sin(0.1 * np.pi * t)
     kept = np.array(st.GroundMotion(0.02, short + long).corrected(highpass=0.5).values)
     assert abs(kept - short).max() < 1e-3  # less than the sidebands of the window
 
@@ -225,34 +199,14 @@ def test_longer_steps_keep_slow_waves_and_remove_fast_ones():
 
 
 def test_a_history_with_uneven_times_is_interpolated():
-    floor = st.GroundMotion.from_history([2.0, 3.0, 5.0], [0.0, 2.0, 0.0], dt=0.5, name="floor")
+    floor = HISTORY([2.0, 3.0, 5.0], [0.0, 2.0, 0.0], dt=0.5, name="floor")
     assert floor == st.GroundMotion(0.5, [0.0, 1.0, 2.0, 1.5, 1.0, 0.5, 0.0], "floor")
-    even = st.GroundMotion.from_history(0.1 * np.arange(5), np.arange(5))
-    assert even.dt == pytest.approx(0.1, rel=1e-15)
+    assert HISTORY(0.1 * np.arange(5), np.arange(5)).dt == pytest.approx(0.1, rel=1e-15)
 
 
-def test_rayleigh_damping_has_the_ratios():
+@pytest.mark.parametrize("ratios", [0.03, (0.02, 0.05)])
+def test_rayleigh_damping_has_the_ratios(ratios):
     """[closed] a0/(2 ω) + a1 ω/2."""
-    for ratios in (0.03, (0.02, 0.05)):
-        damping = ub.Rayleigh.with_ratios(ratios, (5.0, 40.0))
-        at = [damping.mass / (2 * w) + damping.stiffness * w / 2 for w in (5.0, 40.0)]
-        np.testing.assert_allclose(at, ratios, rtol=1e-14)
-
-
-def test_exponents_may_begin_with_d(written):
-    """As Fortran writes them."""
-    text = NEW.replace("   .0100 SEC", " 0.5D-02 SEC").replace(".3000000E+00", ".3000000D+00")
-    expected = st.GroundMotion.read(written(NEW))
-    found = st.GroundMotion.read(written(text))
-    assert found.dt == 0.005
-    assert found.values == expected.values
-
-
-def test_lines_may_all_end_with_a_comma(written):
-    file = written("1,2,\n3,4,\n")
-    assert st.GroundMotion.read(file, unit="m/s2", dt=0.1).values == (1.0, 2.0, 3.0, 4.0)
-
-
-def test_a_record_too_short_for_the_filter_is_refused():
-    with pytest.raises(ub.ModelError, match="has 4 values; a filter needs more than 15"):
-        st.GroundMotion(0.01, [0, 1, 2, 1.0]).corrected(highpass=1.0)
+    damping = ub.Rayleigh.with_ratios(ratios, (5.0, 40.0))
+    at = [damping.mass / (2 * w) + damping.stiffness * w / 2 for w in (5.0, 40.0)]
+    np.testing.assert_allclose(at, ratios, rtol=1e-14)

@@ -12,49 +12,42 @@ from uniaxial_points import LENGTH, Bars, C
 import ufl_beam as ub
 import ufl_beam.structures as st
 
-MIDDLE = ub.EnergyMomentumStatic(0.5)
+MIDDLE, END = ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic(1.0)
 LAWS = {
     "Ramberg-Osgood": st.RambergOsgood(yield_limit=2.0, offset=0.01, exponent=6),
     "Armstrong-Frederick": st.ArmstrongFrederick(yield_limit=1.0, kinematic=150.0, recovery=60.0),
     "Bouc-Wen": st.BoucWen(yield_limit=2.0, hardening=0.05, exponent=2),
     "degrading": st.BoucWen(2.0, 0.05, 1.5, shape=0.7, strength=0.05),
 }
-SCHEMES = [ub.Static(), MIDDLE, ub.EnergyMomentumStatic(0.8), ub.EnergyMomentumStatic(1.0)]
-each_law = pytest.mark.parametrize("law", LAWS)
 
 
 def follow(law, strains, scheme=MIDDLE):
-    """Stresses and bar after small steps of strain; second order."""
+    """The last stress and the bar after small steps of strain; second order."""
     one = Bars(1, law, None, scheme)
-    stresses = []
     for strain in strains:
         one.step([strain])
-        stresses.append(one.stress()[0])
-    return np.array(stresses), one
+    return one.stress()[0], one
 
 
-def test_a_ramberg_osgood_law_follows_its_power():
+@pytest.mark.parametrize("σ", [0.5, 2.0, 3.7])
+@pytest.mark.parametrize("steps", [1, 7])
+def test_a_ramberg_osgood_law_follows_its_power(σ, steps):
     """[closed] strain = stress/C + offset (stress/limit)^n, then elastic; in one step or many."""
-    law = LAWS["Ramberg-Osgood"]
-    for σ in (0.5, 2.0, 3.7):
-        strain = σ / C + 0.01 * (σ / 2) ** 6
-        for steps in (1, 7):
-            found, one = follow(
-                law, strain * np.arange(1, steps + 1) / steps, ub.EnergyMomentumStatic(1.0)
-            )
-            assert found[-1] == pytest.approx(σ, rel=1e-12)
-        one.step([strain - 0.5 * σ / C])
-        assert one.stress()[0] == pytest.approx(0.5 * σ, rel=1e-11)
+    strain = σ / C + 0.01 * (σ / 2) ** 6
+    found, one = follow(LAWS["Ramberg-Osgood"], np.linspace(0, strain, steps + 1)[1:], END)
+    assert found == pytest.approx(σ, rel=1e-12)
+    one.step([strain - 0.5 * σ / C])
+    assert one.stress()[0] == pytest.approx(0.5 * σ, rel=1e-11)
 
 
 def test_armstrong_frederick_hardens_exponentially():
     """[closed] back stress = kinematic/recovery (1 - exp(-recovery p)); 4000 steps, 1e-7."""
     law = LAWS["Armstrong-Frederick"]
     _, one = follow(law, np.linspace(0, 0.06, 4001)[1:])
-    p = one["plastic"][0]
-    assert one["back"][0] == pytest.approx(150 / 60 * (1 - math.exp(-60 * p)), rel=1e-6)
-    found, one = follow(law, np.linspace(0, 0.06, 31)[1:], ub.EnergyMomentumStatic(1.0))
-    assert found[-1] == pytest.approx(1 + one["back"][0], rel=1e-12)
+    back = 150 / 60 * (1 - math.exp(-60 * one["plastic"][0]))
+    assert one["back"][0] == pytest.approx(back, rel=1e-6)
+    found, one = follow(law, np.linspace(0, 0.06, 31)[1:], END)
+    assert found == pytest.approx(1 + one["back"][0], rel=1e-12)
 
 
 def test_armstrong_frederick_ratchets():
@@ -62,20 +55,16 @@ def test_armstrong_frederick_ratchets():
 
     X0 = low + limit and X1 = high - limit are the back stresses at its ends.
     """
-    limit, B, r = 1.0, 150.0, 60.0
-    high, low = 2.2, -1.6
+    limit, B, r, high, low = 1.0, 150.0, 60.0, 2.2, -1.6
     X1, X0 = high - limit, low + limit
     exact = math.log((B - r * X0) / (B - r * X1)) / r - math.log((B + r * X1) / (B + r * X0)) / r
     law = st.ArmstrongFrederick(limit, B, r)
-    section = ub.Section(EA=200.0, GA=1.0, EI=1.0, axial=law)
-    beam = ub.Beam((0, 0), (1, 0), section, cells=1)
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=200.0, GA=1.0, EI=1.0, axial=law), cells=1)
 
     # Yielding begins, and the load turns, at the ends of steps, so that errors are powers of these.
     stresses = [0, limit, high, *(2 * [high - 2 * limit, low, low + 2 * limit, high])]
-    load = ub.PointLoad(
-        beam.end, force=(1.0, 0.0), amplitude=ub.Table([0, 0.5, *np.linspace(1, 3, 9)], stresses)
-    )
-    scene = clamped(beam, loads=[load])
+    cycles = ub.Table([0, 0.5, *np.linspace(1, 3, 9)], stresses)
+    scene = clamped(beam, loads=[ub.PointLoad(beam.end, force=(1.0, 0.0), amplitude=cycles)])
     found = []
     for n in (200, 400):
         run = ub.simulate(scene, MIDDLE, t=(0, 3), dt=1 / n)
@@ -99,25 +88,22 @@ def test_bouc_wen_against_integration(law):
         z, e = y
         dx = 0.04 * (np.sin(2 * np.pi * t) + 2 * np.pi * t * np.cos(2 * np.pi * t))
         bends = 1 - law.shape + law.shape * np.sign(z * dx)
-        flow = (1 + law.strength * e) * abs(z / z0) ** law.exponent * bends
-        dz = dx * (1 - flow)
+        dz = dx * (1 - (1 + law.strength * e) * abs(z / z0) ** law.exponent * bends)
         return [dz, z * (dx - dz) / z0**2]
 
     of_equations = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-15, "max_step": 1e-3}
-    exact = solve_ivp(rates, (0, 2), [0, 0], **of_equations)
-    z, e = exact.y[:, -1]
-    expected = C * (a * x(2.0) + (1 - a) * z)
-    errors = []
+    z, e = solve_ivp(rates, (0, 2), [0, 0], **of_equations).y[:, -1]
+    expected, errors = C * (a * x(2.0) + (1 - a) * z), []
     for n in (3000, 6000):
         found, one = follow(law, x(np.linspace(0, 2, n + 1)[1:]))
-        errors.append(abs(found[-1] - expected) / law.yield_limit)
+        errors.append(abs(found - expected) / law.yield_limit)
         assert one["energy"][0] == pytest.approx(e, rel=2e-6)
     assert errors[1] < 1e-7
     assert errors[0] / errors[1] > 3.5  # second order, and more where errors change their sign
 
 
-@each_law
-@pytest.mark.parametrize("scheme", SCHEMES[1:], ids=str)
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("scheme", [MIDDLE, ub.EnergyMomentumStatic(0.8), END], ids=str)
 def test_work_is_stored_or_dissipated(law, scheme):
     """Work is stored, dissipated or lost; over small steps nothing comes back from dissipation."""
     one, stored = Bars(1, LAWS[law], None, scheme), 0.0
@@ -131,19 +117,3 @@ def test_work_is_stored_or_dissipated(law, scheme):
         assert plastic > -1e-6  # of second order in the step where a branch turns
         stored = now
     assert one.dissipated()[0][0] > 0.1
-
-
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
-        (lambda: st.RambergOsgood(0.0, 0.002, 5), "RambergOsgood: yield_limit"),
-        (lambda: st.RambergOsgood(1.0, 0.002, 0.5), "RambergOsgood: exponent"),
-        (lambda: st.ArmstrongFrederick(1.0, 1.0, 0.0), "ArmstrongFrederick: recovery"),
-        (lambda: st.BoucWen(1.0, hardening=1.0), "BoucWen: hardening = 1 must lie between"),
-        (lambda: st.BoucWen(1.0, shape=0.2), "BoucWen: shape"),
-        (lambda: st.BoucWen(1.0, strength=-1.0), "BoucWen: strength"),
-    ],
-)
-def test_numbers_out_of_range_are_refused(make, says):
-    with pytest.raises(ub.ArgumentError, match=says):
-        make()

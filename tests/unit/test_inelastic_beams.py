@@ -12,18 +12,6 @@ import ufl_beam as ub
 from ufl_beam.discretization.dof_numbering import DofNumbering
 
 ELASTIC = {"EA": 1e5, "GA": 1e5, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.01}
-LAWS = {
-    "yielding": {"bending": ub.ElastoPlastic(5.0, 20.0)},
-    "softening": {"bending": ub.ElastoPlastic(5.0, 20.0), "hinge": ub.Softening(7.0, 8.0)},
-}
-
-
-def cantilever(kind, tip=0.4, cells=5):
-    """A cantilever whose end is lifted in one second, back and forth."""
-    section = ub.Section(**ELASTIC, **LAWS[kind])
-    beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
-    lift = ub.Table([0, 0.5, 1], [0, tip, tip / 4])
-    return clamped(beam, ub.PrescribedDisplacement(beam.end, v=lift))
 
 
 class CutSteps(ub.Simulation):
@@ -50,16 +38,22 @@ def state(simulation):
     ]
 
 
-@pytest.mark.parametrize("kind", LAWS)
 @pytest.mark.parametrize(
-    "scheme", [ub.EnergyMomentumStatic(), ub.EnergyMomentum(0.1, 0.1)], ids=str
+    ("scheme", "more"),
+    [
+        (ub.EnergyMomentumStatic(), {}),
+        (ub.EnergyMomentum(0.1, 0.1), {"hinge": ub.Softening(7.0, 8.0)}),
+    ],
 )
-def test_a_cut_step_is_its_parts(kind, scheme):
+def test_a_cut_step_is_its_parts(scheme, more):
     """Two failures cut a step into quarters: the same as quarters from there.
 
     To the last digit in dynamics: steps have the same ends, 1/64 s and its parts.
     """
-    scene = cantilever(kind)
+    section = ub.Section(**ELASTIC, bending=ub.ElastoPlastic(5.0, 20.0), **more)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=5)
+    lift = ub.PrescribedDisplacement(beam.end, v=ub.Table([0, 0.5, 1], [0, 0.4, 0.1]))
+    scene = clamped(beam, lift)
     cut, fine = CutSteps(scene, scheme), CutSteps(scene, scheme)
     for n in range(32):
         cut.fails = 2 * (n % 5 == 0)
@@ -77,39 +71,17 @@ def test_a_cut_step_is_its_parts(kind, scheme):
             np.testing.assert_allclose(one, two, rtol=digits, atol=digits)
     _, _, lost = cut.entries()  # of all processes, each of which has some of the cells
     assert lost["plastic"] > 0
-    assert ("hinges" in lost) == (kind == "softening")
-    assert lost.get("hinges", 1.0) > 0
-
-
-@pytest.mark.parametrize("kind", LAWS)
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()], ids=str)
-def test_few_iterations_cut_steps_and_change_little(kind, scheme):
-    """Steps that are cut for want of iterations lead where small ones lead, and the ledger closes.
-
-    Half a second in four steps, which three iterations do not solve, against 200.
-    """
-    few, many = (
-        ub.simulate(cantilever(kind), scheme, t=(0, 0.5), dt=dt, newton=ub.Newton(max_iterations=n))
-        for dt, n in ((0.125, 3), (0.0025, 30))
-    )
-    assert few.substeps > 4
-    coarse, fine = (s.section_forces(s.scene.beams[0])[:, 2] for s in (few, many))
-    # First order in steps of at most a quarter of the whole
-    assert np.abs(coarse - fine).max() < 0.1 * np.abs(fine).max()
-    if scheme != ub.Static():
-        assert few.energy.worst < 1e-9  # closed by design, section 9
+    assert lost.get("hinges", 0.0) > 0 if more else "hinges" not in lost
 
 
 def test_a_failure_keeps_the_results_so_far():
-    """A force beyond the plastic limit: what was reached is there, Material included."""
+    """[closed] A force beyond the plastic limit, which is reached at half of the load."""
     section = ub.Section(**ELASTIC, bending=ub.ElastoPlastic(5.0), axial=ub.ElastoPlastic(10.0))
     beam = ub.Beam((0, 0), (1, 0), section, cells=4)
-    pull = ub.PointLoad(beam.end, force=(20.0, 0.0), amplitude=ub.ramp(1.0))
-    scene = clamped(beam, loads=[pull])
+    scene = clamped(beam, loads=[ub.PointLoad(beam.end, force=(20.0, 0), amplitude=ub.ramp(1.0))])
     with pytest.raises(ub.ConvergenceError) as failure:
         ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.125)
     solution = failure.value.solution
-    # [closed] N = 10 is reached at half of the load, a step's end
     assert solution.times[-1] == failure.value.time == pytest.approx(0.5, abs=1e-3)
     material = solution.material_at(beam.end)
     assert len(material.forces) == len(solution.times) == len(solution.energy.total)
@@ -119,22 +91,20 @@ def test_a_failure_keeps_the_results_so_far():
     assert solution.energy.worst < 1e-9
 
 
-# -- where points are ------------------------------------------------------------------------------
-
-
-def test_one_hinge_among_fifty_cells():
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_one_hinge_among_fifty_cells(degree):
     """No cell has points; the jump is at the place, and files have it in the cell before it."""
-    section = ub.Section(**ELASTIC)
-    law = ub.Softening(5.0, 10.0)
-    beam = ub.Beam((0, 0), (1, 0), section, cells=50, hinges={0.503: law})
-    lift = ub.PrescribedDisplacement(beam.end, psi=ub.ramp(1.0))
-    scene = clamped(beam, lift)
-    simulation = ub.Simulation(scene, ub.EnergyMomentumStatic())
+    beam = ub.Beam(
+        (0, 0), (1, 0), ub.Section(**ELASTIC), cells=50, hinges={0.503: ub.Softening(5.0, 10.0)}
+    )
+    scene = clamped(beam, ub.PrescribedDisplacement(beam.end, psi=ub.ramp(1.0)))
+    mesh = ub.Mesh(degree=degree)
+    simulation = ub.Simulation(scene, ub.EnergyMomentumStatic(), mesh=mesh)
     assert not simulation.inelastic
     simulation.step_to(1.0)
     jump, dissipated = simulation.damage()
     assert np.flatnonzero(jump).tolist() == np.flatnonzero(dissipated).tolist() == [25]
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.05)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.05, mesh=mesh)
     material = solution.material_at(beam.at(0.503))
     assert "plastic" not in solution.energy.lost
     assert "hardening" not in solution.energy.state
@@ -155,8 +125,7 @@ def test_hinges_of_a_beam_come_before_those_of_its_section():
         for y, hinges in enumerate([{}, {1.0: other}, {0.0: None, 0.5: other}])
     ]
     scene = ub.Scene(beams, supports=[ub.Clamped(p) for b in beams for p in (b.start, b.end)])
-    at = [(beams.index(h.a.beam), h.a.s, h.law.law) for h in scene.hinges]
-    assert at == [
+    assert [(beams.index(h.a.beam), h.a.s, h.law.law) for h in scene.hinges] == [
         (0, 0.0, law), (0, 1.0, law), (1, 0.0, law), (1, 1.0, other), (2, 1.0, law), (2, 0.5, other)
     ]  # fmt: skip
     numbering = DofNumbering(scene)
@@ -167,8 +136,7 @@ def test_cracks_of_fibres_are_no_rotations():
     fibres = ub.Fibres(ub.ElastoPlastic(math.inf), number=4, softening=ub.Softening(1e6, 1e3))
     section = ub.Section.rectangle(0.1, 0.2, E=1e9, nu=0.3, fibres=fibres)
     beam = ub.Beam((0, 0), (1, 0), section, cells=2)
-    turn = ub.PrescribedDisplacement(beam.end, u=0, psi=ub.ramp(1.0))
-    scene = clamped(beam, turn)
+    scene = clamped(beam, ub.PrescribedDisplacement(beam.end, u=0, psi=ub.ramp(1.0)))
     solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 0.1), dt=0.01)
     assert solution.energy["hinges"][-1] > 0
     assert (solution.material(beam).jump == 0).all()

@@ -3,16 +3,18 @@
 
 import numpy as np
 import pytest
+from helpers import raises
 from scenes import clamped
 
 import ufl_beam as ub
 import ufl_beam.structures as st
 from ufl_beam.blocks.material_points import Points
-from ufl_beam.model.fibres import SectionPoints
 
 EA, EI, NP, MP = 1000.0, 50.0, 10.0, 2.0
 LAW = st.AxialBending(NP, MP)
-SCHEMES = [ub.Static(), ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic(1.0)]
+each_scheme = pytest.mark.parametrize(
+    "scheme", [ub.Static(), ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic(1.0)], ids=str
+)
 
 
 def section(**more):
@@ -24,7 +26,6 @@ class Cells:
 
     def __init__(self, n, scheme):
         section_points = section(interaction=LAW).section_points(None)[0]
-        assert isinstance(section_points, SectionPoints)
         self.points = Points(section_points, [(0, k) for k in range(n)], np.full(n, 0.5), scheme)
         self.strain = np.zeros((n, 3))
 
@@ -40,6 +41,9 @@ class Cells:
         self.strain = strain.copy()
         return r
 
+    def plastic(self):
+        return np.array([self.points[f"state {x}"][:, 0] for x in ("stretch", "curvature")])
+
 
 def histories(n, steps):
     """Random walks of (Σ, Γ, K), up to ten times the elastic range."""
@@ -48,26 +52,24 @@ def histories(n, steps):
     return walk * [NP / EA, 0.01, MP / EI] * np.linspace(0.01, 4, n)[:, None]
 
 
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+@each_scheme
 def test_resultants_lie_within_the_surface(scheme):
-    """On it where it flows, with plastic strains along its normal."""
+    """On it where it flows, with work on plastic strains that is not negative."""
     cells, flows = Cells(500, scheme), 0
     for strain in histories(500, 6):
-        r, _ = cells.return_map(strain)
-        assert LAW.excess(r[:, 0], r[:, 2]).max() < 1e-12
-        before = [cells.points[f"state {x}"][:, 0].copy() for x in ("stretch", "curvature")]
-        cells.step(strain)
-        now = [cells.points[f"state {x}"][:, 0] for x in ("stretch", "curvature")]
-        dp = np.array(now) - before
+        before = cells.plastic()
+        r = cells.step(strain)
+        excess, dp = LAW.excess(r[:, 0], r[:, 2]), cells.plastic() - before
         on = np.abs(dp).max(axis=0) > 0
         flows += on.sum()
-        assert np.abs(LAW.excess(r[on, 0], r[on, 2])).max() < 1e-12
-        # Work on plastic strains is not negative: the surface is convex and contains the origin.
+        assert excess.max() < 1e-12
+        assert np.abs(excess[on]).max() < 1e-12
+        # The surface is convex and contains the origin.
         assert (r[on, 0] * dp[0][on] + r[on, 2] * dp[1][on] > 0).all()
     assert flows > 500
 
 
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+@each_scheme
 def test_tangents_are_derivatives(scheme):
     """Against central differences, coupled in N and M."""
     cells = Cells(300, scheme)
@@ -103,32 +105,23 @@ def test_a_column_under_axial_force():
     assert pytest.approx(MP * (1 - (N / NP) ** 2), rel=0.02) == M
 
 
-def test_the_ledger_closes():
-    """Of a beam that is thrown and yields in tension and bending."""
-    beam = ub.Beam((0, 0), (2, 0), section(interaction=LAW), cells=4)
-    load = ub.PointLoad(beam.end, force=(3.0, 8.0), amplitude=lambda t: float(t < 0.5))
-    scene = clamped(beam, loads=[load])
-    for scheme in (ub.EnergyMomentum(), ub.EnergyMomentum(0.1)):
-        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01)
-        assert run.energy.worst < 1e-9
-        assert run.energy.lost["plastic"][-1] > 0.01 * run.energy.energy_transferred
+COUPLES = "couples the resultants NM"
 
 
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: section(bending=LAW), r"couples the resultants NM; use it as Section\("),
-        (lambda: section(interaction=ub.ElastoPlastic(1.0)), "is no law of N and M together"),
+        (lambda: section(bending=LAW), [COUPLES + "; use it as Section("]),
+        (lambda: section(interaction=ub.ElastoPlastic(1.0)), ["is no law of N and M together"]),
         (
             lambda: section(interaction=LAW, bending=ub.ElastoPlastic(1.0)),
-            "bending beside interaction",
+            ["bending beside interaction"],
         ),
-        (lambda: section(interaction=LAW, hinge=ub.Softening(1.0, 1.0)), "hinge beside interact"),
-        (lambda: ub.Spring(1.0, law=LAW), "Spring: law = .* couples the resultants NM"),
-        (lambda: ub.Fibres(LAW), "Fibres: law = .* couples the resultants NM"),
-        (lambda: st.AxialBending(0.0, 1.0), "AxialBending: axial"),
+        (lambda: section(interaction=LAW, hinge=ub.Softening(1.0, 1.0)), ["hinge beside interact"]),
+        (lambda: ub.Spring(1.0, law=LAW), ["Spring: law = ", COUPLES]),
+        (lambda: ub.Fibres(LAW), ["Fibres: law = ", COUPLES]),
     ],
 )
 def test_bad_interaction_laws_are_refused(make, says):
-    with pytest.raises(ub.ArgumentError, match=says):
+    with raises(*says):
         make()

@@ -21,25 +21,17 @@ LAWS = {
     "linear": (NONE, ub.LinearSoftening(4.0, 0.3)),
     "both": (ub.ElastoPlastic(2.0, 30.0), ub.Softening(3.0, 0.3)),
     "viscous both": (
-        ub.ElastoPlastic(2.0, 5.0, 5.0, ub.Perzyna(0.5)),
-        ub.LinearSoftening(4.0, 0.3),
+        ub.ElastoPlastic(2.0, 5.0, 5.0, ub.Perzyna(0.5)), ub.LinearSoftening(4.0, 0.3)
     ),
     "joint": (NONE, ub.Softening(0.0, 1.0)),
-}
+}  # fmt: skip
 """Bulk and discontinuity of a point of stiffness C: yields at a strain of 0.015, or 0.01."""
 
-STATIC, EXACT = (
-    ub.Static(),
-    [ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic(0.8), ub.EnergyMomentumStatic(1.0)],
-)
+STATIC = ub.Static()
+EXACT = [ub.EnergyMomentumStatic(θ) for θ in (0.5, 0.8, 1.0)]
 
 each_law = pytest.mark.parametrize("law", LAWS)
 each_scheme = pytest.mark.parametrize("scheme", [STATIC, *EXACT], ids=str)
-
-
-def bars(law, scheme, cells=200):
-    bulk, softening = LAWS[law]
-    return Bars(cells, bulk, softening, scheme)
 
 
 # -- after a step the laws hold ------------------------------------------------------------------
@@ -48,9 +40,12 @@ def bars(law, scheme, cells=200):
 @each_law
 @each_scheme
 def test_laws_hold_after_each_step(law, scheme):
-    """At t_n+θ: below the limit or on it, flow with the stress, resistance or less."""
-    some, dt, θ = bars(law, scheme), 0.1, scheme.theta
-    bulk, softening = LAWS[law]
+    """At t_n+θ: below the limit or on it, flow with the stress, resistance or less.
+
+    The stress in the accepted state is that of the strain less plastic strain and jump.
+    """
+    (bulk, softening), dt, θ = LAWS[law], 0.1, scheme.theta
+    some = Bars(200, bulk, softening, scheme)
     H, B = bulk.isotropic, bulk.kinematic
     eta = float(np.ravel(some.parameters["viscosity"])[0])
     seen = set()
@@ -58,16 +53,17 @@ def test_laws_hold_after_each_step(law, scheme):
         p, ξ, opening, jump = (some[n] for n in ("plastic", "accumulated", "opening", "jump"))
         σ = some.step(strain, dt)
         dp, growth = some["plastic"] - p, some["opening"] - opening
-        relative = np.abs(σ - B * (p + θ * dp))
+        relative, flows, opens = σ - B * (p + θ * dp), dp != 0, growth > 0
         limit = bulk.limit + H * (ξ + θ * np.abs(dp))
-        flows, opens = dp != 0, growth > 0
         scale = C * np.abs(strain).max() * 1e-13  # round-off of stresses as large as C strain
         assert np.isfinite(σ).all()
-        assert (relative <= limit + scale)[~flows].all()
+        assert (np.abs(relative) <= limit + scale)[~flows].all()
+        elastic = strain - some["jump"] / LENGTH - some["plastic"]
+        assert np.abs(some.stress() - C * elastic).max() < 10 * scale
         if flows.any():
             expected = limit + eta * np.abs(dp) / dt
-            assert np.abs(relative - expected)[flows].max() < scale
-            assert (np.sign(dp) == np.sign(σ - B * (p + θ * dp)))[flows].all()
+            assert np.abs(np.abs(relative) - expected)[flows].max() < scale
+            assert (np.sign(dp) == np.sign(relative))[flows].all()
             assert some["accumulated"] - ξ == pytest.approx(np.abs(dp), abs=1e-15)
             seen.add("flows")
         if softening is not None:
@@ -87,25 +83,9 @@ def test_laws_hold_after_each_step(law, scheme):
     assert ("opens" in seen) == (softening is not None)
 
 
-@each_law
-@each_scheme
-def test_stress_in_the_accepted_state(law, scheme):
-    """That of the strain less plastic strain and jump; with θ = 1 that of the step itself."""
-    some = bars(law, scheme)
-    for strain in histories(200, steps=8):
-        σ = some.step(strain)
-        elastic = strain - some["jump"] / LENGTH - some["plastic"]
-        assert np.abs(some.stress() - C * elastic).max() < 1e-12 * C
-        if scheme.theta == 1:
-            assert np.abs(some.stress() - σ).max() < 1e-12 * C
-
-
-# -- tangents ------------------------------------------------------------------------------------
-
-
 @each_scheme
 @pytest.mark.parametrize("side", [-1, 1])
-@pytest.mark.parametrize("near", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("near", [1e-2, 1e-6])
 @pytest.mark.parametrize("law", [x for x in LAWS if x not in ("elastic", "joint")])
 def test_tangents_just_before_and_after_onset(law, near, side, scheme):
     """Elastic before, with the slope of flow or opening after."""
@@ -127,106 +107,64 @@ def test_tangents_just_before_and_after_onset(law, near, side, scheme):
 # -- energies ------------------------------------------------------------------------------------
 
 
-def one_cell_at_a_time(law, scheme, cells=8):
-    """Bars of one cell each, for energies are known as sums over cells."""
-    bulk, softening = LAWS[law]
-    return [Bars(1, bulk, softening, scheme) for _ in range(cells)]
-
-
 @each_law
 @pytest.mark.parametrize("scheme", EXACT, ids=str)
 def test_work_is_stored_or_dissipated_or_lost(law, scheme):
-    """σ_θ Δε = Δ(elastic) + Δ(hardening) + dissipated + (2θ - 1) lost, in each step; each >= 0."""
-    walks = histories(8)
-    for k, one in enumerate(one_cell_at_a_time(law, scheme)):
-        elastic = hardening = worked = broken = 0.0
-        through = C * np.abs(walks[:, k]).max() ** 2 * LENGTH  # what the bulk would store alone
-        for strain in walks[:, k]:
+    """σ_θ Δε = Δ(elastic) + Δ(hardening) + dissipated + (2θ - 1) lost, in each step; each >= 0.
+
+    [closed] A discontinuity dissipates the integral of its traction, whatever the steps are.
+    """
+    bulk, softening = LAWS[law]
+    for walk in histories(8).T:
+        one, stored, worked, broken = Bars(1, bulk, softening, scheme), 0.0, 0.0, 0.0
+        through = C * np.abs(walk).max() ** 2 * LENGTH  # what the bulk would store alone
+        for strain in walk:
             before = one.strain[0]
             (σ,) = one.step([strain])
-            plastic, breaks, lost, elastic_now, hardening_now, released, _ = one.points.sums
-            work = σ * (strain - before) * LENGTH
+            plastic, breaks, lost, elastic, hardening, released, _ = one.points.sums
+            work, now = σ * (strain - before) * LENGTH, elastic + hardening
             sinks = plastic + breaks + (2 * scheme.theta - 1) * lost + released
-            change = elastic_now - elastic + hardening_now - hardening
-            through = max(through, abs(work), elastic_now + hardening_now, sinks)
+            through = max(through, abs(work), now, sinks)
             # Round-off of the largest energies so far; the opening squares an error of 1e-9
-            assert abs(work - change - sinks) < 1e-14 * through
-            for sink in (plastic, breaks, lost, released):
-                assert sink >= 0
-            worked, broken = worked + plastic, broken + breaks
-            elastic, hardening = elastic_now, hardening_now
-        assert one.dissipated()[0][0] == pytest.approx(worked, rel=1e-12)
-        assert one.dissipated()[1][0] == pytest.approx(broken, rel=1e-12)
+            assert abs(work - (now - stored) - sinks) < 1e-14 * through
+            assert min(plastic, breaks, lost, released) >= 0
+            stored, worked, broken = now, worked + plastic, broken + breaks
+        assert np.ravel(one.dissipated()) == pytest.approx([worked, broken], rel=1e-12)
+        if softening is not None:
+            opening = one["opening"]
+            whole = opening * softening.mean_traction(np.zeros(1), opening)
+            assert abs(broken - whole[0]) <= 1e-12 * softening.fracture_energy
 
 
 @each_law
 def test_static_steps_dissipate(law):
     """Nothing is negative, and no discontinuity dissipates more than its energy."""
-    some = bars(law, STATIC)
-    before = some.dissipated()
+    bulk, softening = LAWS[law]
+    some, before = Bars(200, bulk, softening, STATIC), np.zeros((2, 200))
     for strain in histories(200):
         some.step(strain)
-        now = some.dissipated()
-        for one, two in zip(before, now, strict=True):
-            assert (two >= one).all()
+        now = np.array(some.dissipated())
+        assert (now >= before).all()
         before = now
-    softening = LAWS[law][1]
-    if softening is not None:
-        assert (before[1] <= softening.fracture_energy * (1 + 1e-12)).all()
-
-
-@each_law
-@pytest.mark.parametrize(
-    "scheme", [ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic(1.0)], ids=str
-)
-def test_dissipation_of_openings_does_not_depend_on_steps(law, scheme):
-    """[closed] That of the accumulated opening, the integral of the traction."""
-    softening = LAWS[law][1]
-    some = bars(law, scheme)
-    for strain in histories(200):
-        some.step(strain)
-    _, broken = some.dissipated()
-    if softening is None:
-        assert (broken == 0).all()
-        return
-    opening = some["opening"]
-    whole = opening * softening.mean_traction(np.zeros(200), opening)
-    assert np.abs(broken - whole).max() <= 1e-12 * softening.fracture_energy
-
-
-# -- steps that are not taken ----------------------------------------------------------------------
+    assert softening is None or (before[1] <= softening.fracture_energy * (1 + 1e-12)).all()
 
 
 @each_law
 def test_responses_leave_no_trace(law):
-    """Only an accepted step changes the state: what cutting of steps rests on."""
-    one, other = bars(law, EXACT[0]), bars(law, EXACT[0])
+    """Only an accepted step changes the state, which can be restored."""
+    one, other = (Bars(200, *LAWS[law], EXACT[0]) for _ in range(2))
     random = np.random.default_rng(1)
     for strain in histories(200, steps=10):
         for far in random.uniform(-1, 1, (3, 200)):
             one.return_map(far, dt=random.uniform(1e-3, 1))
         assert (one.step(strain) == other.step(strain)).all()
     assert (one.points.state() == other.points.state()).all()
-
-
-@each_law
-def test_state_and_restore(law):
-    """A state that was restored goes on as the one it was taken from."""
-    one, other = bars(law, EXACT[2]), bars(law, EXACT[2])
-    walks = histories(200, steps=20)
-    for strain in walks[:10]:
-        one.step(strain)
-    other.points.restore(one.points.state())
-    other.strain = one.strain.copy()
-    other.points.refresh(other._strains(other.strain))
+    again = Bars(200, *LAWS[law], EXACT[0])
+    again.points.restore(one.points.state())
+    again.points.refresh(again._strains(strain))
     # Sums in another order
-    assert other.stress() == pytest.approx(one.stress(), rel=1e-13, abs=1e-13)
-    assert other.points.sums[3:5] == pytest.approx(one.points.sums[3:5], rel=1e-12)
-    for strain in walks[10:]:
-        one.step(strain)
-        other.step(strain)
-    assert other["jump"] == pytest.approx(one["jump"], rel=1e-12, abs=1e-15)
-    assert other["plastic"] == pytest.approx(one["plastic"], rel=1e-12, abs=1e-15)
+    assert again.stress() == pytest.approx(one.stress(), rel=1e-13, abs=1e-13)
+    assert again.points.sums[3:5] == pytest.approx(one.points.sums[3:5], rel=1e-12)
 
 
 # -- openings of any size ------------------------------------------------------------------------
@@ -234,13 +172,12 @@ def test_state_and_restore(law):
 BEYOND = np.concatenate([10.0 ** np.arange(-15.0, 4.0), 2.0 ** np.arange(-52.0, -10.0)])
 """How far the trial stress is beyond the limit, as a part of it."""
 
-RATIOS = 10.0 ** np.arange(-12, 13, 4)
-KINDS = [ub.Softening, ub.LinearSoftening]
+each_kind = pytest.mark.parametrize("kind", [ub.Softening, ub.LinearSoftening])
 
 
 @each_scheme
-@pytest.mark.parametrize("ratio", RATIOS)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("ratio", 10.0 ** np.arange(-12, 13, 4))
+@each_kind
 def test_openings_are_found(kind, ratio, scheme):
     """For limit/energy of 24 magnitudes, cells that snap back (limit²/energy > C/length) too."""
     limit = 2.0
@@ -252,40 +189,34 @@ def test_openings_are_found(kind, ratio, scheme):
     growth = some["opening"]
     assert (growth >= 0).all()
     assert (growth <= strain * LENGTH / scheme.theta * (1 + 1e-12)).all()
-    resists = scheme.resistance(law, np.zeros_like(growth), growth)
     opens = growth > 0
     assert opens[BEYOND > 1e-14].all()
+    resists = scheme.resistance(law, np.zeros_like(growth), growth)
     # Round-off of C times the strain
     assert (np.abs(σ - resists)[opens] <= 1e-14 * (C * strain + limit)[opens]).all()
 
 
 @each_scheme
-@pytest.mark.parametrize("kind", KINDS)
+@each_kind
 def test_openings_of_a_broken_point(kind, scheme):
     """Nothing left to resist: the stress is round-off, in both directions and again."""
-    law = kind(2.0, 1e-6)
-    some = Bars(5, NONE, law, scheme)
+    some = Bars(5, NONE, kind(2.0, 1e-6), scheme)
     strain = np.array([1e-4, 1e-2, 1.0, 30.0, 1e-9])
     for factor in (1e3, -1e3, 1.0, 1e-3, -1e-6, 0.0, 5.0):
         σ = some.step(factor * strain)
         assert np.isfinite(σ).all()
     assert (np.abs(σ[:4]) < 1e-12 * C * 1e3 * strain[:4]).all()
-    _, broken = some.dissipated()
     if scheme != STATIC:
-        assert broken[:4] == pytest.approx(1e-6, rel=1e-9)
+        assert some.dissipated()[1][:4] == pytest.approx(1e-6, rel=1e-9)
 
 
 @each_scheme
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", range(3))
-def test_openings_beside_a_bulk_that_yields(kind, scheme, seed):
+@each_kind
+def test_openings_beside_a_bulk_that_yields(kind, scheme):
     """Kinematic hardening far beyond its limit flows back under stresses that pull."""
-    random = np.random.default_rng(seed)
     bulk = ub.ElastoPlastic(0.5, 1.0, 150.0, ub.Perzyna(0.01))
-    law = kind(6.0, 0.2)
-    some = Bars(200, bulk, law, scheme)
-    for strain in histories(200, seed=seed, size=0.5):
-        σ = some.step(strain + random.uniform(-0.1, 0.1, 200))
-        assert np.isfinite(σ).all()
+    some = Bars(600, bulk, kind(6.0, 0.2), scheme)
+    for strain in histories(600, size=0.5):
+        assert np.isfinite(some.step(strain)).all()
     assert (some["opening"] > 0).any()
     assert (some["accumulated"] > 0).any()
