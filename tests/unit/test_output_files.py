@@ -13,7 +13,7 @@ from mpi4py import MPI
 import h5py
 import numpy as np
 import pytest
-from helpers import raises
+from helpers import at_step, raises
 from scenes import SECTION, clamped
 from time_series import read_vtkhdf, read_xdmf
 
@@ -188,20 +188,9 @@ def test_checkpoints_hold_no_copies_of_files(tmp_path):
 # -- files that are removed, full disks ------------------------------------------------------------
 
 
-class Remove(Notes):
-    """Removes a file after some steps."""
-
-    def __init__(self, path, steps):
-        super().__init__(path.with_suffix(".notes"))
-        self.gone, self.steps = path, steps
-
-    def write(self, simulation):
-        self.steps -= 1
-        if self.steps == 0 and simulation.comm.rank == 0:
-            self.gone.unlink()
-
-    def state(self):
-        return {}
+def remove(path):
+    """A recorder that removes a file after three steps."""
+    return at_step(3, lambda: MPI.COMM_WORLD.rank == 0 and path.unlink())
 
 
 each_file = pytest.mark.parametrize(
@@ -216,12 +205,12 @@ def test_a_file_that_was_removed_before_a_checkpoint(recorder, name, shared_path
     checkpoint = ub.Checkpoint(shared_path / "a.checkpoint", every=2)
     words = f"output {path} was removed ", "the checkpoint before is kept"
     with raises(*words, kind=FileNotFoundError) as error:
-        run(recorder(path), Remove(path, 3), checkpoint=checkpoint)
+        run(recorder(path), remove(path), checkpoint=checkpoint)
     assert len(error.value.solution.times) == 5
     kept = on_first_rank(lambda: read(shared_path / "a.checkpoint", FORMAT))
     assert len(kept["history/q"]) == 3
     with raises("it differs from the file at the checkpoint"):
-        run(recorder(path), Remove(path, 3), checkpoint=checkpoint)
+        run(recorder(path), remove(path), checkpoint=checkpoint)
 
 
 @pytest.mark.serial
@@ -229,7 +218,7 @@ def test_a_file_that_was_removed_before_a_checkpoint(recorder, name, shared_path
 def test_a_file_that_was_removed_otherwise(recorder, name, tmp_path):
     """The run goes on to its end, and a warning says what is lost."""
     with pytest.warns(RuntimeWarning, match=rf"output \S*{name} was removed or replaced"):
-        solution = run(recorder(tmp_path / name), Remove(tmp_path / name, 3))
+        solution = run(recorder(tmp_path / name), remove(tmp_path / name))
     assert len(solution.times) == 6
 
 
