@@ -11,11 +11,6 @@ pytestmark = pytest.mark.serial
 SCRIPT = Path(__file__).parents[2] / "docs" / "notebooks" / "first_steps.py"
 
 
-def skip_without(*modules):
-    """Skip a test that needs optional packages."""
-    return [pytest.importorskip(module) for module in modules]
-
-
 def test_the_notebook_runs_as_a_script(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     try:
@@ -30,8 +25,9 @@ def test_the_notebook_runs_as_a_script(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def cells(tmp_path_factory):
-    """Cells of code of the notebook after its execution, by their last lines."""
-    jupytext, nbclient, *_ = skip_without("jupytext", "nbclient", "ipykernel", "pyvista", "imageio")
+    """Outputs of the cells of code of the executed notebook, by their last lines."""
+    optional = "jupytext", "nbclient", "ipykernel", "pyvista", "imageio"
+    jupytext, nbclient, *_ = map(pytest.importorskip, optional)
     notebook = jupytext.read(SCRIPT)
     notebook.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3"}
     folder = {"metadata": {"path": str(tmp_path_factory.mktemp("notebook"))}}
@@ -46,25 +42,22 @@ def shown(outputs):
     return result.data
 
 
-@pytest.mark.parametrize("name", ["scene", "modes", "solution", "damaged", "tradeoff"])
-def test_models_and_results_have_a_page(cells, name):
-    data = shown(cells[name])
-    assert data["text/plain"].startswith("<")
-    assert "\n" not in data["text/plain"]
-    assert data["text/html"].count("data:image/png") == 1
-    assert "no picture" not in data["text/html"]
+def test_models_and_results_have_a_page(cells):
+    for name in ("scene", "modes", "solution", "damaged", "tradeoff"):
+        data = shown(cells[name])
+        assert data["text/plain"].startswith("<"), name
+        assert "\n" not in data["text/plain"], name
+        assert data["text/html"].count("data:image/png") == 1, name
+        assert "no picture" not in data["text/html"], name
 
 
-@pytest.mark.parametrize("quantity", ["M", "history", "energy", "hinge"])
-def test_figures_are_pictures(cells, quantity):
+def test_figures_are_pictures_and_the_film_plays(cells):
     """Without `%matplotlib inline`."""
-    (source,) = (x for x in cells if x.startswith("ub.plot(") and f'"{quantity}"' in x)
-    data = shown(cells[source])
-    assert data["image/png"].startswith("iVBOR")  # the first bytes of PNG
-    assert "text/html" not in data
-
-
-def test_the_film_plays(cells):
+    for quantity in ("M", "history", "energy", "hinge"):
+        (source,) = (x for x in cells if x.startswith("ub.plot(") and f'"{quantity}"' in x)
+        data = shown(cells[source])
+        assert data["image/png"].startswith("iVBOR")  # the first bytes of PNG
+        assert "text/html" not in data
     (source,) = (source for source in cells if source.startswith("ub.animate"))
     assert "data:image/gif;base64," in shown(cells[source])["text/html"]
 

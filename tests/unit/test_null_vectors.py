@@ -5,13 +5,12 @@ import math
 
 import numpy as np
 import pytest
-from helpers import run
+from helpers import raises, run
 
 import ufl_beam as ub
 from ufl_beam.discretization.state_io import Archive
 
-DYNAMIC = [ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1, beta=0.1), ub.EnergyMomentumDecaying()]
-STATIC = [ub.Static(), ub.EnergyMomentumStatic()]
+SCHEMES = [ub.EnergyMomentum(alpha=0.1, beta=0.1), ub.EnergyMomentumDecaying(), ub.Static()]
 PERFECT = ub.Softening(limit=0.0, fracture_energy=1.0)
 
 
@@ -31,8 +30,8 @@ def star(number, *, hinge=None, joint=ub.Rigid, moment=0.0):
     return ub.Scene(members, joints=[joint(*ends)], supports=clamped, loads=forces)
 
 
-@pytest.mark.parametrize("scheme", [*DYNAMIC, *STATIC], ids=str)
-@pytest.mark.parametrize("number", [2, 3, 5])
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+@pytest.mark.parametrize("number", [2, 5])
 def test_perfect_hinges_around_a_node_are_a_revolute_joint(scheme, number):
     """The node between them is idle; members move as if it were not there, but for round-off."""
     hinged = run(star(number, hinge=PERFECT), scheme)
@@ -47,11 +46,8 @@ def test_perfect_hinges_around_a_node_are_a_revolute_joint(scheme, number):
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
 def test_a_driven_node_is_not_idle(scheme):
     """Nothing resists a moment on the node, however small."""
-    with pytest.raises(ub.ConvergenceError) as caught:
+    with raises("held by nothing", "at (0, 0)", kind=ub.ConvergenceError):
         run(star(3, hinge=PERFECT, moment=0.01), scheme)
-    said = str(caught.value)
-    assert "held by nothing" in said
-    assert "at (0, 0)" in said
 
 
 def storeys(embedded):
@@ -61,20 +57,16 @@ def storeys(embedded):
         b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0, hinge=law if embedded else None
     )
     hinges = {} if embedded else {0.0: law, 1.0: law}
-    push = ub.Table([0, 0.025, 0.05], [0, 1, 0])
     members, joints, loads = [], [], []
-    meeting = {"left": [], "right": []}
+    for y in (0, 3, 6):
+        sides = ((0, y), (0, y + 3)), ((4, y), (4, y + 3)), ((0, y + 3), (4, y + 3))
+        members += [ub.Beam(a, b, section, cells=4, hinges=hinges) for a, b in sides]
+    push = ub.Table([0, 0.025, 0.05], [0, 1, 0])
     for k in range(3):
-        left = ub.Beam((0, 3 * k), (0, 3 * k + 3), section, cells=4, hinges=hinges)
-        right = ub.Beam((4, 3 * k), (4, 3 * k + 3), section, cells=4, hinges=hinges)
-        girder = ub.Beam((0, 3 * k + 3), (4, 3 * k + 3), section, cells=4, hinges=hinges)
-        if k > 0:
-            joints += [ub.Rigid(*meeting["left"], left.start)]
-            joints += [ub.Rigid(*meeting["right"], right.start)]
-        meeting = {"left": [left.end, girder.start], "right": [right.end, girder.end]}
-        members += [left, right, girder]
-        loads.append(ub.PointLoad(left.end, force=(200e3 * (k + 1) / 3, -20e3), amplitude=push))
-    joints += [ub.Rigid(*ends) for ends in meeting.values()]
+        left, right, girder, *above = members[3 * k : 3 * k + 5]
+        joints += [ub.Rigid(left.end, girder.start, *(x.start for x in above[:1]))]
+        joints += [ub.Rigid(right.end, girder.end, *(x.start for x in above[1:]))]
+        loads.append(ub.PointLoad(left.end, (200e3 * (k + 1) / 3, -20e3), amplitude=push))
     feet = [ub.Clamped(members[0].start), ub.Clamped(members[1].start)]
     return ub.Scene(members, joints=joints, supports=feet, loads=loads)
 
@@ -99,12 +91,11 @@ def test_a_run_goes_on_with_what_is_idle():
             simulation.step_to((n + 1) * 0.1)
         return simulation
 
-    def begun():
-        return ub.Simulation(star(3, hinge=PERFECT), ub.EnergyMomentum())
-
-    whole, other = after(begun(), range(10)), begun()
-    half = after(begun(), range(5))
-    half.save_or_restore(archive := Archive(half.subdomain))
+    whole, half, other = (
+        ub.Simulation(star(3, hinge=PERFECT), ub.EnergyMomentum()) for _ in range(3)
+    )
+    after(whole, range(10))
+    after(half, range(5)).save_or_restore(archive := Archive(half.subdomain))
     other.save_or_restore(Archive(other.subdomain, archive.state()))
     after(other, range(5, 10))
     assert other.iterations == whole.iterations

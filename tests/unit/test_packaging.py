@@ -12,20 +12,27 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.serial
+
 ROOT = Path(__file__).parents[2]
 SHIPPED = ("demos", "docs", "tests", "benchmarks", "ufl_beam")
+
+
+def command(*arguments, status=0, **more):
+    """Run Python; its output, or its last words if it is to fail."""
+    ran = subprocess.run(
+        [sys.executable, *map(str, arguments)], capture_output=True, text=True, timeout=300, **more
+    )
+    assert ran.returncode == status, ran.stdout + ran.stderr
+    return ran.stderr.strip().splitlines()[-1] if status else ran.stdout
 
 
 def import_error(missing, **more):
     """Last line of `import ufl_beam` where some packages are missing."""
     script = f"import sys; sys.modules.update(dict.fromkeys({missing!r})); import ufl_beam"
-    command = [sys.executable, "-c", script]
-    ran = subprocess.run(command, capture_output=True, text=True, timeout=60, **more)
-    assert ran.returncode == 1
-    return ran.stderr.strip().splitlines()[-1]
+    return command("-c", script, status=1, **more)
 
 
-@pytest.mark.serial
 @pytest.mark.parametrize(
     "missing",
     [("mpi4py", "petsc4py", "dolfinx", "basix", "ufl", "ffcx"), ("dolfinx",), ("petsc4py",)],
@@ -39,15 +46,6 @@ def test_an_import_without_dolfinx_says_what_is_needed(missing):
     assert f"{ROOT}/env, see docs/installation.md" in last
 
 
-def command(*arguments, **more):
-    """Run Python; its output. What it says if it fails is the message."""
-    ran = subprocess.run(
-        [sys.executable, *map(str, arguments)], capture_output=True, text=True, timeout=300, **more
-    )
-    assert ran.returncode == 0, ran.stdout + ran.stderr
-    return ran.stdout
-
-
 def pip(verb, *arguments):
     """Run pip without a network."""
     command("-m", "pip", verb, "--no-deps", "--no-index", *arguments)
@@ -58,6 +56,14 @@ def wheel_of(source, folder):
     pip("wheel", "--no-build-isolation", "--wheel-dir", folder, source)
     (wheel,) = folder.glob("ufl_beam-*.whl")
     return wheel
+
+
+def content_of(wheel):
+    """Names of files beside the metadata, and the metadata."""
+    with zipfile.ZipFile(wheel) as file:
+        inside = {name for name in file.namelist() if ".dist-info/" not in name}
+        (metadata,) = (n for n in file.namelist() if n.endswith(".dist-info/METADATA"))
+        return inside, file.read(metadata).decode()
 
 
 @pytest.fixture(scope="module")
@@ -92,47 +98,31 @@ def wheel(sdist, tmp_path_factory):
     return wheel_of(sdist, tmp_path_factory.mktemp("wheel"))
 
 
-@pytest.mark.serial
 def test_an_sdist_has_documentation_and_demos(copied, sdist):
     with tarfile.open(sdist) as tar:
         inside = {name.partition("/")[2] for name in tar.getnames()}
-    for name in SHIPPED:
-        for file in (copied / name).rglob("*.*"):
-            if file.is_file():
-                assert str(file.relative_to(copied)) in inside
-    assert {
-        "env",
-        "environment.yml",
-        "Makefile",
-        "CHANGELOG.md",
-        "CITATION.cff",
-        "CONTRIBUTING.md",
-    } <= inside
+    shipped = [file for name in SHIPPED for file in (copied / name).rglob("*.*") if file.is_file()]
+    assert {str(file.relative_to(copied)) for file in shipped} <= inside
+    assert {"env", "environment.yml", "Makefile", "CHANGELOG.md"} <= inside
+    assert {"CITATION.cff", "CONTRIBUTING.md"} <= inside
 
 
-@pytest.mark.serial
 def test_a_wheel_has_the_package_its_c_and_the_licence(copied, wheel):
     """All files of the package, nothing else; the same from the checkout as from the sdist."""
-    with zipfile.ZipFile(wheel) as file:
-        inside = {name for name in file.namelist() if ".dist-info/" not in name}
-        (metadata,) = (n for n in file.namelist() if n.endswith(".dist-info/METADATA"))
-        said = file.read(metadata).decode()
-    package = ROOT / "ufl_beam"
+    inside, said = content_of(wheel)
     known = {
         str(path.relative_to(ROOT))
-        for path in package.rglob("*")
+        for path in (ROOT / "ufl_beam").rglob("*")
         if path.suffix in {".py", ".c", ".h", ".csv", ".typed"}
     }
     assert any(name.endswith(".h") for name in known)
     assert inside == known
     assert re.search("^License-Expression: MIT$", said, re.MULTILINE)
     assert re.search("^License-File: LICENSE$", said, re.MULTILINE)
-    with zipfile.ZipFile(wheel_of(copied, copied / "wheels")) as file:
-        assert {name for name in file.namelist() if ".dist-info/" not in name} == inside
+    assert content_of(wheel_of(copied, copied / "wheels"))[0] == inside
 
 
 INSTALLED = """
-import sys
 import ufl_beam as ub
 beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1e-3), cells=2)
 load = ub.PointLoad(beam.end, force=(0.0, 0.1))
@@ -143,7 +133,6 @@ print(ub.__file__, ub.__version__, sep="\\n")
 """
 
 
-@pytest.mark.serial
 @pytest.mark.parametrize("compiles", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_an_installed_wheel_runs_outside_of_the_checkout(wheel, tmp_path, compiles):
     """Its C is read in any case, and compiled where the cache is empty."""

@@ -17,18 +17,29 @@ from ufl_beam import parallel
 
 FIRST = MPI.COMM_WORLD.rank == 0
 BEAM = ub.Beam((0, 0), (0, 2), SECTION, cells=2)
-PUSH = ub.PointLoad(BEAM.end, force=(1.0, 0), amplitude=lambda t: t)
-SCENE = clamped(BEAM, loads=[PUSH])
+TIMES = {"t": (0, 1), "dt": 0.5}
+
+
+def pushed(force=1.0):
+    return clamped(BEAM, loads=[ub.PointLoad(BEAM.end, (force, 0), amplitude=lambda t: t)])
 
 
 def simulate(**more):
-    return ub.simulate(SCENE, ub.Static(), t=(0, 1), dt=0.5, **more)
+    return ub.simulate(pushed(), ub.Static(), **TIMES, **more)
 
 
 CALLS = {
     "simulate": (simulate, r"100%\|.*\n$"),
+    "reference solver": (
+        lambda **more: simulate(newton=ub.Newton(reference=True), **more),
+        r"100%\|[^/]*\| \[[\d:]+<[\d:]+.*\]",
+    ),
+    "differentiate": (
+        lambda **more: ub.differentiate(pushed, {"force": 1.0}, ub.Static(), **TIMES, **more),
+        r"100%\|[^/]*\| \[[\d:]+<[\d:]+.*\]",
+    ),
     "follow": (
-        lambda **more: ub.follow(SCENE, ub.LoadControl(0.5), steps=2, **more),
+        lambda **more: ub.follow(pushed(), ub.LoadControl(0.5), steps=2, **more),
         r"2/2 \[.*\] *\n$",
     ),
     "study": (
@@ -37,12 +48,13 @@ CALLS = {
     ),
     "tradeoff": (
         lambda **more: ub.tradeoff(
-            SCENE, {"tip": lambda run: run.position(BEAM.end)[-1]}, scheme=ub.Static(), t=(0, 1),
-            dt=0.5, tolerance=0.01, **more,
+            pushed(), {"tip": lambda run: run.position(BEAM.end)[-1]}, scheme=ub.Static(),
+            **TIMES, tolerance=0.01, **more,
         ),
         r"trade-off: \d+ runs \[\d+:\d+\] *\n$",
     ),
 }  # fmt: skip
+"""Calls, and ends of their bars; fractions of time are shown as per cent without digits."""
 
 
 class Terminal(io.StringIO):
@@ -65,39 +77,13 @@ def at_once(monkeypatch):
 
 
 @pytest.mark.parametrize("call", CALLS)
-def test_a_terminal_shows_the_progress(call, at_once):
+def test_a_terminal_shows_the_progress(call, at_once, capsys):
+    """One bar, that of a study and none of its members; none if it is not wanted or no terminal."""
     run, last = CALLS[call]
     shown = in_terminal(run)
     assert bool(re.search(last, shown)) == FIRST, shown
-    # One bar: that of the study, none of its members
     assert shown.count("\n") == FIRST, shown
-
-
-FRACTIONS = {
-    "reference solver": lambda: simulate(newton=ub.Newton(reference=True)),
-    "derivatives": lambda: ub.differentiate(
-        lambda force: clamped(BEAM, loads=[ub.PointLoad(BEAM.end, force=(force, 0))]),
-        {"force": 1.0}, ub.Static(), t=(0, 1), dt=0.5,
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("call", FRACTIONS)
-def test_fractions_are_per_cent(call, at_once):
-    """A bar of all digits of the fraction, 0.30228333333333335/1.0, tells nothing."""
-    shown = in_terminal(FRACTIONS[call])
-    assert bool(re.search(r"100%\|[^/]*\| \[[\d:]+<[\d:]+.*\]", shown)) == FIRST, shown
-
-
-@pytest.mark.parametrize("call", CALLS)
-def test_no_progress_if_it_is_not_wanted(call, at_once):
-    run, _ = CALLS[call]
     assert in_terminal(run, progress=False) == ""
-
-
-@pytest.mark.parametrize("call", CALLS)
-def test_no_progress_without_a_terminal(call, at_once, capsys):
-    run, _ = CALLS[call]
     run()
     assert capsys.readouterr().err == ""
 

@@ -54,7 +54,7 @@ def test_plastic_rectangle():
     exact = np.where(
         κ > K_YIELD, 1 - (K_YIELD / np.maximum(κ, K_YIELD)) ** 2 / 3, κ / K_YIELD / 1.5
     )
-    for n in (10, 40, 160):
+    for n in (10, 40):
         result = st.moment_curvature(rectangle(n), κ)
         # A layer has one stress: the yielded depth errs by half a layer at most
         assert np.abs(result.moment / M_PLASTIC - exact).max() < 1.5 / n**2
@@ -62,7 +62,7 @@ def test_plastic_rectangle():
         assert result.N.tolist() == [0.0] * len(κ)
 
 
-@pytest.mark.parametrize("N", [-0.5, 0.3, 0.8])
+@pytest.mark.parametrize("N", [-0.5, 0.8])
 def test_plastic_moment_under_axial_force(N):
     """[closed] M = Mp (1 - (N/Np)²); the dissipated energy is the work that is not stored."""
     κ = K_YIELD * np.linspace(0, 40, 81)
@@ -78,34 +78,18 @@ def test_plastic_moment_under_axial_force(N):
     assert result.dissipated[-1] == pytest.approx(work + before - stored, rel=0.01)
 
 
-def test_cyclic_loops_dissipate_their_area():
-    """[closed] In a closed loop all work is dissipated; trapezoidal rule, second order."""
-    section = rectangle(20, ub.ElastoPlastic(LIMIT, kinematic=E / 20))
-    errors = []
-    for steps in (40, 160):
-        κ = 6 * K_YIELD * np.sin(2 * np.pi * np.arange(3 * steps + 1) / steps)
-        result = st.moment_curvature(section, κ)
-        last = slice(2 * steps, None)
-        area = np.trapezoid(result.moment[last], κ[last])
-        errors.append(abs(1 - np.ptp(result.dissipated[[2 * steps, -1]]) / area))
-    # The trapezoidal rule errs by the steps in which fibres begin to flow
-    assert errors[1] < min(errors[0] / 4, 0.002)
-
-
 def test_cracked_concrete():
     """[closed] Depth x of compression: b x²/2 = n As (d - x), with n = Es/Ec."""
     As, d, n = 1.5e-3, 0.45, 200 / 30
     x = (-n * As + math.sqrt((n * As) ** 2 + 2 * 0.3 * n * As * d)) / 0.3
     EI = 30e9 * (0.3 * x**3 / 3 + n * As * (d - x) ** 2)
     κ = np.linspace(0, 3e-3, 4)
-    for number in (50, 200):
-        # Concrete in tension, which the bar displaces, bears nothing
-        section = concrete(number, (-0.2, As))
-        result = st.moment_curvature(section, κ)
-        # One layer contains the neutral axis
-        assert result.moment == pytest.approx(EI * κ, rel=1 / number**2 / (x / 0.5) ** 2)
-        neutral = (section.fibres.axis + result.strain / np.maximum(κ, 1e-9))[1:]
-        assert 0.25 - neutral == pytest.approx(np.full(3, x), abs=0.5 / number)
+    section = concrete(50, (-0.2, As))
+    result = st.moment_curvature(section, κ)
+    # One layer contains the neutral axis; the bar displaces concrete that bears nothing
+    assert result.moment == pytest.approx(EI * κ, rel=1 / 50**2 / (x / 0.5) ** 2)
+    neutral = (section.fibres.axis + result.strain / np.maximum(κ, 1e-9))[1:]
+    assert 0.25 - neutral == pytest.approx(np.full(3, x), abs=0.5 / 50)
     assert not result.dissipated.any()
 
 
@@ -163,9 +147,9 @@ def test_pictures_show_the_results():
     diagram = st.interaction_diagram(rectangle(10), (0.01, 0.01), points=16)
     for shown, x, y in ((result, "curvature", "moment"), (diagram, "M", "N")):
         (axes,) = ub.plot(shown).axes
-        lines = [line.get_xydata() for line in axes.lines if len(line.get_xydata()) > 2]
-        (data,) = lines
-        assert np.array_equal(data, np.column_stack([getattr(shown, x), getattr(shown, y)]))
+        (line,) = (line for line in axes.lines if len(line.get_xdata()) > 2)
+        drawn = np.column_stack([getattr(shown, x), getattr(shown, y)])
+        assert np.array_equal(line.get_xydata(), drawn)
     assert axes.yaxis_inverted()  # compression is at the top
 
 
@@ -180,7 +164,9 @@ def test_interaction_of_a_rectangle():
         assert np.abs(np.abs(diagram.M) / M_PLASTIC - exact).max() < 1.5 / n**2
         assert (diagram.M[0], diagram.N[0]) == pytest.approx((0.0, N_PLASTIC), abs=1e-9 * N_PLASTIC)
         assert (diagram.M[-1], diagram.N[-1]) == (diagram.M[0], diagram.N[0])
-    for N in (-0.7, 0.0, 0.4):
+    for end in (diagram.N.min(), diagram.N.max()):
+        assert np.allclose(diagram.moments(end), 0.0, atol=1e-6 * diagram.M.max())
+    for N in (-0.7, 0.4):
         low, high = diagram.moments(N * N_PLASTIC)
         assert high / M_PLASTIC == pytest.approx(1 - N**2, abs=1.5 / 40**2)
         assert low == pytest.approx(-high, rel=1e-9)
@@ -253,20 +239,11 @@ def test_interaction_of_concrete_that_softens(limit):
 def test_limits_that_are_missing():
     section = concrete(10, (0.2, 1e-3))
     steel, plain = section.fibres.fibres
-    with raises("no fibre limits the strain in tension"):
-        st.interaction_diagram(section, {plain: (0.0035, math.inf)})
-    with raises("no fibre limits the strain in compression"):
-        st.interaction_diagram(section, (math.inf, 0.01))
-    with raises("limits of Fibres(", "which is not in the section"):
-        st.interaction_diagram(rectangle(), {steel: (0.01, 0.01)})
-    with raises("the section has no fibres"):
-        st.interaction_diagram(ub.Section(EA=1.0, GA=1.0, EI=1.0), (0.01, 0.01))
-
-
-def test_moments_at_both_ends_of_an_interaction_diagram():
-    section = ub.Section.rectangle(
-        b=0.1, h=0.2, E=210e9, nu=0.3, fibres=ub.Fibres(ub.ElastoPlastic(250e6), number=8)
-    )
-    diagram = st.interaction_diagram(section, (0.01, 0.01))
-    for N in (diagram.N.min(), diagram.N.max()):
-        assert np.allclose(diagram.moments(N), 0.0, atol=1e-6 * diagram.M.max())
+    for limited, limits, words in (
+        (section, {plain: (0.0035, math.inf)}, "no fibre limits the strain in tension"),
+        (section, (math.inf, 0.01), "no fibre limits the strain in compression"),
+        (rectangle(), {steel: (0.01, 0.01)}, "which is not in the section"),
+        (ub.Section(EA=1.0, GA=1.0, EI=1.0), (0.01, 0.01), "the section has no fibres"),
+    ):
+        with raises(words):
+            st.interaction_diagram(limited, limits)
