@@ -32,6 +32,23 @@ def rigid_chain(beams, joints=(), **parts):
     return ub.Scene(beams, joints=[*corners, *joints], **parts)
 
 
+def on_rail(*laws, mass=1.0, speed=0.0, kind=ub.Slide, force=None, **parts):
+    """A body at (1, 0) on a rail along x, with connectors of these laws to the origin.
+
+    Args:
+        speed: Velocity at the beginning.
+        kind: `ub.Slide` or `ub.Stretch`.
+        force: Function of time: force along the rail.
+    """
+    body = ub.Body((1, 0), mass=mass, inertia=1.0)
+    rail = ub.ground(0, 0), body.middle
+    push = [ub.PointLoad(body.middle, force=(1, 0), amplitude=force)] if force else []
+    moves = [ub.Velocity([body], linear=(speed, 0.0))] if speed else []
+    connectors = [kind(*rail, law) for law in laws]
+    given = {"joints": [ub.Prismatic(*rail)], "loads": push, "initial": moves, **parts}
+    return ub.Scene(bodies=[body], connectors=connectors, **given)
+
+
 # -- statics -----------------------------------------------------------------------------------
 
 

@@ -6,6 +6,7 @@ python3 script_of_kills.py DIRECTORY STEPS EVERY: steps of the run, and between 
 
 import hashlib
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,7 @@ import ufl_beam as ub
 
 directory, steps, every = Path(sys.argv[1]), *map(int, sys.argv[2:])
 elastic = ub.Section(EA=1e6, GA=1e6, EI=1e2, rhoA=1.0, rhoI=1e-3)
-yielding = ub.Section(
-    **{"EA": 1e6, "GA": 1e6, "EI": 1e2, "rhoA": 1.0, "rhoI": 1e-3},
-    bending=ub.ElastoPlastic(yield_limit=25.0, isotropic=10.0),
-)
+yielding = replace(elastic, bending=ub.ElastoPlastic(yield_limit=25.0, isotropic=10.0))
 a = ub.Beam((0, 0), (1, 0), yielding, cells=4)
 b = ub.Beam((1, 0), (2, 0), elastic, cells=4)
 body = ub.Body((2, 0), mass=1.0, inertia=0.01)

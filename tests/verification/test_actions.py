@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -45,45 +45,30 @@ def test_ring_under_pressure():
     assert short - 1 == pytest.approx(-p / RING.EA, rel=2 * half**2)
 
 
-def test_buckling_of_a_ring_under_hydrostatic_pressure():
-    """[closed] p = 3 EI/R³ (Lévy 1884; Timoshenko and Gere, Theory of Elastic Stability, 7.3).
-
-    The square of the frequency with two waves is linear in p.  The two modes of two waves have the
-    same factor.  The error of a polygon is quadratic in the length of its cells.
-    """
-    found = []
-    for cells in (24, 48):
-        free, pressed = (
-            ub.modes(scene, 2, at=run).omega ** 2
-            for scene, run in (ring(p, cells) for p in (0.0, 150.0))
-        )
-        found.append(150.0 / (1 - pressed / free))
-    extrapolated = found[1] + (found[1] - found[0]) / 3
-    # errors of the fourth order: (π/24)⁴ n⁴ of two waves are 5e-3, in the finer ring 3e-4
-    assert extrapolated == pytest.approx(3 * RING.EI, rel=2e-3)
-
-
 L, EI, MU, P = 10.0, 1e6, 100.0, 1e3
 BRIDGE = ub.Section(EA=1e10, GA=1e10, EI=EI, rhoA=MU, rhoI=1e-6)
 """Shear and rotary inertia change results by EI/(GA L²) = 1e-6."""
 
 
-def crossing(speed, steps, *, mass=0.0, until=1.5, degree=3):
-    """A bridge of 10 m, which a force of 1 kN and a mass cross."""
-    beam = ub.Beam((0, 0), (L, 0), BRIDGE, cells=8)
-    load = ub.MovingLoad(beam, lambda t: speed * t, (0, -P), mass=mass)
+def crossing(
+    section, length, cells, speed, steps, degree, *, force, mass=0.0, scheme=None, until=1.0
+):
+    """Deflection of the middle of a bridge that a force and a mass cross; m."""
+    beam = ub.Beam((0, 0), (length, 0), section, cells=cells)
+    load = ub.MovingLoad(beam, lambda t: speed * t, (0, -force), mass=mass)
     supports = [ub.Pinned(beam.start), ub.Roller(beam.end)]
-    scene, end = ub.Scene([beam], supports=supports, loads=[load]), until * L / speed
-    mesh = ub.Mesh(degree=degree)
-    return beam, ub.simulate(scene, ub.EnergyMomentum(), t=(0, end), dt=end / steps, mesh=mesh)
+    scene, end = ub.Scene([beam], supports=supports, loads=[load]), until * length / speed
+    scheme, mesh = scheme or ub.EnergyMomentum(), ub.Mesh(degree=degree)
+    run = ub.simulate(scene, scheme, t=(0, end), dt=end / steps, mesh=mesh)
+    assert not isinstance(scheme, ub.EnergyMomentum) or run.energy.worst < 1e-9
+    return run.times, run.displacement(beam.at(0.5))[:, 1]
 
 
 def test_moving_load():
     """[closed] Frýba (1999), chapter 1: the series of modes, and free vibration after the crossing.
 
-    At half the critical speed.  In the finer run the phase errors (ω dt)²/12 ω t of the first and
-    third mode are 4e-4 and 0.3 at the end; free vibrations of these modes have amplitudes of 1 and
-    1.5e-3 of the largest deflection.  Extrapolation removes the error of the first mode.
+    In the finer run the phase errors (ω dt)²/12 ω t of the first and third mode are 4e-4 and 0.3 at
+    the end; free vibrations of these modes have amplitudes of 1 and 1.5e-3 of the deflection.
     """
     c = 0.5 * math.pi / L * math.sqrt(EI / MU)
     j = np.arange(1, 40)
@@ -97,49 +82,14 @@ def test_moving_load():
         free = t[:, None] - on
         return q * np.cos(ω * free) + v / ω * np.sin(ω * free)
 
-    (beam, coarse), (other, fine) = (crossing(c, steps) for steps in (200, 400))
-    expected = -(modal(coarse.times) * np.sin(j * math.pi / 2)).sum(axis=1)
-    w1 = coarse.displacement(beam.at(0.5))[:, 1]
-    w2 = fine.displacement(other.at(0.5))[::2, 1]
-    size = np.abs(expected).max()
+    (t, w1), (_, w2) = (
+        crossing(BRIDGE, L, 8, c, steps, 3, force=P, until=1.5) for steps in (200, 400)
+    )
+    expected = -(modal(t) * np.sin(j * math.pi / 2)).sum(axis=1)
+    size, w2 = np.abs(expected).max(), w2[::2]
     assert size / (P * L**3 / (48 * EI)) == pytest.approx(1.7, abs=0.01)  # Frýba's figure 1.3
     assert np.abs(w2 - expected).max() < 1e-3 * size
     assert np.abs(w2 + (w2 - w1) / 3 - expected).max() < 5e-4 * size
-    assert fine.energy.worst < 1e-9
-
-
-def test_moving_mass():
-    """[calc] Nine sine modes with the mass and its convective acceleration, integrated by SciPy.
-
-    w_tt + 2 c w_xt + c² w_xx at the place c t, with a mass of 30 % of the bridge.  The error is
-    1.5e-3, 5.6e-4 and 2.7e-4 with 200, 400 and 800 steps; it tends to that of nine modes.
-    """
-    c, m, number = 0.3 * math.pi / L * math.sqrt(EI / MU), 0.3 * MU * L, 9
-    k = np.arange(1, number + 1) * math.pi / L
-
-    def rates(t, y, convective):
-        f = np.sin(k * c * t)
-        of_velocity, of_place = 2 * c * k * np.cos(k * c * t), -((c * k) ** 2) * f
-        q, v = np.split(y, 2)
-        force = -P - convective * m * (of_velocity @ v + of_place @ q)
-        rest = 2 / (MU * L) * f * force - k**4 * EI / MU * q
-        # Inverse of 1 + a f fᵀ
-        a = 2 * m / (MU * L)
-        return np.concatenate([v, rest - a * f * (f @ rest) / (1 + a * (f @ f))])
-
-    beam, run = crossing(c, 400, mass=m, until=1.0)
-    expected, without = (
-        np.sin(k * L / 2)
-        @ solve_ivp(
-            rates, (0, L / c), np.zeros(2 * number), t_eval=run.times, args=(convective,),
-            rtol=1e-6, atol=1e-9, method="DOP853",
-        ).y[:number]
-        for convective in (1.0, 0.0)
-    )  # fmt: skip
-    size = np.abs(expected).max()
-    assert np.abs(run.displacement(beam.at(0.5))[:, 1] - expected).max() < 1e-3 * size
-    assert np.abs(without - expected).max() > 0.05 * size
-    assert run.energy.worst < 1e-9
 
 
 DECK = ub.Section(EA=2e10, GA=8e9, EI=6e9, rhoA=4e3, rhoI=1e3)
@@ -147,10 +97,9 @@ SPAN, MASS, SPEED = 20.0, 2e4, 80.0
 
 
 def timoshenko_modes(number, steps):
-    """Deflections of the middle of a bridge that a mass crosses, by modes of a Timoshenko beam.
+    """Deflections of the middle of a bridge that a mass crosses, w = Σ a sin(kx), ψ = Σ b cos(kx).
 
-    w = Σ a sin(kx), ψ = Σ b cos(kx) are exact for the supports.  The mass has the second derivative
-    of w(ct, t): w_tt + 2 c w_xt + c² w_xx.  Steps are by the midpoint rule.
+    The mass has the acceleration w_tt + 2 c w_xt + c² w_xx.  Steps are by the midpoint rule.
     """
     k, i, dt = np.arange(1, number + 1) * math.pi / SPAN, np.arange(number), SPAN / SPEED / steps
     M, K = np.zeros((2, 2 * number, 2 * number))
@@ -176,46 +125,38 @@ def timoshenko_modes(number, steps):
 
 
 @pytest.mark.parametrize(
-    ("scheme", "degree"),
+    ("scheme", "degree", "meshes"),
     [
-        (ub.EnergyMomentum(), 1), (ub.EnergyMomentum(), 2), (ub.EnergyMomentum(), 3),
-        (ub.EnergyMomentumDecaying(), 2), (ub.GeneralizedAlpha(0.8), 1), (ub.Newmark(), 2),
-        (ub.EnergyMomentum(0.05, 0.0), 1),
+        (ub.EnergyMomentum(), 2, [(40, 400), (160, 400), (160, 160)]),
+        (ub.EnergyMomentum(), 1, [(40, 400)]),
+        (ub.EnergyMomentum(), 3, [(40, 400)]),
+        (ub.EnergyMomentumDecaying(), 2, [(40, 400)]),
+        (ub.GeneralizedAlpha(0.8), 1, [(40, 400)]),
+        (ub.Newmark(), 2, [(40, 400)]),
+        (ub.EnergyMomentum(0.05, 0.0), 1, [(40, 400)]),
     ],
     ids=str,
-)  # fmt: skip
-def test_moving_mass_on_a_beam_with_shear_strains(scheme, degree):
-    """[calc] Twenty modes of the Timoshenko beam with the mass; -9.740 mm at most.
+)
+def test_moving_mass(scheme, degree, meshes):
+    """[calc] Twenty modes of the Timoshenko beam with the mass; 10 and 40 modes differ by 1e-4.
 
-    10 and 40 modes differ by 1e-4.  The steps are resolved to (ω dt)²/12 ω t = 1e-3 in the first
-    mode, cells of degree 1 to F/(GA h) l²/8 of the deflection, 3e-3 of it with 40 cells.
-    Refinement by 4, with steps that are as short as a cell or a tenth of it, changes no more.
+    Steps err by (ω dt)²/12 ω t = 1e-3 in the first mode, 40 cells of degree 1 by F/(GA h) l²/8,
+    3e-3 of the deflection.  Shorter cells, of a step or ten steps, change no more.
     """
     expected = timoshenko_modes(20, 1600)
     assert expected.min() == pytest.approx(-9.740e-3, rel=1e-4)
-    for cells, steps in ((40, 400), (160, 400), (160, 160)):
-        beam = ub.Beam((0, 0), (SPAN, 0), DECK, cells=cells // degree)
-        load = ub.MovingLoad(beam, lambda t: SPEED * t, (0, -9.81 * MASS), mass=MASS)
-        supports = [ub.Pinned(beam.start), ub.Roller(beam.end)]
-        scene = ub.Scene([beam], supports=supports, loads=[load])
-        end, mesh = SPAN / SPEED, ub.Mesh(degree=degree)
-        run = ub.simulate(scene, scheme, t=(0, end), dt=end / steps, mesh=mesh)
-        w = run.displacement(beam.at(0.5))[:, 1]
-        error = np.abs(w - expected[:: 1600 // steps]).max() / np.abs(expected).max()
-        assert error < 5e-3
-        if isinstance(scheme, ub.EnergyMomentum):
-            assert run.energy.worst < 1e-9
+    for cells, steps in meshes:
+        mesh = DECK, SPAN, cells // degree, SPEED, steps, degree
+        _, w = crossing(*mesh, force=9.81 * MASS, mass=MASS, scheme=scheme)
+        assert np.abs(w - expected[:: 1600 // steps]).max() < 5e-3 * np.abs(expected).max()
 
 
 def test_a_mass_crosses_fine_cells_of_a_soft_beam():
-    """[estimate] The shear wave speed is 20 m/s, m s'²/(GA h) is 0.02 and 1.6.
-
-    Sways differ by a local shear deflection of F h/(4 GA), 1e-5 m with the coarser cells.
-    """
+    """[estimate] m s'²/(GA h) is 0.02 and 1.6; sways differ by the shear deflection F h/(4 GA)."""
     section = ub.Section(EA=1e3, GA=4e2, EI=1.0, rhoA=1.0, rhoI=1e-3, depth=0.1)
     beam = ub.Beam((0, 0), (1, 0), section, cells=4)
     load = ub.MovingLoad(beam, lambda t: 1.1 * t, force=(0, -1.0), mass=0.5)
-    scene, found = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load]), []
+    scene, found = clamped(beam, loads=[load]), []
     for refine in (16, 128):
         mesh = ub.Mesh(refine=refine, degree=2)
         run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=6.25e-4, mesh=mesh)

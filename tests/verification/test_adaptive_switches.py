@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Adaptive steps of scenes that slide, touch, yield or break: the estimate is the error.
 
-The error of a run is the largest error of a position, in sizes of the scene, or of a rotation, at
-all times of the run.  It is measured against equal steps that are far shorter.  The estimate is
-between a third of it and three times of it.
+The error is the largest one of a position, in sizes of the scene, or of a rotation, against equal
+steps that are far shorter.  The estimate is between a third of it and three times of it.
 """
 
 import math
@@ -12,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from scenes import flying_beam, swing
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -39,8 +38,13 @@ class Breakaway(ub.extend.ConnectorLaw):
 # -- scenes ------------------------------------------------------------------------------------
 
 
-def block(law, *, spring=0.0, mass=2.0, belt=0.0, loads=lambda body: ()):
-    """A mass on a rail, held by a law to the ground or to a belt that moves at a speed."""
+def block(law, *, spring=0.0, mass=2.0, belt=0.0, pull=None, motor=None):
+    """A mass on a rail, held by a law to the ground or to a belt that moves at a speed.
+
+    Args:
+        pull: Function of time: force on the mass.
+        motor: Controller of another force on it.
+    """
     body, other = ub.Body((0, 0), mass=mass, inertia=1.0), ub.Body((0, 0), mass=1.0, inertia=1.0)
     ground, axis = ub.ground(0, 0), (1, 0)
     bodies, supports = [body], [ub.PrescribedDisplacement(body.middle, v=0.0, psi=0.0)]
@@ -51,57 +55,59 @@ def block(law, *, spring=0.0, mass=2.0, belt=0.0, loads=lambda body: ()):
     connectors = [ub.Slide(other.middle if belt else ground, body.middle, law, axis=axis)]
     if spring:
         connectors.append(ub.Slide(ground, body.middle, ub.Spring(spring), axis=axis))
+    if motor:
+        connectors.append(ub.Slide(ub.ground(-1, 0), body.middle, motor))
     initial = [ub.Velocity(bodies, linear=(belt, 0.0))] if belt else []
+    loads = [ub.PointLoad(body.middle, force=(1.0, 0.0), amplitude=pull)] if pull else []
     return ub.Scene(
-        bodies=bodies, supports=supports, connectors=connectors, loads=loads(body), initial=initial
+        bodies=bodies, supports=supports, connectors=connectors, loads=loads, initial=initial
     )
 
 
-def pulled(law):
-    """A block of 2 kg that is pulled with t N."""
-    pull = lambda body: [ub.PointLoad(body.middle, force=(1.0, 0.0), amplitude=lambda t: t)]  # noqa: E731
-    return block(law, loads=pull)
+def controlled():
+    """A block pushed by a controller without memory, whose force lags by a step."""
+
+    def push(now):
+        return 3.0 * math.sin(now.t) - now.displacement(now.scene.bodies[0].middle)[0]
+
+    return block(ub.Coulomb(1.0), motor=ub.Controller(push))
 
 
 def ball(stiffness, *, depth=0.4, mass=1.0, damping=0.0, velocity=(0.3, 0.0)):
     """A ball that falls on a stop, again and again."""
     body = ub.Body((0, 0), mass=mass, inertia=1.0)
     law = ub.Stop(stiffness, low=-depth, damping=damping)
-    return ub.Scene(
-        bodies=[body],
-        connectors=[ub.Slide(ub.ground(0, 0), body.middle, law, axis=(0, 1))],
-        loads=[ub.Gravity()],
-        initial=[ub.Velocity((body,), linear=velocity)],
-    )
+    stop = ub.Slide(ub.ground(0, 0), body.middle, law, axis=(0, 1))
+    moves = ub.Velocity((body,), linear=velocity)
+    return ub.Scene(bodies=[body], connectors=[stop], loads=[ub.Gravity()], initial=[moves])
+
+
+def rubbing(*rail, axis, force, coefficient, spring):
+    """A slot with a spring and with friction, whose normal force lags by a step."""
+    guide = ub.Prismatic(*rail, axis=axis)
+    laws = ub.Spring(spring), ub.Coulomb(force, coefficient=coefficient, joint=guide)
+    return guide, [ub.Slide(*rail, law, axis=axis) for law in laws]
 
 
 def slot(angle, coefficient, *, force=0.5, spring=80.0, mass=1.0, pull=(10.0, 6.0), speed=4.0):
-    """A bead in a slot that a force presses to and fro: the normal force lags by a step."""
+    """A bead in a slot that a force presses to and fro."""
     bead, axis = ub.Body((0, 0), mass=mass, inertia=0.1), (math.cos(angle), math.sin(angle))
-    rail = ub.ground(0, 0), bead.middle
-    guide = ub.Prismatic(*rail, axis=axis)
-    rub = ub.Coulomb(force, coefficient=coefficient, joint=guide)
+    numbers = {"axis": axis, "force": force, "coefficient": coefficient, "spring": spring}
+    guide, connectors = rubbing(ub.ground(0, 0), bead.middle, **numbers)
     wave = ub.PointLoad(bead.middle, force=pull, amplitude=lambda t: math.sin(speed * t))
-    return ub.Scene(
-        bodies=[bead],
-        joints=[guide],
-        connectors=[ub.Slide(*rail, law, axis=axis) for law in (ub.Spring(spring), rub)],
-        loads=[ub.Gravity(), wave],
-    )
+    loads = [ub.Gravity(), wave]
+    return ub.Scene(bodies=[bead], joints=[guide], connectors=connectors, loads=loads)
 
 
 def disc(at, coefficient, *, force=0.2, spring=80.0, mass=1.0, inertia=0.5):
     """A bead in the slot of a disc that swings like a pendulum."""
     wheel = ub.Body((0, 0), mass=1.0, inertia=inertia)
-    bead, axis = ub.Body((at, 0), mass=mass, inertia=0.01), (1, 0)
-    rail = wheel.at(at, 0), bead.middle
-    guide = ub.Prismatic(*rail, axis=axis)
-    rub = ub.Coulomb(force, coefficient=coefficient, joint=guide)
+    bead = ub.Body((at, 0), mass=mass, inertia=0.01)
+    numbers = {"axis": (1, 0), "force": force, "coefficient": coefficient, "spring": spring}
+    guide, connectors = rubbing(wheel.at(at, 0), bead.middle, **numbers)
+    joints = [ub.Revolute(ub.ground(0, 0), wheel.middle), guide]
     return ub.Scene(
-        bodies=[wheel, bead],
-        joints=[ub.Revolute(ub.ground(0, 0), wheel.middle), guide],
-        connectors=[ub.Slide(*rail, law, axis=axis) for law in (ub.Spring(spring), rub)],
-        loads=[ub.Gravity()],
+        bodies=[wheel, bead], joints=joints, connectors=connectors, loads=[ub.Gravity()]
     )
 
 
@@ -111,13 +117,7 @@ def arm(law, *, length=1.0, EI=100.0, rhoA=1.0, mass=1.0, cells=2, push=20.0, sp
     beam = ub.Beam((0, 0), (length, 0), section, cells=cells, hinges={0: law})
     tip = ub.Body((length, 0), mass=mass, inertia=0.01)
     wave = ub.PointLoad(tip.middle, force=(0, push), amplitude=lambda t: math.sin(speed * t))
-    return ub.Scene(
-        [beam],
-        bodies=[tip],
-        joints=[ub.Rigid(beam.end, tip.middle)],
-        supports=[ub.Clamped(beam.start)],
-        loads=[wave],
-    )
+    return clamped(beam, bodies=[tip], joints=[ub.Rigid(beam.end, tip.middle)], loads=[wave])
 
 
 def random_bounce(r):
@@ -198,7 +198,7 @@ def error(run, exact):
     return largest
 
 
-def compare(scene, scheme, end, *tolerances, steps=20_000):
+def compare(scene, scheme, end, *tolerances, steps=10_000):
     """Errors of runs with adaptive steps, and ratios of the estimates to the errors."""
     exact = ub.simulate(scene, scheme, t=(0, end), dt=end / steps)
     runs = [ub.simulate(scene, scheme, t=(0, end), dt=ub.Adaptive(x)) for x in tolerances]
@@ -217,10 +217,10 @@ ONSETS = {
 
 @pytest.mark.parametrize("law", ONSETS)
 def test_the_onset_of_sliding_and_yielding(law):
-    """[closed] It moves from 10 s on, by (t - 10)³/12; steps before had no reason to be short."""
+    """[closed] A block of 2 kg under t N moves from 10 s on, by (t - 10)³/12."""
     before = math.inf
     for tolerance in (1e-3, 1e-5, 1e-7):
-        scene = pulled(ONSETS[law]())
+        scene = block(ONSETS[law](), pull=lambda t: t)
         run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 14), dt=ub.Adaptive(tolerance))
         x = run.displacement(scene.bodies[0].middle)[:, 0]
         # A spring has stretched by 1e-5 m when it yields
@@ -234,15 +234,14 @@ def test_the_onset_of_sliding_and_yielding(law):
 SCENES = {
     "slot": lambda: (slot(0.3, 0.3), ub.EnergyMomentum(), 3.0),
     "disc": lambda: (disc(0.4, 0.3), ub.EnergyMomentum(), 2.0),
-    "bounces": lambda: (ball(1e4), ub.EnergyMomentum(), 2.0),
     "damped bounces": lambda: (ball(1e4, damping=0.2), ub.EnergyMomentum(), 2.0),
     "generalized-alpha": lambda: (ball(1e4), ub.GeneralizedAlpha(0.8), 2.0),
-    "belt": lambda: (block(ub.Coulomb(5.0), spring=100.0, belt=0.2), ub.EnergyMomentum(), 4.0),
     "stick and slip": lambda: (
         block(Breakaway(5.0, 3.0, 0.1), spring=100.0, belt=0.2), ub.EnergyMomentum(), 4.0
     ),
     "breaking arm": lambda: (arm(ub.Softening(6.0, 2.0)), ub.EnergyMomentum(0.05, 0.05), 0.8),
     "yielding arm": lambda: (arm(ub.ElastoPlastic(6.0, 3.0)), ub.EnergyMomentum(), 0.8),
+    "controller": lambda: (controlled(), ub.EnergyMomentum(), 4.0),
 }  # fmt: skip
 
 
@@ -256,41 +255,16 @@ def test_the_estimate_is_the_error(name):
     assert fine < coarse / 1.3
 
 
-@pytest.mark.parametrize("seed", range(70_000, 70_004))
-def test_random_scenes(seed):
-    _, ratio = compare(*draw(seed))
-    assert 1 / 3 < ratio < 3
-
-
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:the energy ledger is open")  # by round-off of so short steps
-@pytest.mark.parametrize("seed", range(70_004, 70_060))
-def test_more_random_scenes(seed):
+@pytest.mark.parametrize("seed", range(70_000, 70_060))
+def test_random_scenes(seed):
     """With a reference that is fine enough for stiff contacts."""
     _, ratio = compare(*draw(seed), steps=50_000)
     assert 1 / 3 < ratio < 3
 
 
 # -- costs, and runs without an estimate -------------------------------------------------------
-
-
-def test_scenes_without_switches_take_the_steps_that_they_took():
-    """[calc] Steps, iterations and sums of estimates by the version that did not know switches.
-
-    Round-off, as on two processes, may add or remove an iteration in a hundred.
-    """
-    runs = [
-        (flying_beam(cells=4), ub.EnergyMomentum(), 2.0, 1e-4),
-        (flying_beam(cells=4), ub.EnergyMomentum(order=4), 2.0, 1e-4),
-        (flying_beam(cells=4), ub.GeneralizedAlpha(0.8), 2.0, 1e-3),
-        (swing(cells=4, rigidity=1e4), ub.EnergyMomentum(0.05), 0.3, 1e-5),
-    ]
-    found = []
-    for scene, scheme, end, tolerance in runs:
-        run = ub.simulate(scene, scheme, t=(0, end), dt=ub.Adaptive(tolerance))
-        found.append((run.substeps, run.iterations, run.time_error))
-    before = [(69, 165, 0.004555), (24, 240, 0.001118), (29, 90, 0.016432), (54, 327, 0.000308)]
-    np.testing.assert_allclose(found, before, rtol=0.015)
 
 
 class Counter:
@@ -313,39 +287,20 @@ class Counter:
 @pytest.mark.serial  # the first process warns
 @pytest.mark.parametrize("kind", ["load", "sampled controller"])
 def test_functions_that_remember_leave_the_error_unknown(kind):
-    """They are called once for each step, and the run says that nobody judges it."""
-    amplitude = Counter() if kind == "load" else (lambda t: t)
-    pull = lambda body: [ub.PointLoad(body.middle, force=(2.0, 0.0), amplitude=amplitude)]  # noqa: E731
-    scene = block(ub.Coulomb(10.0), loads=pull)
-    if kind != "load":
-        motor = ub.Slide(
-            ub.ground(-1, 0), scene.bodies[0].middle, ub.Controller(lambda now: 1.0, sample=0.5)
-        )
-        scene = ub.Scene(
-            bodies=scene.bodies, supports=scene.supports, loads=scene.loads,
-            connectors=[*scene.connectors, motor],
-        )  # fmt: skip
+    """They are called once for each step, and the run warns that its error is unknown."""
+    if kind == "load":
+        scene = block(ub.Coulomb(5.0), pull=Counter())
+    else:
+        motor = ub.Controller(lambda now: 1.0, sample=0.5)
+        scene = block(ub.Coulomb(5.0), pull=lambda t: t, motor=motor)
     with pytest.warns(ub.ModelWarning, match="error is not known"):
         run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 7), dt=ub.Adaptive(1e-4))
     assert math.isnan(run.time_error)
     assert "error is not known" in run.warnings
 
 
-def test_a_controller_without_memory_is_judged():
-    """Its force lags by a step, so that the error is of first order."""
-    scene = block(ub.Coulomb(1.0), loads=lambda body: [])
-    body = scene.bodies[0]
-    push = ub.Controller(lambda now: 3.0 * math.sin(now.t) - now.displacement(body.middle)[0])
-    scene = ub.Scene(
-        bodies=scene.bodies, supports=scene.supports,
-        connectors=[*scene.connectors, ub.Slide(ub.ground(-1, 0), body.middle, push)],
-    )  # fmt: skip
-    _, ratio = compare(scene, ub.EnergyMomentum(), 4.0, 1e-4)
-    assert 1 / 3 < ratio < 3
-
-
 def test_where_no_step_is_short_enough():
-    """The run ends with all that it has, and can go on with other steps."""
+    """The solution is kept, and the run can go on with other steps."""
     steps = ub.Adaptive(1e-9, shortest=2e-3)
     with pytest.raises(ub.ConvergenceError, match="above the tolerance") as failure:
         ub.simulate(ball(1e5), ub.EnergyMomentum(), t=(0, 1), dt=steps)

@@ -6,6 +6,7 @@ The data are computed with known parameters, and have errors of 2 % of their lar
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 import ufl_beam.structures as st
@@ -28,13 +29,9 @@ def column(limit, energy, stiffness, pushed):
     else:  # pulled by 8 kN, which stays below the limit, and released after 0.2 s
         pull = ub.Table([0.0, 0.2, 0.2001], [0, 1, 0])
         test = {"loads": [ub.PointLoad(beam.end, force=(8e3, 0), amplitude=pull)]}
-    return ub.Scene(
-        [beam],
-        joints=[ub.Revolute(foot, beam.start)],
-        connectors=[ub.Turn(foot, beam.start, spring)],
-        masses=[ub.PointMass(beam.end, 400.0)],
-        **test,
-    )
+    pin, turn = ub.Revolute(foot, beam.start), ub.Turn(foot, beam.start, spring)
+    mass = ub.PointMass(beam.end, 400.0)
+    return ub.Scene([beam], joints=[pin], connectors=[turn], masses=[mass], **test)
 
 
 def force(run):
@@ -126,7 +123,7 @@ def test_random_starts_with_a_hinge_in_a_beam_end_at_the_same_minimum():
         beam = ub.Beam((0, 0), (0, 3), section, cells=12, name="column", hinges=hinge)
         load = ub.PointLoad(beam.end, force=(32e3, 0), amplitude=pulse)
         mass = ub.PointMass(beam.end, 400.0)
-        return ub.Scene([beam], supports=[ub.Clamped(beam.start)], masses=[mass], loads=[load])
+        return clamped(beam, masses=[mass], loads=[load])
 
     run = {"scheme": ub.EnergyMomentum(alpha=0.02), "t": (0, 0.6), "dt": 2e-3}
     true = {"limit": 60e3, "energy": 6e3, "EI": 9e6}

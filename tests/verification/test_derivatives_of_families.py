@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from run_differences import TIGHT, errors, relative_error
+from run_differences import TIGHT, errors, history, relative_error
 from scenes import clamped
 
 import ufl_beam as ub
@@ -122,6 +122,30 @@ def swinging(length=2.0, height=0.2):
     return ub.Scene([beam], supports=[ub.Pinned(beam.start)], loads=[ub.Gravity()])
 
 
+def pulled(yields=50e3, isotropic=4e5, EI=9e6, M_u=55e3, G_f=40e3, height=3.0, sway=0.05):
+    """A column whose top is moved; it yields, and a hinge of zero length opens at its foot."""
+    section = replace(SECTION, EI=EI, bending=ub.ElastoPlastic(yields, isotropic))
+    beam = ub.Beam((0, 0), (0, height), section, cells=6, hinges={0.0: ub.Softening(M_u, G_f)})
+    move = ub.PrescribedDisplacement(beam.end, u=lambda t: sway * t)
+    return clamped(beam, move, loads=[ub.PointLoad(beam.end, force=(0, -1e5))])
+
+
+def residual_displacement(s):
+    """Mean of the displacement over the last half of the run, m; the column swings about it."""
+    return s.displacement(s.scene.beams[0].end)[150:, 0].mean()
+
+
+def decay_ratio(s):
+    """Damping ratio of the swings after the pulse."""
+    u = s.displacement(s.scene.beams[0].end)[75:, 0]  # after 0.3 s
+    return st.damping(s.times[75:], u - u.mean()).ratio
+
+
+def limit_load(s):
+    """Largest force that the support at the top bears, just after the hinge opens; N."""
+    return np.abs(s.reaction(s.scene.supports[1])[1:, 0]).max()
+
+
 STEPS = {"t": (0, 0.6), "dt": 0.002}
 FAMILIES = {
     "flying beam": (flying, ub.EnergyMomentum(), {"t": (0, 5), "dt": 0.05}),
@@ -143,7 +167,16 @@ FAMILIES = {
     "fibres of steel": (steel, DAMPED, STEPS),
     "swinging beam": (swinging, ub.EnergyMomentum(), {"t": (0, 1), "dt": 0.01}),
     "machine": (machine, ub.EnergyMomentum(0.05), {"t": (0, 1), "dt": 0.01}),
+    "statics": (pulled, ub.Static(), {"t": (0, 1), "dt": 0.02}),
+    "exact statics": (pulled, ub.EnergyMomentumStatic(), {"t": (0, 1), "dt": 0.02}),
+    "exact statics, θ = 0.7": (pulled, ub.EnergyMomentumStatic(0.7), {"t": (0, 1), "dt": 0.02}),
+    "residual displacement": (yielding, DAMPED, STEPS, residual_displacement),
+    # A ratio of logarithms of small differences of peaks, each of which is interpolated
+    "damping ratio": (yielding, DAMPED, {"t": (0, 1.2), "dt": 0.004}, decay_ratio, 1e-5),
+    # G_f changes the largest force little, just after the hinge opens
+    "limit load": (pulled, ub.Static(), {"t": (0, 1), "dt": 0.01}, limit_load, 1e-5),
 }  # fmt: skip
+"""Models, schemes and steps, and quantities and tolerances other than the motion to AGREE."""
 
 
 def defaults(model):
@@ -151,77 +184,17 @@ def defaults(model):
     return dict(zip(model.__code__.co_varnames, model.__defaults__, strict=False))
 
 
+def best_errors(model, scheme, options, of=history, tolerance=AGREE):
+    """Least errors by parameter, and their tolerance."""
+    changes = 1e-3, 1e-4, 3e-5, 1e-5, 1e-6
+    best = errors(model, defaults(model), scheme, of, changes, enough=tolerance, **options)
+    return best, tolerance
+
+
 @pytest.mark.parametrize("name", FAMILIES)
-def test_dynamics(name):
-    model, scheme, options = FAMILIES[name]
-    changes = 1e-3, 1e-4, 1e-5, 1e-6
-    best = errors(model, defaults(model), scheme, changes=changes, enough=AGREE, **options)
+def test_derivatives_by_all_parameters(name):
+    best, tolerance = best_errors(*FAMILIES[name])
     print(name, " ".join(f"{key} {error:.0e}" for key, error in best.items()))
-    assert max(best.values()) < AGREE, best
-
-
-# -- statics ---------------------------------------------------------------------------------------
-
-
-def pulled(yields=50e3, isotropic=4e5, EI=9e6, M_u=55e3, G_f=40e3, height=3.0, sway=0.05):
-    """A column whose top is moved; it yields, and a hinge of zero length opens at its foot."""
-    section = replace(SECTION, EI=EI, bending=ub.ElastoPlastic(yields, isotropic))
-    beam = ub.Beam((0, 0), (0, height), section, cells=6, hinges={0.0: ub.Softening(M_u, G_f)})
-    move = ub.PrescribedDisplacement(beam.end, u=lambda t: sway * t)
-    return clamped(beam, move, loads=[ub.PointLoad(beam.end, force=(0, -1e5))])
-
-
-@pytest.mark.parametrize(
-    "scheme", [ub.Static(), ub.EnergyMomentumStatic(), ub.EnergyMomentumStatic(0.7)], ids=str
-)
-def test_statics(scheme):
-    at = defaults(pulled)
-    changes = 1e-4, 1e-5, 1e-6
-    best = errors(pulled, at, scheme, t=(0, 1), dt=0.02, changes=changes, enough=AGREE)
-    assert max(best.values()) < AGREE, best
-
-
-# -- quantities ------------------------------------------------------------------------------------
-
-
-def residual_displacement(s):
-    """Mean of the displacement over the last half of the run, m; the column swings about it."""
-    return s.displacement(s.scene.beams[0].end)[150:, 0].mean()
-
-
-def decay_ratio(s):
-    """Damping ratio of the swings after the pulse."""
-    u = s.displacement(s.scene.beams[0].end)[75:, 0]  # after 0.3 s
-    return st.damping(s.times[75:], u - u.mean()).ratio
-
-
-def limit_load(s):
-    """Largest force that the support at the top bears, just after the hinge opens; N."""
-    return np.abs(s.reaction(s.scene.supports[1])[1:, 0]).max()
-
-
-@pytest.mark.parametrize(
-    ("quantity", "model", "scheme", "options", "tolerance"),
-    [
-        (residual_displacement, yielding, DAMPED, STEPS, AGREE),
-        # A ratio of logarithms of small differences of peaks, each of which is interpolated
-        (decay_ratio, yielding, DAMPED, {"t": (0, 1.2), "dt": 0.004}, 1e-5),
-        # G_f changes the largest force little, just after the hinge opens
-        (limit_load, pulled, ub.Static(), {"t": (0, 1), "dt": 0.01}, 1e-5),
-    ],
-    ids=["residual displacement", "damping ratio", "limit load"],
-)
-def test_quantities(quantity, model, scheme, options, tolerance):
-    best = errors(
-        model,
-        defaults(model),
-        scheme,
-        quantity,
-        changes=(1e-4, 3e-5, 1e-5, 1e-6),
-        enough=tolerance,
-        **options,
-    )
-    print(quantity.__name__, " ".join(f"{key} {error:.0e}" for key, error in best.items()))
     assert max(best.values()) < tolerance, best
 
 
@@ -229,12 +202,10 @@ def test_tolerances_of_steps():
     """Steps that are solved to rtol have derivatives of that error, times a small factor."""
     at = {"limit": 60e3, "EI": 9e6}
 
-    def history(rtol):
-        run = ub.differentiate(
-            yielding, at, DAMPED, newton=ub.Newton(rtol=rtol), progress=False, **STEPS
-        )
-        return run.of(lambda s: s.q)
+    def derivatives(rtol):
+        options = {"newton": ub.Newton(rtol=rtol), "progress": False, **STEPS}
+        return ub.differentiate(yielding, at, DAMPED, **options).of(history)
 
-    exact = history(TIGHT.rtol)
+    exact = derivatives(TIGHT.rtol)
     for rtol in (1e-6, 1e-8, 1e-10):
-        assert relative_error(history(rtol), exact) < max(100 * rtol, 1e-9)
+        assert relative_error(derivatives(rtol), exact) < max(100 * rtol, 1e-9)

@@ -5,9 +5,12 @@ Friction sticks exactly, without a stiffness, and what it takes is never negativ
 """
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from helpers import assert_balanced
+from scenes import on_rail
 
 import ufl_beam as ub
 
@@ -16,7 +19,6 @@ OMEGA = math.sqrt(STIFFNESS / MASS)  # rad/s
 PERIOD = 2 * math.pi / OMEGA  # s
 DEAD = LIMIT / STIFFNESS  # m: half the zone in which the mass may stay
 G = 9.81  # m/s²
-ROD = ub.Section(EA=1e6, GA=1e6, EI=1e2, rhoA=1.0, rhoI=1e-3)
 
 
 def run(scene, end, dt, **more):
@@ -26,25 +28,17 @@ def run(scene, end, dt, **more):
 # -- a mass on a spring ------------------------------------------------------------------------
 
 
-def struck(v0, *, friction=LIMIT):
+def struck(v0, friction=LIMIT):
     """A mass on a rail with a spring to the ground and friction on the rail, struck at rest."""
-    mass = ub.Body((1.0, 0.0), mass=MASS, inertia=1.0)
-    rail = ub.ground(0, 0), mass.middle
-    rub = ub.Slide(*rail, ub.Coulomb(friction))
-    scene = ub.Scene(
-        bodies=[mass],
-        joints=[ub.Prismatic(*rail)],
-        connectors=[ub.Slide(*rail, ub.Spring(STIFFNESS)), rub],
-        initial=[ub.Velocity((mass,), linear=(v0, 0.0))],
-    )
-    return scene, mass, rub
+    return on_rail(ub.Spring(STIFFNESS), ub.Coulomb(friction), mass=MASS, speed=v0)
 
 
 def oscillator(v0, steps, *, periods=4.25, friction=LIMIT):
     """Solution of the struck mass, its motion, and the history of the friction."""
-    scene, mass, rub = struck(v0, friction=friction)
+    scene = struck(v0, friction)
     solution = run(scene, periods * PERIOD, PERIOD / steps)
-    return solution, solution.displacement(mass.middle)[:, 0], solution.connector(rub)
+    x = solution.displacement(scene.bodies[0].middle)[:, 0]
+    return solution, x, solution.connector(scene.connectors[1])
 
 
 def first_peak(v0):
@@ -57,40 +51,41 @@ V0 = OMEGA * math.sqrt((0.63 + DEAD) ** 2 - DEAD**2)
 
 
 def test_amplitudes_fall_by_4R_k_each_period():
-    """Half the period apart they differ by 2 R/k, and the last one stays.
+    """Half the period apart they differ by 2 R/k; from the sixth peak on the mass stays.
 
     A peak between two samples is missed by up to (π/n)²/2 of the distance to the centre of its
     half swing, 1.2e-4 with n = 200 steps a period, and by as much the turn comes late; the
     losses add up over five half swings.
     """
     steps = 200
-    solution, x, _ = oscillator(V0, steps)
+    solution, x, rub = oscillator(V0, steps)
     assert first_peak(V0) == pytest.approx(0.63)
     quarter = steps // 4
     swings = [x[quarter + i * steps // 2 - 20 : quarter + i * steps // 2 + 21] for i in range(6)]
     peaks = np.array([np.abs(swing).max() for swing in swings])
-    expected = 0.63 - 2 * DEAD * np.arange(6)
-    np.testing.assert_allclose(peaks, expected, rtol=0, atol=12 * 1.2e-4 * 0.63)
-    assert solution.energy.worst < 1e-9
-
-
-def test_it_stays_where_it_stops():
-    """From the sixth peak on: not a digit of the position changes, and the spring is held."""
-    solution, x, rub = oscillator(V0, 200)
+    missed = 12 * 1.2e-4 * 0.63
+    np.testing.assert_allclose(peaks, 0.63 - 2 * DEAD * np.arange(6), rtol=0, atol=missed)
     at_rest = solution.times > 3.0 * PERIOD
     assert np.ptp(x[at_rest]) < 1e-14
-    assert x[-1] == pytest.approx(-0.03, abs=12 * 1.2e-4 * 0.63)
-    # Friction bears what the spring pulls with.  The velocity that is left when it sticks changes
-    # its sign from step to step, so that the mean of two steps is meant.
+    assert x[-1] == pytest.approx(-0.03, abs=missed)
+    # Friction bears the force of the spring.  The velocity that is left alternates between steps,
+    # so that the mean of two steps is compared.
     bears = (rub.force[at_rest][1:] + rub.force[at_rest][:-1]) / 2
     np.testing.assert_allclose(bears, -STIFFNESS * x[-1], rtol=1e-10)
     assert np.abs(rub.force).max() <= LIMIT * (1 + 1e-10)
+    # The work is the limit times the way, but for six steps in which the mass stops.
+    lost, ways = solution.energy["friction"], np.abs(np.diff(x))
+    assert np.diff(lost).min() >= 0.0
+    np.testing.assert_allclose(lost, rub.work, rtol=1e-13)
+    stops = 6 * LIMIT * ways.max() * math.pi / 200
+    assert lost[-1] == pytest.approx(LIMIT * ways.sum(), abs=stops)
+    assert solution.energy.worst < 1e-9
 
 
-@pytest.mark.parametrize("steps", [5, 7, 9, 13])
+@pytest.mark.parametrize("steps", [5, 9])
 def test_a_run_goes_on_in_the_same_way_from_each_of_its_states(steps):
     """Also where a long step could end at rest as well as at a reversed velocity."""
-    scene, *_ = struck(V0)
+    scene = struck(V0)
     dt, last = PERIOD / steps, 4 * steps
     whole = run(scene, last * dt, dt)
     for k in range(1, last):
@@ -99,33 +94,6 @@ def test_a_run_goes_on_in_the_same_way_from_each_of_its_states(steps):
         second = ub.simulate(scene, ub.EnergyMomentum(), t=t, dt=dt, start=first)
         # 2e-10 of the forces by Newton's rtol in each step, against a stiffness of 50 N/m
         assert np.abs(second.q - whole.q[k:]).max() < 1e-9 * V0 / OMEGA
-
-
-def test_work_of_friction():
-    """The limit times the way, exactly; it never falls; and it is in the ledger."""
-    solution, x, rub = oscillator(V0, 200)
-    lost = solution.energy["friction"]
-    assert np.diff(lost).min() >= 0.0
-    np.testing.assert_allclose(lost, rub.work, rtol=1e-13)
-    way = np.abs(np.diff(x)).sum()
-    # In the steps in which it stops friction bears less than the limit: at most six of them
-    longest = np.abs(np.diff(x)).max()
-    assert lost[-1] == pytest.approx(LIMIT * way, abs=6 * LIMIT * longest * math.pi / 200)
-    assert np.abs(rub.force).max() <= LIMIT * (1 + 1e-10)
-
-
-def test_the_first_peak_converges_with_second_order():
-    """The first peak, with four times the steps a sixteenth of the error.
-
-    Samples of its position differ from it by (way of the sample)² as well, so that the energy
-    at the peak is compared: R times the way to the rest is what friction took.
-    """
-    errors = []
-    for steps in (50, 200):
-        _, x, _ = oscillator(V0, steps, periods=0.4)
-        errors.append(abs(np.abs(x).max() - first_peak(V0)))
-    assert errors[0] < 5e-3 * first_peak(V0)
-    assert errors[1] < errors[0] / 8
 
 
 def test_limit_beyond_all_forces():
@@ -138,31 +106,23 @@ def test_limit_beyond_all_forces():
 # -- a block on an incline ---------------------------------------------------------------------
 
 
-def block(angle, coefficient, *, end=1.0, dt=0.01):
-    """A block on an incline, put down at rest.
-
-    The limit of friction comes from the force of the step before, so the first step has none.
-    """
+def block(angle, coefficient):
+    """A block on an incline, put down at rest; the first step has no friction."""
     along = math.cos(angle), math.sin(angle)
     mass = ub.Body(along, mass=MASS, inertia=0.3)
     rail = ub.ground(0, 0), mass.middle
     incline = ub.Prismatic(*rail)
     rub = ub.Slide(*rail, ub.Coulomb(coefficient=coefficient, joint=incline))
-    scene = ub.Scene(
-        bodies=[mass],
-        joints=[incline],
-        connectors=[rub],
-        loads=[ub.Gravity((0.0, -G))],
-    )
-    return run(scene, end, dt), incline, rub
+    weight = ub.Gravity((0.0, -G))
+    scene = ub.Scene(bodies=[mass], joints=[incline], connectors=[rub], loads=[weight])
+    return run(scene, 1.0, 0.01), incline, rub
 
 
-@pytest.mark.parametrize("coefficient", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize("coefficient", [0.1, 1.0])
 def test_friction_angle(coefficient):
     """3 % below the friction angle it sticks, 0.5 % above it slides with the difference.
 
-    What the first step without friction gave it is gone after 1/0.03 steps and more.  The
-    acceleration is constant then, so that differences of velocity are exact.
+    The acceleration is constant then, so that differences of velocity are exact.
     """
     angle = math.atan(coefficient)
     below, _, rub = block(0.97 * angle, coefficient)
@@ -173,22 +133,15 @@ def test_friction_angle(coefficient):
     expected = -G * (math.sin(1.005 * angle) - coefficient * math.cos(1.005 * angle))
     computed = (rate[-1] - rate[5]) / (above.times[-1] - above.times[5])
     assert computed == pytest.approx(expected, rel=1e-8)  # two digits of ten are the difference
-    assert np.diff(above.energy["friction"]).min() >= 0.0
-    assert above.energy.worst < 1e-9
+    assert_balanced(above.energy)
 
 
 def test_force_of_the_incline():
-    """It presses with m g cos; b is the block."""
-    angle = 0.3
+    """It presses with m g cos; friction bears m g sin, in the mean of two steps."""
+    angle, weight = 0.3, MASS * G
     solution, incline, rub = block(angle, 0.5)
-    history = solution.joint(incline)
-    weight = MASS * G
-    np.testing.assert_allclose(
-        history.force[-1],
-        weight * math.cos(angle) * np.array([-math.sin(angle), math.cos(angle)]),
-        rtol=1e-9,
-    )
-    # It would slide down, towards the foot; the mean of two steps, as above
+    pressure = weight * math.cos(angle) * np.array([-math.sin(angle), math.cos(angle)])
+    np.testing.assert_allclose(solution.joint(incline).force[-1], pressure, rtol=1e-9)
     bears = solution.connector(rub).force[-2:].mean()
     assert bears == pytest.approx(-weight * math.sin(angle), rel=1e-9)
 
@@ -197,11 +150,7 @@ def test_force_of_the_incline():
 
 
 def test_bearing():
-    """A wheel on a pin: dω/dt = -μ r m g/J, until it stops exactly.
-
-    The limit is that of the step before: the first step runs without friction, so that rates are
-    compared from there.
-    """
+    """A wheel on a pin: dω/dt = -μ r m g/J, from the second step on, until it stops exactly."""
     inertia, radius, coefficient, ω0, dt = 0.4, 0.02, 0.3, 5.0, 0.02
     wheel = ub.Body((0, 0), mass=MASS, inertia=inertia)
     bearing = ub.Revolute(ub.ground(0, 0), wheel.middle, multipliers=True)
@@ -227,35 +176,27 @@ def test_bearing():
     energy = solution.energy
     # ω falls to zero, but for what the step that sticks leaves to its ends
     assert energy["friction"][-1] == pytest.approx(inertia * ω0**2 / 2, rel=1e-3)
-    assert np.diff(energy["friction"]).min() >= 0.0
-    assert energy.worst < 1e-9
+    assert_balanced(energy)
 
 
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(0.1, 0.1)])
-def test_a_support_presses_as_a_measured_joint_does(scheme):
-    """The same pin, once a support and once a joint to the ground; also if the run goes on.
-
-    Both forces are those of the same equilibrium; Newton's tolerance is 1e-10 of the forces.
-    """
+def test_a_support_presses_as_a_measured_joint_does():
+    """The same pin, once a support and once a joint to the ground; also if the run goes on."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e2, rhoA=1.0, rhoI=1e-3)
+    rod = ub.Beam((0, 0), (1, 0), section, cells=2)
+    joint, support = ub.Revolute(ub.ground(0, 0), rod.start, multipliers=True), ub.Pinned(rod.start)
     motions, works = [], []
-    for how in ("support", "joint", "in two runs"):
-        rod = ub.Beam((0, 0), (1, 0), ROD, cells=2)
-        pin = ub.Revolute(ub.ground(0, 0), rod.start, multipliers=True)
-        held = {"joints": [pin]}
-        if how != "joint":
-            pin = ub.Pinned(rod.start)
-            held = {"supports": [pin]}
+    for pin, held, ends in (
+        (support, {"supports": [support]}, [0.0, 0.1]),
+        (joint, {"joints": [joint]}, [0.0, 0.1]),
+        (support, {"supports": [support]}, [0.0, 0.05, 0.1]),
+    ):
         rub = ub.Turn(ub.ground(0, 0), rod.start, ub.Coulomb(coefficient=0.1, joint=pin))
-        scene = ub.Scene([rod], connectors=[rub], loads=[ub.Gravity()], **held)
-        start, begin = None, 0.0
-        for end in (0.05, 0.1) if how == "in two runs" else (0.1,):
-            t = begin, end
-            start = ub.simulate(scene, scheme, t=t, dt=0.01, start=start)
-            begin = end
-        motions.append(start.displacement(rod.end)[-1])
-        works.append(start.energy.lost["friction"][-1])
-    np.testing.assert_allclose(motions[1], motions[0], rtol=1e-8)
-    np.testing.assert_allclose(motions[2], motions[0], rtol=1e-8)
+        scene, last = ub.Scene([rod], connectors=[rub], loads=[ub.Gravity()], **held), None
+        for t in pairwise(ends):
+            last = ub.simulate(scene, ub.EnergyMomentum(0.1, 0.1), t=t, dt=0.01, start=last)
+        motions.append(last.displacement(rod.end)[-1])
+        works.append(last.energy.lost["friction"][-1])
+    np.testing.assert_allclose(motions[1:], [motions[0]] * 2, rtol=1e-8)
     # μ F over a turn of 0.07 rad, with F between zero and the weight of 9.81 N
     assert 0.1 * 0.07 * 9.81 / 5 < works[0] < 0.1 * 0.07 * 9.81
     assert works[1] == pytest.approx(works[0], rel=1e-8)
@@ -265,11 +206,10 @@ def test_a_support_presses_as_a_measured_joint_does(scheme):
 
 
 def test_friction_at_all_pins_of_a_closed_loop():
-    """Four places stick where one would do; then virtual work says when all slide at once.
+    """Four places stick where one would do; virtual work says when all slide at once.
 
-    A push F on the coupler of a four-bar linkage, cranks of 1 m and 1.2 m upright: with a unit
-    angular velocity of the first crank the second turns with 1/1.2 and the coupler not at all,
-    so F · 1 m = (M_A + M_B) + (M_C + M_D) / 1.2.
+    A push F on the coupler of a four-bar linkage, cranks of 1 m and 1.2 m upright, which turn with
+    1 and 1/1.2, the coupler not at all: F · 1 m = (M_A + M_B) + (M_C + M_D) / 1.2.
     """
     A, B, C, D = (0, 0), (0, 1), (1.5, 1.2), (1.5, 0)
     crank, coupler, rocker = (
@@ -287,12 +227,8 @@ def test_friction_at_all_pins_of_a_closed_loop():
         ub.Turn(*pin, ub.Coulomb(force=moment)) for pin, moment in zip(pins, moments, strict=True)
     ]
     push = ub.PointLoad(coupler.middle, force=(1, 0), amplitude=lambda t: 60 * t)
-    scene = ub.Scene(
-        bodies=[crank, coupler, rocker],
-        joints=[ub.Revolute(*pin) for pin in pins],
-        connectors=frictions,
-        loads=[push],
-    )
+    parts = {"joints": [ub.Revolute(*pin) for pin in pins], "connectors": frictions}
+    scene = ub.Scene(bodies=[crank, coupler, rocker], loads=[push], **parts)
     events = ub.Events()
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=1e-3, record=events)
     slides = {}
@@ -305,19 +241,4 @@ def test_friction_at_all_pins_of_a_closed_loop():
     before = solution.times < limit - 1e-3
     assert np.abs(solution.displacement(coupler.middle)[before]).max() < 1e-9
     assert np.abs(solution.displacement(coupler.middle)[-1]).max() > 1e-3
-    assert solution.energy.worst < 1e-9
-    assert (np.diff(solution.energy.lost["friction"]) >= 0).all()
-
-
-@pytest.mark.parametrize("dt", [0.01, 0.1])
-def test_friction_never_reverses_a_velocity(dt):
-    mass = ub.Body((1.0, 0.0), mass=2.0, inertia=1.0)
-    rail = ub.ground(0, 0), mass.middle
-    scene = ub.Scene(
-        bodies=[mass],
-        joints=[ub.Prismatic(*rail)],
-        connectors=[ub.Slide(*rail, ub.Coulomb(3.0))],
-        initial=[ub.Velocity((mass,), linear=(1.0, 0.0))],
-    )
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1.2), dt=dt)
-    assert run.velocity(mass.middle)[:, 0].min() > -1e-12
+    assert_balanced(solution.energy)

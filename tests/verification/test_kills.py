@@ -22,43 +22,27 @@ SIGNALS = [signal.SIGKILL, signal.SIGINT, signal.SIGKILL, signal.SIGTERM]
 
 
 class Killed:
-    """A run in a directory that begins empty.
-
-    Args:
-        directory: For its files.
-        steps: Number of steps.
-        every: Steps from checkpoint to checkpoint.
-        cache: Directory of compiled code; that of the tests if there is none.
-    """
+    """A run of so many steps, with its files in a new directory, maybe with its own cache."""
 
     def __init__(self, directory, steps, every, cache=None):
         directory.mkdir()
         self.directory = directory
         self._command = [sys.executable, str(SCRIPT), str(directory), str(steps), str(every)]
-        self._environment = {**os.environ, **({"XDG_CACHE_HOME": str(cache)} if cache else {})}
+        own = {"XDG_CACHE_HOME": str(cache)} if cache else {}
+        self._options = {"env": {**os.environ, **own}, "text": True}
 
     def stopped(self, by, wait):
         """Begin the run and stop it when ``wait()`` returns; False if it has ended before."""
-        process = subprocess.Popen(
-            self._command,
-            env=self._environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
+        silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        process = subprocess.Popen(self._command, **silent, **self._options)
         wait(process)
         process.send_signal(by)
         return process.wait(60) != 0
 
     def end(self):
         """Let the run come to its end; return how long that took, in seconds, and its checksum."""
-        run = subprocess.run(
-            self._command,
-            env=self._environment,
-            capture_output=True,
-            text=True,
-            timeout=300,
-            check=False,
-        )
+        more = {"capture_output": True, "timeout": 300, "check": False}
+        run = subprocess.run(self._command, **more, **self._options)
         assert run.returncode == 0, run.stderr
         seconds, checksum = re.search(r"stepped for (.*) s, checksum (.*)", run.stdout).groups()
         return float(seconds), checksum

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers import raises, run
+from scenes import clamped
 
 import ufl_beam as ub
 import ufl_beam.structures as st
@@ -59,14 +60,12 @@ def test_the_envelope_of_a_cantilever():
 def test_combinations_are_runs_of_the_scene():
     """A plastic hinge: results cannot be superposed; loads of the scene act in each combination."""
     hinged = ub.Beam((0, 0), (L, 0), SECTION, hinges={0.0: ub.ElastoPlastic(1e5, isotropic=1e6)})
-    tip = [ub.PointLoad(hinged.end, force=(0, -6e4))]
-    scene = ub.Scene([hinged], supports=[ub.Clamped(hinged.start)], loads=[ub.Gravity()])
-    found = st.load_combinations(
-        scene, {"tip": tip}, {"half": {"tip": 0.5}, "all": {"tip": 1.0}}, steps=5, progress=False
-    )
+    cases = {"tip": [ub.PointLoad(hinged.end, force=(0, -6e4))]}
+    scene, rows = clamped(hinged, loads=[ub.Gravity()]), {"half": {"tip": 0.5}, "all": {"tip": 1.0}}
+    found = st.load_combinations(scene, cases, rows, steps=5, progress=False)
     for name, factor in (("half", 0.5), ("all", 1.0)):
         load = ub.PointLoad(hinged.end, (0, -6e4), amplitude=ub.Table((0, 1), (0, factor)))
-        alone = ub.Scene([hinged], supports=scene.supports, loads=[ub.Gravity(), load])
+        alone = replace(scene, loads=[ub.Gravity(), load])
         same = run(alone, ub.Static(), dt=0.2, progress=False)
         np.testing.assert_allclose(found.solutions[name].q[-1], same.q[-1], rtol=1e-10, atol=1e-15)
     drop = found.envelope(lambda one: one.displacement(hinged.end)[-1, 1])
@@ -76,10 +75,7 @@ def test_combinations_are_runs_of_the_scene():
 
 @pytest.mark.parametrize("place", [0.3, 0.5])
 def test_loads_between_vertices_are_in_the_envelope(place):
-    """[closed] Forces and ends of line loads are vertices, here in one of two combinations each.
-
-    Deflections are 1e-7 of the length, as above; the force at 0.5 is at a vertex of both.
-    """
+    """[closed] Forces and ends of line loads are vertices, here in one of two combinations each."""
     cases = {
         "P": [ub.PointLoad(BEAM.at(place), force=(0, -2.0))],
         "q": [ub.LineLoad(BEAM, force=(0, -1.0), span=(0.0, 0.7))],
@@ -98,14 +94,10 @@ def test_a_combination_without_equilibrium_is_named_and_left_out():
     """The hinge bears 1e5 N m, so that the tip bears 5e4 N."""
     hinge = ub.Softening(limit=1e5, fracture_energy=1e3)  # N m, J
     weak = ub.Beam((0, 0), (L, 0), SECTION, hinges={0.0: hinge})
-    scene = ub.Scene([weak], supports=[ub.Clamped(weak.start)])
-    cases = {"P": [ub.PointLoad(weak.end, force=(0, -1e5))]}
-    with pytest.warns(
-        ub.ModelWarning, match=r"load_combinations: much: no equilibrium beyond 0\.5"
-    ):
-        found = st.load_combinations(
-            scene, cases, {"much": {"P": 1.0}, "little": {"P": 0.4}}, progress=False
-        )
+    scene, cases = clamped(weak), {"P": [ub.PointLoad(weak.end, force=(0, -1e5))]}
+    rows = {"much": {"P": 1.0}, "little": {"P": 0.4}}
+    with pytest.warns(ub.ModelWarning, match=r"much: no equilibrium beyond 0\.5"):
+        found = st.load_combinations(scene, cases, rows, progress=False)
     assert ([*found.solutions], [*found.failed]) == (["little"], ["much"])
     assert found.failed["much"].startswith("no equilibrium beyond 0.5")
     assert "\n  much: no equilibrium beyond 0.5" in str(found)
@@ -118,17 +110,17 @@ def test_mistakes_are_named():
         st.load_combinations(SCENE, CASES, {"A": {"wnd": 1.0}})
     with raises("cases['spin']: forces of a RotatingFrame have no factor"):
         st.load_combinations(SCENE, {"spin": [ub.RotatingFrame(rate=1.0)]}, {"A": {"spin": 1.0}})
+    found = st.load_combinations(SCENE, CASES, COMBINATIONS, progress=False)
+    with raises("combination 'ULS 1' = None must be numbers"):
+        found.envelope(lambda run: None)
 
 
 def test_loads_that_act_twice_or_not_at_all_are_named():
     """Cases act with their values at 1 s; the scene's own loads act in all combinations."""
-    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
-    beam = ub.Beam((0, 0), (2, 0), section)
-    loaded = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+    loaded = replace(SCENE, loads=[ub.Gravity()])
     row = {"1": {"G": 1.0}}
     with pytest.raises(ub.ArgumentError, match=r"Gravity of cases\['G'\].*replace\(scene, loads"):
         st.load_combinations(loaded, {"G": loaded.loads}, row)
-    bare = replace(loaded, loads=[])
     quake = st.GroundMotion(0.01, [0, 1, 2, -1, 0]).acceleration
     for amplitude, said in (
         (quake, "no force at t = 1 s"),
@@ -137,16 +129,16 @@ def test_loads_that_act_twice_or_not_at_all_are_named():
     ):
         case = [ub.Gravity((0, -1), amplitude=amplitude)]
         with pytest.warns(ub.ModelWarning, match=said):
-            st.load_combinations(bare, {"G": case}, row)
-    gone = ub.MovingLoad(beam, lambda t: 3.0 * t, (0, -1.0))
+            st.load_combinations(SCENE, {"G": case}, row)
+    gone = ub.MovingLoad(BEAM, lambda t: 3.0 * t, (0, -1.0))
     with (
         pytest.warns(ub.ModelWarning, match="not on its beam at t = 1 s"),
         pytest.warns(ub.ModelWarning, match="never on its route"),
     ):
-        st.load_combinations(bare, {"G": [gone]}, row)
+        st.load_combinations(SCENE, {"G": [gone]}, row)
     for amplitude in (lambda t: t, lambda t: 2.0, ub.ramp(1.0)):
-        point = ub.PointLoad(beam.end, force=(0, -1e3), amplitude=amplitude)
-        st.load_combinations(bare, {"G": [point]}, row)  # no warning is issued
+        point = ub.PointLoad(BEAM.end, force=(0, -1e3), amplitude=amplitude)
+        st.load_combinations(SCENE, {"G": [point]}, row)  # no warning is issued
 
 
 def test_dampers_and_damping_bear_nothing():
@@ -155,17 +147,11 @@ def test_dampers_and_damping_bear_nothing():
     cases = {"axle": [axle], "side": [ub.PointLoad(BEAM.end, (0.5, 0.0))]}
     combinations = {"all": {"axle": 2.0, "side": 1.0}}
     brake = ub.Stretch(BEAM.start, BEAM.end, ub.Damper(1e9))
-    for more in ({"connectors": [brake]}, {"damping": [ub.KelvinVoigt(retardation_time=9.0)]}):
-        scene = replace(SCENE, loads=[], **more)
-        found = st.load_combinations(scene, cases, combinations, progress=False)
-        reaction = found.solutions["all"].reaction(CLAMPED)[-1]
-        np.testing.assert_allclose(reaction, (-0.5, 2.0, L), rtol=1e-6)
-        still = st.load_combinations(replace(SCENE, loads=[]), cases, combinations, progress=False)
-        ends = (one.solutions["all"].displacement(BEAM.end)[-1] for one in (found, still))
-        np.testing.assert_allclose(*ends, rtol=1e-8, atol=1e-15)
-
-
-def test_envelopes_of_something_else_are_refused():
-    found = st.load_combinations(SCENE, CASES, COMBINATIONS, progress=False)
-    with pytest.raises(ub.ArgumentError, match="combination 'ULS 1' = None must be numbers"):
-        found.envelope(lambda run: None)
+    damped = replace(SCENE, connectors=[brake], damping=[ub.KelvinVoigt(retardation_time=9.0)])
+    runs = [
+        st.load_combinations(scene, cases, combinations, progress=False).solutions["all"]
+        for scene in (damped, SCENE)
+    ]
+    np.testing.assert_allclose(runs[0].reaction(CLAMPED)[-1], (-0.5, 2.0, L), rtol=1e-6)
+    ends = (found.displacement(BEAM.end)[-1] for found in runs)
+    np.testing.assert_allclose(*ends, rtol=1e-8, atol=1e-15)

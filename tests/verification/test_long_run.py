@@ -66,14 +66,9 @@ def test_very_many_steps(tmp_path):
     spots = [st.HotSpot.fibre(place, y=0.1, E=210e9) for place in (left.start, roof.start)]
     fatigue, extremes = st.Fatigue(spots, st.SNCurve.eurocode(71e6)), ub.Extremes()
     table, watch = tmp_path / "long.csv", Watch({1000, STEPS})
-    solution = ub.simulate(
-        scene,
-        ub.EnergyMomentum(alpha=0.05, beta=0.05),
-        t=(0, 0.01 * STEPS),
-        dt=0.01,
-        record=[fatigue, extremes, ub.History(table, [left.end], max_rows=200), watch],
-        max_states=200,
-    )
+    record = [fatigue, extremes, ub.History(table, [left.end], max_rows=200), watch]
+    steps = {"t": (0, 0.01 * STEPS), "dt": 0.01, "max_states": 200}
+    solution = ub.simulate(scene, ub.EnergyMomentum(0.05, 0.05), record=record, **steps)
     gc.collect()
     grown = watch.memory[STEPS] - watch.memory[1000]
     energy, hinges = solution.energy, solution.energy["hinges"]

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
 """Bodies, joints and connectors against closed forms; all [closed].
 
-The midpoint rule of a mass on a linear spring, a damper or under a constant force has a closed form
-itself, which must be met to the tolerance of the solver; where there is none, the error is of
-second order in the step, and Richardson's limit is compared.
+Steps of the midpoint rule of a mass on a linear spring, a damper or under a constant force have a
+closed form.  Else the error is of second order in the step, and Richardson's limit is compared.
 """
 
-import itertools
 import math
 
 import numpy as np
 import pytest
 from convergence.study import extrapolated
+from helpers import assert_balanced
+from scenes import on_rail
 from scipy.special import ellipk
 
 import ufl_beam as ub
@@ -38,28 +38,22 @@ def crossing(times, values):
 # -- pendulums ---------------------------------------------------------------------------------
 
 
-def pendulum(angle, *, inertia=1e-6, length=1.2, mass=0.7, multipliers=False):
-    """A body on a pivot at the origin, its centre ``angle`` away from hanging down."""
-    center = length * math.sin(angle), -length * math.cos(angle)
-    bob = ub.Body(center, mass=mass, inertia=inertia, name="bob")
-    pivot = ub.Revolute(ub.ground(0, 0), bob.at(0, 0), multipliers=multipliers)
-    return ub.Scene(bodies=[bob], joints=[pivot], loads=[ub.Gravity((0, -G))]), bob
-
-
-@pytest.mark.parametrize("inertia", [1e-6, 0.5], ids=["simple", "compound"])
-@pytest.mark.parametrize("angle", [0.1, 1.5, 3.0])
+@pytest.mark.parametrize(("angle", "inertia"), [(0.1, 0.5), (3.0, 1e-6)])
 def test_period_of_a_pendulum(angle, inertia):
     """T = 4 √(I/(m g l)) K(sin²(θ/2)), at any amplitude: Richardson's limit of two steps.
 
-    The error of 200 steps a period is about (2π/200)²/12 of it, and of the limit its square; near
-    the top, at 3 rad, rates are larger than 2π/T by a factor of three.
+    The error of 200 steps a period is about (2π/200)²/12 of it, and of the limit its square; at
+    3 rad rates are larger than 2π/T by a factor of three.
     """
     mass, length = 0.7, 1.2
     about_pivot = inertia + mass * length**2
     period = 4 * math.sqrt(about_pivot / (mass * G * length)) * ellipk(math.sin(angle / 2) ** 2)
+    centre = length * math.sin(angle), -length * math.cos(angle)
+    bob = ub.Body(centre, mass=mass, inertia=inertia, name="bob")
+    pivot = ub.Revolute(ub.ground(0, 0), bob.at(0, 0))
+    scene = ub.Scene(bodies=[bob], joints=[pivot], loads=[ub.Gravity((0, -G))])
     found = []
     for steps in (200, 400):
-        scene, bob = pendulum(angle, inertia=inertia)
         solution = run(scene, 0.3 * period, period / steps)
         assert solution.energy.worst < SOLVED
         turned = solution.displacement(bob.middle)[:, 2] + angle
@@ -120,84 +114,33 @@ def test_force_of_a_joint_with_an_axis_that_turns_accelerates_the_body(kind, sch
     assert np.abs(error[1:]).max() < 1e-8 * np.abs(force[1:]).max()
 
 
-def test_double_pendulum():
-    """Two bars, let go above the pivot, chaotic: the energy stays, at a coarse step, and so on."""
-    bars, joints, at = [], [], ub.ground(0, 0)
-    for i in range(2):
-        x = i + 0.5
-        bar = ub.Body((x, 0.2 * x), mass=1.0, inertia=1 / 12, name=f"bar {i}")
-        joints.append(ub.Revolute(at, bar.at(i, 0.2 * i)))
-        at = bar.at(i + 1, 0.2 * (i + 1))
-        bars.append(bar)
-    scene = ub.Scene(
-        bodies=bars, joints=joints, loads=[ub.Gravity((0, -G))],
-        initial=[ub.Velocity(bars, angular=4.0)],
-    )  # fmt: skip
-    solution = run(scene, 10.0, 0.02)
-    energy = solution.energy
-    assert energy.worst < SOLVED
-    by_hand = -sum(G * solution.displacement(bar.middle)[:, 1] for bar in bars)
-    np.testing.assert_allclose(energy["loads"], by_hand, atol=1e-9 * np.abs(by_hand).max())
-    gap = solution.position(bars[0].at(1, 0.2)) - solution.position(bars[1].at(1, 0.2))
-    assert np.abs(gap).max() < 1e-11
-    assert np.ptp(solution.displacement(bars[1].middle)[:, 2]) > 2 * math.pi  # it turns over
-
-
-def test_measured_joint_is_the_shared_one():
+@pytest.mark.parametrize("kind", [ub.Revolute, ub.Rigid])
+def test_measured_joint_is_the_shared_one(kind):
     """The same motion with and without unknowns of its own, and the force by equilibrium."""
     section = ub.Section(EA=1e5, GA=1e5, EI=20.0, rhoA=1.0, rhoI=1e-3)
-    tips = []
-    for kind, multipliers in itertools.product((ub.Revolute, ub.Rigid), (False, True)):
-        upper = ub.Beam((0, 0), (1, 0), section, cells=4)
-        lower = ub.Beam((1, 0), (1.5, 0.5), section, cells=4)
+    upper = ub.Beam((0, 0), (1, 0), section, cells=4)
+    lower = ub.Beam((1, 0), (1.5, 0.5), section, cells=4)
+    loads, tips = [ub.Gravity((0, -G)), ub.PointLoad(lower.end, force=(3, 5))], []
+    for multipliers in (False, True):
         joint = kind(upper.end, lower.start, multipliers=multipliers)
-        scene = ub.Scene(
-            [upper, lower],
-            joints=[joint],
-            supports=[ub.Clamped(upper.start)],
-            loads=[ub.Gravity((0, -G)), ub.PointLoad(lower.end, force=(3, 5))],
-        )
-        solution = run(scene, 0.5, 0.005)
+        parts = {"joints": [joint], "supports": [ub.Clamped(upper.start)], "loads": loads}
+        solution = run(ub.Scene([upper, lower], **parts), 0.5, 0.005)
         assert solution.energy.worst < SOLVED
         tips.append(solution.displacement(lower.end))
-        if multipliers:
-            # b is the lower beam: what acts on it makes its momentum grow
-            alone = ub.Scene([lower])
-            mass = math.sqrt(0.5)
-            history = solution.joint(joint)
-            v = np.trapezoid(
-                [solution.velocity(lower.at(s))[:, :2] for s in np.linspace(0, 1, 5)],
-                dx=0.25, axis=0,
-            )  # fmt: skip
-            grows = mass * np.diff(v, axis=0) / 0.005
-            by_hand = grows - np.array([3.0, 5.0 - mass * G])
-            np.testing.assert_allclose(history.force[1:], by_hand, atol=1e-7 * np.abs(grows).max())
-            assert alone.size == pytest.approx(mass)
-            if kind is ub.Revolute:
-                np.testing.assert_array_equal(history.moment, 0.0)
-            else:
-                assert np.abs(history.moment).max() > 0.1
     # Solved to 1e-10 of forces that the stiffness EA makes large
-    for shared, held in (tips[:2], tips[2:]):
-        np.testing.assert_allclose(shared, held, rtol=0, atol=1e-7)
-
-
-def test_force_of_a_joint_whichever_is_first():
-    """On the ground the opposite of what acts on the body, also where the body comes first."""
-    forces = []
-    for turned_round in (False, True):
-        bob = ub.Body((1, 0), mass=1.0, inertia=0.1)
-        places = ub.ground(0, 0), bob.at(0, 0)
-        pivot = ub.Revolute(*(places[::-1] if turned_round else places))
-        spin = ub.Velocity((bob,), angular=2.0)
-        solution = run(ub.Scene(bodies=[bob], joints=[pivot], initial=[spin]), 0.05, 0.01)
-        forces.append(solution.joint(pivot).force[1:])
-    assert (forces[0][:, 0] < 0).all()  # the body is on the right
-    np.testing.assert_allclose(forces[0], -forces[1], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(*tips, rtol=0, atol=1e-7)
+    # b is the lower beam: forces on it make its momentum grow
+    mass, history = math.sqrt(0.5), solution.joint(joint)
+    nodes = [solution.velocity(lower.at(s))[:, :2] for s in np.linspace(0, 1, 5)]
+    grows = mass * np.diff(np.trapezoid(nodes, dx=0.25, axis=0), axis=0) / 0.005
+    by_hand = grows - np.array([3.0, 5.0 - mass * G])
+    np.testing.assert_allclose(history.force[1:], by_hand, atol=1e-7 * np.abs(grows).max())
+    most = np.abs(history.moment).max()
+    assert most == 0.0 if kind is ub.Revolute else most > 0.1
 
 
 def test_what_nobody_knows_of_a_joint():
-    """Places that share a rotation are one unknown, and its moment is not known; so with forces."""
+    """The moment of places that share a rotation, which is one unknown; so with forces."""
     box = ub.Body((1, 0), mass=1.0, inertia=0.1, name="box")
     rail = ub.Prismatic(ub.ground(0, 0), box.middle)
     spring = ub.Slide(ub.ground(0, 0), box.middle, ub.Spring(10.0))
@@ -218,52 +161,38 @@ def test_what_nobody_knows_of_a_joint():
 # -- motors and given forces -------------------------------------------------------------------
 
 
+def wheel_on(law, spin=0.0, inertia=0.3):
+    """A wheel on a pivot, with a connector of a law to the ground."""
+    wheel = ub.Body((0, 0), mass=1.0, inertia=inertia)
+    turn = ub.Turn(ub.ground(0, 0), wheel.middle, law)
+    pivot, moves = ub.Revolute(ub.ground(0, 0), wheel.middle), ub.Velocity([wheel], angular=spin)
+    initial = [moves] if spin else []
+    return ub.Scene(bodies=[wheel], joints=[pivot], connectors=[turn], initial=initial), turn
+
+
 def test_motor_bears_the_inertia():
     """A wheel with φ = α t²/2: the moment is J α, and the work J ω²/2; both exact."""
     inertia, growth = 0.3, 2.0
-    wheel = ub.Body((0, 0), mass=1.0, inertia=inertia)
-    turn = ub.Turn(ub.ground(0, 0), wheel.middle, ub.PrescribedMotion(lambda t: growth * t**2 / 2))
-    scene = ub.Scene(bodies=[wheel], joints=[ub.Revolute(ub.ground(0, 0), wheel.middle)],
-                     connectors=[turn])  # fmt: skip
+    scene, turn = wheel_on(ub.PrescribedMotion(lambda t: growth * t**2 / 2))
     solution = run(scene, 1.0, 0.01)
     driven = solution.connector(turn)
     np.testing.assert_allclose(driven.motion, growth * solution.times**2 / 2, atol=1e-12)
     # Turns of up to 0.02 rad in a step: (Δψ/2)² of the force
     np.testing.assert_allclose(driven.force[1:], -inertia * growth, rtol=2e-2)
-    ω = solution.velocity(wheel.middle)[:, 2]
+    ω = solution.velocity(scene.bodies[0].middle)[:, 2]
     np.testing.assert_allclose(-driven.work, inertia * ω**2 / 2, atol=1e-12)
     np.testing.assert_allclose(solution.energy["motors"], -driven.work, atol=1e-14)
     assert ω[-1] == pytest.approx(growth, rel=1e-3)
     assert solution.energy.worst < SOLVED
 
 
-def test_motor_lifts_a_crank():
-    """Quasi-static: the moment is m g l cos φ in statics, and the work m g l sin φ."""
-    mass, length = 2.0, 0.4
-    crank = ub.Body((length, 0), mass=mass, inertia=0.1)
-    turn = ub.Turn(ub.ground(0, 0), crank.at(0, 0), ub.PrescribedMotion(lambda t: t))
-    scene = ub.Scene(
-        bodies=[crank],
-        joints=[ub.Revolute(ub.ground(0, 0), crank.at(0, 0))],
-        connectors=[turn],
-        loads=[ub.Gravity((0, -G))],
-    )
-    solution = run(scene, 1.5, 0.1, ub.Static())
-    driven = solution.connector(turn)
-    moment = mass * G * length * np.cos(solution.times[1:])
-    np.testing.assert_allclose(-driven.force[1:], moment, rtol=1e-9, atol=1e-9)
-
-
 def test_given_moment():
     """ω = M t/J, but for (Δψ/2)/tan(Δψ/2); the work M φ, exactly."""
     inertia, moment = 0.3, 0.6
-    wheel = ub.Body((0, 0), mass=1.0, inertia=inertia)
-    turn = ub.Turn(ub.ground(0, 0), wheel.middle, ub.PrescribedForce(lambda t: moment))
-    scene = ub.Scene(bodies=[wheel], joints=[ub.Revolute(ub.ground(0, 0), wheel.middle)],
-                     connectors=[turn])  # fmt: skip
+    scene, turn = wheel_on(ub.PrescribedForce(lambda t: moment))
     solution = run(scene, 1.0, 0.01)
-    turned = solution.displacement(wheel.middle)[:, 2]
-    ω = solution.velocity(wheel.middle)[-1, 2]
+    wheel = scene.bodies[0].middle
+    turned, ω = solution.displacement(wheel)[:, 2], solution.velocity(wheel)[-1, 2]
     assert ω == pytest.approx(moment / inertia, rel=(0.02 / 2) ** 2 / 3)
     assert inertia * ω**2 / 2 == pytest.approx(moment * turned[-1], rel=SOLVED)
     np.testing.assert_allclose(solution.energy["loads"], moment * turned, atol=1e-12)
@@ -276,26 +205,17 @@ MASS, STIFFNESS = 2.0, 50.0  # kg, N/m
 OMEGA = math.sqrt(STIFFNESS / MASS)
 
 
-def carriage(law, *, v0=0.3, kind=ub.Slide, free=False, more=()):
-    """A mass that moves along x at 1 m from the origin, with a connector to there."""
-    mass = ub.Body((1, 0), mass=MASS, inertia=1.0)
-    between = ub.ground(0, 0), mass.middle
-    connector = kind(*between, law)
-    rail = [] if free else [ub.Prismatic(*between)]
-    scene = ub.Scene(
-        bodies=[mass],
-        joints=rail,
-        connectors=[connector, *(kind(*between, other) for other in more)],
-        initial=[ub.Velocity((mass,), linear=(v0, 0))],
-    )
-    return scene, connector, mass.middle
+def carriage(*laws, v0=0.3, **more):
+    """A mass on a rail, the first of its connectors, and its place."""
+    scene = on_rail(*laws, mass=MASS, speed=v0, **more)
+    return scene, scene.connectors[0], scene.bodies[0].middle
 
 
 @pytest.mark.parametrize("kind", [ub.Slide, ub.Stretch])
-@pytest.mark.parametrize("free", [False, True], ids=["on a rail", "free"])
-def test_frequency_of_a_spring(kind, free):
+@pytest.mark.parametrize("more", [{}, {"joints": []}], ids=["on a rail", "free"])
+def test_frequency_of_a_spring(kind, more):
     """The midpoint rule turns the phase by 2 atan(ω Δt/2) in each step: exactly."""
-    scene, spring, at = carriage(ub.Spring(STIFFNESS), kind=kind, free=free)
+    scene, spring, at = carriage(ub.Spring(STIFFNESS), kind=kind, **more)
     dt = 0.02
     solution = run(scene, 4.0, dt)
     phase = 2 * math.atan(OMEGA * dt / 2) * np.arange(len(solution.times))
@@ -313,34 +233,9 @@ def test_frequency_of_a_spring(kind, free):
     np.testing.assert_allclose(history.force[1:], STIFFNESS * middle, atol=1e-9)
 
 
-def test_frequency_of_a_torsional_spring():
-    """Small turns: the same closed form, to the square of 1e-4 rad."""
-    inertia, stiffness, dt = 0.2, 5.0, 0.02
-    wheel = ub.Body((0, 0), mass=1.0, inertia=inertia)
-    spring = ub.Turn(ub.ground(0, 0), wheel.middle, ub.Spring(stiffness))
-    ω = math.sqrt(stiffness / inertia)
-    scene = ub.Scene(
-        bodies=[wheel],
-        joints=[ub.Revolute(ub.ground(0, 0), wheel.middle)],
-        connectors=[spring],
-        initial=[ub.Velocity((wheel,), angular=1e-4 * ω)],
-    )
-    solution = run(scene, 4.0, dt)
-    phase = 2 * math.atan(ω * dt / 2) * np.arange(len(solution.times))
-    turned = solution.displacement(wheel.middle)[:, 2]
-    np.testing.assert_allclose(turned, 1e-4 * np.sin(phase), atol=1e-4 * 1e-6)
-
-
 def test_spring_at_large_turns():
     """Two turns of a torsional spring: its energy is k φ²/2 at any angle and step."""
-    wheel = ub.Body((0, 0), mass=1.0, inertia=0.2)
-    spring = ub.Turn(ub.ground(0, 0), wheel.middle, ub.Spring(5.0))
-    scene = ub.Scene(
-        bodies=[wheel],
-        joints=[ub.Revolute(ub.ground(0, 0), wheel.middle)],
-        connectors=[spring],
-        initial=[ub.Velocity((wheel,), angular=60.0)],
-    )
+    scene, spring = wheel_on(ub.Spring(5.0), spin=60.0, inertia=0.2)
     solution = run(scene, 1.0, 0.01)
     history = solution.connector(spring)
     np.testing.assert_allclose(history.work, 5.0 * history.motion**2 / 2, rtol=1e-10, atol=1e-10)
@@ -362,41 +257,6 @@ def test_damper():
     assert v[-1] == pytest.approx(0.3 * math.exp(-viscosity / MASS * 2.0), rel=1e-3)
 
 
-def test_function_is_a_spring_and_a_damper():
-    scene, _, at = carriage(ub.Spring(STIFFNESS), more=(ub.Damper(4.0),))
-    one = run(scene, 2.0, 0.02).displacement(at)
-    scene, asked, at = carriage(ub.ForceLaw(lambda e, rate: STIFFNESS * e + 4.0 * rate))
-    other = run(scene, 2.0, 0.02)
-    np.testing.assert_allclose(one, other.displacement(at), rtol=0, atol=SOLVED)
-    history = other.connector(asked)
-    np.testing.assert_allclose(other.energy["functions"], history.work, atol=1e-14)
-    assert other.energy.worst < SOLVED
-
-
-def test_function_in_any_units():
-    """A stiffening spring in units of 10⁹ m to 1 nm: the same numbers from as many iterations."""
-    runs = []
-    for metre in (1.0, 1e-9, 1e9):
-        mass = ub.Body((metre, 0), mass=1.0, inertia=metre**2)
-        rail = ub.ground(0, 0), mass.middle
-
-        def force(e, rate, metre=metre):
-            x, v = e / metre, rate / metre
-            return metre * (50 * x + 5e3 * x**3 + 0.5 * v)
-
-        scene = ub.Scene(
-            bodies=[mass],
-            joints=[ub.Prismatic(*rail)],
-            connectors=[ub.Slide(*rail, ub.ForceLaw(force))],
-            initial=[ub.Velocity((mass,), linear=(metre, 0))],
-        )
-        solution = run(scene, 0.5, 0.02)
-        runs.append((solution.displacement(mass.middle)[-1, 0] / metre, solution.iterations))
-    for end, iterations in runs[1:]:
-        assert end == pytest.approx(runs[0][0], rel=1e-9)
-        assert iterations == runs[0][1]
-
-
 def test_bouncing_mass():
     """Contact lasts π √(m/k), and the mass comes back as fast as it went."""
     stiffness, way, v0, dt = 2e4, 0.05, 0.3, 1e-3
@@ -414,24 +274,12 @@ def test_bouncing_mass():
     assert np.abs(history.work[touches[-1] + 1 :]).max() < 1e-12
 
 
-def test_mass_between_two_stops():
-    """Sixty bounces at coarse steps: the energy stays."""
-    scene, _, at = carriage(ub.Stop(2e4, low=-0.02, high=0.03), v0=1.0)
-    solution = run(scene, 5.0, 0.005)
-    x = solution.displacement(at)[:, 0]
-    assert np.sum(np.diff(np.sign(solution.velocity(at)[:, 0])) != 0) > 50
-    assert solution.energy.worst < SOLVED
-    assert x.max() < 0.03 + math.sqrt(MASS / 2e4) * 1.01
-    assert solution.energy.total[-1] == pytest.approx(MASS / 2, rel=1e-9)
-
-
 # -- springs that yield and break --------------------------------------------------------------
 
 
 def driven(law, motion, scheme, end=1.0, dt=0.01):
     """A connector whose motion is given."""
-    scene, spring, _ = carriage(law, v0=0.0, more=(ub.PrescribedMotion(motion),))
-    scene = ub.Scene(bodies=scene.bodies, joints=scene.joints, connectors=scene.connectors)
+    scene, spring, _ = carriage(law, ub.PrescribedMotion(motion), v0=0.0)
     solution = run(scene, end, dt, scheme)
     return solution, solution.connector(spring)
 
@@ -459,7 +307,7 @@ def test_loop_of_a_bilinear_spring(scheme):
 
 @pytest.mark.parametrize("scheme", STATICS, ids=str)
 def test_breaking_spring(scheme):
-    """All that it takes is G_f (1 - exp(-f_u ξ/G_f)), ξ being how far it opened."""
+    """G_f (1 - exp(-f_u ξ/G_f)) is dissipated with the opening ξ."""
     k, limit, energy = 1e4, 20.0, 1.0
     law = ub.Spring(k, softening=ub.Softening(limit, energy))
     solution, history = driven(law, lambda t: t, scheme, end=1.0, dt=0.01)
@@ -471,32 +319,7 @@ def test_breaking_spring(scheme):
     assert history.work[-1] == pytest.approx(energy, rel=0.03)
 
 
-# -- controllers and loads ---------------------------------------------------------------------
-
-
-def test_controlled_pendulum():
-    """A PD controller with the weight fed forward turns a pendulum to its target, and stops it."""
-    target, length, mass = 2.0, 0.5, 1.0
-    bob = ub.Body((0, -length), mass=mass, inertia=0.05)
-    pivot = ub.ground(0, 0), bob.at(0, 0)
-
-    def moment(simulation):
-        angle, rate = simulation.displacement(bob.middle)[2], simulation.velocity(bob.middle)[2]
-        return 20.0 * (target - angle) - 4.0 * rate + mass * G * length * math.sin(angle)
-
-    turn = ub.Turn(*pivot, ub.Controller(moment))
-    scene = ub.Scene(
-        bodies=[bob], joints=[ub.Revolute(*pivot)], connectors=[turn], loads=[ub.Gravity((0, -G))]
-    )
-    solution = run(scene, 6.0, 0.01)
-    end = solution.displacement(bob.middle)[-1, 2]
-    assert end == pytest.approx(target, abs=1e-5)
-    energy = solution.energy
-    assert energy.worst < SOLVED
-    # It has lifted the bob, and what else it gave it took back
-    lifted = mass * G * length * (1 - math.cos(end))
-    assert energy["controllers"][-1] == pytest.approx(lifted, rel=1e-5)
-    np.testing.assert_allclose(energy["controllers"], -solution.connector(turn).work, atol=1e-12)
+# -- loads -------------------------------------------------------------------------------------
 
 
 def test_free_fall():
@@ -549,11 +372,15 @@ def released(free, load):
 
 
 def test_release_of_the_axial_force():
-    """The left half alone takes it: u = F L/EA; the right half feels nothing."""
+    """The left half alone bears it: u = F L/EA; without N and M the joint passes V on."""
     left, right, reactions = released("N", {"force": (FORCE, 0)})
     assert left[0] == pytest.approx(FORCE / 1e4, rel=1e-6)
     np.testing.assert_allclose(right, 0.0, atol=1e-12)
     np.testing.assert_allclose(reactions[1], 0.0, atol=1e-9 * FORCE)
+    _, right, reactions = released("NM", {"force": (FORCE, FORCE)})
+    assert reactions[0] == pytest.approx([-FORCE, -FORCE / 2, -FORCE / 2], abs=2e-6 * FORCE)
+    assert reactions[1] == pytest.approx([0, -FORCE / 2, FORCE / 2], abs=2e-6 * FORCE)
+    assert abs(right[0]) < 1e-10
 
 
 def test_release_of_the_shear_force():
@@ -568,7 +395,7 @@ def test_release_of_the_shear_force():
 
 
 def test_release_of_the_moment():
-    """Two cantilevers: each takes half of the force, and F L/2 at its foot."""
+    """Two cantilevers: each bears half of the force, and F L/2 at its foot."""
     left, right, reactions = released("M", {"force": (0, FORCE)})
     np.testing.assert_allclose(left[:2], right[:2], atol=1e-15)
     assert left[2] == pytest.approx(-right[2], rel=1e-6)
@@ -576,24 +403,12 @@ def test_release_of_the_moment():
     assert reactions[1] == pytest.approx([0, -FORCE / 2, FORCE / 2], abs=1e-6 * FORCE)
 
 
-def test_release_of_two():
-    """Without N and M the joint passes V on: as above, but nothing along the axis."""
-    _, right, reactions = released("NM", {"force": (FORCE, FORCE)})
-    assert reactions[0] == pytest.approx([-FORCE, -FORCE / 2, -FORCE / 2], abs=2e-6 * FORCE)
-    assert reactions[1] == pytest.approx([0, -FORCE / 2, FORCE / 2], abs=2e-6 * FORCE)
-    assert abs(right[0]) < 1e-10
-
-
 # -- many together -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("steps", [500, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_momenta_and_energy_of_a_free_assembly(steps):
-    """A flexible beam and bodies with all joints, spinning freely about their centre of mass.
-
-    Momenta and energy stay to 1e-10 of their size over 10⁴ steps that turn it by 0.05 each, with
-    the default tolerance.  (Far from the origin the moment of round-off would grow.)
-    """
+    """A flexible beam and bodies with all joints, spinning freely by 0.05 rad in each step."""
     section = ub.Section(EA=1e4, GA=1e4, EI=50.0, rhoA=1.0, rhoI=1e-2)
     beam = ub.Beam((0, 0), (1, 0), section, cells=4)
     arm = ub.Body((1.3, 0.1), mass=0.5, inertia=0.02, name="arm")
@@ -626,7 +441,7 @@ def test_momenta_and_energy_of_a_free_assembly(steps):
 
 @pytest.mark.parametrize("joint", ["Revolute", "Link"])
 def test_far_from_where_it_began(joint):
-    """10⁴ of its sizes away in a second: the digits that are left hold the joint."""
+    """10⁴ of its sizes away in a second."""
     a, b = ub.Body((0, 0), mass=1.0, inertia=0.1), ub.Body((1, 0), mass=1.0, inertia=0.1)
     held = {
         "Revolute": ub.Revolute(a.at(0.5, 0), b.at(0.5, 0)),
@@ -663,24 +478,17 @@ def test_works_of_connectors_add_up_to_the_ledger():
     )
     solution = run(scene, 2.0, 0.01)
     energy = solution.energy
-    assert energy.worst < SOLVED
     works = [solution.connector(c).work for c in scene.connectors]
     np.testing.assert_allclose(works[1], energy["friction"], atol=1e-12)
     np.testing.assert_allclose(works[4], energy["damping"], atol=1e-12)
     np.testing.assert_allclose(works[6], energy["functions"], atol=1e-12)
-    np.testing.assert_allclose(
-        works[0] + works[2] + works[3],
-        energy["stored"] + energy["hardening"] + energy["plastic"],
-        atol=1e-9 * energy.energy_transferred,
-    )
+    kept = energy["stored"] + energy["hardening"] + energy["plastic"]
+    digits = {"rtol": 1e-7, "atol": 1e-9 * energy.energy_transferred}
+    np.testing.assert_allclose(works[0] + works[2] + works[3], kept, **digits)
     moved = solution.displacement(flap.at(1.6, 0.3))[:, :2] @ (2, 1)
-    fallen = -G * (
-        MASS * solution.displacement(box.middle)[:, 1]
-        + 0.5 * solution.displacement(flap.middle)[:, 1]
-    )
-    np.testing.assert_allclose(
-        energy["loads"], moved + fallen - works[5], atol=1e-9 * energy.energy_transferred
-    )
+    box_down, flap_down = (-solution.displacement(body.middle)[:, 1] for body in (box, flap))
+    fallen = G * (MASS * box_down + 0.5 * flap_down)
+    np.testing.assert_allclose(energy["loads"], moved + fallen - works[5], **digits)
+    assert_balanced(energy)
     for name in ("friction", "damping", "plastic"):
-        assert np.diff(energy[name]).min() >= -1e-13
         assert energy[name][-1] > 1e-3  # each of them does something

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Static paths through limit points, bifurcations and snap-backs: S5, S7, S8, S17 of the reference.
 
-[calc] values are those of an independent converged solution, with the digits that are given.  Mesh
-errors are of second order: limits are Richardson's of two meshes, and a fifteenth of what the limit
-changed by from the mesh before is what the fourth order may leave, doubled for the orders above.
+[calc] values are those of an independent converged solution, with the digits that are given.
+Limits are Richardson's of two meshes; the fourth order may leave a fifteenth of the change from the
+mesh before, doubled for the orders above.
 """
 
 import math
 
 import numpy as np
 import pytest
+from closed_forms import buckled_column, softened
 from convergence.study import extrapolated
 from scenes import clamped, rigid_chain
-from verification.test_euler_column import TABLE, closed_form
 
 import ufl_beam as ub
 
@@ -122,28 +122,33 @@ def column(cells, section, P):
 @pytest.mark.parametrize("cells", [4, 32])
 @pytest.mark.parametrize(("EA", "GA"), [(1e8, 1e8), (200.0, 50.0), (50.0, 1e4)])
 def test_critical_load(cells, EA, GA):
-    """[closed] P (1 - P/EA + P/GA) = 4 EI/h² tan²(π h/4L), which tends to π² EI/4L².
+    """[closed] P (1 - P/EA + P/GA) = 4 EI/h² tan²(π h/4L), which tends to π² EI/4L²; also buckling.
 
-    The straight column is shorter by P/EA; what buckles is ψ'' EI + P v' = 0, v' = (1 - P/EA +
-    P/GA) ψ.  Of nodes ψ_i and cells h: ψ' is a difference, v' a mean of both ends, and cos turns
-    to tan².  Located to 1e-7 of a step; round-off of EA and the solver's tolerance are below.
+    With cells h in ψ'' EI + P v' = 0, v' = (1 - P/EA + P/GA) ψ: ψ' is a difference, v' a mean of
+    both ends.  The point is located to 1e-7 of a step.
     """
     _, scene = column(cells, ub.Section(EA=EA, GA=GA, EI=1.0), 1.0)
     path = ub.follow(scene, ub.ArcLength(0.2), until=lambda now: now.t > 3)
     (point,) = path.critical
-    P = point.factor
     assert point.kind == "bifurcation"
-    left = P * (1 - P / EA + P / GA)
-    assert left == pytest.approx(4 * cells**2 * math.tan(math.pi / 4 / cells) ** 2, rel=1e-7)
+    near = ub.simulate(scene, ub.Static(), t=(0, 0.999 * point.factor), dt=3.0)
+    more = ub.buckling(scene, 1, t=point.factor, at=near).factors[0]
+    factors = point.factor, point.factor * (0.999 + 0.001 * more), ub.buckling(scene, 1).factors[0]
+    for P in factors:
+        left = P * (1 - P / EA + P / GA)
+        assert left == pytest.approx(4 * cells**2 * math.tan(math.pi / 4 / cells) ** 2, rel=1e-7)
     # The path goes on straight.
     assert np.abs(path.q[-1][path.numbering.dofs[:, 1:]]).max() < 1e-6
 
 
-def test_branch_to_the_elastica():
-    """[closed] Load and end position at the angles of the table, up to 176 degrees.
+DEGREES = np.array([20, 40, 60, 80, 100, 120, 140, 160, 176])
 
-    Besides the mesh: strains of axis and shear, 1e-8 P.
-    """
+
+def test_branch_to_the_elastica():
+    """[closed] Load and end position at nine angles; strains of axis and shear are 1e-8 P."""
+    exact = [buckled_column(α) for α in np.radians(DEGREES)]
+    # [pub] Timoshenko and Gere, table 2-4
+    np.testing.assert_allclose(exact[-1], [9.1162, -0.5772, 0.4214], rtol=0, atol=0.51e-4)
     results = []
     for cells in (32, 64, 128):
         beam, scene = column(cells, ub.Section(EA=1e8, GA=1e8, EI=1.0), math.pi**2 / 4)
@@ -151,12 +156,11 @@ def test_branch_to_the_elastica():
         (point,) = straight.critical
         turn = ub.DisplacementControl(beam.end, "psi", math.radians(4))
         bent = ub.follow(scene, turn, start=point.branch(), steps=44)
-        at = [row[0] // 4 for row in TABLE]
+        at = DEGREES // 4
         u, v, ψ = bent.displacement(beam.end)[at].T
-        np.testing.assert_allclose(np.degrees(ψ), [row[0] for row in TABLE], rtol=1e-8)
+        np.testing.assert_allclose(np.degrees(ψ), DEGREES, rtol=1e-8)
         results.append(np.column_stack([bent.factor[at], 1 + u, v]))
         assert bent.energy.lost == {}
-    exact = [closed_form(math.radians(degrees)) for degrees, *_ in TABLE]
     # P = 22 at most: 22e-8 of 1e-6
     assert_reaches(*results, exact, [1e-6, 1e-6, 1e-6])
 
@@ -173,9 +177,8 @@ SCALE = 1e-3
 def test_hinge_snap_back(law, steepness):
     """[closed] M = M_u exp(-M_u α/G_f) or linear, δ = F Σ(..) + α arm, G_f (1 - M/M_u); 1e-6.
 
-    As in ``test_hinge.py``, but softening falls ``steepness`` times as steeply as 3EI/L: beyond the
-    peak both the load and the displacement go back, and no other control finds a way.  Rotations
-    are 1e-3 of a radian, and what is not linear 1e-6 of that.
+    As in ``test_hinge.py``, but softening falls ``steepness`` times as steeply as 3EI/L: load and
+    displacement go back.  Rotations are 1e-3 of a radian, nonlinear terms 1e-6 of that.
     """
     part = 2 if law is ub.LinearSoftening else 1
     energy = M_U**2 / (part * steepness * 3 * EI / LENGTH)
@@ -198,7 +201,7 @@ def test_hinge_snap_back(law, steepness):
     np.testing.assert_allclose(path.displacement(beam.end)[1:, 1] / SCALE, δ[1:], rtol=1e-6)
     opens = α > 0
     assert opens.sum() >= 15
-    M = M_U * (np.exp(-M_U * α / energy) if part == 1 else 1 - M_U * α / (2 * energy))
+    M = softened(law(M_U, energy), α)
     np.testing.assert_allclose(F[opens] * arms[0], M[opens], rtol=1e-6)
     lost = path.energy.lost["hinges"] / SCALE**2 / energy
     # Of the exponential law 1 - M/M_u, of the linear one 1 - (M/M_u)²

@@ -36,10 +36,8 @@ def string_of_rods():
     rods = [ub.Beam(a, b, SECTION, cells=4) for a, b in pairwise(points)]
     bob = ub.Body((0, -1), mass=2.0, inertia=0.01)
     joints = [ub.Revolute(rods[0].end, rods[1].start), ub.Rigid(rods[1].end, bob.middle)]
-    supports = [ub.Pinned(rods[0].start)]
-    return rods[0].end, ub.Scene(
-        rods, joints=joints, supports=supports, loads=[ub.Gravity()], bodies=[bob]
-    )
+    parts = {"supports": [ub.Pinned(rods[0].start)], "loads": [ub.Gravity()], "bodies": [bob]}
+    return rods[0].end, ub.Scene(rods, joints=joints, **parts)
 
 
 PRELOADED = {
@@ -60,10 +58,8 @@ PRELOADED = {
 def test_modes_against_free_vibration(preload):
     """Started in the first mode with an amplitude of 1e-3, it has the period of that mode.
 
-    EnergyMomentum lengthens it by Ω²/12, Ω = 2π/100: 3.3e-4, which is taken into account; what is
-    left of it is Ω⁴/80.  Zeros of what is nearly harmonic come from straight lines between the
-    steps: Ω²/8 of a step at most, 8e-6 of the time in all.  Nonlinear terms are squares of the
-    amplitude.
+    EnergyMomentum lengthens it by Ω²/12, Ω = 2π/100.  Zeros are found by straight lines between
+    the steps, to 8e-6 of the time in all.
     """
     place, scene = PRELOADED[preload]()
     rest = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
@@ -73,14 +69,8 @@ def test_modes_against_free_vibration(preload):
     swing = found.motion(0, amplitude=1e-3, count=4)  # from the largest displacement
     dt = 2 * np.pi / ω / STEPS
     # A solution of the same beams is a state to start in, and it begins with no velocity.
-    run = ub.simulate(
-        scene,
-        ub.EnergyMomentum(),
-        t=(1, 1 + PERIODS * STEPS * dt),
-        dt=dt,
-        start=swing,
-        newton=TIGHT,
-    )
+    steps = {"t": (1, 1 + PERIODS * STEPS * dt), "dt": dt, "newton": TIGHT}
+    run = ub.simulate(scene, ub.EnergyMomentum(), start=swing, **steps)
     x = run.displacement(place)[:, across] - rest.displacement(place)[-1, across]
     zeros = np.flatnonzero(x[:-1] * x[1:] < 0)
     at = run.times[zeros] + dt * x[zeros] / (x[zeros] - x[zeros + 1])

@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from helpers import raises
 from scenes import clamped, flying_beam, swing
 
 import ufl_beam as ub
@@ -23,7 +24,6 @@ SECOND_ORDER = [
     ub.EnergyMomentum(),
     ub.EnergyMomentumPrinted(),
     ub.EnergyMomentumDecaying(),
-    ub.EnergyMomentumDecaying(1 / 3),
     ub.Newmark(),
     ub.GeneralizedAlpha(0.8),
     ub.GeneralizedAlpha(0.0),
@@ -57,9 +57,9 @@ def exact():
     return solution.q[-1], solution.v[-1]
 
 
-def rates(scheme, steps=(50, 100, 200)):
+def rates(scheme):
     """Orders by which errors of displacements and velocities at the end fall, step by step."""
-    runs = [go(shaken(), scheme, 0.5, n) for n in steps]
+    runs = [go(shaken(), scheme, 0.5, n) for n in (50, 100, 200)]
     q, v = exact()
     assert np.abs(q).max() > 0.1  # large motion
     errors = np.array([[np.abs(r.q[-1] - q).max(), np.abs(r.v[-1] - v).max()] for r in runs])
@@ -68,13 +68,12 @@ def rates(scheme, steps=(50, 100, 200)):
 
 @pytest.mark.parametrize("scheme", SECOND_ORDER, ids=str)
 def test_errors_are_of_second_order(scheme):
-    """What is measured against has a hundredth of the error of the finest run, so 1 % off 4."""
+    """The ledger closes, or its imbalance is of second order, too."""
     orders, runs = rates(scheme)
     assert orders.min() > 1.7  # annihilating needs shorter steps until only the leading term counts
     assert orders[-1] == pytest.approx(2, abs=0.13)
     imbalances = np.array([run.energy.worst for run in runs])
     if scheme in AT_END or scheme == ub.EnergyMomentumPrinted():
-        # The ledger does not close, and says so: its imbalance is of second order too.
         assert 1e-8 < imbalances[-1] < 1e-3
         assert np.log2(imbalances[:-1] / imbalances[1:]) == pytest.approx(2, abs=0.5)
     else:
@@ -85,21 +84,6 @@ def test_errors_are_of_second_order(scheme):
 def test_errors_are_of_first_order(scheme):
     orders, _ = rates(scheme)
     assert orders[-1] == pytest.approx(1, abs=0.2)
-
-
-@pytest.mark.parametrize("scheme", [ub.Newmark(), ub.GeneralizedAlpha(0.8)], ids=str)
-def test_adaptive_steps_keep_to_their_tolerance(scheme):
-
-    def error(tolerance):
-        dt = ub.Adaptive(tolerance)
-        solution = ub.simulate(shaken(), scheme, t=(0, 0.5), dt=dt)
-        return np.abs(solution.q[-1] - exact()[0]).max(), solution.time_error
-
-    (coarse, said), (fine, said_fine) = error(1e-5), error(1e-7)
-    assert fine < coarse / 5  # 100**(2/3) = 21 if the order is two, steps being cut alike
-    # The sum of local errors, of which the motion may forget or magnify a part
-    assert coarse < 3 * said
-    assert fine < 3 * said_fine
 
 
 # -- one mode ----------------------------------------------------------------------------------
@@ -150,20 +134,6 @@ def test_amplification_of_a_mode(scheme, Ω):
     assert np.abs(residual).max() < 1e-11 * np.abs(u).max()
 
 
-def test_period_of_average_acceleration():
-    """[closed] tan(θ/2) = Ω/2, θ being the phase of a step; amplitudes stay."""
-    Ω = 0.3
-    θ = 2 * math.atan(Ω / 2)
-    assert np.roots(polynomial(ub.Newmark(), Ω))[:2] == pytest.approx(
-        [np.exp(1j * θ), np.exp(-1j * θ)], rel=1e-12
-    )
-    solution = go(bar(), ub.Newmark(), 400 * Ω / OMEGA, 400)
-    energy = solution.energy.total
-    # Linear: energy is kept but for the first step, whose acceleration is that a 16th later.
-    assert np.ptp(energy[1:]) < 1e-10 * energy[0]
-    assert np.ptp(energy) < 0.07 * Ω**2 * energy[0]
-
-
 @pytest.mark.parametrize("rho_inf", [0.0, 0.4, 0.8, 1.0])
 def test_spectral_radius_at_infinity(rho_inf):
     """[closed] As told; a triple root is found to the cube root of round-off, 1e-5."""
@@ -174,45 +144,12 @@ def test_spectral_radius_at_infinity(rho_inf):
         assert np.abs(roots).max() == pytest.approx(rho_inf, abs=1e-3)
 
 
-@pytest.mark.parametrize("rho_inf", [1 / 3, 0.6, 0.9])
-@pytest.mark.parametrize("Ω", np.geomspace(1e-2, 1e4, 7))
-def test_decaying_midpoint_never_amplifies(rho_inf, Ω):
-    scheme = ub.EnergyMomentumDecaying(rho_inf)
-    largest = np.abs(np.roots(polynomial(scheme, Ω))).max()
-    assert largest <= 1 + 1e-12
-    if Ω <= 0.1:
-        # What the docstring says: the part c Ω⁴ of the energy, to the next order in Ω²
-        assert 1 - largest**2 == pytest.approx(
-            scheme.lost_fraction * Ω**4, rel=20 * Ω**2, abs=1e-14
-        )
-
-
 # -- energy and momenta ------------------------------------------------------------------------
 
 
-def test_energy_of_decaying_midpoint_with_its_memory_never_grows():
-    """[closed] E + c/2 (k Δu² + m Δv²), whatever the steps; E loses what the ledger says."""
-    scheme, random = ub.EnergyMomentumDecaying(0.5), np.random.default_rng(4)
-    simulation = ub.Simulation(bar(), scheme)
-    place = simulation.scene.beams[0].end
-    k, m, states, entries = EA / LENGTH, DENSITY * LENGTH / 3, [], []
-    for dt in [0.0, *10 ** random.uniform(-3, 1, 200) / OMEGA]:
-        if dt:
-            simulation.step_to(simulation.t + dt)
-        states.append([simulation.displacement(place)[0], simulation.velocity(place)[0]])
-        entries.append(simulation.entries()[2]["numerical"])
-    simulation.close()
-    squares = np.array(states) ** 2 @ [k, m] / 2
-    memory = scheme.lost_fraction * np.diff(states, axis=0) ** 2 @ [k, m] / 2
-    stored = squares + np.concatenate([[0.0], memory])
-    assert np.diff(stored).max() <= 1e-12 * stored[0]
-    assert stored[-1] < 0.5 * stored[0]
-    assert squares + np.array(entries) == pytest.approx(np.full(201, squares[0]), rel=1e-10)
-
-
-def thrown(cells=4):
+def thrown():
     """A free beam that moves and turns; its bending and stretching begin at once."""
-    beam = ub.Beam((0, 0), (1, 0), SOFT, cells=cells)
+    beam = ub.Beam((0, 0), (1, 0), SOFT, cells=4)
     return ub.Scene([beam], initial=[ub.Velocity([beam], linear=(1, 2), angular=5.0)])
 
 
@@ -229,7 +166,7 @@ def test_decaying_midpoint_in_large_motion(dt, degree):
 
 
 def test_fourth_order_keeps_energy_and_momenta_at_any_step():
-    """Round-off of 200 stages, each 1e-12 of its forces; a step turns the beam by up to 0.5 rad."""
+    """Steps turn the beam by up to 0.5 rad; round-off of 200 stages, each 1e-12 of its forces."""
     for dt in (0.005, 0.1):
         solution = go(thrown(), ub.EnergyMomentum(order=4), 2.0, round(2 / dt))
         energy, momentum = solution.energy.total, solution.momentum()
@@ -238,18 +175,9 @@ def test_fourth_order_keeps_energy_and_momenta_at_any_step():
         assert np.abs(momentum - momentum[0]).max() < 1e-11 * np.abs(momentum[0]).max()
 
 
-def test_decaying_midpoint_loses_angular_momentum_at_second_order():
-    drifts = []
-    for steps in (100, 200, 400):
-        momentum = go(thrown(), ub.EnergyMomentumDecaying(), 0.5, steps).momentum()[:, 2]
-        drifts.append(np.abs(momentum - momentum[0]).max())
-    assert np.log2(drifts[-2] / drifts[-1]) == pytest.approx(2, abs=0.1)
-    assert drifts[-1] < 1e-4 * abs(momentum[0])
-
-
 @pytest.mark.parametrize(("dt", "drift"), [(0.01, 1.2e-5), (0.1, 1.1e-3)])
 def test_printed_midpoint_drifts_in_energy_and_keeps_momenta(dt, drift):
-    """[calc] The drift of design notes, by another program, of the flying beam with 8 cells."""
+    """[calc] The drift by another program, of the flying beam with 8 cells."""
     solution = go(flying_beam(cells=8), ub.EnergyMomentumPrinted(), 10.0, round(10 / dt))
     loaded = np.sum(solution.times[1:] - dt / 2 < 2.5 - 1e-9)
     energy, momentum = solution.energy.total[loaded:], solution.momentum()[loaded:]
@@ -266,10 +194,9 @@ def test_forces_at_the_end_keep_linear_momentum_alone(scheme):
 
 @pytest.mark.slow
 def test_newmark_survives_the_snap_of_the_swing_but_not_its_energy():
-    """[calc] Programs with Newmark's scheme and equal steps diverge here near 1.53 s.
+    """[calc] Programs with Newmark's scheme and equal steps diverge near 1.53 s.
 
-    With steps that may be cut it gets through, but what the snaps at 0.64 s leave of the energy is
-    not what there was, and the ledger says so; the decaying scheme accounts for what it takes.
+    With steps that may be cut the run ends, but loses energy at 0.64 s, which the ledger shows.
     """
     runs = [
         ub.simulate(swing(), scheme, t=(0, 2), dt=1e-3)
@@ -282,121 +209,77 @@ def test_newmark_survives_the_snap_of_the_swing_but_not_its_energy():
     assert decaying.total[500:].max() <= decaying.total[500] * (1 + 1e-9)
 
 
-# -- what else steps depend on ------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("scheme", AT_END, ids=str)
-def test_accelerations_carry_on(scheme):
-    scene = shaken()
-    whole = go(scene, scheme, 0.5, 100)
-    first = go(scene, scheme, 0.25, 50)
-    second = ub.simulate(
-        scene, scheme, t=(0.25, 0.5), dt=0.005, start=first, newton=ub.Newton(1e-12)
-    )
-    # The guess of the first step differs, and with it what Newton's method leaves
-    assert np.abs(second.q - whole.q[50:]).max() < 1e-10
-    assert np.abs(second.v - whole.v[50:]).max() < 1e-8
+# -- forces at the beginning, moving supports ----------------------------------------------------
 
 
 @pytest.mark.parametrize("scheme", [ub.Newmark(), ub.GeneralizedAlpha(0.8)], ids=str)
 def test_forces_of_the_beginning_do_their_work(scheme):
-    """What moves from the start on and is pushed at once: the imbalance is of second order."""
-
-    def scene():
-        beam = ub.Beam((0, 0), (1, 0), SOFT, cells=4)
-        push = ub.Slide(ub.ground(0, 0), beam.end, ub.PrescribedForce(lambda t: 3.0), axis=(0, 1))
-        return ub.Scene(
-            [beam],
-            connectors=[push],
-            loads=[ub.PointLoad(beam.start, force=(1, 2)), ub.FollowerLoad(beam.end, force=(1, 1))],
-            initial=[ub.Velocity([beam], linear=(0, 2))],
-        )
-
-    worst = [go(scene(), scheme, 0.2, n).energy.worst for n in (100, 200, 400)]
+    """A moving beam is pushed at once: the imbalance is of second order."""
+    beam = ub.Beam((0, 0), (1, 0), SOFT, cells=4)
+    push = ub.Slide(ub.ground(0, 0), beam.end, ub.PrescribedForce(lambda t: 3.0), axis=(0, 1))
+    loads = [ub.PointLoad(beam.start, force=(1, 2)), ub.FollowerLoad(beam.end, force=(1, 1))]
+    moves = ub.Velocity([beam], linear=(0, 2))
+    scene = ub.Scene([beam], connectors=[push], loads=loads, initial=[moves])
+    worst = [go(scene, scheme, 0.2, n).energy.worst for n in (100, 200, 400)]
     assert np.log2(np.divide(worst[:-1], worst[1:])).min() > 1.8
 
 
 @pytest.mark.filterwarnings("ignore:.*it resists rigid turning")
 def test_moving_supports_and_joints_of_multipliers_with_generalized_alpha():
     """A body that turns on the ground and pulls a beam whose end is moved: second order."""
-
-    def scene():
-        body = ub.Body((0.25, 0), mass=1.0, inertia=0.1)
-        beam = ub.Beam((0.5, 0), (1.5, 0), SOFT, cells=2)
-        hinge = ub.Revolute(body.at(0.5, 0), beam.start, multipliers=True)
-        return ub.Scene(
-            [beam],
-            bodies=[body],
-            joints=[ub.Revolute(ub.ground(0, 0), body.at(0, 0)), hinge],
-            supports=[ub.PrescribedDisplacement(beam.end, v=lambda t: 0.3 * math.sin(3 * t) ** 4)],
-            damping=[ub.Rayleigh(stiffness=0.02)],
-        )
-
-    finest = go(scene(), ub.EnergyMomentum(), 0.5, 1000)
-    runs = [go(scene(), ub.GeneralizedAlpha(0.6), 0.5, n) for n in (50, 100)]
+    body = ub.Body((0.25, 0), mass=1.0, inertia=0.1)
+    beam = ub.Beam((0.5, 0), (1.5, 0), SOFT, cells=2)
+    hinge = ub.Revolute(body.at(0.5, 0), beam.start, multipliers=True)
+    scene = ub.Scene(
+        [beam],
+        bodies=[body],
+        joints=[ub.Revolute(ub.ground(0, 0), body.at(0, 0)), hinge],
+        supports=[ub.PrescribedDisplacement(beam.end, v=lambda t: 0.3 * math.sin(3 * t) ** 4)],
+        damping=[ub.Rayleigh(stiffness=0.02)],
+    )
+    finest = go(scene, ub.EnergyMomentum(), 0.5, 1000)
+    runs = [go(scene, ub.GeneralizedAlpha(0.6), 0.5, n) for n in (50, 100)]
     coarse, fine = (np.abs(run.v[-1] - finest.v[-1]).max() for run in runs)
     assert math.log2(coarse / fine) == pytest.approx(2, abs=0.05)
     assert runs[-1].energy.worst < 1e-4
-    joint = runs[-1].scene.joints[1]
-    body, beam = runs[-1].scene.bodies[0], runs[-1].scene.beams[0]
     apart = runs[-1].displacement(body.at(0.5, 0)) - runs[-1].displacement(beam.start)
-    assert joint is not None
     assert np.abs(apart[:, :2]).max() < 1e-10
 
 
 # -- refusals ------------------------------------------------------------------------------------
 
 
-def one_beam(**parts):
-    beam = ub.Beam((0, 0), (1, 0), SOFT, cells=1)
-    return ub.Scene([beam], **{name: [make(beam)] for name, make in parts.items()})
+BEAM = ub.Beam((0, 0), (1, 0), SOFT, cells=1)
+MOVED = {"supports": [ub.PrescribedDisplacement(BEAM.start, u=math.sin)]}
+GUIDED = {"joints": [ub.Guided(BEAM.end, lambda s: (1 + s, 0.0))]}
+RUBBING = {"connectors": [ub.Turn(ub.ground(0, 0), BEAM.start, ub.Coulomb(1.0))]}
+TURNING = {"loads": [ub.RotatingFrame(1.0)]}
 
 
-MOVED = one_beam(supports=lambda beam: ub.PrescribedDisplacement(beam.start, u=math.sin))
-GUIDED = one_beam(joints=lambda beam: ub.Guided(beam.end, lambda s: (1 + s, 0.0)))
-RUBBING = one_beam(
-    connectors=lambda beam: ub.Turn(ub.ground(0, 0), beam.start, ub.Coulomb(1.0)),
-)
-TURNING = one_beam(loads=lambda beam: ub.RotatingFrame(1.0))
-
-
-@pytest.mark.parametrize(
-    ("scheme", "scene", "message"),
-    [
-        (ub.Newmark(), MOVED, "Newmark: the support of beam.start .* prescribes a motion"),
-        (ub.GeneralizedAlpha(1.0), MOVED, "GeneralizedAlpha: the support of beam.start"),
-        (ub.Newmark(0.6, 0.3), MOVED, "prescribes a motion"),
-        (ub.Newmark(), GUIDED, "Newmark: Guided.* use GeneralizedAlpha"),
-        (ub.Newmark(0.6, 0.35), RUBBING, "needs the mean velocity of a step"),
-        (ub.GeneralizedAlpha(), TURNING, "RotatingFrame.* needs the mean velocity"),
-    ],
-)
-def test_wrong_schemes_are_refused(scheme, scene, message):
-    with pytest.raises(ub.ArgumentError, match=message):
-        ub.simulate(scene, scheme, t=(0, 1), dt=0.1)
+def refused(scheme, parts):
+    return lambda: ub.simulate(ub.Scene([BEAM], **parts), scheme, t=(0, 1), dt=0.1)
 
 
 @pytest.mark.parametrize(
-    ("make", "message"),
+    ("make", "words"),
     [
-        (lambda: ub.Newmark(gamma=0.4), "gamma = 0.4 must be at least 0.5"),
-        (lambda: ub.Newmark(beta=1 / 6), "at least gamma/2 = 0.25"),
-        (lambda: ub.GeneralizedAlpha(1.1), "between 0 and 1"),
-        (lambda: ub.EnergyMomentumDecaying(0.2), "at least 0.333333"),
+        (lambda: ub.Newmark(gamma=0.4), ["gamma = 0.4 must be at least 0.5"]),
+        (lambda: ub.Newmark(beta=1 / 6), ["at least gamma/2 = 0.25"]),
+        (lambda: ub.GeneralizedAlpha(1.1), ["between 0 and 1"]),
+        (lambda: ub.EnergyMomentumDecaying(0.2), ["at least 0.333333"]),
+        (
+            refused(ub.Newmark(), MOVED),
+            ["Newmark: the support of beam.start ", " prescribes a motion"],
+        ),
+        (refused(ub.GeneralizedAlpha(1.0), MOVED), ["GeneralizedAlpha: the support of beam.start"]),
+        (refused(ub.Newmark(), GUIDED), ["Newmark: Guided", " use GeneralizedAlpha"]),
+        (refused(ub.Newmark(0.6, 0.35), RUBBING), ["needs the mean velocity of a step"]),
+        (refused(ub.GeneralizedAlpha(), TURNING), ["RotatingFrame", " needs the mean velocity"]),
     ],
 )
-def test_numbers_out_of_range(make, message):
-    with pytest.raises(ub.ArgumentError, match=message):
+def test_wrong_schemes_are_refused(make, words):
+    with raises(*words):
         make()
-
-
-def test_parameters_may_be_integers():
-    """EnergyMomentum(alpha=0, beta=0) is EnergyMomentum()."""
-    runs = [
-        go(swing(cells=2), scheme, 0.01, 10).q
-        for scheme in (ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0, beta=0))
-    ]
-    np.testing.assert_array_equal(*runs)
 
 
 def test_decaying_midpoint_with_steps_of_any_length_is_its_formula():

@@ -37,7 +37,7 @@ def deflection(cells, dt):
 
 
 def answers(times, uv):
-    """What is compared: the table, the least v with its time and u, and the steady motion."""
+    """The table, the least v with its time and u, and the steady motion."""
     rows = np.searchsorted(times, TABLE[:, 0] - 1e-9)
     least = int(np.argmin(uv[:, 1]))
     near = slice(least - 1, least + 2)
@@ -52,10 +52,7 @@ def answers(times, uv):
 
 @pytest.fixture(scope="module")
 def limit():
-    """Richardson's limit in space and in time, each from its own runs since the errors add.
-
-    And what is left: the change of either limit from its coarser pair of runs.
-    """
+    """Richardson's limit in space and in time, and its change from the coarser pairs of runs."""
     space = [answers(*deflection(n, 0.01)) for n in (20, 40, 80)]
     time = [space[0], *(answers(*deflection(20, dt)) for dt in (0.005, 0.0025))]
     before, after = (
@@ -66,11 +63,7 @@ def limit():
 
 
 def test_the_tip_follows_the_table(limit):
-    """[calc] Table of (u, v), to 1e-5 of the largest deflection.
-
-    Our limit is good to 4e-7 (asserted), and the last digit of the table is not: the limit has
-    v = -0.559083, -0.362815 and -0.112695 at 7.5, 10 and 12.5 s, the table 3e-6 to 5e-6 less.
-    """
+    """[calc] Table of (u, v), to 1e-5 of the largest deflection; its last digit is 5e-6 off."""
     values, left = limit
     computed = values[:12].reshape(6, 2)
     assert left[:12].max() < 4e-7
@@ -90,8 +83,7 @@ def test_largest_deflection(limit):
 def test_steady_rotation(limit):
     """[closed] Extension tan(kL)/k - L, k = ω √(ρA/EA); [calc] amplitude 3.65e-3 that v keeps.
 
-    The oscillation shortens the beam by its mean bending, at most that of the first mode of a
-    cantilever: (1.1624 / 2L) times the mean square of v at the tip.
+    The oscillation shortens the beam by (1.1624 / 2L) times the mean square of v at the tip.
     """
     mean_u, amplitude = limit[0][15:]
     k = OMEGA * np.sqrt(1.2 / 2.8e7)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Table 1 of the paper: a straight cantilever whose end is turned by π, at three rates.
 
-Source: the paper, section 4.1; what it does not print (L = 1 m, T = 1, 0.1 and 0.01 s) follows from
-its numbers.  The moment is the same all along the beam, so no number depends on the mesh.
+Source: the paper, section 4.1; L = 1 m, T = 1, 0.1 and 0.01 s follow from its numbers.  The moment
+is the same all along the beam, so no number depends on the mesh.
 
 Printed for η = 2e7 Pa s is another update, which depends on the step.  The numbers here are those
 of Perzyna's law, which Duvaut and Lions's with τ = η/(E + K) is too: [calc] 5.8961, 5.9854, 6.8784.
@@ -56,13 +56,9 @@ def steady(eta, T):
     return M_PLASTIC + (E / (E + K)) ** 2 * eta * math.pi / (L * T) * I
 
 
-@pytest.mark.parametrize("cells", [2, 4, 8])
+@pytest.mark.parametrize("cells", [2, 8])
 def test_rate_independent(cells):
-    """Printed: 38.230 and 5.88614 kN cm, half a unit of the last digit; and the closed forms.
-
-    Static() states the law at the ends of the steps, which is exact for a moment that only grows;
-    1e-12 is a hundred times what Newton's method leaves.
-    """
+    """Printed: 38.230 and 5.88614 kN cm, half a unit of the last digit; and the closed forms."""
     elastic, plastic = moments(None, cells=cells), moments(perzyna(0.0), cells=cells)
     np.testing.assert_allclose(elastic / 10, 38.230, rtol=0, atol=0.5e-3)
     np.testing.assert_allclose(plastic / 10, 5.88614, rtol=0, atol=0.5e-5)
@@ -70,18 +66,13 @@ def test_rate_independent(cells):
     np.testing.assert_allclose(plastic, M_PLASTIC, rtol=1e-12)
 
 
-@pytest.mark.parametrize("cells", [2, 4, 8])
 @pytest.mark.parametrize(
     ("eta", "table"), [(1e6, (5.8866, 5.8911, 5.9358)), (2e7, (5.8961, 5.9854, 6.8784))]
 )
-def test_viscous(eta, table, cells):
-    """Half a unit of the last digit, and the steady moment.
-
-    Flow is steady after 17 of 20 steps of 1.9 relaxation times or more: (1 + 1.9)⁻¹⁷ = 1e-8 of the
-    overstress, which is an eighth of the moment at most.
-    """
+def test_viscous(eta, table):
+    """Half a unit of the last digit, and the moment of steady flow."""
     for T, column in RATES.items():
-        M = moments(perzyna(eta), T, cells=cells)
+        M = moments(perzyna(eta), T)
         np.testing.assert_allclose(M / 10, table[column], rtol=0, atol=0.5e-4)
         np.testing.assert_allclose(M, steady(eta, T), rtol=2e-9)
 
@@ -98,17 +89,15 @@ def test_two_names_of_one_law(eta, scheme):
     np.testing.assert_allclose(other, one, rtol=1e-11)
 
 
-@pytest.mark.parametrize(("eta", "T"), [(0.0, 1.0), (1e6, 0.01), (2e7, 0.1), (2e7, 0.01)])
-@pytest.mark.parametrize("cells", [2, 8])
-def test_exact_statics(eta, T, cells):
-    """The moment converges to the same numbers, of second order in the step.
+@pytest.mark.parametrize(("eta", "T"), [(0.0, 1.0), (2e7, 0.1), (2e7, 0.01)])
+def test_exact_statics(eta, T):
+    """The moment converges to the same numbers, of second order in the step; the ledger closes.
 
-    Here moments work on 2 tan(Δψ/2) of the nodes, so that they differ along the beam by
-    (Δψ/2)² of themselves or less; the limit of three runs is as exact as what the fourth order
-    leaves: (Δψ/2)⁴ = 4e-9 for the coarsest.  The ledger closes at every step.
+    Moments work on 2 tan(Δψ/2) of the nodes, so they differ by (Δψ/2)² along the beam; the fourth
+    order leaves (Δψ/2)⁴ = 4e-9.
     """
-    runs = [turned(perzyna(eta), T, cells=cells, scheme=ub.EnergyMomentumStatic(), steps=n)
-            for n in (200, 400)]  # fmt: skip
+    exact = ub.EnergyMomentumStatic()
+    runs = [turned(perzyna(eta), T, scheme=exact, steps=n) for n in (200, 400)]
     coarse, fine = (run.section_forces(run.scene.beams[0])[:, 2] for run in runs)
     assert np.abs(coarse / steady(eta, T) - 1).max() <= (math.pi / 400) ** 2
     np.testing.assert_allclose((4 * fine - coarse) / 3, steady(eta, T), rtol=1e-8)
@@ -123,18 +112,3 @@ def test_limits_of_viscosity_are_the_plastic_and_the_elastic_law(law, scheme):
     plastic, elastic = (moments(b, scheme=scheme) for b in (ub.ElastoPlastic(M_Y, K * I), None))
     np.testing.assert_allclose(moments(law(0.0), scheme=scheme), plastic, rtol=1e-12)
     np.testing.assert_allclose(moments(law(math.inf), scheme=scheme), elastic, rtol=1e-12)
-
-
-@pytest.mark.parametrize("law", [perzyna, duvaut_lions])
-def test_limits_are_approached_smoothly(law):
-    """The moment grows with the viscosity; both limits are approached in proportion.
-
-    By decades: at a relaxation time a thousandth of the time of flow the next order is 1e-3.
-    """
-    tau = 10.0 ** np.arange(-8, 9)  # s, beside 1 s
-    values = tau * (E + K) if law is perzyna else tau
-    M = np.array([moments(law(value), steps=40)[0] for value in values])
-    assert (np.diff(M) > 0).all()
-    above, below = M - M_PLASTIC, M_ELASTIC - M
-    np.testing.assert_allclose(above[1:5] / above[:4], 10, rtol=1e-3)
-    np.testing.assert_allclose(below[-5:-1] / below[-4:], 10, rtol=2e-3)

@@ -74,9 +74,8 @@ def integrated():
 def lag():
     """Bound of the error of the lag of a step at each switch, per second of the step [calc].
 
-    For a step at most, the damping factor is off by a1 (k - k'): a change of the velocity by
-    a1 (k - k') |v| dt / m.  It moves the displacement by at most this divided by the lower circular
-    frequency.
+    The damping factor is off by a1 (k - k') for a step at most, the velocity by
+    a1 (k - k') |v| dt/m, the displacement by this divided by the lower circular frequency.
     """
     *_, switches, fastest = integrated()
     return switches * A1 * (STIFFNESS - AFTER_YIELD) * fastest / math.sqrt(AFTER_YIELD)
@@ -91,7 +90,7 @@ def test_a_yielding_oscillator_converges_with_first_order(scheme):
     exact, lost, switches, fastest = integrated()
     assert switches == 8
     damping = ub.Rayleigh(mass=A0, stiffness=A1, tangent=True)
-    for steps in (200, 800, 3200):
+    for steps in (200, 800):
         found, run = oscillator(damping, steps, scheme)
         bound = lag() * END / steps
         assert abs(found - exact) < bound
@@ -111,16 +110,10 @@ def test_an_elastic_beam_is_damped_as_by_the_initial_stiffness(scheme, degree):
     """With rotations of 1e-12 the matrices are equal to 1e-12; 100 times this for 50 steps."""
     beam = ub.Beam((0, 0), (0.8, 0.6), ub.Section(**PLAIN), cells=3)
     load = ub.PointLoad(beam.end, force=(-0.6e-10, 0.8e-10))
-    a, b = (
-        ub.simulate(
-            clamped(beam, loads=[load], damping=[ub.Rayleigh(mass=1, stiffness=1e-3, tangent=x)]),
-            scheme,
-            t=(0, 0.5),
-            dt=0.01,
-            mesh=ub.Mesh(degree=degree),
-        )
-        for x in (False, True)
-    )
+    dampings = (ub.Rayleigh(mass=1, stiffness=1e-3, tangent=x) for x in (False, True))
+    scenes = (clamped(beam, loads=[load], damping=[damping]) for damping in dampings)
+    steps = {"t": (0, 0.5), "dt": 0.01, "mesh": ub.Mesh(degree=degree)}
+    a, b = (ub.simulate(scene, scheme, **steps) for scene in scenes)
     np.testing.assert_allclose(a.q, b.q, rtol=0, atol=1e-10 * np.abs(a.q).max())
     np.testing.assert_allclose(a.energy["damping"], b.energy["damping"], rtol=1e-10)
     M, m = a.diagram(beam).M, b.diagram(beam).M
@@ -130,9 +123,8 @@ def test_an_elastic_beam_is_damped_as_by_the_initial_stiffness(scheme, degree):
 def test_rigid_rotation_is_damped_less_with_smaller_steps():
     """K follows the beam, but in a step of dt it is behind by a rotation ω dt.
 
-    This rotation stretches the axes of K by (ω dt)²/2, so the power is a1 EA L (ω² dt/2)² [closed].
-    Tolerance: the next term is (ω dt)² smaller; the spin loses 1e-3 of its energy; the stretch by
-    centrifugal forces is 1e-4 of the stretch of the axes.
+    [closed] It stretches the axes of K by (ω dt)²/2, so the power is a1 EA L (ω² dt/2)²; the next
+    term is (ω dt)² smaller, and the spin loses 1e-3 of its energy.
     """
     omega, a1, EA = 2 * math.pi, 1e-7, 1e6
     stiff = ub.Section(EA=EA, GA=4e5, EI=1e4, rhoA=1.0, rhoI=0.01)
@@ -203,7 +195,6 @@ def test_a_flowing_cell_has_no_damping_moment():
     """A perfectly plastic cell bears its yield moment while it flows, except in the first step.
 
     With the initial stiffness the moment a1 EI dκ/dt is added, see docs/howto_earthquake.md.
-    Cells without mass have no moments of inertia.  Tolerance: digits of Newton's method.
     """
     section = ub.Section(EA=1e4, GA=4e3, EI=100.0, bending=ub.ElastoPlastic(3.0))
     excess = {}
@@ -218,16 +209,12 @@ def test_a_flowing_cell_has_no_damping_moment():
 
 
 def test_first_step_after_statics_is_elastic():
-    """`start=` a static run: K of the first step is the elastic stiffness; then the tangent."""
+    """`start=` a static run that yielded: small vibrations unload the state, so K is elastic."""
     law = ub.ElastoPlastic(3e-4, kinematic=5.0)
     beam = ub.Beam((0, 0), (1, 0), ub.Section(**PLAIN, bending=law), cells=2)
     load = ub.PointLoad(beam.end, force=(0.0, 5e-4))
     pulled = ub.simulate(clamped(beam, loads=[load]), ub.Static(), t=(0, 1), dt=0.1)
     scene = clamped(beam, loads=[load], damping=[ub.Rayleigh(stiffness=1e-3, tangent=True)])
-    simulation = ub.Simulation(scene, ub.EnergyMomentum(), start=pulled)
-    np.testing.assert_allclose(simulation.inelastic[0].points.damped.tangents[:, 8], PLAIN["EI"])
-    simulation.close()
-    # Small vibrations unload the yielded state, so K is elastic; rotations are about 1e-5.
     for at in (pulled, ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.3), dt=0.01, start=pulled)):
         damped = ub.modes(scene, 1, at=at)
         np.testing.assert_allclose(damped.damping, 1e-3 * damped.omega / 2, rtol=1e-4)

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What a trade-off recommends keeps the tolerance or the time that was asked for.
+"""Recommendations of a trade-off keep the given tolerance or time.
 
-Against runs whose steps are a fifth and whose cells are half as long or shorter, of scenes that
-are smooth, stiff and plastic.
+Against runs of smooth, stiff and plastic scenes with steps of a fifth and cells of half the length.
 """
 
 import math
@@ -16,6 +15,9 @@ import ufl_beam as ub
 from ufl_beam.analysis import tradeoff
 
 pytestmark = [pytest.mark.slow, pytest.mark.serial]
+
+
+STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
 
 
 def flying_beam():
@@ -32,24 +34,15 @@ def swing():
 
 def yielding_cantilever():
     """Plastic: a force that grows within 20 ms and stays."""
-    section = ub.Section.rectangle(
-        b=0.1,
-        h=0.1,
-        E=210e9,
-        nu=0.3,
-        rho=7850.0,
-        bending=ub.ElastoPlastic(yield_limit=40e3, isotropic=1e5),
-    )
-    scene = scenes.cantilever(
-        section, length=2.0, cells=4, force=(0, -25e3), time=ub.Table([0, 0.02], [0, 1])
-    )
+    law, time = ub.ElastoPlastic(yield_limit=40e3, isotropic=1e5), ub.Table([0, 0.02], [0, 1])
+    section = ub.Section.rectangle(b=0.1, h=0.1, **STEEL, bending=law)
+    scene = scenes.cantilever(section, length=2.0, cells=4, force=(0, -25e3), time=time)
     return scene, scene.beams[0].end, {"t": (0.0, 0.1), "dt": 4e-3}
 
 
 def softening_cantilever():
     """A hinge at the clamp opens under a pulse and becomes a joint."""
-    steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
-    section = ub.Section.rectangle(b=0.05, h=0.1, **steel)
+    section = ub.Section.rectangle(b=0.05, h=0.1, **STEEL)
     beam = ub.Beam((0, 0), (2, 0), section, cells=4, hinges={0.0: ub.Softening(20e3, 2e3)})
     push = ub.Table([0, 0.01, 0.02], [0, 1, 0])
     scene = clamped(beam, loads=[ub.PointLoad(beam.end, force=(0, 40e3), amplitude=push)])
@@ -91,18 +84,12 @@ def test_a_tolerance_is_kept(make, part):
     def end(solution):
         return solution.position(place)[-1]
 
-    found = ub.tradeoff(
-        scene, {"end": end}, scheme=ub.EnergyMomentum(), tolerance={"end": tolerance}, **times
-    )
+    scheme = ub.EnergyMomentum()
+    found = ub.tradeoff(scene, {"end": end}, scheme=scheme, tolerance={"end": tolerance}, **times)
     print(found)
     setting = found.best.setting
-    fine = ub.simulate(
-        scene,
-        ub.EnergyMomentum(),
-        t=times["t"],
-        dt=setting.dt / 5,
-        mesh=ub.Mesh(refine=2 * max(setting.mesh.refine, 8)),
-    )
+    mesh = ub.Mesh(refine=2 * max(setting.mesh.refine, 8))
+    fine = ub.simulate(scene, scheme, t=times["t"], dt=setting.dt / 5, mesh=mesh)
     error = np.abs(found.best.values["end"] - end(fine)).max()
     print(f"{make.__name__}: asked {tolerance:.2e}, got {error:.2e}")
     assert error <= tolerance
@@ -130,13 +117,8 @@ def test_a_tolerance_is_used_up_at_a_limited_cost(make, part):
     found = ub.tradeoff(scene, {"path": path}, scheme=ub.EnergyMomentum(), tolerance=part, **times)
     print(found)
     # Cells of sixth order and steps that are ten times as short leave a hundredth of the error.
-    fine = ub.simulate(
-        scene,
-        ub.EnergyMomentum(),
-        t=times["t"],
-        dt=found.best.setting.dt / 10,
-        mesh=ub.Mesh(refine=8, degree=3),
-    )
+    steps = {"t": times["t"], "dt": found.best.setting.dt / 10}
+    fine = ub.simulate(scene, ub.EnergyMomentum(), mesh=ub.Mesh(refine=8, degree=3), **steps)
     error = np.abs(found.best.values["path"] - path(fine)).max() / np.abs(path(fine)).max()
     print(f"{make.__name__}: asked {part:.2e}, got {error:.2e}, effort {found.effort:.1f}")
     # Of 0.3, if another trial would not exceed the effort, which is planned by times.
@@ -153,13 +135,8 @@ def test_a_tolerance_is_used_up_at_a_limited_cost(make, part):
 def test_a_budget_is_kept(make):
     """As it measured the time; benchmarks/bench_budget.py runs what is recommended again."""
     scene, place, times = make()
-    found = ub.tradeoff(
-        scene,
-        {"end": lambda s: s.position(place)[-1]},
-        scheme=ub.EnergyMomentum(),
-        budget=1.0,
-        **times,
-    )
+    end = {"end": lambda s: s.position(place)[-1]}
+    found = ub.tradeoff(scene, end, scheme=ub.EnergyMomentum(), budget=1.0, **times)
     print(found)
     assert found.best.seconds <= 1.2
     assert found.ratio(found.best) < 0.02
