@@ -9,30 +9,8 @@ numbers are drawn in the order of the calls: a changed function changes its stor
 
 import math
 
-from stored_scenes import DYNAMIC, OVER_ANY_STEP, OVER_STEP, effect
-from user_classes import (
-    AirDrag,
-    Brake,
-    Cubic,
-    Cushion,
-    Dashpot,
-    HardeningSpring,
-    Integral,
-    Maxwell,
-    MaxwellElement,
-    Petersson,
-    PowerLaw,
-    Relaxing,
-    Rising,
-    Stiffening,
-    Weighted,
-    current,
-    dead,
-    drag,
-    field,
-    soil,
-    warming,
-)
+import user_classes as own
+from stored_scenes import DYNAMIC, OVER_ANY_STEP, OVER_STEP, Drawn, Instead, effect, effects
 
 import ufl_beam as ub
 import ufl_beam.structures as st
@@ -57,29 +35,51 @@ def arm(d, section=None, force=20.0, cells=3, hold=True, grows=None, **options):
     return beam
 
 
-def forearm(d, beam, apart=0.0, force=15.0):
-    """A second beam from the end of the first one, with a force at its end."""
+def joined(d, joint=None, apart=0.0, section=None):
+    """An arm, a second beam from its end with a force at its own end, and a joint."""
+    beam = arm(d, section)
     x, y = beam.end.point
-    start, section = (x + apart, y + apart / 2), ub.Section(**PLAIN)
-    other = ub.Beam(start, (x + 0.6, y - d.some(0.3, 0.6)), section, cells=2, name="b1")
-    d.add("beams", other)
-    if force:
-        load = (d.some(-force, force), d.sign() * d.some(force / 2, force))
-        d.add("loads", ub.PointLoad(other.end, force=load, amplitude=d.wave()))
-    return other
+    start, end = (x + apart, y + apart / 2), (x + 0.6, y - d.some(0.3, 0.6))
+    other = d.add("beams", ub.Beam(start, end, ub.Section(**PLAIN), cells=2, name="b1"))
+    load = d.some(-15.0, 15.0), d.sign() * d.some(7.5, 15.0)
+    d.add("loads", ub.PointLoad(other.end, force=load, amplitude=d.wave()))
+    if joint:
+        d.add("joints", joint(beam.end, other.start))
+    return beam, other
+
+
+def turning_spring(d, a, b, low=20, high=60):
+    d.add("connectors", ub.Turn(a, b, ub.Spring(d.some(low, high))))
+
+
+def springs_along_axes(d, a, b, low, high):
+    for axis in ((1.0, 0.0), (0.0, 1.0)):
+        d.add("connectors", ub.Slide(a, b, ub.Spring(d.some(low, high)), axis=axis))
 
 
 def driven(d, section=None, size=0.06, grows=None, **options):
     """An arm whose end is moved forth and back, so that it has no limit load."""
     beam = arm(d, section, force=0.0, **options)
     moved, size = grows or d.swell(), d.sign() * d.some(0.8 * size, 1.2 * size)
-    d.add("supports", ub.PrescribedDisplacement(beam.end, v=lambda t: size * moved(t)))
+    d.add("supports", ub.PrescribedDisplacement(beam.end, v=of_size(moved, size)))
     return beam
 
 
 def of_size(grows, size):
     """A function of time, multiplied by a number."""
     return lambda t: size * grows(t)
+
+
+def some(low, high):
+    return lambda d: d.some(low, high)
+
+
+def either(low, high):
+    return lambda d: d.either_sign(low, high)
+
+
+def yes_or_no(d):
+    return d.one(True, False)
 
 
 def near(d, low=0.2, high=0.8):
@@ -128,25 +128,20 @@ def follower_load(d):
 
 @effect(ub.LineLoad)
 def line_load(d):
-    beam = arm(d)
-    force, moment, amplitude = force_of(d, 30.0), d.either_sign(1, 4), d.wave()
-    d.add("loads", ub.LineLoad(beam, force, moment, amplitude, **span_and_profile(d)))
+    numbers = arm(d), force_of(d, 30.0), d.either_sign(1, 4), d.wave()
+    d.add("loads", ub.LineLoad(*numbers, **span_and_profile(d)))
 
 
 @effect(ub.Pressure)
 def pressure(d):
-    beam = arm(d)
-    p, q, amplitude = d.either_sign(10, 30), d.either_sign(10, 30), d.wave()
-    d.add("loads", ub.Pressure(beam, p, q, amplitude, **span_and_profile(d)))
+    numbers = arm(d), d.either_sign(10, 30), d.either_sign(10, 30), d.wave()
+    d.add("loads", ub.Pressure(*numbers, **span_and_profile(d)))
 
 
 @effect(ub.MovingLoad)
 def moving_load(d):
-    beam = arm(d)
-    d.add("supports", ub.Roller(beam.end))
-    other = forearm(d, beam)
-    d.add("joints", ub.Revolute(beam.end, other.start))
-    d.add("supports", ub.Roller(other.end))
+    beam, other = joined(d, ub.Revolute)
+    d.add("supports", ub.Roller(beam.end), ub.Roller(other.end))
     speed, start = d.acts(4.0, 6.0), d.some(0.1, 0.2)
     mass = 0.0 if d.static else d.acts(0.2, 0.6)
     d.add("loads", ub.MovingLoad(
@@ -164,9 +159,8 @@ def gravity(d):
 @effect(ub.RotatingFrame, schemes=OVER_ANY_STEP)
 def rotating_frame(d):
     arm(d)
-    d.add("loads", ub.RotatingFrame(
-        d.either_sign(4, 8), about=(-d.acts(0.1, 0.3), d.acts(0.1, 0.3))
-    ))  # fmt: skip
+    rate, about = d.either_sign(4, 8), (-d.acts(0.1, 0.3), d.acts(0.1, 0.3))
+    d.add("loads", ub.RotatingFrame(rate, about=about))
 
 
 @effect(ub.ImposedStrain)
@@ -193,12 +187,11 @@ def ground_motion(d):
     values = [d.either_sign(10.0, 40.0) for _ in range(6)]
     quake = st.GroundMotion(d.acts(0.02, 0.03), values)
     d.further.append(quake)
-    if d.static or d.one(True, False):
+    if d.static or yes_or_no(d):
         d.add("loads", ub.Gravity((-1, 0.5), amplitude=quake.acceleration))
     else:
-        d.parts["supports"] = [
-            ub.PrescribedDisplacement(beam.start, u=0.0, v=quake.displacement, psi=0.0)
-        ]
+        moved = ub.PrescribedDisplacement(beam.start, u=0.0, v=quake.displacement, psi=0.0)
+        d.parts["supports"] = [moved]
 
 
 # -- works and damping ---------------------------------------------------------------------------
@@ -207,28 +200,24 @@ def ground_motion(d):
 @effect(ub.VirtualWork)
 def virtual_work(d):
     """A force across the deformed axis, or a dead force on one of two beams, and drag."""
-    beam = arm(d)
-    other = forearm(d, beam)
-    d.add("joints", ub.Rigid(beam.end, other.start))
+    beam, _ = joined(d, ub.Rigid)
     grows, size = d.wave(), d.either_sign(5, 15)
     d.add("works", d.one(
-        ub.VirtualWork("current", current, beams=[beam], numbers={"p": size}, degree=3),
-        ub.VirtualWork("dead", dead, numbers={"x": size, "y": lambda t: size * grows(t)}),
+        ub.VirtualWork("current", own.current, beams=[beam], numbers={"p": size}, degree=3),
+        ub.VirtualWork("dead", own.dead, numbers={"x": size, "y": of_size(grows, size)}),
     ))  # fmt: skip
     if not d.static:
-        d.add("works", ub.VirtualWork("drag", drag, numbers={"c": d.acts(0.5, 3)}))
+        d.add("works", ub.VirtualWork("drag", own.drag, numbers={"c": d.acts(0.5, 3)}))
 
 
 @effect(ub.Potential)
 def potential(d):
-    beam = arm(d)
-    other = forearm(d, beam)
-    d.add("joints", ub.Rigid(beam.end, other.start))
+    _, other = joined(d, ub.Rigid)
     grows, size = d.wave(), d.either_sign(2, 5)
-    d.add("works", ub.Potential("soil", soil, beams=[other], numbers={"k": d.acts(50, 300)}))
+    d.add("works", ub.Potential("soil", own.soil, beams=[other], numbers={"k": d.acts(50, 300)}))
     d.add("works", d.one(
-        ub.Potential("field", field, numbers={"size": lambda t: size * grows(t)}),
-        ub.Potential("warming", warming, numbers={"M": lambda t: size * grows(t)}, degree=3),
+        ub.Potential("field", own.field, numbers={"size": of_size(grows, size)}),
+        ub.Potential("warming", own.warming, numbers={"M": of_size(grows, size)}, degree=3),
     ))  # fmt: skip
 
 
@@ -238,55 +227,47 @@ def own_statement(d):
     beam = arm(d)
     x, y = beam.end.point
     place, k, grows = ub.ground(x, y + 0.5), d.acts(100, 300), d.wave()
-    d.add("works", ub.Effect(
-        HardeningSpring(), places=[place, beam.end],
-        numbers={"k": lambda t: k * (1 + grows(t) / 2), "h": d.acts(1e4, 3e4)},
-    ))  # fmt: skip
-    numbers = {"k": d.acts(100, 300), "time": d.acts(0.02, 0.1)}
-    d.add("works", ub.Effect(MaxwellElement(), places=[beam.at(0.5), beam.end], numbers=numbers))
+    numbers = {"k": lambda t: k * (1 + grows(t) / 2), "h": d.acts(1e4, 3e4)}
+    d.add("works", ub.Effect(own.HardeningSpring(), places=[place, beam.end], numbers=numbers))
+    numbers, places = {"k": d.acts(100, 300), "time": d.acts(0.02, 0.1)}, [beam.at(0.5), beam.end]
+    d.add("works", ub.Effect(own.MaxwellElement(), places=places, numbers=numbers))
     if not d.static:
         drag = {"c": d.acts(0.5, 3)}
-        d.add("works", ub.Effect(AirDrag(), beams=[beam], numbers=drag, degree=3))
+        d.add("works", ub.Effect(own.AirDrag(), beams=[beam], numbers=drag, degree=3))
 
 
 @effect(ub.Rayleigh, schemes=DYNAMIC)
 def rayleigh(d):
-    law = ub.ElastoPlastic(d.some(3, 6), kinematic=d.some(3, 10))
-    arm(d, ub.Section(**PLAIN, bending=law))
+    arm(d, ub.Section(**PLAIN, bending=ub.ElastoPlastic(d.some(3, 6), kinematic=d.some(3, 10))))
     mass, stiffness = d.acts(0.5, 3), d.acts(5e-4, 3e-3)
-    d.add("damping", ub.Rayleigh(mass=mass, stiffness=stiffness, tangent=d.one(True, False)))
+    d.add("damping", ub.Rayleigh(mass=mass, stiffness=stiffness, tangent=yes_or_no(d)))
 
 
 @effect(ub.KelvinVoigt)
 def kelvin_voigt(d):
-    beam = arm(d)
-    other = forearm(d, beam)
-    d.add("joints", ub.Rigid(beam.end, other.start))
+    _, other = joined(d, ub.Rigid)
     d.add("damping", ub.KelvinVoigt(d.acts(2e-3, 1e-2), beams=d.one(None, [other])))
 
 
 # -- supports ----------------------------------------------------------------------------------
 
 
-@effect(ub.Clamped)
-def clamped(d):
+def held_at_its_start(d, support):
     beam = arm(d, hold=False)
-    d.add("supports", d.instead(ub.Clamped, ub.Pinned)(beam.start))
-    d.add("connectors", ub.Turn(ub.ground(0, 0), beam.end, ub.Spring(d.some(20, 60))))
+    d.add("supports", support(d)(beam.start))
+    turning_spring(d, ub.ground(0, 0), beam.end)
 
 
-@effect(ub.Pinned)
-def pinned(d):
-    beam = arm(d, hold=False)
-    d.add("supports", d.instead(ub.Pinned, ub.Clamped)(beam.start))
-    d.add("connectors", ub.Turn(ub.ground(0, 0), beam.end, ub.Spring(d.some(20, 60))))
+effects(
+    held_at_its_start,
+    clamped=Instead(ub.Clamped, ub.Pinned),
+    pinned=Instead(ub.Pinned, ub.Clamped),
+)
 
 
 @effect(ub.Roller)
 def roller(d):
-    beam = arm(d)
-    other = forearm(d, beam)
-    d.add("joints", ub.Rigid(beam.end, other.start))
+    _, other = joined(d, ub.Rigid)
     d.add("supports", ub.Roller(other.end, along=(d.acts(0.2, 0.6), 1.0)))
 
 
@@ -302,59 +283,45 @@ def prescribed_displacement(d):
 # -- joints ------------------------------------------------------------------------------------
 
 
-def joined(d, apart=0.0):
-    beam = arm(d)
-    return beam, forearm(d, beam, apart)
-
-
-@effect(ub.Rigid)
-def rigid(d):
+def joined_with_a_spring(d, joint):
     beam, other = joined(d)
-    multipliers = d.one(True, False)
-    d.add("joints", d.instead(ub.Rigid, ub.Revolute)(
-        beam.end, other.start, multipliers=multipliers
-    ))  # fmt: skip
-    d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
+    multipliers = yes_or_no(d)
+    d.add("joints", joint(d)(beam.end, other.start, multipliers=multipliers))
+    turning_spring(d, beam.end, other.start)
 
 
-@effect(ub.Revolute)
-def revolute(d):
-    beam, other = joined(d)
-    multipliers = d.one(True, False)
-    d.add("joints", d.instead(ub.Revolute, ub.Rigid)(
-        beam.end, other.start, multipliers=multipliers
-    ))  # fmt: skip
-    d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
+effects(
+    joined_with_a_spring,
+    rigid=Instead(ub.Rigid, ub.Revolute),
+    revolute=Instead(ub.Revolute, ub.Rigid),
+)
 
 
 @effect(ub.Prismatic)
 def prismatic(d):
     beam, other = joined(d)
-    axis, turning = (d.acts(0.3, 0.8), 1.0), d.one(True, False)
+    axis, turning = (d.acts(0.3, 0.8), 1.0), yes_or_no(d)
     d.add("joints", ub.Prismatic(beam.end, other.start, axis=axis, turning=turning))
     d.add("connectors", ub.Slide(beam.end, other.start, ub.Spring(d.some(100, 500)), axis=axis))
     if turning:
-        d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
+        turning_spring(d, beam.end, other.start)
 
 
 @effect(ub.RigidLink)
 def rigid_link(d):
-    beam, other = joined(d, apart=d.acts(0.1, 0.2))
-    d.add("joints", ub.RigidLink(beam.end, other.start))
+    joined(d, ub.RigidLink, apart=d.acts(0.1, 0.2))
 
 
 @effect(ub.Link)
 def link(d):
-    beam, other = joined(d)
-    d.add("joints", ub.Rigid(beam.end, other.start))
+    _, other = joined(d, ub.Rigid)
     x, y = other.end.point
     d.add("joints", ub.Link(ub.ground(x + d.acts(0.3, 0.6), y + d.acts(0.3, 0.9)), other.end))
 
 
 @effect(ub.Guided, seeds={4: 11})
 def guided(d):
-    beam, other = joined(d)
-    d.add("joints", ub.Rigid(beam.end, other.start))
+    _, other = joined(d, ub.Rigid)
     (x, y), slope, bend = other.end.point, d.acts(0.2, 0.6), d.acts(1.0, 3.0)
     d.add("joints", ub.Guided(other.end, lambda s: (x + slope * s + bend * s**2, y + s)))
 
@@ -362,10 +329,9 @@ def guided(d):
 @effect(ub.Spline)
 def spline(d):
     """A guide through points; some of its segments are passed in the run."""
-    beam, other = joined(d)
-    d.add("joints", ub.Rigid(beam.end, other.start))
+    _, other = joined(d, ub.Rigid)
     (x, y), slope, rate = other.end.point, d.acts(0.2, 0.6), d.acts(10, 20)
-    both = d.one(True, False)  # sides of the place; else the parameters are distances
+    both = yes_or_no(d)  # sides of the place; else the parameters are distances
     s = [0.02 * k for k in range(-20 if both else 0, 21)]
     points = [(x + slope * p + 0.02 * math.sin(rate * p), y + p) for p in s]
     d.add("joints", ub.Guided(other.end, ub.Spline(points, s) if both else ub.Spline(points)))
@@ -374,13 +340,11 @@ def spline(d):
 @effect(ub.Release)
 def release(d):
     beam, other = joined(d)
-    free, multipliers = d.one("N", "V", "M"), d.one(True, False)
+    free, multipliers = d.one("N", "V", "M"), yes_or_no(d)
     free = d.instead(free, {"N": "V", "V": "M", "M": "N"}[free])
     d.add("joints", ub.Release(beam.end, other.start, free=free, multipliers=multipliers))
-    for axis in ((1.0, 0.0), (0.0, 1.0)):
-        spring = ub.Spring(d.some(200, 600))
-        d.add("connectors", ub.Slide(beam.end, other.start, spring, axis=axis))
-    d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
+    springs_along_axes(d, beam.end, other.start, 200, 600)
+    turning_spring(d, beam.end, other.start)
 
 
 # -- connectors --------------------------------------------------------------------------------
@@ -388,16 +352,14 @@ def release(d):
 
 @effect(ub.Turn)
 def turn(d):
-    beam, other = joined(d)
-    d.add("joints", ub.Revolute(beam.end, other.start))
+    beam, other = joined(d, ub.Revolute)
     d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.acts(20, 60))))
 
 
 @effect(ub.Stretch)
 def stretch(d):
     """Between the ground or a beam and a place of another beam."""
-    beam, other = joined(d)
-    d.add("joints", ub.Rigid(beam.end, other.start))
+    beam, other = joined(d, ub.Rigid)
     a = d.one(beam.at(1 / 3), ub.ground(d.some(0.1, 0.4), -0.5))
     d.add("connectors", ub.Stretch(a, other.end, ub.Spring(d.acts(100, 400))))
 
@@ -405,8 +367,7 @@ def stretch(d):
 @effect(ub.Slide)
 def slide(d):
     """Along an axis that turns with a beam, to a place at a distance."""
-    beam, other = joined(d)
-    d.add("joints", ub.Rigid(beam.end, other.start))
+    beam, other = joined(d, ub.Rigid)
     axis = (d.acts(0.3, 0.8), 1.0)
     d.add("connectors", ub.Slide(beam.at(2 / 3), other.end, ub.Spring(d.acts(100, 400)), axis=axis))
 
@@ -414,30 +375,18 @@ def slide(d):
 @effect(ub.Bushing, schemes=DYNAMIC)
 def bushing(d):
     beam, other = joined(d)
-    law = Cushion(d.acts(100, 300), d.acts(0.05, 0.1), d.acts(1, 5))
+    law = own.Cushion(d.acts(100, 300), d.acts(0.05, 0.1), d.acts(1, 5))
     axis = (d.acts(0.3, 0.8), 1.0)
     d.add("connectors", ub.Bushing(beam.end, other.start, law, axis=axis))
-    d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
-
-
-@effect(ub.PrescribedMotion)
-def prescribed_motion(d):
-    grows, size = d.swell(), d.either_sign(0.03, 0.1)
-    connected(d, ub.PrescribedMotion(lambda t: size * grows(t)), d.one("Turn", "Stretch", "Slide"))
-
-
-@effect(ub.PrescribedForce)
-def prescribed_force(d):
-    grows, size = d.wave(), d.either_sign(3, 10)
-    connected(d, ub.PrescribedForce(lambda t: size * grows(t)), d.one("Turn", "Stretch", "Slide"))
+    turning_spring(d, beam.end, other.start)
 
 
 @effect(ub.Controller)
 def controller(d):
     """Integral of a rotation, or a force from a displacement that is sampled."""
     beam = arm(d)
-    if d.one(True, False):
-        law = ub.Controller(Integral(beam.end, d.acts(5, 20)))
+    if yes_or_no(d):
+        law = ub.Controller(own.Integral(beam.end, d.acts(5, 20)))
         d.add("connectors", ub.Turn(ub.ground(0, 0), beam.end, law))
         return
     gain, sample = d.acts(20, 60), d.one(None, 3 * d.dt)
@@ -445,10 +394,33 @@ def controller(d):
     connected(d, law, beam=beam)
 
 
-@effect(ub.Spring)
-def spring(d):
-    """Elastic with a free motion."""
-    connected(d, ub.Spring(d.acts(100, 400), free=d.either_sign(0.01, 0.03)))
+@effect(ub.PrescribedMotion)
+def prescribed_motion(d):
+    law = ub.PrescribedMotion(of_size(d.swell(), d.either_sign(0.03, 0.1)))
+    connected(d, law, d.one("Turn", "Stretch", "Slide"))
+
+
+@effect(ub.PrescribedForce)
+def prescribed_force(d):
+    law = ub.PrescribedForce(of_size(d.wave(), d.either_sign(3, 10)))
+    connected(d, law, d.one("Turn", "Stretch", "Slide"))
+
+
+effects(
+    lambda d, law: connected(d, law(d)),
+    spring=Drawn(ub.Spring, (100, 400), free=either(0.01, 0.03)),
+    damper=Drawn(ub.Damper, (2, 10)),
+    own_connector_law=Drawn(own.Stiffening, (50, 200), (3e4, 9e4)),
+)
+
+MAXWELL = Drawn(own.Maxwell, (100, 300), (0.02, 0.1))
+
+effects(
+    lambda d, law: connected(d, law(d)),
+    schemes=DYNAMIC,
+    force_law_with_state=Drawn(ub.ForceLaw, MAXWELL, state=[0.0]),
+    own_connector_law_with_state=Drawn(own.Relaxing, (100, 300), (0.02, 0.1), (2, 10)),
+)
 
 
 @effect(ub.Spring)
@@ -460,15 +432,9 @@ def yielding_spring(d):
 
 @effect(ub.Spring)
 def breaking_spring(d):
-    beam = driven(d, size=0.1)
-    kind = d.one(ub.Softening, ub.LinearSoftening)
+    beam, kind = driven(d, size=0.1), d.one(ub.Softening, ub.LinearSoftening)
     softening = kind(d.acts(0.3, 0.8), d.acts(0.02, 0.05))
     connected(d, ub.Spring(d.acts(150, 300), softening=softening), beam=beam)
-
-
-@effect(ub.Damper)
-def damper(d):
-    connected(d, ub.Damper(d.acts(2, 10)))
 
 
 @effect(ub.Stop)
@@ -520,35 +486,20 @@ def rigid_plastic(d):
 
 @effect(ub.RigidPlastic, schemes=OVER_STEP)
 def rigid_then_softening(d):
-    kind = d.one(ub.Softening, ub.LinearSoftening, Petersson)
-    connected(d, ub.RigidPlastic(kind(d.acts(1, 4), d.acts(0.1, 0.3))), beam=arm(d))
+    kind = d.one(ub.Softening, ub.LinearSoftening, own.Petersson)
+    connected(d, ub.RigidPlastic(kind(d.acts(1, 4), d.acts(0.1, 0.3))))
 
 
 @effect(ub.ForceLaw)
 def force_law(d):
-    cubic = Cubic(d.acts(50, 200), d.acts(3e4, 9e4))
+    cubic = own.Cubic(d.acts(50, 200), d.acts(3e4, 9e4))
     connected(d, ub.ForceLaw(cubic, stored=d.one(None, cubic.energy)))
-
-
-@effect(ub.ForceLaw, schemes=DYNAMIC)
-def force_law_with_state(d):
-    connected(d, ub.ForceLaw(Maxwell(d.acts(100, 300), d.acts(0.02, 0.1)), state=[0.0]))
-
-
-@effect(ub.extend.ConnectorLaw)
-def own_connector_law(d):
-    connected(d, Stiffening(d.acts(50, 200), d.acts(3e4, 9e4)))
-
-
-@effect(ub.extend.ConnectorLaw, schemes=DYNAMIC)
-def own_connector_law_with_state(d):
-    connected(d, Relaxing(d.acts(100, 300), d.acts(0.02, 0.1), d.acts(2, 10)))
 
 
 @effect(ub.extend.ConnectorLaw, schemes=OVER_STEP)
 def own_connector_law_that_holds(d):
     rest = d.acts(4, 8)
-    connected(d, Brake(rest, rest * d.acts(0.5, 0.8), d.acts(0.02, 0.1)))
+    connected(d, own.Brake(rest, rest * d.acts(0.5, 0.8), d.acts(0.02, 0.1)))
 
 
 def backbone(d, M, k):
@@ -565,11 +516,9 @@ def deteriorating(d, kind, *more, **numbers):
     d.add("supports", ub.Pinned(beam.start))
     M, k = d.some(0.8, 1.5), d.acts(150, 250)
     plus, minus = backbone(d, M, k), None if d.static else backbone(d, M, k)
-    energies = {
-        name: d.acts(20, 60) * M / k for name in ("strength", "softening", "unloading", *more)
-    }
-    exponent = d.acts(1.0, 1.5)
-    law = kind(k, plus, minus, **energies, exponent=exponent, **numbers)
+    of = "strength", "softening", "unloading", *more
+    energies = {name: d.acts(20, 60) * M / k for name in of}
+    law = kind(k, plus, minus, **energies, exponent=d.acts(1.0, 1.5), **numbers)
     d.add("connectors", ub.Turn(ub.ground(0, 0), beam.start, law))
 
 
@@ -580,34 +529,49 @@ def ibarra_krawinkler(d):
 
 @effect(st.PinchingHinge, st.Backbone)
 def pinching_hinge(d):
-    deteriorating(
-        d, st.PinchingHinge, "reloading", kappa_F=d.acts(0.3, 0.7), kappa_D=d.acts(0.2, 0.7)
-    )
+    numbers = {"kappa_F": d.acts(0.3, 0.7), "kappa_D": d.acts(0.2, 0.7)}
+    deteriorating(d, st.PinchingHinge, "reloading", **numbers)
 
 
 @effect(st.AxialBendingHinge)
 def axial_bending_hinge(d):
     beam, other = joined(d)
-    law = st.AxialBendingHinge(
-        d.acts(3, 6), d.acts(0.5, 1.5), d.acts(500, 900), d.acts(500, 900), d.acts(100, 300)
-    )
+    ranges = (3, 6), (0.5, 1.5), (500, 900), (500, 900), (100, 300)
+    law = st.AxialBendingHinge(*(d.acts(*limits) for limits in ranges))
     d.add("connectors", ub.Bushing(beam.end, other.start, law, axis=(1.0, 0.3)))
-    for axis in ((1.0, 0.0), (0.0, 1.0)):
-        spring = ub.Spring(d.some(100, 200))
-        d.add("connectors", ub.Slide(beam.end, other.start, spring, axis=axis))
-    d.add("connectors", ub.Turn(beam.end, other.start, ub.Spring(d.some(20, 60))))
+    springs_along_axes(d, beam.end, other.start, 100, 200)
+    turning_spring(d, beam.end, other.start)
 
 
 # -- laws of sections ----------------------------------------------------------------------------
 
 
 def bent(d, law):
+    driven(d, ub.Section(**PLAIN, bending=law(d)))
+
+
+effects(
+    bent,
+    elasto_plastic=Drawn(ub.ElastoPlastic, (3, 6), isotropic=(3, 10), kinematic=(3, 10)),
+    ramberg_osgood=Drawn(st.RambergOsgood, (4, 8), (0.02, 0.08), (2, 6)),
+    armstrong_frederick=Drawn(st.ArmstrongFrederick, (4, 8), (10, 30), (2, 8)),
+    bouc_wen=Drawn(st.BoucWen, (4, 8), (0.05, 0.2), (1, 3), (0.55, 0.8), (0.1, 0.3)),
+)
+
+
+def creeping(d, viscosity):
+    """Isotropic hardening of one kind, kinematic hardening of the other."""
+    of = viscosity(d)
+    kind = "kinematic" if isinstance(of, ub.Perzyna) else "isotropic"
+    law = ub.ElastoPlastic(d.acts(3, 6), **{kind: d.acts(3, 10)}, viscosity=of)
     driven(d, ub.Section(**PLAIN, bending=law))
 
 
-@effect(ub.ElastoPlastic)
-def elasto_plastic(d):
-    bent(d, ub.ElastoPlastic(d.acts(3, 6), isotropic=d.acts(3, 10), kinematic=d.acts(3, 10)))
+effects(
+    creeping,
+    perzyna=Drawn(ub.Perzyna, (0.5, 3)),
+    duvaut_lions=Drawn(ub.DuvautLions, (0.01, 0.05)),
+)
 
 
 @effect(ub.ElastoPlastic, ub.Section)
@@ -615,35 +579,6 @@ def axial_and_shear(d):
     axial = ub.ElastoPlastic(d.acts(1, 2), isotropic=d.acts(500, 1000))
     shear = ub.ElastoPlastic(d.acts(3, 6), kinematic=d.acts(200, 500))
     arm(d, ub.Section(**PLAIN, axial=axial, shear=shear))
-
-
-@effect(ub.Perzyna)
-def perzyna(d):
-    viscosity = ub.Perzyna(d.acts(0.5, 3))
-    bent(d, ub.ElastoPlastic(d.acts(3, 6), kinematic=d.acts(3, 10), viscosity=viscosity))
-
-
-@effect(ub.DuvautLions)
-def duvaut_lions(d):
-    viscosity = ub.DuvautLions(d.acts(0.01, 0.05))
-    bent(d, ub.ElastoPlastic(d.acts(3, 6), isotropic=d.acts(3, 10), viscosity=viscosity))
-
-
-@effect(st.RambergOsgood)
-def ramberg_osgood(d):
-    bent(d, st.RambergOsgood(d.acts(4, 8), d.acts(0.02, 0.08), d.acts(2, 6)))
-
-
-@effect(st.ArmstrongFrederick)
-def armstrong_frederick(d):
-    bent(d, st.ArmstrongFrederick(d.acts(4, 8), d.acts(10, 30), d.acts(2, 8)))
-
-
-@effect(st.BoucWen)
-def bouc_wen(d):
-    bent(d, st.BoucWen(
-        d.acts(4, 8), d.acts(0.05, 0.2), d.acts(1, 3), d.acts(0.55, 0.8), d.acts(0.1, 0.3)
-    ))  # fmt: skip
 
 
 @effect(st.AxialBending)
@@ -656,9 +591,8 @@ def axial_bending(d):
 
 @effect(ub.extend.MaterialLaw)
 def own_material_law(d):
-    bent(d, d.choose(
-        lambda: Dashpot(d.acts(0.5, 2)), lambda: PowerLaw(d.acts(4, 8), 0.05, d.acts(2, 5))
-    ))  # fmt: skip
+    power = Drawn(own.PowerLaw, (4, 8), 0.05, (2, 5))
+    bent(d, d.one(Drawn(own.Dashpot, (0.5, 2)), power))
 
 
 def layered(d, fibres, **options):
@@ -672,8 +606,7 @@ def fibres(d):
     """Cracks, a core of another law, and bars."""
     law = ub.ElastoPlastic(d.acts(8e4, 1e5), isotropic=d.acts(4e6, 9e6))
     crack = d.one(ub.Softening, ub.LinearSoftening)(d.acts(1.1e5, 1.3e5), d.acts(400, 800))
-    number = d.instead(4, 6)
-    cover = ub.Fibres(law, number=number, softening=crack)
+    cover = ub.Fibres(law, number=d.instead(4, 6), softening=crack)
     core = ub.Fibres(st.RambergOsgood(d.some(1e5, 2e5), 1e-4, 3.0))
     bars = ub.Fibres(st.ArmstrongFrederick(d.acts(3e5, 5e5), 1e8, 100.0))
     section = d.one(layered(d, cover), layered(d, cover, cover=0.002, core=core))
@@ -688,32 +621,17 @@ def placed_fibres(d):
 
 
 def scattered(d, limit):
-    driven(d, layered(d, ub.Fibres(ub.ElastoPlastic(limit, isotropic=6e6), number=4)))
+    driven(d, layered(d, ub.Fibres(ub.ElastoPlastic(limit(d), isotropic=6e6), number=4)))
 
 
-@effect(ub.distributions.Normal)
-def normal(d):
-    scattered(d, ub.distributions.Normal(d.acts(1e5, 2e5), d.acts(1e4, 2e4), seed=d.instead(1, 5)))
-
-
-@effect(ub.distributions.TruncatedNormal)
-def truncated_normal(d):
-    scattered(
-        d,
-        ub.distributions.TruncatedNormal(d.acts(1e5, 2e5), d.acts(2e4, 4e4), seed=d.instead(2, 6)),
-    )
-
-
-@effect(ub.distributions.Lognormal)
-def lognormal(d):
-    scattered(
-        d, ub.distributions.Lognormal(d.acts(1e5, 2e5), d.acts(2e4, 4e4), seed=d.instead(3, 7))
-    )
-
-
-@effect(ub.distributions.Weibull)
-def weibull(d):
-    scattered(d, ub.distributions.Weibull(d.acts(1e5, 2e5), d.acts(4, 8), seed=d.instead(4, 8)))
+LIMIT, WIDE = (1e5, 2e5), (2e4, 4e4)
+effects(
+    scattered,
+    normal=Drawn(ub.distributions.Normal, LIMIT, (1e4, 2e4), seed=Instead(1, 5)),
+    truncated_normal=Drawn(ub.distributions.TruncatedNormal, LIMIT, WIDE, seed=Instead(2, 6)),
+    lognormal=Drawn(ub.distributions.Lognormal, LIMIT, WIDE, seed=Instead(3, 7)),
+    weibull=Drawn(ub.distributions.Weibull, LIMIT, (4, 8), seed=Instead(4, 8)),
+)
 
 
 @effect(st.MenegottoPinto)
@@ -744,7 +662,7 @@ def kent_park(d):
 def mander(d):
     strength, tension = d.acts(1e5, 2e5), ub.LinearSoftening(d.acts(6e4, 1e5), d.acts(400, 900))
     strain = d.acts(1.2, 1.5) * 2.4e5 / 1.2e8
-    spalling = d.choose(lambda: math.inf, lambda: d.acts(2.1, 2.5) * strain)
+    spalling = d.one(lambda: math.inf, lambda: d.acts(2.1, 2.5) * strain)()
     concrete(d, st.Mander(strength, strain, spalling, tension))
 
 
@@ -752,56 +670,51 @@ def mander(d):
 
 
 def hinge_in_cells(d, law):
-    bending = d.one(None, ub.ElastoPlastic(d.some(5, 6), isotropic=20.0))
+    law, bending = law(d), d.one(None, ub.ElastoPlastic(d.some(5, 6), isotropic=20.0))
     driven(d, ub.Section(**PLAIN, hinge=law, bending=bending))
 
 
 def hinge_at_a_place(d, law):
+    law = law(d)
     driven(d, hinges={d.one(0.0, 1 / 3): law})
 
 
-def numbers_of_softening(d):
-    return d.acts(4, 7), d.acts(1.0, 3.0)
+def own_softening(d):
+    limit, energy = d.acts(4, 7), d.acts(1.0, 3.0)
+    return d.one(own.Petersson(limit, energy), own.Rising(limit, energy / (1.5 * limit)))
 
 
-@effect(ub.Softening, ub.Section)
-def softening_in_cells(d):
-    hinge_in_cells(d, ub.Softening(*numbers_of_softening(d)))
-
-
-@effect(ub.Softening, ub.Beam, schemes=OVER_ANY_STEP)
-def softening_at_a_place(d):
-    hinge_at_a_place(d, ub.Softening(*numbers_of_softening(d)))
-
-
-@effect(ub.LinearSoftening, ub.Section)
-def linear_softening_in_cells(d):
-    hinge_in_cells(d, ub.LinearSoftening(*numbers_of_softening(d)))
-
-
-@effect(ub.LinearSoftening, ub.Beam, schemes=OVER_ANY_STEP)
-def linear_softening_at_a_place(d):
-    hinge_at_a_place(d, ub.LinearSoftening(*numbers_of_softening(d)))
+SOFTENING, LINEAR = (Drawn(x, (4, 7), (1.0, 3.0)) for x in (ub.Softening, ub.LinearSoftening))
+effects(
+    hinge_in_cells,
+    ub.Section,
+    softening_in_cells=SOFTENING,
+    linear_softening_in_cells=LINEAR,
+)
+effects(
+    hinge_at_a_place,
+    ub.Beam,
+    schemes=OVER_ANY_STEP,
+    softening_at_a_place=SOFTENING,
+    linear_softening_at_a_place=LINEAR,
+)
 
 
 @effect(ub.extend.SofteningLaw, ub.Section)
 def own_softening_in_cells(d):
-    limit, energy = numbers_of_softening(d)
-    hinge_in_cells(d, d.one(Petersson(limit, energy), Rising(limit, energy / (1.5 * limit))))
+    hinge_in_cells(d, own_softening)
 
 
 @effect(ub.extend.SofteningLaw, ub.Beam, schemes=OVER_ANY_STEP)
 def own_softening_at_a_place(d):
-    limit, energy = numbers_of_softening(d)
-    hinge_at_a_place(d, d.one(Petersson(limit, energy), Rising(limit, energy / (1.5 * limit))))
+    hinge_at_a_place(d, own_softening)
 
 
 @effect(ub.ElastoPlastic, ub.Beam, schemes=OVER_ANY_STEP)
 def hardening_at_a_place(d):
-    viscosity = ub.Perzyna(d.choose(lambda: 0.0, lambda: d.acts(0.5, 2)))
-    hinge_at_a_place(d, ub.ElastoPlastic(
-        d.acts(3, 5), isotropic=d.acts(5, 20), kinematic=d.acts(5, 20), viscosity=viscosity
-    ))  # fmt: skip
+    viscosity = ub.Perzyna(d.one(lambda: 0.0, lambda: d.acts(0.5, 2))())
+    numbers = {"isotropic": (5, 20), "kinematic": (5, 20), "viscosity": viscosity}
+    hinge_at_a_place(d, Drawn(ub.ElastoPlastic, (3, 5), **numbers))
 
 
 # -- sections, axes, bodies, motions ---------------------------------------------------------------
@@ -818,9 +731,10 @@ def section(d):
 def curved_axis(d):
     """An arc, a polyline, or a curve of a user."""
     plain, h = ub.Section(**PLAIN), d.acts(0.1, 0.3)
+    angle = math.atan2(h, 0.5)
+    arc = (0.5, -h), math.hypot(0.5, h), (math.pi - angle, angle)
     beam = d.add("beams", d.one(
-        ub.Beam.arc((0.5, -h), math.hypot(0.5, h), (math.pi - math.atan2(h, 0.5),
-                    math.atan2(h, 0.5)), plain, cells=3, name="b0"),
+        ub.Beam.arc(*arc, plain, cells=3, name="b0"),
         ub.Beam.polyline([(0, 0), (0.5, h), (1, 0)], plain, cells=2, name="b0"),
         ub.Beam.along(lambda s: (s, 4 * h * s * (1 - s)), plain, cells=3, name="b0"),
     ))  # fmt: skip
@@ -834,11 +748,11 @@ def body(d):
     x, y = beam.end.point
     body = ub.Body((x + d.acts(0.1, 0.2), y + 0.1), mass=d.instead(0.7, 0.9), inertia=0.02)
     d.add("bodies", body)
-    if d.one(True, False):
+    if yes_or_no(d):
         d.add("joints", ub.Rigid(beam.end, body.at(x, y)))
     else:
         d.add("joints", ub.Revolute(beam.end, body.at(x, y), multipliers=True))
-        d.add("connectors", ub.Turn(beam.end, body.middle, ub.Spring(d.some(20, 90))))
+        turning_spring(d, beam.end, body.middle, 20, 90)
     d.add("loads", ub.PointLoad(body.at(x + 0.3, y), (3.0, -8.0), amplitude=d.wave()))
     d.add("loads", ub.Gravity((0.0, -9.81), d.wave()))
 
@@ -857,10 +771,9 @@ def velocity(d):
     beam = arm(d, hold=False)
     body = d.add("bodies", ub.Body((1.2, 0.5), mass=0.5, inertia=0.02))
     d.add("joints", ub.RigidLink(beam.end, body.middle))
-    d.add("initial", ub.Velocity(
-        [beam, body], (d.either_sign(0.5, 2), d.either_sign(0.5, 2)), d.either_sign(2, 4),
-        about=(d.acts(0.2, 0.5), 0.0),
-    ))  # fmt: skip
+    linear = d.either_sign(0.5, 2), d.either_sign(0.5, 2)
+    angular, about = d.either_sign(2, 4), (d.acts(0.2, 0.5), 0.0)
+    d.add("initial", ub.Velocity([beam, body], linear, angular, about=about))
 
 
 @effect(ub.PrescribedMotion, ub.PrescribedDisplacement, schemes=DYNAMIC)
@@ -869,7 +782,7 @@ def impact(d):
     beam = arm(d)
     times, way = [0.0, d.some(0.04, 0.07), 1.0], d.either_sign(0.02, 0.05)
     moved = ub.Table(times, [0.0, way, way])
-    if d.one(True, False):
+    if yes_or_no(d):
         d.add("supports", ub.PrescribedDisplacement(beam.end, v=moved))
     else:
         connected(d, ub.PrescribedMotion(moved), beam=beam)
@@ -881,14 +794,11 @@ def impact(d):
 def varied(d):
     """A frame with a load, a connector and, now and then, a law that yields."""
     law = d.one(None, ub.ElastoPlastic(d.some(3, 6), kinematic=d.some(3, 10)))
-    beam = arm(d, ub.Section(**PLAIN, bending=law))
-    other = forearm(d, beam)
-    d.add("joints", ub.Rigid(beam.end, other.start))
-    spring = d.one(
+    beam, other = joined(d, ub.Rigid, section=ub.Section(**PLAIN, bending=law))
+    d.add("connectors", d.one(
         ub.Stretch(near(d, 1.3, 1.8), other.end, ub.Spring(d.some(50, 200))),
         ub.Slide(near(d), other.end, ub.Spring(d.some(50, 200)), axis=(0.3, 1.0)),
-    )
-    d.add("connectors", spring)
+    ))  # fmt: skip
     d.add("loads", d.one(
         ub.Pressure(beam, d.some(5, 20), amplitude=d.wave()),
         ub.LineLoad(beam, (0.0, d.some(5, 20)), amplitude=d.wave()),
@@ -896,28 +806,18 @@ def varied(d):
     ))  # fmt: skip
 
 
-@effect(ub.Mesh)
-def mesh_of_degree_2(d):
+def meshed(d, mesh):
     varied(d)
-    d.mesh = ub.Mesh(degree=d.instead(2, 1), lumped=d.one(True, False))
+    d.mesh = mesh(d)
 
 
-@effect(ub.Mesh)
-def mesh_of_degree_3(d):
-    varied(d)
-    d.mesh = ub.Mesh(degree=d.instead(3, 2), lumped=d.one(True, False))
-
-
-@effect(ub.Mesh)
-def refined_mesh(d):
-    varied(d)
-    d.mesh = ub.Mesh(refine=d.instead(2, 1))
-
-
-@effect(ub.Mesh, schemes=DYNAMIC)
-def lumped_mass(d):
-    varied(d)
-    d.mesh = ub.Mesh(lumped=d.instead(True, False))
+effects(
+    meshed,
+    mesh_of_degree_2=Drawn(ub.Mesh, degree=Instead(2, 1), lumped=yes_or_no),
+    mesh_of_degree_3=Drawn(ub.Mesh, degree=Instead(3, 2), lumped=yes_or_no),
+    refined_mesh=Drawn(ub.Mesh, refine=Instead(2, 1)),
+)
+effects(meshed, schemes=DYNAMIC, lumped_mass=Drawn(ub.Mesh, lumped=Instead(True, False)))
 
 
 def of_scheme(d, scheme, other):
@@ -925,30 +825,24 @@ def of_scheme(d, scheme, other):
     varied(d)
 
 
-@effect(ub.Static)
-def static(d):
-    of_scheme(d, ub.Static(), ub.EnergyMomentum())
+effects(
+    lambda d, scheme: of_scheme(d, scheme(d), ub.EnergyMomentum()),
+    static=Drawn(ub.Static),
+    energy_momentum_printed=Drawn(ub.EnergyMomentumPrinted),
+    energy_momentum=Drawn(ub.EnergyMomentum, some(0.02, 0.1), some(0.05, 0.2)),
+)
 
 
 @effect(ub.EnergyMomentumStatic)
 def energy_momentum_static(d):
-    theta = (1.0, 0.5, 0.7)[int(d.random.integers(3))]
-    of_scheme(d, ub.EnergyMomentumStatic(theta), ub.EnergyMomentum())
+    of_scheme(d, ub.EnergyMomentumStatic(d.one(1.0, 0.5, 0.7)), ub.EnergyMomentum())
     d.add("damping", ub.KelvinVoigt(5e-3))
-
-
-@effect(ub.EnergyMomentum)
-def energy_momentum(d):
-    alpha, beta = d.some(0.02, 0.1), d.some(0.05, 0.2)
-    of_scheme(d, ub.EnergyMomentum(alpha, beta), ub.EnergyMomentum())
 
 
 @effect(ub.EnergyMomentum)
 def fourth_order(d):
     d.scheme = d.instead(ub.EnergyMomentum(order=4), ub.EnergyMomentum())
-    beam = arm(d)
-    other = forearm(d, beam)
-    d.add("joints", ub.Rigid(beam.end, other.start))
+    _, other = joined(d, ub.Rigid)
     d.add("connectors", ub.Stretch(near(d, 1.3, 1.8), other.end, ub.Spring(d.some(50, 200))))
 
 
@@ -958,28 +852,20 @@ def energy_momentum_decaying(d):
     of_scheme(d, ub.EnergyMomentumDecaying(d.some(0.4, 0.7)), ub.EnergyMomentumDecaying(1.0))
 
 
-@effect(ub.EnergyMomentumPrinted)
-def energy_momentum_printed(d):
-    of_scheme(d, ub.EnergyMomentumPrinted(), ub.EnergyMomentum())
+@effect(ub.GeneralizedAlpha)
+def generalized_alpha(d):
+    of_scheme(d, ub.GeneralizedAlpha(d.some(0.4, 0.9)), ub.GeneralizedAlpha(1.0))
 
 
 @effect(ub.Newmark)
 def newmark(d):
     gamma, more = d.some(0.5, 0.6), d.some(0.0, 0.05)
-    scheme = ub.Newmark(gamma, (gamma + 0.5) ** 2 / 4 + more)
-    of_scheme(d, scheme, ub.Newmark(0.65, 0.4))
-
-
-@effect(ub.GeneralizedAlpha)
-def generalized_alpha(d):
-    rho = d.some(0.4, 0.9)
-    of_scheme(d, ub.GeneralizedAlpha(rho), ub.GeneralizedAlpha(1.0))
+    of_scheme(d, ub.Newmark(gamma, (gamma + 0.5) ** 2 / 4 + more), ub.Newmark(0.65, 0.4))
 
 
 @effect(ub.extend.EnergyMomentumBase, ub.extend.MidpointDynamics)
 def own_scheme(d):
-    weight = d.some(0.52, 0.58)
-    of_scheme(d, Weighted(weight), Weighted(0.5))
+    of_scheme(d, own.Weighted(d.some(0.52, 0.58)), own.Weighted(0.5))
 
 
 @effect(ub.Adaptive)
@@ -1025,7 +911,7 @@ def arc_length(d):
     beam = d.add("beams", ub.Beam((0, 0), (1, rise), section, cells=3, name="b0"))
     d.add("supports", ub.Pinned(beam.start), ub.Roller(beam.end, along=(0, 1)))
     step, factor = d.some(0.01, 0.02), d.some(0.5, 2)
-    along_path(d, beam, ub.ArcLength(step, factor=factor), ub.ArcLength(1.1 * step, factor=factor))
+    along_path(d, beam, *(ub.ArcLength(x * step, factor=factor) for x in (1, 1.1)))
 
 
 @effect(ub.DissipationControl)
