@@ -13,7 +13,6 @@ import re
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import features_of_forces  # noqa: F401 - adds its features
 import numpy as np
 from features import FEATURES, PLAIN, Feature
 from user_classes import CONNECTOR_LAWS, LAWS, SOFTENING
@@ -49,6 +48,9 @@ COLUMN = (
     "shape", "pinned", "degree", "refined", "potential", "newton", "propped", "side_spring",
 )  # fmt: skip
 """Features that leave a straight column straight under a load along it; every 16th seed is one."""
+
+RANDOM = re.compile(r"<(\S+) (\S+?)(?: (\S+))?>|\[\[(.*?)\]\](?!\])|TIME")
+"""Parts of texts that are drawn: limits and format of a number, alternatives, a function of time."""
 
 STIFF = "EA=1e6, GA=1e6, EI=100.0, rhoA=1.0, rhoI=0.01"
 
@@ -98,6 +100,20 @@ class Draft:
 
     def one(self, choices):
         return choices[int(self.random.integers(len(choices)))]
+
+    def text(self, row):
+        """A text with its random parts drawn; one of several texts; or what a function draws."""
+        if callable(row):
+            return row(self)
+        if not isinstance(row, str):
+            return self.one([self.text(each) for each in row])
+        return RANDOM.sub(self._draw, row.replace("TIP", "LAST.end").replace("LAST", self.last))
+
+    def _draw(self, part):
+        low, high, digits, choices = part.groups()
+        if choices is not None:
+            return self.one(choices.split("|"))
+        return format(self.some(float(low), float(high)), digits or ".4g") if low else self.time()
 
     def time(self):
         """A function of time, at most about one large."""
@@ -301,7 +317,7 @@ def _allows(one, scheme, base):
     if scheme.startswith("EnergyMomentumDecaying") and one.name == "adaptive":
         return False
     static, at_end = scheme in STATICS, scheme.startswith(("Newmark", "Generalized"))
-    return one.statics if static else (one.dynamics and (one.at_end or not at_end))
+    return one.allows(static, at_end)
 
 
 def _build(d, base):
