@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 from random_laws import Laws
-from scene_statements import AS_GIVEN, MotionGeometry
+from scene_statements import AS_GIVEN, PARTS, MotionGeometry, scene_call
 
 STEPS = 15
 """Steps of a run of equal ones."""
@@ -25,10 +25,6 @@ SAMPLE = 9, 27, 34, 38, 51, 91, 99, 110, 113, 150, 151, 164, 165, 175, 184, 190
 
 SPOTS = (0.0, 0.25, 1 / 3, 0.5, 1.0)
 """Where things are attached to beams."""
-
-PARTS = (
-    "beams", "bodies", "joints", "supports", "connectors", "loads", "masses", "damping", "initial",
-)  # fmt: skip
 
 
 def script(seed, statement=AS_GIVEN):
@@ -459,13 +455,8 @@ class _Writer(Laws):
 
     def source(self):
         """The script."""
-        lines = [*self._lines, "scene = ub.Scene("]
-        for name, records in self._lists.items():
-            if records:
-                self._shuffle(records)
-                lines += [f"    {name}=[", *(f"        {record}," for record in records), "    ],"]
-        lines += [
-            ")", f"scheme = ub.{self._name}",
-            f"times = (0.0, {self._say.number(self._end, 's')})", f"dt = {self._step}",
-        ]  # fmt: skip
-        return "\n".join(lines)
+        for records in filter(None, self._lists.values()):
+            self._shuffle(records)
+        times = f"times = (0.0, {self._say.number(self._end, 's')})"
+        scheme, dt = f"scheme = ub.{self._name}", f"dt = {self._step}"
+        return "\n".join([*self._lines, *scene_call(self._lists), scheme, times, dt])

@@ -24,6 +24,21 @@ DIMENSIONS = {
 }  # fmt: skip
 
 
+PARTS = (
+    "beams", "bodies", "joints", "supports", "connectors", "loads", "masses", "damping", "initial",
+)  # fmt: skip
+"""Lists of the parts of scenes."""
+
+
+def scene_call(parts):
+    """Lines of source that make a scene from texts of its parts by name."""
+    lines = ["scene = ub.Scene("]
+    for name, records in parts.items():
+        if records:
+            lines += [f"    {name}=[", *(f"        {record}," for record in records), "    ],"]
+    return [*lines, ")"]
+
+
 @dataclass(frozen=True)
 class Statement:
     """How a scene is stated.
