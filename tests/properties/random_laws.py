@@ -8,6 +8,9 @@ STRAINS = {"N m2": "1/m", "N": "1", "Pa": "1", "N/m": "m", "N m": "1"}
 
 INVERSE = {"1/m": "m", "1": "1", "m": "1/m"}
 
+IMPORTS = "import math", "import ufl_beam as ub", "import ufl_beam.structures as st", ""
+"""First lines of scripts."""
+
 CLASSES = ["ElastoPlastic", "ElastoPlastic", "RambergOsgood", "ArmstrongFrederick", "BoucWen"]
 
 
@@ -29,6 +32,11 @@ class Draws:
 
     def _one(self, choices):
         return choices[self._integer(0, len(choices) - 1)]
+
+    def _polar(self, size):
+        """A vector of a size."""
+        angle = self._some(-math.pi, math.pi)
+        return size * math.cos(angle), size * math.sin(angle)
 
 
 class Laws(Draws):

@@ -14,7 +14,7 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from random_laws import Laws
+from random_laws import IMPORTS, Laws
 from scene_statements import AS_GIVEN, PARTS, MotionGeometry, scene_call
 
 STEPS = 15
@@ -58,13 +58,8 @@ class _Writer(Laws):
         self._scattered = self._chance(0.1)
         self._say = MotionGeometry(statement, places_stay=self._scattered)
         self._lists = {name: [] for name in PARTS}
-        self._lines = [
-            f"# {'scattered, ' * self._scattered}seed {seed}, {statement.name}",
-            "import math",
-            "import ufl_beam as ub",
-            "import ufl_beam.structures as st",
-            "",
-        ]
+        title = f"# {'scattered, ' * self._scattered}seed {seed}, {statement.name}"
+        self._lines = [title, *IMPORTS]
         self._statement, self._parts, self._anchors = statement, [], []
         self._flips = np.random.default_rng(statement.backwards)
         self._order = np.random.default_rng(statement.shuffled)
@@ -84,12 +79,6 @@ class _Writer(Laws):
         self._damp()
         self._frame()
         self._mesh()
-
-    # -- draws ---------------------------------------------------------------------------------
-
-    def _polar(self, size):
-        angle = self._some(-math.pi, math.pi)
-        return size * math.cos(angle), size * math.sin(angle)
 
     # -- sizes and schemes ---------------------------------------------------------------------
 
