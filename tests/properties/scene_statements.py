@@ -78,11 +78,12 @@ class Statement:
         tx, ty = self.turned(x - cx, y - cy)
         return cx + tx + dx, cy + ty + dy
 
-    def motion(self, displacement):
+    def motion(self, displacement, of_vectors="m", of_rotations="1"):
         """Displacement and rotation (n, 3) of a solution, in SI and the axes of the first one."""
         u, v, ψ = np.asarray(displacement).T
-        cos, sin, metre = math.cos(self.angle), math.sin(self.angle), self.unit("m")
-        return np.column_stack([(cos * u + sin * v) / metre, (cos * v - sin * u) / metre, ψ])
+        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        back = np.column_stack([cos * u + sin * v, cos * v - sin * u, ψ])
+        return back / [self.unit(x) for x in (of_vectors, of_vectors, of_rotations)]
 
 
 AS_GIVEN = Statement()
