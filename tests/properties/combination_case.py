@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 import numpy as np
 from combinations import Combination
+from restart_scenes import arrays_of
 
 import ufl_beam as ub
 
@@ -92,12 +93,6 @@ def check(function):
     """Add a function to the checks."""
     CHECKS[function.__name__] = function
     return function
-
-
-def arrays_of(solution):
-    """All that a solution kept, and what it counted, by name."""
-    counts = {"substeps": np.array(solution.substeps), "iterations": np.array(solution.iterations)}
-    return {**solution.history(), **counts, **{f"end {n}": x for n, x in solution.internal.items()}}
 
 
 def assert_same_bits(one, other):

@@ -2,10 +2,11 @@
 """A random scene in several statements: runs, and differences of their motions."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 from random_scenes import script
-from scene_statements import AS_GIVEN, Statement, changed_statements
+from scene_statements import AS_GIVEN
 
 import ufl_beam as ub
 
@@ -42,11 +43,9 @@ class Run:
             warnings.simplefilter("always")
             exec(self.source, names)
             self.scene = names["scene"]
+            arguments = {"t": names["times"], "dt": names["dt"], "mesh": names["mesh"]}
             try:
-                self.solution = ub.simulate(
-                    self.scene, names["scheme"], t=names["times"], dt=names["dt"],
-                    mesh=names["mesh"],
-                )  # fmt: skip
+                self.solution = ub.simulate(self.scene, names["scheme"], **arguments)
             except ub.ConvergenceError as error:
                 self.solution, self.failure = error.solution, str(error)
         self.warnings = [str(w.message) for w in caught]
@@ -55,17 +54,12 @@ class Run:
 
     def motion(self):
         """Times, s; (u, v, ψ) of places of all parts in SI and the axes of the first statement."""
-        rows = {}
+        places = {(body.name, 0.0): body.middle for body in self.scene.bodies}
         for beam in self.scene.beams:
             for s in PLACES:
-                there = 1 - s if self.is_backwards(beam) else s
-                rows[beam.name, s] = self.statement.motion(
-                    self.solution.displacement(beam.at(there))
-                )
-        for body in self.scene.bodies:
-            rows[body.name, 0.0] = self.statement.motion(self.solution.displacement(body.middle))
-        values = np.array([rows[key] for key in sorted(rows)])
-        return self.solution.times / self.seconds, values
+                places[beam.name, s] = beam.at(1 - s if self.is_backwards(beam) else s)
+        moved = [self.solution.displacement(places[key]) for key in sorted(places)]
+        return self.solution.times / self.seconds, np.array([*map(self.statement.motion, moved)])
 
     def forces(self):
         """N, V in N and M in N m within all beams, in their directions of the first statement."""
@@ -122,8 +116,4 @@ def _common(t, s, near):
 
 def perturbed(statement, number):
     """The same statement with other last digits."""
-    return Statement(**{**vars(statement), "name": f"{statement.name}, digits {number}",
-                        "digits": number})  # fmt: skip
-
-
-__all__ = ["Run", "changed_statements", "difference", "perturbed"]
+    return replace(statement, name=f"{statement.name}, digits {number}", digits=number)

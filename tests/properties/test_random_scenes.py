@@ -13,38 +13,27 @@ import sys
 import pytest
 from constraint_gaps import largest_gap
 from random_scenes import SAMPLE, script
-from scene_statements import EPS
-from statement_runs import Run, changed_statements, difference, perturbed
-
-import ufl_beam as ub
+from scene_statements import AS_GIVEN, EPS, changed_statements
+from statement_runs import Run, difference, perturbed
 
 ALL = range(200)
 
 SAME = 1e-12
-"""Part of the size of the scene, or rad, that needs no reason; see `difference` for the rest.
-
-It is some thousand times the last digit: what a few hundred operations in each of 15 steps lose.
-"""
+"""Part of the size of the scene, or rad, that needs no reason: some thousand times the last digit,
+as a few hundred operations in each of 15 steps lose; see `difference` for the rest."""
 
 COPIES = 3
 """Runs with other last digits; each number changes by 4 units of its last place, its own way."""
 
 FACTOR = 100
-"""A statement may differ by so many times what other last digits of the data make.
-
-Data are rounded once, a run rounds in each operation of each step, and three copies see a part of
-the directions in which a scene is sensitive: ten for either.
-"""
+"""A statement may differ by so many times what other last digits of the data make: data are rounded
+once, and three copies see a part of the directions in which a scene is sensitive."""
 
 CHAOTIC = 1e-6
 """Difference of copies from which on a scene shows nothing."""
 
 KEPT = 1e-9
-"""Largest gap of a constraint, as a part of the size of the scene, or rad.
-
-Joints are met to 1e-12 of the size of the scene by the default tolerance, or to the last digits of
-coordinates; angles of short links lose some digits more.
-"""
+"""Largest gap of a constraint, as a part of the size of the scene, or rad."""
 
 CLOSED = 1e-9
 """Largest imbalance of the ledger as a part of the energy that went through."""
@@ -99,19 +88,13 @@ def check(seed):
             f"{name}: the result differs by {found:.1e}, other last digits make "
             f"{sensitivities[name]:.1e}\n{given.source}"
         )
-    if given.failure is not None:
+    if given.failure is not None:  # perhaps within a step, on the way to its motions
         assert CLEAR in given.failure, f"{given.failure}\n{given.source}"
-    check_constraints(given)
+    else:
+        gap, owner = largest_gap(given.solution, given.scene.size)
+        assert gap <= KEPT, f"{owner} is missed by {gap:.1e}\n{given.source}"
     check_ledger(given)
     return max(sensitivities.values(), default=0.0)
-
-
-def check_constraints(run):
-    """Joints, motors, guides and supports are where they are said to be."""
-    if run.failure is not None:
-        return  # it may have ended within a step, on the way to its motions
-    gap, owner = largest_gap(run.solution, run.scene.size)
-    assert gap <= KEPT, f"{owner} is missed by {gap:.1e}\n{run.source}"
 
 
 def check_ledger(run):
@@ -138,10 +121,8 @@ def test_nearly_all_scenes_are_regular():
 
 
 if __name__ == "__main__":
-    from scene_statements import AS_GIVEN
-
     number = int(sys.argv[1])
     for one in (AS_GIVEN, *changed_statements(number)):
-        ub.print_once(script(number, one))
+        print(script(number, one))
     found_run, *found_numbers = compare(number)
-    ub.print_once(found_run.solution, *found_numbers, found_run.failure or "", sep="\n")
+    print(found_run.solution, *found_numbers, found_run.failure or "", sep="\n")
