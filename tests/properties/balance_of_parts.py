@@ -46,47 +46,37 @@ class Balance:
         x, y = self.solution.position(place)[-1]
         return np.array([*force, x * force[1] - y * force[0] + moment])
 
-    def factor(self, time):
-        return time(self.t)
-
     def turn(self, place):
         return self.solution.displacement(place)[-1, 2]
 
     def on_places(self):
         """Forces of loads, supports, weights, and of what is joined to the ground, with places."""
-        solution, last = self.solution, -1
-        for load in self.scene.loads:
+        solution, scene, last = self.solution, self.scene, -1
+        for load in scene.loads:
             if isinstance(load, ub.PointLoad | ub.FollowerLoad):
-                c = s = 0.0
-                if isinstance(load, ub.FollowerLoad):
-                    s = self.turn(load.place)
-                c, s = math.cos(s), math.sin(s)
-                x, y = load.force
-                force = self.factor(load.amplitude) * np.array([c * x - s * y, s * x + c * y])
-                yield (
-                    load.place,
-                    self.at(load.place, force, self.factor(load.amplitude) * load.moment),
-                )
-        for support in self.scene.supports:
+                turn = self.turn(load.place) * isinstance(load, ub.FollowerLoad)
+                factor = load.amplitude(self.t)
+                force = factor * _turned(load.force, turn)
+                yield load.place, self.at(load.place, force, factor * load.moment)
+        for support in scene.supports:
             *force, moment = solution.reaction(support)[last]
             yield support.place, self.at(support.place, force, moment)
-        heavy = [(one.place, one.mass) for one in self.scene.masses]
-        heavy += [(one.middle, one.mass) for one in self.scene.bodies]
-        for place, mass in heavy:
+        heavy = [(one.place, one.mass) for one in scene.masses]
+        for place, mass in heavy + [(one.middle, one.mass) for one in scene.bodies]:
             yield place, self.at(place, mass * self.field(solution.position(place)[last]))
-        for one in self.scene.connectors:
+        for one in scene.connectors:
             if node(one.a) is GROUND:
                 yield one.b, self._of_connector(one, solution.connector(one).force[last])
-        for one in self.scene.works:
+        for one in scene.works:
             if isinstance(one, ub.Effect) and isinstance(one.statement, HardeningSpring):
-                e, place = solution.displacement(one.places[1])[last, 1], one.places[1]
-                force = one.numbers["k"] * e + one.numbers["h"] * e**3
-                yield place, self.at(place, np.array([0.0, -force]))
-        for joint in self.scene.joints:
+                place, of = one.places[1], one.numbers
+                e = solution.displacement(place)[last, 1]
+                yield place, self.at(place, np.array([0.0, -of["k"] * e - of["h"] * e**3]))
+        for joint in scene.joints:
             if node(joint.places[0]) is GROUND:
-                history = solution.joint(joint)
+                history, place = solution.joint(joint), joint.places[1]
                 moment = np.nan_to_num(history.moment[last])
-                yield joint.places[1], self.at(joint.places[1], history.force[last], moment)
+                yield place, self.at(place, history.force[last], moment)
 
     def _of_connector(self, one, force):
         if one.components:
@@ -103,7 +93,7 @@ class Balance:
         g = np.zeros(2)
         for load in self.scene.loads:
             if isinstance(load, ub.Gravity):
-                g += self.factor(load.amplitude) * np.array(load.acceleration)
+                g += load.amplitude(self.t) * np.array(load.acceleration)
             if isinstance(load, ub.RotatingFrame):
                 g += load.rate**2 * np.subtract(x, load.about)
         return g
@@ -117,20 +107,23 @@ class Balance:
             x = self.solution.position(place)[-1]
             force, moment = beam.section.rhoA * self.field(x), 0.0
             for load in self.scene.loads:
-                if isinstance(load, ub.LineLoad) and load.beam is beam:
-                    factor = self.factor(load.amplitude) * load.factors(np.array([place.s]))[0]
-                    force = force + factor * np.array(load.force)
-                    moment += factor * load.moment
-                if isinstance(load, ub.Pressure) and load.beam is beam:
-                    factor = self.factor(load.amplitude) * load.factors(np.array([place.s]))[0]
-                    x, y = factor * self._slope(place, s1 - s0) / length
-                    along, across = load.tangential, load.normal
-                    force = force + np.array([along * x - across * y, along * y + across * x])
+                if isinstance(load, ub.LineLoad | ub.Pressure) and load.beam is beam:
+                    factor = load.amplitude(self.t) * load.factors(np.array([place.s]))[0]
+                    per_length, couple = self._per_length(load, place, s1 - s0, length)
+                    force, moment = force + factor * per_length, moment + factor * couple
                 if isinstance(load, ub.MovingLoad):
                     total += w / 2 * self._of_moving_load(load, beam, k)
             of_works = self._of_works(beam, place, (s0, s1), length)
             total += w / 2 * length * self.at(place, force + of_works[:2], moment + of_works[2])
         return total
+
+    def _per_length(self, load, place, width, length):
+        """Force and moment per length of a line load or pressure."""
+        if isinstance(load, ub.LineLoad):
+            return np.array(load.force), load.moment
+        x, y = self._slope(place, width) / length
+        along, across = load.tangential, load.normal
+        return np.array([along * x - across * y, along * y + across * x]), 0.0
 
     def _of_moving_load(self, load, beam, k):
         """Force on the k-th cell of a beam, at its place on the axis between the nodes."""
@@ -142,15 +135,13 @@ class Balance:
             return np.zeros(3)
         s, ξ = numbering.parameters(beam), (d - ends[i]) / (ends[i + 1] - ends[i])
         place = beam.at(s[k] + ξ * (s[k + 1] - s[k]))
-        return self.at(place, self.factor(load.amplitude) * np.array(load.force))
+        return self.at(place, load.amplitude(self.t) * np.array(load.force))
 
     def _slope(self, place, width):
         """Derivative of the position by the fraction of a cell; exact for cubic polynomials."""
-        x = [
-            self.solution.position(place.beam.at(place.s + k * width / 50))[-1]
-            for k in (-2, -1, 1, 2)
-        ]
-        return 50 * (8 * (x[2] - x[1]) - (x[3] - x[0])) / 12
+        at = (place.beam.at(place.s + k * width / 50) for k in (-2, -1, 1, 2))
+        a, b, c, d = (self.solution.position(p)[-1] for p in at)
+        return 50 * (8 * (c - b) - (d - a)) / 12
 
     def _nodes(self, beam, k):
         """Vertices of the k-th cell of a beam."""
@@ -179,16 +170,18 @@ class Balance:
     def cuts(self, beam):
         """Forces on the cells of a straight beam at their ends, from the diagram; pairs of (3,)."""
         diagram = self.solution.diagram(beam, points=2)
-        x, y = np.subtract(*beam.ends[::-1]) / math.dist(*beam.ends)
+        axis = np.subtract(*beam.ends[::-1]) / math.dist(*beam.ends)
         for k in range(0, len(diagram.s), 2):
             ends = []
             turns = self.solution.q[-1, self.solution.numbering.dofs[self._nodes(beam, k // 2), 2]]
             for i, sign, turn in ((k, -1.0, turns[0]), (k + 1, 1.0, turns[1])):
-                place = beam.at(diagram.s[i])
-                c, s = math.cos(turn), math.sin(turn)
-                t = np.array([c * x - s * y, s * x + c * y])
-                n = np.array([-t[1], t[0]])
-                force = sign * (diagram.N[i] * t + diagram.V[i] * n)
+                place, t = beam.at(diagram.s[i]), _turned(axis, turn)
+                force = sign * (diagram.N[i] * t + diagram.V[i] * np.array([-t[1], t[0]]))
                 ends.append(self.at(place, force, sign * diagram.M[i]))
                 self.size = max(self.size, np.abs(ends[-1]).max())
             yield k // 2, (diagram.s[k], diagram.s[k + 1]), ends
+
+
+def _turned(vector, angle):
+    (x, y), c, s = vector, math.cos(angle), math.sin(angle)
+    return np.array([c * x - s * y, s * x + c * y])

@@ -113,25 +113,22 @@ def difference(one, other, size=None):
 
 
 def results(names, solution, rows=slice(None)):
-    """Results of a solution by name: motions as parts of the scene, forces, energies."""
+    """Results of a solution by name: motions as parts of the scene, forces of all parts."""
     scene = names["scene"]
-    found = {}
     lengths = scene.size * np.array([1.0, 1.0, 0.0]) + np.array([0.0, 0.0, 1.0])
     moved = [one.at(s) for one in scene.beams for s in (0.0, 0.5, 1.0)]
-    moved += [one.middle for one in scene.bodies]
-    found["motions"] = np.array([solution.displacement(p)[rows] / lengths for p in moved]), 1.0
-    forces = [solution.section_forces_at(p)[rows] for p in moved if isinstance(p, ub.Place)]
+    forces = [solution.section_forces_at(place)[rows] for place in moved]
     forces += [solution.reaction(support)[rows] for support in scene.supports]
-    connectors = [solution.connector(one) for one in scene.connectors]
-    found["forces"] = np.array(forces), None
-    of_each = [
-        np.atleast_2d(connector.force[rows].T) for connector in connectors
-    ]  # rows by component
-    found["of connectors"] = np.concatenate(of_each) if connectors else np.array([]), None
-    return found
+    moved += [one.middle for one in scene.bodies]
+    of_each = [np.atleast_2d(solution.connector(x).force[rows].T) for x in scene.connectors]
+    return {
+        "motions": (np.array([solution.displacement(p)[rows] / lengths for p in moved]), 1.0),
+        "forces": (np.array(forces), None),
+        "of connectors": (np.concatenate(of_each) if of_each else np.array([]), None),
+    }
 
 
-def differences(one, other, rows=slice(None), begin=None):
+def differences(one, other, rows=slice(None)):
     """Largest differences of two runs by kind; of the second those of some rows.
 
     Energies that were supplied and lost count from the first of the rows on.

@@ -28,13 +28,11 @@ class Case(NamedTuple):
         model: Function of x that returns the scene.
         run: Scheme, times, step and mesh, as arguments of ``simulate``.
         number: The number with its line.
-        title: Title of the combination.
     """
 
     model: object
     run: dict
     number: str
-    title: str
 
 
 def case(seed):
@@ -55,7 +53,7 @@ def case(seed):
         return combination.make(source[:first] + number + source[last:])["scene"]
 
     run = {name: names[name] for name in ("scheme", "t", "dt", "mesh")}
-    return Case(model, run, f"{source[first:last]} in {line}", combination.title)
+    return Case(model, run, f"{source[first:last]} in {line}")
 
 
 class Outcome(NamedTuple):

@@ -4,8 +4,6 @@
 The balance of a scene would not show two errors that cancel.
 """
 
-import warnings
-
 from mpi4py import MPI
 
 import numpy as np
@@ -49,17 +47,14 @@ def works(block, trial):
 
 
 @pytest.mark.serial  # each process would compute the same
+@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 @pytest.mark.parametrize("name", [x for x in EFFECTS if EFFECTS[x].draft(0).control is None])
 def test_work_is_explained(name):
     drafts = [EFFECTS[name].draft(seed) for seed in range(SCENES)]
     drafts = [x for x in drafts if x.scheme.weight_of_before == 0.0 and isinstance(x.dt, float)]
     for draft in drafts:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ub.ModelWarning)
-            simulation = ub.Simulation(
-                ub.Scene(**draft.parts), draft.scheme, mesh=draft.mesh, newton=EXACT,
-                comm=MPI.COMM_SELF,
-            )  # fmt: skip
+        options = {"mesh": draft.mesh, "newton": EXACT, "comm": MPI.COMM_SELF}
+        simulation = ub.Simulation(ub.Scene(**draft.parts), draft.scheme, **options)
         blocks = [
             x for x in simulation.equation.terms
             if isinstance(x, Block) and not x._supplies and not isinstance(x, POINTS)
