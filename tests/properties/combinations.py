@@ -96,12 +96,12 @@ class Draft:
         return choices[int(self.random.integers(len(choices)))]
 
     def text(self, row):
-        """A text with its random parts drawn; one of several texts; or what a function draws."""
-        if callable(row):
-            return row(self)
-        if not isinstance(row, str):
-            return self.one([self.text(each) for each in row])
+        """A text with its random parts drawn."""
         return RANDOM.sub(self._draw, row.replace("TIP", "LAST.end").replace("LAST", self.last))
+
+    def one_text(self, *rows):
+        """One of some texts; parts of the others are drawn, too."""
+        return self.one([self.text(row) for row in rows])
 
     def _draw(self, part):
         low, high, digits, choices = part.groups()
@@ -133,9 +133,6 @@ class Draft:
         while len(self.beams) < number:
             x, y = self.beams[-1]["b"]
             self.beam((x, y), (x + 0.8, y - 0.5), 2)
-
-    def section(self, i, text):
-        self.sections[i] = text
 
     def _beams(self):
         for i, beam in enumerate(self.beams):
@@ -282,7 +279,7 @@ def draw(seed):
             chosen.append(one)
             taken |= set(one.slots)
     for one in chosen:
-        one.write(draft)
+        one.write(draft, one.name)
     steps = int(random.integers(8, 25))
     draft.step = draft.step or f"{draft.end / steps:.6g}"
     words = ", ".join(one.name for one in chosen)
@@ -306,7 +303,7 @@ def _build(d, base):
     if base == "column":
         d.beam((0.0, 0.0), (1.0, 0.0), 6)
         d.loads.append("ub.PointLoad(b0.end, force=(-1.0, 0.0), amplitude=lambda t: t)")
-        d.section(0, f"ub.Section({STIFF})")
+        d.sections[0] = f"ub.Section({STIFF})"
         return
     if base == "portal":
         corners = (0.0, 0.0), (0.1, 1.0), (1.0, 1.1), (1.1, 0.0)

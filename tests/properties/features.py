@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Features of models that combinations draw, each a text or a function that changes a draft.
+"""Features of models that combinations draw: functions that write features by name into a draft.
 
 A feature takes the slots that it names, which no other feature of a combination may take.  Sizes
 are of beams of about 1 m with EA = 1e4 N, GA = 4e3 N, EI = 100 N m2 and 1 kg/m, under forces of
-some tens of N, so that yielding moments are some N m and the lowest periods some 0.1 s.  The order
-of the features decides what a seed draws.
+some tens of N, so that yielding moments are some N m and the lowest periods some 0.1 s.
 
 Texts are Python source with random parts: ``<1 5>`` is a number between 1 and 5, perhaps with a
 format, as in ``<1 5 .3f>``; ``[[a|b]]`` is one of some texts; ``LAST`` is the last beam, ``TIP`` its
@@ -39,7 +38,7 @@ INELASTIC = {
 
 @dataclass(frozen=True)
 class Feature:
-    """A feature, and the slots that it takes."""
+    """A feature, a function of a draft and its name, and the slots that it takes."""
 
     name: str
     write: Callable
@@ -53,30 +52,6 @@ class Feature:
         """Whether static schemes, or schemes with forces at the ends of steps, allow it."""
         forbidden = WITHOUT_STATICS if static else OVER_STEPS if at_end else ()
         return self.name not in forbidden
-
-
-FEATURES: list[Feature] = []
-
-
-def feature(*slots):
-    """Add a function to the features."""
-
-    def add(function):
-        FEATURES.append(Feature(function.__name__, function, slots))
-        return function
-
-    return add
-
-
-def features(write, *slots, **rows):
-    """Add features by name, of which `write(draft, row)` writes the row."""
-    for name, row in rows.items():
-        FEATURES.append(Feature(name, lambda d, row=row: write(d, row), slots))
-
-
-def added_to(part):
-    """A function that adds a text to a part of the scene."""
-    return lambda d, row: getattr(d, part).append(d.text(row))
 
 
 def bulk_law(d, limit, stiffness):
@@ -95,10 +70,9 @@ def own_softening(d, limit, energy):
 # -- sections ----------------------------------------------------------------------------------
 
 
-@feature("any section")
-def shape(d):
+def shapes(d, name):
     E, rho = 1.2e10 if d.column else 1.2e8, 1.2e4  # EI and mass of the plain section, in order
-    d.section(0, d.one([
+    d.sections[0] = d.one([
         f"ub.Section.rectangle(0.01, 0.1, E={E}, nu=0.3, rho={rho / 12:.6g})",
         f"ub.Section.circle(0.05, E={3 * E}, nu=0.3, rho={rho / 24:.6g})",
         f"ub.Section.tube(0.08, 0.005, E={E / 2}, nu=0.3, rho={rho / 15:.6g})",
@@ -110,48 +84,46 @@ def shape(d):
         f"st.steel('IPE 80', E={E}, rho={rho / 9:.6g})",
         "ub.Section.of_shape(st.Shape([(-0.01, 0), (0.01, 0), (0.005, 0.1), (-0.005, 0.1)]), "
         f"shear_factor=0.8, E={E}, nu=0.3, rho={rho / 18:.6g})",
-    ]))  # fmt: skip
+    ])  # fmt: skip
 
 
-def _axial_and_shear(d):
-    axial, shear = (bulk_law(d, d.some(8, 30), stiffness) for stiffness in (EA, GA))
-    return f"axial={axial}, shear={shear}"
+def laws_of_resultants(d, name):
+    match name:
+        case "hardening":
+            law = f"bending={bulk_law(d, d.some(3, 10), EI)}"
+        case "axial_and_shear":
+            axial, shear = (bulk_law(d, d.some(8, 30), stiffness) for stiffness in (EA, GA))
+            law = f"axial={axial}, shear={shear}"
+        case "perzyna":
+            law = "bending=ub.ElastoPlastic(<3 8>, kinematic=5.0, viscosity=ub.Perzyna(<0.5 5>))"
+        case "duvaut_lions":
+            viscosity = "ub.DuvautLions(<0.01 0.1>)"
+            law = f"bending=ub.ElastoPlastic(<3 8>, isotropic=5.0, viscosity={viscosity})"
+        case "hysteresis":  # with or without an axial law of another class
+            M = d.some(4, 10)
+            axial = d.one(["", f"axial=ub.ElastoPlastic({4 * M:.4g}, isotropic=500), "])
+            law = f"{axial}bending=" + d.one_text(
+                f"st.RambergOsgood({M:.4g}, <0.02 0.1>, <2 6 .3g>)",
+                f"st.ArmstrongFrederick({M:.4g}, <5 20>, <0.5 4>)",
+                f"st.BoucWen({M:.4g}, <0.02 0.3 .3g>, <1 4 .3g>)",
+            )
+        case "own_law":
+            law = "bending=" + d.one_text("Dashpot(<5 50>)", "PowerLaw(<4 10>, 0.05, <2 5 .3g>)")
+        case "interaction":
+            law = "interaction=st.AxialBending(<15 60>, <4 10>)"
+        case "hinge_in_cells":
+            kind = d.one(["Softening", "LinearSoftening"])
+            more = d.one(["", "", f", bending={bulk_law(d, d.some(3, 6), EI)}"])
+            law = f"hinge=ub.{kind}(<5 9>, <2 9>){more}"
+        case "own_hinge_in_cells":
+            law = f"hinge={own_softening(d, d.some(5, 9), d.some(2, 9))}"
+    d.sections[0] = d.text(f"ub.Section({PLAIN}, {law})")
 
 
-def _hysteresis(d):
-    M = d.some(4, 10)
-    axial = d.one(["", f"axial=ub.ElastoPlastic({4 * M:.4g}, isotropic=500), "])  # another class
-    return f"{axial}bending=" + d.text((
-        f"st.RambergOsgood({M:.4g}, <0.02 0.1>, <2 6 .3g>)",
-        f"st.ArmstrongFrederick({M:.4g}, <5 20>, <0.5 4>)",
-        f"st.BoucWen({M:.4g}, <0.02 0.3 .3g>, <1 4 .3g>)",
-    ))  # fmt: skip
+RECTANGLE = "ub.Section.rectangle(0.01, 0.1, E=1.2e8, nu=0.3, rho=1e3"
 
 
-def _hinge_in_cells(d):
-    kind = d.one(["Softening", "LinearSoftening"])
-    more = d.one(["", "", f", bending={bulk_law(d, d.some(3, 6), EI)}"])
-    return d.text(f"hinge=ub.{kind}(<5 9>, <2 9>){more}")
-
-
-features(
-    lambda d, row: d.section(0, f"ub.Section({PLAIN}, {d.text(row)})"),
-    *("section", "any section"),
-    hardening=lambda d: f"bending={bulk_law(d, d.some(3, 10), EI)}",
-    axial_and_shear=_axial_and_shear,
-    perzyna="bending=ub.ElastoPlastic(<3 8>, kinematic=5.0, viscosity=ub.Perzyna(<0.5 5>))",
-    duvaut_lions="bending=ub.ElastoPlastic(<3 8>, isotropic=5.0, "
-    "viscosity=ub.DuvautLions(<0.01 0.1>))",
-    hysteresis=_hysteresis,
-    own_law=("bending=Dashpot(<5 50>)", "bending=PowerLaw(<4 10>, 0.05, <2 5 .3g>)"),
-    interaction="interaction=st.AxialBending(<15 60>, <4 10>)",
-    hinge_in_cells=_hinge_in_cells,
-    own_hinge_in_cells=lambda d: f"hinge={own_softening(d, d.some(5, 9), d.some(2, 9))}",
-)
-
-
-@feature("section", "any section")
-def fibres(d):
+def laws_of_fibres(d, name):
     mean = d.some(4e4, 1e5)
     limit = d.one([
         f"ub.distributions.Normal({mean:.5g}, {mean / 8:.5g}, seed=1)",
@@ -161,169 +133,137 @@ def fibres(d):
     ])  # fmt: skip
     crack = d.one(["", f", softening=ub.Softening({1.5 * mean:.5g}, {mean / 500:.5g})"])
     law = f"ub.Fibres(ub.ElastoPlastic({limit}, isotropic=6e6), number=4{crack})"
-    rectangle = "ub.Section.rectangle(0.01, 0.1, E=1.2e8, nu=0.3, rho=1e3"
-    d.section(0, d.one([
-        f"{rectangle}, fibres={law})",
+    d.sections[0] = d.one([
+        f"{RECTANGLE}, fibres={law})",
         f"ub.Section.of_fibres([-0.05, 0.0, 0.03, 0.06], [2e-4, 3e-4, 3e-4, 2e-4], E=8e7, "
         f"nu=0.3, rho=1e3, fibres={law.replace(', number=4', '')})",
         # laws of several classes: two with cracks at different limits, and bars
-        f"{rectangle}, fibres={law}, cover=0.002, "
+        f"{RECTANGLE}, fibres={law}, cover=0.002, "
         f"core=ub.Fibres(st.RambergOsgood({mean:.5g}, 1e-4, 3.0), softening=ub.LinearSoftening("
         f"{2 * mean:.5g}, {mean / 300:.5g}))).reinforced([-0.04, 0.04], [1e-5, 2e-5], E=8e8, "
         f"fibres=ub.Fibres(st.ArmstrongFrederick({3 * mean:.5g}, 1e8, 100.0)))",
         f"st.t_shape(0.1, 0.03, 0.008, 0.02, E=1.2e8, nu=0.3, rho=1e3, fibres={law}, "
         f"cover=0.002, core=ub.Fibres(ub.ElastoPlastic({2 * mean:.5g}))).reinforced([-0.04], "
         f"[1e-5], E=8e8, fibres=ub.Fibres(st.RambergOsgood({3 * mean:.5g}, 1e-4, 3.0)))",
-    ]))  # fmt: skip
+    ])  # fmt: skip
 
 
-@feature("section", "any section")
-def fibres_of_steel_or_concrete(d):
+def laws_of_steel_or_concrete(d, name):
     strength, limit = d.some(2e5, 4e5), d.some(1e5, 2e5)
     kind, energy = d.one(["Softening", "LinearSoftening"]), d.some(300, 900)
     tension = f"tension=ub.{kind}({limit:.5g}, {energy:.4g})"
-    law = d.text((
+    law = d.one_text(
         f"st.MenegottoPinto({limit / 2:.5g}, <0.02 0.2 .3g>, a1=0.1, a3=0.05)",
         f"st.KentPark({strength:.5g}, {strength / 3:.5g}, {strength / 2e7:.4g}, {tension})",
         f"st.Mander({strength:.5g}, {strength / 6e7:.4g}, {tension})",
-    ))  # fmt: skip
-    fibres = f"ub.Fibres({law}, number=4)"
-    d.section(0, f"ub.Section.rectangle(0.01, 0.1, E=1.2e8, nu=0.3, rho=1e3, fibres={fibres})")
+    )
+    d.sections[0] = f"{RECTANGLE}, fibres=ub.Fibres({law}, number=4))"
 
 
-def _hinges(d):
-    M, place = f"{d.some(3, 9):.4g}", d.one([0.0, 0.0, 0.5])
-    law = d.text((
-        f"ub.Softening({M}, <1 8>)", f"ub.LinearSoftening({M}, <2 9>)",
-        f"ub.ElastoPlastic({M}, isotropic=<5 30>)",
-    ))  # fmt: skip
-    return f"{place}: {law}"
+def hinges(d, name):
+    M, place = d.some(3, 9), "0.0"
+    if name == "own_hinges":
+        law = own_softening(d, M, d.some(2, 9))
+    else:
+        place, softening = d.one([0.0, 0.0, 0.5]), f"Softening({M:.4g}"
+        law = d.one_text(
+            f"ub.{softening}, <1 8>)", f"ub.Linear{softening}, <2 9>)",
+            f"ub.ElastoPlastic({M:.4g}, isotropic=<5 30>)",
+        )  # fmt: skip
+    d.beams[0]["hinges"] = f"{{{place}: {law}}}"
 
-
-features(
-    lambda d, row: d.beams[0].update(hinges=f"{{{d.text(row)}}}"),
-    "hinges",
-    hinges=_hinges,
-    own_hinges=lambda d: f"0.0: {own_softening(d, d.some(3, 9), d.some(2, 9))}",
-)
 
 # -- axes, joints, supports --------------------------------------------------------------------
 
 
-@feature("axis", "hinges")
-def curved(d):
+def axes(d, name):
     d.beams[0]["kind"] = d.text("[[arc|polyline|along]]")
 
 
-def _join(d, row):
-    """A joint of two beams, and springs between its places."""
-    joint, *springs = row
-    d.need_beams(2, apart="RigidLink" in joint)
-    d.joint = d.text(joint)
-    d.connectors += map(d.text, springs)
+def joints(d, name):
+    """A joint of two beams, and connectors between its places."""
+    d.need_beams(2, apart=name == "rigid_link")
+    match name:
+        case "revolute":
+            d.joint = d.text("ub.Revolute({a}, {b}[[|, multipliers=True]])")
+            connectors = ["Turn: ub.Spring(<20 100>)"]
+        case "multipliers":
+            d.joint, connectors = "ub.Rigid({a}, {b}, multipliers=True)", []
+        case "prismatic":
+            axis = d.text("axis=(<-1 1 .3f>, 1.0)")
+            d.joint = f"ub.Prismatic({{a}}, {{b}}, {axis})"
+            connectors = [f"Slide: ub.Spring(<100 900>), {axis}"]
+        case "slot":
+            d.joint = "ub.Prismatic({a}, {b}, axis=(0.3, 1.0), turning=True)"
+            connectors = ["Slide: ub.Spring(400.0), axis=(0.3, 1.0)", "Turn: ub.Spring(<20 100>)"]
+        case "rigid_link":
+            d.joint, connectors = "ub.RigidLink({a}, {b})", []
+        case "release":
+            free = d.text("[[N|V|M]]")
+            d.joint = d.text(f"ub.Release({{a}}, {{b}}, free='{free}'[[|, multipliers=True]])")
+            axis = "b0.end.direction" if free == "N" else ACROSS
+            slide = f"Slide: ub.Spring(<50 300>), axis={axis}"
+            connectors = ["Turn: ub.Spring(<50 300>)" if free == "M" else slide]
+        case "rubbing_pin":
+            d.joint = "ub.Revolute({a}, {b}, multipliers=True)"
+            connectors = ["Turn: ub.Coulomb(<0.05 0.3>, coefficient=0.02, joint=joint)"]
+        case "motor":
+            ω = d.some(2, 6) / d.end
+            way = f"<0.05 0.4 .3f> * (1.0 - math.cos({ω:.4g} * t))"
+            d.joint = "ub.Revolute({a}, {b})"
+            connectors = [f"Turn: ub.PrescribedMotion(lambda t: {way})"]
+    for text in connectors:
+        kind, law = text.split(": ", 1)
+        d.connectors.append(d.text(f"ub.{kind}(b0.end, b1.start, {law})"))
 
 
-TURN = "ub.Turn(b0.end, b1.start, ub.Spring(<20 100>))"
-SLIDE = "ub.Slide(b0.end, b1.start, ub.Spring({k}), axis={axis})"
-
-features(
-    _join,
-    "joint",
-    revolute=("ub.Revolute({a}, {b}[[|, multipliers=True]])", TURN),
-    multipliers=["ub.Rigid({a}, {b}, multipliers=True)"],
-)
+ACROSS = "(-b0.end.direction[1], b0.end.direction[0])"
 
 
-@feature("joint")
-def prismatic(d):
-    axis = d.text("(<-1 1 .3f>, 1.0)")
-    slide = SLIDE.format(k="<100 900>", axis=axis)
-    _join(d, (f"ub.Prismatic({{a}}, {{b}}, axis={axis})", slide))
-
-
-features(
-    _join,
-    "joint",
-    slot=(
-        "ub.Prismatic({a}, {b}, axis=(0.3, 1.0), turning=True)",
-        SLIDE.format(k="400.0", axis="(0.3, 1.0)"),
-        TURN,
-    ),
-    rigid_link=["ub.RigidLink({a}, {b})"],
-)
-
-
-@feature("joint")
-def release(d):
-    free, more = d.text("[[N|V|M]]"), d.text("[[|, multipliers=True]]")
-    spring = TURN.replace("20 100", "50 300")
-    if free != "M":
-        axes = {"N": "b0.end.direction", "V": "(-b0.end.direction[1], b0.end.direction[0])"}
-        spring = SLIDE.format(k="<50 300>", axis=axes[free])
-    _join(d, (f"ub.Release({{a}}, {{b}}, free='{free}'{more})", spring))
-
-
-@feature("tip")
-def connector(d):
+def at_the_tip(d, name):
     x, y = d.tip
-    d.joints.append(f"ub.Link(ub.ground({x - 0.4:.3f}, {y - 0.9:.3f}), {d.last}.end)")
+    match name:
+        case "connector":
+            d.joints.append(f"ub.Link(ub.ground({x - 0.4:.3f}, {y - 0.9:.3f}), {d.last}.end)")
+        case "guided":
+            bend = d.some(-0.5, 0.5)
+            curve = f"lambda s: ({x!r} + 0.4 * s, {y!r} + s + {bend:.3f} * s**2)"
+            if bend > 0:  # without another random number
+                s = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
+                curve = f"ub.Spline([({curve})(s) for s in {s}], {s})"
+            d.joints.append(f"ub.Guided({d.last}.end, {curve})")
+        case "roller":
+            d.supports.append(d.text("ub.Roller(TIP, along=(<-1 1 .3f>, 1.0))"))
+        case "propped":
+            d.supports.append(f"ub.Roller({d.last}.end, along=(1.0, {0.0 if d.column else 0.3}))")
+        case "moved_tip":
+            component, size = d.one([("u", 0.05), ("v", 0.1), ("psi", 0.3)])
+            along = d.one(["", ", along=(1.0, 0.4)"]) if component != "psi" else ""
+            way = f"ub.Table([0.0, {d.end / 2:.4g}, {d.end:.4g}], [0.0, {size}, {-size / 2}])"
+            if not d.static:  # kinks of motions are blows, of which the energy does not converge
+                way = f"lambda t: {size} * (1.0 - math.cos({d.some(2, 6) / d.end:.4g} * t))"
+            d.supports.append(f"ub.PrescribedDisplacement({d.last}.end, {component}={way}{along})")
 
 
-@feature("tip")
-def guided(d):
-    x, y = d.tip
-    bend = d.some(-0.5, 0.5)
-    curve = f"lambda s: ({x!r} + 0.4 * s, {y!r} + s + {bend:.3f} * s**2)"
-    if bend > 0:  # without another random number
-        s = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
-        curve = f"ub.Spline([({curve})(s) for s in {s}], {s})"
-    d.joints.append(f"ub.Guided({d.last}.end, {curve})")
+def at_the_root(d, name):
+    match name:
+        case "pinned":
+            d.root = "ub.Pinned({place})"
+            d.connectors.append(d.text("ub.Turn(ub.ground(0, 0), b0.start, ub.Spring(<100 500>))"))
+        case "shaken":
+            motion = f"lambda t: 0.03 * (1.0 - math.cos({d.some(2, 6) / d.end:.4g} * t))"
+            if d.one([True, False]):
+                values = ", ".join(f"{d.some(-0.3, 0.3) / d.end**2:.3f}" for _ in range(8))
+                d.lines.append(f"quake = st.GroundMotion({d.end / 10:.4g}, [0.0, {values}, 0.0])")
+                motion = "quake.displacement"
+            d.root = d.text(f"ub.PrescribedDisplacement({{place}}, [[u|v|psi]]={motion}, {{rest}})")
+        case "free_flight":
+            d.root = None
+            motion = "linear=(<-2 2 .3f>, 1.0), angular=<-4 4 .3f>, about=(0.0, 0.0)"
+            d.initial.append(d.text(f"ub.Velocity([{{moving}}], {motion})"))
 
 
-features(
-    added_to("supports"),
-    "tip",
-    roller="ub.Roller(TIP, along=(<-1 1 .3f>, 1.0))",
-    propped=lambda d: f"ub.Roller({d.last}.end, along=(1.0, {0.0 if d.column else 0.3}))",
-)
-
-
-@feature("tip")
-def moved_tip(d):
-    component, size = d.one([("u", 0.05), ("v", 0.1), ("psi", 0.3)])
-    along = d.one(["", ", along=(1.0, 0.4)"]) if component != "psi" else ""
-    way = f"ub.Table([0.0, {d.end / 2:.4g}, {d.end:.4g}], [0.0, {size}, {-size / 2}])"
-    if not d.static:  # kinks of motions are blows, of which the energy does not converge
-        way = f"lambda t: {size} * (1.0 - math.cos({d.some(2, 6) / d.end:.4g} * t))"
-    d.supports.append(f"ub.PrescribedDisplacement({d.last}.end, {component}={way}{along})")
-
-
-@feature("root")
-def pinned(d):
-    d.root = "ub.Pinned({place})"
-    d.connectors.append(d.text("ub.Turn(ub.ground(0, 0), b0.start, ub.Spring(<100 500>))"))
-
-
-@feature("root")
-def shaken(d):
-    ω = d.some(2, 6) / d.end
-    motion = f"lambda t: 0.03 * (1.0 - math.cos({ω:.4g} * t))"
-    if d.one([True, False]):
-        values = ", ".join(f"{d.some(-0.3, 0.3) / d.end**2:.3f}" for _ in range(8))
-        d.lines.append(f"quake = st.GroundMotion({d.end / 10:.4g}, [0.0, {values}, 0.0])")
-        motion = "quake.displacement"
-    d.root = d.text(f"ub.PrescribedDisplacement({{place}}, [[u|v|psi]]={motion}, {{rest}})")
-
-
-@feature("root", "tip", "free")
-def free_flight(d):
-    d.root = None
-    motion = "linear=(<-2 2 .3f>, 1.0), angular=<-4 4 .3f>, about=(0.0, 0.0)"
-    d.initial.append(d.text(f"ub.Velocity([{{moving}}], {motion})"))
-
-
-@feature("body")
-def body(d):
+def bodies(d, name):
     x, y = d.tip
     middle = f"{x + d.some(0.05, 0.2):.4f}, {y + d.some(-0.1, 0.1):.4f}"
     d.bodies.append(f"body = ub.Body(({middle}), mass=0.7, inertia=0.02, name='body')")
@@ -336,46 +276,72 @@ def body(d):
 
 # -- connectors --------------------------------------------------------------------------------
 
-
-def _connect(d, row):
-    """A connector, or one of a law between the ground and a place, or of two places."""
-    law, (x, y) = d.text(row), d.tip
-    if not law.startswith(("ub.Turn", "ub.Slide", "ub.Bushing")):
-        kind, place = d.one("SLT"), d.one([f"{d.last}.at(0.5)", "b0.end"])
-        far = f"{x + 0.5:.3f}, {y + 0.8:.3f}"
-        law = {
-            "T": f"ub.Turn(ub.ground(0, 0), {place}, {law})",
-            "S": f"ub.Stretch(ub.ground({far}), {place}, {law})",
-            "L": f"ub.Slide(ub.ground(0.2, 0.7), {place}, {law}, axis=(0.3, 1.0))",
-        }[kind]
-    d.connectors.append(law)
-
-
-def _side_spring(d):
-    (x, y), law = d.tip, "ub.Spring(<50 300>), axis=(0.0, 1.0)"
-    return d.text(f"ub.Slide(ub.ground({x!r}, {y!r}), TIP, {law})")
-
-
-def _breaking(d):
-    law = own_softening(d, d.some(1, 5), d.some(0.5, 2))
-    return d.one([f"ub.Spring(200.0, softening={law})", f"ub.RigidPlastic({law})"])
+LAWS = {
+    "spring": "ub.Spring(<50 300>)",
+    "spring_breaks": "ub.Spring(200.0, softening=ub.[[Softening|LinearSoftening]](<1 5>, <0.5 2>))",
+    "damper": "ub.Damper(<0.2 3>)",
+    "stop": "ub.Stop(<200 900>, low=-0.01, high=<0.005 0.02>)",
+    "damped_stop": "ub.Stop(<200 900>, high=<0.005 0.02>, damping=<0.1 3 .3g>)",
+    "coulomb": "ub.Coulomb(<0.2 2>)",
+    "actuator": "ub.PrescribedForce(lambda t: <2 9 .3f> * math.sin(60 * t))",
+    "controller": "ub.Controller(lambda now: <1 5 .3f> * math.sin(60 * now.t))",
+    "force_law_with_history": "ub.ForceLaw(Maxwell(<50 200>, <0.02 0.1>), state=[0.0])",
+    "connector_law": "Stiffening(<50 200>, <500 3000>)",
+    "connector_law_with_history": "Relaxing(<50 200>, <0.02 0.1>, <0.1 2>)",
+}
+CLEARANCE = "ub.Clearance(<300 900>, gap=<0.002 0.01>"
+BUSHINGS = {
+    "cushion": "[[LAST.at(0.5)|b0.end]], Cushion(<50 200>, <0.02 0.1>, <0.1 2>)",
+    "clearance": f"TIP, {CLEARANCE})",
+    "rough_clearance": f"TIP, {CLEARANCE}, damping=1.0, friction=<0.1 0.5 .3g>, radius=0.02)",
+    "axial_bending_hinge": "TIP, st.AxialBendingHinge(<2 20>, <0.5 3>, <300 900>, 500.0, 100.0)",
+}
 
 
-def _bushing(law, place="TIP"):
-    return f"ub.Bushing(ub.ground(0.2, 0.7), {place}, {law}, axis=(0.3, 1.0))"
+def connectors_to_places(d, name):
+    x, y = d.tip
+    match name:
+        case "side_spring":
+            law = "ub.Spring(<50 300>), axis=(0.0, 1.0)"
+            text = f"ub.Slide(ub.ground({x!r}, {y!r}), TIP, {law})"
+        case "integral_controller":
+            text = "ub.Turn(ub.ground(0, 0), b0.end, ub.Controller(Integral(b0.end, <0.5 2 .3f>)))"
+        case "rigid_plastic":
+            law = "ub.RigidPlastic(ub.ElastoPlastic(<1 4>, isotropic=<50 200>))"
+            text = f"ub.Slide(ub.ground(0.2, 0.7), LAST.at(0.5), {law}, axis=(0.3, 1.0))"
+        case _:
+            text = f"ub.Bushing(ub.ground(0.2, 0.7), {BUSHINGS[name]}, axis=(0.3, 1.0))"
+    d.connectors.append(d.text(text))
 
 
-def _force_law(d):
-    d.lines.append(d.text("cubic = Cubic(<50 200>, <500 3000>)"))
-    return d.text("ub.ForceLaw(cubic[[|, stored=cubic.energy]])")
+def connectors(d, name):
+    """A connector of a law between the ground and a place."""
+    match name:
+        case "spring_yields":
+            law = f"ub.Spring(200.0, law={bulk_law(d, d.some(0.5, 4), 200.0)})"
+        case "own_law_of_breaking":
+            law = own_softening(d, d.some(1, 5), d.some(0.5, 2))
+            law = d.one([f"ub.Spring(200.0, softening={law})", f"ub.RigidPlastic({law})"])
+        case "force_law":
+            d.lines.append(d.text("cubic = Cubic(<50 200>, <500 3000>)"))
+            law = "ub.ForceLaw(cubic[[|, stored=cubic.energy]])"
+        case "brake":
+            rest = d.some(0.3, 2)
+            law = f"Brake({rest:.4g}, {rest * d.some(0.5, 1):.4g}, <0.02 0.2>)"
+        case "deteriorating":
+            law = deteriorating(d)
+        case _:
+            law = LAWS[name]
+    law, (x, y) = d.text(law), d.tip
+    kind, place = d.one("SLT"), d.one([f"{d.last}.at(0.5)", "b0.end"])
+    d.connectors.append({
+        "T": f"ub.Turn(ub.ground(0, 0), {place}, {law})",
+        "S": f"ub.Stretch(ub.ground({x + 0.5:.3f}, {y + 0.8:.3f}), {place}, {law})",
+        "L": f"ub.Slide(ub.ground(0.2, 0.7), {place}, {law}, axis=(0.3, 1.0))",
+    }[kind])  # fmt: skip
 
 
-def _brake(d):
-    rest = d.some(0.3, 2)
-    return d.text(f"Brake({rest:.4g}, {rest * d.some(0.5, 1):.4g}, <0.02 0.2>)")
-
-
-def _deteriorating(d):
+def deteriorating(d):
     M, k, n = d.some(1, 4), 200.0, d.one([1, 1.3, 2])
     plus, minus = (
         f"st.Backbone({M * f:.4g}, {d.some(1, 4) * M / k:.4g}, {d.some(4, 30) * M / k:.4g}, "
@@ -385,136 +351,51 @@ def _deteriorating(d):
     E = [f"{d.some(5, 50) * M / k:.4g}" for _ in range(3)]
     kind, more = "IbarraKrawinkler", ""
     if d.one([True, False]):
-        kind, more = "PinchingHinge", d.text(f", <0.2 1 .3g>, <0 1 .3g>, {E[1]}")
+        kind, more = "PinchingHinge", f", <0.2 1 .3g>, <0 1 .3g>, {E[1]}"
     return f"st.{kind}({k}, {plus}, {minus}, {', '.join(E)}, {n}{more})"
 
 
-features(
-    _connect,
-    spring="ub.Spring(<50 300>)",
-    side_spring=_side_spring,
-    spring_yields=lambda d: f"ub.Spring(200.0, law={bulk_law(d, d.some(0.5, 4), 200.0)})",
-    spring_breaks="ub.Spring(200.0, softening=ub.[[Softening|LinearSoftening]](<1 5>, <0.5 2>))",
-    own_law_of_breaking=_breaking,
-    damper="ub.Damper(<0.2 3>)",
-    stop="ub.Stop(<200 900>, low=-0.01, high=<0.005 0.02>)",
-    damped_stop="ub.Stop(<200 900>, high=<0.005 0.02>, damping=<0.1 3 .3g>)",
-)
-features(_connect, "has_friction", coulomb="ub.Coulomb(<0.2 2>)")
-
-
-@feature("has_friction", "joint")
-def rubbing_pin(d):
-    law = "ub.Coulomb(<0.05 0.3>, coefficient=0.02, joint=joint)"
-    pin = "ub.Revolute({a}, {b}, multipliers=True)"
-    _join(d, (pin, f"ub.Turn(b0.end, b1.start, {law})"))
-
-
-@feature("joint")
-def motor(d):
-    ω = d.some(2, 6) / d.end
-    motion = f"lambda t: <0.05 0.4 .3f> * (1.0 - math.cos({ω:.4g} * t))"
-    turn = f"ub.Turn(b0.end, b1.start, ub.PrescribedMotion({motion}))"
-    _join(d, ("ub.Revolute({a}, {b})", turn))
-
-
-CLEARANCE = "ub.Clearance(<300 900>, gap=<0.002 0.01>"
-
-features(
-    _connect,
-    actuator="ub.PrescribedForce(lambda t: <2 9 .3f> * math.sin(60 * t))",
-    controller="ub.Controller(lambda now: <1 5 .3f> * math.sin(60 * now.t))",
-    integral_controller="ub.Turn(ub.ground(0, 0), b0.end, "
-    "ub.Controller(Integral(b0.end, <0.5 2 .3f>)))",
-    force_law=_force_law,
-    force_law_with_history="ub.ForceLaw(Maxwell(<50 200>, <0.02 0.1>), state=[0.0])",
-    connector_law="Stiffening(<50 200>, <500 3000>)",
-    connector_law_with_history="Relaxing(<50 200>, <0.02 0.1>, <0.1 2>)",
-    cushion=_bushing("Cushion(<50 200>, <0.02 0.1>, <0.1 2>)", "[[LAST.at(0.5)|b0.end]]"),
-    clearance=_bushing(f"{CLEARANCE})"),
-    rough_clearance=_bushing(
-        f"{CLEARANCE}, damping=1.0, friction=<0.1 0.5 .3g>, radius=0.02)"
-    ),
-)
-features(_connect, "has_friction", brake=_brake)
-features(
-    _connect,
-    rigid_plastic="ub.Slide(ub.ground(0.2, 0.7), LAST.at(0.5), "
-    "ub.RigidPlastic(ub.ElastoPlastic(<1 4>, isotropic=<50 200>)), axis=(0.3, 1.0))",
-    axial_bending_hinge=_bushing(
-        "st.AxialBendingHinge(<2 20>, <0.5 3>, <300 900>, 500.0, 100.0)"
-    ),
-    deteriorating=_deteriorating,
-)
-
 # -- loads, works, masses, damping -------------------------------------------------------------
 
-FORCE, WEAK = "(<-20 20 .3f>, <-20 20 .3f>)", "(<-15 15 .3f>, <-15 15 .3f>)"
+WEAK, MASS = "(<-15 15 .3f>, <-15 15 .3f>)", ", mass=0.5"
 PROFILES = (
-    ", span=(0.25, 0.75)", ", profile=(1.5, -0.5)", ", span=(0.0, 0.5), profile=(0.0, 2.0)",
+    "", ", span=(0.25, 0.75)", ", profile=(1.5, -0.5)", ", span=(0.0, 0.5), profile=(0.0, 2.0)",
     ", profile=lambda s: 1 - 4 * (s - 0.5) ** 2",
 )  # fmt: skip
 
-features(
-    added_to("loads"),
-    follower=f"ub.FollowerLoad(TIP, force={WEAK}, moment=<-2 2 .3f>, amplitude=TIME)",
-    moment="ub.PointLoad(LAST.at(0.5), moment=<-6 6 .3f>, amplitude=TIME)",
-)
 
-
-@feature()
-def line_load(d):
-    more = d.text(("", ", moment=<-2 2 .3f>")) + d.one(["", *PROFILES])
-    d.loads.append(d.text(f"ub.LineLoad(b0, force={FORCE}{more}, amplitude=TIME)"))
-
-
-@feature()
-def imposed_strain(d):
-    strain = d.text((
-        "axial=<-1e-3 1e-3 .3e>, span=(0.25, 0.75)",
-        "axial=(0.0, <-1e-3 1e-3 .3e>), curvature=<-5e-2 5e-2 .3e>",
-        "curvature=lambda s: <-5e-2 5e-2 .3e> * (1 - s**2), shear=1e-4",
-    ))  # fmt: skip
-    d.loads.append(d.text(f"ub.ImposedStrain(b0, {strain}, amplitude=TIME)"))
-
-
-@feature()
-def pressure(d):
-    more = d.one(["", *PROFILES])
-    d.loads.append(
-        d.text(f"ub.Pressure(b0, <-20 20 .3f>, <-20 20 .3f>{more}, amplitude=TIME)")
-    )
-
-
-@feature()
-def moving_load(d):
-    place = d.one([f"3 * t / {d.end:.4g} - 1", "0.2 + 0.1 * math.sin(20 * t)", "0.5"])
-    beam = d.one(["b0", "[b1, b2]"]) if len(d.beams) > 2 else "b0"
-    load = f"ub.MovingLoad({beam}, lambda t: {place}, {WEAK}, TIME[[|{MASS}]])"
-    d.loads.append(d.text(load))
-    without_mass_in_a_frame(d)
-
-
-MASS = ", mass=0.5"
-
-
-def without_mass_in_a_frame(d):
-    """Take the masses from moving loads in a rotating frame, which refuses them."""
-    if any("RotatingFrame" in load for load in d.loads):
+def loads(d, name):
+    match name:
+        case "follower":
+            text = f"FollowerLoad(TIP, force={WEAK}, moment=<-2 2 .3f>, amplitude=TIME)"
+        case "moment":
+            text = "PointLoad(LAST.at(0.5), moment=<-6 6 .3f>, amplitude=TIME)"
+        case "line_load":
+            more = d.one_text("", ", moment=<-2 2 .3f>") + d.one(PROFILES)
+            text = f"LineLoad(b0, force=(<-20 20 .3f>, <-20 20 .3f>){more}, amplitude=TIME)"
+        case "imposed_strain":
+            strain = d.one_text(
+                "axial=<-1e-3 1e-3 .3e>, span=(0.25, 0.75)",
+                "axial=(0.0, <-1e-3 1e-3 .3e>), curvature=<-5e-2 5e-2 .3e>",
+                "curvature=lambda s: <-5e-2 5e-2 .3e> * (1 - s**2), shear=1e-4",
+            )
+            text = f"ImposedStrain(b0, {strain}, amplitude=TIME)"
+        case "pressure":
+            text = f"Pressure(b0, <-20 20 .3f>, <-20 20 .3f>{d.one(PROFILES)}, amplitude=TIME)"
+        case "moving_load":
+            place = d.one([f"3 * t / {d.end:.4g} - 1", "0.2 + 0.1 * math.sin(20 * t)", "0.5"])
+            beam = d.one(["b0", "[b1, b2]"]) if len(d.beams) > 2 else "b0"
+            text = f"MovingLoad({beam}, lambda t: {place}, {WEAK}, TIME[[|{MASS}]])"
+        case "gravity":
+            text = "Gravity((<-5 5 .3f>, -9.81), amplitude=TIME)"
+        case "rotating_frame":
+            text = "RotatingFrame(<1 5 .3f>, about=(-0.2, 0.1))"
+    d.loads.append(d.text(f"ub.{text}"))
+    if any("RotatingFrame" in load for load in d.loads):  # which refuses masses of moving loads
         d.loads[:] = [load.replace(MASS, "") for load in d.loads]
 
 
-features(added_to("loads"), gravity="ub.Gravity((<-5 5 .3f>, -9.81), amplitude=TIME)")
-
-
-@feature("frame")
-def rotating_frame(d):
-    d.loads.append(d.text("ub.RotatingFrame(<1 5 .3f>, about=(-0.2, 0.1))"))
-    without_mass_in_a_frame(d)
-
-
-@feature("work")
-def virtual_work(d):
+def virtual_works(d, name):
     size = d.some(-15, 15)
     k, end = f"{10 * abs(size):.3f}", d.end
     kinds = [
@@ -534,54 +415,86 @@ def virtual_work(d):
         ]
     kinds, beams = [d.text(kind) for kind in kinds], d.one(["", ", beams=[b0]"])
     works = [f"ub.VirtualWork({kind}{beams})" for kind in kinds]
-    d.works.append(d.text([*works, *(f"ub.Effect({kind})" for kind in own)]))
+    d.works.append(d.one_text(*works, *(f"ub.Effect({kind})" for kind in own)))
 
 
-@feature("potential")
-def potential(d):
+def potentials(d, name):
     kinds = [
-        "'soil', soil, numbers={'k': <50 500 .3f>}",
+        d.text("'soil', soil, numbers={'k': <50 500 .3f>}"),
         f"'field', field, numbers={{'size': ub.ramp({d.end / 2:.4g})}}",
-        "'warming', warming, numbers={'M': <-5 5 .3f>}",
+        d.text("'warming', warming, numbers={'M': <-5 5 .3f>}"),
     ]
-    kinds = [d.text(kind) for kind in kinds]
     d.works.append(f"ub.Potential({kinds[0] if d.column else d.one(kinds)}, beams=[b0])")
 
 
-@feature()
-def point_mass(d):
+def masses(d, name):
     inertia = d.one(["", ", 0.02"])
     d.masses.append(d.text(f"ub.PointMass(LAST.[[end|at(0.5)]], 0.8{inertia})"))
     d.loads.append(d.text("ub.Gravity(amplitude=TIME)"))
 
 
-features(
-    added_to("damping"),
-    "damping",
-    rayleigh="ub.Rayleigh(mass=<0.1 2 .3f>, stiffness=<1e-4 1e-3 .2e>[[|, tangent=True]])",
-)
-features(
-    added_to("damping"), "viscous", kelvin_voigt="ub.KelvinVoigt(<1e-4 2e-3 .2e>[[|, beams=[b0]]])"
-)
-
-# -- discretization, solver, steps -------------------------------------------------------------
-
-features(
-    lambda d, row: setattr(d, "mesh", d.text(row)),
-    "mesh",
-    degree="ub.Mesh(degree=[[2|3]][[|, lumped=True]])",
-    refined="ub.Mesh(refine=[[2|3]][[|, lumped=True]])",
-)
+def damping(d, name):
+    factors = "mass=<0.1 2 .3f>, stiffness=<1e-4 1e-3 .2e>[[|, tangent=True]]"
+    kelvin_voigt = "ub.KelvinVoigt(<1e-4 2e-3 .2e>[[|, beams=[b0]]])"
+    d.damping.append(d.text(f"ub.Rayleigh({factors})" if name == "rayleigh" else kelvin_voigt))
 
 
-@feature("newton")
-def newton(d):
-    d.newton = d.one([
-        "ub.Newton(rtol=1e-11, max_iterations=20)",
-        "ub.Newton(petsc={'snes_linesearch_type': 'bt'})",
-    ])  # fmt: skip
+def settings(d, name):
+    """Discretization, solver and steps."""
+    match name:
+        case "degree":
+            d.mesh = d.text("ub.Mesh(degree=[[2|3]][[|, lumped=True]])")
+        case "refined":
+            d.mesh = d.text("ub.Mesh(refine=[[2|3]][[|, lumped=True]])")
+        case "newton":
+            search = "petsc={'snes_linesearch_type': 'bt'}"
+            d.newton = d.text(f"ub.Newton([[rtol=1e-11, max_iterations=20|{search}]])")
+        case "adaptive":
+            d.step = d.text(f"ub.Adaptive(<1e-4 1e-3 .2e>, stops=[{d.end / 3:.4g}])")
 
 
-@feature("steps")
-def adaptive(d):
-    d.step = d.text(f"ub.Adaptive(<1e-4 1e-3 .2e>, stops=[{d.end / 3:.4g}])")
+FEATURES = [
+    Feature(name, write, slots)
+    for write, slots, names in (
+        (shapes, ["any section"], "shape"),
+        (laws_of_resultants, ["section", "any section"], "hardening axial_and_shear perzyna"),
+        (laws_of_resultants, ["section", "any section"], "duvaut_lions hysteresis own_law"),
+        (laws_of_resultants, ["section", "any section"], "interaction hinge_in_cells"),
+        (laws_of_resultants, ["section", "any section"], "own_hinge_in_cells"),
+        (laws_of_fibres, ["section", "any section"], "fibres"),
+        (laws_of_steel_or_concrete, ["section", "any section"], "fibres_of_steel_or_concrete"),
+        (hinges, ["hinges"], "hinges own_hinges"),
+        (axes, ["axis", "hinges"], "curved"),
+        (joints, ["joint"], "revolute multipliers prismatic slot rigid_link release"),
+        (at_the_tip, ["tip"], "connector guided roller propped moved_tip"),
+        (at_the_root, ["root"], "pinned shaken"),
+        (at_the_root, ["root", "tip", "free"], "free_flight"),
+        (bodies, ["body"], "body"),
+        (connectors, [], "spring"),
+        (connectors_to_places, [], "side_spring"),
+        (connectors, [], "spring_yields spring_breaks own_law_of_breaking damper stop damped_stop"),
+        (connectors, ["has_friction"], "coulomb"),
+        (joints, ["has_friction", "joint"], "rubbing_pin"),
+        (joints, ["joint"], "motor"),
+        (connectors, [], "actuator controller"),
+        (connectors_to_places, [], "integral_controller"),
+        (connectors, [], "force_law force_law_with_history"),
+        (connectors, [], "connector_law connector_law_with_history"),
+        (connectors_to_places, [], "cushion clearance rough_clearance"),
+        (connectors, ["has_friction"], "brake"),
+        (connectors_to_places, [], "rigid_plastic axial_bending_hinge"),
+        (connectors, [], "deteriorating"),
+        (loads, [], "follower moment line_load imposed_strain pressure moving_load gravity"),
+        (loads, ["frame"], "rotating_frame"),
+        (virtual_works, ["work"], "virtual_work"),
+        (potentials, ["potential"], "potential"),
+        (masses, [], "point_mass"),
+        (damping, ["damping"], "rayleigh"),
+        (damping, ["viscous"], "kelvin_voigt"),
+        (settings, ["mesh"], "degree refined"),
+        (settings, ["newton"], "newton"),
+        (settings, ["steps"], "adaptive"),
+    )
+    for name in names.split()
+]
+"""All features; their order decides what a seed draws."""

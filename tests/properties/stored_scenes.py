@@ -12,6 +12,7 @@ import warnings
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from mpi4py import MPI
@@ -72,6 +73,10 @@ class Draft:
 
     def one(self, *choices):
         return choices[int(self.random.integers(len(choices)))]
+
+    def choose(self, *functions):
+        """The value of one of some functions; numbers of the others are not drawn."""
+        return self.one(*functions)()
 
     def acts(self, low, high):
         """A random number of the effect; it is larger in the scene that shows that it acts."""
@@ -160,52 +165,17 @@ OVER_ANY_STEP = ub.EnergyMomentum(), ub.EnergyMomentumStatic(), ub.EnergyMomentu
 """Schemes of scenes, in turn; not all effects allow statics, or schemes with forces at the end."""
 
 
-class Drawn:
-    """Draws a record with numbers of the effect: a pair is a range, a function gets the draft."""
-
-    def __init__(self, kind, *numbers, **named):
-        self.record, self.numbers, self.named = kind, numbers, named
-
-    @property
-    def kind(self):
-        """The class, or the base of the package of a user's class."""
-        return next(x for x in self.record.__mro__ if x.__module__.startswith("ufl_beam."))
-
-    def __call__(self, draft):
-        def number(x):
-            return draft.acts(*x) if isinstance(x, tuple) else x(draft) if callable(x) else x
-
-        numbers = [number(x) for x in self.numbers]
-        return self.record(*numbers, **{name: number(x) for name, x in self.named.items()})
-
-
-class Instead:
-    """The effect, or something else in the scene that shows that it acts."""
-
-    def __init__(self, effect, other):
-        self.both, self.kind = (effect, other), effect if isinstance(effect, type) else type(effect)
-
-    def __call__(self, draft):
-        return draft.instead(*self.both)
-
-
-def effect(*kinds, name=None, schemes=ANY, seeds=None):
-    """Add a function to the effects."""
+def effects(schemes=ANY, seeds=None, **kinds):
+    """Add the effects that a function of a draft and their name writes; `kinds`: their classes."""
 
     def add(function):
-        known = name or function.__name__
-        EFFECTS[known] = Effect(known, kinds, function, schemes, seeds or {})
+        for name, of in kinds.items():
+            write = partial(function, name=name)
+            of = of if isinstance(of, tuple) else (of,)
+            EFFECTS[name] = Effect(name, of, write, schemes, seeds or {})
         return function
 
     return add
-
-
-def effects(write, *kinds, schemes=ANY, **rows):
-    """Add effects of which `write(draft, record)` writes scenes with what `record(draft)` draws."""
-    for name, record in rows.items():
-        effect(record.kind, *kinds, name=name, schemes=schemes)(
-            lambda draft, record=record: write(draft, record)
-        )
 
 
 # -- numbers -----------------------------------------------------------------------------------
