@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Advice and files of `make study`, the benchmark of idle effects, and imports of all benchmarks."""
+"""Advice and files of `make study`, the benchmark of idle effects, imports of all benchmarks."""
 
 import importlib
 import json

@@ -51,7 +51,7 @@ COLUMN = (
 """Features that leave a straight column straight under a load along it; every 16th seed is one."""
 
 RANDOM = re.compile(r"<(\S+) (\S+?)(?: (\S+))?>|\[\[(.*?)\]\](?!\])|TIME")
-"""Parts of texts that are drawn: limits and format of a number, alternatives, a function of time."""
+"""Random parts of texts: limits and format of a number, alternatives, a function of time."""
 
 STIFF = "EA=1e6, GA=1e6, EI=100.0, rhoA=1.0, rhoI=0.01"
 

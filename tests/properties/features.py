@@ -6,7 +6,7 @@ are of beams of about 1 m with EA = 1e4 N, GA = 4e3 N, EI = 100 N m2 and 1 kg/m,
 some tens of N, so that yielding moments are some N m and the lowest periods some 0.1 s.
 
 Texts are Python source with random parts: ``<1 5>`` is a number between 1 and 5, perhaps with a
-format, as in ``<1 5 .3f>``; ``[[a|b]]`` is one of some texts; ``LAST`` is the last beam, ``TIP`` its
+format, as in ``<1 5 .3f>``; ``[[a|b]]`` is one of two texts; ``LAST`` is the last beam, ``TIP`` its
 end and ``TIME`` a function of time.
 """
 

@@ -143,7 +143,8 @@ class _Writer(Draws):
         more.append(f"rhoA={rhoA:.6g}, rhoI={rhoI:.6g}")
         if kind in ("resultants", "both"):
             more.append(f"bending={self._hardening(EI, _number(limit))}")
-            for name, force in (("axial", limit / self._L * self._slender), ("shear", limit / self._L)):
+            force = limit / self._L
+            for name, force in (("axial", force * self._slender), ("shear", force)):
                 if self._chance(0.3):
                     more.append(f"{name}={self._hardening(EA, _number(force))}")
         if kind in ("hinge", "both") and self._chance(0.7):

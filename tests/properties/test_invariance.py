@@ -25,8 +25,8 @@ each_draw = pytest.mark.parametrize("seed", DRAWS)
 
 def in_units(seed):
     """A statement in random units."""
-    metre, kilogram, second = (float(x) for x in 10 ** np.random.default_rng(seed).uniform(-4, 4, 3))
-    return Statement(units=(kilogram, metre, second))
+    metre, kilogram, second = 10 ** np.random.default_rng(seed).uniform(-4, 4, 3)
+    return Statement(units=(float(kilogram), float(metre), float(second)))
 
 
 def turned(seed):
@@ -81,10 +81,10 @@ def test_a_beam_cut_in_two_is_the_same_beam(seed):
 
 
 @each_draw
-def test_processes_find_the_result_of_one(seed):
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_processes_find_the_result_of_one(seed, scheme):
     """The number of processes: against each process alone.  On one rank: a run can be repeated."""
-    for scheme in SCHEMES:
-        require_same_on_processes(lambda comm, of=scheme: Built(draw(seed)).run(of, comm=comm), SAME)
+    require_same_on_processes(lambda comm: Built(draw(seed)).run(scheme, comm=comm), SAME)
     assert difference(static(seed), static(seed, comm=MPI.COMM_SELF)) < SAME
 
 

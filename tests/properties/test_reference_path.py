@@ -160,14 +160,14 @@ def softening():
     return clamped(beam, loads=[push])
 
 
-REFERENCE = {"newton": ub.Newton(reference=True)}
+REFERENCE, CHECKPOINT = {"newton": ub.Newton(reference=True)}, ub.Checkpoint("run.h5", every=5)
 
 
 @pytest.mark.parametrize(
     ("words", "call"),
     [
         ("adaptive steps", partial(ub.simulate, t=(0, 0.1), dt=ub.Adaptive(1e-3))),
-        ("checkpoint", partial(ub.simulate, t=(0, 0.1), dt=0.01, checkpoint=ub.Checkpoint("a.h5", 5))),
+        ("checkpoint", partial(ub.simulate, t=(0, 0.1), dt=0.01, checkpoint=CHECKPOINT)),
         ("Simulation", ub.Simulation),
         ("follow", lambda scene, _, **more: ub.follow(scene, ub.LoadControl(0.1), steps=1, **more)),
     ],
