@@ -52,7 +52,9 @@ def state_of(variant):
 
 
 def test_variants_switch_off_one_acceleration_and_leave_the_package_as_it_was():
-    shipped = {"newton": "shell"} | dict.fromkeys(("SIMD", "chains", "fronts", "second order"), True)
+    shipped = {"newton": "shell"} | dict.fromkeys(
+        ("SIMD", "chains", "fronts", "second order"), True
+    )
     for variant, name, found in (
         (switches.PETSC, "newton", "newtonls"),
         (switches.SCALAR, "SIMD", False),

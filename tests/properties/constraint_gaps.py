@@ -11,6 +11,7 @@ from ufl_beam.model.connector_laws import Guide, PrescribedMotion
 from ufl_beam.model.functions import still
 from ufl_beam.model.joints import Joint
 
+
 def largest_gap(solution, size):
     """Largest distance from what is promised, as a part of the size of the scene, or in rad.
 

@@ -7,7 +7,7 @@ must then be the same, scaled and turned.
 """
 
 import math
-from itertools import pairwise
+from itertools import chain, pairwise
 
 from mpi4py import MPI
 
@@ -155,7 +155,7 @@ class Built:
             ub.PointMass(self.place(place), mass * unit("kg"), inertia * unit("kg m2"))
             for place, mass, inertia in draw.masses
         ]
-        pieces, initial = sum(self._beams.values(), []), []
+        pieces, initial = [*chain(*self._beams.values())], []
         if draw.throw:
             linear, angular = self._vector(draw.throw[0], "m/s"), draw.throw[1] * unit("1/s")
             initial.append(ub.Velocity(pieces, linear=linear, angular=angular, about=(0.0, 0.0)))

@@ -144,9 +144,9 @@ class _Writer(Draws):
         if kind in ("resultants", "both"):
             more.append(f"bending={self._hardening(EI, _number(limit))}")
             force = limit / self._L
-            for name, force in (("axial", force * self._slender), ("shear", force)):
+            for name, size in (("axial", force * self._slender), ("shear", force)):
                 if self._chance(0.3):
-                    more.append(f"{name}={self._hardening(EA, _number(force))}")
+                    more.append(f"{name}={self._hardening(EA, _number(size))}")
         if kind in ("hinge", "both") and self._chance(0.7):
             more.append(f"hinge={self._softening(limit * self._size(-1, 1))}")
         return f"({', '.join(more)})"

@@ -4,9 +4,7 @@
 Other units, axes, directions and orders are those of test_random_scenes.py.
 """
 
-from itertools import pairwise
-
-from mpi4py import MPI
+from itertools import chain, pairwise
 
 import numpy as np
 import pytest
@@ -65,7 +63,7 @@ class Frame:
             top, u=lambda t: size * growing(t), v=lambda t: -((size * growing(t)) ** 2) / 2
         )
         self.scene = ub.Scene(
-            sum(self._beams.values(), [])[:: -1 if strut_first else 1],
+            [*chain(*self._beams.values())][:: -1 if strut_first else 1],
             joints=joints,
             supports=[ub.Clamped(self.place((0, 0.0))), ub.Pinned(self.place((2, 1.0))), drive],
             loads=[ub.PointLoad(middle, force=(5.0, -20.0), amplitude=growing)],
