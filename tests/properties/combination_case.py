@@ -151,3 +151,31 @@ def differences(one, other, rows=slice(None)):
 
 def assert_near(found, tolerance=SAME):
     assert max(found.values()) <= tolerance, {k: v for k, v in found.items() if v > tolerance}
+
+
+REFUSED = "hinges are for resultants"
+"""What a refusal of a combination may say: features that the documentation excludes together."""
+
+
+def outcome_of(combination, folder, names=CHECKS):
+    """What became of each check: "passed", "not applicable", "refused", or words of a flag."""
+    case, found = Case(combination, folder), {}
+    try:
+        assert case.whole.solution is not None
+    except ub.ArgumentError as error:
+        return {"run": "refused" if REFUSED in str(error) else f"refused: {error}"}
+    for name in names:
+        try:
+            CHECKS[name](case)
+            found[name] = "passed"
+        except NotApplicable:
+            found[name] = "not applicable"
+        except Exception as error:
+            found[name] = f"{type(error).__name__}: {error}"
+    return found
+
+
+def flags_of(found):
+    """Checks that failed, and what they said."""
+    known = "passed", "not applicable", "refused"
+    return {name: words for name, words in found.items() if words not in known}

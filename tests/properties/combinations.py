@@ -2,12 +2,8 @@
 """Combinations of 2 to 5 features in small models, each a script that anybody can run.
 
 `draw(seed)` draws a model of one to three beams and its features from those of :mod:`features`.
-As a script: ``python3 combinations.py --from 0 --number 2000`` runs all checks of
-:mod:`combination_table` on each and prints how often each applied, passed and flagged;
-``--show SEED`` prints the script of one.
 """
 
-import argparse
 import math
 import re
 from dataclasses import dataclass, field
@@ -317,24 +313,3 @@ def _build(d, base):
         d.beam((1.0, 0.2), (1.8, -0.3), d.one([2, 3]))
     force = "force=(<-25 25 .3f>, <-25 25 .3f>)"
     d.loads.append(d.text(f"ub.PointLoad(TIP, {force}, amplitude=TIME)"))
-
-
-def main(arguments=None):
-    """Run the checks of many seeds, and print how often each applied, passed and flagged."""
-    import combination_table  # it imports this module
-
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--from", type=int, default=0, dest="first")
-    parser.add_argument("--number", type=int, default=100)
-    parser.add_argument("--checks", nargs="*", default=list(combination_table.CHECKS))
-    parser.add_argument("--show", type=int, help="print the script of this seed, and nothing else")
-    options = parser.parse_args(arguments)
-    if options.show is not None:
-        print(draw(options.show).source)
-        return
-    seeds = range(options.first, options.first + options.number)
-    print(combination_table.table_of(seeds, options.checks))
-
-
-if __name__ == "__main__":
-    main()
